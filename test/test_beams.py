@@ -55,12 +55,12 @@ def test_each_beam_tracks_its_own_target(views):
     tracked = {beam: tracking.read(view) for beam, view in views.items()}
     for run in tracked.values():
         assert run.mode[-1] == 'autotrack' and run.tracking.any()
-        error = np.column_stack((run.cross_elevation, run.elevation_error))[run.tracking]
+        error = run.error[run.tracking]
         assert np.abs(error).max() < math.radians(0.06)  # a fiftieth of the beamwidth
     for one, other in itertools.combinations(tracked.values(), 2):
-        assert math.hypot(one.azimuth[-1] - other.azimuth[-1], one.elevation[-1] - other.elevation[-1]) > 0.1
+        assert math.hypot(*(one.encoders[-1] - other.encoders[-1])) > 0.1
         both = np.isfinite(one.measured[:, 1] + other.measured[:, 1])
-        noise = [(run.measured[:, 1] - run.elevation_error)[both] for run in (one, other)]
+        noise = [(run.measured[:, 1] - run.error[:, 1])[both] for run in (one, other)]
         assert abs(np.corrcoef(*noise)[0, 1]) < 0.3  # the noise of each is its own
 
 
@@ -91,7 +91,7 @@ def test_the_same_run_gives_the_same_file(runs, run_process, tmp_path):
 @pytest.mark.parametrize('name, beam', [('four', 'beam_1'), ('four', 'beam_4'), ('sway', ''),
                                         ('type 1, 1 ms', '')])
 def test_every_node_of_a_beam_recomputes_identically(runs, name, beam):
-    recording = recompute.Recording(runs[name].bag, beam=beam)
+    recording = recompute.FedRecording(runs[name].bag, beam=beam)
     nodes = recompute.chosen(recording, (), None)
     assert set(nodes) >= {'tracking_receiver', 'acu', 'adu'}
     for node in nodes:
@@ -116,7 +116,7 @@ def test_a_beam_has_the_beamwidth_of_its_own_antenna(views):
 
 
 def test_a_node_of_another_beam_is_not_recomputed(runs):
-    recording = recompute.Recording(runs['four'].bag, beam='beam_2')
+    recording = recompute.FedRecording(runs['four'].bag, beam='beam_2')
     assert recompute.chosen(recording, ['beam_2/acu'], None) == ['acu']
     with pytest.raises(recompute.RecomputeError, match='--node beam_3/acu: .* use --beam beam_3 --node acu'):
         recompute.chosen(recording, ['beam_3/acu'], None)

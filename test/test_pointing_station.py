@@ -39,7 +39,7 @@ def recorded(start_run):
 def test_the_program_points_to_the_sky_after_the_command(recorded):
     """And neither the change of the model nor a hand-over makes the beam jump."""
     run = tracking.read(bags.read(recorded))
-    error = np.degrees(np.column_stack((run.cross_elevation, run.elevation_error)))
+    error = np.degrees(run.error)
     off = np.hypot(*error.T)
     before, after = (run.t > 1.5) & (run.t < 2.0), (run.t > CHANGED_S) & (run.t < TRACKED_S)
     assert off[before].min() > 0.08

@@ -91,7 +91,7 @@ def test_a_lockstep_recording_comes_out_the_same_to_the_last_bit(runs, name, nod
         f'{node}: identical' for node in nodes]
     values = {(row['case'], row['metric']): row['value'] for row in json.loads(rows.read_text())['rows']}
     assert {case for case, _ in values} == set(nodes)
-    recording = recompute.Recording(runs[name].bag)
+    recording = recompute.FedRecording(runs[name].bag)
     written = {name for name, link in graph.links().items()
                if set(link.writers) & set(nodes) and link.rate != 'second' and recording.has(name)} - {'acu/alarms'}
     assert {metric.split()[0] for _, metric in values} == written
@@ -204,7 +204,7 @@ def test_a_changed_parameter_is_reported_old_against_new(runs, pedestal, tmp_pat
 def test_the_numbers_of_a_recording_and_of_a_late_estimate(runs):
     """Those of the recording are what its run said; the recorded estimate, delayed by 20 ms, lags 20 ms more."""
     from pedestal_analysis.reprocess import what_if
-    recording = recompute.Recording(runs['leo'].bag)
+    recording = recompute.FedRecording(runs['leo'].bag)
     old = {name: recording.output(name) for name in OUTPUTS}
     late = difference.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])
     numbers = what_if.numbers(recording.bag, [old, {**old, ESTIMATE: late}])
@@ -341,7 +341,7 @@ REQUESTS = {'acu': (MODE, {400: 'acu/standby', 500: 'acu/program'}, ['standby', 
 @pytest.fixture(params=REQUESTS)
 def requested(runs, tmp_path, request):
     """(node, path) of the run ashore as it would have been recorded had someone asked something of a node."""
-    recording, node = recompute.Recording(runs['leo'].bag), request.param
+    recording, node = recompute.FedRecording(runs['leo'].bag), request.param
     requests = REQUESTS[node][1]
     done = recompute.recompute(recording, node, recompute.parameters_of(recording, node),
                                {step: [Command(service, SERVICE_CLIENT)] for step, service in requests.items()})

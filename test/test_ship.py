@@ -262,7 +262,7 @@ def test_the_rows_of_a_run_say_its_isolation(told):
 @pytest.mark.thorough
 def test_the_chain_is_recomputed_from_its_recording(told):
     """The INS that aligns and the control unit that waits for it answer the recorded messages with the same bits."""
-    recording = recompute.Recording(told.bag.path)
+    recording = recompute.FedRecording(told.bag.path)
     for node in ('ins', 'acu'):
         done = recompute.recompute(recording, node, recompute.parameters_of(recording, node))
         assert not done.requests and not done.feed.problem

@@ -68,7 +68,7 @@ def test_recording(tuned_bag):
 def test_criterion_is_the_innovations_of_a_recomputation(tuned_bag):
     """The mean log-density by another route: pedestal recompute's outputs, NIS and the Gaussian density in full."""
     file, output = tuned_bag
-    recording = recompute.Recording(BAG)
+    recording = recompute.FedRecording(BAG)
     params = recompute.parameters_of(recording, 'acu', changes=written(file))
     table = recompute.recompute(recording, 'acu', params).outputs['acu/filter'].table('acu/filter')
     t, nu, nis = table['t'], table['azimuth_innovation.position'], table['azimuth_nis.position']

@@ -61,7 +61,7 @@ def test_the_readings_are_recorded_and_recomputed(run):
     bag = bags.read(run.bag)
     for topic, (field, value) in READINGS.items():
         assert (bag.table(topic)[field] == value).any(), topic
-    recording = recompute.Recording(run.bag)
+    recording = recompute.FedRecording(run.bag)
     acu = {key: value for key, value in bag.configuration['parameters']['acu'].items() if not key.startswith('graph.')}
     done = recompute.recompute(recording, 'acu', build(scenario.parameters_of('acu'), acu))
     assert done.unit.air.revision == 1

@@ -10,20 +10,25 @@ import pedestal_common.entry  # noqa: F401
 import sys
 
 from adu_drive import state_file
+from adu_drive.params import AduNodeParameters
 from adu_drive.timekeeper_node import Timekeeper
+from adu_drive.unit import Adu
 from pedestal_common.node import shell
-from pedestal_common.node.unit import LEVEL_WARN
+from pedestal_common.node.unit import LEVEL_WARN, Diagnosis
 
 
 class AduNode(Timekeeper):
     """A drive with a state file, which keeps the state of the plant over a restart."""
 
-    def __init__(self, module='adu_drive.adu_node'):
+    parameters: AduNodeParameters
+    unit: Adu
+
+    def __init__(self, module: str = 'adu_drive.adu_node') -> None:
         self.unsaved = ''
-        self.saved = None
+        self.saved: state_file.PlantState | None = None
         super().__init__(module)
 
-    def prepare(self, unit):
+    def prepare(self, unit: Adu) -> None:
         """Compile the laws, then resume the plant state in the state file."""
         super().prepare(unit)
         saved = state_file.read(self.parameters.state_file) if self.parameters.state_file else None
@@ -32,13 +37,13 @@ class AduNode(Timekeeper):
             self.get_logger().info(f'resumes at azimuth {saved.azimuth:.6f}, elevation {saved.elevation:.6f} rad of '
                                    f'{self.parameters.state_file}')
 
-    def begin(self):
+    def begin(self) -> None:
         """Begin the steps, and save the plant state once per second."""
         super().begin()
         if self.parameters.state_file:
             self.every(1.0, self.save)
 
-    def save(self):
+    def save(self) -> None:
         """Save the plant state, and keep the reason of a failure for `diagnosed`.
 
         Because the end of a run disables the drive, the saved `enabled` then keeps its value from before the end.
@@ -53,19 +58,19 @@ class AduNode(Timekeeper):
         except OSError as error:
             self.unsaved = f'{self.parameters.state_file}: {error.strerror}'
 
-    def draining(self):
+    def draining(self) -> bool:
         """Save the plant state as soon as the run ends, because `close` may come too late."""
         if self.parameters.state_file and not self.stopping:
             self.save()
         return super().draining()
 
-    def close(self):
+    def close(self) -> None:
         """Save the plant state and end."""
         if self.parameters.state_file:
             self.save()
         super().close()
 
-    def diagnosed(self):
+    def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of the drive, with level WARN if the state file could not be written."""
         diagnosis = super().diagnosed()
         if self.unsaved and diagnosis.level < LEVEL_WARN:
@@ -73,7 +78,7 @@ class AduNode(Timekeeper):
         return diagnosis
 
 
-def main(args=None):
+def main(args: list[str] | None = None) -> int:
     """Run the node to its end. Return the exit code."""
     return shell.main(AduNode, args)
 

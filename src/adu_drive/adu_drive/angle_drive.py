@@ -3,10 +3,10 @@
 Such a drive has no brakes. Two switches in its record determine its state: `wanted`, which clients request, and
 `emergency`, a latched emergency stop.
 """
-import typing
 
 from pedestal_common.graph import topics
 from pedestal_common.node.unit import Unit
+from pedestal_common.quantities import Seconds
 from pedestal_common.wire.commands import Reply
 
 REFERENCE_TOPIC, DRIVE_STATE_TOPIC = 'acu/reference', 'adu/state'
@@ -16,13 +16,10 @@ ENABLED_TEXT, EMERGENCY_STOP_TEXT = 'enabled', 'emergency stop'
 
 
 class AngleDrive(Unit):
-    """Unit with a part `switches` of its record, which has at least the fields wanted and emergency.
-
-    STATE_TEXTS   texts of adu/state by their code
-    """
+    """Unit with a part `switches` of its record, which has at least the fields wanted and emergency."""
     COMMAND = REFERENCE_TOPIC
     REQUESTS = ('adu/enable', 'adu/disable', 'adu/emergency_stop', 'adu/reset_faults')
-    STATE_TEXTS: tuple[str, ...] = topics.TOPIC_BY_NAME[DRIVE_STATE_TOPIC].texts
+    STATE_TEXTS: tuple[str, ...] = topics.TOPIC_BY_NAME[DRIVE_STATE_TOPIC].texts    # texts of adu/state by their code
 
     rests = True
     """True always, because the drive has no brakes to wait for."""
@@ -37,11 +34,11 @@ class AngleDrive(Unit):
         """Present text of adu/state, also between two steps."""
         return self.STATE_TEXTS[self.condition_code]
 
-    def latency(self, topic: str) -> float:
-        """Return the age [s] of the command in a step: one period."""
+    def latency(self, topic: str) -> Seconds:
+        """Return the age of the command in a step: one period."""
         return self.parameters.period
 
-    def encode(self, topic: str, code: int) -> typing.Any:
+    def encode(self, topic: str, code: int) -> str:
         """Return the text of a code of adu/state."""
         return self.STATE_TEXTS[code]
 

@@ -17,10 +17,10 @@ from pedestal_common.node.unit import Diagnosis
 class BeamSteeringNode(Timekeeper):
     """Node with a unit for each beam and common diagnostics. A port is a unit with its topics."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('adu_drive.beam_steering_node')
 
-    def diagnosed(self):
+    def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of all beams: their angles, the common state, level and message of the worst beam."""
         of_beams = [(port, port.unit.diagnose()) for port in self.ports]
         port, worst = max(of_beams, key=lambda pair: pair[1].level)
@@ -32,7 +32,7 @@ class BeamSteeringNode(Timekeeper):
         return Diagnosis(worst.level, worst.message.replace(command, port.named(command)), values + state)
 
 
-def main(args=None):
+def main(args: list[str] | None = None) -> int:
     """Run the node to its end. Return the exit code."""
     return shell.main(BeamSteeringNode, args)
 

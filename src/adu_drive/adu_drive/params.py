@@ -5,33 +5,42 @@ assumptions of this project for a pedestal with these motors.
 """
 import dataclasses
 import math
+import typing
 
 import numpy as np
 
 from pedestal_common.injection import table
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
+from pedestal_common.quantities import KilogramMeters2, Radians, RadiansPerSecond, Seconds
 
 SPEED_LOOP_PERIOD_S = 0.5e-3  # period of the speed loop, five periods of the current loop [s]
 PLANT_PERIOD_S = 50e-6  # step of the simulated plant, half a period of the current loop [s]
 MAX_TRANSPORT_DELAY_S = 0.1  # longest transport delay [s]
 BRAKING_REACTION_TIME_S = 0.01  # reaction time of the speed loop before an axis brakes [s]
+BEAM_RING_SIZE = 512  # largest number of commands to a beam of an array within its delay
 DEFAULT_BUFFER_MARGIN_RAD = math.radians(2.0)  # default distance from the emergency switch to the buffer [rad]
 
 
-def whole_speed_periods(name, value):
-    """Return the number of speed-loop periods in `value` [s]. Raises ParameterError unless it is a whole number."""
+def whole_speed_periods(name: str, value: Seconds) -> int:
+    """Return the number of speed-loop periods in `value`. Raises ParameterError unless it is a whole number."""
     periods = round(value / SPEED_LOOP_PERIOD_S)
     if abs(value / SPEED_LOOP_PERIOD_S - periods) > 1e-6:
         raise ParameterError(f'{name} = {value:g} s: must be a multiple of {SPEED_LOOP_PERIOD_S:g} s (the speed loop)')
     return periods
 
 
-def mesh_inertia(motor, ratio, load):
-    """Return the inertia [kg m2] that swings on the stiffness of one mesh, referred to the load axis.
+def check_delay(period: Seconds, transport_delay: Seconds) -> None:
+    """Raise ParameterError if the commands within the delay do not fit into the ring."""
+    if transport_delay >= (BEAM_RING_SIZE - 1) * period:
+        raise ParameterError(f'transport_delay = {transport_delay:g} s: must be below {BEAM_RING_SIZE - 1} periods of '
+                             f'{period:g} s')
 
-    motor: inertia of the motor on its shaft [kg m2]; ratio: turns of the motor per turn of the axis; load: inertia of
-    the load on the gears [kg m2]. The mesh lies between one motor and half of the load, because the axis has two
-    motors.
+
+def mesh_inertia(motor: KilogramMeters2, ratio: float, load: KilogramMeters2) -> KilogramMeters2:
+    """Return the inertia that swings on the stiffness of one mesh, referred to the load axis.
+
+    motor: inertia of the motor on its shaft; ratio: turns of the motor per turn of the axis; load: inertia of the load
+    on the gears. The mesh lies between one motor and half of the load, because the axis has two motors.
     """
     return 1.0 / (1.0 / (motor * ratio**2) + 2.0 / load)
 
@@ -65,13 +74,12 @@ class MotorParameters(Parameters):
     drift: DriftParameters = group(DriftParameters)
 
     @property
-    def torque_constant(self):
+    def torque_constant(self) -> float:
         """Torque per torque-making current, 3/2 p psi [Nm/A]."""
         return 1.5 * self.pole_pairs * self.flux_linkage
 
-    def reachable_rate(self, ratio):
-        """Return the rate of the axis [rad/s] that the motor reaches at its voltage; ratio: turns per turn of the
-        axis."""
+    def reachable_rate(self, ratio: float) -> RadiansPerSecond:
+        """Return the rate of the axis that the motor reaches at its voltage; ratio: turns per turn of the axis."""
         return 0.98 * self.voltage / (self.pole_pairs * self.flux_linkage * ratio)
 
 
@@ -102,7 +110,7 @@ class BiasParameters(Parameters):
     out: float = parameter(45.0, 0.1, 20000.0, 'Nm', 'fade, hold_fade: torque demand per motor with zero bias')
     lag: float = parameter(0.010, 0.0, 1.0, 's', 'time constant of the bias')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if `out` is not above `hold`."""
         if self.schedule == 'hold_fade' and self.out <= self.hold:
             raise ParameterError(f'out = {self.out:g} Nm: must be above hold = {self.hold:g}')
@@ -121,7 +129,7 @@ class GearTrainParameters(Parameters):
     pinion_teeth: int = parameter(20, 5, 200, '', 'number of teeth of each pinion')
 
     @property
-    def ratio(self):
+    def ratio(self) -> float:
         """Turns of the motor for one turn of the axis."""
         return self.reducer_ratio * self.pinion_ratio
 
@@ -152,7 +160,7 @@ class FrictionParameters(Parameters):
     stiffness: float = parameter(2e5, 1.0, 1e9, 'Nm/rad', 'stiffness of the bristles')
     damping: float = parameter(400.0, 0.0, 1e6, 'Nms/rad', 'damping of the bristles')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if static friction is below sliding friction."""
         if self.breakaway < self.coulomb:
             raise ParameterError(f'breakaway = {self.breakaway:g} Nm: must be at least coulomb = {self.coulomb:g}')
@@ -176,18 +184,18 @@ class LimitParameters(Parameters):
     buffer_damping: float = parameter(2e4, 0.0, 1e6, 'Nms/rad', 'damping of the mechanical end stop')
 
     @property
-    def stopping_distance(self):
-        """Stopping distance from `rate`: v^2 / (2 a) + v t with the reaction time t of the speed loop [rad]."""
+    def stopping_distance(self) -> Radians:
+        """Stopping distance from `rate`: v^2 / (2 a) + v t with the reaction time t of the speed loop."""
         return self.rate * self.rate / (2.0 * self.deceleration) + self.rate * BRAKING_REACTION_TIME_S
 
     @property
-    def switches(self):
-        """Distances from an end of travel to the final switch, the emergency switch and the buffer [rad]."""
+    def switches(self) -> tuple[Radians, Radians, Radians]:
+        """Distances from an end of travel to the final switch, the emergency switch and the buffer."""
         final = self.final or self.stopping_distance
         emergency = self.emergency or 1.5 * final
         return final, emergency, self.buffer or emergency + DEFAULT_BUFFER_MARGIN_RAD
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for an empty travel, or a switch within the stopping distance."""
         if self.upper <= self.lower:
             raise ParameterError(f'upper = {self.upper:g} rad: must be above lower = {self.lower:g}')
@@ -239,7 +247,7 @@ class StowPinParameters(Parameters):
     timeout: float = parameter(10.0, 0.01, 600.0, 's', 'longest time for the motion of a pin; then the pin has failed')
     initially_in: bool = flag(False, 'true: both pins are in at t = 0')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if the timeout is not above the travel time."""
         if self.timeout <= self.travel_time:
             raise ParameterError(f'timeout = {self.timeout:g} s: must be above travel_time = {self.travel_time:g} s')
@@ -284,7 +292,7 @@ class AxisParameters(Parameters):
     thermal: ThermalParameters = group(ThermalParameters)
     faults: FaultParameters = group(FaultParameters)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for a rate that the motors cannot reach at their voltage, or for a mesh that the
         simulation cannot follow."""
         for motor in (self.motor_1, self.motor_2):
@@ -294,7 +302,7 @@ class AxisParameters(Parameters):
                                      f'the motors reach at ratio {self.gear_train.ratio:g} and {motor.voltage:g} V')
             self._check_mesh(motor)
 
-    def _check_mesh(self, motor):
+    def _check_mesh(self, motor: MotorParameters) -> None:
         """Raise ParameterError if a mesh is unstable in the semi-implicit Euler steps of the plant.
 
         A mesh is unstable for 2 h c + h^2 k > 4 M with h = PLANT_PERIOD_S, damping c, stiffness k, M of mesh_inertia.
@@ -353,7 +361,7 @@ class WindParameters(Parameters):
     gust: GustParameters = group(GustParameters)
     field: WindFieldParameters = group(WindFieldParameters)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for a spectrum without a mean torque."""
         if self.gust.kind in ('davenport', 'von_karman') and self.azimuth == self.elevation == 0.0:
             raise ParameterError(f'gust.kind = {self.gust.kind}: scales the mean torque, so azimuth or '
@@ -409,7 +417,7 @@ class AduParameters(Parameters):
         limits=LimitParameters(rate=1.7, lower=math.radians(-2.0), upper=math.radians(92.0)),
         faults=FaultParameters(overspeed=2.1))
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for invalid times, an impossible body, or an initial angle outside the travel."""
         whole_speed_periods('period', self.period)
         whole_speed_periods('transport_delay', self.transport_delay)
@@ -423,7 +431,7 @@ class AduParameters(Parameters):
             if self.stow_pins:
                 self._check_pin(name, angle, limits)
 
-    def _check_pin(self, name, angle, limits):
+    def _check_pin(self, name: str, angle: Radians, limits: LimitParameters) -> None:
         """Raise ParameterError for a hole outside the travel, or for pins that are in away from their holes."""
         hole = getattr(self.pins, name)
         if not limits.lower <= hole <= limits.upper:
@@ -433,7 +441,7 @@ class AduParameters(Parameters):
             raise ParameterError(f'initial_{name} = {angle:g} rad: must be pins.{name} = {hole:g} within pins.window, '
                                  'because of pins.initially_in')
 
-    def _check_bodies(self):
+    def _check_bodies(self) -> None:
         """Raise ParameterError for an inertia that no body can have."""
         e = self.elevating
         I_x, I_y, I_z = e.about_beam, self.elevation.load.inertia, e.about_lift
@@ -451,12 +459,14 @@ class AduParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class RunParameters(Parameters):
     """Parameters of the run of a node that owns the time."""
+    if typing.TYPE_CHECKING:
+        period: float       # each subclass declares it
     duration: float = parameter(0.0, 0.0, 86400.0, 's',
                                 'length of the run in the time of the drive; 0: until stopped')
     command_timeout: int = parameter(10, 1, 10000, 'periods', 'realtime: age from which a command is stale; then '
                                      'the axes stop, and a beam stays')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError unless the run is a whole number of periods."""
         super().check()
         if self.duration and abs(self.duration / self.period - round(self.duration / self.period)) > 1e-6:
@@ -470,12 +480,12 @@ class AduNodeParameters(RunParameters, AduParameters):
     state_file: str = text('', 'file for the angles of the simulated plant, from which it continues after a restart; '
                            'empty: it begins at the initial angles')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for an invalid `inject`."""
         super().check()
         table.scheduled_commands('adu', self.inject)
 
-    def check_graph(self, beams, lockstep):
+    def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError for a fault that does not exist in the pacing of the graph."""
         super().check_graph(beams, lockstep)
         table.check_pacing('adu', self.inject, lockstep)
@@ -489,7 +499,7 @@ class BeamParameters(RunParameters):
     initial_azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'azimuth of every beam at t = 0')
     initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'elevation of every beam at t = 0')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for a delay that is no whole number of periods, or during which more commands arrive
         than the ring buffer holds."""
         super().check()
@@ -497,5 +507,4 @@ class BeamParameters(RunParameters):
         if abs(periods - round(periods)) > 1e-6:
             raise ParameterError(f'transport_delay = {self.transport_delay:g} s: must be a multiple of the period '
                                  f'{self.period:g} s')
-        from adu_drive.array import electronic_beam  # imported here because only the array needs numba
-        electronic_beam.check_delay(self.period, self.transport_delay)
+        check_delay(self.period, self.transport_delay)

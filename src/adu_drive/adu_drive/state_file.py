@@ -6,22 +6,19 @@ import pathlib
 import typing
 
 from pedestal_common.parameters import ParameterError
+from pedestal_common.quantities import Radians
 
 
 class PlantState(typing.NamedTuple):
-    """State of the plant that a restart keeps.
-
-    azimuth, elevation: load angles, whole turns included [rad]; enabled: True if the drive followed commands, or was
-    about to follow them; pinned: True if a stow pin was not out.
-    """
-    azimuth: float
-    elevation: float
-    enabled: bool
-    pinned: bool = False
+    """State of the plant that a restart keeps."""
+    azimuth: Radians        # of the load, whole turns included
+    elevation: Radians
+    enabled: bool           # True if the drive followed commands, or was about to follow them
+    pinned: bool = False    # True if a stow pin was not out
 
 
-def read(path):
-    """Return the PlantState in a file, or None if there is no file. Raises ParameterError for invalid content."""
+def read(path: str) -> PlantState | None:
+    """Return the state in a file, or None if there is no file. Raises ParameterError for invalid content."""
     try:
         values = json.loads(pathlib.Path(path).read_text())
         state = PlantState(float(values['azimuth']), float(values['elevation']), values['enabled'] is True,
@@ -36,8 +33,8 @@ def read(path):
     return state
 
 
-def write(path, state):
-    """Replace a file by one with a PlantState, in one operation. Raises OSError if the disk refuses it."""
+def write(path: str, state: PlantState) -> None:
+    """Replace a file by one with a state, in one operation. Raises OSError if the disk refuses it."""
     new = f'{path}.new'
     with open(new, 'w') as file:
         json.dump(state._asdict(), file)

@@ -4,9 +4,16 @@ It is the base of `adu_node`, whose unit is one drive, and of `beam_steering_nod
 (unit_node.Port, in `self.ports`) connects one unit to its topics.
 """
 import time
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
 
+from rclpy.executors import Executor
+
+from adu_drive.params import RunParameters
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import unit_node
+from pedestal_common.node.unit import Diagnosis
+from pedestal_common.quantities import Nanoseconds
 
 ACKNOWLEDGE_INTERVAL_STEPS = 1000
 """Number of lockstep steps between two waits for the acknowledgement of all messages by all subscribers.
@@ -20,17 +27,19 @@ MAX_WAIT_S = 0.1
 MIN_RECEIVE_FRACTION = 0.25
 """Smallest share of a period for receiving messages in realtime, also for a drive that is late for its next step."""
 
+Received: TypeAlias = tuple[Nanoseconds, tuple[float, ...] | None]      # stamp and numbers of a message
+
 
 class Timekeeper(unit_node.UnitNode):
     """Node that makes the steps. Step k uses the messages of step k - 1 and publishes the state at t_k.
 
     In lockstep, step k begins when all nodes have answered step k - 1. In realtime, step k begins k periods after the
     start time, the epoch (UTC).
-
-    missed_steps    steps that were not made in their period, because the node was late
-    lost_steps      missed steps, and steps without the command of the previous step
-    late_ticks      steps that began more than half a period late
     """
+    parameters: RunParameters
+    missed_steps: int       # steps that were not made in their period, because the node was late
+    lost_steps: int         # missed steps, and steps without the command of the previous step
+    late_ticks: int         # steps that began more than half a period late
 
     FIRST_STEP = 0
     """Number of the first step of realtime; a step before 0 publishes nothing."""
@@ -38,10 +47,10 @@ class Timekeeper(unit_node.UnitNode):
     PRECEDENCE = 1
     """Priority above that of the other nodes, whose searches and predictions may take longer than a step."""
 
-    def __init__(self, module):
+    def __init__(self, module: str) -> None:
         super().__init__(module, serves_beams=True)
 
-    def begin(self):
+    def begin(self) -> None:
         """Begin the steps, which define the time of the graph."""
         p = self.parameters
         self.period_ns = round(p.period * NS_PER_SECOND)
@@ -63,38 +72,40 @@ class Timekeeper(unit_node.UnitNode):
                     if name != self.unit.trigger:
                         self.reader(name, unit_node.decoding(decoder), self._newest_receiver(name))
 
-    def _count_from_first_step(self):
+    def _count_from_first_step(self) -> None:
         """Reset the numbers of steps, and the newest messages and stamps of commands."""
         self.k, self.made = (-1 if self.graph.lockstep else self.FIRST_STEP - 1), 0
         self.lost_steps = self.missed_steps = self.late_ticks = 0
-        self.newest, self.command_stamps = {}, {}
+        self.newest: dict[str, Received] = {}
+        self.command_stamps: dict[str, Nanoseconds] = {}
         self.begun = self.last_step_time = time.monotonic_ns()
 
-    def restart(self):
+    def restart(self) -> None:
         """Begin the steps of lockstep again, for another replay."""
         super().restart()
         self._count_from_first_step()
         self.timer = self.every(0.001, self.start)
 
     @property
-    def awaits(self):
+    def awaits(self) -> str:
         """Condition for the first step: subscribers in lockstep, start time in realtime."""
         if self.graph.lockstep:
             return 'the subscribers of its topics'
         _, now = self.clock()
         return f'the start time, in {max(self.epoch(now) - now, 0) / NS_PER_SECOND:.1f} s'
 
-    def start(self):
+    def start(self) -> None:
         """Begin step 0 of lockstep, when the graph is complete. `answer` makes the step."""
         self.timer.cancel()
         self.await_graph()
+        assert self.steps
         self.steps.take(self.unit.trigger, 0, (0, ()))
 
-    def answer(self, stamp, values):
+    def answer(self, stamp: Nanoseconds, values: Mapping[str, Received]) -> None:
         """Make the next step of lockstep; called when all nodes have answered the previous step, whose number is
         self.k.
 
-        stamp: stamp of the new step [ns]; values: {topic: message} of the previous step. The step after the new one is
+        stamp: of the new step; values: {topic: message} of the previous step. The step after the new one is
         announced to `self.steps`, which waits for the answers to the new step and then calls this method again.
         """
         if self.k == self.last_step:     # all nodes have answered the last step
@@ -104,12 +115,13 @@ class Timekeeper(unit_node.UnitNode):
             self.begun = time.monotonic_ns()
         self.k += 1
         self._make(stamp, values)
+        assert self.steps
         self.steps.take(self.unit.trigger, stamp + self.period_ns, (stamp + self.period_ns, ()))
 
-    def _make(self, stamp, values):
+    def _make(self, stamp: Nanoseconds, values: Mapping[str, Received]) -> None:
         """Make the step number self.k with the messages of the previous step.
 
-        stamp: stamp of the step [ns]; values: {topic: message}.
+        values: {topic: message}.
         """
         for port in self.ports:
             port.step(stamp, values)
@@ -123,7 +135,7 @@ class Timekeeper(unit_node.UnitNode):
             port.publish()
         self.after_step()
 
-    def spin(self, executor):
+    def spin(self, executor: Executor) -> None:
         """Receive messages until the next step of realtime, then make it.
 
         This avoids a timer of rclpy. At each reset of a timer, EventsExecutor (rclpy 7.1.6) queues all due timers
@@ -139,7 +151,7 @@ class Timekeeper(unit_node.UnitNode):
         if self.failure is None:
             self.guarded_step()
 
-    def make_due_step(self):
+    def make_due_step(self) -> None:
         """Make the due step of realtime, unless it was made, and set the wait for the next step [s]."""
         now, utc = self.clock()
         start = self.epoch(utc)
@@ -151,8 +163,8 @@ class Timekeeper(unit_node.UnitNode):
         wait = (start + (max(k, self.k) + 1) * self.period_ns - utc) / NS_PER_SECOND
         self.wait = min(max(wait, min_wait), MAX_WAIT_S)
 
-    def _make_realtime_step(self, k, stamp, now):
-        """Make step k. stamp: stamp of the step [ns]; now: time of the monotonic clock [ns].
+    def _make_realtime_step(self, k: int, stamp: Nanoseconds, now: Nanoseconds) -> None:
+        """Make step k. stamp: of the step; now: time of the monotonic clock.
 
         Skipped earlier steps are not published. They count as missed and as lost.
         """
@@ -172,15 +184,15 @@ class Timekeeper(unit_node.UnitNode):
         if self.last_step is not None and k >= self.last_step:
             self.finished = True
 
-    def _newest_receiver(self, name):
+    def _newest_receiver(self, name: str) -> Callable[[Received, object], None]:
         """Return the callback of a topic in realtime, which keeps the newest message."""
-        def take(message, _):
+        def take(message: Received, _: object) -> None:
             self.newest[name] = message
             if name in self.commands:
                 self.command_stamps[name] = message[0]
         return take
 
-    def draining(self):
+    def draining(self) -> bool:
         """Return True at the end of a realtime run, until the axes have stopped and the brakes hold.
 
         The first call disables the drive.
@@ -193,7 +205,7 @@ class Timekeeper(unit_node.UnitNode):
                 port.unit.request('adu/disable')
         return not all(port.unit.rests for port in self.ports)
 
-    def end(self):
+    def end(self) -> None:
         """End lockstep after the answers to the last step, with the result of the run.
 
         The wall-clock time begins with the answers to step 0. Before these answers the nodes still discover each
@@ -203,14 +215,14 @@ class Timekeeper(unit_node.UnitNode):
         self.await_acknowledged()
         self.finished = True
 
-    def close(self):
+    def close(self) -> None:
         """End the node; in realtime, first keep the result of the run, see `_outcome`."""
         if not self.graph.lockstep:
             # Without graph.start the number of a step counts from midnight.
             self.result = self._outcome(self.made, self.made + int(self.missed_steps))
         super().close()
 
-    def _outcome(self, made, steps):
+    def _outcome(self, made: int, steps: int) -> dict[str, float]:
         """Return the result of the run: {name: value}.
 
         made: number of steps made in the wall-clock time, from which the realtime factor follows; steps: number of the
@@ -221,7 +233,7 @@ class Timekeeper(unit_node.UnitNode):
                 'lost_steps': int(self.lost_steps), 'missed_steps': int(self.missed_steps),
                 'late_ticks': int(self.late_ticks)}
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the Diagnosis of the drive with the step and the lost, late and missed steps in its values."""
         diagnosis = super().diagnose()
         values = [*diagnosis.values, ('step', str(self.k)), ('lost_steps', str(int(self.lost_steps))),

@@ -1,24 +1,23 @@
 """Unit of the drive: its step between the messages of the graph, without ROS. `adu_node` runs it.
 
 Inputs are rate commands and the motion of the ship. Outputs are encoders, motor states, and the state with its faults.
-The functions name their arguments so: m a record Record; link, u and y its parts `link`, `inputs`, `outputs`.
 """
 import dataclasses
 import functools
 import math
 import typing
-
-import numpy as np
+from collections.abc import Iterable, Mapping
 
 from adu_drive import drive_state, drive_unit, injected, lanes, state_file, stow_pins
 from adu_drive.controller import faults
+from adu_drive.params import AduNodeParameters
 from adu_drive.plant import thermal
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
-from pedestal_common.quantities import Vector3
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
+from pedestal_common.quantities import AnyRecord, Bit, Floats, Message, Nanoseconds, Records, Seconds, Stamps, Vector3
 from pedestal_common.record import Record
 from pedestal_common.wire.commands import Reply
 from pedestal_common.wire.records import NO_STAMP
@@ -34,195 +33,201 @@ INVALID_COMMAND, INVALID_TRUTH = 1, 2  # indices of these topics; index 0: no in
 
 class Link(Record, align=False):
     """State of the link to other nodes."""
-    stamp: int  # stamp, command_stamp: stamps of the last step and of the last command [ns]
-    command_stamp: int
-    # truth_stamp, deck_rate: stamp [ns] and deck rate (FLU) [rad/s] of the last message of ship/truth with a finite
-    # rate
-    truth_stamp: int
-    deck_rate: Vector3
-    timeout: int  # timeout, period: age at which a command is stale [ns]; period T [ns]
-    period: int
-    stale: int  # 1 while the command is stale
-    invalid: int  # index of INVALID_INPUT_TOPICS: topic with an invalid input since the last diagnosis
+    stamp: Nanoseconds          # of the last step
+    command_stamp: Nanoseconds  # of the last command
+    truth_stamp: Nanoseconds    # of the last message of ship/truth with a finite rate
+    deck_rate: Vector3          # in this message, FLU [rad/s]
+    timeout: Nanoseconds        # age at which a command is stale
+    period: Nanoseconds         # T
+    stale: Bit                  # 1 while the command is stale
+    invalid: int                # index of INVALID_INPUT_TOPICS: topic with an invalid input since the last diagnosis
 
 
 MAX_CATCH_UP_NS = 2_000_000_000
 """Longest time of missed steps that the drive makes later [ns]. Axes without commands stop within this time."""
 
-Record = np.dtype([('state', drive_unit.State), ('constants', drive_unit.Constants),
-                         ('inputs', drive_unit.Inputs.dtype), ('outputs', drive_unit.Outputs.dtype),
-                         ('link', Link.dtype), ('schedule', schedule.Schedule.dtype),
-                         ('injected', injected.DriveInjected.dtype)], align=True)
-"""All data of a drive: records of drive_unit, link to other nodes, scheduled and active injected faults."""
+
+class DriveRecord(Record):
+    """All data of a drive."""
+    state: drive_unit.State
+    constants: drive_unit.Constants
+    inputs: drive_unit.Inputs
+    outputs: drive_unit.Outputs
+    link: Link
+    schedule: schedule.Schedule         # of the injected faults
+    injected: injected.DriveInjected    # those in force
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the drive; record: (1,) of Record."""
-    record: np.ndarray
+    """Memory of the drive."""
+    record: Records         # DriveRecord (1,)
 
 
 @compiled
-def deck_acceleration(u, link, ship):
-    """Set rate [rad/s] and angular acceleration [rad/s2] of the deck, FLU, in the inputs u of the drive.
+def deck_acceleration(drive_inputs: drive_unit.Inputs, link: Link, ship: AnyRecord) -> None:
+    """Set rate and angular acceleration of the deck in the inputs of the drive.
 
     The acceleration is the difference of two successive messages of ship/truth, divided by that of their stamps.
     """
     w, last = ship.twist_angular, link.truth_stamp
     if last != NO_STAMP and ship.stamp > last:
         for i in range(3):
-            u.base_acceleration[i] = (w[i] - link.deck_rate[i]) / ((ship.stamp - last) * 1e-9)
+            drive_inputs.base_acceleration[i] = (w[i] - link.deck_rate[i]) / ((ship.stamp - last) * 1e-9)
     if math.isfinite(w[0]) and math.isfinite(w[1]) and math.isfinite(w[2]) and ship.stamp != last:
         link.truth_stamp = ship.stamp
         for i in range(3):
-            link.deck_rate[i] = u.base_rate[i] = w[i]
+            link.deck_rate[i] = drive_inputs.base_rate[i] = w[i]
 
 
 @compiled
-def supervise(u, link):
+def supervise(drive_inputs: drive_unit.Inputs, link: Link) -> None:
     """Stop the axes if the command is stale at the stamp of the last step."""
     link.stale = link.command_stamp == NO_STAMP or link.stamp - link.command_stamp > link.timeout
-    u.enable = 0 if link.stale else 1
+    drive_inputs.enable = 0 if link.stale else 1
 
 
 @compiled
-def take_command(u, link, command):
-    """Write a command into the inputs u of the drive, and stop the axes if the newest command is stale.
+def take_command(drive_inputs: drive_unit.Inputs, link: Link, command: AnyRecord) -> None:
+    """Write a command into the inputs of the drive, and stop the axes if the newest command is stale.
 
     command: record of acu/rate_command, with stamp NO_STAMP if the step had no command.
     """
     if command.stamp != NO_STAMP:
         link.command_stamp = command.stamp
-        u.azimuth.rate, u.elevation.rate = command.velocity[0], command.velocity[1]
-        u.azimuth.torque, u.elevation.torque = command.effort[0], command.effort[1]
-    supervise(u, link)
+        drive_inputs.azimuth.rate, drive_inputs.elevation.rate = command.velocity[0], command.velocity[1]
+        drive_inputs.azimuth.torque, drive_inputs.elevation.torque = command.effort[0], command.effort[1]
+    supervise(drive_inputs, link)
 
 
 @compiled
-def decode(u, link, dropped, command, ship):
-    """Write the messages of the last step into the inputs u of the drive.
+def decode(drive_inputs: drive_unit.Inputs, link: Link, dropped: Bit, command: AnyRecord, ship: AnyRecord) -> None:
+    """Write the messages of the last step into the inputs of the drive.
 
     dropped: 1 if an injected fault removes the command; command, ship: records of acu/rate_command and ship/truth,
     with stamp NO_STAMP if the step had no such message.
     """
     if dropped == 0:
-        take_command(u, link, command)
+        take_command(drive_inputs, link, command)
     else:
-        supervise(u, link)
+        supervise(drive_inputs, link)
     if ship.stamp != NO_STAMP:
-        deck_acceleration(u, link, ship)
+        deck_acceleration(drive_inputs, link, ship)
 
 
 @compiled
-def record_invalid_topic(u, link):
+def record_invalid_topic(drive_inputs: drive_unit.Inputs, link: Link) -> None:
     """Store the topic of an invalid input: ship/truth if the deck acceleration is invalid, else the command."""
-    deck = u.base_acceleration
+    deck = drive_inputs.base_acceleration
     valid = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_unit.MAX_PLAUSIBLE_INPUT
     link.invalid = INVALID_COMMAND if valid else INVALID_TRUTH
 
 
 @compiled
-def encode_truth(y, stamp, truth):
-    """Write the true angles and rates of the beam into the record of adu/truth, with a stamp [ns]."""
+def encode_truth(drive_outputs: drive_unit.Outputs, stamp: Nanoseconds, truth: AnyRecord) -> None:
+    """Write the true angles and rates of the beam into the record of adu/truth, with a stamp."""
     truth.stamp = stamp
     for i in range(2):
-        axis = y.azimuth if i == 0 else y.elevation
+        axis = drive_outputs.azimuth if i == 0 else drive_outputs.elevation
         truth.position[i], truth.velocity[i] = axis.load_position, axis.load_velocity
 
 
 @compiled
-def encode_measured(y, stamp, outputs):
-    """Write the measured outputs y of the drive into the records of its messages, with a stamp [ns]."""
+def encode_measured(drive_outputs: drive_unit.Outputs, stamp: Nanoseconds, outputs: AnyRecord) -> None:
+    """Write the measured outputs of the drive into the records of its messages, with a stamp."""
     joints, motors = outputs[JOINT_STATES_TOPIC], outputs[MOTOR_STATES_TOPIC]
     joints.stamp = motors.stamp = outputs[CLOCK_TOPIC].stamp = stamp
     for i in range(2):
-        axis = y.azimuth if i == 0 else y.elevation
+        axis = drive_outputs.azimuth if i == 0 else drive_outputs.elevation
         joints.position[i], joints.velocity[i], joints.effort[i] = axis.position, axis.velocity, axis.torque
         for j in range(2):
             motors.position[2 * i + j] = axis.motor_position[j]
             motors.velocity[2 * i + j] = axis.motor_velocity[j]
             motors.effort[2 * i + j] = axis.motor_torque[j]
-    outputs[DRIVE_STATE_TOPIC] = y.condition
+    outputs[DRIVE_STATE_TOPIC] = drive_outputs.condition
 
 
 @compiled
-def receive(m, stamp, inputs):
-    """Take the messages of step k - 1. Return False in the first step, which has none. stamp: t_k [ns]."""
-    if m.link.stamp == NO_STAMP:
-        m.state.k = stamp // m.link.period
+def receive(drive: DriveRecord, stamp: Nanoseconds, inputs: AnyRecord) -> bool:
+    """Take the messages of step k - 1. Return False in the first step, which has none. stamp: t_k."""
+    if drive.link.stamp == NO_STAMP:
+        drive.state.k = stamp // drive.link.period
         return False
-    decode(m.inputs, m.link, m.injected.message_fault.drop, inputs[RATE_COMMAND_TOPIC], inputs[SHIP_TRUTH_TOPIC])
-    m.inputs.pins = inputs[PIN_COMMAND_TOPIC]
+    decode(drive.inputs, drive.link, drive.injected.message_fault.drop, inputs[RATE_COMMAND_TOPIC],
+           inputs[SHIP_TRUTH_TOPIC])
+    drive.inputs.pins = inputs[PIN_COMMAND_TOPIC]
     return True
 
 
 @compiled
-def report(m, stamp, moved, outputs):
+def report(drive: DriveRecord, stamp: Nanoseconds, moved: bool, outputs: AnyRecord) -> None:
     """Write the messages of the drive at t_k. moved: result of `receive`, False in the first step."""
-    if moved and m.outputs.invalid_command:
-        record_invalid_topic(m.inputs, m.link)
-    m.link.stamp = stamp
-    encode_measured(m.outputs, stamp, outputs)
-    encode_truth(m.outputs, stamp, outputs[DRIVE_TRUTH_TOPIC])
-    outputs[PIN_STATES_TOPIC] = m.outputs.pins
+    if moved and drive.outputs.invalid_command:
+        record_invalid_topic(drive.inputs, drive.link)
+    drive.link.stamp = stamp
+    encode_measured(drive.outputs, stamp, outputs)
+    encode_truth(drive.outputs, stamp, outputs[DRIVE_TRUTH_TOPIC])
+    outputs[PIN_STATES_TOPIC] = drive.outputs.pins
 
 
 @compiled
-def advance_missed_steps(m, stamp):
-    """Make the steps that a late node in realtime missed before a stamp [ns], at most those of MAX_CATCH_UP_NS.
+def advance_missed_steps(drive: DriveRecord, stamp: Nanoseconds) -> None:
+    """Make the steps that a late node in realtime missed before a stamp, at most those of MAX_CATCH_UP_NS.
 
     Because a real antenna moves on while its simulation is late, these steps use the last command until it is stale.
     """
-    missed = (min(stamp - m.link.stamp, MAX_CATCH_UP_NS) // m.link.period - 1) if m.link.stamp != NO_STAMP else 0
+    missed = 0
+    if drive.link.stamp != NO_STAMP:
+        missed = min(stamp - drive.link.stamp, MAX_CATCH_UP_NS) // drive.link.period - 1
     for _ in range(missed):
-        supervise(m.inputs, m.link)
-        drive_unit.step(m.state, m.constants, m.inputs, m.outputs)
-        m.link.stamp += m.link.period
+        supervise(drive.inputs, drive.link)
+        drive_unit.step(drive.state, drive.constants, drive.inputs, drive.outputs)
+        drive.link.stamp += drive.link.period
 
 
 @compiled
-def law(memory, stamp, inputs, outputs):
+def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
     """Advance from t_k-1 to t_k with the messages of step k - 1."""
-    m = memory.record[0]
-    advance_missed_steps(m, stamp)
-    if schedule.pending(m.schedule, stamp):
-        injected.apply_due_faults(m, stamp)
-    moved = receive(m, stamp, inputs)
+    drive = memory.record[0]
+    advance_missed_steps(drive, stamp)
+    if schedule.pending(drive.schedule, stamp):
+        injected.apply_due_faults(drive, stamp)
+    moved = receive(drive, stamp, inputs)
     if moved:
-        drive_unit.step(m.state, m.constants, m.inputs, m.outputs)
-    report(m, stamp, moved, outputs)
-    if m.schedule.pending != 0:
-        injected.corrupt_messages(m.injected, stamp, outputs)
+        drive_unit.step(drive.state, drive.constants, drive.inputs, drive.outputs)
+    report(drive, stamp, moved, outputs)
+    if drive.schedule.pending != 0:
+        injected.corrupt_messages(drive.injected, stamp, outputs)
 
 
 @compiled
-def laws(memory, stamps, inputs, outputs):
+def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> None:
     """Apply `law` to each element of arrays."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
 LANE_FLAGS = {'uneven': 0, 'toothless': 0, 'stuck': 0, 'exact': 1}
-"""Flags of Record that a drive needs on lanes (lanes.py): its law then contains no sine.
+"""Flags of DriveRecord that a drive needs on lanes (lanes.py): its law then contains no sine.
 
 These drives have gears and motors without unevenness, whole pinions, and encoders without errors. The processor has no
 vector instruction for a sine.
 """
 
-DRIVE_LANES = lanes.view(Record, LANE_FLAGS)
+DRIVE_LANES = lanes.view(DriveRecord.dtype, LANE_FLAGS)
 """Function for compiled code that gives the drives in a flat array of lanes.to_lanes."""
 
 
 @compiled
-def law_of_lanes(drives, stamp, inputs, outputs):
+def law_of_lanes(drives: DriveRecord, stamp: Nanoseconds, inputs: Records, outputs: Records) -> None:
     """Apply `law` to the first len(inputs) drives of DRIVE_LANES.
 
     Each drive fits lanes (Adu.fits_lanes), and all drives are at the same step.
     """
     moved = False
     for i in range(len(inputs)):
-        m = lanes.at(drives, i)
-        m.schedule.stamp = stamp
-        moved = receive(m, stamp, inputs[i])
+        drive = lanes.at(drives, i)
+        drive.schedule.stamp = stamp
+        moved = receive(drive, stamp, inputs[i])
     if moved:
         drive_unit.step(drives.state, drives.constants, drives.inputs, drives.outputs)
     for i in range(len(inputs)):
@@ -230,15 +235,13 @@ def law_of_lanes(drives, stamp, inputs, outputs):
 
 
 @functools.lru_cache(1)
-def _initial(parameters):
-    """Return the record (1,) of a drive before its first step, cached for trials with the same drive."""
-    link = Link.zeros()
-    link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NO_STAMP
-    link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
-    link['period'] = round(parameters.period * 1e9)
-    record = joined(Record, state=drive_unit.initial_state(parameters),
-                    constants=drive_unit.constants(parameters),
-                    link=link, schedule=schedule.empty())
+def _initial(parameters: AduNodeParameters) -> Records:
+    """Return the DriveRecord (1,) of a drive before its first step, cached for trials with the same drive."""
+    link = Link.of(stamp=NO_STAMP, command_stamp=NO_STAMP, truth_stamp=NO_STAMP,
+                   timeout=round(parameters.command_timeout * parameters.period * 1e9),
+                   period=round(parameters.period * 1e9))
+    record = DriveRecord.of(state=drive_unit.initial_state(parameters), constants=drive_unit.constants(parameters),
+                            link=link, schedule=schedule.empty())
     drive_unit.read(*(record[0][name] for name in ('state', 'constants', 'outputs')))
     return record
 
@@ -247,17 +250,19 @@ class Adu(Simulated):
     """Unit of the drive, from AduNodeParameters."""
     NODE, COMMAND, LAWS = nodes.row(nodes.DRIVE_NODE), RATE_COMMAND_TOPIC, {Memory: (law, laws)}
     REQUESTS, VERBS = tuple(drive_state.REQUEST_CODES), table.INJECT_COMMANDS[NODE.name]
+    parameters: AduNodeParameters
+    memory: Memory
 
-    def __init__(self, parameters, reads):
+    def __init__(self, parameters: AduNodeParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
         self.memory = Memory(_initial(parameters).copy())
 
-    def latency(self, topic):
-        """Return the age [s] of the command in a step: one period."""
+    def latency(self, topic: str) -> Seconds:
+        """Return the age of the command in a step: one period."""
         return self.parameters.period
 
     @property
-    def fits_lanes(self):
+    def fits_lanes(self) -> bool:
         """True if the drive can run on lanes: it has the flags of LANE_FLAGS and no injected fault."""
         axes = [self.parts[part][axis] for part in ('state', 'constants') for axis in topics.AXES]
         flags = [flags[name] == value for name, value in LANE_FLAGS.items()
@@ -265,12 +270,12 @@ class Adu(Simulated):
         return all(flags) and not self.parameters.inject
 
     @property
-    def rests(self):
+    def rests(self) -> bool:
         """True if the brakes hold the axes and the motors make no torque."""
         return bool(self.parts['outputs']['phase'] == drive_state.PHASE_DISABLED)
 
-    def resume(self, state):
-        """Restore a state_file.PlantState before the first step: brakes on, then enabled if the state was enabled."""
+    def resume(self, state: state_file.PlantState) -> None:
+        """Restore the state of the plant before the first step: brakes on, then enabled if the state was enabled."""
         angles = {f'initial_{axis}': min(max(getattr(state, axis), limits.lower), limits.upper) for axis, limits in (
             (axis, getattr(self.parameters, axis).limits) for axis in topics.AXES)}
         pins = dataclasses.replace(self.parameters.pins, initially_in=state.pinned)
@@ -279,28 +284,29 @@ class Adu(Simulated):
         self.parts['state']['wanted'] = state.enabled
         drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
 
-    def plant_state(self):
-        """Return the state_file.PlantState for `resume`."""
+    def plant_state(self) -> state_file.PlantState:
+        """Return the state of the plant for `resume`."""
         o = self.parts['outputs']
         enabled = o['wanted'] and not (o['emergency'] or self.tripped)
         pinned = not stow_pins.pins_out(self.parts['state']['pins'])
-        return state_file.PlantState(*(float(o[axis]['position']) for axis in topics.AXES), bool(enabled), pinned)
+        azimuth, elevation = (float(o[axis]['position']) for axis in topics.AXES)
+        return state_file.PlantState(azimuth, elevation, bool(enabled), pinned)
 
-    def encode(self, topic, code):
+    def encode(self, topic: str, code: int) -> str | Message:
         """Return the text of a code of adu/state, or of another topic as in Unit."""
         return drive_state.state_text(code) if topic == DRIVE_STATE_TOPIC else super().encode(topic, code)
 
     @property
-    def tripped(self):
+    def tripped(self) -> bool:
         """True if an axis has a fault that stops the drive."""
         return any(faults.stops(int(self.parts['outputs'][axis]['faults'])) for axis in topics.AXES)
 
     @property
-    def condition(self):
+    def condition(self) -> str:
         """Present text of adu/state, also between two steps."""
         return drive_state.state_text(int(self.parts['outputs']['condition']))
 
-    def request(self, name):
+    def request(self, name: str) -> Reply:
         """Execute one of REQUESTS. Return the Reply with the resulting state, and the reason for a refusal."""
         m = self.parts
         answer = drive_unit.request(m['state'], m['constants'], m['outputs'], drive_state.REQUEST_CODES[name])
@@ -308,7 +314,7 @@ class Adu(Simulated):
         refusal = '' if granted else f'refused: {drive_state.REFUSAL_REASONS[answer]}; '
         return Reply(granted, f'{refusal}drive is {self.condition}')
 
-    def requests_for(self, topic, text):
+    def requests_for(self, topic: str, text: str) -> list[str]:
         """Return the services that bring the drive to a text of adu/state, in the order of their calls."""
         o = self.parts['outputs']
         tripped, stopped = 'fault' in text, 'emergency stop' in text
@@ -319,7 +325,7 @@ class Adu(Simulated):
                   'adu/enable': text in ('releasing brakes', *topics.ENABLED_STATES) and not o['wanted']}
         return [service for service, due in wanted.items() if due]
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the Diagnosis with limits, faults and thermal load of both axes; an invalid input appears once."""
         outputs, link = self.parts['outputs'], self.parts['link']
         invalid, link['invalid'] = INVALID_INPUT_TOPICS[link['invalid']], 0
@@ -352,14 +358,14 @@ class Adu(Simulated):
         return Diagnosis(LEVEL_OK, 'following', values)
 
     @property
-    def urgent(self):
+    def urgent(self) -> tuple[int, ...]:
         """Values whose change is published at once: emergency stop, stale or invalid inputs, faults."""
         outputs, link = self.parts['outputs'], self.parts['link']
         return (outputs['emergency'], link['stale'], link['invalid'], outputs['azimuth']['faults'],
                 outputs['elevation']['faults'])
 
     @staticmethod
-    def idle(numbers):
+    def idle(numbers: Mapping[str, Floats]) -> str:
         """Return the reason why a recording does not exercise the drive, '' if it does."""
         rates = numbers[RATE_COMMAND_TOPIC][:, 2:4]     # The rates stand after the two positions.
         return '' if (rates != 0.0).any() else 'no rate was ever commanded'

@@ -28,7 +28,7 @@ _MODULES = {'Trials': 'ensemble', 'trials': 'ensemble', 'Run': 'recording', 'Tab
 __all__ = ['Run', 'Scenario', 'Table', 'Trials', 'load', 'read_bag', 'run', 'scenarios', 'trials']
 
 
-def __getattr__(name: str) -> typing.Any:
+def __getattr__(name: str) -> object:
     """Return a public name after importing its module. This avoids slow imports at the start of the command line."""
     if name not in _MODULES:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

@@ -79,9 +79,11 @@ class Parser(argparse.ArgumentParser):
     The parser of argparse reads -1 and -0.5 as values, but -1e-2 and -33.9,18.4,10 as unknown options.
     """
 
-    def parse_known_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def,override]
+    def parse_known_args(  # type: ignore[override]  # overloads of argparse accept other namespaces
+            self, args: Sequence[str] | None = None,
+            namespace: argparse.Namespace | None = None) -> tuple[argparse.Namespace, list[str]]:
         """Return (namespace, unknown arguments), with each negative number joined to the option before it."""
-        joined = []
+        joined: list[str] = []
         for arg in sys.argv[1:] if args is None else args:
             option = bool(joined) and joined[-1].startswith('--') and len(joined[-1]) > 2 and '=' not in joined[-1]
             if option and NEGATIVE_NUMBER_PATTERN.match(arg):
@@ -90,7 +92,9 @@ class Parser(argparse.ArgumentParser):
                 joined.append(arg)
         return super().parse_known_args(joined, namespace)
 
-    def parse_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def,override]
+    def parse_args(  # type: ignore[override]  # overloads of argparse accept other namespaces
+            self, args: Sequence[str] | None = None,
+            namespace: argparse.Namespace | None = None) -> argparse.Namespace:
         """Return the namespace. Arguments NAME=VALUE of a command may also stand behind its options, where the parser
         of argparse does not accept them."""
         namespace, unknown = self.parse_known_args(args, namespace)

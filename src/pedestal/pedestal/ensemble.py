@@ -11,6 +11,7 @@ from pedestal.scenario import Scenario
 from pedestal_analysis.trials import comparison, ensemble, monte_carlo, statistics
 from pedestal_analysis.trials import plan as plans
 from pedestal_analysis.trials import table as tables
+from pedestal_common.quantities import Floats, Ints, Row
 
 
 def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None = None, *, sobol: bool = False,
@@ -41,13 +42,13 @@ def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None =
     return Trials(plan, table)
 
 
-class Trials(Mapping[str, np.ndarray]):
+class Trials(Mapping[str, Floats]):
     """Finished trials as a mapping {name of a result: its values (runs,)}, NaN for a trial without this result."""
 
     def __init__(self, plan: plans.Plan, table: tables.Table) -> None:
         self._plan, self._table = plan, table
 
-    def __getitem__(self, result: str) -> np.ndarray:
+    def __getitem__(self, result: str) -> Floats:
         if result not in self._table.measured_results:
             raise KeyError(f'no trial has {result!r}; must be one of {", ".join(self._table.measured_results)}')
         return self._table.column(result)
@@ -59,12 +60,12 @@ class Trials(Mapping[str, np.ndarray]):
         return len(self._table.measured_results)
 
     @property
-    def seeds(self) -> np.ndarray:
+    def seeds(self) -> Ints:
         """Seeds (runs,) of the trials."""
         return self._table.column('seed').astype(int)
 
     @property
-    def parameters(self) -> dict[str, np.ndarray]:
+    def parameters(self) -> dict[str, Floats]:
         """Varied parameters {'node.key': values (runs,)}.
 
         A parameter with texts has the numbers 0, 1, ... of its texts, in the order of their first trial.
@@ -76,7 +77,7 @@ class Trials(Mapping[str, np.ndarray]):
         """Units {result: unit}."""
         return {name: statistics.unit(name) for name in self}
 
-    def summary(self) -> list[dict]:
+    def summary(self) -> list[Row]:
         """Return the rows of `pedestal trials --json`: percentiles, rates and sensitivities with their intervals.
 
         >>> rows = pedestal.trials(pedestal.load('leo_pass', duration=4.0), 2, workers=1).summary()

@@ -13,14 +13,10 @@ if typing.TYPE_CHECKING:
 
 
 class Panel(typing.NamedTuple):
-    """A figure.
-
-    draw: function(axes, RunData). needs: names of the required parts of RunData. polar: True if the figure needs polar
-    axes.
-    """
+    """A figure."""
     draw: Callable[[Axes, run_data.RunData], None]
-    needs: tuple[str, ...]
-    polar: bool = False
+    needs: tuple[str, ...]  # names of the required parts of RunData
+    polar: bool = False     # True if the figure needs polar axes
 
 
 PANELS: dict[str, Panel] = {

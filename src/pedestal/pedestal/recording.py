@@ -23,9 +23,8 @@ from pedestal_recording import bag as bags
 if typing.TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-POINTING_COLUMNS = {'t': ('t', 's'), 'cross_elevation': ('cross_elevation', 'rad'),
-                    'elevation': ('elevation_error', 'rad'), 'range': ('range', 'm')}
-"""Columns of Run.pointing, {column: (field of tracking.Tracking, unit)}."""
+POINTING_UNITS = {'t': 's', 'cross_elevation': 'rad', 'elevation': 'rad', 'range': 'm'}
+"""{column of Run.pointing: its unit}."""
 
 
 class Table(Mapping[str, np.ndarray]):
@@ -101,9 +100,9 @@ class Run:
         >>> pedestal.run(pedestal.load('leo_pass', duration=1.0)).pointing
         Table(t [s], cross_elevation [rad], elevation [rad], range [m])
         """
-        return Table({name: np.asarray(getattr(self.tracking, field))
-                      for name, (field, _) in POINTING_COLUMNS.items()},
-                     {name: unit for name, (_, unit) in POINTING_COLUMNS.items()})
+        run = self.tracking
+        return Table({'t': run.t, 'cross_elevation': run.error[:, 0], 'elevation': run.error[:, 1],
+                      'range': run.range}, POINTING_UNITS)
 
     @functools.cached_property
     def results(self) -> dict[str, float]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pedestal_bringup.scenario import scenario as bringup
 from pedestal_common.parameters import Parameters, as_dict, flatten
+from pedestal_common.quantities import Seconds
 
 Value = float | int | bool | str
 
@@ -42,14 +43,11 @@ def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None,
 
 @dataclasses.dataclass(frozen=True)
 class Scenario:
-    """A scenario with changed parameters, checked at its creation.
-
-    source: name or path; changes: {'node.key': value}; given_duration [s] and given_seed: None for values of the file.
-    """
-    source: str
-    changes: Mapping[str, Value]
-    given_duration: float | None = None
-    given_seed: int | None = None
+    """A scenario with changed parameters, checked at its creation."""
+    source: str                             # its name or path
+    changes: Mapping[str, Value]            # {'node.key': value}
+    given_duration: Seconds | None = None   # None for the value of the file
+    given_seed: int | None = None           # None for the value of the file
 
     def __post_init__(self) -> None:
         self.checked  # noqa: B018  raises ValueError for wrong values
@@ -122,8 +120,8 @@ class Scenario:
         return self.checked.name
 
     @property
-    def duration(self) -> float:
-        """Length of a run [s]."""
+    def duration(self) -> Seconds:
+        """Length of a run."""
         return self.checked.header.duration
 
     @property

@@ -1,4 +1,6 @@
 """Output of the verbs of the command line: progress bars and tables on a terminal, and rows of results as JSON."""
+from __future__ import annotations
+
 import contextlib
 import functools
 import json
@@ -7,6 +9,22 @@ import pathlib
 import shutil
 import sys
 import textwrap
+import typing
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+
+if typing.TYPE_CHECKING:    # these imports are slow, and most verbs need none of them
+    import argparse
+    from types import ModuleType
+
+    from rich import progress
+    from rich.console import JustifyMethod
+
+    from pedestal_analysis.results.results import Result, Values
+    from pedestal_analysis.trials.solve import Tried
+    from pedestal_common.quantities import Row, Seconds
+
+    _Columns: typing.TypeAlias = Iterable[progress.ProgressColumn]
 
 EXIT_ERROR, EXIT_WRONG_COMMAND, EXIT_DISTURBED, EXIT_FAILED_RUN, EXIT_STOPPED = 1, 2, 3, 4, 130
 EXIT_CODES = {
@@ -37,77 +55,79 @@ MIN_TABLE_COLUMNS = 150
 
 
 @contextlib.contextmanager
-def _bar(columns, advance, description, total=None, **fields):
+def _bar(columns: Callable[[ModuleType], _Columns], advance: Callable[..., None], description: str,
+         total: float | None = None, rate: str = '') -> Iterator[Callable[..., None]]:
     """Yield a function of the progress: on a terminal it calls advance(bar, task, ...), in a pipe it does nothing.
 
-    columns                      columns(module rich.progress) -> columns of the progress bar
+    columns                      function of the module rich.progress that returns the columns of the progress bar
     advance                      advance(bar, task, ...) shows the new progress
-    description, total, fields   properties of the only task of the bar
+    description, total, rate     properties of the only task of the bar
     """
     if not sys.stderr.isatty():
         yield lambda *_: None
         return
     from rich import console, progress
     with progress.Progress(*columns(progress), console=console.Console(stderr=True)) as bar:
-        yield functools.partial(advance, bar, bar.add_task(description, total=total, **fields))
+        yield functools.partial(advance, bar, bar.add_task(description, total=total, rate=rate))
 
 
-def progress_of_run(duration):
-    """Return a context with a function progress(time of the run [s]): a bar on a terminal, nothing in a pipe.
+def progress_of_run(duration: Seconds) -> AbstractContextManager[Callable[..., None]]:
+    """Return a context with a function progress(time of the run): a bar on a terminal, nothing in a pipe.
 
-    duration: length of the run [s].
+    duration: length of the run.
     """
-    def columns(rich):
+    def columns(rich: ModuleType) -> _Columns:
         return (rich.TextColumn('{task.description}'), rich.BarColumn(),
                 rich.TextColumn('{task.completed:.0f} / {task.total:.0f} s'), rich.TimeElapsedColumn())
 
-    def advance(bar, task, seconds):
+    def advance(bar: progress.Progress, task: progress.TaskID, seconds: Seconds) -> None:
         bar.update(task, completed=seconds, description='running' if seconds > 0.0 else None)
     return _bar(columns, advance, 'starting nodes (the first start compiles the laws)', duration)
 
 
-def progress_of_share():
+def progress_of_share() -> AbstractContextManager[Callable[..., None]]:
     """Return a context with a function progress(share of the work that is done [-], text of the next item).
 
     It shows a bar on a terminal, and nothing in a pipe.
     """
-    def columns(rich):
+    def columns(rich: ModuleType) -> _Columns:
         return rich.BarColumn(), rich.TextColumn('{task.description}'), rich.TimeElapsedColumn()
 
-    def advance(bar, task, share, text):
+    def advance(bar: progress.Progress, task: progress.TaskID, share: float, text: str) -> None:
         bar.update(task, completed=share, description=text)
     return _bar(columns, advance, 'compiling the laws (first time only)', 1.0)
 
 
-def progress_of_trials():
+def progress_of_trials() -> AbstractContextManager[Callable[..., None]]:
     """Return a context with a function progress(number of trials done, number of all trials).
 
     It shows a bar with the rate of the trials and the remaining time on a terminal, and nothing in a pipe.
     """
-    def columns(rich):
+    def columns(rich: ModuleType) -> _Columns:
         return (rich.BarColumn(), rich.MofNCompleteColumn(), rich.TextColumn('trials, {task.fields[rate]}'),
                 rich.TimeElapsedColumn(), rich.TextColumn('left'), rich.TimeRemainingColumn())
 
-    def advance(bar, task, done, total):
+    def advance(bar: progress.Progress, task: progress.TaskID, done: int, total: int) -> None:
         speed = bar.tasks[0].speed
-        rate = {'rate': f'{speed:.1f} a second'} if speed else {}
-        bar.update(task, completed=done, total=total, **rate)
+        bar.update(task, completed=done, total=total)
+        if speed:
+            bar.update(task, rate=f'{speed:.1f} a second')
     return _bar(columns, advance, '', rate='compiling the laws (first time only)')
 
 
-def option_of(name):
+def option_of(name: str) -> str:
     """Return the option of a name in the namespace of argparse: --params-file for params_file."""
     return f'--{name.replace("_", "-")}'
 
 
-def add_json(parser):
+def add_json(parser: argparse.ArgumentParser) -> None:
     """Add the option --json [FILE] to the parser of a verb that measures."""
     parser.add_argument('--json', type=lambda text: STDOUT_PATH if text == '-' else pathlib.Path(text), metavar='FILE',
                         nargs='?', const=STDOUT_PATH, help='file for the results as JSON; without FILE, or with -: '
                         'JSON to standard output, all other output to standard error')
 
 
-def check_json(path):
+def check_json(path: pathlib.Path | None) -> None:
     """Raise ValueError if the file of --json cannot be written, or if it exists and holds anything but JSON."""
     if path and (path.is_dir() or not path.parent.is_dir()):
         raise ValueError(f'--json {path}: must be a file in a directory that exists')
@@ -118,13 +138,13 @@ def check_json(path):
             raise ValueError(f'--json {path}: exists already and holds no JSON; the file is not overwritten')
 
 
-def write_json(path, content):
+def write_json(path: pathlib.Path | None, content: object) -> None:
     """Write content as JSON to the path of --json; do nothing if the path is None."""
     if path:
         path.write_text(json.dumps(content, indent=1) + '\n')
 
 
-def show_list(rows):
+def show_list(rows: Iterable[Sequence[str]]) -> None:
     """Print rows of texts in columns; the last text of a row is a sentence.
 
     On a terminal the sentence is wrapped to the width of the terminal. In a pipe a row is one line.
@@ -149,19 +169,20 @@ def show_list(rows):
             print(f'{head:{indent - 2}}  {first}', *(' ' * indent + line for line in more), sep='\n')
 
 
-def exit_codes():
+def exit_codes() -> str:
     """Return EXIT_CODES as the lines of a help text."""
     return '\n'.join(textwrap.fill(f'{code}: {meaning}.', 100, initial_indent='  ', subsequent_indent='      ')
                      for code, meaning in EXIT_CODES.items())
 
 
-def show_results(title, columns, results, whole, marks=()):
+def show_results(title: str, columns: Sequence[str], results: Sequence[Values], whole: Values,
+                 marks: Iterable[Mapping[str, str]] = ()) -> None:
     """Print the table of the results of a run.
 
     columns   texts of the heads, one for each beam; '' for a single column
-    results   [{name: (value, unit)}] of each column
-    whole     {name: (value, unit)} of the results of the run as a whole
-    marks     [{name: note on a value that is not as expected}] of each column
+    results   of each column
+    whole     results of the run as a whole
+    marks     {name: note on a value that is not as expected} of each column
     """
     from rich.console import Console
     from rich.table import Table
@@ -171,7 +192,7 @@ def show_results(title, columns, results, whole, marks=()):
     for column in columns:
         table.add_column(column or 'value', justify='right')
     table.add_column('unit')
-    marked = {}
+    marked: dict[str, list[str]] = {}
     for column, notes in zip(columns, marks):
         for metric, text in notes.items():
             marked.setdefault(metric, []).append(f'{column}: {text}' if column else text)
@@ -188,46 +209,49 @@ def show_results(title, columns, results, whole, marks=()):
     screen.print(table)
 
 
-def measured(value):
+def measured(value: float) -> str:
     """Return a result of a run as text: four digits, but all digits of a large whole number."""
     if not math.isfinite(value):
         return 'not measured'
     return f'{value:,.0f}' if abs(value) >= 1e4 and value == int(value) else number(value)
 
 
-def add_all(parser, what='all results; default: the eight most important ones'):
+def add_all(parser: argparse.ArgumentParser,
+            what: str = 'all results; default: the eight most important ones') -> None:
     """Add the option --all to the parser of a verb that prints results; what: help text of the option."""
     parser.add_argument('--all', action='store_true', help=what)
 
 
-def add_explain(parser):
+def add_explain(parser: argparse.ArgumentParser) -> None:
     """Add the option --explain to the parser of a verb that prints results."""
     parser.add_argument('--explain', action='store_true', help='print the definition of each result as a sentence')
 
 
-def explain(table, names):
-    """Print the definitions of the results in names; table: rows with `name` and `sentence`, as results.RESULTS."""
+def explain(table: Iterable[Result], names: Container[str]) -> None:
+    """Print the definitions of the results in names."""
     show_list((row.name, row.sentence) for row in table if row.name in names)
 
 
-def number(value):
+def number(value: float | None) -> str:
     """Return a number in a row of a study as text, '-' for None."""
     return '-' if value is None else f'{value:.4g}'
 
 
-def interval(row):
+def interval(row: Row) -> str:
     """Return the confidence interval in a row of a study as text, '' for a row of one run."""
     return f'{number(row["ci_low"])} to {number(row["ci_high"])}' if 'runs' in row else ''
 
 
-def show_study(title, rows, missed):
+def show_study(title: str, rows: Iterable[Row], missed: Callable[[Row], bool]) -> None:
     """Print the rows of a study as a table; missed: function that returns True for a row that misses its target."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
     table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    for name, justify in (('case', 'left'), ('metric', 'left'), ('paper', 'right'), ('ours', 'right'),
-                          ('95 % interval', 'right'), ('target', 'left'), ('unit', 'left'), ('', 'left')):
+    heads: tuple[tuple[str, JustifyMethod], ...] = (
+        ('case', 'left'), ('metric', 'left'), ('paper', 'right'), ('ours', 'right'), ('95 % interval', 'right'),
+        ('target', 'left'), ('unit', 'left'), ('', 'left'))
+    for name, justify in heads:
         table.add_column(name, justify=justify, no_wrap=True)
     for row in rows:
         table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), interval(row),
@@ -235,10 +259,10 @@ def show_study(title, rows, missed):
     Console(width=max(Console().width, MIN_TABLE_COLUMNS)).print(table)
 
 
-def show_trials(title, rows, metrics=None):
+def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None = None) -> None:
     """Print the statistics of results over trials as a table.
 
-    rows: rows of trials.statistics and trials.comparison; metrics: names of the printed results in their order, None
+    rows: of trials.statistics and trials.comparison; metrics: names of the printed results in their order, None
     for all rows. The rows of a comparison are printed for the first of these results only.
     """
     from rich.box import SIMPLE_HEAD
@@ -247,7 +271,8 @@ def show_trials(title, rows, metrics=None):
     from rich.text import Text
 
     from pedestal_analysis.trials.statistics import coverage
-    of_results, others = {}, []
+    of_results: dict[tuple[str, str, str], dict[str, Row]] = {}
+    others: list[Row] = []
     for row in rows:
         metric, _, key = row['metric'].rpartition('/')
         if metrics is not None and metric not in metrics:
@@ -272,10 +297,10 @@ def show_trials(title, rows, metrics=None):
     Console(width=max(Console().width, MIN_TABLE_COLUMNS + longest)).print(table)
 
 
-def show_tried(key, unit, tried):
+def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:
     """Print the values that a search has tried as a table, with the mean of the result at each.
 
-    key, unit: parameter 'node.key' of the search and its unit; tried: [solve.Tried] by rising value.
+    key, unit: parameter 'node.key' of the search and its unit; tried: by rising value.
     """
     from rich.box import SIMPLE_HEAD
     from rich.console import Console

@@ -109,7 +109,7 @@ def test_the_loss_at_half_a_beamwidth_is_half_of_the_power():
                         (off, (10.0 * math.log10(1.0 / 0.75), 3.01)), (np.zeros(run.t.size), (0.0, 0.0))):
         for swapped in (False, True):
             first, second = (np.zeros(run.t.size), error)[::-1 if swapped else 1]
-            moved = dataclasses.replace(run, cross_elevation=first, elevation_error=second)
+            moved = dataclasses.replace(run, error=np.column_stack((first, second)))
             assert (pointing_loss.mean_db(moved), pointing_loss.max_db(moved)) == pytest.approx(loss, abs=0.02)
     assert math.isnan(pointing_loss.mean_db(dataclasses.replace(run, tracking=np.zeros(run.t.size, bool))))
     assert math.isnan(pointing_loss.max_db(dataclasses.replace(run, beamwidth=math.nan)))

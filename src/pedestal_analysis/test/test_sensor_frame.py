@@ -29,7 +29,7 @@ class Without(what_if.Overlay):
 def error_against_the_true_direction(bag, run):
     """Estimate minus true target (n, 2), both seen from the true beam: the error of the filter of a rigid antenna."""
     estimate = tracking.on_grid(bag, run.t, 'acu/estimate', ('azimuth.position', 'elevation.position'))
-    beam, attitude = np.column_stack((run.azimuth, run.elevation)), None
+    beam, attitude = run.encoders, None
     if 'adu/truth' in bag.topics:
         beam = tracking.on_grid(bag, run.t, 'adu/truth', ('azimuth.position', 'elevation.position'))
     if 'ship/truth' in bag.topics:
@@ -39,7 +39,7 @@ def error_against_the_true_direction(bag, run):
         line_of_sight.rotation(*(line_of_sight.ASHORE_ATTITUDE if attitude is None else attitude[k]), matrix)
         deck = line_of_sight.to_deck(matrix, *line_of_sight.earth_direction(*estimate[k]))
         out[k] = line_of_sight.offsets(*beam[k], *deck)
-    return (out - np.column_stack((run.cross_elevation, run.elevation_error)))[run.tracking]
+    return (out - run.error)[run.tracking]
 
 
 @pytest.fixture(scope='module')

@@ -2,7 +2,6 @@
 import re
 
 import numba
-import numpy as np
 import pytest
 
 from adu_drive import drive_unit, lanes
@@ -69,6 +68,6 @@ def test_the_plant_is_compiled_to_vectors():
         drives = adu_unit.DRIVE_LANES(flat)
         drive_unit.between_speed_periods(drives.state.azimuth, drives.constants.azimuth, 2)
 
-    period(lanes.to_lanes(np.zeros(1, adu_unit.Record)))
+    period(lanes.to_lanes(adu_unit.DriveRecord.zeros()))
     assembly, = period.inspect_asm().values()
     assert len(re.findall(r'vdivpd\s.*%[yz]mm', assembly)) >= 3

@@ -1,5 +1,5 @@
 """Types of numbers and arrays: what a number means, its unit or its shape. numba and Python ignore both; a reader and
-mypy do not. Three types at the end stand for data without a declared type.
+mypy do not. The types at the end stand for data without a declared type.
 
 `Radians` is a float, `Pairs` is an array of floats of shape (n, 2). A shape such as `Vector3` also gives the size of
 an array in a record (record.Record).
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
 Bools: TypeAlias = NDArray[np.bool_]
+Bytes: TypeAlias = NDArray[np.uint8]
 Complexes: TypeAlias = NDArray[np.complex128]
 Texts: TypeAlias = NDArray[np.str_]
 Records: TypeAlias = NDArray[np.void]               # records of one declared type (record.Record)
@@ -42,11 +43,15 @@ Pair: TypeAlias = Annotated[Floats, (2,)]           # azimuth and elevation, or 
 Vector3: TypeAlias = Annotated[Floats, (3,)]
 Quaternion: TypeAlias = Annotated[Floats, (4,)]     # x, y, z, w
 Matrix3: TypeAlias = Annotated[Floats, (3, 3)]
+Xyz: TypeAlias = tuple[float, float, float]         # a vector in a law, in place of an array
+Xyzw: TypeAlias = tuple[float, float, float, float]     # a quaternion in a law, in place of an array
 Pairs: TypeAlias = Annotated[Floats, '(n, 2)']
 Vectors3: TypeAlias = Annotated[Floats, '(n, 3)']
 Quaternions: TypeAlias = Annotated[Floats, '(n, 4)']
 Times: TypeAlias = Annotated[Floats, '(n,) s']
 Stamps: TypeAlias = Annotated[Ints, '(n,) ns']
+
+Estimate: TypeAlias = tuple[float, float, float]    # a value, and the low and the high end of its confidence interval
 
 _R = TypeVar('_R')
 BothAxes: TypeAlias = Annotated[Sequence[_R], (2,)]     # a record of each axis: azimuth, elevation
@@ -55,3 +60,5 @@ AnyRecord: TypeAlias = Any  # a record whose fields depend on data, as those of 
 Message: TypeAlias = Any    # a ROS message, whose class is made by ROS without types
 Json: TypeAlias = Any       # what a JSON or YAML file holds; the code that takes a value from it checks the value
 Value: TypeAlias = Any      # of a parameter or of an argument of a command, whose declaration states the type
+Row: TypeAlias = dict[str, Any]     # of the rows of a --json file, see pedestal_analysis.results.intervals.row
+Table: TypeAlias = dict[str, Any]   # {column: Floats} with a row per message of a topic; a column of texts is a list

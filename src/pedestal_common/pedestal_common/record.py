@@ -46,6 +46,14 @@ class Record:
         """Return records (count,) in which each number is 0."""
         return np.zeros(count, cls.dtype)
 
+    @classmethod
+    def of(cls, **values: object) -> Records:
+        """Return a record (1,) with these values of its fields; a field without a value is 0."""
+        record = cls.zeros()
+        for name, value in values.items():
+            record[name] = value
+        return record
+
 
 def _form(cls: type, name: str, hint: object) -> tuple[object, ...]:
     """Return (type,) or (type, shape) of a field for numpy. Raises TypeError for another type."""

@@ -99,7 +99,7 @@ K_p, K_iT                     gains of the constants of each axis, for two motor
 follow_gain                   share of the way that `followed` moves in a period
 """
 
-Record = np.dtype([('state', drive_unit.State), ('constants', drive_unit.Constants),
+Record = np.dtype([('state', drive_unit.State.dtype), ('constants', drive_unit.Constants.dtype),
                          ('inputs', drive_unit.Inputs.dtype), ('outputs', drive_unit.Outputs.dtype),
                          ('link', adu_unit.Link.dtype), ('drives', DRIVES_DTYPE), ('scales', SCALES_DTYPE)],
                         align=True)

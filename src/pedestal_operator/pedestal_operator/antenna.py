@@ -4,58 +4,53 @@ The antenna is a running graph (remote_node.Remote), or a recording (pedestal_an
 """
 import abc
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from pedestal_common.geometry import pointing_report
 from pedestal_common.graph import nodes
+from pedestal_common.quantities import Degrees, Message, Seconds
 
 POINTING_TOPIC = 'acu/pointing'  # topic with the report of the pointing model in force
 MAX_MESSAGE_AGE_S = 2.5  # age after which the last message is stale [s]
 
 
 class Antenna(abc.ABC):
-    """Reader of the last messages of an antenna.
-
-    beam      prefix of the nodes of one beam, such as 'beam_2/'; '' without several beams
-    numbers   {topic: numbers of its last message, in the order of `layouts.columns`}
-    texts     {topic: its last text}
-    status    {node: its last DiagnosticStatus}
-    alarms    list of the DiagnosticStatus on acu/alarms
-    """
-    beam: str
-    numbers: dict
-    texts: dict
-    status: dict
-    alarms: list
+    """Reader of the last messages of an antenna."""
+    beam: str                           # prefix of the nodes of one beam, such as 'beam_2/'; '' without several beams
+    numbers: dict[str, Sequence[float]]     # {topic: of its last message, in the order of `layouts.columns`}
+    texts: dict[str, str]               # {topic: its last text}
+    status: dict[str, Message]          # {node: its last DiagnosticStatus}
+    alarms: list[Message]               # the DiagnosticStatus on acu/alarms
 
     @abc.abstractmethod
-    def age(self, name) -> float:
-        """Return the age of the last message of a topic or node [s], infinite before the first."""
+    def age(self, name: str) -> Seconds:
+        """Return the age of the last message of a topic or node, infinite before the first."""
 
-    def present(self, name, age=MAX_MESSAGE_AGE_S):
-        """Return True if the last message of a topic or node is younger than an age [s]."""
+    def present(self, name: str, age: Seconds = MAX_MESSAGE_AGE_S) -> bool:
+        """Return True if the last message of a topic or node is younger than an age."""
         return self.age(name) < age
 
-    def diagnostics_of(self, node) -> dict:
+    def diagnostics_of(self, node: str) -> dict[str, str]:
         """Return {key: text} of the last diagnostics of a node, {} if stale."""
         return self.last_diagnostics_of(node) if self.present(self.name_of(node)) else {}
 
-    def last_diagnostics_of(self, node) -> dict:
+    def last_diagnostics_of(self, node: str) -> dict[str, str]:
         """Return {key: text} of the last diagnostics of a node, however old, {} before the first."""
         status = self.status.get(self.name_of(node))
         return {pair.key: pair.value for pair in status.values} if status else {}
 
-    def name_of(self, node) -> str:
+    def name_of(self, node: str) -> str:
         """Return the name under which a node publishes its diagnostics: with the beam, for a node of a beam."""
         return self.beam + node if nodes.row(node).of_beam else node
 
-    def encoder_angles(self, topic):
-        """Return the encoder angles (azimuth, elevation) [deg] of joint_states or acu/reference, NaN if stale."""
+    def encoder_angles(self, topic: str) -> tuple[Degrees, Degrees]:
+        """Return the encoder angles (azimuth, elevation) of joint_states or acu/reference, NaN if stale."""
         return self._degrees(topic, 0)
 
-    def directions(self, topic):
-        """Return the direction of the beam on the sky, deck angles (azimuth, elevation) [deg], NaN if stale.
+    def directions(self, topic: str) -> tuple[Degrees, Degrees]:
+        """Return the direction of the beam on the sky, deck angles (azimuth, elevation), NaN if stale.
 
         topic: joint_states, or acu/reference for the commanded direction. The pointing model in force converts the
         encoder angles.
@@ -69,18 +64,18 @@ class Antenna(abc.ABC):
         return azimuth, elevation
 
     @property
-    def pointing_model(self):
-        """The pointing_report.Report of the model in force; None without a model, or with a text that is no report."""
+    def pointing_model(self) -> pointing_report.Report | None:
+        """Report of the model in force; None without a model, or with a text that is no report."""
         try:
             return pointing_report.read(self.texts.get(POINTING_TOPIC, ''))
         except ValueError:
             return None
 
-    def rates(self):
+    def rates(self) -> tuple[float, float]:
         """Return (azimuth, elevation) rates [deg/s] of the axes, NaN if stale."""
         return self._degrees('joint_states', 2)
 
-    def _degrees(self, topic, first):
+    def _degrees(self, topic: str, first: int) -> tuple[float, float]:
         """Return two numbers of a topic from index `first` on, in degrees, NaN if stale."""
         if not self.present(topic):
             return math.nan, math.nan

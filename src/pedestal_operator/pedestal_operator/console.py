@@ -8,13 +8,16 @@ import termios
 import textwrap
 import time
 import tty
+from collections.abc import Callable, Iterator, Mapping
 
 from rich.console import Group
 from rich.live import Live
 from rich.text import Text
 
 from pedestal_common.graph import topics
+from pedestal_common.quantities import Seconds
 from pedestal_operator import state
+from pedestal_operator.remote_node import Remote, RemoteSession
 from pedestal_operator.requests import JOG_REPEAT_PERIOD_S
 
 KEY_HOLD_S = 0.35
@@ -41,13 +44,13 @@ VALUE_COLUMN_CHARS = 14  # width of a column of values [characters]
 
 
 @contextlib.contextmanager
-def keyboard():
+def keyboard() -> Iterator[Callable[[], list[str]]]:
     """Yield a function that returns the keys pressed since its last call, without waiting and without echo."""
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
     tty.setcbreak(descriptor)
 
-    def pressed():
+    def pressed() -> list[str]:
         text = ''
         while select.select([descriptor], [], [], 0)[0] and (data := os.read(descriptor, 1024)):
             text += data.decode(errors='replace')
@@ -64,14 +67,14 @@ def keyboard():
 
 
 class Console:
-    """Keys and screen of the console. session: a remote_node.RemoteSession.
+    """Keys and screen of the console."""
+    rate: float             # selected jog rate [deg/s]
+    last_reply: str         # text of the last reply, or of the last refusal without a request
+    finished: bool          # True after a key of QUIT_KEYS
+    _pending: dict[str, str]        # {number of a request: its command}
+    _jog: tuple[int, int] | None    # direction of the last arrow, None before the first
 
-    rate           selected jog rate [deg/s]
-    last_reply     text of the last reply, or of the last refusal without a request
-    finished       True after a key of QUIT_KEYS
-    """
-
-    def __init__(self, session):
+    def __init__(self, session: RemoteSession) -> None:
         self._remote = session.remote
         self._pending = {}
         self._jog, self._press_time, self._last_jog_time = None, 0.0, 0.0
@@ -79,8 +82,8 @@ class Console:
         self.last_reply = ''
         self.finished = False
 
-    def press(self, key, now):
-        """Take a pressed key at the time now [s]."""
+    def press(self, key: str, now: Seconds) -> None:
+        """Take a pressed key at the time now."""
         if key in QUIT_KEYS:
             self.finished = True
         elif key in KEY_COMMANDS:
@@ -96,7 +99,7 @@ class Console:
             place = JOG_RATES_DEG_S.index(self.rate) + (1 if key == '+' else -1)
             self.rate = JOG_RATES_DEG_S[min(max(place, 0), len(JOG_RATES_DEG_S) - 1)]
 
-    def update(self, now):
+    def update(self, now: Seconds) -> None:
         """Repeat a jog while its key is held, and take the replies."""
         if self._jog and now - self._press_time < KEY_HOLD_S and now - self._last_jog_time >= JOG_REPEAT_PERIOD_S:
             self._last_jog_time = now
@@ -107,19 +110,19 @@ class Console:
                 del self._pending[number]
                 self.last_reply = f'{verb}: {reply.text}'
 
-    def _refusal(self, verb):
+    def _refusal(self, verb: str) -> str:
         """Return the reason of the present refusal of a command, '' without a known reason."""
         holds_control = self._remote.diagnostics_of('acu').get('control', '') in ('', self._remote.who)
         return state.refusals(self._remote, holds_control).get(verb, '')
 
-    def _request(self, verb, arguments=None):
+    def _request(self, verb: str, arguments: Mapping[str, object] | None = None) -> None:
         if reason := self._refusal(verb):
             self.last_reply = f'{verb}: {reason}'
         else:
             self._pending[self._remote.request(verb, arguments)] = verb
 
-    def screen(self, width, height):
-        """Return the lines of the screen [Text], at most `height`.
+    def screen(self, width: int, height: int) -> list[Text]:
+        """Return the lines of the screen, at most `height`.
 
         Mode, first alarm, axes, reply and keys have their lines on every terminal of at least 60 x 20 characters.
         Further alarms and reports of nodes fill the rest.
@@ -133,7 +136,7 @@ class Console:
             line.no_wrap, line.overflow = True, 'ellipsis'
         return lines
 
-    def _key_lines(self, width):
+    def _key_lines(self, width: int) -> list[Text]:
         """Return the keys and their commands; a command that would be refused is dim."""
         cells = [Text(f'[{key}] {doc}', style='dim' if self._refusal(verb) else '')
                  for key, (verb, doc) in KEY_COMMANDS.items()]
@@ -148,7 +151,7 @@ class Console:
         return lines
 
 
-def _header_lines(remote):
+def _header_lines(remote: Remote) -> list[Text]:
     header = {name: (shown.text, LEVEL_STYLES[shown.level]) for name, shown in state.header(remote).items()}
     mode = state.header(remote)['mode']
     return [Text.assemble((mode.text.upper(), LEVEL_STYLES[mode.level] or 'bold'), '  ', header['reason']),
@@ -157,7 +160,7 @@ def _header_lines(remote):
                           header['control'])]
 
 
-def _alarm_lines(remote, width):
+def _alarm_lines(remote: Remote, width: int) -> list[Text]:
     """Return the alarm to look at first, and the recommended action."""
     first = state.first_alarm(remote)
     if not remote.diagnostics_of('acu'):
@@ -170,7 +173,7 @@ def _alarm_lines(remote, width):
             *_wrapped(f'-> {first["action"]}', width)]
 
 
-def _axis_lines(remote):
+def _axis_lines(remote: Remote) -> list[Text]:
     """Return the table of the axes."""
     actual, commanded, rates = remote.directions('joint_states'), remote.directions('acu/reference'), remote.rates()
     rows = {'actual [deg]': actual, 'commanded [deg]': commanded,
@@ -185,14 +188,14 @@ def _axis_lines(remote):
     return [*lines, Text.assemble(f'{"state":16}', *states)]
 
 
-def _receiver_line(remote):
-    x, y, level = (row.value for row in state.rows(remote) if row.group == 'receiver')
+def _receiver_line(remote: Remote) -> Text:
+    x, y, level = (row.value for row in state.rows(remote) if row.group == 'receiver' and isinstance(row.value, float))
     locked = remote.diagnostics_of('acu').get('locked') == '1'
     return Text.assemble('receiver  ', ('locked', '') if locked else ('no lock', 'yellow'),
                          f'  level {_number(level, 1)} dB-Hz  error {_number(x)} / {_number(y)} deg')
 
 
-def _report_lines(remote):
+def _report_lines(remote: Remote) -> list[Text]:
     """Return the further alarms and the reports of the nodes."""
     first = state.first_alarm(remote)
     further = [each for each in map(state.alarm, remote.alarms) if first and each['name'] != first['name']]
@@ -200,18 +203,18 @@ def _report_lines(remote):
             *(Text(f'{node}: {text}', style='yellow') for node, text in state.node_reports(remote))]
 
 
-def _wrapped(text, width, style=''):
+def _wrapped(text: str, width: int, style: str = '') -> list[Text]:
     """Return a text in one line, or in MAX_WRAPPED_LINES lines; the last one is cut at the width."""
     lines = textwrap.wrap(text, width)
     rest = ' '.join(lines[MAX_WRAPPED_LINES - 1:])
     return [Text(line, style=style) for line in (*lines[:MAX_WRAPPED_LINES - 1], rest)][:max(len(lines), 1)]
 
 
-def _number(value, digits=4):
+def _number(value: float, digits: int = 4) -> str:
     return '-' if math.isnan(value) else f'{value:.{digits}f}'
 
 
-def operate(session):
+def operate(session: RemoteSession) -> None:
     """Run the console until the operator quits it."""
     console = Console(session)
     with keyboard() as pressed, Live(auto_refresh=False, screen=True) as live:

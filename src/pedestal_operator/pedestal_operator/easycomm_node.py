@@ -12,9 +12,10 @@ import sys
 
 from pedestal_common import parameters
 from pedestal_common.node import shell
+from pedestal_common.quantities import Degrees, Seconds
 from pedestal_operator.rotator import easycomm
 from pedestal_operator.rotator.controller import PendingRequest
-from pedestal_operator.rotator.line_server import Client
+from pedestal_operator.rotator.line_server import Client, Stream
 from pedestal_operator.rotator.outcomes import OUTCOME_DONE, OUTCOME_REFUSED, Refused
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
@@ -30,31 +31,29 @@ class EasycommParameters(ServerParameters):
 
 
 class EasycommClient(Client):
-    """A connected program.
+    """A connected program."""
+    pending: list[tuple[str | None, PendingRequest]]    # lines with their requests, in order
+    set_point: tuple[Degrees, Degrees] | None = None    # the last one, because a line may have one of the angles only
+    refused: bool = False                               # True after a refused setting, until the next accepted one
 
-    pending     [(line, its controller.PendingRequest)] in order
-    set_point   last set-point (azimuth, elevation) [deg], because a line may have one of the angles only
-    refused     True after a refused setting, until the next accepted one
-    """
-    set_point, refused = None, False
-
-    def __init__(self, stream, name, longest):
+    def __init__(self, stream: Stream, name: str, longest: int) -> None:
         super().__init__(stream, name, longest)
         self.pending = []
 
 
-class EasycommNode(ServerNode):
+class EasycommNode(ServerNode[EasycommClient]):
     """Server of EasyComm. A setting has no answer in this protocol, so the log and the status GS report a refusal."""
+    parameters: EasycommParameters
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('easycomm', EasycommParameters, easycomm.MAX_LINE_BYTES, EasycommClient)
 
     @property
-    def device(self):
+    def device(self) -> str:
         """Path of the serial device, '' for none."""
         return self.parameters.device
 
-    def serve(self, client, now):
+    def serve(self, client: EasycommClient, now: Seconds) -> None:
         """Execute the lines of a client, and note the outcomes of its requests."""
         while client.lines:
             line = client.lines.popleft()
@@ -67,13 +66,13 @@ class EasycommNode(ServerNode):
             self._note_outcomes(client, now)
         self._note_outcomes(client, now)
 
-    def _note_outcomes(self, client, now):
+    def _note_outcomes(self, client: EasycommClient, now: Seconds) -> None:
         """Note the known outcomes of the settings, in their order."""
         while client.pending and (outcome := client.pending[0][1].look(self, now)) is not None:
             line, pending = client.pending.pop(0)
             self._note(client, line, '' if outcome == OUTCOME_DONE else pending.reason)
 
-    def _note(self, client, line, refusal):
+    def _note(self, client: EasycommClient, line: str | None, refusal: str) -> None:
         """Note the outcome of a setting; refusal: its reason, '' for an accepted setting."""
         client.refused = bool(refusal)
         if refusal:
@@ -82,7 +81,7 @@ class EasycommNode(ServerNode):
         else:
             client.refusals.pop('setting', None)
 
-    def _do(self, client, line, request, now):
+    def _do(self, client: EasycommClient, line: str, request: easycomm.LineRequest, now: Seconds) -> None:
         control, name = self.controller, client.name
         pending = None
         if request.azimuth is not None or request.elevation is not None:
@@ -97,21 +96,22 @@ class EasycommNode(ServerNode):
         angles = self._angles(client, line) if request.queries else None
         client.queue_answer(easycomm.answer(request, angles, self._status(client, angles), 0, SERVER_VERSION))
 
-    def _point(self, client, angles, now):
-        """Return the pending request of a set-point. angles: (azimuth, elevation) [deg]; an angle that is None keeps
-        its last value."""
+    def _point(self, client: EasycommClient, angles: tuple[Degrees | None, Degrees | None],
+               now: Seconds) -> PendingRequest:
+        """Return the pending request of a set-point. angles: azimuth, elevation; an angle that is None keeps its last
+        value."""
         try:
             last = None if client.refused else self.controller.pointing.set_point(now)
             before = client.set_point or last or self.controller.pointing.earth_angles()
         except Refused as refused:
             return PendingRequest([], now, refused.outcome, refused.reason)
-        set_point = tuple(angle if given is None else given for given, angle in zip(angles, before))
-        pending = self.controller.go(client.name, *set_point, now)
-        client.set_point = set_point if pending.outcome is None else client.set_point
+        azimuth, elevation = (angle if given is None else given for given, angle in zip(angles, before))
+        pending = self.controller.go(client.name, azimuth, elevation, now)
+        client.set_point = (azimuth, elevation) if pending.outcome is None else client.set_point
         return pending
 
-    def _angles(self, client, line):
-        """Return the angles [deg] of the antenna, None while they are unknown."""
+    def _angles(self, client: EasycommClient, line: str) -> tuple[Degrees, Degrees] | None:
+        """Return the angles of the antenna, None while they are unknown."""
         try:
             angles = self.controller.pointing.earth_angles()
         except Refused as refused:
@@ -120,7 +120,7 @@ class EasycommNode(ServerNode):
         client.refusals.pop('query', None)
         return angles
 
-    def _status(self, client, angles):
+    def _status(self, client: EasycommClient, angles: tuple[Degrees, Degrees] | None) -> int:
         """Return the status number in the answer to GS."""
         if client.refused or angles is None:
             return easycomm.STATUS_ERROR
@@ -128,7 +128,7 @@ class EasycommNode(ServerNode):
         return easycomm.STATUS_MOVING if moving else easycomm.STATUS_IDLE
 
 
-def main(args=None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Run the server until it is stopped. args: of the command line, None for sys.argv."""
     return shell.main(EasycommNode, args)
 

@@ -25,7 +25,7 @@ class FramesNode(shell.Shell):
     """Publisher of the model at the start, and of the frames while tf has a subscriber, if tf2_msgs is installed."""
     awaits = 'its end'
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('frames', parameters.Parameters)
         text = messages.String(data=frames.PEDESTAL_URDF)
         description = self.create_publisher(middleware.message_class(text.__msgtype__), 'robot_description',
@@ -42,7 +42,7 @@ class FramesNode(shell.Shell):
         self._tf = self.create_publisher(TFMessage, 'tf', QoSProfile(depth=TF_QUEUE_DEPTH))
         self.every(FRAME_PERIOD_S, self._publish_frames)
 
-    def _publish_frames(self):
+    def _publish_frames(self) -> None:
         self._frames.set_active(self._tf.get_subscription_count() > 0)
         stamp, transforms = self._frames.read()
         if stamp != self._published_stamp:
@@ -50,7 +50,7 @@ class FramesNode(shell.Shell):
             self._tf.publish(messages.serialize(frames.tf_message(stamp, transforms)))
 
 
-def main(args=None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Run the node until it is stopped. args: of the command line, None for sys.argv."""
     return shell.main(FramesNode, args)
 

@@ -10,10 +10,14 @@ import pedestal_common.entry  # noqa: F401
 import dataclasses
 import queue
 import sys
+from collections.abc import Mapping
+from types import ModuleType
 
 from pedestal_common import parameters
 from pedestal_common.graph import topics
+from pedestal_common.graph.nodes import Link
 from pedestal_common.node import shell
+from pedestal_common.quantities import Message, Nanoseconds
 from pedestal_common.wire import messages
 from pedestal_operator.viewers import frames
 from pedestal_operator.viewers.frame_source import FrameSource
@@ -34,7 +38,7 @@ class LiveParameters(parameters.Parameters):
     port: int = parameters.parameter(8765, 0, 65535, '', 'TCP port; 0: a free port, which the node prints')
 
 
-def sdk():
+def sdk() -> ModuleType:
     """Return the package foxglove. Raises ValueError with the command for its installation if it is missing."""
     try:
         import foxglove
@@ -46,57 +50,57 @@ def sdk():
 
 
 class Outlet:
-    """Channel of the Foxglove server with CDR messages of one type. last: (bytes, send time [ns]) of the last message,
-    None before the first."""
+    """Channel of the Foxglove server with CDR messages of one type."""
+    last: tuple[bytes, Nanoseconds] | None      # the last message and its send time, None before the first
 
-    def __init__(self, name, type_name):
+    def __init__(self, name: str, type_name: str) -> None:
         foxglove = sdk()
         schema = foxglove.Schema(name=type_name, encoding='ros2msg', data=messages.definition(type_name))
         self.channel = foxglove.Channel(name, schema=schema, message_encoding='cdr')
         self.last = None
 
-    def publish(self, data, sent):
+    def publish(self, data: bytes, sent: Nanoseconds) -> None:
         """Send a message to all viewers without waiting; a slow viewer loses its oldest messages."""
         self.last = data, sent
         self.channel.log(data, log_time=sent)
 
-    def republish(self):
+    def republish(self) -> None:
         """Send the last message again."""
         if self.last:
             self.channel.log(self.last[0], log_time=self.last[1])
 
 
 class TopicOutlet(Outlet):
-    """Channel of a topic (nodes.Link) of the graph. The subscription lasts while the channel has a viewer, and always
+    """Channel of a topic of the graph. The subscription lasts while the channel has a viewer, and always
     for a latched topic."""
 
-    def __init__(self, node, link):
+    def __init__(self, node: shell.Shell, link: Link) -> None:
         super().__init__(f'/{link.name}', link.type)
         self._topic = OnDemand(node, link, self._take)
         self.latched = topics.QOS_BY_RATE[link.rate].latched
 
-    def look(self):
+    def look(self) -> None:
         """Begin or end the subscription to the topic."""
         self._topic.set_active(self.latched or self.channel.has_sinks())
 
-    def _take(self, data, info):
+    def _take(self, data: bytes, info: Mapping[str, int]) -> None:
         self.publish(data, info['source_timestamp'])
 
 
 class NewSubscriptions:
     """Topics with a new viewer, reported by the server from its own thread."""
 
-    def __init__(self):
-        self._topics = queue.SimpleQueue()
+    def __init__(self) -> None:
+        self._topics: queue.SimpleQueue[str] = queue.SimpleQueue()
 
-    def on_subscribe(self, _client, channel):
+    def on_subscribe(self, _client: object, channel: Message) -> None:
         """Note a topic with a new viewer; called by the server."""
         self._topics.put(channel.topic)
 
-    def on_unsubscribe(self, _client, _channel):
+    def on_unsubscribe(self, _client: object, _channel: object) -> None:
         """Do nothing; called by the server."""
 
-    def taken(self):
+    def taken(self) -> set[str]:
         """Return the names of the topics since the last call, each once."""
         names = set()
         while not self._topics.empty():
@@ -107,8 +111,10 @@ class NewSubscriptions:
 class LiveNode(shell.Shell):
     """Read-only server of the topics of the graph, its frames and the model of the pedestal."""
     awaits = 'clients'
+    parameters: LiveParameters
+    _latched: dict[str, Outlet]     # {name of a channel whose last message every new viewer receives}
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('live', LiveParameters)
         self._foxglove, p = sdk(), self.parameters
         self._topics = [TopicOutlet(self, link) for link in self.links.values()]
@@ -127,13 +133,13 @@ class LiveNode(shell.Shell):
         self.every(POLL_PERIOD_S, self._look)
         self.every(FRAME_PERIOD_S, self._publish_frames)
 
-    def _look(self):
+    def _look(self) -> None:
         for outlet in self._topics:
             outlet.look()
         for name in self._new_subscriptions.taken() & set(self._latched):
             self._latched[name].republish()
 
-    def _publish_frames(self):
+    def _publish_frames(self) -> None:
         watched = self._transforms.has_sinks()
         self._frames.set_active(watched)
         stamp, transforms = self._frames.read()
@@ -146,13 +152,13 @@ class LiveNode(shell.Shell):
             translation=make.Vector3(**dict(zip('xyz', given.translation))),
             rotation=make.Quaternion(**dict(zip('xyzw', given.rotation)))) for given in transforms]))
 
-    def close(self):
+    def close(self) -> None:
         """Close the server, then the node."""
         self._server.stop()
         super().close()
 
 
-def main(args=None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Run the server until it is stopped. args: of the command line, None for sys.argv."""
     return shell.main(LiveNode, args)
 

@@ -14,12 +14,16 @@ import dataclasses
 import socket
 import sys
 import time
+from collections.abc import Callable, Mapping, Sequence
 
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import GetParameters
+from rclpy.client import Client
+from rclpy.task import Future
 
 from pedestal_common import parameters
 from pedestal_common.node import shell
+from pedestal_common.quantities import Message, Seconds
 from pedestal_common.wire import commands
 from pedestal_operator.page import page_security, page_sky, page_state
 from pedestal_operator.page.page_log import Log
@@ -41,12 +45,18 @@ class PageParameters(parameters.Parameters):
     clients: int = parameters.parameter(32, 1, 256, '', 'largest number of open pages')
 
 
-class PageNode(Remote):
+class PageNode(Remote, page_state.PageAntenna):
     """Client of the graph for all pages; a command carries the name of the user of its page."""
     awaits = 'pages'
     """What the node waits for, in the line that it logs when it is ready (Shell.awaits)."""
 
-    def __init__(self):
+    parameters: PageParameters
+    _server: PageServer
+    _history: collections.deque[list[float]]                                # rows of the strip charts
+    _parameter_requests: dict[str, tuple[Client | None, Future | None]]     # {node: client, pending request}
+    _sent_log_revision: int | None
+
+    def __init__(self) -> None:
         super().__init__('operator_page', 'page', parameters_type=PageParameters)
         self.path, self.configuration, self.log = None, {}, Log()
         self._history = collections.deque(maxlen=round(page_state.CHART_SPAN_S / page_state.CHART_PERIOD_S))
@@ -75,45 +85,45 @@ class PageNode(Remote):
         self.every(SLOW_STATE_PERIOD_S, self._send_slow_state)
 
     @property
-    def now(self):
-        """Time in UTC [s]."""
+    def now(self) -> Seconds:
+        """Time in UTC."""
         return self.clock()[1] * 1e-9
 
-    def _request_for(self, client, command, arguments):
+    def _request_for(self, client: str, command: str, arguments: Mapping[str, object]) -> str:
         """Send a command in the name of the user of a page, and return the number of the request."""
         self.who = client
         return self.request(command, arguments)
 
-    def _take_reply(self, status):
+    def _take_reply(self, status: Message) -> None:
         """Keep the reply to a request of a page, and log the replies to all clients."""
         super()._take_reply(status)
         with contextlib.suppress(ValueError):
             self.log.replied(self.now, *commands.of_reply(status))
 
-    def _text_taker(self, topic):
+    def _text_taker(self, topic: str) -> Callable[[Message], None]:
         take = super()._text_taker(topic)
 
-        def logged(message):
+        def logged(message: Message) -> None:
             take(message)
             self.log.text(self.now, topic, message.data)
         return logged
 
-    def _take_alarms(self, array):
+    def _take_alarms(self, array: Message) -> None:
         super()._take_alarms(array)
         self.log.alarms(self.now, page_state.alarms(self))
 
-    def _take_program(self, message):
+    def _take_program(self, message: Message) -> None:
         path = page_sky.path(message, page_state.epoch(self))
         self.path = self.path if path is None else path
 
-    def _take_commands(self):
+    def _take_commands(self) -> None:
         """Take the commands of the pages."""
         now = time.monotonic()
         while not self._server.requests.empty():
             self._pages.take(self._server.requests.get_nowait(), now)
         self._pages.look(now)     # forwards replies, and ends the jogs of silent pages
 
-    def _send_state(self):
+    def _send_state(self) -> None:
         """Send the newest state, if a page is open."""
         if not self._server.pages:
             return
@@ -123,12 +133,12 @@ class PageNode(Remote):
             sections['log'], self._sent_log_revision = list(self.log.lines), self.log.revision
         self._server.publish(sections)
 
-    def _add_chart_point(self):
+    def _add_chart_point(self) -> None:
         """Add a point to the strip charts, for later pages."""
         if self.present('joint_states'):
             self._history.append(page_state.history_row(page_state.now(self)))
 
-    def _send_slow_state(self):
+    def _send_slow_state(self) -> None:
         """Send the slow part of the state: history of the beam, parameters of the nodes, sky."""
         for node, names in page_state.SHOWN_PARAMETERS.items():
             self._request_parameters(node, names)
@@ -137,7 +147,7 @@ class PageNode(Remote):
         self._server.publish({'fixed': page_state.fixed(self), 'past': self._beam_history.places,
                               'sky': page_state.sky(self, self._upcoming_passes.look(self))})
 
-    def _request_parameters(self, node, names):
+    def _request_parameters(self, node: str, names: Sequence[str]) -> None:
         """Request parameters of a node when it appears, and again after each time in which it was silent."""
         client, future = self._parameter_requests.get(node) or (None, None)
         if not self.present(node):
@@ -149,7 +159,7 @@ class PageNode(Remote):
             future.add_done_callback(lambda done: self._take_parameters(names, done.result()))
         self._parameter_requests[node] = client, future
 
-    def _take_parameters(self, names, response):
+    def _take_parameters(self, names: Sequence[str], response: Message) -> None:
         for name, value in zip(names, response.values):
             content = {ParameterType.PARAMETER_INTEGER: value.integer_value,
                        ParameterType.PARAMETER_DOUBLE: value.double_value,
@@ -157,14 +167,14 @@ class PageNode(Remote):
             if content is not None:
                 self.configuration[name] = content
 
-    def close(self):
+    def close(self) -> None:
         """Close the server, then the node."""
         self._server.close()
         self._upcoming_passes.close()
         super().close()
 
 
-def main(args=None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Run the server until it is stopped. args: of the command line, None for sys.argv."""
     return shell.main(PageNode, args)
 

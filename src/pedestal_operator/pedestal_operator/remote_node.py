@@ -7,14 +7,19 @@ import math
 import os
 import socket
 import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
 from rcl_interfaces.srv import GetParameters
+from rclpy.client import Client
+from rclpy.task import Future
 
 from pedestal_common import parameters
 from pedestal_common.graph import domain, nodes
 from pedestal_common.graph.steps import GraphError
 from pedestal_common.node import middleware
 from pedestal_common.node.shell import Shell
+from pedestal_common.quantities import Message, Seconds
 from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import Reply
 from pedestal_operator.antenna import POINTING_TOPIC, Antenna
@@ -32,8 +37,10 @@ DISCOVERY_MARGIN_S = 0.05
 RETRY_PERIOD_S = 1.0
 """Time without a reply after which a command is repeated [s], because discovery may have been incomplete."""
 
+_R = TypeVar('_R')
 
-def user():
+
+def user() -> str:
     """Return the name of the person at the terminal: login@host."""
     try:
         name = getpass.getuser()
@@ -43,18 +50,13 @@ def user():
 
 
 class Remote(Shell, Antenna):
-    """Client of a graph.
+    """Client of a graph."""
+    who: str                        # name of the person or program in the next commands
+    node: nodes.Node                # which receives the commands
+    arrivals: dict[str, Seconds]    # {topic or node: time of its last message, monotonic clock}
 
-    who       name of the person or program in the next commands
-    node      row of nodes.NODES of the node that receives the commands
-    numbers   {topic: numbers of its last message in the order of `layouts.columns`}
-    texts     {topic: its last text}
-    status    {node: its last DiagnosticStatus}
-    alarms    list of the DiagnosticStatus on acu/alarms
-    arrivals  {topic or node: time of its last message [s, monotonic clock]}
-    """
-
-    def __init__(self, name, who, node='acu', beam='', parameters_type=parameters.Parameters):
+    def __init__(self, name: str, who: str, node: str = 'acu', beam: str = '',
+                 parameters_type: type[parameters.Parameters] = parameters.Parameters) -> None:
         super().__init__(name, parameters_type)
         self.links = nodes.links(nodes.MAX_BEAMS if beam else 0)
         self.beam = f'{beam}/' if beam else ''
@@ -70,103 +72,106 @@ class Remote(Shell, Antenna):
         self.message_reader(self.node.replies, self._take_reply)
         self._send_command = self.writer(self.node.obeys)
 
-    def subscribe_numbers(self, topic):
+    def subscribe_numbers(self, topic: str) -> None:
         """Subscribe to a further topic of numbers."""
         decoder = records.Decoder(topic, records.empty(records.of(topic), 1))
 
-        def take(message, _):
+        def take(message: Sequence[float], _: bool) -> None:
             self.numbers[topic], self.arrivals[topic] = message, time.monotonic()
         self.reader(topic, decoder.decoded, take)
 
-    def _text_taker(self, topic):
-        def take(message):
+    def _text_taker(self, topic: str) -> Callable[[Message], None]:
+        def take(message: Message) -> None:
             self.texts[topic], self.arrivals[topic] = message.data, time.monotonic()
         return take
 
-    def _take_alarms(self, array):
+    def _take_alarms(self, array: Message) -> None:
         self.alarms = array.status
 
-    def _take_status(self, array):
+    def _take_status(self, array: Message) -> None:
         for status in array.status:
             self.status[status.name], self.arrivals[status.name] = status, time.monotonic()
 
-    def _take_reply(self, status):
+    def _take_reply(self, status: Message) -> None:
         try:
             command, reply = commands.of_reply(status)
         except ValueError:
             return
         self._requests.take(command, reply)
 
-    def request(self, verb, arguments=None) -> str:
+    def request(self, verb: str, arguments: Mapping[str, object] | None = None) -> str:
         """Send a command with {argument: value}. Return the number of the request, for `replied`."""
         number = self._requests.add(verb, self.who, arguments).number
         self.repeat_request(number)
         return number
 
-    def repeat_request(self, number):
+    def repeat_request(self, number: str) -> None:
         """Send a request again under its number; its reply may then arrive twice."""
         self._send_command(messages.serialize(commands.message(self._requests.pending_command(number))))
 
-    def replied(self, number) -> Reply | None:
-        """Return the Reply to a request once, None before it arrives."""
+    def replied(self, number: str) -> Reply | None:
+        """Return the reply to a request once, None before it arrives."""
         return self._requests.replied(number)
 
-    def age(self, name):
-        """Return the age of the last message of a topic or node [s], infinite before the first."""
+    def age(self, name: str) -> Seconds:
+        """Return the age of the last message of a topic or node, infinite before the first."""
         return time.monotonic() - self.arrivals.get(name, -math.inf)
 
-    def exists(self, name):
+    def exists(self, name: str) -> bool:
         """Return True if a topic has a publisher, or had one."""
         return name in self.arrivals or self.count_publishers(self._link(name)[1]) > 0
 
-    def query(self, names):
+    def query(self, names: Sequence[str]) -> 'Query':
         """Return a Query for parameters of the commanded node."""
         return Query(self.create_client(GetParameters, f'{self.beam}{self.node.name}/get_parameters'), names)
 
 
 class Query:
-    """Request for numeric parameters of a node. values: [number], None before the reply of the node."""
+    """Request for numeric parameters of a node."""
+    values: list[float] | None      # None before the reply of the node
 
-    def __init__(self, client, names):
+    def __init__(self, client: Client, names: Sequence[str]) -> None:
         self._client, self._request = client, GetParameters.Request(names=names)
         self._request_time = -math.inf
         self.values = None
 
-    def look(self):
+    def look(self) -> None:
         """Request the parameters, and repeat the request until the reply arrives."""
         now = time.monotonic()
         if self.values is None and now - self._request_time > RETRY_PERIOD_S and self._client.service_is_ready():
             self._request_time = now
             self._client.call_async(self._request).add_done_callback(self._take)
 
-    def _take(self, future):
+    def _take(self, future: Future) -> None:
         """Take a reply, which may be that of an earlier request."""
         self.values = self.values or [value.double_value for value in future.result().values] or None
 
 
 class RemoteSession:
-    """A Remote with its executor, as a context. make() returns the Remote; arguments: arguments for ROS 2."""
+    """A Remote with its executor, as a context."""
+    remote: Remote      # from the begin of the context
 
-    def __init__(self, make, arguments=()):
+    def __init__(self, make: Callable[[], Remote], arguments: Sequence[str] = ()) -> None:
+        """Keep the function that makes the Remote, and the arguments for ROS 2."""
         self._make, self._arguments = make, arguments
 
-    def __enter__(self):
+    def __enter__(self) -> 'RemoteSession':
         middleware.initialise(self._arguments)
         self.remote = self._make()
         self._executor = middleware.make_executor()
         self._executor.add_node(self.remote)
         return self
 
-    def __exit__(self, *_):
-        import rclpy
+    def __exit__(self, *_: object) -> None:
+        from rclpy.utilities import try_shutdown
         self.remote.destroy_node()
-        rclpy.try_shutdown()
+        try_shutdown()
 
-    def spin(self, seconds):
+    def spin(self, seconds: Seconds) -> None:
         """Receive messages for some seconds, or until the first callback."""
         self._executor.spin_once(timeout_sec=seconds)
 
-    def until(self, condition, seconds):
+    def until(self, condition: Callable[[], _R], seconds: Seconds) -> _R:
         """Receive messages until condition() is true, for some seconds at most. Return the last value of
         condition()."""
         deadline = time.monotonic() + seconds
@@ -174,7 +179,7 @@ class RemoteSession:
             self.spin(0.05)
         return value
 
-    def wait_for_node(self, seconds=REPLY_TIMEOUT_S):
+    def wait_for_node(self, seconds: Seconds = REPLY_TIMEOUT_S) -> None:
         """Wait for the connections to and from the commanded node. Raises GraphError after `seconds`."""
         row, remote = self.remote.node, self.remote
         _, command_topic = remote._link(row.obeys)
@@ -186,8 +191,9 @@ class RemoteSession:
                              f'{domain.hint(domain_id)}')
         self.until(lambda: False, DISCOVERY_MARGIN_S)
 
-    def request(self, verb, arguments=None, seconds=REPLY_TIMEOUT_S) -> Reply:
-        """Send a command and wait for the Reply. Raises GraphError after `seconds`."""
+    def request(self, verb: str, arguments: Mapping[str, object] | None = None,
+                seconds: Seconds = REPLY_TIMEOUT_S) -> Reply:
+        """Send a command and wait for the reply. Raises GraphError after `seconds`."""
         number, deadline = self.remote.request(verb, arguments), time.monotonic() + seconds
         while (reply := self.until(lambda: self.remote.replied(number),
                                    min(RETRY_PERIOD_S, deadline - time.monotonic()))) is None:
@@ -196,8 +202,8 @@ class RemoteSession:
             self.remote.repeat_request(number)
         return reply
 
-    def hold_jog(self, verb, arguments, seconds) -> Reply:
-        """Repeat a jog for some seconds, then stop the axes. Return the last Reply.
+    def hold_jog(self, verb: str, arguments: Mapping[str, object], seconds: Seconds) -> Reply:
+        """Repeat a jog for some seconds, then stop the axes. Return the last reply.
 
         The axes are also stopped if this program is stopped. If the antenna has left the mode of the jog meanwhile,
         its new mode stays.

@@ -9,10 +9,13 @@ import pedestal_common.entry  # noqa: F401
 # isort: split
 import dataclasses
 import sys
+from collections.abc import Sequence
 
 from pedestal_common import parameters
 from pedestal_common.node import shell
+from pedestal_common.quantities import Seconds
 from pedestal_operator.rotator import outcomes, rotctld
+from pedestal_operator.rotator.controller import PendingRequest
 from pedestal_operator.rotator.line_server import Client
 from pedestal_operator.rotator.outcomes import Refused
 from pedestal_operator.rotator.rotctld import RESULT_INVALID, RESULT_OK, RESULT_REJECTED
@@ -38,18 +41,20 @@ class RotctldParameters(ServerParameters):
 
 
 class RotctldClient(Client):
-    """A connected program. line: the line that waits for its answer; request, pending: its rotctld.Request and its
-    controller.PendingRequest."""
-    line = request = pending = None
+    """A connected program."""
+    line: str | None = None                                 # the line that waits for its answer
+    request: rotctld.Request = rotctld.Request('')          # of the line
+    pending: PendingRequest | None = None                   # of the line
 
 
-class RotctldNode(ServerNode):
+class RotctldNode(ServerNode[RotctldClient]):
     """Server of the rotctld protocol; it answers the lines of a client in order."""
+    parameters: RotctldParameters
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('rotctld', RotctldParameters, rotctld.MAX_LINE_BYTES, RotctldClient)
 
-    def serve(self, client, now):
+    def serve(self, client: RotctldClient, now: Seconds) -> None:
         """Answer the lines in order. A line that commands the antenna is answered after the reply of the control unit.
         """
         # A complete command without a line end counts as a line, because gpredict for Windows sends no line end.
@@ -64,7 +69,7 @@ class RotctldNode(ServerNode):
             else:
                 self._begin(client, client.lines.popleft(), now)
 
-    def _begin(self, client, line, now):
+    def _begin(self, client: RotctldClient, line: str | None, now: Seconds) -> None:
         """Answer a line, or begin its request. line: None if it was longer than rotctld.MAX_LINE_BYTES.
 
         A line for which rotctld.read returns None gets no answer.
@@ -87,7 +92,8 @@ class RotctldNode(ServerNode):
             except Refused as refused:
                 self._answer(client, RESULT_BY_OUTCOME[refused.outcome], refused.reason)
 
-    def _answer(self, client, result, reason='', lines=()):
+    def _answer(self, client: RotctldClient, result: int, reason: str = '',
+                lines: Sequence[tuple[str, str]] = ()) -> None:
         """Answer the line of a client; log a refusal with its reason."""
         client.queue_answer(rotctld.answer(client.request, result, lines))
         if result == RESULT_OK:
@@ -95,31 +101,33 @@ class RotctldNode(ServerNode):
         else:
             self.refuse(client, client.request.name, client.line, reason)
 
-    def _move(self, client, request, now):
+    def _move(self, client: RotctldClient, request: rotctld.Request, now: Seconds) -> None:
         """Begin a request that moves or stops the antenna, or refuse it if the server is read only."""
         if self.parameters.read_only:
             self._answer(client, RESULT_REJECTED, 'this server is read only (parameter read_only)')
             return
         control, name = self.controller, client.name
         if request.name == 'set_pos':
-            client.pending = control.go(name, *request.values, now)
+            azimuth, elevation = request.values
+            client.pending = control.go(name, azimuth, elevation, now)
         elif request.name == 'move':
             direction, percent = request.values
             # A percentage of -1 means that none was given.
             rate = self.parameters.jog_rate * (50 if percent == -1 else percent) / 100.0
-            client.pending = control.jog(name, [rate * part for part in rotctld.MOVE_DIRECTIONS[direction]], now)
+            client.pending = control.jog(name, [rate * part for part in rotctld.MOVE_DIRECTIONS[int(direction)]], now)
         elif request.name == 'stop':
             client.pending = control.stop(name, now)
         else:
             client.pending = control.do(name, ANTENNA_COMMAND_BY_NAME[request.name], now)
 
-    def _lines(self, request):
+    def _lines(self, request: rotctld.Request) -> Sequence[tuple[str, str]]:
         """Return [(name, text)], the values in the answer to a request without motion. Raises Refused."""
         if request.name == 'help':
             return rotctld.COMMAND_LIST_LINES
         pointing = self.controller.pointing
         if request.name == 'get_pos':
-            return rotctld.position(*pointing.earth_angles(), self.parameters.raw_azimuth)
+            azimuth, elevation = pointing.earth_angles()
+            return rotctld.position(azimuth, elevation, self.parameters.raw_azimuth)
         if request.name == 'get_info':
             mode = self.texts.get('acu/mode', 'no mode') if self.present('acu') else 'no control unit'
             return [('Info', f'pedestal, {mode}'[:63])]
@@ -131,7 +139,7 @@ class RotctldNode(ServerNode):
         return rotctld.state(limits, bool(request.separator))
 
 
-def main(args=None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Run the server until it is stopped. args: of the command line, None for sys.argv."""
     return shell.main(RotctldNode, args)
 

@@ -1,14 +1,17 @@
 """State of the antenna for the operator, derived from the last messages: values, alarms, refused commands.
 
-The page, the console, `pedestal status` and its JSON show these results and derive nothing themselves. All functions
-take an antenna.Antenna. A level is '' (normal), 'warn' or 'bad'.
+The page, the console, `pedestal status` and its JSON show these results and derive nothing themselves. A
+level is '' (normal), 'warn' or 'bad'.
 """
 import math
-import typing
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from pedestal_common.graph import topics
 from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.node.unit import LEVEL_OK
+from pedestal_common.quantities import Json, Message
+from pedestal_operator.antenna import Antenna
 
 BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
 """Modes with a button or a key; `stop` has a separate button, `rate` is the jog, `slave` is for programs."""
@@ -40,34 +43,34 @@ ALARM_KEYS = ('state', 'priority', 'annunciated', 'first_out', 'cause', 'action'
 """Keys of an alarm on acu/alarms."""
 
 
-class Row(typing.NamedTuple):
-    """An item of the state. value: a number or a text, None if it was not received."""
+class Row(NamedTuple):
+    """An item of the state."""
     group: str
     name: str
-    value: object
+    value: float | str | None   # None if it was not received
     unit: str = ''
 
     @property
-    def text(self):
+    def text(self) -> str:
         """Value as text for a person."""
         if self.json is None:
             return '-'
         return f'{self.value:.4f}' if isinstance(self.value, float) else str(self.value)
 
     @property
-    def json(self):
+    def json(self) -> float | str | None:
         """Value for JSON, which has no NaN."""
         return None if isinstance(self.value, float) and math.isnan(self.value) else self.value
 
 
-class Shown(typing.NamedTuple):
-    """A text for the operator. level: '' (normal), 'warn' or 'bad'."""
+class Shown(NamedTuple):
+    """A text for the operator."""
     text: str
-    level: str = ''
+    level: str = ''     # '' (normal), 'warn' or 'bad'
 
 
-def rows(antenna) -> list:
-    """Return the Rows of the present state."""
+def rows(antenna: Antenna) -> list[Row]:
+    """Return the items of the present state."""
     actual, commanded = antenna.directions('joint_states'), antenna.directions('acu/reference')
     acu = antenna.diagnostics_of('acu')
     found = [Row('angle', axis, angle, 'deg') for axis, angle in zip(topics.AXES, actual)]
@@ -82,8 +85,8 @@ def rows(antenna) -> list:
     return found
 
 
-def _receiver(antenna):
-    values = (math.nan,) * 3
+def _receiver(antenna: Antenna) -> tuple[tuple[str, float, str], ...]:
+    values: Sequence[float] = (math.nan,) * 3
     if antenna.present('tracking_receiver/angle_error'):
         values = antenna.numbers['tracking_receiver/angle_error']
     cross_elevation, elevation, level = values
@@ -91,14 +94,14 @@ def _receiver(antenna):
             ('elevation_error', math.degrees(elevation), 'deg'), ('level', float(level), 'dB-Hz'))
 
 
-def node_reports(antenna) -> list:
+def node_reports(antenna: Antenna) -> list[tuple[str, str]]:
     """Return [(node, text)] of the nodes whose diagnostics are not OK, and of silent nodes."""
     return [(name, 'silent' if not antenna.present(name) else status.message)
             for name, status in antenna.status.items() if not antenna.present(name) or status.level != LEVEL_OK]
 
 
-def header(antenna) -> dict:
-    """Return {item: Shown} of mode, reason, drive, control, fallback and link.
+def header(antenna: Antenna) -> dict[str, Shown]:
+    """Return {item: text} of mode, reason, drive, control, fallback and link.
 
     The mode of a silent control unit is unknown. The reason then states the last mode and its age.
     """
@@ -115,8 +118,8 @@ def header(antenna) -> dict:
             'control': Shown('unknown', 'bad'), 'fallback': Shown('unknown', 'bad'), 'link': link}
 
 
-def _drive(antenna, acu):
-    """Return the Shown state of the drive. acu: diagnostics of the control unit. Their text comes first, because the
+def _drive(antenna: Antenna, acu: Mapping[str, str]) -> Shown:
+    """Return the state of the drive. acu: diagnostics of the control unit. Their text comes first, because the
     control unit notices a silence of the drive first."""
     text = acu.get('drive') or (antenna.texts.get('adu/state') if antenna.present(antenna.name_of('adu')) else None)
     if not text:
@@ -129,8 +132,8 @@ def _drive(antenna, acu):
     return Shown(text, '' if text == 'enabled' else 'warn')
 
 
-def _link(antenna):
-    """Return the Shown state of the link to the graph: live, or the first silent node."""
+def _link(antenna: Antenna) -> Shown:
+    """Return the state of the link to the graph: live, or the first silent node."""
     if not antenna.present(antenna.name_of('acu')):
         return Shown('no ACU', 'bad')
     if is_drive_silent(antenna):
@@ -142,19 +145,19 @@ def _link(antenna):
     return Shown('live')
 
 
-def is_drive_silent(antenna):
+def is_drive_silent(antenna: Antenna) -> bool:
     """Return True if no angles arrive from the drive, or if the control unit reports its silence."""
     return antenna.diagnostics_of('acu').get('drive') == 'silent' or not antenna.present('joint_states')
 
 
-def axis_states(antenna) -> list:
-    """Return the Shown state of each axis: silent, limited, near a limit, stopped or moving."""
+def axis_states(antenna: Antenna) -> list[Shown]:
+    """Return the state of each axis: silent, limited, near a limit, stopped or moving."""
     acu = antenna.diagnostics_of('acu')
     return [_axis_state(is_drive_silent(antenna), acu.get(f'{axis} limited', ''), acu.get(f'{axis} limit_s', 'inf'),
                         rate) for axis, rate in zip(topics.AXES, antenna.rates())]
 
 
-def _axis_state(silent, limited, limit_s, rate):
+def _axis_state(silent: bool, limited: str, limit_s: str, rate: float) -> Shown:
     if silent:
         return Shown('silent', 'bad')
     if limited:
@@ -164,7 +167,7 @@ def _axis_state(silent, limited, limit_s, rate):
     return Shown('stopped' if abs(rate) < REST_RATE_DEG_S else 'moving')
 
 
-def refusals(antenna, holds_control, may_take=False) -> dict:
+def refusals(antenna: Antenna, holds_control: bool, may_take: bool = False) -> dict[str, str]:
     """Return {command: reason} of the OPERATOR_COMMANDS that the control unit would refuse now.
 
     holds_control: the client has control, or control is free; may_take: a supervisor takes control from others.
@@ -184,14 +187,14 @@ def refusals(antenna, holds_control, may_take=False) -> dict:
             if key.startswith(REFUSAL_PREFIX)} | refused
 
 
-def alarm(status) -> dict:
+def alarm(status: Message) -> dict[str, Json]:
     """Return an alarm of acu/alarms as {name, meaning, raised_s [s of the graph], further ALARM_KEYS}."""
     values = {pair.key: pair.value for pair in status.values}
     return {'name': status.name, 'meaning': status.message, **{key: values.get(key, '') for key in ALARM_KEYS},
             'raised_s': float(values.get('raised_s', 'nan'))}
 
 
-def first_alarm(antenna) -> dict | None:
+def first_alarm(antenna: Antenna) -> dict[str, Json] | None:
     """Return the alarm that the operator must look at first, None without alarms: the first unacknowledged one.
 
     The list on acu/alarms is in the order of priority and has the consequences of alarms after their causes.

@@ -3,7 +3,7 @@ import errno
 import socket
 
 
-def listen(address, port, clients=None) -> socket.socket:
+def listen(address: str, port: int, clients: int | None = None) -> socket.socket:
     """Return a socket that listens on a port of an address. Raises OSError; for a port in use its text names the port.
 
     port: 0 for a free port; clients: number of clients that may wait for their connection, None for any.

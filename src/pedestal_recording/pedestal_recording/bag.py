@@ -14,15 +14,17 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 import yaml
 from mcap.opcode import Opcode
-from mcap.records import Channel
+from mcap.records import Channel, Metadata, Schema, Statistics
 
 from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
+from pedestal_common.quantities import DType, Ints, Json, Message, Nanoseconds, Records, Seconds, Table
 from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
 from pedestal_common.wire.cdr import STAMPED_TYPES
 from pedestal_recording import columns, mcap_file
-from pedestal_recording.mcap_file import MESSAGE_HEAD, ZSTD_MAGIC, BagError, McapFile
+from pedestal_recording.mcap_file import MESSAGE_HEAD, ZSTD_MAGIC, McapFile
+from pedestal_recording.mcap_file import BagError as BagError  # its users write bag.BagError
 from pedestal_recording.readable import Readable
 
 MAX_CACHE_BYTES = 64_000_000  # largest size of the cache of unpacked chunks [bytes]
@@ -41,6 +43,7 @@ _UNREADABLE, _OTHER_PUBLISHER = 1, 2
 """Values of the field `foreign` for a foreign message: its reason. The value 0 means a message of the graph."""
 _DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
 """Kinds of records outside chunks that hold no messages and are read."""
+Index: typing.TypeAlias = np.recarray[tuple[int], DType]    # rows of Bag.index
 Content = typing.TypeVar('Content')  # type of the values in a dictionary {topic or node: value}
 MetadataRecords = Mapping[str, Mapping[str, str]]  # metadata records of a bag, {name: {text: text}}
 _NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')  # pattern of the file name NAME_0.mcap, NAME_1.mcap and so on of a bag
@@ -118,7 +121,7 @@ def locate(path: str | pathlib.Path) -> list[pathlib.Path]:
                    'order')
 
 
-def _described(path: pathlib.Path) -> dict[str, typing.Any]:
+def _described(path: pathlib.Path) -> dict[str, Json]:
     """Return the content of metadata.yaml in the directory of a bag, {} if the file is missing or unreadable."""
     try:
         return dict(plain_yaml.read(path / 'metadata.yaml')['rosbag2_bagfile_information'])
@@ -134,13 +137,13 @@ def compressed_messages(path: pathlib.Path, name: str | None) -> BagError:
                     "all: true}]'")
 
 
-def start(metadata_records: MetadataRecords) -> int:
-    """Return the stamp of time 0 of the scenario [ns], from the metadata records of a bag: UTC in realtime, else 0."""
+def start(metadata_records: MetadataRecords) -> Nanoseconds:
+    """Return the stamp of time 0 of the scenario, from the metadata records of a bag: UTC in realtime, else 0."""
     return _nanoseconds(metadata_records.get('pedestal', {}).get('start')) or 0
 
 
-def planned_end(metadata_records: MetadataRecords) -> int | None:
-    """Return the planned end of a run, a stamp [ns], from the metadata records of its bag; None if unknown."""
+def planned_end(metadata_records: MetadataRecords) -> Nanoseconds | None:
+    """Return the planned end of a run, a stamp, from the metadata records of its bag; None if unknown."""
     planned = _nanoseconds(metadata_records.get('pedestal', {}).get('planned_end_ns'))
     if planned is None:  # an older recording has only the parameter `duration` of the recorder
         with contextlib.suppress(KeyError, TypeError, ValueError, OverflowError, yaml.YAMLError):
@@ -148,8 +151,8 @@ def planned_end(metadata_records: MetadataRecords) -> int | None:
     return None if planned is None else start(metadata_records) + planned
 
 
-def _nanoseconds(text: str | None) -> int | None:
-    """Return a text of the metadata as a time [ns], None if the text is no time."""
+def _nanoseconds(text: str | None) -> Nanoseconds | None:
+    """Return a text of the metadata as a time, None if the text is no time."""
     return int(text) if text and text.isdecimal() and len(text) < 20 else None
 
 
@@ -161,14 +164,7 @@ def foreign_encoding(file: pathlib.Path, channel: Channel) -> BagError:
 class Bag:
     """A recording: an index of all its messages, and the methods that read them.
 
-    files, file        paths of its MCAP files in their order; the first of them
-    topics             {name without the leading '/': type}
-    metadata_records   {name: {text: text}}, each from the first file that holds it
-    index              record array (n,) with one row for each message of the graph, in the order of the files
-    statistics         {topic: number of messages} that the summaries of the files state, None if a file has no summary
-    breaks             lines about files without a summary before the last file: their recorder was killed
-    damage             line about a broken or early ended file, with place and reason; '' for a whole bag
-    beam               prefix of the topic names of the only beam in a view, '' outside a view
+    index: one row for each message of the graph, in the order of the files.
 
     Fields of a row of the index:
     channel            number of the channel in its file, plus 65536 times the number of the file
@@ -182,14 +178,16 @@ class Bag:
     """
 
     def __init__(self, path: pathlib.Path, opened: list[McapFile]) -> None:
-        self.path, self.beam = path, ''
-        self.files = [file.path for file in opened]
+        self.path = path
+        self.beam = ''  # prefix of the topic names of the only beam in a view, '' outside a view
+        self.files = [file.path for file in opened]     # its MCAP files in their order
         self.file = self.files[0]
-        self.topics: dict[str, str] = {}
-        self.metadata_records: dict[str, dict[str, str]] = {}
+        self.topics: dict[str, str] = {}    # {name without the leading '/': type}
+        self.metadata_records: dict[str, dict[str, str]] = {}   # by name, each from the first file that holds it
+        # number of messages of each topic that the summaries of the files state, None if a file has no summary
         self.statistics: dict[str, int] | None = None
-        self.breaks: list[str] = []
-        self.damage = ''
+        self.breaks: list[str] = []  # on files without a summary before the last file: their recorder was killed
+        self.damage = ''    # place and reason of a broken or early ended file; '' for a whole bag
         self._opened = opened
         self._cache: dict[int, bytes] = {}
         self._chunks: list[tuple[McapFile, int, int]] = []
@@ -212,11 +210,11 @@ class Bag:
                 self.breaks.append(text)
         if ended and self._counts:
             self.statistics = self._counts
-        self._recorded = np.concatenate(blocks).view(np.recarray)
+        self._recorded: Index = np.concatenate(blocks).view(np.recarray)
         if self._compressed and self._compressed == len(self._recorded):
             raise compressed_messages(self.path, 'zstd')
         self._mark_other_publishers()
-        self.index = self._recorded[self._recorded.foreign == 0]
+        self.index: Index = self._recorded[self._recorded.foreign == 0]
 
     def _mark_other_publishers(self) -> None:
         """Mark the messages with the sequence number 0 as foreign: the recorder gives it to foreign publishers.
@@ -229,7 +227,7 @@ class Bag:
             numbered = np.unique(rows.channel[~zero])
             rows.foreign[zero & np.isin(rows.channel, numbered) & (rows.foreign == 0)] = _OTHER_PUBLISHER
 
-    def _scan(self, number: int, file: McapFile, blocks: list[np.ndarray]) -> None:
+    def _scan(self, number: int, file: McapFile, blocks: list[Records]) -> None:
         """Add the messages of a file to the blocks of the index. Raises EOFError if the file ends early."""
         for opcode, start, stop in file.pieces():
             try:
@@ -246,7 +244,7 @@ class Bag:
             except Exception as error:  # a decoder may raise anything on broken bytes
                 raise EOFError(f'broken record at byte {start}: {error}') from None
 
-    def _walk(self, number: int, data: bytes, offset: int, chunk: int) -> Iterator[np.ndarray]:
+    def _walk(self, number: int, data: bytes, offset: int, chunk: int) -> Iterator[Records]:
         """Yield blocks of the index for the messages in records, given as bytes `data` of the file with a number.
 
         offset: place of the bytes in the file, 0 for an unpacked chunk; chunk: value of that field of the index.
@@ -271,7 +269,7 @@ class Bag:
         if rows:
             yield self._block(file, rows, data, offset)
 
-    def _block(self, file: McapFile, rows: list[tuple[int, ...]], data: bytes, offset: int) -> np.ndarray:
+    def _block(self, file: McapFile, rows: list[tuple[int, ...]], data: bytes, offset: int) -> Records:
         """Return rows of the index as an array, with the stamp from the header of each message that has one.
 
         data: the bytes that hold the messages; offset: see _walk.
@@ -292,7 +290,7 @@ class Bag:
         block['stop'] += offset
         return block
 
-    def _judge(self, block: np.ndarray, data: bytes) -> None:
+    def _judge(self, block: Records, data: bytes) -> None:
         """Mark unreadable messages of a block of the index as foreign; count the messages compressed one by one."""
         for channel in np.unique(block['channel']).tolist():
             rows = np.flatnonzero(block['channel'] == channel)
@@ -312,9 +310,9 @@ class Bag:
         Raises BagError for a channel that is not CDR, ValueError for an invalid record.
         """
         record, base = mcap_file.parsed(opcode, content), number << 16
-        if opcode == Opcode.SCHEMA:
+        if isinstance(record, Schema):
             self._schemas[base | record.id] = record.name
-        elif opcode == Opcode.CHANNEL:
+        elif isinstance(record, Channel):
             if record.message_encoding != 'cdr':
                 raise foreign_encoding(self.files[number], record)
             name = record.topic.lstrip('/')
@@ -326,9 +324,9 @@ class Bag:
             self.topics[name] = self._schemas[base | record.schema_id]
             if self.topics[name] in STAMPED_TYPES:
                 self._stamped.append(base | record.id)
-        elif opcode == Opcode.METADATA:
+        elif isinstance(record, Metadata):
             self.metadata_records.setdefault(record.name, record.metadata)
-        elif opcode == Opcode.STATISTICS:
+        elif isinstance(record, Statistics):
             for channel, name in self._channels.items():
                 if channel >> 16 == number:
                     count = record.channel_message_counts.get(channel & 0xffff, 0)
@@ -361,18 +359,18 @@ class Bag:
         return several or int(beams)
 
     @property
-    def start(self) -> int:
-        """Stamp of time 0 of the scenario [ns]: UTC in realtime, else 0."""
+    def start(self) -> Nanoseconds:
+        """Stamp of time 0 of the scenario: UTC in realtime, else 0."""
         return start(self.metadata_records)
 
     @property
-    def end(self) -> float:
-        """Log time of the last message, minus the start [s]."""
+    def end(self) -> Seconds:
+        """Log time of the last message, minus the start."""
         return float(self.index.log.max() - self.start) / 1e9
 
     @property
-    def planned_end(self) -> int | None:
-        """Planned end of the run, a stamp [ns]; None if unknown."""
+    def planned_end(self) -> Nanoseconds | None:
+        """Planned end of the run, a stamp; None if unknown."""
         return planned_end(self.metadata_records)
 
     @property
@@ -429,13 +427,13 @@ class Bag:
         return view
 
     @functools.cached_property
-    def configuration(self) -> dict[str, typing.Any]:
+    def configuration(self) -> dict[str, Json]:
         """Configuration of the run: {'scenario': its YAML, 'parameters': {node: {dotted name: value}}}.
 
         The values are '' and {} in a bag without a configuration. Raises BagError for invalid YAML, or for a node
         without a section of parameters.
         """
-        parameters: dict[str, dict[str, typing.Any]] = {}
+        parameters: dict[str, dict[str, Json]] = {}
         for node, text in self.metadata_records.get('parameters', {}).items():
             try:
                 parameters[node] = plain_yaml.parse(text)
@@ -445,19 +443,19 @@ class Bag:
                 raise BagError(f'{self.file}: its record `parameters`: {node} must hold a value for each parameter')
         return {'scenario': self.metadata_records.get('scenario', {}).get('yaml', ''), 'parameters': parameters}
 
-    def where(self, topic: str) -> np.ndarray:
-        """Return the positions (m,) in `index` of the rows of a topic. Raises BagError for a missing topic."""
+    def where(self, topic: str) -> Ints:
+        """Return the positions in `index` of the rows of a topic. Raises BagError for a missing topic."""
         name = topic.lstrip('/')
         if name not in self.topics:
             raise BagError(f'{self.path}: no topic {name} in it; there are {", ".join(self.topics)}')
         channels = [channel for channel, channel_name in self._channels.items() if channel_name == name]
         return np.flatnonzero(np.isin(self.index.channel, channels))
 
-    def rows(self, topic: str) -> np.recarray:
+    def rows(self, topic: str) -> Index:
         """Return the rows of `index` of a topic."""
-        return self.index[self.where(topic)]
+        return self.index[self.where(topic)].view(np.recarray)
 
-    def recorded(self, topic: str) -> np.recarray:
+    def recorded(self, topic: str) -> Index:
         """Return the rows of all messages of a topic in the form of `index`, also those of foreign messages."""
         channels = [channel for channel, name in self._channels.items() if name == topic]
         return self._recorded[np.isin(self._recorded.channel, channels)].view(np.recarray)
@@ -477,7 +475,7 @@ class Bag:
                     lines.append(self._foreign_line(name, left_out, reason))
         return lines
 
-    def _foreign_line(self, name: str, rows: np.recarray, reason: int) -> str:
+    def _foreign_line(self, name: str, rows: Index, reason: int) -> str:
         """Return the line on the foreign messages of a topic that have one reason; rows: their rows of the index."""
         shown = ', '.join(f'{(row.log - self.start) / 1e9:.6f} s ({row.stop - row.start} bytes)'
                           for row in rows[:MAX_SHOWN_FOREIGN_MESSAGES])
@@ -499,19 +497,19 @@ class Bag:
                         return {value.key: value.value for value in status.values}
         return {}
 
-    def raw(self, topic: str | None = None) -> Iterator[tuple[str, int, int, bytes]]:
-        """Yield (topic, log time, publish time [ns], CDR bytes) of the messages of a topic, None for all topics."""
+    def raw(self, topic: str | None = None) -> Iterator[tuple[str, Nanoseconds, Nanoseconds, bytes]]:
+        """Yield (topic, log time, publish time, CDR bytes) of the messages of a topic, None for all topics."""
         return self.take(self.index if topic is None else self.rows(topic))
 
-    def take(self, rows: np.ndarray) -> Iterator[tuple[str, int, int, bytes]]:
-        """Yield (topic, log time, publish time [ns], CDR bytes) of any rows of `index`, in their order."""
+    def take(self, rows: Records) -> Iterator[tuple[str, Nanoseconds, Nanoseconds, bytes]]:
+        """Yield (topic, log time, publish time, CDR bytes) of any rows of `index`, in their order."""
         names, take = self._channels, self._bytes
         for begin in range(0, len(rows), INDEX_BLOCK_ROWS):
             for channel, _, log, publish, _, _, *place in rows[begin:begin + INDEX_BLOCK_ROWS].tolist():
                 yield names[channel], log, publish, take(*place)
 
-    def messages(self, topic: str | None = None) -> Iterator[tuple[str, int, int, typing.Any]]:
-        """Yield (topic, log time, publish time [ns], message object) of the messages of a topic, None for all topics.
+    def messages(self, topic: str | None = None) -> Iterator[tuple[str, Nanoseconds, Nanoseconds, Message]]:
+        """Yield (topic, log time, publish time, message object) of the messages of a topic, None for all topics.
 
         Raises BagError for bytes that are no message of the type.
         """
@@ -522,8 +520,8 @@ class Bag:
                 raise BagError(f'{self.path}: {name} at {log / 1e9:.6f} s: {error}') from None
             yield name, log, publish, message
 
-    def table(self, topic: str) -> dict[str, np.ndarray]:
-        """Return {column: array (n,)} of a topic, one row per message; for the names see columns.table.
+    def table(self, topic: str) -> Table:
+        """Return the columns of a topic, one row per message; for the names see columns.table.
 
         Raises BagError for bytes that are no message of the type.
         """

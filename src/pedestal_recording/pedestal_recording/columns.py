@@ -5,9 +5,12 @@ bytes outside their numbers, such as names. Their numbers then stand at the same
 gives these places for the first message. All messages of its shape form one array of bytes, and a column is a slice of
 this array. The messages of the other shapes follow, one shape after another.
 """
+from collections.abc import Collection, Iterable, Sequence
+
 import numpy as np
 
 from pedestal_common.graph import layouts
+from pedestal_common.quantities import Bools, Bytes, Floats, Ints, Nanoseconds, Stamps, Table
 from pedestal_common.wire import cdr
 from pedestal_common.wire.cdr import STAMPED_TYPES
 
@@ -23,8 +26,8 @@ This avoids a huge table from a file whose messages each name other columns.
 STATUS_TEXTS = ('name', 'hardware_id', 'message')  # fields of a DiagnosticStatus that are texts
 
 
-def stamps(data, type_name, log):
-    """Return the stamps (n,) [ns] in the headers of messages; data: list of their CDR bytes, log: log times (n,) [ns].
+def stamps(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanoseconds]) -> Stamps:
+    """Return the stamps in the headers of messages; data: their CDR bytes, log: their log times.
 
     Return the log times for a type without header, or if a message is too short for a header.
     """
@@ -35,11 +38,11 @@ def stamps(data, type_name, log):
     return pairs[:, 0].astype(np.int32).astype(np.int64) * 1_000_000_000 + pairs[:, 1]
 
 
-def table(data, type_name, log, start=0, as_sent=False):
-    """Return the columns {name: array (n,)} of the messages of one type.
+def table(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanoseconds], start: Nanoseconds = 0,
+          as_sent: bool = False) -> Table:
+    """Return the columns of the messages of one type. data: their CDR bytes; log: their log times.
 
-    data: list of their CDR bytes; log: their log times (n,) [ns].
-    The column `t` [s] is the stamp of the header minus start [ns]; for a type without header, it is the log time minus
+    The column `t` [s] is the stamp of the header minus start; for a type without header, it is the log time minus
     start. The names of the other columns depend on the type:
     JointState     azimuth.position, azimuth.velocity, azimuth.effort, elevation.position, ...
     JointTrajectory  the first point: azimuth.position, azimuth.velocity, azimuth.acceleration, ...
@@ -53,7 +56,7 @@ def table(data, type_name, log, start=0, as_sent=False):
     its row. A number that its message marks as no data (layouts.NO_DATA_MARKS) is NaN too, except with as_sent=True.
     Raises ValueError for bytes that are no message of the type.
     """
-    out = {'t': (stamps(data, type_name, log) - start) / 1e9}
+    out: Table = {'t': (stamps(data, type_name, log) - start) / 1e9}
     if type_name == 'std_msgs/msg/String':
         out['data'] = [cdr.Places(message, type_name).texts['data'] for message in data]
     elif type_name not in ('diagnostic_msgs/msg/DiagnosticArray', 'rosgraph_msgs/msg/Clock'):
@@ -61,7 +64,7 @@ def table(data, type_name, log, start=0, as_sent=False):
         most = CELL_LIMITS[0] + int(lengths.sum()) // CELL_LIMITS[1]
         for length in np.unique(lengths):
             rows = np.flatnonzero(lengths == length)
-            block = np.frombuffer(b''.join([data[row] for row in rows]), np.uint8).reshape(rows.size, length)
+            block = np.frombuffer(b''.join([data[row] for row in rows.tolist()]), np.uint8).reshape(rows.size, length)
             _fill(out, block, rows, type_name, len(data), most, as_sent)
     if type_name == 'diagnostic_msgs/msg/DiagnosticStatus':
         texts = [cdr.Places(message, type_name).texts for message in data]
@@ -71,16 +74,16 @@ def table(data, type_name, log, start=0, as_sent=False):
     return out
 
 
-def values_text(pairs):
+def values_text(pairs: Iterable[tuple[str, str]]) -> str:
     """Return the (key, value) pairs of a DiagnosticStatus as one text, 'key=value; key=value'."""
     return '; '.join(f'{key}={value}' for key, value in pairs)
 
 
-def _fill(out, block, rows, type_name, count, most, as_sent):
-    """Put the numbers of messages of one length into the columns `out`.
+def _fill(out: Table, block: Bytes, rows: Ints, type_name: str, count: int, most: int, as_sent: bool) -> None:
+    """Put the numbers of m messages of one length into the columns `out`.
 
-    block (m, length): their bytes; rows (m,): their rows in the columns; count: number of all rows; most: largest
-    number of cells in `out`.
+    block: their bytes (m, length); rows: their rows in the columns; count: number of all rows; most: largest number
+    of cells in `out`.
     """
     shapes = 0
     while rows.size:
@@ -106,13 +109,12 @@ def _fill(out, block, rows, type_name, count, most, as_sent):
         block, rows = (block[~alike], rows[~alike]) if tried == len(block) else (block[tried:], rows[tried:])
 
 
-def _numbers(block, start, dtype):
-    """Return the numbers (m,) of a dtype that begin at the byte `start` of each message in `block` (m, length)."""
+def _numbers(block: Bytes, start: int, dtype: str) -> Floats:
     return np.ascontiguousarray(block[:, start:start + int(dtype[2:])]).view(dtype)[:, 0]
 
 
-def alike(data, type_name, template, names):
-    """Return a mask (n,), True for each message that equals a template (CDR bytes) outside stamp and named columns.
+def alike(data: Sequence[bytes], type_name: str, template: bytes, names: Collection[str]) -> Bools:
+    """Return True for each message that equals a template outside stamp and named columns. data, template: CDR bytes.
 
     names: the columns that may differ. The padding that DDS adds at the end of a message does not count.
     """
@@ -122,10 +124,10 @@ def alike(data, type_name, template, names):
         column = layouts.column(type_name, path, walk.texts)
         if not path.startswith(('header.stamp.', 'clock.')) and column not in names:
             fixed.append(np.arange(start, start + int(dtype[2:])))
-    fixed = np.concatenate(fixed)
-    wanted = np.frombuffer(template, np.uint8)[fixed]
+    places = np.concatenate(fixed)
+    wanted = np.frombuffer(template, np.uint8)[places]
     size = len(template)
     same = np.array([0 <= len(message) - size < cdr.PADDING_LIMIT_BYTES for message in data], bool)
     block = np.frombuffer(b''.join([message[:size] for message, fits in zip(data, same) if fits]), np.uint8)
-    same[same] = (block.reshape(-1, size)[:, fixed] == wanted).all(axis=1)
+    same[same] = (block.reshape(-1, size)[:, places] == wanted).all(axis=1)
     return same

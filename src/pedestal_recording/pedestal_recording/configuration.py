@@ -8,9 +8,12 @@ import importlib.metadata
 import pathlib
 import platform
 import subprocess
+from collections.abc import Iterable
+from typing import Protocol
 
 from pedestal_common import parameters
 from pedestal_common.text_files import plain_yaml
+from pedestal_recording.bag import Bag
 
 VERSIONED_PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
                       'pedestal_hardware', 'pedestal_bringup', 'numpy', 'numba', 'rclpy')
@@ -22,7 +25,21 @@ OMITTED_PARAMETERS = ('bag', 'scenario_yaml', 'parameters_yaml')
 """Parameters of the recorder that the recorded configuration omits: the destination, and the configuration itself."""
 
 
-def _git(*arguments):
+class Scenario(Protocol):
+    """What this module reads of a scenario.Scenario."""
+
+    @property
+    def nodes(self) -> Iterable[str]:
+        """Names of its nodes."""
+
+    def node_parameters(self, name: str) -> parameters.Parameters:
+        """Return the parameters of a node."""
+
+    def as_yaml(self) -> str:
+        """Return the scenario as a ROS 2 parameter file."""
+
+
+def _git(*arguments: str) -> str:
     """Return the output of a git command on this source tree, '' if it fails or git is missing."""
     try:
         done = subprocess.run(['git', '--no-optional-locks', *arguments], cwd=pathlib.Path(__file__).parent,
@@ -32,7 +49,7 @@ def _git(*arguments):
     return done.stdout.strip()
 
 
-def git_revision():
+def git_revision() -> str:
     """Return the revision of the source tree of this file, with '-dirty' if a tracked file is changed.
 
     Return '' for an installed file, also in an environment inside another repository.
@@ -44,7 +61,7 @@ def git_revision():
     return revision + ('-dirty' if revision and _git('status', '--porcelain', '--untracked-files=no') else '')
 
 
-def versions():
+def versions() -> dict[str, str]:
     """Return {'version.NAME': version} of Python and of VERSIONED_PACKAGES."""
     versions = {'version.python': platform.python_version()}
     for package in VERSIONED_PACKAGES:
@@ -53,16 +70,16 @@ def versions():
     return versions
 
 
-def recorder_parameters(scenario):
-    """Return the parameters {name: text} of the recorder node that hold the configuration of a scenario.Scenario."""
+def recorder_parameters(scenario: Scenario) -> dict[str, str]:
+    """Return the parameters of the recorder node that hold the configuration of a scenario."""
     values = {node: parameters.as_dict(scenario.node_parameters(node))
               for node in scenario.nodes if node != 'operator'}
     values['recorder'] = {key: value for key, value in values['recorder'].items() if key not in OMITTED_PARAMETERS}
     return {'scenario_yaml': scenario.as_yaml(), 'parameters_yaml': plain_yaml.dump(values)}
 
 
-def records(scenario_yaml, parameters_yaml):
-    """Return the metadata records {name: {text: text}} of a bag, from the texts of recorder_parameters.
+def records(scenario_yaml: str, parameters_yaml: str) -> dict[str, dict[str, str]]:
+    """Return the metadata records of a bag by name, from the texts of recorder_parameters.
 
     An empty text gives no record.
     """
@@ -75,8 +92,8 @@ def records(scenario_yaml, parameters_yaml):
     return content
 
 
-def line(bag):
-    """Return one line on the origin of a bag.Bag, 'made by: scenario ...', for the reports."""
+def line(bag: Bag) -> str:
+    """Return one line on the origin of a bag, 'made by: scenario ...', for the reports."""
     run = bag.metadata
     parts = ['unknown, the bag holds no configuration']
     if bag.configuration['scenario']:

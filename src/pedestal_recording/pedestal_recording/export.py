@@ -8,18 +8,24 @@ import contextlib
 import csv
 import os
 import pathlib
+from collections.abc import Callable, Collection, Iterator
+from typing import TypeAlias
 
 import numpy as np
 
 from pedestal_common.graph import layouts, nodes
+from pedestal_common.quantities import Floats, Stamps, Table
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
 from pedestal_recording import columns
 
 TIME_COLUMN, STAMP_COLUMN = 't [s]', 'stamp [ns]'
+_TableWriter: TypeAlias = Callable[[pathlib.Path, Table, dict[str, str]], None]     # file, table, metadata
 
 
-def export(path, file_format='csv', output=None, names=(), overwrite=False):
+def export(path: str | pathlib.Path, file_format: str = 'csv', output: str | pathlib.Path | None = None,
+           names: Collection[str] = (),
+           overwrite: bool = False) -> Iterator[tuple[pathlib.Path, int, int] | tuple[None, str, str]]:
     """Write the topics of the bag at a path as tables, and yield one tuple per topic.
 
     The tuple is (file, number of rows, number of columns), or (None, reason, name) for a topic that is omitted.
@@ -56,7 +62,7 @@ def export(path, file_format='csv', output=None, names=(), overwrite=False):
 
 
 @contextlib.contextmanager
-def atomic_file(file):
+def atomic_file(file: pathlib.Path) -> Iterator[pathlib.Path]:
     """Yield the path of a temporary file, which becomes `file` at the end, or is removed after an error."""
     part = file.with_name(file.name + '.part')
     try:
@@ -66,8 +72,8 @@ def atomic_file(file):
         part.unlink(missing_ok=True)
 
 
-def table(bag, name):
-    """Return {header: array or list} of a topic: `t [s]`, `stamp [ns]`, then its columns, each with its unit."""
+def table(bag: bags.Bag, name: str) -> Table:
+    """Return the columns of a topic by their headers: `t [s]`, `stamp [ns]`, then its columns, each with its unit."""
     type_name = bag.topics[name]
     rows = bag.rows(name)
     stamps = rows.stamp
@@ -80,18 +86,18 @@ def table(bag, name):
     return {**_times(stamps), **{_header(name, type_name, column): values for column, values in numbers.items()}}
 
 
-def _times(stamps):
-    """Return the first two columns of a table, from the stamps (n,) [ns]."""
+def _times(stamps: Stamps) -> Table:
+    """Return the first two columns of a table."""
     return {TIME_COLUMN: stamps / 1e9, STAMP_COLUMN: stamps}
 
 
-def _header(name, type_name, column):
+def _header(name: str, type_name: str, column: str) -> str:
     """Return the header of a column, with its unit if the topic and its type are those of the graph."""
     unit = layouts.unit(nodes.plain(name), type_name, column)
     return f'{column} [{unit}]' if unit else column
 
 
-def _has_tracks(bag, name):
+def _has_tracks(bag: bags.Bag, name: str) -> bool:
     """Return True if a trajectory message of the topic has more or fewer than one point.
 
     Because the number of points determines the length in bytes, one message of each length is read.
@@ -103,11 +109,8 @@ def _has_tracks(bag, name):
         return False
 
 
-def _tracks(bag, name, stamps):
-    """Return the table of a topic of trajectories of several points. A row is a point, with its time after the stamp.
-
-    stamps: stamp of each message (n,) [ns].
-    """
+def _tracks(bag: bags.Bag, name: str, stamps: Stamps) -> Table:
+    """Return the table of a topic of trajectories of several points. A row is a point, with time_from_start."""
     type_name = bag.topics[name]
     points = []
     for stamp, (_, _, _, message) in zip(stamps.tolist(), bag.messages(name)):
@@ -122,11 +125,8 @@ def _tracks(bag, name, stamps):
                for column in dict.fromkeys(column for _, row in points for column in row)}}
 
 
-def _diagnostics(bag, name, stamps):
-    """Return the table of a diagnostics topic. A row is a status, with its values as one text 'key=value; key=value'.
-
-    stamps: stamp of each message (n,) [ns].
-    """
+def _diagnostics(bag: bags.Bag, name: str, stamps: Stamps) -> Table:
+    """Return the table of a diagnostics topic. A row is a status, with its values as columns.values_text."""
     statuses = [(stamp, status) for stamp, (_, _, _, message) in zip(stamps.tolist(), bag.messages(name))
                 for status in message.status]
     return {**_times(np.array([stamp for stamp, _ in statuses], np.int64)),
@@ -136,8 +136,8 @@ def _diagnostics(bag, name, stamps):
                        for _, status in statuses]}
 
 
-def _write_csv(file, content, _description):
-    """Write a table {header: values} as CSV.
+def _write_csv(file: pathlib.Path, content: Table, _description: object) -> None:
+    """Write a table as CSV.
 
     A number is the shortest text that reads back as the same float. A missing number is NaN. Texts have quotes where
     needed.
@@ -148,15 +148,15 @@ def _write_csv(file, content, _description):
         writer.writerows(zip(*(_texts(values) for values in content.values())))
 
 
-def _texts(values):
+def _texts(values: Floats | Stamps | list[str]) -> Floats | Stamps | list[str]:
     """Return a column of a table as a list of cells for CSV; texts and whole numbers stay unchanged."""
     if isinstance(values, list) or values.dtype.kind == 'i':
         return values
     return ['NaN' if value != value else repr(value) for value in values.tolist()]
 
 
-def _parquet_writer():
-    """Return the function write(file, table, {text: text} for the metadata) for Parquet. Raises ValueError."""
+def _parquet_writer() -> _TableWriter:
+    """Return the function that writes Parquet. Raises ValueError."""
     try:
         import pyarrow
         import pyarrow.parquet
@@ -164,7 +164,7 @@ def _parquet_writer():
         raise ValueError("Parquet needs pyarrow, which is not installed: pip install pyarrow, or the extra "
                          "'pedestal_recording[parquet]'") from None
 
-    def write(file, content, description):
+    def write(file: pathlib.Path, content: Table, description: dict[str, str]) -> None:
         arrays = {header: pyarrow.array(values, pyarrow.string()) if isinstance(values, list) else values
                   for header, values in content.items()}
         pyarrow.parquet.write_table(pyarrow.table(arrays).replace_schema_metadata(description), file,

@@ -9,19 +9,24 @@ MAX_CHUNK_BYTES, UNPACKED_LIMITS and MESSAGE_LIMITS limit time and memory, in pr
 """
 import fcntl
 import io
+import mmap
 import os
+import pathlib
 import struct
 import zlib
+from collections.abc import Callable, Iterator
+from typing import TypeAlias
 
 import lz4.frame
 import zstandard
 from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.writer import MCAP0_MAGIC as MAGIC
+from mcap.writer import MCAP0_MAGIC
 
 from pedestal_common.text_files import files
 
+MAGIC = MCAP0_MAGIC     # first and last bytes of an MCAP file
 MAX_CHUNK_BYTES = 32_000_000  # largest size of a chunk, compressed or unpacked [bytes]
 
 UNPACKED_LIMITS = 32_000_000, 200
@@ -33,6 +38,8 @@ MESSAGE_LIMITS = 500_000, 0.25
 MESSAGE_HEAD = struct.Struct('<xQHIQQ')
 """Head of a message record: opcode (skipped), length of the content, number of the channel, sequence number, log time
 and publish time [ns]. The CDR bytes of the message follow."""
+
+Data: TypeAlias = bytes | mmap.mmap     # of a file or of a chunk
 
 SQLITE_MAGIC = b'SQLite format 3'
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'  # first bytes of an SQLite file, and of data in the compression zstd
@@ -46,10 +53,11 @@ _RECORD = struct.Struct('<BQ')
 """Opcode of a record, and length of its content [bytes]. The content begins after these 9 bytes."""
 _WINDOW = 1_000_000
 """Number of bytes that one access reads from the disk. It is also the largest size of a piece of McapFile.pieces."""
-_READ = {Opcode.HEADER: records.Header.read, Opcode.SCHEMA: records.Schema.read, Opcode.CHANNEL: records.Channel.read,
-         Opcode.METADATA: records.Metadata.read, Opcode.STATISTICS: records.Statistics.read,
-         Opcode.CHUNK: records.Chunk.read, Opcode.FOOTER: records.Footer.read,
-         Opcode.MESSAGE_INDEX: records.MessageIndex.read}
+_READ: dict[int, Callable[[ReadDataStream], records.McapRecord]] = {
+    Opcode.HEADER: records.Header.read, Opcode.SCHEMA: records.Schema.read, Opcode.CHANNEL: records.Channel.read,
+    Opcode.METADATA: records.Metadata.read, Opcode.STATISTICS: records.Statistics.read,
+    Opcode.CHUNK: records.Chunk.read, Opcode.FOOTER: records.Footer.read,
+    Opcode.MESSAGE_INDEX: records.MessageIndex.read}
 """{kind of record: function of the mcap library that reads its content}."""
 
 
@@ -57,13 +65,13 @@ class BagError(ValueError):
     """Error of a bag that cannot be written or read. Its text is one line with the file and the problem."""
 
 
-def reason(error):
+def reason(error: OSError) -> str:
     """Return the text of an OSError without the path."""
     return error.strerror or str(error)
 
 
-def frame(data, at):
-    """Return (opcode, stop) of the record that begins at the position `at` in bytes; stop: its end.
+def frame(data: Data, at: int) -> tuple[int, int]:
+    """Return (opcode, stop) of the record that begins at the position `at`; stop: its end.
 
     Raises ValueError if no whole record begins there.
     """
@@ -77,13 +85,13 @@ def frame(data, at):
     return opcode, at + 9 + length
 
 
-def parsed(opcode, content):
-    """Return a record as an object of mcap.records, from its content (bytes); None for a kind not read here."""
+def parsed(opcode: int, content: bytes) -> records.McapRecord | None:
+    """Return a record from its content; None for a kind not read here."""
     return _READ[opcode](ReadDataStream(io.BytesIO(content))) if opcode in _READ else None
 
 
-def unpacked(chunk) -> bytes:
-    """Return the records in a records.Chunk as bytes, decompressed.
+def unpacked(chunk: records.Chunk) -> bytes:
+    """Return the records in a chunk as bytes, decompressed.
 
     Raises ValueError for a chunk above MAX_CHUNK_BYTES, in an unknown compression, of another length than its header
     states, or with a wrong checksum.
@@ -104,7 +112,7 @@ def unpacked(chunk) -> bytes:
     return data
 
 
-def _zstd(data, size):
+def _zstd(data: bytes, size: int) -> bytes:
     """Return the decompressed bytes of a zstd frame, b'' if the frame states another length than `size`.
 
     Memory for a frame that states a false length is therefore never allocated.
@@ -114,21 +122,20 @@ def _zstd(data, size):
     return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
 
 
-_UNPACK = {'': lambda data, size: data, 'zstd': _zstd,
-           'lz4': lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)}
+_UNPACK: dict[str, Callable[[bytes, int], bytes]] = {
+    '': lambda data, size: data, 'zstd': _zstd,
+    'lz4': lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)}
 """{name of a compression: function(compressed bytes, size of the unpacked bytes) -> unpacked bytes}."""
 
 
 class McapFile:
-    """An open MCAP file, which is read in pieces.
+    """An open MCAP file, which is read in pieces. size: its length [bytes].
 
-    size     length of the file [bytes]
-    locked   True if this process itself writes the file and holds its lock. Otherwise a lock on the file is an error.
-
+    locked: True if this process itself writes the file and holds its lock. Otherwise a lock on the file is an error.
     Raises BagError if the file is missing, empty, not regular or not MCAP, or while its recorder still writes it.
     """
 
-    def __init__(self, path, locked=False):
+    def __init__(self, path: pathlib.Path, locked: bool = False) -> None:
         self.path = path
         try:
             self._stream = files.open_regular(path)
@@ -152,7 +159,7 @@ class McapFile:
         self._left = UNPACKED_LIMITS[0] + UNPACKED_LIMITS[1] * self.size
         self._messages = 0
 
-    def _check_lock(self):
+    def _check_lock(self) -> None:
         """Raise BagError if another process holds the lock of the file, because it writes the file."""
         try:
             fcntl.flock(self._stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -162,7 +169,7 @@ class McapFile:
         except OSError:  # a file system without locks
             pass
 
-    def read(self, start, stop) -> bytes:
+    def read(self, start: int, stop: int) -> bytes:
         """Return the bytes at [start, stop) of the file, fewer at its end."""
         if stop - start > _WINDOW:
             return os.pread(self._stream.fileno(), stop - start, start)
@@ -170,7 +177,7 @@ class McapFile:
             self._start, self._window = start, os.pread(self._stream.fileno(), _WINDOW, start)
         return self._window[start - self._start:stop - self._start]
 
-    def pieces(self):
+    def pieces(self) -> Iterator[tuple[int, int, int]]:
         """Yield (opcode, start, stop) of each record up to the footer, at the bytes [start, stop) of the file.
 
         Neighbouring messages outside chunks come as one piece. Raises EOFError with place and reason if the file ends
@@ -192,7 +199,7 @@ class McapFile:
                 yield Opcode.MESSAGE, *messages
             raise
 
-    def _frames(self):
+    def _frames(self) -> Iterator[tuple[int, int, int]]:
         """Yield (opcode, start, stop) of each record up to the footer. Raises EOFError if the file ends early."""
         at, opcode = len(MAGIC), None
         while opcode != Opcode.FOOTER:
@@ -209,7 +216,7 @@ class McapFile:
         if self.read(at, at + len(MAGIC) + 1) != MAGIC:
             raise EOFError(f'the file does not end with its footer at byte {at}')
 
-    def chunk(self, start, stop, again=False) -> bytes:
+    def chunk(self, start: int, stop: int, again: bool = False) -> bytes:
         """Return the records in the chunk at [start, stop) of the file as bytes, decompressed.
 
         again: True if the chunk was unpacked before, and so does not count again for UNPACKED_LIMITS. Raises
@@ -217,18 +224,18 @@ class McapFile:
         """
         if stop - start > 2 * MAX_CHUNK_BYTES:
             raise ValueError(f'a chunk of {stop - start} bytes, must be at most {MAX_CHUNK_BYTES}')
-        chunk = parsed(Opcode.CHUNK, self.read(start + 9, stop))
+        chunk = records.Chunk.read(ReadDataStream(io.BytesIO(self.read(start + 9, stop))))
         if not again:
             self.spend(chunk)
         return unpacked(chunk)
 
-    def spend(self, chunk):
-        """Count the unpacked size that a records.Chunk states. Raises ValueError above UNPACKED_LIMITS."""
+    def spend(self, chunk: records.Chunk) -> None:
+        """Count the unpacked size that a chunk states. Raises ValueError above UNPACKED_LIMITS."""
         self._left -= chunk.uncompressed_size
         if self._left < 0:
             raise ValueError(f'its chunks unpack to more than {UNPACKED_LIMITS[1]} times its length')
 
-    def count(self, messages):
+    def count(self, messages: int) -> None:
         """Add to the number of messages read from the file. Raises ValueError above MESSAGE_LIMITS."""
         self._messages += messages
         if self._messages > MESSAGE_LIMITS[0] + MESSAGE_LIMITS[1] * self.size:

@@ -7,13 +7,18 @@ To deserialize each message would be slow. Most messages of a topic differ in th
 compares the bytes outside the numbers (the shape) with those of a message known as readable. Only a message of a new
 shape is deserialized.
 """
+from typing import TypeAlias
+
 import numpy as np
 
 from pedestal_common.graph import layouts, nodes, topics
+from pedestal_common.quantities import Bools, Bytes, Ints
 from pedestal_common.wire import cdr, messages
 
 MAX_SHAPED_BYTES = 4000  # largest size of a message whose bytes are compared [bytes]; a larger message is deserialized
 MAX_SHAPES = 20  # largest number of readable messages of one length with which others are compared
+
+_Shape: TypeAlias = tuple[Ints, Bytes]  # places of the bytes of a message outside its numbers, and these bytes
 
 
 class Readable:
@@ -23,15 +28,16 @@ class Readable:
     the columns of its topic, such as `azimuth.position`.
     """
 
-    def __init__(self, topic, type_name, ours):
+    def __init__(self, topic: str, type_name: str, ours: bool) -> None:
         row = topics.TOPIC_BY_NAME.get(nodes.plain(topic))
-        self._type, self._shapes = type_name, {}
-        self._columns = ()
+        self._type = type_name
+        self._shapes: dict[int, list[_Shape]] = {}     # by the length of the messages
+        self._columns: frozenset[str] = frozenset()
         if ours and row is not None and row.type == type_name and row.rate == 'step':
             self._columns = frozenset(column.name for column in layouts.columns(row.name))
 
-    def mask(self, data, start, stop):
-        """Return a mask (n,), True for each readable message. Message k is at bytes [start[k], stop[k]) of data."""
+    def mask(self, data: bytes, start: Ints, stop: Ints) -> Bools:
+        """Return True for each readable message. Message k is at bytes [start[k], stop[k]) of data."""
         content, readable = np.frombuffer(data, np.uint8), np.zeros(len(start), bool)
         for length in np.unique(stop - start).tolist():
             rows = np.flatnonzero(stop - start == length)
@@ -46,11 +52,10 @@ class Readable:
         return readable
 
     @staticmethod
-    def _alike(content, start, rows, shape, readable):
-        """Set the mask `readable` at the rows whose messages have a shape (see _added). Return the remaining rows.
+    def _alike(content: Bytes, start: Ints, rows: Ints, shape: _Shape | None, readable: Bools) -> Ints:
+        """Set the mask `readable` at the rows whose messages have a shape. Return the remaining rows.
 
-        content: all bytes as an array; start (n,): begin of each message; rows: places in start, of messages of one
-        length.
+        start: begin of each message in content; rows: places in start, of messages of one length.
         """
         if shape is None or not rows.size:
             return rows
@@ -59,8 +64,8 @@ class Readable:
         readable[rows[same]] = True
         return rows[~same]
 
-    def _added(self, message):
-        """Note the shape of a readable message, and return it: (places of the bytes outside its numbers, these bytes).
+    def _added(self, message: bytes) -> _Shape | None:
+        """Note the shape of a readable message, and return it.
 
         Return None if no message is compared with it: see MAX_SHAPED_BYTES and MAX_SHAPES.
         """
@@ -71,7 +76,7 @@ class Readable:
         shapes.append((places, np.frombuffer(message, np.uint8)[places]))
         return shapes[-1]
 
-    def problem(self, message):
+    def problem(self, message: bytes) -> str:
         """Return the reason why CDR bytes are no message of the topic, '' for a readable message."""
         try:
             messages.deserialize(message, self._type)

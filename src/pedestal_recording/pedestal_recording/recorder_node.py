@@ -10,6 +10,8 @@ import pedestal_common.entry  # noqa: F401
 import collections
 import sys
 import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
 
 from rclpy.qos import HistoryPolicy
 
@@ -18,6 +20,7 @@ from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.node import middleware, shell, subscriptions
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
+from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_common.realtime.publisher_gate import (
     CONFIRMED_TAKEOVER_NS,
     DROP_OTHER_PUBLISHER,
@@ -28,7 +31,7 @@ from pedestal_common.text_files import files
 from pedestal_common.wire import messages
 from pedestal_common.wire.cdr import STAMPED_TYPES
 from pedestal_recording import configuration
-from pedestal_recording.bag import BagError
+from pedestal_recording.mcap_file import BagError
 from pedestal_recording.readable import Readable
 from pedestal_recording.recorder_params import RecorderParameters
 from pedestal_recording.step_order import OrderError, StepOrder
@@ -55,26 +58,30 @@ order than that of their arrival.
 MAX_STAMP_DISTANCE_NS = 3600 * NS_PER_SECOND  # largest plausible distance of a stamp from the time of the drive [ns]
 
 
+_Info: TypeAlias = Mapping[str, int]    # message info of rclpy
+_Taker: TypeAlias = Callable[[bytes, _Info], object]    # of the CDR bytes of a message
+_Counter: TypeAlias = Callable[[bytes, _Info], bool]
+
+
 class TopicPublishers:
     """Publishers of one topic in realtime: the graph's publisher, and foreign publishers if there are any.
 
     A PublisherGate distinguishes them, as in the other nodes of the graph.
-
-    node: the RecorderNode; link: nodes.Link of the topic
-    lost: number of messages of the graph's publisher that are missing, by its sequence numbers
     """
 
-    def __init__(self, node, link):
+    def __init__(self, node: 'RecorderNode', link: nodes.Link) -> None:
         self._node, self._link = node, link
         self._gate = PublisherGate(lambda data: (None, data), 0, self._count)
-        self.lost, self._counted = 0, {}
-        self._polled, self._foreign = None, False
+        self.lost = 0   # number of messages of the graph's publisher that are missing, by its sequence numbers
+        self._counted: dict[object, int] = {}
+        self._polled: Nanoseconds | None = None
+        self._foreign = False
 
-    def several(self, now):
-        """Return True if more than one publisher was active shortly before a time of the steady clock [ns]."""
+    def several(self, now: Nanoseconds) -> bool:
+        """Return True if more than one publisher was active shortly before a time of the steady clock."""
         return self._gate.streams.several(now)
 
-    def take(self, data, info):
+    def take(self, data: bytes, info: _Info) -> bool:
         """Return True for a message of the graph, False for a message of a foreign publisher; data: CDR bytes.
 
         A message is foreign if the gate rejects it as a message of another publisher, and two more conditions hold.
@@ -84,20 +91,20 @@ class TopicPublishers:
         now, utc = self._node.clock()
         taken = self._gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
         ours = self._gate.active
-        if taken is not None:
+        if taken is not None and ours is not None:
             self.lost += ours.lost - self._counted.get(ours, 0)
             self._counted[ours] = ours.lost
         return not (taken is None and self._gate.reason == DROP_OTHER_PUBLISHER and ours is not None
                     and ours in self._gate.streams.streams and now - ours.arrival < CONFIRMED_TAKEOVER_NS
                     and self._named(now))
 
-    def _count(self):
+    def _count(self) -> int | None:
         """Return the number of foreign publishers that ROS names, None where it is unknown."""
         names = subscriptions.foreign_publishers(self._node, self._link, self._link.name)
         return None if names is None else len(names)
 
-    def _named(self, now):
-        """Return True if ROS names a foreign publisher, by a check every PUBLISHER_POLL_NS at most; now [ns]."""
+    def _named(self, now: Nanoseconds) -> bool:
+        """Return True if ROS names a foreign publisher, by a check every PUBLISHER_POLL_NS at most."""
         if self._polled is None or now - self._polled >= PUBLISHER_POLL_NS:
             names = subscriptions.foreign_publishers(self._node, self._link, self._link.name) or ()
             self._polled = now
@@ -109,19 +116,9 @@ class RecorderNode(shell.Shell):
     """Recorder of the graph. It writes in the order of steps (StepOrder) in lockstep, of arrival in realtime.
 
     In realtime the publish time of a message is the wall time of the publisher, and the log time is its stamp.
-
-    _bag, _order     Writer of the bag; StepOrder for lockstep
-    _end             planned end of the run, since its start [ns]; None without a limit
-    _stamp           newest time of the drive [ns]
-    _heard           {topic: TopicPublishers} in realtime
-    _lost            {topic: number of lost messages}
-    _without_stamp   number of messages without a valid stamp
-    _received        number of received messages of each recorded topic
-    _last_arrival    (steady time [s], number of received messages) at the last arrival, after the end of the run
-    _error           reason why the node ends early, or None
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('recorder', RecorderParameters)
         names = self.graph.members
         if self.graph.lockstep and not names:
@@ -130,7 +127,8 @@ class RecorderNode(shell.Shell):
         recorded = nodes.recorded(names, flags, beams) if names else list(self.links.values())
         if self.graph.lockstep:  # a command belongs to no step; its reply does, and repeats the command
             recorded = [link for link in recorded if link.rate not in topics.REALTIME_RATES]
-        self._end = round(self.parameters.duration * NS_PER_SECOND) or None
+        # planned end of the run, since its start
+        self._end: Nanoseconds | None = round(self.parameters.duration * NS_PER_SECOND) or None
         self._bag = Writer(self.parameters.bag, recorded, {
             'scenario': self.parameters.scenario, 'pacing': self.graph.pacing, 'seed': self.parameters.seed,
             'beamwidth': self.parameters.beamwidth, **({'beams': beams} if beams else {}),
@@ -140,15 +138,16 @@ class RecorderNode(shell.Shell):
             **({'planned_end_ns': self._end} if self._end else {}),
             'git': configuration.git_revision(), **configuration.versions()},
             configuration.records(self.parameters.scenario_yaml, self.parameters.parameters_yaml))
-        self._order = StepOrder(recorded, names, self._bag.write)
-        self._lost = collections.Counter()
-        self._heard = {}
-        self._stamp = self.graph.start
-        self._without_stamp = 0
-        self._received = [0] * len(recorded)
+        self._order = StepOrder(recorded, names, self._bag.write)   # for lockstep
+        self._lost: collections.Counter[str] = collections.Counter()    # messages of a topic
+        self._heard: dict[str, TopicPublishers] = {}    # by topic, in realtime
+        self._stamp: Nanoseconds = self.graph.start     # newest time of the drive
+        self._without_stamp = 0     # number of messages without a valid stamp
+        self._received = [0] * len(recorded)    # number of messages of each recorded topic
         self._step_topics = [index for index, topic in enumerate(recorded) if topic.rate == 'step']
-        self._error = None
-        self._last_arrival = None
+        self._error: str | None = None  # reason why the node ends early
+        # steady time and number of received messages at the last arrival, after the end of the run
+        self._last_arrival: tuple[Seconds, int] | None = None
         self.diagnose_with(self._diagnosis)
         for index, topic in enumerate(recorded):
             if topic.name != LAST_OPENED_TOPIC:
@@ -158,8 +157,8 @@ class RecorderNode(shell.Shell):
         if not self.graph.lockstep:
             self.every(1.0, lambda: self._write(self._bag.flush))
 
-    def _record(self, index, topic):
-        """Subscribe to a topic, by its index and nodes.Link.
+    def _record(self, index: int, topic: nodes.Link) -> None:
+        """Subscribe to a topic, by its index.
 
         The queue of the subscription keeps all messages in lockstep, and those of several seconds in realtime.
         """
@@ -173,20 +172,20 @@ class RecorderNode(shell.Shell):
         else:
             subscriptions.subscribe(self, topic, topic.name, take, 'recorded')
 
-    def _record_last(self):
+    def _record_last(self) -> None:
         """Subscribe to LAST_OPENED_TOPIC, once the executor runs."""
         self._opening.cancel()
         for index, topic in self._last:
             self._record(index, topic)
 
-    def _receiver(self, index, topic):
-        """Return the function take(CDR bytes, message info of rclpy) that checks, counts and writes each message."""
+    def _receiver(self, index: int, topic: nodes.Link) -> _Taker:
+        """Return the function take(data, info) that checks, counts and writes each message."""
         put = self._into_step(index, topic) if self.graph.lockstep else self._on_arrival(index, topic)
         count = self._lockstep_counter(index, topic) if self.graph.lockstep else self._realtime_counter(index, topic)
         checked = len(topic.writers) == 1 and (self.graph.lockstep or topic.rate not in topics.UNSTEPPED_RATES)
         received = self._received
 
-        def take(data, info):
+        def take(data: bytes, info: _Info) -> None:
             received[index] += 1
             try:
                 if not checked or count(data, info):
@@ -197,7 +196,7 @@ class RecorderNode(shell.Shell):
                 self._fail(str(error))
         return take
 
-    def _lockstep_counter(self, index, topic):
+    def _lockstep_counter(self, index: int, topic: nodes.Link) -> _Counter:
         """Return the function count(data, info) that checks the sequence numbers of a topic in lockstep.
 
         The numbers of the graph's publisher rise by 1, and begin at 1 on a topic of every step. A gap counts as lost
@@ -207,7 +206,7 @@ class RecorderNode(shell.Shell):
                                             first=1 if topic.rate == 'step' and self.graph.members else None)
         readable = Readable(topic.name, topic.type, ours=True)
 
-        def count(data, info):
+        def count(data: bytes, info: _Info) -> bool:
             number = info['publication_sequence_number']
             if not numbers.is_next(number):
                 if numbers.shows_foreign() or readable.problem(data):
@@ -223,14 +222,14 @@ class RecorderNode(shell.Shell):
             return True
         return count
 
-    def _realtime_counter(self, index, topic):
+    def _realtime_counter(self, index: int, topic: nodes.Link) -> _Counter:
         """Return the function count(data, info) that counts the missing messages of a topic in realtime.
 
         The function returns False for a message of a foreign publisher.
         """
         publishers = self._heard[topic.name] = TopicPublishers(self, topic)
 
-        def count(data, info):
+        def count(data: bytes, info: _Info) -> bool:
             before = publishers.lost
             ours = publishers.take(data, info)
             if publishers.lost > before:
@@ -239,11 +238,11 @@ class RecorderNode(shell.Shell):
             return ours
         return count
 
-    def _losses(self):
+    def _losses(self) -> str:
         """Return a text on the lost messages of each topic."""
         return 'lost ' + ', '.join(f'{count} of {name}' for name, count in self._lost.items())
 
-    def _fail(self, reason):
+    def _fail(self, reason: str) -> None:
         """End the node with a reason.
 
         Because rclpy prints a traceback for an exception in a callback, this function raises none.
@@ -251,15 +250,15 @@ class RecorderNode(shell.Shell):
         self._error = self._error or reason
         self.finished = True
 
-    def _stamp_in(self, data):
-        """Return the stamp in the bytes of a message [ns], None without a valid stamp."""
+    def _stamp_in(self, data: bytes) -> Nanoseconds | None:
+        """Return the stamp in the bytes of a message, None without a valid stamp."""
         try:
             return messages.stamp_of(data)
         except ValueError:
             self._without_stamp += 1
             return None
 
-    def _sender(self, data):
+    def _sender(self, data: bytes) -> str:
         """Return the name of the node that published diagnostics, '' if the message is unreadable."""
         try:
             return messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticArray').status[0].name
@@ -267,25 +266,25 @@ class RecorderNode(shell.Shell):
             self._without_stamp += 1
             return ''
 
-    def _into_step(self, index, topic):
+    def _into_step(self, index: int, topic: nodes.Link) -> _Taker:
         """Return the function put(data, info) that passes a message of a topic to the StepOrder in lockstep."""
         order, stamp_in, slot = self._order, self._stamp_in, self._order.slot(topic.name)
 
-        def put(data, _):
+        def put(data: bytes, _: object) -> Nanoseconds | None:
             stamp = stamp_in(data)
-            if stamp is None:
+            if stamp is None or slot is None:
                 order.take_unplaced(index, data)
             else:
                 order.take(slot, stamp, data)
             return stamp
 
-        def put_clock(data, info):
+        def put_clock(data: bytes, info: _Info) -> None:
             self._tick(put(data, info))
 
-        def put_event(data, _):
+        def put_event(data: bytes, _: object) -> None:
             order.take_change(index, data)
 
-        def put_diagnostics(data, _):
+        def put_diagnostics(data: bytes, _: object) -> None:
             sender, stamp = self._sender(data), stamp_in(data)
             sender_slot = order.slot(topic.name, sender)
             if sender != self.name:
@@ -298,8 +297,8 @@ class RecorderNode(shell.Shell):
             return put_event
         return {'clock': put_clock, 'diagnostics': put_diagnostics}.get(topic.name, put)
 
-    def _log_time(self, stamp):
-        """Return the log time of a message [ns]: its stamp, or the time of the drive.
+    def _log_time(self, stamp: Nanoseconds | None) -> Nanoseconds:
+        """Return the log time of a message: its stamp, or the time of the drive.
 
         The time of the drive replaces a stamp that is missing, that lies in the future, or that is more than
         MAX_STAMP_DISTANCE_NS away from it. A stamp lies in the future if it is later than now by more than
@@ -314,22 +313,22 @@ class RecorderNode(shell.Shell):
             self._without_stamp += 1
         return self._stamp
 
-    def _on_arrival(self, index, topic):
+    def _on_arrival(self, index: int, topic: nodes.Link) -> _Taker:
         """Return the function put(data, info) that writes a message of a topic at its arrival in realtime."""
         write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
         clock = PublisherGate(lambda data: (messages.stamp_of(data),) * 2, round(self.graph.future * NS_PER_SECOND))
 
-        def put(data, info):
+        def put(data: bytes, info: _Info) -> None:
             write(index, log_time(stamp_in(data)), info['source_timestamp'], data)
 
-        def put_clock(data, info):
+        def put_clock(data: bytes, info: _Info) -> None:
             self._tick(clock.take(data, info['publication_sequence_number'], info['source_timestamp'], *self.clock()))
             put(data, info)
 
-        def put_unstamped(data, info):
+        def put_unstamped(data: bytes, info: _Info) -> None:
             write(index, self._stamp, info['source_timestamp'], data)
 
-        def put_diagnostics(data, info):
+        def put_diagnostics(data: bytes, info: _Info) -> None:
             if self._sender(data) != self.name:
                 put(data, info)
 
@@ -337,8 +336,8 @@ class RecorderNode(shell.Shell):
             return put_unstamped
         return {'clock': put_clock, 'diagnostics': put_diagnostics}.get(topic.name, put)
 
-    def _tick(self, stamp):
-        """Take a new time of the drive [ns], None for a rejected message; end the node at the planned end."""
+    def _tick(self, stamp: Nanoseconds | None) -> None:
+        """Take a new time of the drive, None for a rejected message; end the node at the planned end."""
         if stamp is None:
             return
         if self.graph.lockstep and stamp // NS_PER_SECOND > self._stamp // NS_PER_SECOND:
@@ -347,14 +346,14 @@ class RecorderNode(shell.Shell):
         if self._end is not None and stamp - self.epoch(stamp) >= self._end:
             self.finished = True
 
-    def _write(self, write):
+    def _write(self, write: Callable[[], None]) -> None:
         """Call a function that writes to the disk, and end the node if it raises BagError."""
         try:
             write()
         except BagError as error:
             self._fail(str(error))
 
-    def _diagnosis(self):
+    def _diagnosis(self) -> Diagnosis:
         """Return the Diagnosis of the recorder: level, message, and counts."""
         level, message = LEVEL_OK, 'recording'
         if self._without_stamp or self._order.unplaced:
@@ -369,7 +368,7 @@ class RecorderNode(shell.Shell):
             ('lost', str(self._lost.total())), ('without valid stamp', str(self._without_stamp)),
             ('out of order', str(self._order.unplaced))])
 
-    def draining(self):
+    def draining(self) -> bool:
         """Return True while the recorder waits for late messages after the end of the run.
 
         The wait ends when all steps are written, after QUIET_TIME_S without a message, or after MAX_DRAIN_S.
@@ -387,7 +386,7 @@ class RecorderNode(shell.Shell):
         incomplete = received and not all(self._received[index] for index in self._step_topics)
         return now < self._drain_end and (incomplete or now < self._last_arrival[0] + QUIET_TIME_S)
 
-    def close(self):
+    def close(self) -> None:
         """Write the waiting steps and finish the bag. `result` states its path, messages, losses, size and SHA-256.
 
         Raises GraphError if an error ended the node, or if messages were lost in lockstep.
@@ -402,7 +401,7 @@ class RecorderNode(shell.Shell):
             raise GraphError(self._error)
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node to its end, and return the exit code."""
     return shell.main(RecorderNode, args)
 

@@ -18,7 +18,7 @@ class RecorderParameters(topic_flags(topics.TOPIC_BY_NAME)):  # type: ignore[mis
     scenario_yaml: str = text('', 'scenario of the run as a ROS 2 parameter file')
     parameters_yaml: str = text('', 'parameters of all nodes of the run as YAML, {node: {name: value}}')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if `bag` is empty."""
         if not self.bag:
             raise ParameterError("bag = '': must be a directory that does not exist")

@@ -13,17 +13,20 @@ import re
 import shutil
 import struct
 import zlib
+from collections.abc import Callable, Iterator
 
 from mcap import records
 from mcap.opcode import Opcode
 
 from pedestal_common.graph import nodes, topics
+from pedestal_common.quantities import Nanoseconds
 from pedestal_recording import bag as bags
 from pedestal_recording.mcap_file import (
     MAGIC,
     MESSAGE_HEAD,
     ZSTD_MAGIC,
     BagError,
+    Data,
     McapFile,
     frame,
     parsed,
@@ -50,21 +53,16 @@ _FOOTER = 9 + 20 + len(MAGIC)  # length of the footer record and the last bytes 
 
 @dataclasses.dataclass
 class Gap:
-    """Unusable bytes [start, stop) of a file.
-
-    problem         reason why the bytes are unusable
-    before, after   log times of the last message before and the first message after the bytes [ns], or None
-    file            name of the file, '' in a bag of one file
-    """
+    """Unusable bytes [start, stop) of a file."""
     start: int
     stop: int
-    problem: str
-    before: int | None
-    after: int | None = None
-    file: str = ''
+    problem: str    # reason why the bytes are unusable
+    before: Nanoseconds | None  # log time of the last message before the bytes
+    after: Nanoseconds | None = None    # log time of the first message after the bytes
+    file: str = ''  # name of the file, '' in a bag of one file
 
-    def line(self, start=0):
-        """Return the gap as text, with its times relative to the stamp `start` [ns]."""
+    def line(self, start: Nanoseconds = 0) -> str:
+        """Return the gap as text, with its times relative to the stamp `start`."""
         return (f'bytes {self.start} to {self.stop}{self.file and f" of {self.file}"} unused ({self.problem})'
                 + (f', after {(self.before - start) / 1e9:.6f} s' if self.before is not None else '')
                 + (f', before {(self.after - start) / 1e9:.6f} s' if self.after is not None else ''))
@@ -72,32 +70,23 @@ class Gap:
 
 @dataclasses.dataclass
 class Recovered:
-    """Result of `recover`: the recovered messages in the new bag at `path`, and the missing messages.
-
-    counts        {topic: number of recovered messages}
-    first, last   log times of the first and the last recovered message [ns]
-    ended         True if the recorder came to its end
-    planned_end   stamp of the planned end of the run [ns], None if unknown
-    start         stamp of time 0 of the scenario [ns]
-    gaps          [Gap], the unusable bytes
-    lost          {topic: number of messages missing before the last one, by the sequence numbers of the recorder}
-    """
+    """Result of `recover`: the recovered messages in the new bag at `path`, and the missing messages."""
     path: pathlib.Path
-    counts: dict
-    first: int
-    last: int
-    ended: bool
-    planned_end: int | None
-    start: int
-    gaps: list
-    lost: dict
+    counts: dict[str, int]  # recovered messages by topic
+    first: Nanoseconds  # log time of the first recovered message
+    last: Nanoseconds   # log time of the last recovered message
+    ended: bool     # True if the recorder came to its end
+    planned_end: Nanoseconds | None     # stamp of the planned end of the run, None if unknown
+    start: Nanoseconds  # stamp of time 0 of the scenario
+    gaps: list[Gap]     # the unusable bytes
+    lost: dict[str, int]    # messages missing before the last one, by topic, by the sequence numbers of the recorder
 
     @property
-    def unused(self):
+    def unused(self) -> int:
         """Number of unusable bytes of all files."""
         return sum(gap.stop - gap.start for gap in self.gaps)
 
-    def lines(self):
+    def lines(self) -> list[str]:
         """Return the report as lines of text: the gaps, the losses in the middle and at the end, the new bag last."""
         lines = [gap.line(self.start) for gap in self.gaps]
         first, last = self.first - self.start, self.last - self.start
@@ -107,18 +96,18 @@ class Recovered:
                          and topics.TOPIC_BY_NAME[nodes.plain(name)].rate == 'step'), default=0)
             lines.append(f'lost in the middle: {steps} steps, {sum(self.lost.values())} messages: '
                          + ', '.join(f'{count} of {name}' for name, count in self.lost.items()))
-        planned = self.planned_end is not None and self.last < self.planned_end
-        if planned or not self.ended:
+        planned = self.planned_end if self.planned_end is not None and self.last < self.planned_end else None
+        if planned is not None or not self.ended:
             lines.append(f'the recording {"ends" if self.ended else "breaks off"} after {last / 1e9:.6f} s'
-                         + (f', the planned end is {(self.planned_end - self.start) / 1e9:.6f} s'
-                            if planned else ''))
+                         + (f', the planned end is {(planned - self.start) / 1e9:.6f} s'
+                            if planned is not None else ''))
         total = sum(self.counts.values())
         return [*(lines or ['nothing is missing']),
                 f'{self.path}: {total} messages, {len(self.counts)} topics, {first / 1e9:.6f} to '
                 f'{last / 1e9:.6f} s; {self.unused} bytes unused']
 
 
-def recover(path, output=None) -> Recovered:
+def recover(path: str | pathlib.Path, output: str | pathlib.Path | None = None) -> Recovered:
     """Write the readable messages of the bag at a path to a new bag. The old bag stays unchanged.
 
     output: directory of the new bag, by default beside the old bag, with '-recovered' after its name.
@@ -150,7 +139,7 @@ def recover(path, output=None) -> Recovered:
     return recovered
 
 
-def _record_begins(data, position):
+def _record_begins(data: Data, position: int) -> bool:
     """Return True if a record with a possible length begins at a position."""
     try:
         return bool(frame(data, position))
@@ -158,21 +147,21 @@ def _record_begins(data, position):
         return False
 
 
-def _read(file, opcode, data, start, stop):
-    """Return the record at [start, stop) of data as an object of mcap.records, for a chunk its unpacked bytes.
+def _read(file: McapFile, opcode: int, data: Data, start: int, stop: int) -> records.McapRecord | bytes | None:
+    """Return the record at [start, stop) of data, for a chunk its unpacked bytes.
 
     Return None for a kind of record that is not copied.
     """
     if opcode not in _COPIED_OPCODES:
         return None
     record = parsed(opcode, data[start + 9:stop])
-    if opcode != Opcode.CHUNK:
+    if not isinstance(record, records.Chunk):
         return record
     file.spend(record)
     return unpacked(record)
 
 
-def _next_chunk(file, data, start):
+def _next_chunk(file: McapFile, data: Data, start: int) -> int:
     """Return the position of the first chunk with a correct checksum from `start` on; the end of data without one."""
     for name in _COMPRESSION.finditer(data, start):
         at = name.start() - _BEFORE_COMPRESSION
@@ -187,8 +176,8 @@ def _next_chunk(file, data, start):
     return len(data)
 
 
-def _pieces(file, data):
-    """Yield (opcode, start, stop, record) of each record before the summary of a file (McapFile; data: its bytes).
+def _pieces(file: McapFile, data: Data) -> Iterator[tuple[int, int, int, records.McapRecord | bytes | str | None]]:
+    """Yield (opcode, start, stop, record) of each record before the summary of a file; data: its bytes.
 
     Unusable bytes give (_UNUSABLE, start, stop, reason) instead. After a broken record whose stated length leads to
     the begin of another record, the reading continues there. Otherwise it continues at the next intact chunk after
@@ -214,7 +203,7 @@ def _pieces(file, data):
         start = stop
 
 
-def _summary(file, data):
+def _summary(data: Data) -> Iterator[records.McapRecord | None]:
     """Yield the schemas and channels that the summary at the end of a file repeats; none in a file without a summary.
 
     This avoids the loss of messages whose schema and channel stand in a broken chunk.
@@ -228,7 +217,7 @@ def _summary(file, data):
     while at < footer:
         opcode, stop = frame(data, at)
         if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            yield _read(file, opcode, data, at, stop)
+            yield parsed(opcode, data[at + 9:stop])
         at = stop
 
 
@@ -236,41 +225,38 @@ class _Salvage:
     """Writer of the messages of damaged files to a new BagFile, and counter of the unusable bytes.
 
     "File" means a file of the damaged bag, and "bag" the new bag.
-
-    several                True if the damaged bag has several files, so a gap must name its file
-    _schemas, _channels    {number of a schema or channel in the current file: its number in the bag}
-    _names                 {channel of the bag: topic}
-    _declared              {content of a schema or channel: its number in the bag}
-    _counts                {topic: number of added messages}
-    _lost                  {channel of the bag: number of messages lost in gaps}
-    _first, _last          smallest and largest log time of the added messages [ns]
-    _sequence              {channel of the bag: sequence number of its last message}
-    _before                _sequence as it was before the current file
-    _offsets               {channel of the bag: addition to the sequence numbers of the current file}
-    _compressed            number of messages that are compressed one by one
-    _unsure                channels of the bag without a message since the last gap
-    _ended                 True if the last file comes to its regular end
+    several: True if the damaged bag has several files, so a gap must name its file.
     """
+    _file: McapFile
 
-    def __init__(self, bag, several):
+    def __init__(self, bag: BagFile, several: bool) -> None:
         self._bag, self._several = bag, several
-        self._file = None
-        self._schemas, self._channels, self._names, self._metadata = {}, {}, {}, {}
-        self._declared = {}
-        self._counts, self._lost = {}, collections.Counter()
-        self._first = self._last = None
-        self._sequence, self._before, self._offsets, self._unsure = {}, {}, {}, set()
-        self._compressed = 0
-        self._gaps = []
-        self._ended = False
+        # number in the bag of a schema or channel, by its number in the current file
+        self._schemas: dict[int, int] = {}
+        self._channels: dict[int, int] = {}
+        self._names: dict[int, str] = {}    # topic of a channel of the bag
+        self._metadata: dict[str, dict[str, str]] = {}
+        self._declared: dict[tuple[str, str], int] = {}     # number in the bag of the content of a schema or channel
+        self._counts: dict[str, int] = {}   # added messages of a topic
+        self._lost: collections.Counter[int] = collections.Counter()    # messages of a channel of the bag lost in gaps
+        # smallest and largest log time of the added messages
+        self._first: Nanoseconds | None = None
+        self._last: Nanoseconds | None = None
+        self._sequence: dict[int, int] = {}     # sequence number of the last message of a channel of the bag
+        self._before: dict[int, int] = {}       # _sequence as it was before the current file
+        self._offsets: dict[int, int] = {}      # addition to the sequence numbers of a channel in the current file
+        self._unsure: set[int] = set()  # channels of the bag without a message since the last gap
+        self._compressed = 0    # number of messages that are compressed one by one
+        self._gaps: list[Gap] = []
+        self._ended = False     # True if the last file comes to its regular end
 
-    def add_file(self, file, data):
-        """Add all readable messages of a McapFile to the bag; data: the bytes of the file."""
+    def add_file(self, file: McapFile, data: Data) -> None:
+        """Add all readable messages of a file to the bag; data: its bytes."""
         self._file = file
         self._schemas, self._channels, self._before, self._offsets = {}, {}, dict(self._sequence), {}
         try:
-            for record in _summary(file, data):
-                self._declare(record)
+            for declared in _summary(data):
+                self._declare(declared)
         except BagError:
             raise
         except Exception:  # a decoder may raise anything on broken bytes; the file itself declares all again
@@ -283,7 +269,7 @@ class _Salvage:
             except (ValueError, struct.error) as error:
                 self._skip(start, stop, str(error))
 
-    def _take(self, opcode, record, message):
+    def _take(self, opcode: int, record: records.McapRecord | bytes | str | None, message: bytes) -> None:
         """Add a record of _pieces to the bag. Raises ValueError for unusable bytes.
 
         message: bytes of a message record outside chunks, b'' for any other record.
@@ -292,22 +278,24 @@ class _Salvage:
             raise ValueError(record)
         if opcode == Opcode.MESSAGE:
             self._add_messages(message)
-        elif opcode == Opcode.CHUNK:
+        elif isinstance(record, bytes):     # of a chunk
             self._add_messages(record)
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+        elif isinstance(record, records.Schema | records.Channel):
             self._declare(record)
-        elif opcode == Opcode.METADATA and record.name != 'recovered' and record.name not in self._metadata:
+        elif isinstance(record, records.Metadata) and record.name != 'recovered' and record.name not in self._metadata:
             self._metadata[record.name] = record.metadata
             self._bag.add_metadata(record.name, record.metadata)
         elif opcode == Opcode.ATTACHMENT:
             raise ValueError('an attachment')
         self._ended = opcode in _END_OPCODES
 
-    def _declare(self, record):
-        """Add a new schema or channel to the bag."""
+    def _declare(self, record: records.McapRecord | None) -> None:
+        """Add a new schema or channel to the bag; other records are left out."""
         if isinstance(record, records.Schema):
             if record.id not in self._schemas:
                 self._schemas[record.id] = self._once(self._bag.add_schema, record.name, record.encoding, record.data)
+        elif not isinstance(record, records.Channel):
+            return
         elif record.message_encoding != 'cdr':
             raise bags.foreign_encoding(self._file.path, record)
         elif record.id not in self._channels and record.schema_id in self._schemas:
@@ -316,7 +304,7 @@ class _Salvage:
             self._names[channel] = record.topic.lstrip('/')
             self._counts.setdefault(self._names[channel], 0)
 
-    def _once(self, add, *content):
+    def _once(self, add: Callable[..., int], *content: object) -> int:
         """Return the number of a schema or channel in the new bag; call add(*content) at its first occurrence.
 
         Because each file of a bag repeats the schemas and channels, this avoids a second copy.
@@ -326,7 +314,7 @@ class _Salvage:
             self._declared[key] = add(*content)
         return self._declared[key]
 
-    def _skip(self, start, stop, problem):
+    def _skip(self, start: int, stop: int, problem: str) -> None:
         """Note the unusable bytes [start, stop) as a new Gap, or as a part of the Gap that ends at `start`."""
         file = self._file.path.name if self._several else ''
         if self._gaps and self._gaps[-1].stop == start and self._gaps[-1].file == file:
@@ -335,13 +323,12 @@ class _Salvage:
         self._gaps.append(Gap(start, stop, problem, self._last, file=file))
         self._unsure = set(self._channels.values())
 
-    def _add_messages(self, raw):
+    def _add_messages(self, raw: bytes) -> None:
         """Add the messages in records, given as bytes (of a chunk, or of one message).
 
         Raises ValueError, and adds none of the messages, if a message has no known channel or an invalid head.
         """
-        first = last = None
-        number = at = 0
+        at, logs = 0, []
         while at < len(raw):
             opcode, stop = frame(raw, at)
             if opcode == Opcode.MESSAGE:
@@ -350,14 +337,13 @@ class _Salvage:
                     raise ValueError(f'channel {channel} is not declared')
                 if stop < at + MESSAGE_HEAD.size or log >= 2**63:
                     raise ValueError('a message with an invalid head')
-                first, last = (log, log) if first is None else (min(first, log), max(last, log))
-                number += 1
+                logs.append(log)
             else:
                 self._declare(parsed(opcode, raw[at + 9:stop]))
             at = stop
-        if not number:
+        if not logs:
             return
-        self._file.count(number)
+        self._file.count(len(logs))
         at = 0
         while at < len(raw):
             opcode, stop = frame(raw, at)
@@ -365,13 +351,14 @@ class _Salvage:
                 _, channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(raw, at)
                 self._add(self._channels[channel], sequence, log, publish, raw[at + MESSAGE_HEAD.size:stop])
             at = stop
+        first, last = min(logs), max(logs)
         for gap in self._gaps:
             gap.after = first if gap.after is None else gap.after
         self._first = first if self._first is None else min(self._first, first)
         self._last = last if self._last is None else max(self._last, last)
 
-    def _add(self, channel, sequence, log, publish, data):
-        """Add a message to a channel of the bag. log, publish: times [ns]; data: CDR bytes.
+    def _add(self, channel: int, sequence: int, log: Nanoseconds, publish: Nanoseconds, data: bytes) -> None:
+        """Add a message to a channel of the bag. data: CDR bytes.
 
         The recorder numbers the messages of each topic from 1 in each file. The sequence number of the first message
         after a gap therefore gives the number of lost messages. A tool that splits a recording continues the numbers
@@ -388,13 +375,14 @@ class _Salvage:
         self._compressed += data[:len(ZSTD_MAGIC)] == ZSTD_MAGIC
         self._counts[self._names[channel]] += 1
 
-    def recovered(self):
+    def recovered(self) -> Recovered:
         """Return the Recovered of the bag, after at least one message was added.
 
         Raises BagError if all messages are compressed one by one: the new bag would not state their compression.
         """
         if self._compressed == sum(self._counts.values()):
             raise bags.compressed_messages(self._file.path, 'zstd')
+        assert self._first is not None and self._last is not None
         ours = 'pacing' in self._metadata.get('pedestal', {})
         lost = {self._names[channel]: count for channel, count in self._lost.items() if ours and count > 0}
         return Recovered(self._bag.path, self._counts, self._first, self._last, self._ended,

@@ -4,9 +4,13 @@ The recorder node passes each message to a StepOrder, which writes them in this 
 the load of the machine, the order of steps does not. So equal runs give equal files.
 """
 import heapq
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, TypeAlias
 
+from pedestal_common.graph.nodes import Link
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.graph.topics import EVENT_RATES
+from pedestal_common.quantities import Nanoseconds
 
 MAX_WAITING_STEPS = 10_000  # largest number of steps whose messages wait because an earlier step is incomplete
 
@@ -18,15 +22,16 @@ class OrderError(ValueError):
     """
 
 
+_Bucket: TypeAlias = list[Any]  # of one step: item 0 a number, the others CDR bytes or None, see StepOrder
+
+
 class StepOrder:
     """Collector of the messages of each step. A step is written when it is complete and all earlier steps are written.
 
-    topics     recorded topics, as rows of topics.TOPICS
-    nodes      names of the nodes in the graph
-    write      function write(index of the topic, log time, publish time [ns], CDR bytes). Its calls are in the order
-               of steps, with the stamp of the step as both times.
-    written    stamp of the last written step [ns], -1 before the first
-    unplaced   number of messages without a place in an unwritten step: doubled, late or without stamp
+    topics   recorded topics
+    nodes    names of the nodes in the graph
+    write    function write(index of the topic, log time, publish time, CDR bytes). Its calls are in the order of
+             steps, with the stamp of the step as both times.
 
     A step is complete with one message of every topic of the rate `step`. At every whole second it also needs the
     diagnostics of every node of the graph. The first step also needs the topics of the rate `once`. An unplaced
@@ -37,9 +42,10 @@ class StepOrder:
     step topics, and item k is the message in slot k, or None.
     """
 
-    def __init__(self, topics, nodes, write):
+    def __init__(self, topics: Sequence[Link], nodes: Collection[str],
+                 write: Callable[[int, Nanoseconds, Nanoseconds, bytes], None]) -> None:
         self._write = write
-        self._slots = []
+        self._slots: list[tuple[int, Link, str | None]] = []
         for index, topic in enumerate(topics):
             if topic.rate == 'second':
                 self._slots += [(index, topic, node) for node in topic.writers if node in nodes]
@@ -49,30 +55,31 @@ class StepOrder:
         self._needed = {rate: [slot for slot, (_, topic, _) in enumerate(self._slots, 1) if topic.rate == rate]
                         for rate in ('step', 'once', 'second')}
         self._steps = len(self._needed['step'])
-        self._last_answer, self._answer_slot = {}, {}
+        self._last_answer: dict[int | None, Nanoseconds] = {}
+        self._answer_slot: dict[int, int | None] = {}
         for index, topic in enumerate(topics):
             if topic.rate in EVENT_RATES:
                 answers = [slot for slot in self._needed['step'] if self._slots[slot - 1][1].writers == topic.writers]
                 self._answer_slot[index] = answers[0] if answers else None
                 self._last_answer[self._answer_slot[index]] = -1
-        self._buckets = {}
-        self._stamps = []
-        self._changes = {index: [] for index in self._answer_slot}
-        self._unplaced = []
-        self.written = -1
-        self.unplaced = 0
+        self._buckets: dict[Nanoseconds, _Bucket] = {}
+        self._stamps: list[Nanoseconds] = []
+        self._changes: dict[int, list[tuple[Nanoseconds, bytes]]] = {index: [] for index in self._answer_slot}
+        self._unplaced: list[tuple[int, bytes]] = []
+        self.written: Nanoseconds = -1  # stamp of the last written step, -1 before the first
+        self.unplaced = 0   # number of messages without a place in an unwritten step: doubled, late or without stamp
 
     @property
-    def waiting(self):
+    def waiting(self) -> int:
         """Number of steps that wait for a message."""
         return len(self._buckets)
 
-    def slot(self, name, node=None):
+    def slot(self, name: str, node: str | None = None) -> int | None:
         """Return the slot of a topic, None if it is not recorded. node: the publisher, for the diagnostics only."""
         return self._slot_of.get((name, node))
 
-    def take(self, slot, stamp, data):
-        """Take a message by its slot, its stamp [ns] and its CDR bytes. Raises OrderError if too many steps wait."""
+    def take(self, slot: int, stamp: Nanoseconds, data: bytes) -> None:
+        """Take a message by its slot, its stamp and its CDR bytes. Raises OrderError if too many steps wait."""
         bucket = self._buckets.get(stamp)
         if bucket is None:
             if stamp <= self.written:
@@ -90,7 +97,7 @@ class StepOrder:
         if not bucket[0] and stamp == self._stamps[0]:
             self._advance()
 
-    def take_change(self, index, data):
+    def take_change(self, index: int, data: bytes) -> None:
         """Take the CDR bytes of a message of a topic of EVENT_RATES, by the index of the topic.
 
         The message belongs to the step after the last step that its publisher has answered. A node answers a step by
@@ -98,13 +105,13 @@ class StepOrder:
         """
         self._changes[index].append((self._last_answer[self._answer_slot[index]], data))
 
-    def take_unplaced(self, index, data):
+    def take_unplaced(self, index: int, data: bytes) -> None:
         """Take the CDR bytes of a message without a place in a step, by the index of its topic."""
         self.unplaced += 1
         self._unplaced.append((index, data))
 
-    def _open(self, stamp):
-        """Add a bucket for the step with a stamp [ns], and return it. Raises OrderError if too many steps wait."""
+    def _open(self, stamp: Nanoseconds) -> _Bucket:
+        """Add a bucket for the step with a stamp, and return it. Raises OrderError if too many steps wait."""
         if len(self._stamps) >= MAX_WAITING_STEPS:
             first = self._stamps[0]
             raise OrderError(f'step {first / NS_PER_SECOND:.6f} s still waits for {", ".join(self.missing(first))} '
@@ -113,8 +120,8 @@ class StepOrder:
         heapq.heappush(self._stamps, stamp)
         return bucket
 
-    def _missing_slots(self, stamp):
-        """Return the empty slots that keep the step with a stamp [ns] incomplete."""
+    def _missing_slots(self, stamp: Nanoseconds) -> list[int]:
+        """Return the empty slots that keep the step with a stamp incomplete."""
         bucket = self._buckets[stamp]
         needed = self._needed['step'] if bucket[0] else []
         if self.written < 0:
@@ -123,17 +130,17 @@ class StepOrder:
             needed = needed + self._needed['second']
         return [slot for slot in needed if bucket[slot] is None]
 
-    def missing(self, stamp):
-        """Return the names of the messages that the step with a stamp [ns] waits for."""
+    def missing(self, stamp: Nanoseconds) -> list[str]:
+        """Return the names of the messages that the step with a stamp waits for."""
         slots = [self._slots[slot - 1] for slot in self._missing_slots(stamp)]
         return [f'{topic.name} of {node}' if node else topic.name for _, topic, node in slots]
 
-    def _advance(self):
+    def _advance(self) -> None:
         """Write the earliest waiting steps as long as they are complete."""
         while self._stamps and not self._buckets[self._stamps[0]][0] and not self._missing_slots(self._stamps[0]):
             self._write_first_step()
 
-    def _write_first_step(self):
+    def _write_first_step(self) -> None:
         """Write the messages of the earliest waiting step, whether it is complete or not."""
         stamp = heapq.heappop(self._stamps)
         bucket = self._buckets.pop(stamp)
@@ -148,13 +155,13 @@ class StepOrder:
                     write(index, stamp, stamp, changes.pop(0)[1])
         self._put_unplaced()
 
-    def _put_unplaced(self):
+    def _put_unplaced(self) -> None:
         """Write the messages without a place in a step, with the stamp of the last written step."""
         unplaced, self._unplaced = self._unplaced, []
         for index, data in unplaced:
             self._write(index, max(self.written, 0), max(self.written, 0), data)
 
-    def finish(self):
+    def finish(self) -> None:
         """Write all waiting messages, in order."""
         while self._stamps:
             self._write_first_step()

@@ -7,15 +7,18 @@ aborted run may be complete up to its end.
 import collections
 import dataclasses
 import typing
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import yaml
 
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Ints, Nanoseconds, Seconds, Stamps
 from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
 from pedestal_recording import configuration
+from pedestal_recording.bag import Bag, Index
 
 MAX_LATENCY_NS = 1_000_000_000
 """Largest time between the last message of a topic and the last step [ns].
@@ -28,76 +31,67 @@ MAX_SHOWN_GAPS = 10  # largest number of gaps of a topic that the report lists
 
 @dataclasses.dataclass
 class TopicCheck:
-    """Result for one topic: number of messages, first and last stamp [s] (NaN without messages), problems as texts."""
+    """Result for one topic."""
     name: str
-    count: int
-    first: float
-    last: float
-    problems: list
+    count: int  # messages
+    first: Seconds  # stamp of the first message, NaN without messages
+    last: Seconds   # stamp of the last message, NaN without messages
+    problems: list[str]
 
 
 @dataclasses.dataclass
 class Report:
-    """Result of `verify`.
-
-    topics            [TopicCheck]
-    foreign           lines about the foreign messages, which the check leaves out
-    cut               time at which a recording of only a part of its run begins [s]; None if it begins with its run
-    problems          texts about the bag as a whole
-    steps, period     number of steps of the run; their period [s], NaN with fewer than two steps
-    made              origin of the bag, one line
-    end               time of the last step [ns]
-    planned_end       time of the planned last step [ns], None if unknown
-    lost              (number of lost steps, number of all steps) in the last diagnostics of the drive, None if unknown
-    """
+    """Result of `verify`."""
     path: str
-    topics: list
-    problems: list
-    steps: int
-    period: float
-    made: str
-    end: int
-    planned_end: int | None
-    lost: tuple | None
-    foreign: list
-    cut: float | None
+    topics: list[TopicCheck]
+    problems: list[str]     # of the bag as a whole
+    steps: int  # of the run
+    period: Seconds     # of the steps, NaN with fewer than two steps
+    made: str   # origin of the bag, one line
+    end: Nanoseconds    # time of the last step
+    planned_end: Nanoseconds | None     # time of the planned last step, None if unknown
+    # number of lost steps and number of all steps in the last diagnostics of the drive, None if unknown
+    lost: tuple[int, int] | None
+    foreign: list[str]  # lines about the foreign messages, which the check leaves out
+    cut: Seconds | None     # time at which a recording of only a part of its run begins; None for a whole run
 
     @property
-    def complete(self):
+    def complete(self) -> bool:
         """True if the recording has no problem up to its end."""
         return not self.problems and not any(check.problems for check in self.topics)
 
     @property
-    def aborted(self):
+    def aborted(self) -> bool:
         """True if the recording ends before the planned end of its run."""
         return self.planned_end is not None and self.end < self.planned_end
 
     @property
-    def finished(self):
+    def finished(self) -> bool:
         """True if the recording is complete up to the planned end of its run."""
         return self.complete and not self.aborted
 
     @property
-    def ending(self):
+    def ending(self) -> str:
         """One line about the end of an aborted run; '' if the run came to its planned end or has no planned end."""
-        if self.aborted and self.cut is not None:
+        if self.planned_end is None or not self.aborted:
+            return ''
+        if self.cut is not None:
             return (f'part of a run: {self.cut:.6f} s to {self.end / 1e9:.6f} s; planned end '
                     f'{self.planned_end / 1e9:.6f} s')
-        return (f'aborted: ends at {self.end / 1e9:.6f} s, planned end {self.planned_end / 1e9:.6f} s'
-                if self.aborted else '')
+        return f'aborted: ends at {self.end / 1e9:.6f} s, planned end {self.planned_end / 1e9:.6f} s'
 
     @property
-    def lost_steps(self):
+    def lost_steps(self) -> str:
         """Lost steps of the drive as text, '' without any."""
         return '{} of {}'.format(*self.lost) if self.lost and self.lost[0] else ''
 
     @property
-    def loss(self):
+    def loss(self) -> str:
         """Line about the lost steps of the drive, '' without any."""
         return f'lost steps: {self.lost_steps}, made by the drive without the command for them' if (
             self.lost_steps) else ''
 
-    def lines(self):
+    def lines(self) -> list[str]:
         """Return the report as lines of text: a row per topic, its gaps below it, the verdict last."""
         width = max([len(check.name) for check in self.topics], default=5)
         lines = [f'{"topic":{width}} {"messages":>9} {"first s":>14} {"last s":>14}']
@@ -118,24 +112,27 @@ class Report:
         return [*lines, f'{self.path}: {verdict}: {total} messages, {len(self.topics)} topics, {steps}']
 
 
+_S = typing.TypeVar('_S', Nanoseconds, Stamps)
+
+
 class _Grid(typing.NamedTuple):
-    """Times of the steps of a run: first and last step, and period [ns]; period 0 with fewer than two steps."""
-    first: int
-    last: int
-    period: int
+    """Times of the steps of a run."""
+    first: Nanoseconds
+    last: Nanoseconds
+    period: Nanoseconds     # 0 with fewer than two steps
 
     @property
-    def steps(self):
+    def steps(self) -> int:
         """Number of steps."""
         return (self.last - self.first) // self.period + 1 if self.period else 0
 
-    def at(self, stamp):
-        """Return the time of the first step at or after a stamp [ns], a number or an array."""
+    def at(self, stamp: _S) -> _S:
+        """Return the time of the first step at or after each stamp."""
         return self.first - (self.first - stamp) // self.period * self.period
 
 
-def verify(bag) -> Report:
-    """Return the Report on a bag.Bag.
+def verify(bag: Bag) -> Report:
+    """Return the Report on a bag.
 
     The stamps of joint_states define the steps. In a bag without them, the first topic of the rate `step` that has
     messages defines the steps.
@@ -165,21 +162,21 @@ def verify(bag) -> Report:
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
     drive = bag.last_values(nodes.DRIVE_NODE)
-    lost = count(drive.get('lost_steps', '')), count(drive.get('step', ''))
+    lost, of_all = count(drive.get('lost_steps', '')), count(drive.get('step', ''))
     planned = planned - bag.start if of_steps and planned is not None else None
     return Report(str(bag.path), checks, bag.breaks + problems, grid.steps,
                   grid.period / 1e9 if grid.period else np.nan, configuration.line(bag), grid.last, planned,
-                  None if None in lost else lost, bag.foreign,
+                  None if lost is None or of_all is None else (lost, of_all), bag.foreign,
                   grid.first / 1e9 if before else None)
 
 
-def count(text):
+def count(text: str) -> int | None:
     """Return a text of the diagnostics as a whole number, None if the text is no whole number."""
     return int(text) if text.isdecimal() and len(text) < 20 else None
 
 
-def steps_before(bag):
-    """Return the number of steps that a bag.Bag of only a part of its run misses before its first step, else 0.
+def steps_before(bag: Bag) -> int:
+    """Return the number of steps that a bag of only a part of its run misses before its first step, else 0.
 
     The recorder counts the messages of each topic from 1. In a part of a run, the sequence numbers of all topics of
     the rate `step` therefore begin with an equal number above 1.
@@ -191,10 +188,10 @@ def steps_before(bag):
     return first[0] - 1 if len(first) > 1 and len(set(first)) == 1 else 0
 
 
-def _problems(bag, rows, name, stamp, grid, cut):
-    """Return the problems of a topic `name` as texts.
+def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut: bool) -> list[str]:
+    """Return the problems of a topic.
 
-    rows: its rows of the index (n,); stamp: its stamps (n,) since the start [ns]; grid: _Grid of the run.
+    stamp: its stamps, since the start.
     cut: True if the recording begins during its run. The number of messages before its begin is then unknown.
     """
     topic, ours = bag.graph.get(name), 'pacing' in bag.metadata
@@ -204,7 +201,7 @@ def _problems(bag, rows, name, stamp, grid, cut):
         return ([] if stamp.size else ['no message']) + _numbering(bag.recorded(name), cut)
     # A node outside the graph publishes samples. It may be restarted, and it may repeat a stamp.
     problems = _order(stamp) if topic and len(topic.writers) == 1 and rate != 'sample' else []
-    if rate == 'step':
+    if topic and rate == 'step':
         problems += _steps(stamp, 'adu' in topic.writers, grid)
         if ours and not np.array_equal(rows.stamp, rows.log):
             problems.append(f'{np.sum(rows.stamp != rows.log)} messages with a log time that differs from their stamp')
@@ -220,14 +217,14 @@ def _problems(bag, rows, name, stamp, grid, cut):
     return problems
 
 
-def _differences(claimed, counts):
-    """Return the differences between stated and actual counts {topic: number of messages} as text."""
+def _differences(claimed: Mapping[str, int], counts: Mapping[str, int]) -> str:
+    """Return the differences between stated and actual numbers of messages by topic as text."""
     return ', '.join(f'{claimed.get(name, 0)} of {name} instead of {counts.get(name, 0)}'
                      for name in dict.fromkeys((*claimed, *counts)) if claimed.get(name, 0) != counts.get(name, 0))
 
 
-def _grid(stamps):
-    """Return the _Grid of a run from the stamps {topic: (n,) [ns]} of its topics of the rate `step`."""
+def _grid(stamps: Mapping[str, Stamps]) -> _Grid:
+    """Return the _Grid of a run from the stamps of its topics of the rate `step`."""
     if not stamps:
         return _Grid(0, 0, 0)
     steps = np.unique(next((stamp for name, stamp in stamps.items() if nodes.plain(name) == 'joint_states'),
@@ -236,22 +233,22 @@ def _grid(stamps):
     return _Grid(int(steps[0]), int(max(steps[-1], *(stamp.max() for stamp in stamps.values()))), period)
 
 
-def _order(stamp):
-    """Return [text about the stamps (n,) [ns] that go back], [] if none does."""
+def _order(stamp: Stamps) -> list[str]:
+    """Return [text about the stamps that go back], [] if none does."""
     back = np.flatnonzero(np.diff(stamp) < 0)
     return [f'{back.size} stamps go back, the first from {stamp[back[0]] / 1e9:.6f} '
             f'to {stamp[back[0] + 1] / 1e9:.6f} s'] if back.size else []
 
 
-def _missing(numbers, count):
-    """Return the gaps [(first, last)] in ascending whole numbers (n,), which should contain each of 0 to count - 1."""
+def _missing(numbers: Ints, count: int) -> list[tuple[int, int]]:
+    """Return the gaps [(first, last)] in ascending whole numbers, which should contain each of 0 to count - 1."""
     bounds = np.concatenate(([-1], numbers[(numbers >= 0) & (numbers < count)], [count]))
     gaps = np.flatnonzero(np.diff(bounds) > 1)
     return list(zip((bounds[gaps] + 1).tolist(), (bounds[gaps + 1] - 1).tolist()))
 
 
-def _steps(stamp, of_drive, grid):
-    """Return texts about missing steps, doubled steps and stamps (n,) [ns] between two steps.
+def _steps(stamp: Stamps, of_drive: bool, grid: _Grid) -> list[str]:
+    """Return texts about missing steps, doubled steps and stamps between two steps.
 
     of_drive: True for a topic of the drive, whose messages are never in transit (MAX_LATENCY_NS).
     """
@@ -281,14 +278,14 @@ def _steps(stamp, of_drive, grid):
     return problems
 
 
-def _seconds(bag, name, stamp, grid):
+def _seconds(bag: Bag, name: str, stamp: Stamps, grid: _Grid) -> list[str]:
     """Return texts about missing diagnostics: each node with a topic in the bag publishes them at each whole second.
 
-    name: topic of the diagnostics; stamp: its stamps (n,) [ns].
+    name: topic of the diagnostics.
     """
     first, last = -(-grid.first // NS_PER_SECOND), grid.last // NS_PER_SECOND
     count = max(last - first + (grid.at(last * NS_PER_SECOND) <= grid.last), 0)
-    stamps_of = collections.defaultdict(list)
+    stamps_of: dict[str, list[Nanoseconds]] = collections.defaultdict(list)
     for at, (_, _, _, data) in zip(stamp, bag.raw(name)):
         try:
             status = messages.deserialize(data, bag.topics[name]).status
@@ -310,10 +307,10 @@ def _seconds(bag, name, stamp, grid):
     return problems
 
 
-def _unrecorded_steps(of_steps, start, grid):
+def _unrecorded_steps(of_steps: Sequence[Index], start: Nanoseconds, grid: _Grid) -> list[str]:
     """Return texts about the gaps between two files: a recorder was killed, and another recorder was started later.
 
-    of_steps: rows of the index, for each topic of the rate `step`; start: stamp of time 0 [ns].
+    of_steps: rows of the index, for each topic of the rate `step`; start: stamp of time 0.
     """
     none = np.zeros(0, np.int64)
     number = np.concatenate([none, *(row.channel >> 16 for row in of_steps)])
@@ -323,8 +320,8 @@ def _unrecorded_steps(of_steps, start, grid):
             for (_, before), (after, _) in zip(spans, spans[1:]) if after - before > max(grid.period, 1)]
 
 
-def _numbering(rows, cut):
-    """Return texts about lost messages and doubled or descending sequence numbers of a topic; rows: of the index.
+def _numbering(rows: Index, cut: bool) -> list[str]:
+    """Return texts about lost messages and doubled or descending sequence numbers of a topic.
 
     The recorder counts from 1 in each file, and leaves out a number for each lost message. The number 0 marks a
     message of a foreign publisher. cut: True in a recording of a part of its run, which begins with a higher number.
@@ -344,10 +341,8 @@ def _numbering(rows, cut):
         [f'{back} sequence numbers go back or repeat'] if back else [])
 
 
-def _metadata_file(bag, counts):
-    """Return texts about the differences between metadata.yaml and the files.
-
-    counts: {topic: number of messages} in the files.
+def _metadata_file(bag: Bag, counts: Mapping[str, int]) -> list[str]:
+    """Return texts about the differences between metadata.yaml and the files. counts: messages by topic, in the files.
     """
     file = bag.path / 'metadata.yaml'
     try:

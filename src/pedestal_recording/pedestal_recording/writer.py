@@ -18,9 +18,12 @@ on, until a file reaches the planned end of the run.
 import collections
 import contextlib
 import fcntl
+import io
 import pathlib
 import struct
 import sys
+from collections.abc import Iterator, Mapping, Sequence
+from typing import IO, cast
 
 import yaml
 from mcap import records, writer
@@ -29,7 +32,8 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from pedestal_common.graph import topics
+from pedestal_common.graph import nodes, topics
+from pedestal_common.quantities import Json, Nanoseconds
 from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
 from pedestal_recording.bag import locate, planned_end
@@ -53,7 +57,7 @@ lists the messages of one channel in a chunk.
 """
 
 
-def _qos(rate):
+def _qos(rate: str) -> list[dict[str, object]]:
     """Return the field offered_qos_profiles of rosbag2 for a topic, from its rate in the table of topics."""
     depth, latched = topics.QOS_BY_RATE[rate].lockstep, topics.QOS_BY_RATE[rate].latched
     return [{'history': 'keep_last' if depth else 'keep_all', 'depth': depth, 'reliability': 'reliable',
@@ -68,19 +72,19 @@ class _Disk:
     stream: the open file; size: number of bytes at its beginning that are already written, and not written again.
     """
 
-    def __init__(self, path, stream, size=0):
+    def __init__(self, path: pathlib.Path, stream: io.FileIO, size: int = 0) -> None:
         self.path, self.stream, self.end = path, stream, 0
         self._size, self._pending = size, bytearray()
 
-    def write(self, data):
+    def write(self, data: bytes) -> None:
         """Keep bytes for the next flush."""
         self._pending += data
 
-    def tell(self):
+    def tell(self) -> int:
         """Return the position of the next byte in the file."""
         return self.end + len(self._pending)
 
-    def flush(self):
+    def flush(self) -> None:
         """Write the kept bytes to the file. If the disk does not take them, restore the file; raises BagError."""
         data, self._pending = bytes(self._pending), bytearray()
         if self.end >= self._size:
@@ -98,17 +102,16 @@ class _Disk:
 class BagFile:
     """A bag that is being written.
 
-    path        absolute path of its directory
-    file        path of its MCAP file that is being written
-    directory   path of the bag; must not exist, unless the bag has earlier files
-    earlier     MCAP files of the bag before this file
+    directory: path of the bag; must not exist, unless the bag has earlier files. earlier: MCAP files of the bag before
+    this file.
 
     Raises BagError with the name of the file if the disk is full. The earlier chunks then stay readable. All later
     messages are dropped, so a bag has no gap.
     """
 
-    def __init__(self, directory, earlier=()):
-        self.path = pathlib.Path(directory).absolute()
+    def __init__(self, directory: str | pathlib.Path, earlier: Sequence[pathlib.Path] = ()) -> None:
+        self.path = pathlib.Path(directory).absolute()  # of the bag
+        # MCAP file that is being written
         self.file = self.path / f'{self.path.name}_{len(earlier)}.mcap'
         self._earlier = list(earlier)
         try:
@@ -124,13 +127,13 @@ class BagFile:
         self._in_file = self._in_chunk = self._chunk_size = self._chunk_start = 0
         self._start(_Disk(self.file, stream))
 
-    def _start(self, disk):
+    def _start(self, disk: _Disk) -> None:
         """Begin a new file by a new Writer of the mcap library on a _Disk."""
         self._disk = disk
-        self._mcap = writer.Writer(disk, chunk_size=sys.maxsize)  # flush() alone ends a chunk
+        self._mcap = writer.Writer(cast(IO[bytes], disk), chunk_size=sys.maxsize)  # flush() alone ends a chunk
         self._mcap.start('ros2', 'pedestal')
 
-    def add_schema(self, name, encoding, data):
+    def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Add a message type: its name, and its definition (bytes of a text) in an encoding such as 'ros2msg'.
 
         Return the number of the schema.
@@ -138,8 +141,8 @@ class BagFile:
         number = self._mcap.register_schema(name, encoding, data)
         return self._declared(records.Schema(id=number, name=name, encoding=encoding, data=data))
 
-    def add_channel(self, topic, schema, metadata):
-        """Add a topic: its name with '/', the number of the schema of its type, and metadata {text: text}.
+    def add_channel(self, topic: str, schema: int, metadata: dict[str, str]) -> int:
+        """Add a topic: its name with '/', the number of the schema of its type, and metadata.
 
         Return the number of the channel. Its messages are CDR, the byte format of ROS 2.
         """
@@ -147,19 +150,20 @@ class BagFile:
         return self._declared(records.Channel(id=number, topic=topic, message_encoding='cdr', schema_id=schema,
                                               metadata=metadata))
 
-    def _declared(self, record):
+    def _declared(self, record: records.Schema | records.Channel) -> int:
         """Write a schema or channel before the first chunk too, and return its number."""
         builder = RecordBuilder()
         record.write(builder)
         self._disk.write(builder.end())
         return record.id
 
-    def add_metadata(self, name, content):
-        """Add a metadata record: its name and {text: text}. close() repeats the record `pedestal` in metadata.yaml."""
+    def add_metadata(self, name: str, content: dict[str, str]) -> None:
+        """Add a metadata record. close() repeats the record `pedestal` in metadata.yaml."""
         self._mcap.add_metadata(name, content)
 
-    def add_message(self, channel, sequence, log_time, publish_time, data):
-        """Add a message: number of its channel, its sequence number, times [ns], CDR bytes."""
+    def add_message(self, channel: int, sequence: int, log_time: Nanoseconds, publish_time: Nanoseconds,
+                    data: bytes) -> None:
+        """Add a message: number of its channel, its sequence number, times, CDR bytes."""
         if self._full:
             return
         if not self._in_chunk:
@@ -172,7 +176,7 @@ class BagFile:
         self._chunk_size += len(data)
         self._mcap.add_message(channel, log_time, data, publish_time, sequence)
 
-    def flush(self):
+    def flush(self) -> None:
         """End the chunk, which writes all added messages to the file. Raises BagError if the disk is full."""
         added, self._in_chunk, self._chunk_size = self._in_chunk, 0, 0
         if self._full:
@@ -185,11 +189,11 @@ class BagFile:
         self._in_file += added
 
     @property
-    def messages(self):
+    def messages(self) -> int:
         """Number of added messages, without those dropped on a full disk."""
         return self._in_file + self._in_chunk
 
-    def close(self):
+    def close(self) -> None:
         """Write the last chunk, the summary and metadata.yaml.
 
         On a full disk, write the part that fits, and raise BagError.
@@ -204,7 +208,7 @@ class BagFile:
                 self._disk.flush()
                 self._write_metadata_file()
 
-    def _truncate_after_disk_full(self):
+    def _truncate_after_disk_full(self) -> None:
         """Replace the Writer of the library by a new Writer that counts only the chunks in the file.
 
         Because a Writer cannot take back a chunk, its summary would list the chunk that the disk did not take. The new
@@ -227,12 +231,13 @@ class BagFile:
                     self._mcap.flush()
         self._mcap.flush()
 
-    def _write_metadata_file(self):
+    def _write_metadata_file(self) -> None:
         """Write metadata.yaml from the content of the files."""
         contents = [_Content(file) for file in (*self._earlier, self.file)]
         files = [{'path': content.path.name, **_times([content]), 'message_count': content.total}
                  for content in contents]
-        described, counts = {}, collections.Counter()
+        described: dict[str, dict[str, Json]] = {}
+        counts: collections.Counter[str] = collections.Counter()
         for content in contents:
             for channel, schema, count in content.topics():
                 counts[channel.topic] += count
@@ -263,13 +268,16 @@ class BagFile:
 class _Content:
     """Summary of an MCAP file of the recorder, which need not be whole: its recorder may have been killed.
 
-    path: the file; metadata: {record: {text: text}}; first, last: log times of its first and last message [ns], 0
-    without a message; total: number of messages.
+    first, last: log times of its first and last message, 0 without a message; total: number of messages.
     """
 
-    def __init__(self, path):
-        self.path, self.metadata = path, {}
-        self._channels, self._schemas, self._counts, times = {}, {}, collections.Counter(), []
+    def __init__(self, path: pathlib.Path) -> None:
+        self.path = path
+        self.metadata: dict[str, dict[str, str]] = {}
+        self._channels: dict[int, records.Channel] = {}
+        self._schemas: dict[int, str] = {}
+        self._counts: collections.Counter[int] = collections.Counter()
+        times: list[Nanoseconds] = []
         file = McapFile(path, locked=True)
         with contextlib.suppress(EOFError):
             for opcode, start, stop in file.pieces():
@@ -282,37 +290,37 @@ class _Content:
                     self._declare(parsed(opcode, file.read(start + 9, stop)))
         self.first, self.last, self.total = min(times, default=0), max(times, default=0), self._counts.total()
 
-    def _declare(self, record):
+    def _declare(self, record: records.McapRecord | None) -> None:
         """Note a record of metadata, a schema or a channel."""
         if isinstance(record, records.Metadata):
             self.metadata[record.name] = record.metadata
         elif isinstance(record, records.Schema):
             self._schemas[record.id] = record.name
-        else:
+        elif isinstance(record, records.Channel):
             self._channels[record.id] = record
 
-    def topics(self):
-        """Yield (records.Channel, name of its type, number of messages) of every topic."""
+    def topics(self) -> Iterator[tuple[records.Channel, str, int]]:
+        """Yield (channel, name of its type, number of messages) of every topic."""
         for number, channel in self._channels.items():
             yield channel, self._schemas[channel.schema_id], self._counts[number]
 
 
-def _times(contents):
-    """Return the duration and the start of some files (_Contents) as fields of metadata.yaml."""
+def _times(contents: Sequence[_Content]) -> dict[str, dict[str, Nanoseconds]]:
+    """Return the duration and the start of some files as fields of metadata.yaml."""
     known = [content for content in contents if content.total] or contents[:1]
     start, end = min(content.first for content in known), max(content.last for content in known)
     return {'duration': {'nanoseconds': end - start}, 'starting_time': {'nanoseconds_since_epoch': start}}
 
 
-def _profiles(channel):
-    """Return the quality of service that a records.Channel states (offered_qos_profiles), [] if unreadable."""
+def _profiles(channel: records.Channel) -> Json:
+    """Return the quality of service that a channel states (offered_qos_profiles), [] if unreadable."""
     try:
         return plain_yaml.parse(channel.metadata.get('offered_qos_profiles', ''), aliases=True) or []
     except yaml.YAMLError:
         return []
 
 
-def _earlier_files(directory, metadata):
+def _earlier_files(directory: str | pathlib.Path, metadata: Mapping[str, object]) -> list[pathlib.Path]:
     """Return the files of an unfinished bag in a directory, which a restarted recorder may continue; [] without a bag.
 
     The bag must be of a realtime run with equal values of COMMON_METADATA_KEYS. Raises BagError for any other bag,
@@ -347,14 +355,15 @@ class Writer(BagFile):
     """A bag of topics of the graph that is being written. The messages of each topic are numbered from 1.
 
     directory   path of the bag: must not exist, or must hold an unfinished bag to continue (_earlier_files)
-    rows        topics of the bag, as rows of topics.TOPICS or as nodes.Links; the methods take the index of a row
-    metadata    {text: text} of the run, for the metadata record `pedestal`
-    more        {name: {text: text}} of further metadata records
+    rows        topics of the bag; the methods take the index of a row
+    metadata    of the run, for the metadata record `pedestal`
+    more        further metadata records by name
 
     Raises BagError like a BagFile.
     """
 
-    def __init__(self, directory, rows, metadata, more=()):
+    def __init__(self, directory: str | pathlib.Path, rows: Sequence[nodes.Link | topics.Topic],
+                 metadata: Mapping[str, object], more: Mapping[str, Mapping[str, str]] | None = None) -> None:
         super().__init__(directory, _earlier_files(directory, metadata))
         schemas = {name: self.add_schema(name, 'ros2msg', messages.definition(name))
                    for name in dict.fromkeys(topic.type for topic in rows)}
@@ -362,19 +371,19 @@ class Writer(BagFile):
             'offered_qos_profiles': yaml.safe_dump(_qos(topic.rate), sort_keys=False),
             'topic_type_hash': messages.ROS_TYPESTORE.hash_rihs01(topic.type)}) for topic in rows]
         self._sequences = [0] * len(rows)
-        for name, content in (('pedestal', metadata), *dict(more).items()):
+        for name, content in (('pedestal', metadata), *(more or {}).items()):
             self.add_metadata(name, {str(key): str(value) for key, value in content.items()})
         self.flush()
 
-    def write(self, topic, log_time, publish_time, data):
-        """Add a message: index of its topic, log time and publish time [ns], CDR bytes."""
+    def write(self, topic: int, log_time: Nanoseconds, publish_time: Nanoseconds, data: bytes) -> None:
+        """Add a message: index of its topic, log time and publish time, CDR bytes."""
         self._sequences[topic] = sequence = self._sequences[topic] + 1
         self.add_message(self._channels[topic], sequence & 0xffffffff, log_time, publish_time, data)
 
-    def write_foreign(self, topic, log_time, publish_time, data):
+    def write_foreign(self, topic: int, log_time: Nanoseconds, publish_time: Nanoseconds, data: bytes) -> None:
         """Add a message of another publisher than that of the graph, with the sequence number 0."""
         self.add_message(self._channels[topic], 0, log_time, publish_time, data)
 
-    def skip(self, topic, count):
+    def skip(self, topic: int, count: int) -> None:
         """Leave a gap in the sequence numbers of a topic, for messages that did not reach the recorder."""
         self._sequences[topic] += count

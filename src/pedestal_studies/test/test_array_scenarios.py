@@ -1,4 +1,5 @@
 """Scenarios of an electronic array: accuracy of the composed loop, messages that are published once, refusals."""
+import dataclasses
 import math
 
 import numpy as np
@@ -46,14 +47,15 @@ def test_a_beam_that_only_leads_is_seen_at_the_beginning_of_its_intervals():
     nothing, on = np.zeros_like(t), np.ones_like(t, bool)
     mode, noise = np.full(t.size, 'autotrack'), 1e-4 * (-1.0)**np.arange(600).reshape(300, 2)
     unknown = np.full_like(beam, np.nan)
-    for_all = (t, *beam.T, unknown, nothing, nothing, unknown, 0.5 * begun + noise, nothing, noise, *4 * [beam],
-               nothing, mode, on, on, math.radians(1.0), np.zeros(2))
-    values = results.measured(results.of_tracking(tracking.Tracking(*for_all, begun=begun)))
+    run = tracking.Tracking(t=t, encoders=beam, reference=unknown, error=np.zeros_like(beam), encoder_error=unknown,
+                            measured=0.5 * begun + noise, cn0=nothing, estimate_error=noise, beam_earth=beam,
+                            target_earth=beam, estimate_earth=beam, sensor_truth=beam, range=nothing, mode=mode,
+                            tracking=on, since=on, beamwidth=math.radians(1.0), boresight=np.zeros(2), begun=begun)
+    values = results.measured(results.of_tracking(run))
     assert values['pointing_max_deg'][0] == pytest.approx(math.degrees(0.005 * math.cos(0.7)), rel=1e-4)
     assert values['cross_elevation_rms_deg'][0] == pytest.approx(values['cross_elevation_max_deg'][0], rel=1e-6)
     assert values['single_sample_noise_deg'][0] == pytest.approx(math.degrees(1e-4))
-    moving = results.measured(results.of_tracking(
-        tracking.Tracking(*for_all, begun=np.full_like(begun, np.nan))))
+    moving = results.measured(results.of_tracking(dataclasses.replace(run, begun=unknown)))
     assert moving['pointing_max_deg'][0] == 0.0
     assert not any('following' in name or 'encoder' in name for name in values)
     assert 'azimuth_following_rms_deg' in moving

@@ -3,6 +3,7 @@ import math
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.geodesy import EARTH_FLATTENING, EARTH_RATE
+from pedestal_common.quantities import MetersPerSecond2, Radians, RadiansPerSecond
 
 WGS84_EARTH_RATE_RAD_S = round(EARTH_RATE, 11)  # rotation rate of the earth with the printed digits of WGS-84 [rad/s]
 EQUATOR_GRAVITY_M_S2, POLE_GRAVITY_M_S2 = 9.7803253359, 9.8321849378
@@ -12,14 +13,13 @@ _SOMIGLIANA = (1.0 - EARTH_FLATTENING) * POLE_GRAVITY_M_S2 / EQUATOR_GRAVITY_M_S
 
 
 @compiled
-def gravity(latitude):
-    """Return normal gravity on the ellipsoid [m/s2] at a geodetic latitude [rad] (Somigliana, TR8350.2 equation
-    4-1)."""
+def gravity(latitude: Radians) -> MetersPerSecond2:
+    """Return normal gravity on the ellipsoid at a geodetic latitude (Somigliana, TR8350.2 equation 4-1)."""
     s2 = math.sin(latitude) ** 2
     return EQUATOR_GRAVITY_M_S2 * (1.0 + _SOMIGLIANA * s2) / math.sqrt(1.0 - ECCENTRICITY_SQUARED * s2)
 
 
 @compiled
-def rate(latitude):
-    """Return the rotation of the earth in ENU [rad/s]: (east, north, up); latitude [rad]."""
+def rate(latitude: Radians) -> tuple[RadiansPerSecond, RadiansPerSecond, RadiansPerSecond]:
+    """Return the rotation of the earth in ENU: (east, north, up)."""
     return 0.0, WGS84_EARTH_RATE_RAD_S * math.cos(latitude), WGS84_EARTH_RATE_RAD_S * math.sin(latitude)

@@ -8,11 +8,18 @@ output 'increment'   the mean rates since the last sample: increments of an inte
 """
 import math
 
-import numpy as np
-
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import to_deck
-from pedestal_common.quantities import Vector3
+from pedestal_common.quantities import (
+    Bit,
+    Floats,
+    MetersPerSecond2,
+    Radians,
+    RadiansPerSecond,
+    Records,
+    Seconds,
+    Vector3,
+)
 from pedestal_common.record import Record
 from ship_motion_sim import earth
 from ship_motion_sim.params import ShipMotionParameters
@@ -29,45 +36,45 @@ _GAUSS_NODE_OFFSET = math.sqrt(0.15)
 
 
 class SensorErrors(Record):
-    """Record."""
-    bias: Vector3  # [rad/s] or [m/s2]
-    noise: float  # density of the white noise [rad/sqrt(s)] or [m/s/sqrt(s)]
-    scale: float  # error of the scale factor [-]
-    misalignment: float  # sensing axis x is turned towards y, y towards z, z towards x [rad]
-    quantum: float  # smallest increment [rad] or [m/s]; 0: no quantisation
+    """Errors of three gyros, or of three accelerometers."""
+    bias: Vector3           # [rad/s] or [m/s2]
+    noise: float            # density of the white noise [rad/sqrt(s)] or [m/s/sqrt(s)]
+    scale: float            # error of the scale factor [-]
+    misalignment: Radians   # sensing axis x is turned towards y, y towards z, z towards x
+    quantum: float          # smallest increment [rad] or [m/s]; 0: no quantisation
 
 
 class Constants(Record):
-    """Record."""
-    earth_rate: Vector3  # ENU [rad/s]
-    gravity: float  # [m/s2]
-    increment: int  # 1: mean rates since the last sample, 0: rates at the stamp
+    """An IMU and its place on the earth."""
+    earth_rate: Vector3     # ENU [rad/s]
+    gravity: MetersPerSecond2
+    increment: Bit          # 1: mean rates since the last sample, 0: rates at the stamp
     gyro: SensorErrors
     accelerometer: SensorErrors
 
 
 class State(Record):
-    """Record."""
-    truth: motion.Truth  # at a node of the quadrature
-    angle_left: Vector3
-    force_left: Vector3  # remainders of the quantised increments [rad, m/s]
+    """State of an IMU."""
+    truth: motion.Truth     # at a node of the quadrature
+    angle_left: Vector3     # remainders of the quantised increments: angles [rad]
+    force_left: Vector3     # velocities [m/s]
 
 
 class Inputs(Record):
-    """Record."""
-    t: float  # time of the sample [s]
-    dt: float  # time since the last sample; in the first step, the period [s]
+    """Inputs of a sample."""
+    t: Seconds              # of the sample
+    dt: Seconds             # time since the last sample; in the first step, the period
 
 
 class Outputs(Record):
-    """Record."""
-    status: int  # index into IMU_STATUS_TEXTS; unless IMU_OK, the rest is NaN
-    angular_velocity: Vector3  # against inertial space, FLU [rad/s]
-    linear_acceleration: Vector3  # specific force, FLU [m/s2]: at rest +g along z
+    """A sample."""
+    status: int                     # index into IMU_STATUS_TEXTS; unless IMU_OK, the rest is NaN
+    angular_velocity: Vector3       # against inertial space, FLU [rad/s]
+    linear_acceleration: Vector3    # specific force, FLU [m/s2]: at rest +g along z
 
 
-def constants(params: ShipMotionParameters) -> np.ndarray:
-    """Return the record (1,) of Constants."""
+def constants(params: ShipMotionParameters) -> Records:
+    """Return the Constants (1,)."""
     imu, latitude = params.imu, math.radians(params.ship.latitude_deg)
     record = Constants.zeros()
     record['earth_rate'] = earth.rate(latitude)
@@ -81,24 +88,26 @@ def constants(params: ShipMotionParameters) -> np.ndarray:
     return record
 
 
-def initial_state() -> np.ndarray:
-    """Return the record (1,) of State before the first sample."""
+def initial_state() -> Records:
+    """Return the State (1,) before the first sample."""
     return State.zeros()
 
 
 @compiled
-def inertial_rate(truth, earth_rate):
-    """Return the angular rate of the deck against inertial space (x, y, z), FLU [rad/s]; earth_rate (3,) in ENU."""
+def inertial_rate(truth: motion.Truth,
+                  earth_rate: Vector3) -> tuple[RadiansPerSecond, RadiansPerSecond, RadiansPerSecond]:
+    """Return the angular rate of the deck against inertial space (x, y, z), FLU; earth_rate in ENU [rad/s]."""
     ex, ey, ez = to_deck(truth.mat_ed, earth_rate[0], earth_rate[1], earth_rate[2])
     w = truth.angular_velocity
     return w[0] + ex, w[1] + ey, w[2] + ez
 
 
 @compiled
-def specific_force(truth, earth_rate, gravity):
-    """Return the specific force mat_ed^T (a + 2 w_ie x v - g), FLU [m/s2].
+def specific_force(truth: motion.Truth, earth_rate: Vector3,
+                   gravity: MetersPerSecond2) -> tuple[MetersPerSecond2, MetersPerSecond2, MetersPerSecond2]:
+    """Return the specific force mat_ed^T (a + 2 w_ie x v - g), FLU.
 
-    a, v: acceleration [m/s2] and velocity [m/s] of the truth, ENU; earth_rate (3,): w_ie, ENU [rad/s]; gravity [m/s2].
+    a, v: acceleration [m/s2] and velocity [m/s] of the truth, ENU; earth_rate: w_ie, ENU [rad/s].
 
     The earth is a rotating plane, the tangent plane of the truth, in which g is constant along -z. The model omits
     that the vertical turns as the ship moves over the round earth (transport rate, 1e-6 rad/s at 7 m/s).
@@ -112,18 +121,16 @@ def specific_force(truth, earth_rate, gravity):
 
 
 @compiled
-def mean_rates(s, c, ship, t, dt, rate, force):
-    """Fill rate (3,) [rad/s] and force (3,) [m/s2] with the means of the true rates over [t - dt, t] [s].
-
-    s, c: records State, Constants; ship: record of motion.Constants.dtype.
-    """
+def mean_rates(state: State, constants: Constants, ship: motion.Constants, t: Seconds, dt: Seconds, rate: Vector3,
+               force: Vector3) -> None:
+    """Fill rate [rad/s] and force [m/s2] with the means of the true rates over [t - dt, t]."""
     for i in range(3):
         rate[i] = force[i] = 0.0
     for node in range(3):
-        motion.truth(ship, t - 0.5 * dt + (node - 1) * _GAUSS_NODE_OFFSET * dt, s.truth)
+        motion.truth(ship, t - 0.5 * dt + (node - 1) * _GAUSS_NODE_OFFSET * dt, state.truth)
         weight = 8.0 / 18.0 if node == 1 else 5.0 / 18.0
-        wx, wy, wz = inertial_rate(s.truth, c.earth_rate)
-        fx, fy, fz = specific_force(s.truth, c.earth_rate, c.gravity)
+        wx, wy, wz = inertial_rate(state.truth, constants.earth_rate)
+        fx, fy, fz = specific_force(state.truth, constants.earth_rate, constants.gravity)
         rate[0] += weight * wx
         rate[1] += weight * wy
         rate[2] += weight * wz
@@ -133,12 +140,12 @@ def mean_rates(s, c, ship, t, dt, rate, force):
 
 
 @compiled
-def add_sensor_errors(errors, dt, values, normals, first, remainder):
-    """Add the errors of three gyros or accelerometers to the true values (3,), measured over dt [s].
+def add_sensor_errors(errors: SensorErrors, dt: Seconds, values: Vector3, normals: Floats, first: int,
+                      remainder: Vector3) -> None:
+    """Add the errors of three gyros or accelerometers to the true values, measured over dt.
 
-    errors: record SensorErrors. White noise is given as a density, so a sample has the noise density /
-    sqrt(dt). The normals are used from index `first` on. remainder (3,): part of the increment that quantisation cut
-    off, kept for the next sample.
+    White noise is given as a density, so a sample has the noise density / sqrt(dt). The normals are used from index
+    `first` on. remainder: part of the increment that quantisation cut off, kept for the next sample.
     """
     x, y, z = values[0], values[1], values[2]
     per_sample = 1.0 / math.sqrt(dt)
@@ -154,16 +161,13 @@ def add_sensor_errors(errors, dt, values, normals, first, remainder):
 
 
 @compiled
-def step(s, c, ship, u, truth, out, normals):
-    """Take one sample.
-
-    s, c, u, out: records State, Constants, Inputs, Outputs; ship, truth: records
-    motion.Constants.dtype, motion.Truth.dtype at the time of the sample; normals: (IMU_NORMALS_PER_STEP,).
-    """
+def step(state: State, constants: Constants, ship: motion.Constants, inputs: Inputs, truth: motion.Truth, out: Outputs,
+         normals: Floats) -> None:
+    """Take one sample. truth: at the time of the sample; normals: (IMU_NORMALS_PER_STEP,)."""
     rate, force = out.angular_velocity, out.linear_acceleration
     if truth.status != motion.MOTION_OK:
         out.status = IMU_BAD_TRUTH
-    elif not 0.0 < u.dt < math.inf:
+    elif not 0.0 < inputs.dt < math.inf:
         out.status = IMU_BAD_STEP
     else:
         out.status = IMU_OK
@@ -171,10 +175,10 @@ def step(s, c, ship, u, truth, out, normals):
         for i in range(3):
             rate[i] = force[i] = math.nan
         return
-    if c.increment == 1:
-        mean_rates(s, c, ship, u.t, u.dt, rate, force)
+    if constants.increment == 1:
+        mean_rates(state, constants, ship, inputs.t, inputs.dt, rate, force)
     else:
-        rate[0], rate[1], rate[2] = inertial_rate(truth, c.earth_rate)
-        force[0], force[1], force[2] = specific_force(truth, c.earth_rate, c.gravity)
-    add_sensor_errors(c.gyro, u.dt, rate, normals, FIRST_GYRO_NORMAL, s.angle_left)
-    add_sensor_errors(c.accelerometer, u.dt, force, normals, FIRST_ACCELEROMETER_NORMAL, s.force_left)
+        rate[0], rate[1], rate[2] = inertial_rate(truth, constants.earth_rate)
+        force[0], force[1], force[2] = specific_force(truth, constants.earth_rate, constants.gravity)
+    add_sensor_errors(constants.gyro, inputs.dt, rate, normals, FIRST_GYRO_NORMAL, state.angle_left)
+    add_sensor_errors(constants.accelerometer, inputs.dt, force, normals, FIRST_ACCELEROMETER_NORMAL, state.force_left)

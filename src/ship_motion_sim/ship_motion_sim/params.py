@@ -77,7 +77,7 @@ class ShipParameters(Parameters):
     plain: PlainParameters = group(PlainParameters)
     recorded: RecordedParameters = group(RecordedParameters)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if `motion`, `spectrum` or `sea_state` lacks a file or a wave height that it needs, or
         does not use a given one."""
         if (self.motion == 'recorded') != bool(self.recorded.path):
@@ -141,11 +141,11 @@ class ShipMotionParameters(Parameters):
     nmea: NmeaParameters = group(NmeaParameters)
     inject: str = text('', table.INJECT_DOC)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if `inject` is not a list of faults of ship_motion."""
         table.scheduled_commands('ship_motion', self.inject)
 
-    def check_graph(self, beams, lockstep):
+    def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError if `inject` holds a fault that the pacing of the graph excludes."""
         super().check_graph(beams, lockstep)
         table.check_pacing('ship_motion', self.inject, lockstep)
@@ -175,7 +175,7 @@ class AlignmentParameters(Parameters):
                                            'classical')
     adrc: AdrcParameters = group(AdrcParameters)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if the level control of adrc would be unstable at this step."""
         if self.adrc.control * self.step > 1.0:
             raise ParameterError(f'adrc.control = {self.adrc.control:g} rad/s: must be at most 1 / step = '
@@ -218,7 +218,7 @@ class InsParameters(Parameters):
     ship: ShipParameters = group(ShipParameters)
     inject: str = text('', table.INJECT_DOC)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if the method cannot use a GNSS velocity before it knows the heading, or if `inject` is
         not a list of faults of the INS."""
         table.scheduled_commands('ins', self.inject)
@@ -226,7 +226,7 @@ class InsParameters(Parameters):
             raise ParameterError(f"aid.source = 'gnss': must be none or log with method = {self.method}, because only "
                                  'oba uses a velocity in ENU before the heading is known')
 
-    def check_graph(self, beams, lockstep):
+    def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError if `inject` holds a fault that the pacing of the graph excludes."""
         super().check_graph(beams, lockstep)
         table.check_pacing('ins', self.inject, lockstep)

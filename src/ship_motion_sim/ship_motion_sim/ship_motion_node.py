@@ -6,21 +6,27 @@ for an instrument of the ship whose errors are not modelled. `entry` is imported
 other imports would end the process with a traceback.
 """
 import pedestal_common.entry  # noqa: F401
+from pedestal_common.quantities import Nanoseconds
 
 # isort: split
 import socket
 import sys
+from collections.abc import Mapping
 
 from pedestal_common.node import shell, unit_node
-from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN
+from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.parameters import ParameterError
 from ship_motion_sim import nmea
+from ship_motion_sim.params import NmeaParameters, ShipMotionParameters
+from ship_motion_sim.ship_unit import ShipMotion
 
 
 class ShipMotionNode(unit_node.UnitNode):
     """The node of the unit of the ship, which also sends NMEA datagrams if nmea.port is set."""
+    parameters: ShipMotionParameters
+    unit: ShipMotion
 
-    def begin(self):
+    def begin(self) -> None:
         """Open the socket, then begin like every unit. Raises ParameterError for a host without an address."""
         self.send_failure = ''          # reason why a datagram was not sent since the last diagnosis
         self.next_datagram_ns = 0       # stamp from which the next datagram is due
@@ -30,21 +36,21 @@ class ShipMotionNode(unit_node.UnitNode):
             self.connect(self.parameters.nmea)
         super().begin()
 
-    def connect(self, equipment):
-        """Resolve the host of NmeaParameters once. Raises ParameterError if it is not the name of one host."""
+    def connect(self, equipment: NmeaParameters) -> None:
+        """Resolve the host of the equipment once. Raises ParameterError if it is not the name of one host."""
         try:
             self.socket.connect((equipment.host, equipment.port))
         except OSError as error:
             raise ParameterError(f"nmea.host = '{equipment.host}': must be the name or IPv4 address of one host: "
                                  f'{error.strerror}') from None
 
-    def answer(self, stamp, values):
-        """Publish the step at a stamp [ns]; then send the attitude if the next datagram is due."""
+    def answer(self, stamp: Nanoseconds, values: Mapping[str, object]) -> None:
+        """Publish the step at a stamp; then send the attitude if the next datagram is due."""
         super().answer(stamp, values)
         if self.parameters.nmea.port and stamp >= self.next_datagram_ns:
             self.send_attitude(stamp)
 
-    def send_attitude(self, stamp):
+    def send_attitude(self, stamp: Nanoseconds) -> None:
         """Send one datagram; missing equipment only causes a warning in the next diagnostics.
 
         Linux reports a datagram without a receiver when the next one is sent, which then fails. So every second
@@ -60,7 +66,7 @@ class ShipMotionNode(unit_node.UnitNode):
             to = self.parameters.nmea
             self.send_failure = f'NMEA to {to.host}:{to.port}: {error.strerror}'
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the diagnosis of the unit, with WARN instead of OK if a datagram could not be sent."""
         diagnosis = super().diagnose()
         failure, self.send_failure = self.send_failure, ''
@@ -69,7 +75,7 @@ class ShipMotionNode(unit_node.UnitNode):
         return diagnosis
 
 
-def main(args=None):
+def main(args: list[str] | None = None) -> int:
     """Run the node to its end; args: command line, None for sys.argv."""
     return shell.main(lambda: ShipMotionNode('ship_motion_sim.ship_motion_node'), args)
 

@@ -19,27 +19,34 @@ rotation axis and of the force within it. They use the previous increment, as in
 Navigation Integration Algorithm Design".
 """
 import math
-from typing import Annotated
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import cross, rotation, to_earth
 from pedestal_common.geometry.quaternion import product
-from pedestal_common.quantities import Floats, Matrix3, Vector3
+from pedestal_common.quantities import (
+    Matrix3,
+    MetersPerSecond,
+    MetersPerSecond2,
+    Quaternion,
+    Radians,
+    Seconds,
+    Vector3,
+)
 from pedestal_common.record import Record
 
 
 class State(Record):
-    """Record."""
-    quaternion: Annotated[Floats, (4,)]  # x, y, z, w, deck -> n'
-    mat: Matrix3  # matrix of this rotation
-    velocity: Vector3  # in n' [m/s]
-    last_angle: Vector3  # increments of the previous interval [rad], for coning and sculling
-    last_force: Vector3  # [m/s]
+    """Attitude and velocity."""
+    quaternion: Quaternion  # deck -> n'
+    mat: Matrix3            # matrix of this rotation
+    velocity: Vector3       # in n' [m/s]
+    last_angle: Vector3     # increments of the previous interval, for coning and sculling [rad]
+    last_force: Vector3     # [m/s]
 
 
 @compiled
-def from_rotvec(x, y, z):
-    """Return the unit quaternion (x, y, z, w) of a rotation vector [rad]."""
+def from_rotvec(x: Radians, y: Radians, z: Radians) -> tuple[float, float, float, float]:
+    """Return the unit quaternion (x, y, z, w) of a rotation vector."""
     square = x * x + y * y + z * z
     half = 0.5 * math.sqrt(square)
     # sin(half) / (2 half) is 0/0 without rotation; the first two terms of its series are exact below 1e-4 rad.
@@ -48,26 +55,27 @@ def from_rotvec(x, y, z):
 
 
 @compiled
-def set_attitude(s, qx, qy, qz, qw):
-    """Set the attitude of a State record s to the quaternion (qx, qy, qz, qw), scaled to length 1."""
+def set_attitude(state: State, qx: float, qy: float, qz: float, qw: float) -> None:
+    """Set the attitude to the quaternion (qx, qy, qz, qw), scaled to length 1."""
     scale = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
-    q = s.quaternion
+    q = state.quaternion
     q[0], q[1], q[2], q[3] = scale * qx, scale * qy, scale * qz, scale * qw
-    rotation(q[0], q[1], q[2], q[3], s.mat)
+    rotation(q[0], q[1], q[2], q[3], state.mat)
 
 
 @compiled
-def coning(a, b):
-    """Return the rotation vector [rad] of an angle increment a (3,) [rad] that follows b (3,): a + b x a / 12."""
+def coning(a: Vector3, b: Vector3) -> tuple[Radians, Radians, Radians]:
+    """Return the rotation vector of an angle increment a [rad] that follows b: a + b x a / 12."""
     cx, cy, cz = cross(b[0], b[1], b[2], a[0], a[1], a[2])
     return a[0] + cx / 12.0, a[1] + cy / 12.0, a[2] + cz / 12.0
 
 
 @compiled
-def sculling(a, f, last_a, last_f):
-    """Return the velocity increment [m/s] in the deck axes at the start of an interval.
+def sculling(a: Vector3, f: Vector3, last_a: Vector3,
+             last_f: Vector3) -> tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond]:
+    """Return the velocity increment in the deck axes at the start of an interval.
 
-    a [rad], f [m/s], each (3,): increments of angle and force in the interval; last_a, last_f: increments of the
+    a [rad], f [m/s]: increments of angle and force in the interval; last_a, last_f: increments of the
     previous interval. For steady rates the result is f + a x f / 2 + a x (a x f) / 6. Under quick sway the term
     a x (a x f) / 6 changes the vertical acceleration by 1 ug.
     """
@@ -80,15 +88,16 @@ def sculling(a, f, last_a, last_f):
 
 
 @compiled
-def step(s, angle, force, dt, earth_rate, command, gravity):
-    """Integrate one IMU interval of dt [s]; s: record of State.
+def step(state: State, angle: Vector3, force: Vector3, dt: Seconds, earth_rate: Vector3, command: Vector3,
+         gravity: MetersPerSecond2) -> None:
+    """Integrate one IMU interval of dt.
 
-    angle, force (3,): integrals of w_ib and f over the interval, FLU [rad, m/s]; earth_rate, command (3,): w_ie, w_c
-    in n' [rad/s]; gravity: g [m/s2].
+    angle, force: integrals of w_ib and f over the interval, FLU [rad, m/s]; earth_rate, command: w_ie, w_c in n'
+    [rad/s]; gravity: g.
     """
-    v, q = s.velocity, s.quaternion
-    dx, dy, dz = sculling(angle, force, s.last_angle, s.last_force)
-    gx, gy, gz = to_earth(s.mat, dx, dy, dz)
+    v, q = state.velocity, state.quaternion
+    dx, dy, dz = sculling(angle, force, state.last_angle, state.last_force)
+    gx, gy, gz = to_earth(state.mat, dx, dy, dz)
     # tx, ty, tz: minus the rotation of n' in the interval [rad].
     tx, ty, tz = (-dt * (earth_rate[0] + command[0]), -dt * (earth_rate[1] + command[1]),
                   -dt * (earth_rate[2] + command[2]))
@@ -98,8 +107,8 @@ def step(s, angle, force, dt, earth_rate, command, gravity):
     v[0] += gx + hx - dt * cx
     v[1] += gy + hy - dt * cy
     v[2] += gz + hz - dt * cz - dt * gravity
-    ux, uy, uz = coning(angle, s.last_angle)
+    ux, uy, uz = coning(angle, state.last_angle)
     x, y, z, w = product(from_rotvec(tx, ty, tz), product(q, from_rotvec(ux, uy, uz)))
-    set_attitude(s, x, y, z, w)
+    set_attitude(state, x, y, z, w)
     for i in range(3):
-        s.last_angle[i], s.last_force[i] = angle[i], force[i]
+        state.last_angle[i], state.last_force[i] = angle[i], force[i]

@@ -7,7 +7,8 @@ import datetime
 import json
 import pathlib
 import re
-import typing
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 from xml.parsers import expat
 
 from pedestal_common.geometry import omm, orbit
@@ -30,50 +31,39 @@ FIRST_SATELLITE_YEAR = 57
 TLE_EPOCH_COLUMNS = slice(18, 32)  # columns of the epoch in line 1 of a TLE
 
 
-class Elements(typing.NamedTuple):
-    """Elements of a satellite.
-
-    values: {field of LeoPassParameters (line_1, line_2, omm): text}; remark: the set that was chosen from a history,
-    and values that were missing; '' if there is nothing to remark.
-    """
+class Elements(NamedTuple):
+    """Elements of a satellite."""
     name: str
-    values: dict
-    remark: str = ''
+    values: dict[str, str]  # {field of LeoPassParameters (line_1, line_2, omm): text}
+    remark: str = ''        # the set that was chosen from a history, and values that were missing
 
 
-class Satellite(typing.NamedTuple):
-    """One set of elements of a satellite in a file.
-
-        line        first line in the file
-        number      catalogue number
-        designator  international designator
-        lines       both lines of its TLE, None for an OMM
-        fields      {keyword: text} of an OMM, empty for a TLE
-    """
-    line: int
+class Satellite(NamedTuple):
+    """One set of elements of a satellite in a file."""
+    line: int                       # first line in the file
     name: str
-    number: str
-    designator: str
-    lines: tuple | None
-    fields: dict
+    number: str                     # catalogue number
+    designator: str                 # international designator
+    lines: tuple[str, str] | None   # of its TLE, None for an OMM
+    fields: dict[str, str]          # {keyword: text} of an OMM, empty for a TLE
 
     @property
-    def identity(self):
+    def identity(self) -> str:
         """Catalogue number; without one the international designator, or else the name."""
         return self.number or self.designator or self.name
 
-    def is_named(self, name):
+    def is_named(self, name: str) -> bool:
         """Return True for the name, catalogue number or international designator of the satellite, in any case."""
         number = self.number.lstrip('0') or '0'
         return name.strip().upper() in (self.name.upper(), number, self.number, self.designator)
 
 
-def read(path, name='', when=None) -> Elements:
-    """Return the Elements of a satellite in a file. Raises TargetError.
+def read(path: str, name: str = '', when: datetime.datetime | None = None) -> Elements:
+    """Return the elements of a satellite in a file. Raises TargetError.
 
-    name: name, catalogue number or international designator; it may be empty for a file of one satellite. when:
-    datetime, UTC. From a history the function takes the elements whose epoch is nearest to `when`, or the latest ones
-    if `when` is None.
+    name: name, catalogue number or international designator; it may be empty for a file of one satellite. when: UTC.
+    From a history the function takes the elements whose epoch is nearest to `when`, or the latest ones if `when` is
+    None.
     """
     try:
         with csv_table.stream(path) as stream:
@@ -117,8 +107,8 @@ def read(path, name='', when=None) -> Elements:
     return Elements(satellite.name, {key: getattr(values, key) for key in ('line_1', 'line_2', 'omm')}, remark)
 
 
-def _nearest(path, history, when):
-    """Return (the Satellite of a history whose epoch is nearest to `when`, remark). Raises TargetError."""
+def _nearest(path: str, history: list[Satellite], when: datetime.datetime | None) -> tuple[Satellite, str]:
+    """Return (the satellite of a history whose epoch is nearest to `when`, remark). Raises TargetError."""
     if len(history) == 1:
         return history[0], ''
     epochs = [_epoch(path, satellite) for satellite in history]
@@ -131,8 +121,8 @@ def _nearest(path, history, when):
                         f'{history[i].line}, the nearest to {wanted:%Y-%m-%d %H:%M:%S}')
 
 
-def _epoch(path, satellite):
-    """Return the epoch of a Satellite as datetime, UTC. Raises TargetError."""
+def _epoch(path: str, satellite: Satellite) -> datetime.datetime:
+    """Return the epoch, UTC. Raises TargetError."""
     if satellite.lines:
         text = satellite.lines[0][TLE_EPOCH_COLUMNS]
         try:
@@ -149,8 +139,8 @@ def _epoch(path, satellite):
     return datetime.datetime(1970, 1, 1) + datetime.timedelta(seconds=SECONDS_PER_DAY * day + second)
 
 
-def _reader(beginning):
-    """Return the function path -> Satellites for a file that begins with a text."""
+def _reader(beginning: str) -> Callable[[str], Iterator[Satellite]]:
+    """Return the reader of a file that begins with a text."""
     if beginning.startswith('<'):
         return _xml
     if beginning.startswith(('{', '[')):
@@ -164,7 +154,7 @@ def _reader(beginning):
     return _csv if 'EPOCH' in names else _tles
 
 
-def _tles(path):
+def _tles(path: str) -> Iterator[Satellite]:
     """Yield the satellites of a file of TLEs, with or without a line of the name before each."""
     # first: (line number, text) of the line before; before: that of the line before `first`, which may hold a name.
     before, first = (0, ''), (0, '')
@@ -177,7 +167,7 @@ def _tles(path):
         before, first = first, (number, text)
 
 
-def _number(text):
+def _number(text: str) -> str:
     """Return the catalogue number of a text in a TLE or OMM. Its first digit may be a letter (notation Alpha-5)."""
     try:
         return omm.catalogue_number(text)
@@ -185,22 +175,23 @@ def _number(text):
         return text.strip()
 
 
-def _designator(line):
+def _designator(line: str) -> str:
     """Return the international designator in line 1 of a TLE, such as 1998-067A."""
     year, piece = line[9:11], line[11:17].strip()
     return f'{"19" if year >= str(FIRST_SATELLITE_YEAR) else "20"}{year}-{piece}'
 
 
-def _omm(line, fields):
-    """Return the Satellite of an OMM that begins at a line; fields: {keyword: text}."""
+def _omm(line: int, fields: dict[str, str]) -> Satellite:
+    """Return the satellite of an OMM that begins at a line; fields: {keyword: text}."""
     number = _number(fields.get('NORAD_CAT_ID', ''))
     return Satellite(line, fields.get('OBJECT_NAME') or number or fields.get('OBJECT_ID', ''), number,
                      fields.get('OBJECT_ID', '').upper(), None, fields)
 
 
-def _kvn(path):
+def _kvn(path: str) -> Iterator[Satellite]:
     """Yield the satellites of OMMs in sequence; each begins with its CCSDS_OMM_VERS."""
-    fields, begun = {}, 0
+    fields: dict[str, str] = {}
+    begun = 0
     for number, text in lines.read(path):
         keyword, equals, value = text.partition('=')
         keyword = keyword.strip()
@@ -216,7 +207,7 @@ def _kvn(path):
         yield _omm(begun, fields)
 
 
-def _csv(path):
+def _csv(path: str) -> Iterator[Satellite]:
     """Yield the satellites of a CSV file with a row for each OMM."""
     with csv_table.opened(path) as reader:
         csv_table.require(reader, ('EPOCH', 'NORAD_CAT_ID'))
@@ -225,12 +216,18 @@ def _csv(path):
                                          if isinstance(row.get(keyword), str)})
 
 
-def _json(path):
+def _json(path: str) -> Iterator[Satellite]:
     """Yield the satellites of a JSON array of objects, or of one object, decoded one by one."""
     text = csv_table.text(path)
     decoder, between = json.JSONDecoder(parse_int=str, parse_float=str), re.compile(r'[\s,\[\]]*')
+
+    def skipped(at: int) -> int:
+        """Return the index behind what lies between two objects."""
+        match = between.match(text, at)
+        return match.end() if match else at
+
     # at: index in the text; line: its line number; counted: index up to which line ends are counted in `line`.
-    at, line, counted = between.match(text).end(), 1, 0
+    at, line, counted = skipped(0), 1, 0
     while at < len(text):
         line, counted = line + text.count('\n', counted, at), at
         begun = at
@@ -247,20 +244,25 @@ def _json(path):
                               f'EPOCH is missing; keywords found: {", ".join(value):.60}')
         yield _omm(line, {keyword: str(value[keyword]).strip()[:MAX_VALUE_CHARS] for keyword in omm.KEYWORDS
                           if value.get(keyword) is not None})
-        at = between.match(text, at).end()
+        at = skipped(at)
 
 
-def _xml(path):
+def _xml(path: str) -> Iterator[Satellite]:
     """Yield the satellites of the segments of an OMM or NDM as XML; expat keeps no parsed data in memory."""
-    satellites, open_elements, texts = [], [], {}
+    # line: of the open segment.
+    satellites: list[Satellite] = []
+    open_elements: list[str] = []
+    texts: dict[str, str] = {}
+    line = 1
 
-    def doctype(*_):
+    def doctype(*_: object) -> None:
         """Raise TableError for a document type declaration."""
         raise lines.wrong(path, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1,
                           'a document type declaration: an OMM has none')
 
-    def start(name, _attributes):
+    def start(name: str, _attributes: dict[str, str]) -> None:
         """Begin an element; a segment begins a new satellite. Raises TableError if it is nested too deeply."""
+        nonlocal line
         if len(open_elements) >= MAX_XML_DEPTH:
             raise csv_table.TableError(f'{path}: line {parser.CurrentLineNumber}: must be at most {MAX_XML_DEPTH} '
                                        'nested elements')
@@ -268,18 +270,19 @@ def _xml(path):
         open_elements.append(name)
         if name == 'segment':
             texts.clear()
-            texts['line'] = parser.CurrentLineNumber
+            line = parser.CurrentLineNumber
 
-    def text(data):
+    def text(data: str) -> None:
         """Add a part of the text of a keyword."""
         if open_elements and open_elements[-1] in omm.KEYWORDS:
             texts[open_elements[-1]] = (texts.get(open_elements[-1], '') + data)[:MAX_VALUE_CHARS]
 
-    def end(_name):
+    def end(_name: str) -> None:
         """End an element; the end of a segment completes its satellite."""
+        nonlocal line
         if open_elements.pop() == 'segment':
-            line = texts.pop('line', 1)
             satellites.append(_omm(line, {keyword: value.strip() for keyword, value in texts.items()}))
+            line = 1
 
     try:
         with csv_table.stream(path) as stream:
@@ -301,7 +304,7 @@ def _xml(path):
         raise lines.wrong(path, 1, 1, f'not well-formed XML: {error}') from None
 
 
-def _omm_text(path, satellite):
+def _omm_text(path: str, satellite: Satellite) -> str:
     """Return the elements of a satellite of an OMM as JSON. Raises TargetError."""
     fields = dict(satellite.fields)
     try:

@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Hertz, Radians, Seconds
 
 U_PER_BEAMWIDTH = 2.0 * 1.8676215105779688
 """Value of u = pi D / lambda sin(theta) per half-power beamwidth of the cosine taper.
@@ -28,13 +29,13 @@ points on a ring. The squares of the distances are the nodes of the Gauss-Legend
 
 
 @compiled
-def sinc(x):
+def sinc(x: float) -> float:
     """Return sin(x) / x."""
     return math.sin(x) / x if x != 0.0 else 1.0
 
 
 @compiled
-def sum_pattern(v):
+def sum_pattern(v: float) -> float:
     """Return S at v beamwidths off the axis: cos(u) / (1 - (2u/pi)^2), written so that nothing cancels at u = pi/2.
 
     Balanis, Antenna Theory, 3rd ed., table 12.1 (cosine distribution).
@@ -44,17 +45,17 @@ def sum_pattern(v):
 
 
 @compiled
-def difference_pattern(v, k_m):
+def difference_pattern(v: float, k_m: float) -> float:
     """Return D at v beamwidths off the axis, slope k_m: sin(u) / (1 - (u/pi)^2), the far field of one sine period."""
     u = U_PER_BEAMWIDTH * abs(v)
     return math.copysign(k_m / U_PER_BEAMWIDTH, v) * math.pi**2 * sinc(u - math.pi) / (u + math.pi)
 
 
 @compiled
-def channels(v_x, v_e, k_m, cos_beta, sin_beta):
+def channels(v_x: float, v_e: float, k_m: float, cos_beta: float, sin_beta: float) -> tuple[float, float, float]:
     """Return the (sum, difference X, difference E) voltages of a unit carrier, v_x and v_e beamwidths off the axis.
 
-    k_m: slope [-]; cos_beta, sin_beta: of the cross-coupling angle beta, which rotates the error axes. Each difference
+    k_m: slope; cos_beta, sin_beta: of the cross-coupling angle beta, which rotates the error axes. Each difference
     then also contains a part of the other error.
     """
     S_x, S_e = sum_pattern(v_x), sum_pattern(v_e)
@@ -63,7 +64,8 @@ def channels(v_x, v_e, k_m, cos_beta, sin_beta):
 
 
 @compiled
-def disk_channels(v_x, v_e, radius, k_m, cos_beta, sin_beta):
+def disk_channels(v_x: float, v_e: float, radius: float, k_m: float, cos_beta: float,
+                  sin_beta: float) -> tuple[float, float, float]:
     """Return (sum, difference X, difference E) voltages of a disk of incoherent noise, as strong as a unit carrier.
 
     The centre of the disk is v_x, v_e beamwidths off the axis; radius: of the disk [beamwidths]; others: see
@@ -84,14 +86,11 @@ def disk_channels(v_x, v_e, radius, k_m, cos_beta, sin_beta):
 
 
 @compiled
-def detect(d_real, d_imag, s_real, s_imag):
+def detect(d_real: float, d_imag: float, s_real: float, s_imag: float) -> float:
     """Return Re(d conj(s)) of a difference voltage d and a sum voltage s, noise included."""
     return d_real * s_real + d_imag * s_imag
 
 
-def thermal_noise(beamwidth, k_m, cn0, tau):
-    """Return the 1-sigma angle error on axis [rad] of one sample: theta3 / (k_m sqrt(2 C/N0 tau)) (Barton form).
-
-    beamwidth [rad], slope k_m, cn0 [Hz] (not dB), tau [s]: numbers or arrays.
-    """
+def thermal_noise(beamwidth: Radians, k_m: float, cn0: Hertz, tau: Seconds) -> Radians:
+    """Return the 1-sigma angle error on axis of one sample: theta3 / (k_m sqrt(2 C/N0 tau)) (Barton form)."""
     return beamwidth / (k_m * np.sqrt(2.0 * cn0 * tau))

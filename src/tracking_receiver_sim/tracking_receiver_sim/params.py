@@ -35,7 +35,7 @@ class LeoPassParameters(Parameters):
     ut1_offset: float = parameter(0.0, -0.9, 0.9, 's', 'UT1 - UTC (IERS Bulletin A), which turns the earth further, '
                                   'also below sun and moon; a program track assumes 0')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if the lower limit of the culmination is not below the upper limit."""
         if self.culmination_low_deg >= self.culmination_high_deg:
             raise ParameterError(f'culmination_low_deg = {self.culmination_low_deg:g} deg: must be below '
@@ -107,7 +107,7 @@ class TargetParameters(Parameters):
     polarisation: PolarisationParameters = group(PolarisationParameters)
 
     @property
-    def of_noise(self):
+    def of_noise(self) -> bool:
         """True if the target is a source of noise, without a carrier."""
         return self.kind in bodies.POSITIONS
 
@@ -171,7 +171,7 @@ class ReceiverParameters(Parameters):
     rate: RateParameters = group(RateParameters)
     ranging: RangingParameters = group(RangingParameters)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if a moving average is too long, or if the lower lock level is above the upper one."""
         if self.smoothing == 'moving_average' and self.smoothing_samples > MAX_WINDOW_SAMPLES:
             raise ParameterError(f'smoothing_samples = {self.smoothing_samples}: must be 1 to {MAX_WINDOW_SAMPLES} '
@@ -192,7 +192,7 @@ class TrackingReceiverParameters(Parameters):
     receiver: ReceiverParameters = group(ReceiverParameters)
     seed: int = parameter(1, 0, 2**31 - 1, '1', 'seed of the receiver noise')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if `blockage` is not a list of hidden sectors."""
         sectors(self.blockage)
 
@@ -204,12 +204,12 @@ class TrackingReceiverNodeParameters(TrackingReceiverParameters):
     duration: float = parameter(3600.0, 0.1, 86400.0, 's', 'duration of the run, covered by the target motion')
     inject: str = text('', table.INJECT_DOC)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if `inject` is not a list of faults of the receiver."""
         super().check()
         table.scheduled_commands('tracking_receiver', self.inject)
 
-    def check_graph(self, beams, lockstep):
+    def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError if `inject` holds a fault that the pacing of the graph excludes."""
         super().check_graph(beams, lockstep)
         table.check_pacing('tracking_receiver', self.inject, lockstep)

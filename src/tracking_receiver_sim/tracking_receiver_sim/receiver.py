@@ -10,11 +10,9 @@ rate of the error at the stamp and the range, with white noise.
 
 Voltages are scaled so that the noise of one channel has the power 1 in one sample. The carrier power on axis is then
 C/N0 tau, with the time tau of a sample.
-
-Arguments: s state, c constants, i inputs, o outputs (records of this module).
 """
 import math
-from collections import namedtuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -23,13 +21,28 @@ from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry import blockage
 from pedestal_common.geometry.line_of_sight import angles, earth_angles, offsets, to_deck, to_earth
 from pedestal_common.parameters import ParameterError
-from pedestal_common.quantities import Matrix3, Pair, Vector3
+from pedestal_common.quantities import (
+    Bit,
+    DecibelHertz,
+    Floats,
+    Ints,
+    Matrix3,
+    Meters,
+    Nanoseconds,
+    Pair,
+    Radians,
+    RadiansPerSecond,
+    Records,
+    Seconds,
+    Times,
+    Vector3,
+)
 from pedestal_common.record import Record
 from tracking_receiver_sim import detector, smoothing, target
 from tracking_receiver_sim.detector import Voltages, hertz
 from tracking_receiver_sim.error_rate import error_rate
 from tracking_receiver_sim.monopulse import channels, disk_channels, thermal_noise
-from tracking_receiver_sim.params import BEAM_HELD, BEAM_MOTIONS
+from tracking_receiver_sim.params import BEAM_HELD, BEAM_MOTIONS, ReceiverParameters, TrackingReceiverParameters
 from tracking_receiver_sim.path import arrival, multipath, polarisation, scintillation
 
 STATUS_TEXTS = dict(
@@ -42,118 +55,123 @@ Status = codes(STATUS_TEXTS)
 NORMALS_PER_SAMPLE = 6
 """Standard normals of a sample: real and imaginary noise of the sum and of the two difference channels."""
 RESULT_RING_SIZE = 512  # largest number of results that wait for the latency to pass
-Result = namedtuple('Result', 'error cn0_dbhz rates range')
-"""Published result of one step: error and rates (cross-elevation, elevation) [rad, rad/s], C/N0 [dB-Hz], range [m];
-NaN while not locked or if not measured."""
-Incidence = namedtuple('Incidence', 'dX dE amplitude image hidden rates range')
-"""Signal of a step as it arrives: error (cross-elevation, elevation) [rad] at the stamp, sum voltage on axis [-],
-multipath.Image, True if hidden; measured rates and range as in Result."""
 NOT_MEASURED = (math.nan, math.nan)  # pair of numbers that the receiver did not measure
 
-State = np.dtype([
-    ('stamp_ns', 'i8'), ('error_known', 'i8'), ('cross_elevation', 'f8'), ('elevation', 'f8'), ('direction', 'f8', 3),
-    *detector.STATE_FIELDS,
-    ('written', 'i8'), ('released', 'i8'),
-    ('ring_stamp_ns', 'i8', RESULT_RING_SIZE), ('ring_locked', 'i8', RESULT_RING_SIZE),
-    ('ring_cross_elevation', 'f8', RESULT_RING_SIZE), ('ring_elevation', 'f8', RESULT_RING_SIZE),
-    ('ring_cn0_dbhz', 'f8', RESULT_RING_SIZE),
-    ('ring_rate', 'f8', (RESULT_RING_SIZE, 2)), ('ring_range', 'f8', RESULT_RING_SIZE),
-    ('antenna', 'f8', 3), ('antenna_velocity', 'f8', 3), ('scintillation', 'f8', scintillation.NORMALS_PER_STEP)],
-                       align=True)
-"""State of the receiver, with the state of its detector.
 
-    ring_...            ring of the results whose latency has not passed, see Result
-    scintillation       state of scintillation.wander
-    error_known         1 if cross_elevation, elevation hold the true error at stamp_ns [rad], and direction the vector
-                        to the target in FLU [m]
-    written, released   numbers of results put into and taken out of the ring since the start
-    antenna             position of the antenna against the station, ENU [m]
-    antenna_velocity    velocity of the antenna, FLU [m/s]
-"""
+class Result(NamedTuple):
+    """Published result of one step; its numbers are NaN while not locked or if not measured, except C/N0."""
+    error: tuple[Radians, Radians]                      # cross-elevation, elevation
+    cn0_dbhz: DecibelHertz
+    rates: tuple[RadiansPerSecond, RadiansPerSecond]    # of the error
+    range: Meters
 
-Constants = np.dtype([
-    ('target', target.TargetRecord.dtype),
-    ('beamwidth', 'f8'), ('slope', 'f8'), *detector.CONSTANTS_FIELDS,
-    ('cos_beta', 'f8'), ('sin_beta', 'f8'), ('cos_phi', 'f8'), ('sin_phi', 'f8'), ('sign', 'f8', 2),
-    ('boresight', 'f8', 2),
-    ('path', arrival.Path.dtype), ('multipath', multipath.Multipath.dtype),
-    ('scintillation', scintillation.Scintillation.dtype),
-    ('first_measured_normal', 'i8'), ('first_source_normal', 'i8'), ('first_scintillation_normal', 'i8'),
-    ('disk_radius', 'f8'), ('source_sigma', 'f8'), ('period_ns', 'i8'), ('held', 'i8'),
-    ('power', 'f8'), ('reference_range', 'f8'), ('half_exponent', 'f8'), ('horizon_mask', 'f8'),
-    ('latency_ns', 'i8'),
-    ('rate_measured', 'i8'), ('rate_sigma', 'f8'), ('range_measured', 'i8'), ('range_sigma', 'f8'),
-    ('range_variance', 'f8'), ('lever_arm', 'f8', 3), ('sectors', 'f8', (blockage.MAX_SECTORS, 3))], align=True)
-"""Constants of the receiver, with the constants of its detector.
 
-    slope               true k_m
-    sign                1 or -1, of each difference channel
-    boresight           null of the differences off the beam, cross-elevation and elevation [rad]
-    first_..._normal    index of the first normal of the measured rate and range, of a source of noise, and of the
-                        scintillation
-    disk_radius         radius of a source of noise [beamwidths]; 0: a carrier
-    source_sigma        1-sigma of the power of a source of noise in one sample, as a share of it
-    power               carrier power / noise power in one sample at the reference range
-    range_variance      variance of the range [m2], in single precision
-"""
+class Incidence(NamedTuple):
+    """Signal of a step as it arrives."""
+    dX: Radians                                         # error at the stamp: cross-elevation
+    dE: Radians
+    amplitude: float                                    # sum voltage on axis
+    image: multipath.Image
+    hidden: bool
+    rates: tuple[RadiansPerSecond, RadiansPerSecond]    # measured; NaN if not measured, as the range
+    range: Meters
+
+
+class State(Record):
+    """State of the receiver. The ring holds the results whose latency has not passed, see Result."""
+    stamp_ns: Nanoseconds       # of the last step, -1 before the first
+    error_known: Bit            # 1 if the next three fields hold the true error at stamp_ns
+    cross_elevation: Radians
+    elevation: Radians
+    direction: Vector3          # vector to the target, FLU [m]
+    detector: detector.State
+    written: int                # number of results put into the ring since the start
+    released: int               # number of results taken out of the ring since the start
+    ring_stamp_ns: Annotated[Ints, (RESULT_RING_SIZE,)]
+    ring_locked: Annotated[Ints, (RESULT_RING_SIZE,)]
+    ring_cross_elevation: Annotated[Floats, (RESULT_RING_SIZE,)]    # [rad]
+    ring_elevation: Annotated[Floats, (RESULT_RING_SIZE,)]          # [rad]
+    ring_cn0_dbhz: Annotated[Floats, (RESULT_RING_SIZE,)]
+    ring_rate: Annotated[Floats, (RESULT_RING_SIZE, 2)]             # [rad/s]
+    ring_range: Annotated[Floats, (RESULT_RING_SIZE,)]              # [m]
+    antenna: Vector3            # position of the antenna against the station, ENU [m]
+    antenna_velocity: Vector3   # velocity of the antenna, FLU [m/s]
+    scintillation: Annotated[Floats, (scintillation.NORMALS_PER_STEP,)]     # state of scintillation.wander
+
+
+class Constants(Record):
+    """Constants of the receiver."""
+    target: target.TargetRecord
+    beamwidth: Radians
+    slope: float                # true k_m
+    detector: detector.Constants
+    cos_beta: float
+    sin_beta: float
+    cos_phi: float
+    sin_phi: float
+    sign: Pair                  # 1 or -1, of each difference channel
+    boresight: Pair             # null of the differences off the beam [rad]
+    path: arrival.Path
+    multipath: multipath.Multipath
+    scintillation: scintillation.Scintillation
+    first_measured_normal: int          # index of the first normal of the measured rate and range
+    first_source_normal: int            # index of the first normal of a source of noise
+    first_scintillation_normal: int     # index of the first normal of the scintillation
+    disk_radius: float          # of a source of noise [beamwidths]; 0: a carrier
+    source_sigma: float         # 1-sigma of the power of a source of noise in one sample, as a share of it
+    period_ns: Nanoseconds
+    held: Bit                   # 1 for an electronic beam
+    power: float                # carrier power / noise power in one sample at the reference range
+    reference_range: Meters
+    half_exponent: float        # half of the power of the range with which C/N0 falls
+    horizon_mask: Radians
+    latency_ns: Nanoseconds
+    rate_measured: Bit
+    rate_sigma: RadiansPerSecond
+    range_measured: Bit
+    range_sigma: Meters
+    range_variance: float       # [m2], in single precision
+    lever_arm: Vector3          # from base_link to the antenna, FLU [m]
+    sectors: Annotated[Floats, (blockage.MAX_SECTORS, 3)]   # see blockage.sectors
 
 
 class Inputs(Record):
-    """Inputs of a step.
-
-    valid                           1 if the direction of the beam is known
-        azimuth, elevation, .._rate     true beam on the deck [rad], [rad/s]
-        mat_ed                          true attitude deck -> earth
-        position                        base_link against the station, ENU [m]
-        twist_linear, twist_angular     velocity of base_link [m/s] and rate of the deck [rad/s], FLU
-    """
-    stamp_ns: int
-    valid: int
-    azimuth: float
-    elevation: float
-    mat_ed: Matrix3
-    position: Vector3
-    azimuth_rate: float
-    elevation_rate: float
-    twist_linear: Vector3
-    twist_angular: Vector3
+    """Inputs of a step: true beam and true motion of the ship."""
+    stamp_ns: Nanoseconds
+    valid: Bit                  # 1 if the direction of the beam is known
+    azimuth: Radians            # of the beam on the deck
+    elevation: Radians
+    mat_ed: Matrix3             # attitude deck -> earth
+    position: Vector3           # of base_link against the station, ENU [m]
+    azimuth_rate: RadiansPerSecond
+    elevation_rate: RadiansPerSecond
+    twist_linear: Vector3       # velocity of base_link, FLU [m/s]
+    twist_angular: Vector3      # rate of the deck, FLU [rad/s]
 
 
 class Outputs(Record):
-    """Outputs of a step.
+    """Outputs of a step: a result, if one comes out, then values at the stamp of this step.
 
-    due                             1 if a result comes out in this step
-
-    The result, measured at stamp_ns; its numbers are NaN while not locked, except C/N0:
-
-    cross_elevation, elevation      errors [rad]
-        cn0_dbhz, locked                C/N0 [dB-Hz]; 1 while locked
-        rate, range                     rates of the errors [rad/s] and range [m], NaN if not measured; the range has the
-                                        single precision of its topic
-
-    Values at the stamp of this step, NaN if not known:
-
-    status                          index into STATUS_TEXT_BY_CODE
-        true_..., target_...            true error [rad]; target, ENU [m, m/s]
+    The numbers of the result are NaN while not locked, except C/N0. The values are NaN if not known.
     """
-    due: int
-    stamp_ns: int
-    cross_elevation: float
-    elevation: float
-    cn0_dbhz: float
-    locked: int
-    status: int
-    rate: Pair
-    range: float
-    true_cross_elevation: float
-    true_elevation: float
-    target_valid: int
-    target_position: Vector3
-    target_velocity: Vector3
+    due: Bit                    # 1 if a result comes out in this step
+    stamp_ns: Nanoseconds       # at which the result was measured
+    cross_elevation: Radians    # error
+    elevation: Radians
+    cn0_dbhz: DecibelHertz
+    locked: Bit
+    status: int                 # of this step: index into STATUS_TEXT_BY_CODE
+    rate: Pair                  # rates of the errors [rad/s], NaN if not measured
+    range: Meters               # NaN if not measured; in the single precision of its topic
+    true_cross_elevation: Radians   # error at the stamp of this step
+    true_elevation: Radians
+    target_valid: Bit
+    target_position: Vector3    # ENU [m]
+    target_velocity: Vector3    # ENU [m/s]
 
 
-def constants(params, period, built) -> np.ndarray:
-    """Return Constants (1,) of TrackingReceiverParameters, a drive step `period` [s] and a target.Target.
+def constants(params: TrackingReceiverParameters, period: Seconds, built: target.Target) -> Records:
+    """Return the Constants (1,) of a drive step `period` and a target.
 
     Raises ParameterError for a latency that the ring of results does not cover.
     """
@@ -162,10 +180,10 @@ def constants(params, period, built) -> np.ndarray:
         raise ParameterError(f'receiver.latency = {receiver.latency:g} s: must be below {RESULT_RING_SIZE - 1} '
                              f'periods of {period:g} s')
     tau = period / receiver.samples_per_step
-    c = np.zeros(1, Constants)
+    c = Constants.zeros()
     c['target'], c['beamwidth'] = built.constants, antenna.beamwidth
     c['slope'] = antenna.slope * antenna.slope_factor
-    detector.set_constants(c, antenna, receiver, period)
+    detector.set_constants(c['detector'], antenna, receiver, period)
     c['cos_beta'], c['sin_beta'] = math.cos(antenna.cross_coupling), math.sin(antenna.cross_coupling)
     c['cos_phi'], c['sin_phi'] = math.cos(antenna.phase_error), math.sin(antenna.phase_error)
     c['sign'] = 1.0
@@ -197,30 +215,30 @@ def constants(params, period, built) -> np.ndarray:
     return c
 
 
-def initial_state() -> np.ndarray:
-    """Return (1,) State before the first step: noise in the channels, not locked."""
-    s = np.zeros(1, State)
-    s['stamp_ns'], s['agc_power'], s['level_power'] = -1, 1.0, 1.0
-    return s
+def initial_state() -> Records:
+    """Return the State (1,) before the first step: noise in the channels, not locked."""
+    state = State.zeros()
+    state['stamp_ns'], state['detector']['agc_power'], state['detector']['level_power'] = -1, 1.0, 1.0
+    return state
 
 
-def _measured_normals(receiver) -> int:
-    """Return the number of standard normals per step that the channels, rate and range of ReceiverParameters take."""
+def _measured_normals(receiver: ReceiverParameters) -> int:
+    """Return the number of standard normals per step that the channels, rate and range take."""
     return NORMALS_PER_SAMPLE * receiver.samples_per_step + 2 * receiver.rate.measured + receiver.ranging.measured
 
 
-def _receiver_normals(params) -> int:
-    """Return _measured_normals of TrackingReceiverParameters, and those of a source of noise."""
+def _receiver_normals(params: TrackingReceiverParameters) -> int:
+    """Return _measured_normals, and those of a source of noise."""
     return _measured_normals(params.receiver) + params.receiver.samples_per_step * params.target.of_noise
 
 
-def normals_per_step(params) -> int:
-    """Return the number of standard normals that `step` takes with TrackingReceiverParameters."""
+def normals_per_step(params: TrackingReceiverParameters) -> int:
+    """Return the number of standard normals that `step` takes."""
     return _receiver_normals(params) + scintillation.NORMALS_PER_STEP * params.path.scintillation.on
 
 
-def angle_noise(params, cn0_dbhz, period):
-    """Return the predicted 1-sigma of one published error on axis [rad] at a C/N0 [dB-Hz] and a drive step [s]."""
+def angle_noise(params: TrackingReceiverParameters, cn0_dbhz: DecibelHertz, period: Seconds) -> Radians:
+    """Return the predicted 1-sigma of one published error on axis at a C/N0 and a drive step `period`."""
     antenna, receiver = params.antenna, params.receiver
     tau = period / receiver.samples_per_step
     one_sample = thermal_noise(antenna.beamwidth, antenna.slope, hertz(cn0_dbhz), tau)
@@ -229,11 +247,11 @@ def angle_noise(params, cn0_dbhz, period):
     return one_sample / math.sqrt(independent[receiver.smoothing])
 
 
-def age(params, period):
-    """Return the mean age [s] of an error at its stamp if the beam is held between two steps, otherwise 0.
+def age(params: TrackingReceiverParameters, period: Seconds) -> Seconds:
+    """Return the mean age of an error at its stamp if the beam is held between two steps, otherwise 0.
 
     A moving beam needs no age. There the mean over a step differs from the error at the stamp at most by the change of
-    the error within the step. params: TrackingReceiverParameters; period: drive step [s].
+    the error within the step. period: drive step.
     """
     receiver = params.receiver
     if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
@@ -242,11 +260,11 @@ def age(params, period):
             * period / receiver.samples_per_step)
 
 
-def beam_age(params, period):
-    """Return the mean time [s] from the stamp of the measured beam to the stamp of an error.
+def beam_age(params: TrackingReceiverParameters, period: Seconds) -> Seconds:
+    """Return the mean time from the stamp of the measured beam to the stamp of an error.
 
     Because a held beam is published at the end of its step, only older steps in the smoothing count. The result is 0
-    for a moving beam. params: TrackingReceiverParameters; period: drive step [s].
+    for a moving beam. period: drive step.
     """
     receiver = params.receiver
     if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
@@ -255,77 +273,80 @@ def beam_age(params, period):
 
 
 @compiled
-def inputs_known(i):
+def inputs_known(inputs: Inputs) -> bool:
     """Return True if beam, attitude and position are known and finite."""
-    total = i.azimuth + i.elevation
+    total = inputs.azimuth + inputs.elevation
     for row in range(3):
-        total += i.position[row] + i.mat_ed[row, 0] + i.mat_ed[row, 1] + i.mat_ed[row, 2]
-    return i.valid != 0 and math.isfinite(total)
+        total += inputs.position[row] + inputs.mat_ed[row, 0] + inputs.mat_ed[row, 1] + inputs.mat_ed[row, 2]
+    return inputs.valid != 0 and math.isfinite(total)
 
 
 @compiled
-def place_antenna(s, c, i):
-    """Set the antenna's position p + M r [m] and velocity v + w x r [m/s] in the state; r: the lever arm, FLU [m]."""
-    x, y, z = c.lever_arm[0], c.lever_arm[1], c.lever_arm[2]
-    wx, wy, wz = i.twist_angular[0], i.twist_angular[1], i.twist_angular[2]
-    e, n, u = to_earth(i.mat_ed, x, y, z)
-    s.antenna[0], s.antenna[1], s.antenna[2] = i.position[0] + e, i.position[1] + n, i.position[2] + u
-    s.antenna_velocity[0] = i.twist_linear[0] + wy * z - wz * y
-    s.antenna_velocity[1] = i.twist_linear[1] + wz * x - wx * z
-    s.antenna_velocity[2] = i.twist_linear[2] + wx * y - wy * x
+def place_antenna(state: State, constants: Constants, inputs: Inputs) -> None:
+    """Set the antenna's position p + M r [m] and velocity v + w x r [m/s] in the state; r: the lever arm."""
+    x, y, z = constants.lever_arm[0], constants.lever_arm[1], constants.lever_arm[2]
+    wx, wy, wz = inputs.twist_angular[0], inputs.twist_angular[1], inputs.twist_angular[2]
+    e, n, u = to_earth(inputs.mat_ed, x, y, z)
+    state.antenna[0], state.antenna[1] = inputs.position[0] + e, inputs.position[1] + n
+    state.antenna[2] = inputs.position[2] + u
+    state.antenna_velocity[0] = inputs.twist_linear[0] + wy * z - wz * y
+    state.antenna_velocity[1] = inputs.twist_linear[1] + wz * x - wx * z
+    state.antenna_velocity[2] = inputs.twist_linear[2] + wx * y - wy * x
 
 
 @compiled
-def apparent_state(s, c, true):
-    """Return the apparent TargetState of a true one, both ENU of the station, with refraction and delay of light."""
-    if c.path.refractivity == 0.0 and c.path.light_time == 0:
+def apparent_state(state: State, constants: Constants, true: target.TargetState) -> target.TargetState:
+    """Return the apparent state of a true one, with refraction and delay of light."""
+    if constants.path.refractivity == 0.0 and constants.path.light_time == 0:
         return true
-    e, n, u = true.position
-    r, v = arrival.seen(c.path, (e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]), true.velocity)
-    return target.TargetState(true.valid, (s.antenna[0] + r[0], s.antenna[1] + r[1], s.antenna[2] + r[2]), v)
+    (e, n, u), antenna = true.position, state.antenna
+    r, v = arrival.seen(constants.path, (e - antenna[0], n - antenna[1], u - antenna[2]), true.velocity)
+    return target.TargetState(true.valid, (antenna[0] + r[0], antenna[1] + r[1], antenna[2] + r[2]), v)
 
 
 @compiled
-def carrier_amplitude(c, e, n, u, hidden):
-    """Return the sum voltage on axis [-] from a target at a vector (e, n, u) from the antenna, ENU [m].
+def carrier_amplitude(constants: Constants, e: Meters, n: Meters, u: Meters, hidden: bool) -> float:
+    """Return the sum voltage on axis from a target at a vector (e, n, u) from the antenna.
 
     The voltage is 0 below the horizon mask. hidden: True if a blockage hides the target; the voltage is then 0 too.
     """
     _, elevation = earth_angles(e, n, u)
-    if hidden or not elevation >= c.horizon_mask:       # also true for an elevation of NaN
+    if hidden or not elevation >= constants.horizon_mask:       # also true for an elevation of NaN
         return 0.0
     distance = max(math.sqrt(e * e + n * n + u * u), 1.0)
-    return math.sqrt(c.power) * (c.reference_range / distance)**c.half_exponent
+    return math.sqrt(constants.power) * (constants.reference_range / distance)**constants.half_exponent
 
 
 @compiled
-def voltages(c, amplitude, v_x, v_e, image):
+def voltages(constants: Constants, amplitude: float, v_x: float, v_e: float, image: multipath.Image) -> Voltages:
     """Return the Voltages of one sample without noise.
 
-    amplitude: sum voltage on axis [-]; v_x, v_e: offsets of the target from the null of the differences, in
-    beamwidths; image: multipath.Image.
+    amplitude: sum voltage on axis; v_x, v_e: offsets of the target from the null of the differences, in beamwidths.
     """
     # S_g, D_xg, D_eg: patterns for the image of the target in the ground.
-    if c.disk_radius > 0.0:
-        S, D_x, D_e = disk_channels(v_x, v_e, c.disk_radius, c.slope, c.cos_beta, c.sin_beta)
+    slope, cos_beta, sin_beta = constants.slope, constants.cos_beta, constants.sin_beta
+    if constants.disk_radius > 0.0:
+        S, D_x, D_e = disk_channels(v_x, v_e, constants.disk_radius, slope, cos_beta, sin_beta)
     else:
-        S, D_x, D_e = channels(v_x, v_e, c.slope, c.cos_beta, c.sin_beta)
+        S, D_x, D_e = channels(v_x, v_e, slope, cos_beta, sin_beta)
     S_imag = D_x_imag = D_e_imag = 0.0
-    if c.multipath.reflection != 0.0:
-        S_g, D_xg, D_eg = channels((image.dX - c.boresight[0]) / c.beamwidth,
-                                   (image.dE - c.boresight[1]) / c.beamwidth, c.slope, c.cos_beta, c.sin_beta)
+    if constants.multipath.reflection != 0.0:
+        S_g, D_xg, D_eg = channels((image.dX - constants.boresight[0]) / constants.beamwidth,
+                                   (image.dE - constants.boresight[1]) / constants.beamwidth, slope, cos_beta,
+                                   sin_beta)
         S, D_x, D_e = S + image.real * S_g, D_x + image.real * D_xg, D_e + image.real * D_eg
         S_imag, D_x_imag, D_e_imag = image.imaginary * S_g, image.imaginary * D_xg, image.imaginary * D_eg
-    x_real, x_imag = c.sign[0] * amplitude * D_x, c.sign[0] * amplitude * D_x_imag
-    e_real, e_imag = c.sign[1] * amplitude * D_e, c.sign[1] * amplitude * D_e_imag
+    x_real, x_imag = constants.sign[0] * amplitude * D_x, constants.sign[0] * amplitude * D_x_imag
+    e_real, e_imag = constants.sign[1] * amplitude * D_e, constants.sign[1] * amplitude * D_e_imag
+    cos_phi, sin_phi = constants.cos_phi, constants.sin_phi
     return Voltages(amplitude * S, amplitude * S_imag,
-                    x_real * c.cos_phi - x_imag * c.sin_phi, x_real * c.sin_phi + x_imag * c.cos_phi,
-                    e_real * c.cos_phi - e_imag * c.sin_phi, e_real * c.sin_phi + e_imag * c.cos_phi)
+                    x_real * cos_phi - x_imag * sin_phi, x_real * sin_phi + x_imag * cos_phi,
+                    e_real * cos_phi - e_imag * sin_phi, e_real * sin_phi + e_imag * cos_phi)
 
 
 @compiled
-def with_noise(v, normals, first):
-    """Return Voltages with noise, made of the normals from index `first` on."""
+def with_noise(v: Voltages, normals: Floats, first: int) -> Voltages:
+    """Return voltages with noise, made of the normals from index `first` on."""
     # The noise power 1 of a channel is half in its real and half in its imaginary part.
     half = math.sqrt(0.5)
     return Voltages(v.s_real + half * normals[first], v.s_imag + half * normals[first + 1],
@@ -334,167 +355,172 @@ def with_noise(v, normals, first):
 
 
 @compiled
-def error_at(s, seen, part):
-    """Return the true (cross-elevation, elevation) error [rad] when a part [-] of a step has passed.
+def error_at(state: State, seen: Incidence, part: float) -> tuple[Radians, Radians]:
+    """Return the true (cross-elevation, elevation) error when a part of a step has passed.
 
-    The error changes during the step from that of the state s to that of `seen`, an Incidence.
+    The error changes during the step from that of the state to that of `seen`.
     """
-    from_X, from_E = (s.cross_elevation, s.elevation) if s.error_known != 0 else (seen.dX, seen.dE)
+    from_X, from_E = (state.cross_elevation, state.elevation) if state.error_known != 0 else (seen.dX, seen.dE)
     return from_X + part * (seen.dX - from_X), from_E + part * (seen.dE - from_E)
 
 
 @compiled
-def voltages_at(s, c, seen, part, amplitude):
-    """Return the Voltages without noise when a part [-] of a step has passed; amplitude: sum voltage on axis [-].
-
-    s, seen: see `error_at`.
-    """
-    X, E = error_at(s, seen, part)
-    return voltages(c, amplitude, (X - c.boresight[0]) / c.beamwidth, (E - c.boresight[1]) / c.beamwidth, seen.image)
+def voltages_at(state: State, constants: Constants, seen: Incidence, part: float, amplitude: float) -> Voltages:
+    """Return the Voltages without noise when a part of a step has passed; amplitude: sum voltage on axis."""
+    X, E = error_at(state, seen, part)
+    return voltages(constants, amplitude, (X - constants.boresight[0]) / constants.beamwidth,
+                    (E - constants.boresight[1]) / constants.beamwidth, seen.image)
 
 
 @compiled
-def measure(s, c, seen, normals):
-    """Return the errors (cross-elevation, elevation) [rad] that the receiver measures in one step with an Incidence.
-    """
-    detector.begin(s)
-    for k in range(c.samples):
+def measure(state: State, constants: Constants, seen: Incidence, normals: Floats) -> tuple[Radians, Radians]:
+    """Return the errors (cross-elevation, elevation) that the receiver measures in one step."""
+    samples = constants.detector.samples
+    detector.begin(state.detector)
+    for k in range(samples):
         level = seen.amplitude
-        if c.source_sigma > 0.0:
-            level *= math.sqrt(max(0.0, 1.0 + c.source_sigma * normals[c.first_source_normal + k]))
-        detector.put(s, c, with_noise(voltages_at(s, c, seen, (k + 1.0) / c.samples, level), normals,
-                                      NORMALS_PER_SAMPLE * k))
-    return detector.errors(s, c)
+        if constants.source_sigma > 0.0:
+            level *= math.sqrt(max(0.0, 1.0 + constants.source_sigma * normals[constants.first_source_normal + k]))
+        sample = voltages_at(state, constants, seen, (k + 1.0) / samples, level)
+        detector.put(state.detector, constants.detector, with_noise(sample, normals, NORMALS_PER_SAMPLE * k))
+    return detector.errors(state.detector, constants.detector)
 
 
 @compiled
-def rate_and_range(s, c, i, target_state, normals):
-    """Return the measured ((cross-elevation rate, elevation rate) [rad/s], range [m]) of a TargetState.
+def rate_and_range(state: State, constants: Constants, inputs: Inputs, target_state: target.TargetState,
+                   normals: Floats) -> tuple[tuple[RadiansPerSecond, RadiansPerSecond], Meters]:
+    """Return the measured ((cross-elevation rate, elevation rate), range) of the target.
 
     NaN stands for a number that the receiver does not measure.
     """
     rates, distance = NOT_MEASURED, math.nan
-    first = c.first_measured_normal
-    if c.rate_measured != 0:
-        rate_x, rate_e = error_rate(i, s.antenna, s.antenna_velocity, target_state)
-        rates = rate_x + c.rate_sigma * normals[first], rate_e + c.rate_sigma * normals[first + 1]
+    first = constants.first_measured_normal
+    if constants.rate_measured != 0:
+        rate_x, rate_e = error_rate(inputs, state.antenna, state.antenna_velocity, target_state)
+        rates = rate_x + constants.rate_sigma * normals[first], rate_e + constants.rate_sigma * normals[first + 1]
         first += 2
-    if c.range_measured != 0:
+    if constants.range_measured != 0:
         e, n, u = target_state.position
-        e, n, u = e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]
-        distance = float(np.float32(math.sqrt(e * e + n * n + u * u) + c.range_sigma * normals[first]))
+        e, n, u = e - state.antenna[0], n - state.antenna[1], u - state.antenna[2]
+        distance = float(np.float32(math.sqrt(e * e + n * n + u * u) + constants.range_sigma * normals[first]))
     return rates, distance
 
 
 @compiled
-def delay(s, c, o, stamp_ns, result):
-    """Put a Result into the ring and release the newest result measured at or before stamp_ns - latency."""
-    slot = s.written % RESULT_RING_SIZE
-    s.ring_stamp_ns[slot], s.ring_locked[slot] = stamp_ns, s.locked
-    s.ring_cross_elevation[slot], s.ring_elevation[slot] = result.error
-    s.ring_rate[slot, 0], s.ring_rate[slot, 1] = result.rates
-    s.ring_cn0_dbhz[slot], s.ring_range[slot] = result.cn0_dbhz, result.range
-    s.written += 1
-    s.released = max(s.released, s.written - RESULT_RING_SIZE)
-    while s.released < s.written and s.ring_stamp_ns[s.released % RESULT_RING_SIZE] <= stamp_ns - c.latency_ns:
-        slot = s.released % RESULT_RING_SIZE
-        s.released += 1
-        o.due, o.stamp_ns, o.locked = 1, s.ring_stamp_ns[slot], s.ring_locked[slot]
-        o.cross_elevation, o.elevation = s.ring_cross_elevation[slot], s.ring_elevation[slot]
-        o.cn0_dbhz = s.ring_cn0_dbhz[slot]
-        o.rate[0], o.rate[1], o.range = s.ring_rate[slot, 0], s.ring_rate[slot, 1], s.ring_range[slot]
+def delay(state: State, constants: Constants, outputs: Outputs, stamp_ns: Nanoseconds, result: Result) -> None:
+    """Put a result into the ring and release the newest result measured at or before stamp_ns - latency."""
+    slot = state.written % RESULT_RING_SIZE
+    state.ring_stamp_ns[slot], state.ring_locked[slot] = stamp_ns, state.detector.locked
+    state.ring_cross_elevation[slot], state.ring_elevation[slot] = result.error
+    state.ring_rate[slot, 0], state.ring_rate[slot, 1] = result.rates
+    state.ring_cn0_dbhz[slot], state.ring_range[slot] = result.cn0_dbhz, result.range
+    state.written += 1
+    state.released = max(state.released, state.written - RESULT_RING_SIZE)
+    latest_ns = stamp_ns - constants.latency_ns
+    while state.released < state.written and state.ring_stamp_ns[state.released % RESULT_RING_SIZE] <= latest_ns:
+        slot = state.released % RESULT_RING_SIZE
+        state.released += 1
+        outputs.due, outputs.stamp_ns, outputs.locked = 1, state.ring_stamp_ns[slot], state.ring_locked[slot]
+        outputs.cross_elevation, outputs.elevation = state.ring_cross_elevation[slot], state.ring_elevation[slot]
+        outputs.cn0_dbhz = state.ring_cn0_dbhz[slot]
+        outputs.rate[0], outputs.rate[1] = state.ring_rate[slot, 0], state.ring_rate[slot, 1]
+        outputs.range = state.ring_range[slot]
 
 
 @compiled
-def reset_outputs(o):
+def reset_outputs(outputs: Outputs) -> None:
     """Reset the outputs at the start of a step: nothing measured, nothing known."""
-    o.due, o.stamp_ns, o.locked = 0, 0, 0
-    o.cross_elevation, o.elevation, o.cn0_dbhz = math.nan, math.nan, math.nan
-    o.rate[0], o.rate[1], o.range = math.nan, math.nan, math.nan
-    o.true_cross_elevation, o.true_elevation = math.nan, math.nan
-    o.target_valid = 0
+    outputs.due, outputs.stamp_ns, outputs.locked = 0, 0, 0
+    outputs.cross_elevation, outputs.elevation, outputs.cn0_dbhz = math.nan, math.nan, math.nan
+    outputs.rate[0], outputs.rate[1], outputs.range = math.nan, math.nan, math.nan
+    outputs.true_cross_elevation, outputs.true_elevation = math.nan, math.nan
+    outputs.target_valid = 0
     for axis in range(3):
-        o.target_position[axis], o.target_velocity[axis] = math.nan, math.nan
+        outputs.target_position[axis], outputs.target_velocity[axis] = math.nan, math.nan
 
 
 @compiled
-def incidence(s, c, i, o, true, normals):
+def incidence(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, true: target.TargetState,
+              normals: Floats) -> Incidence:
     """Return the Incidence of the target's true state, and set the true error in the outputs."""
     dX, dE, amplitude = 0.0, 0.0, 0.0
     rates, distance = NOT_MEASURED, math.nan
     image = multipath.Image(0.0, 0.0, 0.0, 0.0)
     hidden = False
     if true.valid:
-        place_antenna(s, c, i)
-        seen = apparent_state(s, c, true)
-        rates, distance = rate_and_range(s, c, i, seen, normals)
+        place_antenna(state, constants, inputs)
+        seen = apparent_state(state, constants, true)
+        rates, distance = rate_and_range(state, constants, inputs, seen, normals)
         e, n, u = seen.position
-        e, n, u = e - s.antenna[0], n - s.antenna[1], u - s.antenna[2]
-        x, y, z = to_deck(i.mat_ed, e, n, u)
-        if c.held and s.error_known:
-            s.cross_elevation, s.elevation = offsets(i.azimuth, i.elevation, s.direction[0], s.direction[1],
-                                                     s.direction[2])
-        s.direction[0], s.direction[1], s.direction[2] = x, y, z
-        dX, dE = offsets(i.azimuth, i.elevation, x, y, z)
-        hidden = blockage.blocked(c.sectors, *angles(x, y, z))
-        amplitude = carrier_amplitude(c, e, n, u, hidden)
-        image = multipath.image(c.multipath, i, e, n, u)
-        o.true_cross_elevation, o.true_elevation = dX, dE
-        if c.scintillation.on != 0:
+        e, n, u = e - state.antenna[0], n - state.antenna[1], u - state.antenna[2]
+        x, y, z = to_deck(inputs.mat_ed, e, n, u)
+        if constants.held and state.error_known:
+            state.cross_elevation, state.elevation = offsets(inputs.azimuth, inputs.elevation, state.direction[0],
+                                                             state.direction[1], state.direction[2])
+        state.direction[0], state.direction[1], state.direction[2] = x, y, z
+        dX, dE = offsets(inputs.azimuth, inputs.elevation, x, y, z)
+        hidden = blockage.blocked(constants.sectors, *angles(x, y, z))
+        amplitude = carrier_amplitude(constants, e, n, u, hidden)
+        image = multipath.image(constants.multipath, inputs, e, n, u)
+        outputs.true_cross_elevation, outputs.true_elevation = dX, dE
+        if constants.scintillation.on != 0:
             sin_E = u / math.sqrt(e * e + n * n + u * u)
-            fading, X, E = scintillation.wander(c.scintillation, s.scintillation, sin_E, normals,
-                                                c.first_scintillation_normal)
+            fading, X, E = scintillation.wander(constants.scintillation, state.scintillation, sin_E, normals,
+                                                constants.first_scintillation_normal)
             amplitude, dX, dE = fading * amplitude, dX + X, dE + E
     return Incidence(dX, dE, amplitude, image, hidden, rates, distance)
 
 
 @compiled
-def begin(s, c, i, o, breaks, coefficients):
+def begin(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, breaks: Times,
+          coefficients: Floats) -> tuple[target.TargetState, Nanoseconds]:
     """Begin a step: reset the outputs and set the target in them. Return (the target's true state, time since the last
-    step [ns]); the time is 0 for a stamp that is not after the last one. Arguments: see `step`."""
-    reset_outputs(o)
+    step [ns]); the time is 0 for a stamp that is not after the last one."""
+    reset_outputs(outputs)
     elapsed_ns = 0
-    if i.stamp_ns > s.stamp_ns:
-        elapsed_ns = i.stamp_ns - s.stamp_ns if s.stamp_ns >= 0 else c.period_ns
-        s.stamp_ns = i.stamp_ns
-    true = target.state(c.target, breaks, coefficients, 1e-9 * i.stamp_ns)
+    if inputs.stamp_ns > state.stamp_ns:
+        elapsed_ns = inputs.stamp_ns - state.stamp_ns if state.stamp_ns >= 0 else constants.period_ns
+        state.stamp_ns = inputs.stamp_ns
+    true = target.state(constants.target, breaks, coefficients, 1e-9 * inputs.stamp_ns)
     if elapsed_ns > 0:
-        o.target_valid = true.valid
-        o.target_position[0], o.target_position[1], o.target_position[2] = true.position
-        o.target_velocity[0], o.target_velocity[1], o.target_velocity[2] = true.velocity
+        outputs.target_valid = true.valid
+        outputs.target_position[0], outputs.target_position[1], outputs.target_position[2] = true.position
+        outputs.target_velocity[0], outputs.target_velocity[1], outputs.target_velocity[2] = true.velocity
     else:
-        o.status = Status.STAMP_ORDER
+        outputs.status = Status.STAMP_ORDER
     return true, elapsed_ns
 
 
 @compiled
-def finish(s, o, true, seen):
+def finish(state: State, outputs: Outputs, true: target.TargetState, seen: Incidence) -> None:
     """Keep the error of a step for the next step, and set the status."""
-    s.cross_elevation, s.elevation = seen.dX, seen.dE
-    s.error_known = true.valid
-    o.status = (Status.NO_TARGET if true.valid == 0 else Status.HIDDEN if seen.hidden else
-                Status.BELOW_HORIZON if seen.amplitude == 0.0 else Status.LOCKED if s.locked != 0 else Status.NO_LOCK)
+    state.cross_elevation, state.elevation = seen.dX, seen.dE
+    state.error_known = true.valid
+    outputs.status = (Status.NO_TARGET if true.valid == 0 else Status.HIDDEN if seen.hidden else
+                      Status.BELOW_HORIZON if seen.amplitude == 0.0 else
+                      Status.LOCKED if state.detector.locked != 0 else Status.NO_LOCK)
 
 
 @separate
-def step(s, c, i, o, breaks, coefficients, normals):
+def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, breaks: Times, coefficients: Floats,
+         normals: Floats) -> None:
     """Execute one drive step. Never raises: the status of the outputs names a missing input.
 
-    s, c, i, o: records State, Constants, Inputs, Outputs; breaks, coefficients: of the Target;
-    normals: (normals_per_step,).
+    breaks, coefficients: of the Target; normals: (normals_per_step,).
     """
-    true, elapsed_ns = begin(s, c, i, o, breaks, coefficients)
+    true, elapsed_ns = begin(state, constants, inputs, outputs, breaks, coefficients)
     if elapsed_ns == 0:
         return
     error, rates, distance = NOT_MEASURED, NOT_MEASURED, math.nan
-    if inputs_known(i):
-        seen = incidence(s, c, i, o, true, normals)
-        error, rates, distance = measure(s, c, seen, normals), seen.rates, seen.range
-        detector.lock(s, c, s.level_power - 1.0, elapsed_ns)
-        finish(s, o, true, seen)
+    if inputs_known(inputs):
+        seen = incidence(state, constants, inputs, outputs, true, normals)
+        error, rates, distance = measure(state, constants, seen, normals), seen.rates, seen.range
+        detector.lock(state.detector, constants.detector, state.detector.level_power - 1.0, elapsed_ns)
+        finish(state, outputs, true, seen)
     else:
-        s.error_known, s.locked, s.timer_ns = 0, 0, 0
-        o.status = Status.NO_BEAM
-    if s.locked == 0:
+        state.error_known, state.detector.locked, state.detector.timer_ns = 0, 0, 0
+        outputs.status = Status.NO_BEAM
+    if state.detector.locked == 0:
         error, rates, distance = NOT_MEASURED, NOT_MEASURED, math.nan
-    delay(s, c, o, i.stamp_ns, Result(error, detector.cn0_dbhz(s, c), rates, distance))
+    cn0_dbhz = detector.cn0_dbhz(state.detector, constants.detector)
+    delay(state, constants, outputs, inputs.stamp_ns, Result(error, cn0_dbhz, rates, distance))

@@ -5,13 +5,13 @@
                     1 / ((n - 1) T) rad/s, its mean delay n - 1 samples
     moving_average  the text of the paper, not its eq. (1): the mean of the last n samples, delay (n - 1) / 2 samples
 
-y: sample of the error [rad]; x: smoothed error [rad]; n: number of samples [-]; T: time between two samples [s]. The
-argument `kind` is a code such as SMOOTHING_NONE in the compiled laws, and a name of SMOOTHING_KINDS elsewhere.
+y: sample of the error; x: smoothed error; n: number of samples; T: time between two samples. The argument `kind` is a
+code such as SMOOTHING_NONE in the compiled laws, and a name of SMOOTHING_KINDS elsewhere.
 """
 from typing import Annotated
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Floats
+from pedestal_common.quantities import Floats, Radians
 from pedestal_common.record import Record
 
 SMOOTHING_KINDS = ('none', 'recursion', 'moving_average')
@@ -21,53 +21,51 @@ MAX_WINDOW_SAMPLES = 256  # length of the longest moving average [samples]
 
 
 class Smoother(Record):
-    """State of a smoother. low_pass: output of the recursion; sum: sum of the samples of this step; samples: the last
-    samples; count: number of samples since the start.
-    """
-    low_pass: float
-    sum: float
-    samples: Annotated[Floats, (MAX_WINDOW_SAMPLES,)]
-    count: int
+    """State of a smoother."""
+    low_pass: Radians           # output of the recursion
+    sum: Radians                # of the samples of this step
+    samples: Annotated[Floats, (MAX_WINDOW_SAMPLES,)]   # the last samples [rad]
+    count: int                  # number of samples since the start
 
 
 @compiled
-def begin(s):
+def begin(smoother: Smoother) -> None:
     """Begin a drive step: reset the sum of its samples."""
-    s.sum = 0.0
+    smoother.sum = 0.0
 
 
 @compiled
-def put(s, y, gain):
-    """Add one sample y [rad]; gain: 1/n of the recursion [-]."""
-    s.sum += y
-    s.low_pass += gain * (y - s.low_pass)
-    s.samples[s.count % MAX_WINDOW_SAMPLES] = y
-    s.count += 1
+def put(smoother: Smoother, y: Radians, gain: float) -> None:
+    """Add one sample y; gain: 1/n of the recursion."""
+    smoother.sum += y
+    smoother.low_pass += gain * (y - smoother.low_pass)
+    smoother.samples[smoother.count % MAX_WINDOW_SAMPLES] = y
+    smoother.count += 1
 
 
 @compiled
-def smoothed(s, kind, samples, n):
-    """Return the smoothed error [rad] at the end of a step.
+def smoothed(smoother: Smoother, kind: int, samples: int, n: int) -> Radians:
+    """Return the smoothed error at the end of a step.
 
     samples: number of samples of a step; n: length of the moving average [samples], which is shorter at the start.
     """
     if kind == SMOOTHING_RECURSION:
-        return s.low_pass
+        return smoother.low_pass
     if kind == SMOOTHING_NONE:
-        return s.sum / samples
-    length = min(n, s.count)
+        return smoother.sum / samples
+    length = min(n, smoother.count)
     total = 0.0
-    for k in range(s.count - length, s.count):
-        total += s.samples[k % MAX_WINDOW_SAMPLES]
+    for k in range(smoother.count - length, smoother.count):
+        total += smoother.samples[k % MAX_WINDOW_SAMPLES]
     return total / length
 
 
-def delay(kind, samples, n):
+def delay(kind: str, samples: int, n: int) -> float:
     """Return the mean delay of a kind in samples before the newest; samples: number of samples of a step."""
     return {'none': 0.5 * (samples - 1), 'recursion': n - 1.0, 'moving_average': 0.5 * (n - 1)}[kind]
 
 
-def steps_back(kind, samples, n):
+def steps_back(kind: str, samples: int, n: int) -> float:
     """Return the mean age of the steps whose samples are in the result, in drive steps; 0 for the last step.
 
     samples: number of samples of a step. A beam that is held within a step has one direction in each step. For the

@@ -20,9 +20,8 @@ every extremum, and its velocity is wrong by 1.3 m/s.
 """
 import functools
 import math
-import typing
-from collections import namedtuple
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,9 +32,17 @@ from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import record
+from pedestal_common.quantities import Bit, Degrees, Floats, Radians, Records, Seconds, Times, Vectors3, Xyz
 from pedestal_common.record import Record
 from pedestal_common.sky import bodies
-from tracking_receiver_sim.params import TARGET_KINDS, TARGET_RAMP, TARGET_SINE, TARGET_STEP, AngleParameters
+from tracking_receiver_sim.params import (
+    TARGET_KINDS,
+    TARGET_RAMP,
+    TARGET_SINE,
+    TARGET_STEP,
+    AngleParameters,
+    TargetParameters,
+)
 
 SGP4_KNOT_SPACING_S = 1.0  # time between two SGP4 knots [s]
 BODY_KNOT_SPACING_S = 10.0  # time between two knots of the sun or the moon [s]; the pieces are within 1e-9 rad
@@ -50,37 +57,40 @@ A track_file covers this time only as far as the file goes.
 
 MAX_HORIZON_POINTS = 10_000  # largest number of points at which a target is compared with the horizon
 
-TargetState = namedtuple('TargetState', 'valid position velocity')
-"""State of a target. valid: 0 or 1; position: ENU of the station [m]; velocity [m/s]; three floats each, NaN if not
-valid."""
+
+class TargetState(NamedTuple):
+    """State of a target."""
+    valid: Bit
+    position: Xyz       # ENU of the station [m], NaN if not valid
+    velocity: Xyz       # ENU [m/s], NaN if not valid
 
 
 class TargetRecord(Record):
-    """Constants of a target. kind: index into TARGET_KINDS; angle: AngleParameters."""
-    kind: int
+    """Constants of a target."""
+    kind: int           # index into TARGET_KINDS
     angle: AngleParameters
 
 
-class Target(typing.NamedTuple):
-    """A target built for one run.
+class Target(NamedTuple):
+    """A target built for one run."""
+    constants: Records              # (1,) of TargetRecord
+    breaks: Times                   # (n + 1,)
+    coefficients: Floats            # (4, n, 3), highest power first, of (t - breaks[i]), ENU [m]
+    start_time: str = ''            # UTC of stamp 0 in ISO 8601, empty if the target has no date
+    summary: tuple[str, ...] = ()   # lines about the file and the track of a track_file, empty for other kinds
 
-        constants       (1,) record of TARGET_DTYPE
-        breaks          (n + 1,) times [s]
-        coefficients    (4, n, 3), highest power first, of (t - breaks[i]), ENU [m]
-        start_time      UTC of stamp 0 in ISO 8601, empty if the target has no date
-        summary         two lines about the file and the track of a track_file, empty for other kinds
-    """
-    constants: np.ndarray
-    breaks: np.ndarray
-    coefficients: np.ndarray
+
+class Course(NamedTuple):
+    """What a kind of target gives for a run: its track as in Target, start time and summary as far as it has them."""
+    breaks: Times
+    coefficients: Floats
     start_time: str = ''
-    summary: tuple = ()
+    summary: tuple[str, ...] = ()
 
 
 @compiled
-def on_track(breaks, coefficients, t):
-    """Return the TargetState of a piecewise cubic (breaks, coefficients as in Target) at t [s]; not valid outside its
-    breaks."""
+def on_track(breaks: Times, coefficients: Floats, t: Seconds) -> TargetState:
+    """Return the TargetState of a piecewise cubic (as in Target) at t; not valid outside its breaks."""
     if not breaks[0] <= t <= breaks[-1]:
         return TargetState(0, (math.nan, math.nan, math.nan), (math.nan, math.nan, math.nan))
     i = interval(breaks, t)
@@ -94,9 +104,8 @@ def on_track(breaks, coefficients, t):
 
 
 @compiled
-def in_angles(kind, angle, t):
-    """Return the TargetState at t [s] of a sine, step or ramp in earth azimuth and elevation; angle: record of
-    AngleParameters."""
+def in_angles(kind: int, angle: AngleParameters, t: Seconds) -> TargetState:
+    """Return the TargetState at t of a sine, step or ramp in earth azimuth and elevation."""
     tau = t - angle.start
     A, E, A_dot, E_dot = angle.azimuth, angle.elevation, 0.0, 0.0
     if tau >= 0.0:
@@ -119,24 +128,25 @@ def in_angles(kind, angle, t):
 
 
 @compiled
-def state(target, breaks, coefficients, t):
-    """Return the TargetState at t [s]; target: record of TARGET_DTYPE; breaks, coefficients: as in Target."""
+def state(target: TargetRecord, breaks: Times, coefficients: Floats, t: Seconds) -> TargetState:
+    """Return the TargetState at t; breaks, coefficients: as in Target."""
     if target.kind == TARGET_SINE or target.kind == TARGET_STEP or target.kind == TARGET_RAMP:
         return in_angles(target.kind, target.angle, t)
     return on_track(breaks, coefficients, t)
 
 
 @compiled
-def _look_angles(constants, breaks, coefficients, times, azimuth, elevation, distance):
-    """Fill azimuth, elevation [rad] and distance [m], each (n,), at times (n,) [s]; see `look_angles`."""
+def _look_angles(constants: Records, breaks: Times, coefficients: Floats, times: Times, azimuth: Floats,
+                 elevation: Floats, distance: Floats) -> None:
+    """Fill azimuth, elevation and distance at times; see `look_angles`."""
     for i in range(len(times)):
         e, n, u = state(constants[0], breaks, coefficients, times[i]).position
         azimuth[i], elevation[i] = earth_angles(e, n, u)
         distance[i] = math.sqrt(e * e + n * n + u * u)
 
 
-def look_angles(built, times):
-    """Return (azimuth, elevation, range) [rad, rad, m] of a Target from the station at times [s], each (n,).
+def look_angles(built: Target, times: Times) -> tuple[Floats, Floats, Floats]:
+    """Return (azimuth, elevation, range) [rad, rad, m] of a target from the station at times, each (n,).
 
     Azimuth clockwise from north in (-pi, pi]; NaN at times outside the track of the target.
     """
@@ -146,25 +156,25 @@ def look_angles(built, times):
     return azimuth, elevation, distance
 
 
-def build(params, duration, horizon_mask=0.0) -> Target:
-    """Return a Target of TargetParameters for a run of `duration` [s] from stamp 0.
+def build(params: TargetParameters, duration: Seconds, horizon_mask: Radians = 0.0) -> Target:
+    """Return a Target for a run of `duration` from stamp 0.
 
-    Raises TargetError, also if the target stays below the horizon. A horizon_mask [rad] below 0 takes the place of the
+    Raises TargetError, also if the target stays below the horizon. A horizon_mask below 0 takes the place of the
     horizon.
     """
-    builders: dict[str, Callable] = {'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby,
-                                     **dict.fromkeys(bodies.POSITIONS, _body)}
-    # known: start_time and summary, as far as the kind has them.
-    breaks, coefficients, *known = builders.get(params.kind, _angles)(params, duration)
+    builders: dict[str, Callable[[TargetParameters, Seconds], Course]] = {
+        'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby, **dict.fromkeys(bodies.POSITIONS, _body)}
+    course = builders.get(params.kind, _angles)(params, duration)
     constants = TargetRecord.zeros()
     constants['kind'], constants['angle'] = TARGET_KINDS.index(params.kind), record(params.angle)
-    built = Target(constants, np.ascontiguousarray(breaks), np.ascontiguousarray(coefficients), *known)
+    built = Target(constants, np.ascontiguousarray(course.breaks), np.ascontiguousarray(course.coefficients),
+                   course.start_time, course.summary)
     _require_above(params, built, duration, min(0.0, horizon_mask))
     return built
 
 
-def _require_above(params, built, duration, limit):
-    """Raise TargetError if a Target stays below an elevation [rad] throughout a run of `duration` [s]."""
+def _require_above(params: TargetParameters, built: Target, duration: Seconds, limit: Radians) -> None:
+    """Raise TargetError if a target stays below an elevation `limit` throughout a run of `duration`."""
     _, elevation, _ = look_angles(built, np.linspace(0.0, duration, 2 + int(min(duration, MAX_HORIZON_POINTS))))
     highest = np.fmax.reduce(elevation)
     if highest < limit:
@@ -176,13 +186,13 @@ def _require_above(params, built, duration, limit):
                           f'{duration:g} s{station}: highest {math.degrees(highest):.1f} deg')
 
 
-def _angles(params, duration):
-    """Return (breaks, coefficients) of an angle target: its time range, and coefficients without a meaning."""
-    return np.array([-RUN_MARGIN_S, duration + RUN_MARGIN_S]), np.zeros((4, 1, 3))
+def _angles(params: TargetParameters, duration: Seconds) -> Course:
+    """Return the time range of an angle target, and coefficients without a meaning."""
+    return Course(np.array([-RUN_MARGIN_S, duration + RUN_MARGIN_S]), np.zeros((4, 1, 3)))
 
 
-def _flyby(params, duration):
-    """Return (breaks, coefficients) of a straight, level pass by FlybyParameters."""
+def _flyby(params: TargetParameters, duration: Seconds) -> Course:
+    """Return a straight, level pass."""
     flyby = params.flyby
     east, north = math.sin(flyby.heading), math.cos(flyby.heading)
     velocity = flyby.speed * np.array([east, north, 0.0])
@@ -190,19 +200,19 @@ def _flyby(params, duration):
     coefficients = np.zeros((4, 1, 3))
     coefficients[2, 0] = velocity
     coefficients[3, 0] = closest - velocity * (RUN_MARGIN_S + flyby.closest_time)
-    return np.array([-RUN_MARGIN_S, duration + RUN_MARGIN_S]), coefficients
+    return Course(np.array([-RUN_MARGIN_S, duration + RUN_MARGIN_S]), coefficients)
 
 
 # leo_pass
 
-def culmination(params, satrec):
-    """Return the time [s] past the TLE epoch of the first culmination between the two limits of LeoPassParameters.
+def culmination(params: TargetParameters, satrec: orbit.Satellite) -> Seconds:
+    """Return the time past the TLE epoch of the first culmination between the two limits of LeoPassParameters.
 
-    params: TargetParameters; satrec: of orbit.satellite. Raises TargetError if there is none within search_days.
+    satrec: of orbit.satellite. Raises TargetError if there is none within search_days.
     """
     leo_pass, low, high = params.leo_pass, params.leo_pass.culmination_low_deg, params.leo_pass.culmination_high_deg
 
-    def elevations(times):
+    def elevations(times: Times) -> Floats:
         return orbit.elevations(satrec, params.station, satrec.jdsatepoch, satrec.jdsatepochF, times)
 
     best = -math.inf
@@ -224,8 +234,8 @@ def culmination(params, satrec):
                       f'{params.station.latitude_deg:g}, longitude {params.station.longitude_deg:g} deg')
 
 
-def _peak(elevations, begin, end):
-    """Return (time [s], elevation [deg]) of the only peak between begin and end, to a millisecond.
+def _peak(elevations: Callable[[Times], Floats], begin: Seconds, end: Seconds) -> tuple[Seconds, Degrees]:
+    """Return (time, elevation) of the only peak between begin and end, to a millisecond.
 
     The search refines the interval with PEAK_SEARCH_POINTS points again and again.
     """
@@ -237,7 +247,7 @@ def _peak(elevations, begin, end):
     return float(times[top]), float(elevation[top])
 
 
-def _start(params, satrec, duration):
+def _start(params: TargetParameters, satrec: orbit.Satellite, duration: Seconds) -> tuple[float, float]:
     """Return (Julian day, fraction) of stamp 0: start_time, or else a whole second of UTC that centres the run on a
     culmination. satrec: of orbit.satellite."""
     if not params.leo_pass.start_time:
@@ -255,16 +265,15 @@ def _start(params, satrec, duration):
 
 
 @functools.lru_cache(8)
-def _leo_pass(params, duration):
-    """Return (breaks, coefficients, start_time) of a satellite pass by LeoPassParameters."""
+def _leo_pass(params: TargetParameters, duration: Seconds) -> Course:
     satrec = orbit.satellite(params.leo_pass)
     julian, fraction = _start(params, satrec, duration)
     knots = np.arange(-RUN_MARGIN_S, duration + RUN_MARGIN_S + SGP4_KNOT_SPACING_S, SGP4_KNOT_SPACING_S)
     position, velocity = orbit.enu(satrec, params.station, julian, fraction, knots, params.leo_pass.ut1_offset)
-    return knots, _hermite(knots, position, velocity), orbit.iso(julian, fraction)
+    return Course(knots, _hermite(knots, position, velocity), orbit.iso(julian, fraction))
 
 
-def _hermite(x, y, y_dot):
+def _hermite(x: Times, y: Floats, y_dot: Floats) -> Floats:
     """Return coefficients (4, n, columns), highest power first, of cubic Hermite pieces.
 
     The pieces have the values y and the derivatives y_dot, both (n + 1, columns), at x (n + 1,). The coefficients
@@ -279,25 +288,24 @@ def _hermite(x, y, y_dot):
 
 # sun, moon
 
-def _body(params, duration):
-    """Return (breaks, coefficients, start_time) of the sun or the moon."""
+def _body(params: TargetParameters, duration: Seconds) -> Course:
+    """Return the course of the sun or the moon."""
     if not params.leo_pass.start_time:
         raise TargetError(f"leo_pass.start_time = '': must be the UTC of the start for a target of kind {params.kind}")
     julian, fraction = orbit.julian_date(orbit.instant('start_time', params.leo_pass.start_time))
     knots = np.arange(-RUN_MARGIN_S, duration + RUN_MARGIN_S + BODY_KNOT_SPACING_S, BODY_KNOT_SPACING_S)
 
-    def position(times):
+    def position(times: Times) -> Vectors3:
         fractions = fraction + times / SECONDS_PER_DAY
         to_fixed = orbit.earth_fixed(julian, fractions, params.leo_pass.ut1_offset)
         return bodies.seen(params.kind, params.station, julian, fractions, to_fixed)
     velocity = 0.5 * (position(knots + 1.0) - position(knots - 1.0))
-    return knots, _hermite(knots, position(knots), velocity), orbit.iso(julian, fraction)
+    return Course(knots, _hermite(knots, position(knots), velocity), orbit.iso(julian, fraction))
 
 
 # track_file
 
-def _track_file(params, duration):
-    """Return (breaks, coefficients, start_time, summary) of the file of TrackFileParameters."""
+def _track_file(params: TargetParameters, duration: Seconds) -> Course:
     from tracking_receiver_sim import track_files  # imports scipy, which only a track file needs
     flight = track_files.lay_out(params, duration, RUN_MARGIN_S)
-    return flight.breaks, flight.coefficients, flight.start_time, flight.summary
+    return Course(flight.breaks, flight.coefficients, flight.start_time, flight.summary)

@@ -4,24 +4,26 @@ target.py calls `lay_out`. The first row of FILE_FORMATS that matches the beginn
 kind.
 """
 import re
-import typing
+from collections.abc import Callable, Collection, Iterator
+from typing import Any, NamedTuple, TypeAlias
 
+from pedestal_common.quantities import Seconds
 from pedestal_common.text_files import content, csv_table
 from tracking_receiver_sim.ephemeris import course, directions, lines, oem, stk
+from tracking_receiver_sim.params import TargetParameters, TrackFileParameters
 from tracking_receiver_sim.track import fixes, flight, gpx, nmea, place, tables
 
 FORMAT_PROBE_BYTES = 65536  # number of bytes at the beginning of a file that decide its format
 
 
-class FileKind(typing.NamedTuple):
-    """Kind of track, with two functions of the data that a reader returns.
+Data: TypeAlias = Any   # of a reader: fixes.Fixes, states.Ephemeris or Directions, which functions of one kind share
 
-        lay_out         (data, TargetParameters, duration, margin) -> flight.Flight
-        run_parameters  (data, TargetParameters, given) -> {parameter: value} for a scenario that does not set them;
-                        given: names of the parameters that the scenario sets
-    """
-    lay_out: typing.Callable
-    run_parameters: typing.Callable
+
+class FileKind(NamedTuple):
+    """Kind of track, with two functions of the data that a reader returns."""
+    lay_out: Callable[[Data, TargetParameters, Seconds, Seconds], flight.Flight]    # of a duration and a margin
+    # {parameter: value} for a scenario that does not set them, from the names of the parameters that it sets.
+    run_parameters: Callable[[Data, TargetParameters, Collection[str]], dict[str, float]]
 
 
 LOG_KIND = FileKind(lambda log, target, _duration, _margin: flight.lay_out(log, target.track_file, target.station),
@@ -30,22 +32,21 @@ ORBIT_KIND = FileKind(course.flight_of_orbit, course.run_parameters_of_orbit)
 DIRECTIONS_KIND = FileKind(course.flight_of_directions, course.run_parameters_of_directions)
 
 
-class FileFormat(typing.NamedTuple):
-    """Format of a file. matches(beginning: str): True if a file has this format; read(TrackFileParameters): its
-    data."""
+class FileFormat(NamedTuple):
+    """Format of a file."""
     name: str
     kind: FileKind
-    matches: typing.Callable
-    read: typing.Callable
+    matches: Callable[[str], object]    # a true value if a file with this beginning has this format
+    read: Callable[[TrackFileParameters], Data]
 
 
-def _read_log(rows):
-    """Return the function TrackFileParameters -> fixes.Fixes for a function `rows` that yields fixes."""
+def _read_log(rows: Callable[[str, fixes.Log], Iterator[fixes.Fix]]) -> Callable[[TrackFileParameters], fixes.Fixes]:
+    """Return the reader of a format whose function `rows` yields fixes."""
     return lambda track: fixes.read(track, rows)
 
 
-def _read_object(read):
-    """Return the function TrackFileParameters -> data for a function read(path, name of the object)."""
+def _read_object(read: Callable[[str, str], Data]) -> Callable[[TrackFileParameters], Data]:
+    """Return the reader of a format whose function is read(path, name of the object)."""
     return lambda track: read(track.path, track.aircraft)
 
 
@@ -72,8 +73,8 @@ DERIVED_PARAMETERS = (*place.STATION_FIELDS, 'receiver.reference_range', 'durati
 """Parameters that a track file gives if the scenario does not: of the receiver, and the duration of the run."""
 
 
-def read(track):
-    """Return (FileKind, data) of the file of a TrackFileParameters. Raises csv_table.TableError."""
+def read(track: TrackFileParameters) -> tuple[FileKind, Data]:
+    """Return (kind, data) of a track file. Raises csv_table.TableError."""
     if not track.path:
         raise csv_table.TableError('track_file.path is empty: must name a file of one of the formats '
                                    + ', '.join(form.name for form in FILE_FORMATS))
@@ -86,15 +87,15 @@ def read(track):
     return form.kind, form.read(track)
 
 
-def lay_out(target, duration, margin) -> flight.Flight:
-    """Return the Flight of a TargetParameters for a run of `duration` [s], with `margin` [s] at both ends as far as
-    the file goes; raises csv_table.TableError."""
+def lay_out(target: TargetParameters, duration: Seconds, margin: Seconds) -> flight.Flight:
+    """Return the Flight of a target for a run of `duration`, with `margin` at both ends as far as the file goes;
+    raises csv_table.TableError."""
     kind, data = read(target.track_file)
     return kind.lay_out(data, target, duration, margin)
 
 
-def derived_parameters(target, given):
-    """Return {name: value} of DERIVED_PARAMETERS from the file of a TargetParameters. Raises csv_table.TableError.
+def derived_parameters(target: TargetParameters, given: Collection[str]) -> dict[str, float]:
+    """Return {name: value} of DERIVED_PARAMETERS from the file of a target. Raises csv_table.TableError.
 
     given: names of the parameters that the scenario sets; only those of the station and the start matter here.
     """

@@ -12,7 +12,7 @@ import sys
 from pedestal_common.node import unit_node
 
 
-def main(args=None):
+def main(args: list[str] | None = None) -> int:
     """Run the node to its end; args: command line, None for sys.argv."""
     return unit_node.main('tracking_receiver_sim.tracking_receiver_node', args)
 

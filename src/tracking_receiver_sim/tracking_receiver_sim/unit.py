@@ -1,9 +1,10 @@
 """The unit of the tracking receiver: from the true beam and the truth of the ship to the measurements of the receiver.
 
-The node tracking_receiver runs this unit. Arguments: u, o, c are the inputs, outputs and constants of receiver.step.
+The node tracking_receiver runs this unit.
 """
 import math
-import typing
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +14,11 @@ from pedestal_common.graph import nodes, noise
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.quantities import AnyRecord, Floats, Nanoseconds, Records, Stamps, Times
+from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 from tracking_receiver_sim import injected, receiver, target
+from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
 DRIVE_TRUTH_TOPIC, SHIP_TRUTH_TOPIC, TARGET_TRUTH_TOPIC = 'adu/truth', 'ship/truth', 'target/truth'
 ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC = 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate'
@@ -23,67 +27,65 @@ RANGE_TOPIC = 'tracking_receiver/range'
 FAULT_STATUSES = (receiver.Status.NO_TARGET, receiver.Status.NO_BEAM, receiver.Status.STAMP_ORDER)
 """Statuses that the receiver keeps for the next diagnosis."""
 
-Record = np.dtype([('state', receiver.State), ('constants', receiver.Constants),
-                         ('inputs', receiver.Inputs.dtype), ('outputs', receiver.Outputs.dtype),
-                         ('row', 'i8'), ('fault', 'i8'),
-                         ('schedule', schedule.Schedule.dtype), ('injected', injected.Injected.dtype)], align=True)
-"""Record of the unit.
 
-row: row of the noise `normals` for the next step; fault: last status of FAULT_STATUSES since the last diagnosis,
-LOCKED if there was none.
-"""
+class ReceiverRecord(Record):
+    """Record of the unit."""
+    state: receiver.State
+    constants: receiver.Constants
+    inputs: receiver.Inputs
+    outputs: receiver.Outputs
+    row: int            # row of the noise `normals` for the next step
+    fault: int          # last status of FAULT_STATUSES since the last diagnosis, LOCKED if there was none
+    schedule: schedule.Schedule
+    injected: injected.Injected
 
 
-class Memory(typing.NamedTuple):
-    """All data of the receiver.
-
-    record: (1,) of Record; breaks, coefficients: track of the target, see target.Target; normals: (steps,
-    receiver.normals_per_step), noise of the next steps.
-    """
-    record: np.ndarray
-    breaks: np.ndarray
-    coefficients: np.ndarray
-    normals: np.ndarray
+class Memory(NamedTuple):
+    """All data of the receiver."""
+    record: Records         # (1,) of ReceiverRecord
+    breaks: Times           # track of the target, see target.Target
+    coefficients: Floats
+    normals: Floats         # (steps, receiver.normals_per_step), noise of the next steps
 
 
 @compiled
-def decode(u, stamp, beam, ship):
-    """Set the inputs of the receiver from the messages of a step at a stamp [ns].
+def decode(known: receiver.Inputs, stamp: Nanoseconds, beam: AnyRecord, ship: AnyRecord) -> None:
+    """Set the inputs of the receiver from the messages of a step at a stamp.
 
     beam, ship: records of adu/truth and ship/truth. Without a new ship/truth the inputs keep the last one.
     """
-    u.stamp_ns = stamp
-    u.azimuth, u.elevation = beam.position[0], beam.position[1]
-    u.azimuth_rate, u.elevation_rate = beam.velocity[0], beam.velocity[1]
-    u.valid = 1
+    known.stamp_ns = stamp
+    known.azimuth, known.elevation = beam.position[0], beam.position[1]
+    known.azimuth_rate, known.elevation_rate = beam.velocity[0], beam.velocity[1]
+    known.valid = 1
     if ship.stamp != NO_STAMP:
         q = ship.orientation
-        line_of_sight.rotation(q[0], q[1], q[2], q[3], u.mat_ed)
+        line_of_sight.rotation(q[0], q[1], q[2], q[3], known.mat_ed)
         for i in range(3):
-            u.position[i] = ship.position[i]
-            u.twist_linear[i], u.twist_angular[i] = ship.twist_linear[i], ship.twist_angular[i]
+            known.position[i] = ship.position[i]
+            known.twist_linear[i], known.twist_angular[i] = ship.twist_linear[i], ship.twist_angular[i]
 
 
 @compiled
-def encode(o, c, stamp, outputs):
+def encode(result: receiver.Outputs, constants: receiver.Constants, stamp: Nanoseconds, outputs: AnyRecord) -> None:
     """Set the records of the messages from the outputs of the receiver."""
     error, rate = outputs[ANGLE_ERROR_TOPIC], outputs[ANGLE_RATE_TOPIC]
     distance, truth = outputs[RANGE_TOPIC], outputs[TARGET_TRUTH_TOPIC]
-    error.stamp = o.stamp_ns if o.due == 1 else NO_STAMP
-    error.vector[0], error.vector[1], error.vector[2] = o.cross_elevation, o.elevation, o.cn0_dbhz
-    rate.stamp = error.stamp if c.rate_measured != 0 else NO_STAMP
-    rate.vector[0], rate.vector[1], rate.vector[2] = o.rate[0], o.rate[1], c.rate_sigma
-    distance.stamp = error.stamp if c.range_measured != 0 else NO_STAMP
-    distance.range[0], distance.variance[0] = o.range, c.range_variance
+    error.stamp = result.stamp_ns if result.due == 1 else NO_STAMP
+    error.vector[0], error.vector[1], error.vector[2] = result.cross_elevation, result.elevation, result.cn0_dbhz
+    rate.stamp = error.stamp if constants.rate_measured != 0 else NO_STAMP
+    rate.vector[0], rate.vector[1], rate.vector[2] = result.rate[0], result.rate[1], constants.rate_sigma
+    distance.stamp = error.stamp if constants.range_measured != 0 else NO_STAMP
+    distance.range[0], distance.variance[0] = result.range, constants.range_variance
     truth.stamp = stamp
     truth.orientation[3] = 1.0
     for i in range(3):
-        truth.position[i], truth.twist_linear[i] = o.target_position[i], o.target_velocity[i]
+        truth.position[i], truth.twist_linear[i] = result.target_position[i], result.target_velocity[i]
 
 
 @compiled
-def law(memory, stamp, inputs, outputs):
-    """Execute one step at a stamp [ns]."""
+def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
+    """Execute one step at a stamp."""
     m = memory.record[0]
     if schedule.pending(m.schedule, stamp):
         injected.apply_due_faults(m, stamp)
@@ -99,7 +101,7 @@ def law(memory, stamp, inputs, outputs):
 
 
 @compiled
-def laws(memory, stamps, inputs, outputs):
+def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> None:
     """Execute `law` for each row of arrays."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
@@ -110,21 +112,22 @@ class TrackingReceiver(Simulated):
     NODE, LAWS = nodes.row('tracking_receiver'), {Memory: (law, laws)}
     VERBS = table.INJECT_COMMANDS[NODE.name]
 
-    def __init__(self, parameters, reads):
+    def __init__(self, parameters: TrackingReceiverNodeParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
         self.target = target.build(parameters.target, parameters.duration, parameters.receiver.horizon_mask)
         self._noise = noise.generator(parameters.seed, self.NODE.name)
         self._air, = self._noise.spawn(1)
         constants = receiver.constants(parameters, parameters.period, self.target)
-        record = joined(Record, state=receiver.initial_state(), constants=constants,
-                        fault=receiver.Status.LOCKED, schedule=schedule.empty(), injected=injected.initial(constants))
+        record = joined(ReceiverRecord.dtype, state=receiver.initial_state(), constants=constants,
+                        schedule=schedule.empty(), injected=injected.initial(constants))
+        record['fault'] = receiver.Status.LOCKED
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
         self.memory = Memory(record, self.target.breaks, self.target.coefficients,
                              np.zeros((1, receiver.normals_per_step(parameters))))
         if RANGE_TOPIC in self.messages:
             self.messages[RANGE_TOPIC].field_of_view = parameters.antenna.beamwidth
 
-    def block(self, steps):
+    def block(self, steps: int) -> Memory:
         """Return the memory with noise (steps, normals_per_step) drawn for the next steps.
 
         The scintillation has a random generator of its own, `_air`. So the noise of the receiver is equal with and
@@ -138,7 +141,7 @@ class TrackingReceiver(Simulated):
             drawn = np.hstack((drawn, self._air.standard_normal((steps, total_count - receiver_count))))
         return self.memory._replace(normals=drawn)
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the Diagnosis, with C/N0 and angle noise among its values.
 
         The level is ERROR after a status of FAULT_STATUSES since the last diagnosis, and WARN while not locked.
@@ -158,6 +161,6 @@ class TrackingReceiver(Simulated):
                          receiver.STATUS_TEXT_BY_CODE[status], values)
 
     @staticmethod
-    def idle(numbers):
+    def idle(numbers: Mapping[str, Floats]) -> str:
         """Return a reason if no error is finite: such a recording does not exercise the receiver."""
         return '' if np.isfinite(numbers[ANGLE_ERROR_TOPIC][:, 0]).any() else 'the receiver never locked'

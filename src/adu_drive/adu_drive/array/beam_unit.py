@@ -4,14 +4,17 @@
 """
 import math
 import typing
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from adu_drive.angle_drive import DRIVE_STATE_TOPIC, EMERGENCY_STOP_TEXT, ENABLED_TEXT, REFERENCE_TOPIC, AngleDrive
 from adu_drive.array import electronic_beam
+from adu_drive.params import BeamParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
+from pedestal_common.quantities import AnyRecord, Bit, Floats, Nanoseconds, Records, Stamps
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
@@ -24,14 +27,14 @@ STATE_CODE_ENABLED, STATE_CODE_DISABLED, STATE_CODE_EMERGENCY_STOP = (
 
 class Switches(Record, align=False):
     """Switches of a beam."""
-    wanted: int  # 1 at the start and after a request to enable; 0 after a request to disable
-    emergency: int  # 1 while an emergency stop is latched
-    stamp: int  # stamp of the last step [ns]
-    invalid: int  # 1 if a command since the last diagnosis was invalid
+    wanted: Bit             # 1 at the start and after a request to enable; 0 after a request to disable
+    emergency: Bit          # 1 while an emergency stop is latched
+    stamp: Nanoseconds      # of the last step
+    invalid: Bit            # 1 if a command since the last diagnosis was invalid
 
 
 class UnitRecord(Record):
-    """Record."""
+    """All data of a beam."""
     state: electronic_beam.State
     constants: electronic_beam.Constants
     inputs: electronic_beam.Inputs
@@ -40,43 +43,43 @@ class UnitRecord(Record):
 
 
 class Memory(typing.NamedTuple):
-    """Memory of a beam; record: (1,) of Record."""
-    record: np.ndarray
+    """Memory of a beam."""
+    record: Records         # UnitRecord (1,)
 
 
 @compiled
-def condition(switches):
-    """Return the code of adu/state from a record Switches."""
+def condition(switches: Switches) -> int:
+    """Return the code of adu/state."""
     if switches.emergency:
         return STATE_CODE_EMERGENCY_STOP
     return STATE_CODE_ENABLED if switches.wanted else STATE_CODE_DISABLED
 
 
 @compiled
-def decode(u, switches, command):
-    """Write a command into the inputs u of the beam, at the stamp of the last step. command: record of its message."""
-    u.stamp_ns = switches.stamp
-    u.due = 1 if command.stamp != NO_STAMP and condition(switches) == STATE_CODE_ENABLED else 0
-    if u.due == 1:
-        u.command_stamp_ns = command.stamp
-        u.position[0], u.position[1] = command.position[0], command.position[1]
+def decode(beam_inputs: electronic_beam.Inputs, switches: Switches, command: AnyRecord) -> None:
+    """Write a command into the inputs of the beam, at the stamp of the last step. command: record of its message."""
+    beam_inputs.stamp_ns = switches.stamp
+    beam_inputs.due = 1 if command.stamp != NO_STAMP and condition(switches) == STATE_CODE_ENABLED else 0
+    if beam_inputs.due == 1:
+        beam_inputs.command_stamp_ns = command.stamp
+        beam_inputs.position[0], beam_inputs.position[1] = command.position[0], command.position[1]
 
 
 @compiled
-def encode(y, switches, stamp, outputs):
-    """Write the outputs y of the beam into the records of its messages, with a stamp [ns].
+def encode(beam_outputs: electronic_beam.Outputs, switches: Switches, stamp: Nanoseconds, outputs: AnyRecord) -> None:
+    """Write the outputs of the beam into the records of its messages, with a stamp.
 
     A beam has no rate and no torque, and its reported angles are the true ones.
     """
     joints, truth = outputs[JOINT_STATES_TOPIC], outputs[DRIVE_TRUTH_TOPIC]
     joints.stamp = truth.stamp = outputs[CLOCK_TOPIC].stamp = stamp
     for i in range(2):
-        joints.position[i] = truth.position[i] = y.position[i]
+        joints.position[i] = truth.position[i] = beam_outputs.position[i]
     outputs[DRIVE_STATE_TOPIC] = condition(switches)
 
 
 @compiled
-def law(memory, stamp, inputs, outputs):
+def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
     """Advance from t_k-1 to t_k with the command of step k - 1.
 
     A beam that is not enabled ignores commands, and discards commands that are still delayed.
@@ -93,32 +96,33 @@ def law(memory, stamp, inputs, outputs):
 
 
 @compiled
-def laws(memory, stamps, inputs, outputs):
+def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> None:
     """Apply `law` to each element of arrays."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
 class Beam(AngleDrive):
-    """One beam of a BeamParameters. The motion of the ship has no effect on a beam."""
+    """One beam. The motion of the ship has no effect on a beam."""
     NODE, LAWS = nodes.ARRAY_DRIVE, {Memory: (law, laws)}
+    parameters: BeamParameters
+    memory: Memory
 
-    def __init__(self, parameters, reads):
+    def __init__(self, parameters: BeamParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
         p = parameters
-        switches = Switches.zeros()
-        switches['wanted'], switches['stamp'] = 1, NO_STAMP
+        switches = Switches.of(wanted=1, stamp=NO_STAMP)
         constants = electronic_beam.constants(p.period, p.transport_delay, p.command_timeout * p.period)
-        self.memory = Memory(joined(UnitRecord.dtype, constants=constants, switches=switches,
-                                    state=electronic_beam.initial_state(p.initial_azimuth, p.initial_elevation)))
+        state = electronic_beam.initial_state(p.initial_azimuth, p.initial_elevation)
+        self.memory = Memory(UnitRecord.of(constants=constants, switches=switches, state=state))
         electronic_beam.read(self.parts['state'], self.parts['outputs'])
 
     @property
-    def condition_code(self):
+    def condition_code(self) -> int:
         """Present code of STATE_TEXTS, also between two steps."""
         return condition(self.parts['switches'])
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the Diagnosis: ERROR in an emergency stop or after an invalid command, WARN while disabled."""
         outputs, switches = self.parts['outputs'], self.parts['switches']
         invalid, switches['invalid'] = switches['invalid'], 0
@@ -136,7 +140,7 @@ class Beam(AngleDrive):
         return Diagnosis(LEVEL_OK, 'following', values)
 
     @staticmethod
-    def idle(numbers):
+    def idle(numbers: Mapping[str, Floats]) -> str:
         """Return the reason why a recording does not exercise a beam, '' if it does."""
         angles = numbers[REFERENCE_TOPIC][:, :2]        # Columns: two positions, then two rates.
         return '' if len(angles) and np.ptp(angles, axis=0).any() else 'the beam was never steered'

@@ -7,13 +7,15 @@ without the bias at a low demand. A bias of zero from `out` on leaves the peak t
 """
 import math
 
+from adu_drive.params import BiasParameters
 from pedestal_common.compiled import inlined
+from pedestal_common.quantities import NewtonMeters
 
 
-def schedule_constants(p):
-    """Return (T_b, out, per_fade) of BiasParameters for `scheduled`.
+def schedule_constants(p: BiasParameters) -> tuple[NewtonMeters, NewtonMeters, float]:
+    """Return (T_b, out, per_fade) for `scheduled`.
 
-    T_b: full bias [Nm]; out: demand with zero bias [Nm]; per_fade: slope of the line between them [1/Nm]. An infinite
+    T_b: full bias; out: demand with zero bias; per_fade: slope of the line between them [1/Nm]. An infinite
     `out` makes the bias constant; a full bias of 0 switches it off.
     """
     if p.schedule == 'off':
@@ -25,6 +27,6 @@ def schedule_constants(p):
 
 
 @inlined
-def scheduled(torque, T_b, out, per_fade):
-    """Return the bias [Nm] at a torque demand per motor [Nm]; T_b, out, per_fade: see schedule_constants."""
+def scheduled(torque: NewtonMeters, T_b: NewtonMeters, out: NewtonMeters, per_fade: float) -> NewtonMeters:
+    """Return the bias at a torque demand per motor; T_b, out, per_fade: see schedule_constants."""
     return T_b * min(max((out - abs(torque)) * per_fade, 0.0), 1.0)

@@ -10,14 +10,16 @@ import math
 
 from adu_drive.controller import pi
 from pedestal_common.compiled import inlined
+from pedestal_common.quantities import Amperes, RadiansPerSecond, Volts
 
 
 @inlined
-def voltages(i_d, i_q, i_ref, omega_e, sum_d, sum_q, K_p, K_iT, L, psi, v_max):
-    """Return the voltages v_d, v_q [V], the two new integral parts, and True if the voltages were limited.
+def voltages(i_d: Amperes, i_q: Amperes, i_ref: Amperes, omega_e: RadiansPerSecond, sum_d: Volts, sum_q: Volts,
+             K_p: float, K_iT: float, L: float, psi: float, v_max: Volts) -> tuple[Volts, Volts, Volts, Volts, bool]:
+    """Return the voltages v_d, v_q, the two new integral parts, and True if the voltages were limited.
 
     K_p = w L and K_i = w R cancel the pole of the winding: the closed loop of each axis is w / (s + w). The terms with
-    omega_e, the electrical speed [rad/s], decouple the axes. i_ref: reference of i_q [A].
+    omega_e, the electrical speed, decouple the axes. i_ref: reference of i_q.
     """
     e_d, e_q = -i_d, i_ref - i_q
     u_d = K_p * e_d + sum_d - omega_e * L * i_q

@@ -9,9 +9,10 @@ cannot wind up the estimate. The observer is the linear extended state observer 
 import math
 
 from pedestal_common.compiled import inlined
+from pedestal_common.quantities import NewtonMeters, RadiansPerSecond, Seconds
 
 
-def gains(w_o, h):
+def gains(w_o: RadiansPerSecond, h: Seconds) -> tuple[float, float]:
     """Return the gains (l_1, l_2) that put both poles at exp(-w_o h). w_o = 0: observer off, the estimate of d stays.
 
     l_1: correction of omega per innovation; l_2: correction of d h / J per innovation.
@@ -21,11 +22,12 @@ def gains(w_o, h):
 
 
 @inlined
-def update(omega_hat, d_hat, omega, T, l_1, l_2, h_J):
-    """Return the estimates of speed [rad/s] and disturbance torque [Nm] one period h later.
+def update(omega_hat: RadiansPerSecond, d_hat: NewtonMeters, omega: RadiansPerSecond, T: NewtonMeters, l_1: float,
+           l_2: float, h_J: float) -> tuple[RadiansPerSecond, NewtonMeters]:
+    """Return the estimates of speed and disturbance torque one period h later.
 
-    omega_hat, d_hat: estimates before; omega: measured speed [rad/s]; T: torque of a motor in the period [Nm]; l_1,
-    l_2: see `gains`; h_J = h / J.
+    omega_hat, d_hat: estimates before; omega: measured speed; T: torque of a motor in the period; l_1, l_2: see
+    `gains`; h_J = h / J.
     """
     predicted = omega_hat + h_J * (T + d_hat)
     e = omega - predicted

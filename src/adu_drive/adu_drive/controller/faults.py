@@ -1,17 +1,19 @@
 """Faults that a drive detects by its own measurements. A fault is latched until its reset (drive_state.request)."""
-import typing
+from typing import NamedTuple
 
 from adu_drive.plant import thermal
 from pedestal_common.codes import bits
 from pedestal_common.compiled import inlined
+from pedestal_common.quantities import Ints, Radians, RadiansPerSecond
+from pedestal_common.record import Record
 
 
-class Fault(typing.NamedTuple):
-    """A fault of an axis: name, condition, parameters of its limits; stops: True if the drive stops on it."""
+class Fault(NamedTuple):
+    """A fault of an axis."""
     name: str
-    doc: str
-    parameters: tuple
-    stops: bool = True
+    doc: str                        # its condition
+    parameters: tuple[str, ...]     # those of its limits
+    stops: bool = True              # True if the drive stops on it
 
 
 AXIS_FAULTS = (
@@ -47,8 +49,22 @@ _TORQUE_OFF_BITS = Bit.OVERCURRENT | Bit.FINAL_LIMIT | Bit.EMERGENCY_LIMIT
 _STOP_BITS = sum(1 << i for i, fault in enumerate(AXIS_FAULTS) if fault.stops)
 
 
-def names(bits):
-    """Return the names of the faults in a fault word, a tuple."""
+class Limits(Record):
+    """Trip levels and places of the switches of an axis, from params.FaultParameters and params.LimitParameters."""
+    current_2: float                # square of the overcurrent [A2]
+    omega: RadiansPerSecond         # overspeed of a motor
+    disagreement: Radians
+    error: RadiansPerSecond         # following error, of a motor
+    late_periods: int               # number of periods of the speed loop with this error
+    heat: float                     # thermal load
+    final_low: Radians              # places of the final and of the emergency switches
+    final_high: Radians
+    emergency_low: Radians
+    emergency_high: Radians
+
+
+def names(bits: int) -> tuple[str, ...]:
+    """Return the names of the faults in a fault word."""
     return tuple(fault.name for i, fault in enumerate(AXIS_FAULTS) if int(bits) >> i & 1)
 
 
@@ -56,65 +72,62 @@ MIN_OUTWARD_RATE_RAD_S = 1e-3  # smallest rate of an axis that counts as outward
 
 
 @inlined
-def stops(bits):
+def stops(bits: int) -> bool:
     """Return True if the drive stops on the faults of an axis."""
     return bits & _STOP_BITS != 0 or bits & MOTORS_LOST_BITS == MOTORS_LOST_BITS
 
 
 @inlined
-def removes_torque(bits):
+def removes_torque(bits: int) -> bool:
     """Return True if an axis cannot be stopped under control: torque off, brakes on at once."""
     return bits & _TORQUE_OFF_BITS != 0 or bits & MOTORS_LOST_BITS == MOTORS_LOST_BITS
 
 
 @inlined
-def late(periods, error, limit):
-    """Return the number of successive periods with a rate error [rad/s] beyond its limit; periods: number before."""
+def late(periods: int, error: RadiansPerSecond, limit: RadiansPerSecond) -> int:
+    """Return the number of successive periods with a rate error beyond its limit; periods: number before."""
     return periods + 1 if abs(error) > limit else 0
 
 
 @inlined
-def lost_motor_faults(motors):
+def lost_motor_faults(motors: Ints) -> int:
     """Return the fault word of the motors (2,) whose amplifiers are off."""
     return (Bit.MOTOR_1_LOST if motors[0] else 0) | (Bit.MOTOR_2_LOST if motors[1] else 0)
 
 
 @inlined
-def end_switch_faults(theta, omega, c):
-    """Return the fault word of the switches beyond the ends of travel for a load at theta [rad] with the rate omega.
-
-    omega in rad/s; c: places of the switches, constants `faults` of axis.constants.
-    """
+def end_switch_faults(theta: Radians, omega: RadiansPerSecond, limits: Limits) -> int:
+    """Return the fault word of the switches beyond the ends of travel for a load at theta with the rate omega."""
     bits = 0
-    if (theta > c.final_high and omega > MIN_OUTWARD_RATE_RAD_S
-            or theta < c.final_low and omega < -MIN_OUTWARD_RATE_RAD_S):
+    if (theta > limits.final_high and omega > MIN_OUTWARD_RATE_RAD_S
+            or theta < limits.final_low and omega < -MIN_OUTWARD_RATE_RAD_S):
         bits |= Bit.FINAL_LIMIT
-    if theta > c.emergency_high or theta < c.emergency_low:
+    if theta > limits.emergency_high or theta < limits.emergency_low:
         bits |= Bit.EMERGENCY_LIMIT
     return bits
 
 
 @inlined
-def measured_faults(current_2, omega, disagreement, late_periods, heat, latched, c):
+def measured_faults(current_2: float, omega: RadiansPerSecond, disagreement: Radians, late_periods: int, heat: float,
+                    latched: int, limits: Limits) -> int:
     """Return the fault word of one period of one axis.
 
     current_2      larger square of a motor current [A2]
-    omega          larger absolute motor speed [rad/s]
-    disagreement   load encoder minus mean motor encoder divided by the ratio [rad]
+    omega          larger absolute motor speed
+    disagreement   load encoder minus mean motor encoder divided by the ratio
     late_periods   result of `late`
     heat           larger thermal load of a motor; a latched overtemperature ends below WARNING_THERMAL_LOAD
     latched        fault word of the axis before this period
-    c              trip levels, constants `faults` of axis.constants (see params.FaultParameters)
     """
     bits = 0
-    if current_2 > c.current_2:
+    if current_2 > limits.current_2:
         bits |= Bit.OVERCURRENT
-    if omega > c.omega:
+    if omega > limits.omega:
         bits |= Bit.OVERSPEED
-    if abs(disagreement) > c.disagreement:
+    if abs(disagreement) > limits.disagreement:
         bits |= Bit.ENCODER_DISAGREEMENT
-    if late_periods >= c.late_periods:
+    if late_periods >= limits.late_periods:
         bits |= Bit.FOLLOWING_ERROR
-    if heat > (min(thermal.WARNING_THERMAL_LOAD, c.heat) if latched & Bit.OVERTEMPERATURE else c.heat):
+    if heat > (min(thermal.WARNING_THERMAL_LOAD, limits.heat) if latched & Bit.OVERTEMPERATURE else limits.heat):
         bits |= Bit.OVERTEMPERATURE
     return bits

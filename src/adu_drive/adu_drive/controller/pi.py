@@ -3,7 +3,7 @@ from pedestal_common.compiled import inlined
 
 
 @inlined
-def integral(total, error, K_iT, excess):
+def integral(total: float, error: float, K_iT: float, excess: float) -> float:
     """Return the integral part after one period T: total + K_i T e.
 
     excess = demanded output - realised output. The integral is held while excess and error e have the same sign,

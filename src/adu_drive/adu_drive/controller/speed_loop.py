@@ -8,29 +8,31 @@ integral of the second loop acts as a spring between the motors. It opposes ever
 that of an offset of a current sensor, and also the wanted bias torque.
 """
 from pedestal_common.compiled import inlined
+from pedestal_common.quantities import NewtonMeters, RadiansPerSecond
 
 
 @inlined
-def torque(error, total, K_p, feed_forward):
-    """Return the torque demand per motor [Nm] from a speed error [rad/s] on the motor shaft.
+def torque(error: RadiansPerSecond, total: NewtonMeters, K_p: float, feed_forward: NewtonMeters) -> NewtonMeters:
+    """Return the torque demand per motor from a speed error on the motor shaft.
 
-    total: integral part [Nm]; K_p: proportional gain [Nms/rad]; feed_forward [Nm].
+    total: integral part; K_p: proportional gain [Nms/rad].
     """
     return K_p * error + total + feed_forward
 
 
 @inlined
-def shared(T_1, T_2, T_b, omega_1, omega_2, K_d):
-    """Return the torque demands [Nm] of the two motors: T_1,2 +- T_b -+ K_d (omega_1 - omega_2).
+def shared(T_1: NewtonMeters, T_2: NewtonMeters, T_b: NewtonMeters, omega_1: RadiansPerSecond,
+           omega_2: RadiansPerSecond, K_d: float) -> tuple[NewtonMeters, NewtonMeters]:
+    """Return the torque demands of the two motors: T_1,2 +- T_b -+ K_d (omega_1 - omega_2).
 
-    T_1, T_2: demands of the speed loop [Nm]; T_b: bias torque [Nm]; K_d: damping between the motors [Nms/rad]. The
-    loop on the mean speed cannot damp motion of the motors against each other, so K_d damps it.
+    T_1, T_2: demands of the speed loop; T_b: bias torque; K_d: damping between the motors [Nms/rad]. The loop on the
+    mean speed cannot damp motion of the motors against each other, so K_d damps it.
     """
     split = T_b - K_d * (omega_1 - omega_2)
     return T_1 + split, T_2 - split
 
 
 @inlined
-def limited(T, limit):
-    """Return the torque T [Nm] limited to +-limit [Nm]."""
+def limited(T: NewtonMeters, limit: NewtonMeters) -> NewtonMeters:
+    """Return the torque T limited to +-limit."""
     return min(max(T, -limit), limit)

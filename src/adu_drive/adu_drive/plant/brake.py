@@ -2,11 +2,12 @@
 import math
 
 from pedestal_common.compiled import inlined
+from pedestal_common.quantities import RadiansPerSecond
 
 
 @inlined
-def braked(omega, h_T_J):
-    """Return the shaft speed [rad/s] after a sub-step h with the brake on: reduced by h T / J, but not reversed.
+def braked(omega: RadiansPerSecond, h_T_J: RadiansPerSecond) -> RadiansPerSecond:
+    """Return the shaft speed after a sub-step h with the brake on: reduced by h T / J, but not reversed.
 
     T: torque of the brake [Nm]; J: inertia of the motor [kg m2].
     """

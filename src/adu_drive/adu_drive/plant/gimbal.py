@@ -15,59 +15,76 @@ turns with omega = C(E) (R(A) w + (0, -E', -A')). Both signs are negative, becau
 and elevation lifts the beam, against y. The torque on the elevating part is I omega' + omega x I omega. The yoke turns
 with the azimuth only, so it has only the inertia J_yoke. Bodies turn about the intersection of the axes; gravity acts
 by the unbalance of an axis. The test compares with Lagrange's equations of the same bodies.
-
-Argument c of the functions: see `constants`.
 """
 import math
 
 import numpy as np
 
+from adu_drive.params import AduParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import cross
+from pedestal_common.quantities import (
+    Bit,
+    Hertz,
+    KilogramMeters2,
+    Matrix3,
+    NewtonMeters,
+    Radians,
+    RadiansPerSecond,
+    RadiansPerSecond2,
+    Records,
+    Vector3,
+)
+from pedestal_common.record import Record
 
 
-def constants(p):
-    """Return the constants of the bodies from AduParameters: nested dictionary.
+class Constants(Record):
+    """The bodies that turn."""
+    rigid: Bit              # 1 if the parameters state the inertia of the elevating part; 0: this module has no effect
+    I: Matrix3              # [kg m2]  # noqa: E741
+    J_yoke: KilogramMeters2
+    per_period: Hertz       # 1 / control period; `drive_unit` computes accelerations with it
 
-    rigid         1 if the parameters state the inertia of the elevating part; otherwise this module has no effect
-    per_period    1 / control period [1/s]; `drive_unit` computes accelerations with it from the rates of two periods
-    """
-    e, I_y = p.elevating, p.elevation.load.inertia
+
+def constants(params: AduParameters) -> Records:
+    """Return the Constants (1,) of the bodies."""
+    e, I_y = params.elevating, params.elevation.load.inertia
     inertia = np.array([[e.about_beam, -e.product_xy, -e.product_xz], [-e.product_xy, I_y, -e.product_yz],
                         [-e.product_xz, -e.product_yz, e.about_lift]])
-    return {'rigid': int(e.about_beam > 0.0), 'I': inertia, 'J_yoke': p.azimuth.load.inertia - e.about_lift,
-            'per_period': 1.0 / p.period}
+    return Constants.of(rigid=e.about_beam > 0.0, I=inertia, J_yoke=params.azimuth.load.inertia - e.about_lift,
+                        per_period=1.0 / params.period)
 
 
 @compiled
-def _times(m, x, y, z):
-    """Return the product of a matrix m (3, 3) and a vector (x, y, z)."""
+def _times(m: Matrix3, x: float, y: float, z: float) -> tuple[float, float, float]:
     return (m[0, 0] * x + m[0, 1] * y + m[0, 2] * z, m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
             m[2, 0] * x + m[2, 1] * y + m[2, 2] * z)
 
 
 @compiled
-def inertia(c, E):
-    """Return (M_AA, M_AE) [kg m2] at an elevation [rad]; M_EE is the inertia of the elevation axis."""
+def inertia(constants: Constants, E: Radians) -> tuple[KilogramMeters2, KilogramMeters2]:
+    """Return (M_AA, M_AE) at an elevation; M_EE is the inertia of the elevation axis."""
     # (-s, 0, -k): unit vector about which the azimuth grows, in the frame of the elevating part.
     s, k = math.sin(E), math.cos(E)
-    x, y, z = _times(c.I, -s, 0.0, -k)
-    return -s * x - k * z + c.J_yoke, -y
+    x, y, z = _times(constants.I, -s, 0.0, -k)
+    return -s * x - k * z + constants.J_yoke, -y
 
 
 @compiled
-def _on_elevating(A, E, x, y, z):
-    """Return a deck vector (x, y, z), FLU, in the frame of the elevating part at the angles A, E [rad] of the axes."""
+def _on_elevating(A: Radians, E: Radians, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return a deck vector (x, y, z), FLU, in the frame of the elevating part at the angles A, E of the axes."""
     forward, left = x * math.cos(A) - y * math.sin(A), x * math.sin(A) + y * math.cos(A)
     return forward * math.cos(E) + z * math.sin(E), left, z * math.cos(E) - forward * math.sin(E)
 
 
 @compiled
-def gyroscopic(c, angles, rates, w, w_dot):
-    """Return h [Nm] on azimuth and elevation.
+def gyroscopic(constants: Constants, angles: tuple[Radians, Radians],
+               rates: tuple[RadiansPerSecond, RadiansPerSecond], w: Vector3,
+               w_dot: tuple[RadiansPerSecond2, RadiansPerSecond2, RadiansPerSecond2],
+               ) -> tuple[NewtonMeters, NewtonMeters]:
+    """Return h on azimuth and elevation.
 
-    angles, rates: of azimuth and elevation axis [rad, rad/s]; w, w_dot (3,): rate [rad/s] and angular acceleration
-    [rad/s2] of the deck, FLU.
+    angles, rates: of azimuth and elevation axis; w, w_dot: rate [rad/s] and angular acceleration of the deck, FLU.
     """
     # Vectors in the frame of the elevating part: (wx, wy, wz) is w; (ax, ay, az) the rate of the azimuth axis; (x, y,
     # z) omega; (nx, ny, nz) the torque.
@@ -82,7 +99,7 @@ def gyroscopic(c, angles, rates, w, w_dot):
     vx, vy, vz = cross(ax, ay, az, 0.0, -E_dot, 0.0)
     bx, by, bz = _on_elevating(A, E, w_dot[0], w_dot[1], w_dot[2])
     x_dot, y_dot, z_dot = bx + ux + vx, by + uy + vy, bz + uz + vz
-    nx, ny, nz = _times(c.I, x_dot, y_dot, z_dot)
-    gx, gy, gz = cross(x, y, z, *_times(c.I, x, y, z))
+    nx, ny, nz = _times(constants.I, x_dot, y_dot, z_dot)
+    gx, gy, gz = cross(x, y, z, *_times(constants.I, x, y, z))
     nx, ny, nz = nx + gx, ny + gy, nz + gz
-    return -math.sin(E) * nx - math.cos(E) * nz - c.J_yoke * w_dot[2], -ny
+    return -math.sin(E) * nx - math.cos(E) * nz - constants.J_yoke * w_dot[2], -ny

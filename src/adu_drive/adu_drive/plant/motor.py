@@ -15,19 +15,22 @@ import math
 
 from adu_drive.plant import friction
 from pedestal_common.compiled import inlined
+from pedestal_common.quantities import Amperes, NewtonMeters, Radians, RadiansPerSecond, Volts
 
 
 @inlined
-def currents(i_d, i_q, v_d, v_q, omega_e, L, psi, h_L, q_R):
-    """Return i_d, i_q [A] one sub-step h later, implicit in R: h_L = h / L, q_R = 1 / (1 + h R / L)."""
+def currents(i_d: Amperes, i_q: Amperes, v_d: Volts, v_q: Volts, omega_e: RadiansPerSecond, L: float, psi: float,
+             h_L: float, q_R: float) -> tuple[Amperes, Amperes]:
+    """Return i_d, i_q one sub-step h later, implicit in R: h_L = h / L, q_R = 1 / (1 + h R / L)."""
     i_d = (i_d + h_L * (v_d + omega_e * L * i_q)) * q_R
     i_q = (i_q + h_L * (v_q - omega_e * (L * i_d + psi))) * q_R
     return i_d, i_q
 
 
 @inlined
-def speed(omega, torque, T_c, per_v, h_J, q_B):
-    """Return the shaft speed [rad/s] one sub-step later under the net torque [Nm] without friction.
+def speed(omega: RadiansPerSecond, torque: NewtonMeters, T_c: NewtonMeters, per_v: float, h_J: float,
+          q_B: float) -> RadiansPerSecond:
+    """Return the shaft speed one sub-step later under the net torque without friction.
 
     Implicit in the viscous part: h_J = h / J_m, q_B = 1 / (1 + h B / J_m).
     """
@@ -35,8 +38,8 @@ def speed(omega, torque, T_c, per_v, h_J, q_B):
 
 
 @inlined
-def cogging(theta, T_cog, per_turn):
-    """Return the torque [Nm] of the magnets on the slots at a shaft angle [rad]; its mean over a turn is 0.
+def cogging(theta: Radians, T_cog: NewtonMeters, per_turn: float) -> NewtonMeters:
+    """Return the torque of the magnets on the slots at a shaft angle; its mean over a turn is 0.
 
     per_turn: least common multiple of slots and poles.
     """

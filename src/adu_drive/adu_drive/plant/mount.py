@@ -22,15 +22,29 @@ import math
 
 import numpy as np
 
+from adu_drive.params import MountParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import angles, wrap
+from pedestal_common.quantities import Bit, Matrix3, Radians, RadiansPerSecond, Records
+from pedestal_common.record import Record
 
 MIN_ZENITH_DISTANCE_RAD = 1e-9
 """Distance from the zenith below which the rate of the azimuth of a beam is limited [rad]."""
 
 
-def _tilt(forward, starboard):
-    """Return the rotation (3, 3), FLU, that leans the vertical by `forward` and `starboard` [rad] about one axis."""
+class Constants(Record):
+    """Errors of the mount: sines, cosines and rotation of the angles in MountParameters."""
+    true: Bit               # 1 for a mount without errors, where the beam has the angles of the axes
+    tilt: Matrix3           # rotation, FLU, by the tilt of the azimuth axis
+    sin_lean: float         # of the lean of the elevation axis, non_perpendicularity
+    cos_lean: float
+    sin_off: float          # of the collimation
+    cos_off: float
+    sag: Radians
+
+
+def _tilt(forward: Radians, starboard: Radians) -> Matrix3:
+    """Return the rotation, FLU, that leans the vertical by `forward` and `starboard` about one axis."""
     tau = math.hypot(forward, starboard)
     if tau == 0.0:
         return np.eye(3)
@@ -38,37 +52,38 @@ def _tilt(forward, starboard):
     return np.eye(3) + math.sin(tau) * K + (1.0 - math.cos(tau)) * np.einsum('ij,jk', K, K)
 
 
-def constants(p):
-    """Return the constants of MountParameters: nested dictionary. true: 1 for a mount without errors."""
-    # The beam of a mount without errors has the angles of the axes.
+def constants(p: MountParameters) -> Records:
+    """Return the Constants (1,) of a mount."""
     lean, off = p.non_perpendicularity, p.collimation
-    return {'true': int(p.tilt_forward == p.tilt_starboard == lean == off == p.sag == 0.0),
-            'tilt': _tilt(p.tilt_forward, p.tilt_starboard), 'sin_lean': math.sin(lean), 'cos_lean': math.cos(lean),
-            'sin_off': math.sin(off), 'cos_off': math.cos(off), 'sag': p.sag}
+    return Constants.of(true=p.tilt_forward == p.tilt_starboard == lean == off == p.sag == 0.0,
+                        tilt=_tilt(p.tilt_forward, p.tilt_starboard), sin_lean=math.sin(lean),
+                        cos_lean=math.cos(lean), sin_off=math.sin(off), cos_off=math.cos(off), sag=p.sag)
 
 
 @compiled
-def _leaning(c, x, y, z):
+def _leaning(constants: Constants, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return a vector (x, y, z) of the elevating part in the frame of the yoke, whose elevation axis leans."""
-    return x, c.cos_lean * y + c.sin_lean * z, c.cos_lean * z - c.sin_lean * y
+    sin, cos = constants.sin_lean, constants.cos_lean
+    return x, cos * y + sin * z, cos * z - sin * y
 
 
 @compiled
-def beam(c, A, E, A_dot, E_dot):
-    """Return ((azimuth, elevation) [rad], their rates [rad/s]) of the beam, as deck angles.
+def beam(constants: Constants, A: Radians, E: Radians, A_dot: RadiansPerSecond, E_dot: RadiansPerSecond,
+         ) -> tuple[tuple[Radians, Radians], tuple[RadiansPerSecond, RadiansPerSecond]]:
+    """Return ((azimuth, elevation), their rates) of the beam, as deck angles.
 
-    c: see `constants`; A, E, A_dot, E_dot: angles [rad] and rates [rad/s] of the axes. Among azimuths whole turns
-    apart, the result is nearest to A. If the elevation axis is beyond 90 deg, the elevation of the beam is too.
+    A, E, A_dot, E_dot: angles and rates of the axes. Among azimuths whole turns apart, the result is nearest to A. If
+    the elevation axis is beyond 90 deg, the elevation of the beam is too.
     """
-    E_beam, E_beam_dot = E - c.sag * math.cos(E), (1.0 + c.sag * math.sin(E)) * E_dot
-    cos_E, sin_E = c.cos_off * math.cos(E_beam), c.cos_off * math.sin(E_beam)
-    x, y, z = _leaning(c, cos_E, -c.sin_off, sin_E)
-    vx, vy, vz = _leaning(c, -E_beam_dot * sin_E, 0.0, E_beam_dot * cos_E)
+    E_beam, E_beam_dot = E - constants.sag * math.cos(E), (1.0 + constants.sag * math.sin(E)) * E_dot
+    cos_E, sin_E = constants.cos_off * math.cos(E_beam), constants.cos_off * math.sin(E_beam)
+    x, y, z = _leaning(constants, cos_E, -constants.sin_off, sin_E)
+    vx, vy, vz = _leaning(constants, -E_beam_dot * sin_E, 0.0, E_beam_dot * cos_E)
     cos_A, sin_A = math.cos(A), math.sin(A)
     x, y = x * cos_A + y * sin_A, y * cos_A - x * sin_A
     vx, vy = vx * cos_A + vy * sin_A + A_dot * y, vy * cos_A - vx * sin_A - A_dot * x
     # x, y, z and vx, vy, vz: unit vector along the beam and its rate; T: rotation by the tilt.
-    T = c.tilt
+    T = constants.tilt
     x, y, z = (T[0, 0] * x + T[0, 1] * y + T[0, 2] * z, T[1, 0] * x + T[1, 1] * y + T[1, 2] * z,
                T[2, 0] * x + T[2, 1] * y + T[2, 2] * z)
     vx, vy, vz = (T[0, 0] * vx + T[0, 1] * vy + T[0, 2] * vz, T[1, 0] * vx + T[1, 1] * vy + T[1, 2] * vz,

@@ -7,6 +7,7 @@ T: torque of the motor [Nm]; tau: time constant of the winding [s]; R_20: resist
 follows the true torque of the motor, a trip by x represents a sensor in the winding.
 """
 from pedestal_common.compiled import inlined
+from pedestal_common.quantities import NewtonMeters
 
 COPPER_COEFFICIENT_PER_K = 0.00393  # temperature coefficient of copper at 20 degrees C [1/K] (IEC 60028)
 
@@ -15,8 +16,8 @@ WARNING_THERMAL_LOAD = 0.8
 
 
 @inlined
-def load(x, torque, per_rated, gain):
-    """Return the thermal load one period h later, from the thermal load x, under a torque [Nm].
+def load(x: float, torque: NewtonMeters, per_rated: float, gain: float) -> float:
+    """Return the thermal load one period h later, from the thermal load x, under a torque.
 
     per_rated = 1 / T_rated; gain = 1 - exp(-h / tau).
     """
@@ -25,6 +26,6 @@ def load(x, torque, per_rated, gain):
 
 
 @inlined
-def damping(h_R_L, rise, x):
+def damping(h_R_L: float, rise: float, x: float) -> float:
     """Return the factor 1 / (1 + h R / L) of the implicit step of the current at thermal load x; rise = alpha dT."""
     return 1.0 / (1.0 + h_R_L * (1.0 + rise * x))

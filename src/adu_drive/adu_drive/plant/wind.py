@@ -7,11 +7,23 @@ equal times give equal torques. Drag grows with the square of the wind speed: to
 f: frequency [Hz]; V: mean speed of the wind [m/s]; v, sigma_v: turbulence along the wind and its standard deviation.
 """
 import math
-import types
+from typing import Annotated, cast
 
 import numpy as np
 
+from adu_drive.params import GustParameters, WindParameters
 from pedestal_common.compiled import compiled
+from pedestal_common.law import Law
+from pedestal_common.quantities import (
+    Floats,
+    Meters,
+    MetersPerSecond,
+    NewtonMeters,
+    RadiansPerSecond,
+    Records,
+    Seconds,
+)
+from pedestal_common.record import Record
 from pedestal_common.reproducible import geomspace, power
 
 SPECTRAL_LINE_COUNT = 128  # number of cosines of a spectral gust
@@ -24,8 +36,22 @@ _GUST_KINDS = {'none': GUST_NONE, 'step': GUST_STEP, 'sine': GUST_SINE, 'davenpo
                'von_karman': GUST_SPECTRUM}
 
 
-def davenport(f, V):
-    """Return the density [s] of v^2 / sigma_v^2 at f [Hz] for a mean speed V [m/s], by Davenport's spectrum.
+class Constants(Record):
+    """A wind: its mean torques and its gust."""
+    azimuth: NewtonMeters           # mean torque
+    elevation: NewtonMeters
+    kind: int                       # one of GUST_NONE to GUST_SPECTRUM
+    gust_azimuth: NewtonMeters      # amplitude of a step or a sine
+    gust_elevation: NewtonMeters
+    start: Seconds                  # of a step or a sine
+    omega_sine: RadiansPerSecond
+    amplitude: Annotated[Floats, (SPECTRAL_LINE_COUNT,)]    # of v / V, of each cosine
+    omega: Annotated[Floats, (SPECTRAL_LINE_COUNT,)]        # [rad/s]
+    phase: Annotated[Floats, (SPECTRAL_LINE_COUNT,)]        # [rad]
+
+
+def davenport(f: Floats, V: MetersPerSecond) -> Floats:
+    """Return the density [s] of v^2 / sigma_v^2 at f [Hz] for a mean speed V, by Davenport's spectrum.
 
         2/3 x^2 / (f (1 + x^2)^(4/3)),  x = 1200 m f / V
 
@@ -35,12 +61,12 @@ def davenport(f, V):
     return 2.0 / 3.0 * x * x / (f * power(1.0 + x * x, 4.0 / 3.0))
 
 
-def von_karman(f, V, L):
-    """Return the density [s] of v^2 / sigma_v^2 of the longitudinal von Karman spectrum with length scale L [m]."""
+def von_karman(f: Floats, V: MetersPerSecond, L: Meters) -> Floats:
+    """Return the density [s] of v^2 / sigma_v^2 of the longitudinal von Karman spectrum with length scale L."""
     return 4.0 * (L / V) / power(1.0 + 70.8 * (f * L / V) ** 2, 5.0 / 6.0)
 
 
-def _lines(gust):
+def _lines(gust: GustParameters) -> Floats:
     """Return amplitude of v / V, angular frequency [rad/s] and phase of every cosine."""
     if _GUST_KINDS[gust.kind] != GUST_SPECTRUM:
         return np.zeros((3, SPECTRAL_LINE_COUNT))
@@ -51,17 +77,17 @@ def _lines(gust):
     return np.array([gust.intensity * np.sqrt(2.0 * density * np.diff(edges)), 2.0 * math.pi * f, phase])
 
 
-def constants(p):
-    """Return the constants of WindParameters: nested dictionary."""
+def constants(p: WindParameters) -> Records:
+    """Return the Constants (1,) of a wind."""
     amplitude, omega, phase = _lines(p.gust)
-    return {'azimuth': p.azimuth, 'elevation': p.elevation, 'kind': _GUST_KINDS[p.gust.kind],
-            'gust_azimuth': p.gust.azimuth, 'gust_elevation': p.gust.elevation, 'start': p.gust.start,
-            'omega_sine': 2.0 * math.pi * p.gust.frequency, 'amplitude': amplitude, 'omega': omega, 'phase': phase}
+    return Constants.of(azimuth=p.azimuth, elevation=p.elevation, kind=_GUST_KINDS[p.gust.kind],
+                        gust_azimuth=p.gust.azimuth, gust_elevation=p.gust.elevation, start=p.gust.start,
+                        omega_sine=2.0 * math.pi * p.gust.frequency, amplitude=amplitude, omega=omega, phase=phase)
 
 
 @compiled
-def turbulence(t, amplitude, omega, phase):
-    """Return the longitudinal turbulence v / V at the time t [s]."""
+def turbulence(t: Seconds, amplitude: Floats, omega: Floats, phase: Floats) -> float:
+    """Return the longitudinal turbulence v / V at the time t."""
     v = 0.0
     for i in range(SPECTRAL_LINE_COUNT):
         v += amplitude[i] * math.cos(omega[i] * t + phase[i])
@@ -69,17 +95,20 @@ def turbulence(t, amplitude, omega, phase):
 
 
 @compiled
-def torques(c, t):
-    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s]; c: see `constants`."""
-    if c.kind == GUST_SPECTRUM:
-        g = 1.0 + turbulence(t, c.amplitude, c.omega, c.phase)
-        return c.azimuth * g * abs(g), c.elevation * g * abs(g)    # A gust that reverses the wind reverses the torque.
+def torques(wind: Constants, t: Seconds) -> tuple[NewtonMeters, NewtonMeters]:
+    """Return the torques on the azimuth and elevation loads at the time t."""
+    if wind.kind == GUST_SPECTRUM:
+        g = 1.0 + turbulence(t, wind.amplitude, wind.omega, wind.phase)
+        # A gust that reverses the wind reverses the torque.
+        return wind.azimuth * g * abs(g), wind.elevation * g * abs(g)
     gust = 0.0
-    if t >= c.start:
-        gust = 1.0 if c.kind == GUST_STEP else math.sin(c.omega_sine * (t - c.start)) if c.kind == GUST_SINE else 0.0
-    return c.azimuth + c.gust_azimuth * gust, c.elevation + c.gust_elevation * gust
+    if t >= wind.start:
+        gust = (1.0 if wind.kind == GUST_STEP
+                else math.sin(wind.omega_sine * (t - wind.start)) if wind.kind == GUST_SINE else 0.0)
+    return wind.azimuth + wind.gust_azimuth * gust, wind.elevation + wind.gust_elevation * gust
 
 
-def initial_torques(p):
-    """Return the torques [Nm] of WindParameters on azimuth and elevation at t = 0."""
-    return torques.py_func(types.SimpleNamespace(**constants(p)), 0.0)
+def initial_torques(p: WindParameters) -> tuple[NewtonMeters, NewtonMeters]:
+    """Return the torques on azimuth and elevation at t = 0."""
+    azimuth, elevation = cast(Law, torques).py_func(constants(p).view(np.recarray)[0], 0.0)
+    return azimuth, elevation

@@ -17,10 +17,11 @@ intensity of u (ESDU 85020) and, for simplicity, the von Karman spectrum of u. G
 its area. The aerodynamic admittance 1 / (1 + (2 f sqrt(S) / V)^(4/3)) reduces their amplitude (Vickery 1965).
 """
 import math
-import types
+from typing import Annotated, cast
 
 import numpy as np
 
+from adu_drive.params import WindFieldParameters
 from adu_drive.plant.wind import (
     MAX_GUST_FREQUENCY_HZ,
     MIN_GUST_FREQUENCY_HZ,
@@ -30,13 +31,29 @@ from adu_drive.plant.wind import (
 )
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import cross, direction
+from pedestal_common.law import Law
+from pedestal_common.quantities import Bit, Floats, NewtonMeters, Radians, Records, Seconds
+from pedestal_common.record import Record
 from pedestal_common.reproducible import geomspace, power
 
 TURBULENCE_SIGMA_RATIOS = (1.0, 0.78, 0.55)  # standard deviations of u, v, w divided by that of u
 
 
-def constants(p):
-    """Return the constants of WindFieldParameters: nested dictionary."""
+class Constants(Record):
+    """A wind over both axes. The rows of the spectra are those of u, v, w."""
+    blows: Bit              # 0: no wind
+    omega: Annotated[Floats, (3, SPECTRAL_LINE_COUNT)]      # [rad/s]
+    amplitude: Annotated[Floats, (3, SPECTRAL_LINE_COUNT)]
+    phase: Annotated[Floats, (3, SPECTRAL_LINE_COUNT)]      # [rad]
+    to_x: float             # x and y of the direction to which the wind blows, in the frame of the axes
+    to_y: float
+    torque: NewtonMeters    # rho / 2 V^2 S D
+    c_1: float
+    c_2: float
+
+
+def constants(p: WindFieldParameters) -> Records:
+    """Return the Constants (1,) of a wind."""
     edges = geomspace(MIN_GUST_FREQUENCY_HZ, MAX_GUST_FREQUENCY_HZ, SPECTRAL_LINE_COUNT + 1)
     random = np.random.default_rng(p.seed)
     phase = random.uniform(0.0, 2.0 * math.pi, (3, SPECTRAL_LINE_COUNT))
@@ -47,33 +64,32 @@ def constants(p):
         admittance = 1.0 / (1.0 + power(2.0 * f * math.sqrt(area) / p.speed, 4.0 / 3.0))
         amplitude = p.intensity * admittance * np.sqrt(2.0 * von_karman(f, p.speed, p.length) * np.diff(edges))
     to_x, to_y, _ = direction(p.from_azimuth + math.pi, 0.0)
-    return {'blows': int(p.speed > 0.0), 'omega': 2.0 * math.pi * f,
-            'amplitude': np.array(TURBULENCE_SIGMA_RATIOS)[:, np.newaxis] * amplitude, 'phase': phase,
-            'to_x': to_x, 'to_y': to_y, 'torque': 0.5 * p.density * p.speed ** 2 * area * p.diameter,
-            'c_1': p.c_1, 'c_2': p.c_2}
+    return Constants.of(blows=p.speed > 0.0, omega=2.0 * math.pi * f,
+                        amplitude=np.array(TURBULENCE_SIGMA_RATIOS)[:, np.newaxis] * amplitude, phase=phase,
+                        to_x=to_x, to_y=to_y, torque=0.5 * p.density * p.speed ** 2 * area * p.diameter,
+                        c_1=p.c_1, c_2=p.c_2)
 
 
 @compiled
-def torques(c, t, A, E):
-    """Return the torques [Nm] on the azimuth and elevation loads at the time t [s] with the axes at A, E [rad].
-
-    c: see `constants`; A, E: azimuth and elevation.
-    """
-    u, v, w = (turbulence(t, c.amplitude[0], c.omega[0], c.phase[0]),
-               turbulence(t, c.amplitude[1], c.omega[1], c.phase[1]),
-               turbulence(t, c.amplitude[2], c.omega[2], c.phase[2]))
-    # x, y, z: W / V in the frame of the azimuth and elevation axes; to_x, to_y: direction to which the wind blows; b:
-    # unit vector along the beam.
-    x, y, z = (1.0 + u) * c.to_x - v * c.to_y, (1.0 + u) * c.to_y + v * c.to_x, w
+def torques(wind: Constants, t: Seconds, A: Radians, E: Radians) -> tuple[NewtonMeters, NewtonMeters]:
+    """Return the torques on the azimuth and elevation loads at the time t with the axes at azimuth A, elevation E."""
+    u, v, w = (turbulence(t, wind.amplitude[0], wind.omega[0], wind.phase[0]),
+               turbulence(t, wind.amplitude[1], wind.omega[1], wind.phase[1]),
+               turbulence(t, wind.amplitude[2], wind.omega[2], wind.phase[2]))
+    # x, y, z: W / V in the frame of the azimuth and elevation axes; b: unit vector along the beam.
+    x, y, z = (1.0 + u) * wind.to_x - v * wind.to_y, (1.0 + u) * wind.to_y + v * wind.to_x, w
     bx, by, bz = direction(A, E)
     nx, ny, nz = cross(bx, by, bz, x, y, z)     # |W| / V sin alpha, along the axis of the turn from b to W
     speed = math.sqrt(x * x + y * y + z * z)
     cosine = -(bx * x + by * y + bz * z)        # |W| / V cos alpha
-    T = c.torque * (c.c_1 * speed + 2.0 * c.c_2 * cosine)
+    T = wind.torque * (wind.c_1 * speed + 2.0 * wind.c_2 * cosine)
     # Azimuth turns about (0, 0, -1), elevation about (-sin A, -cos A, 0).
     return -T * nz, -T * (nx * math.sin(A) + ny * math.cos(A))
 
 
-def initial_torques(p, A, E):
-    """Return the torques [Nm] of WindFieldParameters p on both loads at t = 0 with the axes at A, E [rad]."""
-    return torques.py_func(types.SimpleNamespace(**constants(p)), 0.0, A, E) if p.speed > 0.0 else (0.0, 0.0)
+def initial_torques(p: WindFieldParameters, A: Radians, E: Radians) -> tuple[NewtonMeters, NewtonMeters]:
+    """Return the torques on both loads at t = 0 with the axes at A, E."""
+    if p.speed <= 0.0:
+        return 0.0, 0.0
+    azimuth, elevation = cast(Law, torques).py_func(constants(p).view(np.recarray)[0], 0.0, A, E)
+    return azimuth, elevation

@@ -11,6 +11,7 @@ from pedestal_analysis import console
 
 if typing.TYPE_CHECKING:
     from pedestal_operator.remote_node import RemoteSession
+    from pedestal_recording.recording import Recording
 
 
 def add_subcommands(parser: argparse.ArgumentParser, title: str, modules: Mapping[str, types.ModuleType]) -> None:
@@ -161,7 +162,7 @@ def check_recording(options: argparse.Namespace) -> None:
             raise ValueError(f'{console.option_of(name)}: has no effect with --bag')
 
 
-def recording(options: argparse.Namespace) -> tuple[typing.Any, str]:
+def recording(options: argparse.Namespace) -> 'tuple[Recording, str]':
     """Return (recording, name) of --bag, or of a run in memory of --scenario with --params-file and --param.
 
     Raises ValueError.

@@ -9,14 +9,19 @@ in cross-elevation and elevation on the deck. The prediction is that of the cont
 the prediction (refraction, time, elements) and, on a ship, of the INS are a part of the offsets.
 """
 import math
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from acu_tracker.program.program_track import ProgramTrack
 from pedestal_analysis.calibration import predicted, scan
 from pedestal_analysis.calibration.offsets import Offsets
 from pedestal_analysis.calibration.predicted import PredictionError
 from pedestal_analysis.results import tracking
 from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.quantities import Floats, Pair, Pairs, Seconds, Times
+from pedestal_recording.recording import Recording
 
 WINDOW_S = 8.0  # length of the part of a recording whose mean is one offset [s]
 DEFAULT_POINTS = 10  # default number of offsets from one recording
@@ -28,8 +33,16 @@ class CollectError(ValueError):
     """Error of a recording that gives no offset. Its text is one line."""
 
 
-def points(bag, tracks, count=DEFAULT_POINTS):
-    """Return (times [s], directions, offsets) of at most `count` points of a recording; the arrays are (k, 2) [deg].
+class Point(NamedTuple):
+    """An offset from a recording."""
+    kind: str           # '' from autotrack; a text for a scan
+    time: Seconds
+    direction: Pair     # azimuth and elevation [deg]
+    offset: Pair        # cross-elevation and elevation [deg]
+
+
+def points(bag: Recording, tracks: Sequence[ProgramTrack], count: int = DEFAULT_POINTS) -> tuple[Times, Pairs, Pairs]:
+    """Return (times, directions [deg], offsets [deg]) of at most `count` points of a recording.
 
     tracks: predicted.programs. The points are in the middle of equal parts of the steps in settled autotrack. Raises
     CollectError.
@@ -74,13 +87,13 @@ def points(bag, tracks, count=DEFAULT_POINTS):
     return table[:, 0], table[:, 1:3], table[:, 3:5]
 
 
-def listed(kind, table):
-    """Return [(kind, time, direction, offset)] of the arrays (times, directions, offsets) of points."""
-    return [(kind, *one) for one in zip(*table)]
+def listed(kind: str, table: Iterable[Floats]) -> list[Point]:
+    """Return the points of one kind from the arrays (times, directions, offsets)."""
+    return [Point(kind, *one) for one in zip(*table)]
 
 
-def every_point(bag, count=DEFAULT_POINTS):
-    """Return [(kind of point, its time [s], direction (2,), offset (2,) [deg])] of the passes and scans of a bag.Bag.
+def every_point(bag: Recording, count: int = DEFAULT_POINTS) -> list[Point]:
+    """Return the points of the passes and scans of a recording.
 
     count: largest number of points from autotrack. Raises CollectError.
     """
@@ -92,7 +105,7 @@ def every_point(bag, count=DEFAULT_POINTS):
         reasons.append(str(error))
     try:
         *table, sigma = scan.points(bag, tracks)
-        found += [(f'scan (sigma {max(wide):.4f} deg)', *one) for *one, wide in zip(*table, sigma)]
+        found += [Point(f'scan (sigma {max(wide):.4f} deg)', *one) for *one, wide in zip(*table, sigma)]
     except scan.ScanError as error:
         reasons.append(str(error))
     if not found:
@@ -100,8 +113,8 @@ def every_point(bag, count=DEFAULT_POINTS):
     return found
 
 
-def joined(parts, source):
-    """Return the Offsets of several recordings; parts: [(label, result of `every_point`)]; source: their name."""
+def joined(parts: Sequence[tuple[str, Sequence[Point]]], source: str) -> Offsets:
+    """Return the offsets of several recordings; parts: (label, its points) of each; source: their name."""
     places = [' '.join(f'{label} {kind} at {time:.1f} s'.split()) for label, found in parts
               for kind, time, *_ in found]
     directions, values = (np.array([one[column] for _, found in parts for one in found]) for column in (2, 3))

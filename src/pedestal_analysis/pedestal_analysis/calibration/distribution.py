@@ -1,8 +1,11 @@
 """Check of the distribution of directions on the sky, before the pointing model is fitted to offsets in them."""
+from collections.abc import Sequence
+
 import numpy as np
 
 from pedestal_analysis.calibration.fit import FitError
 from pedestal_analysis.calibration.terms import FULL_TURN_TERMS
+from pedestal_common.quantities import Degrees, Floats, Pairs
 
 MIN_POINTS, GOOD_POINTS = 10, 20
 """Smallest number of points for a fit, and number below which a sentence recommends more of them."""
@@ -14,8 +17,8 @@ _ELEVATION_TERMS = {'P1', 'P3', 'P4'}, {'P7', 'P8', 'P9', 'P11', 'P19', 'P20'}
 """Sets of terms that differ by the elevation only."""
 
 
-def check(names, directions):
-    """Raise FitError for too few directions (n, 2) [deg], or for directions that leave terms undetermined."""
+def check(names: Sequence[str], directions: Pairs) -> None:
+    """Raise FitError for too few directions [deg], or for directions that leave terms undetermined."""
     az, el = directions.T
     least = max(MIN_POINTS, len(names) + EXTRA_POINTS)
     if len(az) < least:
@@ -34,8 +37,8 @@ def check(names, directions):
                        f'{MAX_AZIMUTH_GAP_DEG:g} deg for {", ".join(turning)}')
 
 
-def largest_gap(azimuths):
-    """Return (size, start) of the largest range without any of the azimuths, modulo a turn [deg]."""
+def largest_gap(azimuths: Floats) -> tuple[Degrees, Degrees]:
+    """Return (size, start) of the largest range without any of the azimuths [deg], modulo a turn."""
     ordered = np.unique(np.mod(azimuths, 360.0))
     gaps = np.diff(ordered, append=ordered[0] + 360.0)
     place = int(np.argmax(gaps))

@@ -1,11 +1,14 @@
 """Fit of the terms by the method of Gauss and Newton. It uses the exact law of the pointing model, as the control
 unit does."""
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 
 from pedestal_analysis.calibration import fit, terms
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
 from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.quantities import Floats, Pairs, Records
 
 MAX_ITERATIONS, CONVERGENCE_DEG = 30, 1e-10
 """Largest number of iterations, and change of the terms that ends them [deg]."""
@@ -14,32 +17,33 @@ DIFFERENCE_DEG = 1e-3
 
 
 @compiled
-def _offsets(m, directions):
-    """Return the offsets (n, 2) of a model on the sky [rad]: cross-elevation and elevation to add to the command.
+def _offsets(model: Records, directions: Pairs) -> Pairs:
+    """Return the offsets of a PointingModel (1,) on the sky [rad]: cross-elevation and elevation to add to the
+    command.
 
-    directions (n, 2): wanted azimuth and elevation [rad]
+    directions: wanted azimuth and elevation [rad]
     """
     offsets = np.empty_like(directions)
     for i in range(len(directions)):
         azimuth, elevation = directions[i]
-        A, E, _ = pointing_model.encoder_of(m[0], azimuth, elevation)
+        A, E, _ = pointing_model.encoder_of(model[0], azimuth, elevation)
         offsets[i, 0], offsets[i, 1] = wrap(A - azimuth) * np.cos(elevation), E - elevation
     return offsets
 
 
-def model(names, values):
-    """Return the record (1,) of the pointing model with terms [deg, -]; see pointing_model.model."""
+def model(names: Iterable[str], values: Iterable[float]) -> Records:
+    """Return the PointingModel (1,) with terms [deg, -]; see pointing_model.model."""
     return pointing_model.model({name.lower(): float(value if terms.TERM_BY_NAME[name].factor else np.radians(value))
                                  for name, value in zip(names, values)})
 
 
-def offsets(names, values, directions):
-    """Return the exact offsets (n, 2) [deg] of terms `values` (p,) [deg, -] at directions (n, 2) [deg]."""
+def offsets(names: Sequence[str], values: Floats, directions: Pairs) -> Pairs:
+    """Return the exact offsets [deg] of terms `values` (p,) [deg, -] at directions [deg]."""
     return np.degrees(_offsets(model(names, values), np.radians(directions)))
 
 
-def exact(names, directions, values, sigma):
-    """Return the fit.Fit of terms as fit.linear does, but with the exact law. Raises fit.FitError."""
+def exact(names: Sequence[str], directions: Pairs, values: Pairs, sigma: Pairs) -> fit.Fit:
+    """Return the Fit of terms as fit.linear does, but with the exact law. Raises FitError."""
     x = fit.linear(names, directions, values, sigma).values
     steps = np.array([np.radians(DIFFERENCE_DEG) if terms.TERM_BY_NAME[name].factor else DIFFERENCE_DEG
                       for name in names])

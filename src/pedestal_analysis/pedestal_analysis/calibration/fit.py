@@ -13,12 +13,15 @@ point in H and r_i its residual. Their rms is the leave-one-out rms, the error t
 """
 import dataclasses
 import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
 
 from pedestal_analysis.calibration import terms
 from pedestal_analysis.results.intervals import CONFIDENCE_LEVEL
+from pedestal_common.quantities import Degrees, Floats, Ints, Pairs
 
 SMALLEST_SINGULAR_VALUE = 1e-8
 """Ratio to the largest singular value below which terms have the same effect at all points [-]."""
@@ -34,64 +37,60 @@ class FitError(ValueError):
     """Error of offsets that do not allow a fit. Its text is one line."""
 
 
+class Solved(NamedTuple):
+    """Singular value decomposition of A, whose columns are scaled to length 1."""
+    U: Floats           # (2 n, p)
+    s: Floats           # (p,)
+    V: Floats           # (p, p), transposed
+    lengths: Floats     # (p,) of the columns of A before
+
+
 @dataclasses.dataclass(frozen=True)
 class Fit:
-    """Fit of p terms to n offsets.
-
-    form          `linear`: first order in the terms, as in katpoint; `exact`: the law of the control unit
-    names         p names of terms
-    values        (p,) terms [deg, or - for a factor]
-    covariance    (p, p) of the terms, from the noise of the offsets
-    of_dropped    (p,) variance of the terms by those that were dropped: their effect goes to the terms that are kept
-    interval      half the width of the confidence interval of a term [standard deviations]
-    condition     ratio of the largest to the smallest singular value, with columns of length 1 [-]
-    residuals     (n, 2) offsets minus model [deg]
-    left_out      (n, 2) the same against the fit without the point
-    scale         standard deviation of the residuals divided by the stated sigmas [-], or [deg] without stated sigmas
-    """
-    form: str
-    names: tuple
-    values: np.ndarray
-    covariance: np.ndarray
-    of_dropped: np.ndarray
-    interval: float
-    condition: float
-    residuals: np.ndarray
-    left_out: np.ndarray
-    scale: float
+    """Fit of p terms to n offsets."""
+    form: str               # `linear`: first order in the terms, as in katpoint; `exact`: the law of the control unit
+    names: tuple[str, ...]  # of the p terms
+    values: Floats          # (p,) of the terms [deg, or - for a factor]
+    covariance: Floats      # (p, p) of the terms, from the noise of the offsets
+    of_dropped: Floats      # (p,) variance by the dropped terms, because their effect goes to the terms that are kept
+    interval: float         # half the width of the confidence interval of a term [standard deviations]
+    condition: float        # ratio of the largest to the smallest singular value, with columns of length 1 [-]
+    residuals: Pairs        # offsets minus model [deg]
+    left_out: Pairs         # the same against the fit without the point
+    scale: float            # standard deviation of the residuals per stated sigma [-], or [deg] without stated sigmas
 
     @property
-    def sigma(self):
+    def sigma(self) -> Floats:
         """Return the standard deviations (p,) of the terms."""
         return np.sqrt(np.diag(self.covariance) + self.of_dropped)
 
     @property
-    def correlation(self):
+    def correlation(self) -> Floats:
         """Return the correlations (p, p) of the terms; 0 where a standard deviation is 0."""
         sigma = np.sqrt(np.diag(self.covariance))
         scale = np.outer(sigma, sigma)
         return np.divide(self.covariance, scale, out=np.eye(len(sigma)), where=scale > 0.0)
 
-    def outliers(self, sigma):
+    def outliers(self, sigma: Pairs) -> Ints:
         """Return the places of the points whose left-out residual exceeds OUTLIER_SIGMAS.
 
-        sigma (n, 2): stated standard deviations. Their scale is taken from the median of the residuals, because an
+        sigma: stated standard deviations [deg]. Their scale is taken from the median of the residuals, because an
         outlier does not move the median.
         """
         size = np.hypot(*(self.left_out / sigma).T)
         own = np.median(np.hypot(*(self.residuals / sigma).T)) / MEDIAN_RAYLEIGH
         return np.flatnonzero(size > max(OUTLIER_SIGMAS * own, 1e-9))
 
-    def correlated(self):
-        """Return [(name, name, correlation)] of the pairs with a strong correlation, the strongest first."""
+    def correlated(self) -> list[tuple[str, str, float]]:
+        """Return both names and the correlation of the pairs with a strong correlation, the strongest first."""
         matrix = self.correlation
         pairs = [(self.names[j], self.names[i], float(matrix[i, j]))
                  for i in range(len(self.names)) for j in range(i) if abs(matrix[i, j]) > STRONG_CORRELATION]
         return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
 
-def linear(names, directions, values, sigma) -> Fit:
-    """Return the Fit of terms to offsets `values` (n, 2) [deg] at directions (n, 2) [deg] with sigma (n, 2) [deg].
+def linear(names: Sequence[str], directions: Pairs, values: Pairs, sigma: Pairs) -> Fit:
+    """Return the Fit of terms to offsets `values` at directions with standard deviations sigma, all [deg].
 
     The model is first order in its terms. Raises FitError if the data cannot tell terms apart.
     """
@@ -100,8 +99,8 @@ def linear(names, directions, values, sigma) -> Fit:
     return fitted('linear', names, x, solved, values - A @ x, sigma)
 
 
-def solve(names, A, values, sigma):
-    """Return (x, (U, s, V, lengths of the columns)) of the weighted least squares. Raises FitError."""
+def solve(names: Sequence[str], A: Floats, values: Pairs, sigma: Pairs) -> tuple[Floats, Solved]:
+    """Return (x, Solved) of the weighted least squares. Raises FitError."""
     rows = (A / sigma[:, :, None]).reshape(-1, len(names))
     lengths = np.linalg.norm(rows, axis=0)
     for name, length in zip(names, lengths):
@@ -114,11 +113,11 @@ def solve(names, A, values, sigma):
         raise FitError(f'the offsets cannot tell these terms apart: {", ".join(shared)}; leave one of them out '
                        '(--terms), or add points in other directions')
     b = (values / sigma).reshape(-1)
-    return V.T @ (U.T @ b / s) / lengths, (U, s, V, lengths)
+    return V.T @ (U.T @ b / s) / lengths, Solved(U, s, V, lengths)
 
 
-def fitted(form, names, x, solved, residuals, sigma):
-    """Return the Fit of the terms x; solved: second result of `solve`; residuals (n, 2) [deg]."""
+def fitted(form: str, names: Sequence[str], x: Floats, solved: Solved, residuals: Pairs, sigma: Pairs) -> Fit:
+    """Return the Fit of the terms x of `solve`; residuals, sigma [deg]."""
     U, s, V, lengths = solved
     n, p = len(residuals), len(names)
     r = residuals / sigma
@@ -136,12 +135,13 @@ def fitted(form, names, x, solved, residuals, sigma):
     return Fit(form, tuple(names), x, scale**2 * C, np.zeros(p), half, float(s[0] / s[-1]), residuals, left_out, scale)
 
 
-def without_doubtful(names, fit):
+def without_doubtful(names: Sequence[str],
+                     fit: Callable[[Sequence[str]], Fit]) -> tuple[Fit, list[tuple[str, float, float]]]:
     """Return (Fit, [(name, value, sigma)] of the dropped terms) after each term below its sigma is dropped.
 
-    fit(names) -> Fit. The terms are dropped one after another, the most doubtful first, because each drop changes the
-    other terms. A dropped term is not 0, but smaller than its sigma. So the variance of a term that is kept is at
-    least its variance in the fit of all terms.
+    The terms are dropped one after another, the most doubtful first, because each drop changes the other terms. A
+    dropped term is not 0, but smaller than its sigma. So the variance of a term that is kept is at least its variance
+    in the fit of all terms.
     """
     whole = found = fit(names)
     dropped = []
@@ -157,14 +157,14 @@ def without_doubtful(names, fit):
     return dataclasses.replace(found, of_dropped=np.array(extra)), dropped
 
 
-def unit_covariance(names, directions):
+def unit_covariance(names: Sequence[str], directions: Pairs) -> Floats:
     """Return the covariance (p, p) of terms that are fitted to offsets with a standard deviation of 1 deg."""
     rows = terms.design(names, directions).reshape(-1, len(names))
     return np.linalg.inv(rows.T @ rows)
 
 
-def model_error(names, covariance, directions):
-    """Return the rms error [deg] of a model on the sky, of both axes together, over directions (n, 2) [deg].
+def model_error(names: Sequence[str], covariance: Floats, directions: Pairs) -> Degrees:
+    """Return the rms error of a model on the sky, of both axes together, over directions [deg].
 
     covariance (p, p): of its terms.
     """

@@ -10,14 +10,18 @@ The content of a file shows its format:
               delta_elevation_std, in degrees; the azimuth offset is one of the axis
     TPOINT    see tpoint.py
 """
+import csv
 import datetime
 import pathlib
 import re
-import typing
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from pedestal_analysis.calibration import tpoint
+from pedestal_analysis.calibration.tpoint import OffsetRow
+from pedestal_common.quantities import Floats, Pairs
 from pedestal_common.text_files import columns, csv_table
 from pedestal_common.text_files.csv_table import TableError
 
@@ -39,36 +43,25 @@ _KATPOINT_SIGMA_NAMES = ('delta_azimuth_std', 'delta_elevation_std')
 _DATE_PATTERN = re.compile(r'\b(\d{4}-\d{2}-\d{2})(?!\d)')
 
 
-class Offsets(typing.NamedTuple):
-    """Measured offsets.
-
-    directions   (n, 2) azimuth and elevation wanted on the sky [deg]
-    values       (n, 2) offsets to be added to the command: cross-elevation and elevation [deg]
-    sigma        (n, 2) standard deviations [deg]; ones if the file states none
-    has_sigma    True if the file states standard deviations
-    places       n texts that state where an offset is, such as `line 7`
-    source       name of the file, or of the recordings
-    format       CSV, katpoint, TPOINT or recordings
-    date         date of the measurement, as in 2026-11-26, '' if the file states none
-    notes        sentences on the meaning of the file
-    """
-    directions: np.ndarray
-    values: np.ndarray
-    sigma: np.ndarray
-    has_sigma: bool
-    places: typing.Sequence
-    source: str
-    format: str
-    date: str
-    notes: tuple = ()
+class Offsets(NamedTuple):
+    """Measured offsets."""
+    directions: Pairs       # azimuth and elevation wanted on the sky [deg]
+    values: Pairs           # offsets to be added to the command: cross-elevation and elevation [deg]
+    sigma: Pairs            # standard deviations [deg]; ones if the file states none
+    has_sigma: bool         # True if the file states standard deviations
+    places: Sequence[str]   # texts that state where an offset is, such as `line 7`
+    source: str             # name of the file, or of the recordings
+    format: str             # CSV, katpoint, TPOINT or recordings
+    date: str               # of the measurement, as in 2026-11-26, '' if the file states none
+    notes: tuple[str, ...] = ()     # sentences on the meaning of the file
 
 
-def read(path, latest='') -> Offsets:
+def read(path: str | pathlib.Path, latest: str = '') -> Offsets:
     """Return the Offsets of a file. Raises TableError, which names file, line, field, value and allowed range.
 
     latest: date, as in 2026-11-26, after which no date is that of the measurement; '': every date may be.
     """
-    notes: tuple = ()
+    notes: tuple[str, ...] = ()
     text = csv_table.text(path)
     if not text.strip():
         raise TableError(f'{path}: the file is empty; it must have a line with the names of the columns and a line '
@@ -93,15 +86,15 @@ def read(path, latest='') -> Offsets:
                    pathlib.Path(path).name, kind, date, notes)
 
 
-def table(measured):
-    """Return Offsets as the text of a CSV file that `read` accepts."""
+def table(measured: Offsets) -> str:
+    """Return the text of a CSV file that `read` accepts."""
     names = [quantity.label for quantity in (*_SKY, *_OFFSET)] + [_SIGMA.label] * measured.has_sigma
     numbers = np.column_stack((measured.directions, measured.values, measured.sigma[:, :1]))[:, :len(names)]
     head = [f'# {measured.source} {measured.date}'.rstrip()]
     return '\n'.join([*head, ','.join(names), *(','.join(f'{value:.7f}' for value in row) for row in numbers)]) + '\n'
 
 
-def valid_date(text, latest):
+def valid_date(text: str, latest: str) -> str:
     """Return a date such as 2026-11-26 as it is. Raises ValueError, also for a date later than `latest`."""
     try:
         date = datetime.date.fromisoformat(text).isoformat()
@@ -112,35 +105,36 @@ def valid_date(text, latest):
     return date
 
 
-def _table(path, text):
-    """Return (rows, dates, format) of a CSV file. A row is (line, az, el, xel, el offset, sigma xel, sigma el)."""
+def _table(path: str | pathlib.Path, text: str) -> tuple[list[OffsetRow], list[str], str]:
+    """Return (rows, dates, format) of a CSV file."""
     try:
         table = csv_table.Table(path, text)
         katpoint = set(_KATPOINT_NAMES) <= set(table.fieldnames)
         rows = list((_katpoint if katpoint else _plain)(table))
-    except csv_table.csv.Error as error:
+    except csv.Error as error:
         raise TableError(f'{path}: not a CSV text file: {error}') from None
     return rows, _dates(text), 'katpoint' if katpoint else 'CSV'
 
 
-def _plain(table):
+def _plain(table: csv_table.Table) -> Iterator[OffsetRow]:
     """Yield the rows of a CSV file with named columns."""
     sky = [table.column(quantity) for quantity in _SKY]
     offset = [table.column(quantity) for quantity in _OFFSET]
     sigma = table.column(_SIGMA, required=False)
     for row in table:
-        def number(column, limits, row=row):
+        def number(column: columns.Column, limits: tuple[float, float], row: Mapping[str, str] = row) -> float:
             return table.number(column, row[column.name], *limits)
         numbers = (number(sky[0], AZIMUTH_RANGE_DEG), number(sky[1], ELEVATION_RANGE_DEG),
                    number(offset[0], OFFSET_RANGE_DEG), number(offset[1], OFFSET_RANGE_DEG))
-        yield table.line_num, *numbers, *[number(sigma, SIGMA_RANGE_DEG) if sigma else np.nan] * 2
+        of_both = number(sigma, SIGMA_RANGE_DEG) if sigma else np.nan
+        yield table.line_num, *numbers, of_both, of_both
 
 
-def _katpoint(table):
+def _katpoint(table: csv_table.Table) -> Iterator[OffsetRow]:
     """Yield the rows of a file of katpoint's reduction scripts, which state offsets of the axes in degrees."""
     has_sigma = set(_KATPOINT_SIGMA_NAMES) <= set(table.fieldnames)
     for row in table:
-        def number(name, low, high, row=row):
+        def number(name: str, low: float, high: float, row: Mapping[str, str] = row) -> float:
             return csv_table.number(table.path, table.line_num, name, row[name] or '', low, high)
         az, el = number('azimuth', *AZIMUTH_RANGE_DEG), number('elevation', *ELEVATION_RANGE_DEG)
         cosine = max(float(np.cos(np.radians(el))), MIN_COSINE)
@@ -150,11 +144,11 @@ def _katpoint(table):
         sigma = [number(name, 0.0, most) for name, most in zip(_KATPOINT_SIGMA_NAMES, (largest, MAX_OFFSET_DEG))
                  ] if has_sigma else [0.0, 0.0]
         # The scripts write 0 for a standard deviation that they have not estimated.
-        yield (table.line_num, az, el, xel, offset, *((cosine * sigma[0], sigma[1]) if min(sigma) > 0.0
-                                                      else (np.nan, np.nan)))
+        of_xel, of_el = (cosine * sigma[0], sigma[1]) if min(sigma) > 0.0 else (np.nan, np.nan)
+        yield table.line_num, az, el, xel, offset, of_xel, of_el
 
 
-def _dates(text):
+def _dates(text: str) -> list[str]:
     """Return the dates in a CSV file. Dates stand in comments and in columns of times."""
     found = []
     for word in _DATE_PATTERN.findall(text):
@@ -165,9 +159,9 @@ def _dates(text):
     return found
 
 
-def _check(path, lines, table):
+def _check(path: str | pathlib.Path, lines: Sequence[int], table: Floats) -> None:
     """Raise TableError for a row that repeats another row, for radians, and for sigmas of a part of the rows."""
-    seen = {}
+    seen: dict[tuple[float, ...], int] = {}
     for line, row in zip(lines, table[:, :4].tolist()):
         first = seen.setdefault(tuple(row), line)
         if first != line:

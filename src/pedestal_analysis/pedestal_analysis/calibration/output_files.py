@@ -1,12 +1,16 @@
 """Files that each step of `pedestal calibrate` writes: a parameter file and a page."""
+import argparse
 import shlex
+from collections.abc import Callable, Iterable, Mapping
 
 from pedestal_common.graph import nodes
 from pedestal_common.parameters import check_each
+from pedestal_common.quantities import Json
 from pedestal_common.text_files import parameter_file
 
 
-def write(options, printed, sections, page, iq=False, verified=True) -> list[str]:
+def write(options: argparse.Namespace, printed: Iterable[str], sections: Mapping[str, Mapping[str, Json]],
+          page: Callable[[], str], iq: bool = False, verified: bool = True) -> list[str]:
     """Write the files that the options `output` and `report` of a step name. Return a line for each of them.
 
     printed: lines that the step prints, for the head of the parameter file; sections: {node: {parameter: value}};

@@ -1,4 +1,5 @@
 """Plan of directions in which pointing offsets are measured: spread over the sky, within the travel of the axes."""
+import argparse
 import math
 
 import numpy as np
@@ -6,6 +7,7 @@ import numpy as np
 from pedestal_analysis.calibration import distribution, fit, terms
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Degrees, Pairs
 
 MAX_POINTS = 500  # largest number of directions of a plan
 TRAVEL_RANGE_DEG = (-270.0, 270.0)  # travel of the azimuth axis without a scenario [deg]
@@ -16,12 +18,13 @@ EDGE_DEG = 2.0  # distance of the directions from the ends of the travel [deg]
 _GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
 
 
-def directions(count, azimuths=TRAVEL_RANGE_DEG, elevations=PLAN_ELEVATION_RANGE_DEG):
-    """Return encoder directions (count, 2) [deg] in the order of a slew along the azimuth travel.
+def directions(count: int, azimuths: tuple[Degrees, Degrees] = TRAVEL_RANGE_DEG,
+               elevations: tuple[Degrees, Degrees] = PLAN_ELEVATION_RANGE_DEG) -> Pairs:
+    """Return encoder directions [deg] in the order of a slew along the azimuth travel.
 
-    azimuths, elevations: travel of the axes [deg]. The directions are a lattice of the golden ratio over the azimuth
-    travel and the elevation. A travel of more than a turn is covered as a whole, so a part of the sky is measured in
-    both turns of the wrap. Raises ValueError.
+    azimuths, elevations: travel of the axes. The directions are a lattice of the golden ratio over the azimuth travel
+    and the elevation. A travel of more than a turn is covered as a whole, so a part of the sky is measured in both
+    turns of the wrap. Raises ValueError.
     """
     if not distribution.MIN_POINTS <= count <= MAX_POINTS:
         raise ValueError(f'--plan {count}: must be {distribution.MIN_POINTS} to {MAX_POINTS}')
@@ -38,28 +41,27 @@ def directions(count, azimuths=TRAVEL_RANGE_DEG, elevations=PLAN_ELEVATION_RANGE
     return np.column_stack((azimuth, elevation))
 
 
-def noise_gain(planned):
+def noise_gain(planned: Pairs) -> float:
     """Return the rms error of the default model on the sky, divided by the noise of one offset [-].
 
-    planned (n, 2): directions of the offsets [deg]. The error is the mean over all azimuths and the elevations of a
-    plan.
+    planned: directions of the offsets [deg]. The error is the mean over all azimuths and the elevations of a plan.
     """
     az, el = np.meshgrid(np.arange(0.0, 360.0, 10.0), np.linspace(*PLAN_ELEVATION_RANGE_DEG, 15))
     sky = np.column_stack((az.ravel(), el.ravel()))
     return fit.model_error(terms.DEFAULT_TERMS, fit.unit_covariance(terms.DEFAULT_TERMS, planned), sky)
 
 
-def travel(name):
-    """Return ((lowest, highest) azimuth, the same of the elevation) [deg] of the drive of a scenario. Raises
-    ValueError."""
+def travel(name: str) -> tuple[tuple[Degrees, Degrees], tuple[Degrees, Degrees]]:
+    """Return the lowest and highest azimuth and elevation of the drive of a scenario. Raises ValueError."""
     drive = scenario.load(name).node_parameters('adu')
     if not hasattr(drive, AXES[0]):
         raise ValueError(f'--scenario {name}: must have a drive with motors')
-    return tuple((math.degrees(axis.limits.lower), math.degrees(axis.limits.upper))
-                 for axis in (getattr(drive, axis) for axis in AXES))
+    azimuth, elevation = ((math.degrees(axis.limits.lower), math.degrees(axis.limits.upper))
+                          for axis in (getattr(drive, axis) for axis in AXES))
+    return azimuth, elevation
 
 
-def main(options):
+def main(options: argparse.Namespace) -> list[str]:
     """Plan for the options of the verb, write the file of --output and return the lines to print. Raises ValueError.
 
     The lines are a CSV table, if no file is written.

@@ -3,10 +3,14 @@
 The result is a table of the terms, rows for --json, a page with the residuals, and a ROS 2 parameter file with the
 parameters acu.pointing.*. The file states where the model comes from: source, date and rms.
 """
+import argparse
 import dataclasses
 import datetime
+import pathlib
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pedestal_analysis.calibration import (
     collect,
@@ -21,6 +25,7 @@ from pedestal_analysis.calibration import (
 from pedestal_analysis.results.intervals import estimated, row
 from pedestal_analysis.results.tracking import rms
 from pedestal_common.geometry.pointing_report import residual_text
+from pedestal_common.quantities import Ints, Json, Row
 from pedestal_recording import bag as bags
 
 CASE_NAME = 'pointing'  # case of the rows
@@ -32,25 +37,18 @@ TERM_DECIMALS = 9  # decimals of the terms in a parameter file
 
 @dataclasses.dataclass(frozen=True)
 class Calibration:
-    """Pointing model that was fitted to offsets.
-
-    offsets   offsets.Offsets
-    fit       fit.Fit of the terms that were kept
-    dropped   [(name, value, sigma)] of the terms whose sigma exceeds their value
-    outliers  places of the outliers among the offsets, the largest first
-    date      date of the measurement, '' if unknown
-    notes     sentences on the choice of the form
-    """
+    """Pointing model that was fitted to offsets."""
     offsets: offsets.Offsets
-    fit: fit.Fit
-    dropped: list
-    outliers: np.ndarray
-    date: str
-    notes: tuple
+    fit: fit.Fit                # of the terms that were kept
+    dropped: list[tuple[str, float, float]]     # (name, value, sigma) of the terms whose sigma exceeds their value
+    outliers: Ints              # places of the outliers among the offsets, the largest first
+    date: str                   # of the measurement, '' if unknown
+    notes: tuple[str, ...]      # sentences on the choice of the form
 
 
-def calibrate(measured, names, form='', keep_all=False, date='') -> Calibration:
-    """Return the Calibration of offsets.Offsets with the terms `names`. Raises FitError.
+def calibrate(measured: offsets.Offsets, names: Sequence[str], form: str = '', keep_all: bool = False,
+              date: str = '') -> Calibration:
+    """Return the Calibration of offsets with the terms `names`. Raises FitError.
 
     form       one of FORMS; '': linear, unless the exact form converges and has a leave-one-out rms below EXACT_GAIN
                of that of the linear form
@@ -61,7 +59,7 @@ def calibrate(measured, names, form='', keep_all=False, date='') -> Calibration:
     offsets_of = measured.directions, measured.values, measured.sigma
     notes: set[str] = set()
 
-    def fitted(chosen):
+    def fitted(chosen: Sequence[str]) -> fit.Fit:
         if form:
             return FORMS[form](chosen, *offsets_of)
         found = fit.linear(chosen, *offsets_of)
@@ -79,24 +77,24 @@ def calibrate(measured, names, form='', keep_all=False, date='') -> Calibration:
                        tuple(sorted(notes)))
 
 
-def rows(found):
-    """Return the rows of a Calibration for --json: terms with their intervals, then the residuals."""
+def rows(found: Calibration) -> list[Row]:
+    """Return the rows for --json: terms with their intervals, then the residuals."""
     count, fitted = len(found.offsets.places), found.fit
     half = fitted.interval * fitted.sigma
     of_terms = [estimated(CASE_NAME, name, (value, value - width, value + width), terms.TERM_BY_NAME[name].unit, count)
                 for name, value, width in zip(fitted.names, fitted.values, half)]
     residuals = fitted.residuals
-    measured = {'raw_rms_deg': rms(found.offsets.values), 'residual_rms_deg': rms(residuals),
-                'residual_cross_elevation_rms_deg': rms(residuals[:, 0]), 'residual_elevation_rms_deg':
-                rms(residuals[:, 1]),
-                'leave_one_out_rms_deg': rms(fitted.left_out),
-                'model_error_deg': fit.model_error(fitted.names, fitted.covariance, found.offsets.directions)}
+    measured: dict[str, ArrayLike] = {
+        'raw_rms_deg': rms(found.offsets.values), 'residual_rms_deg': rms(residuals),
+        'residual_cross_elevation_rms_deg': rms(residuals[:, 0]), 'residual_elevation_rms_deg': rms(residuals[:, 1]),
+        'leave_one_out_rms_deg': rms(fitted.left_out),
+        'model_error_deg': fit.model_error(fitted.names, fitted.covariance, found.offsets.directions)}
     return [*of_terms, *(row(CASE_NAME, name, value, 'deg') for name, value in measured.items()),
             row(CASE_NAME, 'condition', fitted.condition), row(CASE_NAME, 'points', count)]
 
 
-def content(found):
-    """Return the content of the --json file of a Calibration."""
+def content(found: Calibration) -> dict[str, Json]:
+    """Return the content of the --json file."""
     fitted = found.fit
     return {'name': 'calibrate pointing', 'rows': rows(found), 'source': found.offsets.source,
             'format': found.offsets.format, 'date': found.date, 'form': fitted.form, 'terms': list(fitted.names),
@@ -106,8 +104,8 @@ def content(found):
             'outliers': [found.offsets.places[place] for place in found.outliers]}
 
 
-def term_lines(found):
-    """Return the lines of the table of the terms of a Calibration, with a title."""
+def term_lines(found: Calibration) -> list[str]:
+    """Return the lines of the table of the terms, with a title."""
     measured, fitted = found.offsets, found.fit
     half = fitted.interval * fitted.sigma
     table = [f'{"term":5} {"value":>10} {"sigma":>9}  {"95 % interval":23} {"unit":4} meaning']
@@ -120,8 +118,8 @@ def term_lines(found):
             f'{f" of {found.date}" if found.date else ""}, {fitted.form} form', '', *table, '']
 
 
-def residual_lines(found):
-    """Return the lines on the residuals of a Calibration."""
+def residual_lines(found: Calibration) -> list[str]:
+    """Return the lines on the residuals."""
     known = {item['metric']: item['value'] for item in rows(found)}
     return [f'rms of the offsets      {known["raw_rms_deg"]:.5f} deg',
             f'rms of the residuals    {known["residual_rms_deg"]:.5f} deg (cross-elevation '
@@ -132,7 +130,7 @@ def residual_lines(found):
             f'condition               {known["condition"]:.4g}']
 
 
-def remarks(found):
+def remarks(found: Calibration) -> list[str]:
     """Return sentences on dropped terms, correlated terms, outliers, and offsets that are few or badly stated."""
     measured, fitted = found.offsets, found.fit
     said = [*measured.notes, *found.notes]
@@ -160,8 +158,8 @@ def remarks(found):
     return said
 
 
-def parameters(found, file, antenna=''):
-    """Return the parameters {name: value} of the control unit for a Calibration.
+def parameters(found: Calibration, file: str, antenna: str = '') -> dict[str, Json]:
+    """Return the parameters {name: value} of the control unit.
 
     file, antenna: names of the parameter file and of the antenna, which the control unit reports with the model
     """
@@ -173,12 +171,12 @@ def parameters(found, file, antenna=''):
     return {f'pointing.{name}': value for name, value in {**model, **stated}.items()}
 
 
-def collected(paths, count):
-    """Return the offsets.Offsets of recordings; count: points of each, None for the default. Raises ValueError."""
+def collected(paths: Sequence[pathlib.Path], count: int | None) -> offsets.Offsets:
+    """Return the offsets of recordings; count: points of each, None for the default. Raises ValueError."""
     parts, dates = [], []
     if count is not None and not 1 <= count <= MAX_POINTS:
         raise ValueError(f'--points {count}: must be 1 to {MAX_POINTS}')
-    origins = {}
+    origins: dict[tuple[float, ...], pathlib.Path] = {}
     for path in paths:
         bag = bags.read(path, '')
         try:
@@ -195,7 +193,7 @@ def collected(paths, count):
     return joined._replace(date=max(dates, default=''))
 
 
-def main(options):
+def main(options: argparse.Namespace) -> tuple[list[str], dict[str, Json]]:
     """Calibrate for the options of the verb, write its files and return (lines to print, content for --json). Raises
     ValueError."""
     names = terms.chosen(options.terms) if options.terms is not None else terms.DEFAULT_TERMS

@@ -1,16 +1,24 @@
 """HTML page of `pedestal calibrate pointing`: the residuals as a plot of the sky and as arrows, and tables."""
 import html
+import typing
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
 
 from pedestal_analysis.calibration import terms
 from pedestal_analysis.report import elements
 from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, Spec, new_panels
+from pedestal_common.quantities import Degrees, Pairs
+
+if typing.TYPE_CHECKING:
+    from pedestal_analysis.calibration.pointing import Calibration
 
 ARROW_LENGTH_DEG = 12.0  # length on the plot of the arrow whose residual is stated as its scale [deg of elevation]
 
 
-def _sky(axes):
+def _sky(axes: PolarAxes) -> None:
     """Prepare polar axes as a view of the sky from below: north above, east to the right, the zenith in the middle."""
     axes.set_theta_zero_location('N')
     axes.set_theta_direction(-1)
@@ -18,10 +26,10 @@ def _sky(axes):
     axes.set_rgrids((0.0, 30.0, 60.0), ('90', '60', '30'), fontsize=7)
 
 
-def _arrows(axes, directions, vectors, scale, colour):
-    """Draw arrows for vectors (n, 2) [deg] in cross-elevation and elevation.
+def _arrows(axes: PolarAxes, directions: Pairs, vectors: Pairs, scale: Degrees, colour: str) -> None:
+    """Draw arrows for vectors [deg] in cross-elevation and elevation at directions [deg].
 
-    scale: size of the vector whose arrow has the length ARROW_LENGTH_DEG [deg]
+    scale: size of the vector whose arrow has the length ARROW_LENGTH_DEG
     """
     az, el = np.radians(directions).T
     radius = 90.0 - directions[:, 1]
@@ -37,7 +45,7 @@ def _arrows(axes, directions, vectors, scale, colour):
     axes.plot(az, radius, '.', color=INK_COLOUR, markersize=3)
 
 
-def sky_plot(found):
+def sky_plot(found: 'Calibration') -> Figure:
     """Return the figure with the directions on the sky; the colour is the size of offset and residual."""
     figure, panels = new_panels(1, 2, height=3.9, x='', subplot_kw={'projection': 'polar'})
     az, el = np.radians(found.offsets.directions).T
@@ -52,7 +60,7 @@ def sky_plot(found):
     return figure
 
 
-def arrow_plot(found):
+def arrow_plot(found: 'Calibration') -> Figure:
     """Return the figure with the offsets and the residuals as arrows, each with its own scale."""
     figure, panels = new_panels(1, 2, height=4.1, x='', subplot_kw={'projection': 'polar'})
     for axes, vectors, colour, title in zip(panels.flat, (found.offsets.values, found.fit.residuals),
@@ -64,7 +72,7 @@ def arrow_plot(found):
     return figure
 
 
-def by_angle(found):
+def by_angle(found: 'Calibration') -> Figure:
     """Return the figure with the residuals of both axes over azimuth and elevation."""
     figure, panels = new_panels(2, 2, y=('cross-elevation [deg]', 'elevation [deg]'),
                                 x=('azimuth [deg]', 'elevation [deg]'))
@@ -89,8 +97,8 @@ FIGURES = (
 """Figures of the page."""
 
 
-def page(found, summary, remarks, command):
-    """Return the text of the page of a pointing.Calibration; summary, remarks: lines of text."""
+def page(found: 'Calibration', summary: Iterable[str], remarks: Sequence[str], command: str) -> str:
+    """Return the HTML page of a calibration; summary, remarks: lines of text; command: the command line."""
     fitted, measured = found.fit, found.offsets
     half = fitted.interval * fitted.sigma
     table = [[name, f'{value:.6f}', f'{sigma:.6f}', f'{value - width:.6f} to {value + width:.6f}',

@@ -4,16 +4,21 @@ The prediction of a step is that of the table which the control unit followed la
 contains the refraction that the control unit adds, and not the offsets that an operator has commanded. On a ship, the
 recorded attitude of the INS turns the earth direction to the deck, from the alignment of the INS on.
 """
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 
-from acu_tracker.modes import MODE_ROWS
 from acu_tracker.program import program_track
-from acu_tracker.program.program_track import checked
+from acu_tracker.program.prediction import Predictor
+from acu_tracker.program.program_track import ProgramTrack, checked
 from pedestal_analysis.results import known_attitude, mode_pointing, tracking
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.parameters import ParameterError
+from pedestal_common.quantities import Json, Pairs, Quaternions, Texts, Times
 from pedestal_common.wire import messages
+from pedestal_recording.recording import Recording
 
 PROGRAM_TOPIC, S_PER_NS = 'acu/program_track', 1e-9
 TABLE_MODES = tuple(row.name for row in MODE_ROWS if row.table)  # modes that follow a table
@@ -24,8 +29,8 @@ class PredictionError(ValueError):
 
 
 @compiled
-def _of_table(program, times, out):
-    """Fill out (n, 2) with the directions of a ProgramTrack at times (n,); NaN outside its table."""
+def _of_table(program: ProgramTrack, times: Times, out: Pairs) -> None:
+    """Fill out with the directions of a program track at times; NaN outside its table."""
     for k in range(len(times)):
         out[k, 0] = out[k, 1] = np.nan
         if program.times[0] <= times[k] <= program.times[-1]:
@@ -34,8 +39,8 @@ def _of_table(program, times, out):
 
 
 @compiled
-def _on_deck(attitude, angles):
-    """Turn earth angles (n, 2) [rad] to deck angles, in place; attitude (n, 4): rotation deck -> earth."""
+def _on_deck(attitude: Quaternions, angles: Pairs) -> None:
+    """Turn earth angles [rad] to deck angles, in place; attitude: rotation deck -> earth."""
     mat_ed = np.empty((3, 3))
     for k in range(len(angles)):
         line_of_sight.rotation(attitude[k, 0], attitude[k, 1], attitude[k, 2], attitude[k, 3], mat_ed)
@@ -43,8 +48,8 @@ def _on_deck(attitude, angles):
         angles[k, 0], angles[k, 1] = line_of_sight.angles(*line_of_sight.to_deck(mat_ed, e, n, u))
 
 
-def programs(bag):
-    """Return the program tracks of a bag.Bag in the order of their messages, as the control unit followed them.
+def programs(bag: Recording) -> list[ProgramTrack]:
+    """Return the program tracks of a recording in the order of their messages, as the control unit followed them.
 
     Refraction is a part of them if the recorded control unit adds it.
     """
@@ -62,13 +67,13 @@ def programs(bag):
     return [air.apparent(track) for track in found]
 
 
-def _of_acu(bag):
+def _of_acu(bag: Recording) -> dict[str, Json]:
     """Return the recorded parameters {name: value} of the control unit."""
     return bag.configuration['parameters'].get('acu', {})
 
 
-def of_programs(tracks, t):
-    """Return the directions (n, 2) [rad] of the last of several program tracks that covers an instant."""
+def of_programs(tracks: Iterable[ProgramTrack], t: Times) -> Pairs:
+    """Return the directions [rad] of the last of several program tracks that covers an instant."""
     out, part = np.full((t.size, 2), np.nan), np.empty((t.size, 2))
     for track in tracks:
         _of_table(track, t, part)
@@ -77,8 +82,8 @@ def of_programs(tracks, t):
     return out
 
 
-def _satellite(bag, predictor, t):
-    """Return the directions (n, 2) [rad] of the satellite of the mode tle, by the elements in force at each time."""
+def _satellite(bag: Recording, predictor: Predictor, t: Times) -> Pairs:
+    """Return the directions [rad] of the satellite of the mode tle, by the elements in force at each time."""
     changes = [(-np.inf, predictor)]
     for time, command, reply in tracking.replies(bag, 'acu/command_result'):
         given = command.arguments
@@ -99,11 +104,10 @@ def _satellite(bag, predictor, t):
     return out
 
 
-def followed(bag, modes, tracks):
-    """Return the mode of the table (n,) that the control unit followed last at each step.
+def followed(bag: Recording, modes: Texts, tracks: Sequence[ProgramTrack]) -> Texts:
+    """Return the mode of the table that the control unit followed last at each step.
 
-    modes: (n,) of the steps; tracks: the program tracks. Before the first table, the program track is expected, and
-    without one the satellite of the mode tle.
+    Before the first table, the program track is expected, and without one the satellite of the mode tle.
     """
     inside = np.isin(modes, TABLE_MODES)
     last = np.maximum.accumulate(np.where(inside, np.arange(modes.size), -1))
@@ -111,10 +115,10 @@ def followed(bag, modes, tracks):
     return np.where(last < 0, first, modes[last])
 
 
-def on_deck(bag, t, tracks, modes):
-    """Return the predicted deck angles (n, 2) [rad] at stamps t (n,) [s]; NaN where nothing is predicted.
+def on_deck(bag: Recording, t: Times, tracks: Sequence[ProgramTrack], modes: Texts) -> Pairs:
+    """Return the predicted deck angles [rad] at the steps; NaN where nothing is predicted.
 
-    tracks: of `programs`; modes: (n,) of the steps. Raises PredictionError for predictions that need more than the
+    tracks: of `programs`; modes: of the steps. Raises PredictionError for predictions that need more than the
     recording.
     """
     tables, out = followed(bag, modes, tracks), np.full((t.size, 2), np.nan)

@@ -13,14 +13,18 @@ The offset of the point is the place of the highest level, c1 / (2 c3) and c2 / 
 there, also if its disk is wider than the beam.
 """
 import math
-import typing
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from acu_tracker.program.program_track import ProgramTrack
 from pedestal_analysis.calibration import predicted
 from pedestal_analysis.calibration.predicted import PredictionError
 from pedestal_analysis.results import tracking
 from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.quantities import Floats, Pair, Pairs, Radians, Texts, Times
+from pedestal_recording.recording import Recording
 
 MIN_LEVELS = 5  # smallest number of levels of a scan
 MIN_LEVEL_SHARE = 0.2  # smallest level that is fitted, as a share of the highest; further out a beam is no Gaussian
@@ -34,19 +38,15 @@ class ScanError(ValueError):
     """Error of a scan that gives no offset. Its text is one line."""
 
 
-class Peak(typing.NamedTuple):
-    """Place of the highest level of a scan.
-
-    offset, sigma: (2,) cross-elevation and elevation, and their standard deviations, in the unit of the offsets;
-    width: between the half levels, in the same unit
-    """
-    offset: np.ndarray
-    sigma: np.ndarray
-    width: float
+class Peak(NamedTuple):
+    """Place of the highest level of a scan, in the unit of the offsets."""
+    offset: Pair        # cross-elevation and elevation
+    sigma: Pair         # their standard deviations
+    width: float        # between the half levels
 
 
-def peak(offsets, levels) -> Peak:
-    """Return the Peak of levels (n,) [any linear unit] at offsets (n, 2). Raises ScanError."""
+def peak(offsets: Pairs, levels: Floats) -> Peak:
+    """Return the Peak of levels [any linear unit] at offsets. Raises ScanError."""
     used = levels >= MIN_LEVEL_SHARE * levels.max(initial=0.0)
     x, y = offsets[used].T
     L = levels[used] / levels.max(initial=0.0)
@@ -72,22 +72,19 @@ def peak(offsets, levels) -> Peak:
     return Peak(place, sigma, 2.0 * math.sqrt(math.log(2.0) / c[3]))
 
 
-class Dwell(typing.NamedTuple):
-    """Time at a commanded offset: first and last row of its steps, and the azimuth and elevation of the offset [rad].
-
-    The last row does not belong to the dwell.
-    """
-    first: int
-    last: int
-    azimuth: float
-    elevation: float
+class Dwell(NamedTuple):
+    """Time at a commanded offset."""
+    first: int          # row of its first step
+    last: int           # row after its last step
+    azimuth: Radians
+    elevation: Radians
 
 
-def scans(bag, t, modes) -> list[list[Dwell]]:
-    """Return the scans of a recording, each a list of Dwells in the order of time.
+def scans(bag: Recording, t: Times, modes: Texts) -> list[list[Dwell]]:
+    """Return the scans of a recording, each with its dwells in the order of time.
 
-    t, modes: stamps [s] and modes of the steps. A scan ends with a dwell that no command ends within MAX_DWELL_S, or
-    with a change of the mode. The last dwell is at most as long as the dwell before it.
+    t, modes: of the steps. A scan ends with a dwell that no command ends within MAX_DWELL_S, or with a change of the
+    mode. The last dwell is at most as long as the dwell before it.
     """
     commands = [(time, command.arguments) for time, command, reply in tracking.replies(bag, 'acu/command_result')
                 if command.verb == 'offset' and reply.granted]
@@ -116,13 +113,13 @@ def scans(bag, t, modes) -> list[list[Dwell]]:
     return [scan for scan in found if scan]
 
 
-def at_rest(dwell) -> slice:
-    """Return the rows of the last part of a Dwell, over which its level is averaged."""
+def at_rest(dwell: Dwell) -> slice:
+    """Return the rows of the last part of a dwell, over which its level is averaged."""
     return slice(dwell.last - max(round(DWELL_SHARE * (dwell.last - dwell.first)), 1), dwell.last)
 
 
-def points(bag, tracks):
-    """Return (times [s], directions, offsets, sigmas) of the scans of a recording; the arrays are (k, 2) [deg].
+def points(bag: Recording, tracks: Sequence[ProgramTrack]) -> tuple[Times, Pairs, Pairs, Pairs]:
+    """Return (times, directions, offsets, sigmas) of the scans of a recording, all except the times [deg].
 
     tracks: predicted.programs. Raises ScanError without a scan, or for a scan that gives no offset.
     """
@@ -161,8 +158,8 @@ def points(bag, tracks):
     return table[:, 0], table[:, 1:3], table[:, 3:5], table[:, 5:7]
 
 
-def mean_direction(directions):
-    """Return the mean azimuth in (-pi, pi] and elevation of directions (n, 2) [rad] that lie near each other."""
+def mean_direction(directions: Pairs) -> tuple[Radians, Radians]:
+    """Return the mean azimuth in (-pi, pi] and elevation of directions [rad] that lie near each other."""
     first = directions[0, 0]
     turned = np.array([wrap(azimuth) for azimuth in directions[:, 0] - first])
     return wrap(first + turned.mean()), directions[:, 1].mean()

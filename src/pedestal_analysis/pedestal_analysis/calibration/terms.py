@@ -6,28 +6,27 @@ pedestal_common.geometry.pointing_model.
 
 az, el   azimuth, clockwise from north, and elevation of the wanted direction [rad], each (n,)
 """
-import typing
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from pedestal_common.quantities import Floats, Pairs
 
-class Term(typing.NamedTuple):
+
+class Term(NamedTuple):
     """A term of the pointing model.
 
-    name     P and its number in the VLBI Field System
-    meaning  cause of the term, as a noun
-    tpoint   its name in TPOINT, with the sign for the conversion
-    effect   effect(az, el) -> offsets of a term of 1: cross-elevation and elevation [rad] or [rad per rad]
-    factor   True for a factor [-]; the other terms are angles
+    effect(az, el) returns the offsets of a term of 1: cross-elevation and elevation [rad] or [rad per rad].
     """
-    name: str
-    meaning: str
-    tpoint: str
-    effect: typing.Callable
-    factor: bool = False
+    name: str       # P and its number in the VLBI Field System
+    meaning: str    # cause of the term, as a noun
+    tpoint: str     # its name in TPOINT, with the sign for the conversion
+    effect: Callable[[Floats, Floats], tuple[float | Floats, float | Floats]]
+    factor: bool = False    # True for a factor [-]; the other terms are angles
 
     @property
-    def unit(self):
+    def unit(self) -> str:
         """Return the unit of the term: deg, or '' for a factor."""
         return '' if self.factor else 'deg'
 
@@ -63,7 +62,7 @@ FULL_TURN_TERMS = frozenset(('P5', 'P6', 'P13', 'P14', 'P15', 'P16', 'P17', 'P18
 """Names of the terms whose effect depends on the azimuth, with a period of one turn or half a turn."""
 
 
-def chosen(text):
+def chosen(text: str) -> tuple[str, ...]:
     """Return the names of the terms in a text such as 'P1,P7' or 'p1 p7', in the order of TERMS. Raises ValueError."""
     words = text.replace(',', ' ').upper().split()
     given = [word if word.startswith('P') else f'P{word}' for word in words]
@@ -80,11 +79,10 @@ def chosen(text):
     return tuple(name for name in TERM_BY_NAME if name in given)
 
 
-def design(names, directions):
-    """Return the matrix (n, 2, p) of the offsets on the sky (cross-elevation, elevation) for terms of 1.
+def design(names: Sequence[str], directions: Pairs) -> Floats:
+    """Return the matrix (n, 2, p) of the offsets on the sky (cross-elevation, elevation) for p terms of 1.
 
-    names: p names of terms; directions (n, 2): azimuth and elevation [deg]. Multiplied by the terms [deg, -], the
-    matrix gives offsets [deg].
+    directions: azimuth and elevation [deg]. Multiplied by the terms [deg, -], the matrix gives offsets [deg].
     """
     az, el = np.radians(directions).T
     matrix = np.empty((len(directions), 2, len(names)))

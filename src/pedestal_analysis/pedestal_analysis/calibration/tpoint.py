@@ -13,7 +13,9 @@ both conventions fit equally well, the convention of a file is always stated wit
 """
 import datetime
 import math
+import pathlib
 import re
+from typing import TypeAlias
 
 from pedestal_common.text_files import csv_table
 from pedestal_common.text_files.csv_table import TableError
@@ -21,6 +23,12 @@ from pedestal_common.text_files.csv_table import TableError
 AXIS_RANGE_DEG = (-540.0, 720.0)  # accepted azimuths [deg]
 MOUNT_ELEVATION_RANGE_DEG = (-10.0, 95.0)  # accepted elevations of the mount [deg]; those on the sky are at most 90
 MAX_DIFFERENCE_DEG = 5.0  # largest accepted offset on the sky [deg]
+
+OffsetRow: TypeAlias = tuple[int, float, float, float, float, float, float]
+"""Line in the file, azimuth and elevation, offsets in cross-elevation and elevation, their standard deviations [deg].
+
+A standard deviation is NaN if the file states none.
+"""
 
 _ALTAZ_OPTIONS = ('ALTAZ', 'AZALT')
 _MIN_DATE_NUMBERS = 6
@@ -32,15 +40,16 @@ _LATITUDE_PATTERN = re.compile(r'[-+]?\d{1,2}$')
 _NUMBERS_PATTERN = re.compile(r'[-+]?\.?\d')
 
 
-def is_tpoint(text):
+def is_tpoint(text: str) -> bool:
     """Return True for a text of TPOINT: a line of it begins with : (an option) or with ! (a comment)."""
     return any(line.lstrip().startswith((':', '!')) or line.strip().upper() in _ALTAZ_OPTIONS
                for line in text.splitlines())
 
 
-def _records(text):
+def _records(text: str) -> tuple[list[tuple[int, list[str]]], list[str]]:
     """Return ([(line, words) of the lines of numbers], options) of a text, up to the line END."""
-    numbers, options = [], []
+    numbers: list[tuple[int, list[str]]] = []
+    options: list[str] = []
     for line, content in enumerate(text.splitlines(), start=1):
         content = content.partition('!')[0].strip()
         if content.upper() == 'END':
@@ -54,7 +63,7 @@ def _records(text):
     return numbers, options
 
 
-def date(text):
+def date(text: str) -> str:
     """Return the date in the run parameters, as in 2021-08-21, '' without one."""
     numbers, _ = _records(text)
     words = numbers[0][1] if numbers else []
@@ -64,10 +73,10 @@ def date(text):
         return ''
 
 
-def origin(path, text):
+def origin(path: str | pathlib.Path, text: str) -> tuple[str, int]:
     """Return (`north` or `south`, line of the comment that states it, 0 without one). Raises TableError for comments
     that contradict each other."""
-    stated = {}
+    stated: dict[str, int] = {}
     for line, content in enumerate(text.splitlines(), start=1):
         match = _ORIGIN_PATTERN.search(content.partition('!')[2])
         if match:
@@ -79,23 +88,22 @@ def origin(path, text):
     return next(iter(stated.items()), ('north', 0))
 
 
-def rows(path, text):
-    """Return [(line, azimuth, elevation, offsets in cross-elevation and elevation, NaN, NaN)] [deg]. Raises
-    TableError.
+def rows(path: str | pathlib.Path, text: str) -> list[OffsetRow]:
+    """Return the offsets of the file, without a standard deviation. Raises TableError.
 
     The azimuth is in the turn of the wrap in which the mount was.
     """
     numbers, options = _records(text)
     if not set(options) & set(_ALTAZ_OPTIONS):
-        found = f'; options found: {", ".join(options)}' if options else ''
+        others = f'; options found: {", ".join(options)}' if options else ''
         raise TableError(f'{path}: a TPOINT file must have the option `: ALTAZ`, for observations of azimuth and '
-                         f'elevation{found}')
+                         f'elevation{others}')
     from_south = origin(path, text)[0] == 'south'
     if numbers and not all(map(_LATITUDE_PATTERN.match, numbers[0][1][:2])):
         line, words = numbers[0]
         raise TableError(f'{path}: line {line}: begins with {" ".join(words[:3]):.40}: the first line of numbers must '
                          'be the run parameters, with the latitude in degrees, minutes and seconds')
-    found = []
+    found: list[OffsetRow] = []
     for line, words in numbers[1:]:
         if len(words) < 4:
             raise TableError(f'{path}: line {line}: {len(words)} numbers, must be at least 4: azimuth and elevation '

@@ -1,5 +1,6 @@
 """Figure of a report on the INS of a ship: attitude error and stated standard deviation."""
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.report.figures import (
     FILTERED_COLOUR,
@@ -7,19 +8,18 @@ from pedestal_analysis.report.figures import (
     TRUTH_COLOUR,
     Spec,
     draw_line,
+    existing,
     new_panels,
     outside_legend,
 )
+from pedestal_analysis.report.run_data import RunData
 
 MIN_DRAWN_ERROR_DEG = 1e-4  # smallest error drawn on the logarithmic scale [deg]
 
 
-def attitude(data):
-    """Return the figure of the heading and level errors of the INS [deg], and of their stated standard deviations.
-
-    data: run_data.RunData.
-    """
-    known = data.attitude
+def attitude(data: RunData) -> Figure:
+    """Return the figure of the heading and level errors of the INS [deg], and of their stated standard deviations."""
+    known = existing(data.attitude)
     figure, panels = new_panels(2, y='error [deg]', sharex=True)
     # known.sigma is (n, 2): level per axis, heading. Both level axes together have sqrt(2) times the sigma of one.
     for axes, name, error, sigma in zip(panels[:, 0], ('heading', 'level, both axes'),

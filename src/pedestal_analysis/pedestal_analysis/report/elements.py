@@ -2,6 +2,7 @@
 import html
 import io
 import math
+from collections.abc import Iterable, Sequence
 
 from pedestal_analysis.report import figures
 
@@ -32,7 +33,7 @@ figure svg { display: block; width: 100%; height: auto; min-width: 26rem; }
 """
 
 
-def page(title, parts):
+def page(title: str, parts: Iterable[str]) -> str:
     """Return the text of an HTML page; parts: its elements as texts."""
     return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -40,10 +41,10 @@ def page(title, parts):
             + '\n'.join(parts) + '\n</body></html>\n')
 
 
-def figure(spec, data, reason=''):
+def figure(spec: figures.Spec, data: object, reason: str = '') -> str:
     """Return a figure as an HTML element with title and caption.
 
-    spec: figures.Spec; data: argument of its function `draw`; reason: why the figure cannot be drawn, or ''.
+    data: argument of spec.draw; reason: why the figure cannot be drawn, or ''.
     """
     caption = f'<h3>{html.escape(spec.title)}</h3>'
     if reason:
@@ -54,18 +55,18 @@ def figure(spec, data, reason=''):
             f'<div class="wide">{figures.inline(stream.getvalue())}</div></figure>')
 
 
-def number(value, unit=''):
+def number(value: float, unit: str = '') -> str:
     """Return a value with its unit as text."""
     text = f'{value:#.4g}'.rstrip('.') if math.isfinite(value) else 'not measured'
     return f'{text}\N{NO-BREAK SPACE}{unit}'.rstrip() if math.isfinite(value) else text
 
 
-def table(head, rows, kind=''):
-    """Return an HTML table; head: texts of its header, or None; rows: lists of texts, the name of the row first.
+def table(head: Sequence[str] | None, rows: Iterable[Sequence[str]], kind: str = '') -> str:
+    """Return an HTML table; head: its header; rows: the name of the row first.
 
     kind: CSS class; 'n' aligns the other cells to the right, 'meta' is for the table at the head of a page.
     """
-    def line(cells, tag):
+    def line(cells: Sequence[str], tag: str) -> str:
         rest = ''.join(f'<{tag} class="{kind}">{html.escape(cell)}</{tag}>' if kind != 'meta' and kind else
                        f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells[1:])
         return f'<tr><th>{html.escape(cells[0])}</th>{rest}</tr>'

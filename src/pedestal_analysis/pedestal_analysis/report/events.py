@@ -3,14 +3,17 @@ alarms. A table lists them, and marks with the numbers of its rows show them on 
 import contextlib
 import math
 import typing
+from collections.abc import Iterator, Sequence
 
 from pedestal_analysis.results import tracking
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection.table import CLEAR_COMMAND, INJECT_COMMANDS, INJECTED_FAULTS
+from pedestal_common.quantities import Message, Seconds
 from pedestal_common.wire import commands
 from pedestal_operator import state
 from pedestal_operator.page.page_log import Log
+from pedestal_recording.recording import Recording
 
 STATE_TOPICS = ('adu/state', 'adu/stow_pins', 'ins/state', 'acu/blockage')
 """Topics whose texts state the condition of the equipment."""
@@ -19,32 +22,36 @@ RAISED_STATES = ('unacknowledged', 'acknowledged')  # states of an alarm whose c
 MAX_LISTED_EVENTS = 300  # largest number of events of a kind, from the beginning
 
 
+ModeSpan: typing.TypeAlias = tuple[Seconds, Seconds, str]   # begin, end and name of a mode
+
+
 class Event(typing.NamedTuple):
-    """An event. t, end: beginning and end [s], NaN for no end; kind: of figures.EVENT_COLOURS; who: its source."""
-    t: float
-    kind: str
-    who: str
+    """An event."""
+    t: Seconds  # of its beginning
+    kind: str   # of figures.EVENT_COLOURS
+    who: str    # its source
     text: str
-    end: float = math.nan
+    end: Seconds = math.nan     # NaN for no end
 
 
-def read(bag, mode_spans) -> list[Event]:
-    """Return the events of a bag.Bag of one beam in the order of time; mode_spans: [(start, stop [s], mode)]."""
+def read(bag: Recording, mode_spans: Sequence[ModeSpan]) -> list[Event]:
+    """Return the events of a recording of one beam in the order of time."""
     found = [[Event(start, 'mode', 'acu', mode, stop) for start, stop, mode in mode_spans], _replies(bag),
              _states(bag), _alarms(bag)]
     return sorted((event for events in found for event in events[:MAX_LISTED_EVENTS]), key=lambda event: event.t)
 
 
-def _messages(bag, topic, message_type):
-    """Yield (time [s], message) of a topic, nothing if it is missing or of another type."""
+def _messages(bag: Recording, topic: str, message_type: str) -> Iterator[tuple[Seconds, Message]]:
+    """Yield (time, message) of a topic, nothing if it is missing or of another type."""
     if bag.topics.get(topic) == message_type:
         for _, log, _, message in bag.messages(topic):
             yield (log - bag.start) / NS_PER_SECOND, message
 
 
-def _replies(bag):
+def _replies(bag: Recording) -> list[Event]:
     """Return the events of all replies: commands, refusals and injected faults; a repeated jog is one event."""
-    events, log = [], Log()
+    events: list[Event] = []
+    log = Log()
     for node in nodes.NODES:
         for t, command, reply in tracking.replies(bag, node.replies):
             with contextlib.suppress(ValueError):  # the command has a wrong argument
@@ -58,8 +65,8 @@ def _replies(bag):
     return events
 
 
-def _reply(t, node, command, reply):
-    """Return the Event of a commands.Command to a node and its Reply."""
+def _reply(t: Seconds, node: str, command: commands.Command, reply: commands.Reply) -> Event:
+    """Return the Event of a command to a node and its reply."""
     if not reply.granted:
         return Event(t, 'refused', command.who, f'{node}: {command}: {reply.text}')
     if command.verb not in [fault.name for fault in INJECTED_FAULTS.get(node, ())]:
@@ -68,7 +75,7 @@ def _reply(t, node, command, reply):
     return Event(t, 'injected fault', command.who, f'{node}: {command}', t + duration)
 
 
-def _states(bag):
+def _states(bag: Recording) -> list[Event]:
     """Return the events of changed states of the equipment; the first state of a topic is none."""
     events = []
     for topic in STATE_TOPICS:
@@ -80,9 +87,10 @@ def _states(bag):
     return events
 
 
-def _alarms(bag):
+def _alarms(bag: Recording) -> list[Event]:
     """Return the events of raised alarms, from the raising to the clearing of the condition."""
-    events, raised = [], {}
+    events: list[Event] = []
+    raised: dict[str, Event] = {}
     for t, message in _messages(bag, 'acu/alarms', 'diagnostic_msgs/msg/DiagnosticArray'):
         listed = {alarm['name']: alarm for alarm in map(state.alarm, message.status)
                   if alarm['state'] in RAISED_STATES}
@@ -98,14 +106,14 @@ def _alarms(bag):
     return [*events, *raised.values()]
 
 
-def rows(events, end) -> list[list[str]]:
-    """Return the rows [number, time, duration, kind, source, text] of a table; end: time of the last message [s]."""
+def rows(events: Sequence[Event], end: Seconds) -> list[list[str]]:
+    """Return the rows [number, time, duration, kind, source, text] of a table; end: time of the last message."""
     return [[str(number), f'{event.t:.2f}', _duration(event, end), event.kind, event.who, event.text]
             for number, event in enumerate(events, start=1)]
 
 
-def _duration(event, end):
-    """Return the duration of an event [s] as text, '' for an event without one; end: as in `rows`."""
+def _duration(event: Event, end: Seconds) -> str:
+    """Return the duration of an event as text, '' for an event without one; end: as in `rows`."""
     if math.isnan(event.end):
         return ''
     return f'{event.end - event.t:.2f}' if event.end < end else 'to the end'

@@ -5,13 +5,29 @@ Measured values are grey, filtered or commanded values blue, and true values ora
 import pathlib
 import re
 import typing
+from collections.abc import Callable, Iterable, Sequence
+from typing import IO, TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter
+from numpy.typing import NDArray
 
 from pedestal_analysis.results.tracking import stretches
+from pedestal_common.quantities import Bools, Floats, Seconds, Times
+
+if TYPE_CHECKING:
+    from matplotlib.typing import RcKeyType
+
+    from pedestal_analysis.report.events import Event
+    from pedestal_analysis.report.run_data import RunData
+
+Panels: TypeAlias = NDArray[np.object_]     # (rows, columns) of Axes
+Window: TypeAlias = tuple[Seconds, Seconds]     # first and last time to draw
+_Part = TypeVar('_Part')
 
 INK_COLOUR = '#20242a'
 RAW_COLOUR, FILTERED_COLOUR, TRUTH_COLOUR = '#8d949e', '#1f6fd1', '#e57a00'
@@ -19,7 +35,7 @@ MOTOR_1_COLOUR, MOTOR_2_COLOUR = '#0b8f8c', '#a04fc4'
 """Colours of texts and marks, of measured, filtered and true values, and of both motors."""
 FIGURE_WIDTH_INCH = 7.4  # width of a figure [inch]
 
-MATPLOTLIB_STYLE = {
+MATPLOTLIB_STYLE: 'dict[RcKeyType, object]' = {
     'font.size': 9.0, 'axes.titlesize': 9.5, 'axes.titlelocation': 'left', 'legend.fontsize': 8.5,
     'legend.frameon': False, 'axes.spines.top': False, 'axes.spines.right': False, 'axes.grid': True,
     'grid.color': '#88919c', 'grid.alpha': 0.25, 'grid.linewidth': 0.6, 'axes.edgecolor': INK_COLOUR,
@@ -32,28 +48,25 @@ MATPLOTLIB_STYLE = {
 
 
 class Spec(typing.NamedTuple):
-    """Specification of a figure.
-
-    key              name of its file without extension
-    title, caption   texts above the figure
-    needs            data that the figure needs: keys of run_data._NEEDS
-    draw             function draw(data) -> Figure; data: run_data.RunData or trials_page.Trials
-    dpi              dots per inch of its PNG
-    timed            True for panels over time, which get the marks of the events
-    paper            number of the same figure in the paper; 0: none
-    """
-    key: str
+    """Specification of a figure."""
+    key: str    # name of its file without extension
     title: str
-    caption: str
-    needs: tuple
-    draw: typing.Callable
-    dpi: int = 150
-    timed: bool = False
-    paper: int = 0
+    caption: str    # below the title
+    needs: tuple[str, ...]  # data that the figure needs: keys of run_data._NEEDS
+    draw: Callable[..., Figure]     # function of run_data.RunData or of trials_page.Trials
+    dpi: int = 150  # of its PNG
+    timed: bool = False     # True for panels over time, which get the marks of the events
+    paper: int = 0  # number of the same figure in the paper; 0: none
 
 
-def thin(t, y, bins=1000):
-    """Return a line t, y (n,) with fewer points: the smallest and the largest value in each of `bins` parts.
+def existing(part: _Part | None) -> _Part:
+    """Return a part of the data that a figure needs, which therefore exists (Spec.needs)."""
+    assert part is not None
+    return part
+
+
+def thin(t: Times, y: Floats, bins: int = 1000) -> tuple[Times, Floats]:
+    """Return a line t, y with fewer points: the smallest and the largest value in each of `bins` parts.
 
     Because gaps must stay visible, the first NaN of each part stays too.
     """
@@ -70,13 +83,15 @@ def thin(t, y, bins=1000):
     return t[index], y[index]
 
 
-def spans(flags):
-    """Return [(first index, last index)] of the intervals in which flags (n,) bool are true."""
+def spans(flags: Bools) -> list[tuple[int, int]]:
+    """Return [(first index, last index)] of the intervals in which flags are true."""
     return [(first, end - 1) for first, end in stretches(flags)]
 
 
-def new_panels(rows, columns=1, height=None, width=FIGURE_WIDTH_INCH, x='time [s]', y='', **options):
-    """Return (Figure, axes (rows, columns)) of a figure with some panels.
+def new_panels(rows: int, columns: int = 1, height: float | None = None, width: float = FIGURE_WIDTH_INCH,
+               x: str | Sequence[str] = 'time [s]', y: str | Sequence[str] = '',
+               **options: Any) -> tuple[Figure, Panels]:  # of matplotlib, which has many
+    """Return a figure with some panels.
 
     height, width   size of the figure [inch]; the default height is 0.5, plus 1.75 for each row
     x               label below the last row: one text for all columns, or one for each
@@ -92,8 +107,9 @@ def new_panels(rows, columns=1, height=None, width=FIGURE_WIDTH_INCH, x='time [s
     return figure, axes
 
 
-def draw_line(axes, t, y, window=None, **options):
-    """Draw y (n,) over t (n,) with fewer points (`thin`); window: (first, last) t to draw; options: of Axes.plot."""
+def draw_line(axes: Axes, t: Times, y: Floats, window: Window | None = None,
+              **options: Any) -> None:  # of matplotlib, which has many
+    """Draw y over t with fewer points (`thin`); options: of Axes.plot."""
     if window is not None:
         inside = (t >= window[0]) & (t <= window[1])
         t, y = t[inside], y[inside]
@@ -102,7 +118,7 @@ def draw_line(axes, t, y, window=None, **options):
         axes.set_xlim(t[0], t[-1])
 
 
-def outside_legend(figure, axes):
+def outside_legend(figure: Figure, axes: Axes) -> Figure:
     """Add the legend of one panel (axes) above all panels, and return the figure."""
     figure.legend(*axes.get_legend_handles_labels(), loc='outside upper right', ncols=4)
     return figure
@@ -116,23 +132,23 @@ MIN_MARK_DISTANCE = 0.02
 """Smallest distance of two numbers on a panel [widths of the panel]; closer events share one number."""
 
 
-def mark(figure, events):
-    """Draw a vertical line for each of the events.Event on all panels, with its number, from 1, on the first row."""
+def mark(figure: Figure, events: Sequence['Event']) -> None:
+    """Draw a vertical line for each event on all panels, with its number, from 1, on the first row."""
     for axes in figure.axes:
         low, high = axes.get_xlim()
         seen = [(number, event) for number, event in enumerate(events, start=1) if low < event.t < high]
         for _, event in seen:
             axes.axvline(event.t, color=EVENT_COLOURS[event.kind], linewidth=0.8, linestyle=':')
-        if axes.get_subplotspec().is_first_row():
+        if existing(axes.get_subplotspec()).is_first_row():
             for label, t, colour in _labels(seen, MIN_MARK_DISTANCE * (high - low)):
                 axes.text(t, 0.99, label, color=colour, fontsize=6.5, ha='right', va='top', rotation=90.0,
                           transform=axes.get_xaxis_transform())
 
 
-def _labels(seen, distance):
-    """Return [(text, time, colour)] of the numbers of events; seen: [(number, Event)] in order; distance: smallest
-    distance of two numbers [s]."""
-    groups = []
+def _labels(seen: Sequence[tuple[int, 'Event']], distance: Seconds) -> list[tuple[str, Seconds, str]]:
+    """Return [(text, time, colour)] of the numbers of events; seen: (number, event) in order; distance: smallest
+    distance of two numbers."""
+    groups: list[list[tuple[int, Event]]] = []
     for numbered in seen:
         if groups and numbered[1].t - groups[-1][0][1].t < distance:
             groups[-1].append(numbered)
@@ -147,22 +163,22 @@ FILE_METADATA = {'png': {'Software': None}, 'pdf': {'CreationDate': None, 'Creat
                  'svg': {'Date': None, 'Creator': None, 'Format': None, 'Type': None}}
 """{format of a file: metadata that are left out}. This avoids different bytes of equal figures."""
 
-LINE_DASHES = {TRUTH_COLOUR: (0, (6.0, 1.5)), MOTOR_1_COLOUR: (0, (3.0, 1.0, 1.0, 1.0)),
-               MOTOR_2_COLOUR: (0, (2.0, 1.2))}
+LINE_DASHES: dict[object, tuple[float, tuple[float, ...]]] = {
+    TRUTH_COLOUR: (0, (6.0, 1.5)), MOTOR_1_COLOUR: (0, (3.0, 1.0, 1.0, 1.0)), MOTOR_2_COLOUR: (0, (2.0, 1.2))}
 """{colour: dashes} by which the lines differ in a print without colour. Lines of all other colours are solid."""
 
 
 MIN_WIDE_LINE_PT = 2.0  # width above which a line needs no dashes, because its width distinguishes it [pt]
 
 
-def tidy(figure):
+def tidy(figure: Figure) -> None:
     """Make a figure easier to read, after all is drawn.
 
     In a panel with several lines, the solid lines become dashed by their colours (LINE_DASHES). A logarithmic axis of
     less than three decades has plain numbers as labels.
     """
     for axes in figure.axes:
-        lines = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
+        lines = [line for line in axes.get_lines() if np.size(line.get_xdata()) > 2]
         _dash(lines if len(lines) > 1 else ())
         for axis in (axes.xaxis, axes.yaxis):
             low, high = sorted(axis.get_view_interval())
@@ -175,13 +191,13 @@ def tidy(figure):
         _dash(legend.get_lines())
 
 
-def _dash(lines):
+def _dash(lines: Iterable[Line2D]) -> None:
     for line in lines:
         if line.get_linestyle() == '-' and line.get_linewidth() < MIN_WIDE_LINE_PT and line.get_color() in LINE_DASHES:
             line.set_linestyle(LINE_DASHES[line.get_color()])
 
 
-def store(figure, output, dpi=150):
+def store(figure: Figure, output: pathlib.Path | IO[str], dpi: int = 150) -> None:
     """Write a figure to a path or to a stream.
 
     The suffix of the path is the format; PNG and PDF have a white background. A stream receives a transparent SVG.
@@ -191,16 +207,16 @@ def store(figure, output, dpi=150):
     figure.savefig(output, format=kind, dpi=dpi, metadata=FILE_METADATA[kind], **colours)
 
 
-def render(spec, data, output):
+def render(spec: Spec, data: object, output: pathlib.Path | IO[str]) -> None:
     """Draw the figure of a Spec, and `store` it in a path or stream. Equal data give equal bytes."""
     with matplotlib.rc_context({**MATPLOTLIB_STYLE, 'svg.hashsalt': spec.key}):
         figure = spec.draw(data)
         if spec.timed:
-            mark(figure, data.events)
+            mark(figure, cast('RunData', data).events)
         store(figure, output, spec.dpi)
 
 
-def inline(svg):
+def inline(svg: str) -> str:
     """Return the text of an SVG file as an element of an HTML page.
 
     The prolog, the names of elements and the metadata are left out. Texts have the colour of the page. Coordinates are

@@ -3,6 +3,7 @@
 Each function of FIGURES takes the run_data.RunData of a recording (`data`).
 """
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.report.figures import (
     FILTERED_COLOUR,
@@ -11,11 +12,14 @@ from pedestal_analysis.report.figures import (
     TRUTH_COLOUR,
     Spec,
     draw_line,
+    existing,
     new_panels,
     outside_legend,
 )
+from pedestal_analysis.report.run_data import RunData
 from pedestal_analysis.results.consistency import BAND_PROBABILITY, bounds
 from pedestal_common.graph import topics
+from pedestal_common.quantities import Floats, Times
 
 MODEL_COLOURS = {'cv': '#2f9e5b', 'ca': '#1f6fd1', 'singer': '#8364c8', 'current_statistical': '#b5179e',
                  'ca_2': '#0b8f8c', 'ca_3': '#7fb069', 'ca_4': '#e0b400', 'ca_5': '#e57a00', 'ca_6': '#d1495b',
@@ -24,9 +28,9 @@ MODEL_COLOURS = {'cv': '#2f9e5b', 'ca': '#1f6fd1', 'singer': '#8364c8', 'current
 NIS_SPAN_S = 1.0  # span over which the figure averages the NIS (normalised innovation squared) [s]
 
 
-def estimate(data):
+def estimate(data: RunData) -> Figure:
     """Return the figure of estimate minus truth and of twice the stated sigma, for angle [deg] and rate [deg/s]."""
-    known = data.filter
+    known = existing(data.filter)
     figure, panels = new_panels(2, 2, sharex=True)
     for row, axis, i in zip(panels, topics.AXES, range(2)):
         for axes, error, sigma, unit in ((row[0], known.error, known.sigma, 'deg'),
@@ -46,9 +50,9 @@ def estimate(data):
     return outside_legend(figure, panels[0, 0])
 
 
-def innovations(data):
+def innovations(data: RunData) -> Figure:
     """Return the figure of the innovations [deg] and of the mean NIS over NIS_SPAN_S with its band."""
-    known = data.filter
+    known = existing(data.filter)
     figure, panels = new_panels(2, 2, y='innovation [deg]', sharex=True)
     for row, axis, i in zip(panels, topics.AXES, range(2)):
         draw_line(row[0], known.t, np.degrees(known.innovation[:, i]), color=RAW_COLOUR, linewidth=0.7)
@@ -64,11 +68,11 @@ def innovations(data):
     return outside_legend(figure, panels[0, 1])
 
 
-def _averaged(t, nis, freedoms):
-    """Return the mean NIS in spans of NIS_SPAN_S: arrays (m,) of time [s], mean, expectation, low and high.
+def _averaged(t: Times, nis: Floats, freedoms: Floats) -> tuple[Times, Floats, Floats, Floats, Floats]:
+    """Return the mean NIS in spans of NIS_SPAN_S: time, mean, expectation, low and high.
 
-    t, nis, freedoms (n,): time of the steps [s], NIS and its degrees of freedom. low and high are the band of a
-    consistent filter. A span with less than half of the largest number of measurements is NaN.
+    t, nis, freedoms: time of the steps, NIS and its degrees of freedom. low and high are the band of a consistent
+    filter. A span with less than half of the largest number of measurements is NaN.
     """
     part = np.floor((t - t[0]) / NIS_SPAN_S).astype(int)
     known = np.isfinite(nis)
@@ -81,9 +85,9 @@ def _averaged(t, nis, freedoms):
         return t[0] + NIS_SPAN_S * (np.arange(count.size) + 0.5), mean, total / count, low, high
 
 
-def probabilities(data):
+def probabilities(data: RunData) -> Figure:
     """Return the figure of the probability of each motion model, for both axes."""
-    known = data.filter
+    known = existing(data.filter)
     figure, panels = new_panels(2, y='probability', sharex=True)
     for axes, axis, i in zip(panels[:, 0], topics.AXES, range(2)):
         for number, model in enumerate(topics.MOTION_MODELS):

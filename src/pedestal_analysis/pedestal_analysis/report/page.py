@@ -2,6 +2,8 @@
 import html
 import itertools
 import pathlib
+import types
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -22,7 +24,7 @@ from pedestal_common.graph import topics
 from pedestal_common.graph.topics import AXES
 from pedestal_common.text_files.files import sha256
 from pedestal_recording import bag as bags
-from pedestal_recording.verify import verify
+from pedestal_recording.verify import Report, verify
 
 MAX_DIAGNOSTICS_ROWS = 200  # largest number of rows of the table of diagnostics
 
@@ -31,7 +33,9 @@ PAPER_SCENARIOS = ('uav_flyby',)
 """Scenarios that repeat the experiment of the paper; only their reports name its figures."""
 
 
-def write(bag_path, output=None, png_folder=None, beam='', vector=None, author='', pdf=False) -> pathlib.Path:
+def write(bag_path: str | pathlib.Path, output: str | pathlib.Path | None = None,
+          png_folder: str | pathlib.Path | None = None, beam: str = '', vector: str | None = None, author: str = '',
+          pdf: bool = False) -> pathlib.Path:
     """Write the report of a bag, and return the path of its file.
 
     output       file of the report, by default report.html in the bag (beside a bare .mcap)
@@ -65,23 +69,23 @@ def write(bag_path, output=None, png_folder=None, beam='', vector=None, author='
     return output
 
 
-def _of_axes(name, values, last=''):
-    """Return a row of a table: name, numbers [(value, unit)] of azimuth and elevation, and the text `last`."""
+def _of_axes(name: str, values: Sequence[tuple[float, str]], last: str = '') -> list[str]:
+    """Return a row of a table: name, numbers (value, unit) of azimuth and elevation, and the text `last`."""
     return [name, *(elements.number(*value) for value in values), last]
 
 
-def _pointing(bag, data, values):
-    """Return the rows of the table of pointing errors and torques; values: those of results.measured."""
+def _pointing(bag: bags.Bag, data: run_data.RunData, values: results.Values) -> list[list[str]]:
+    """Return the rows of the table of pointing errors and torques."""
     noise = values['single_sample_noise_deg'][0]
 
-    def row(name, *keys, scale=1.0, unit='deg'):
+    def row(name: str, *keys: str, scale: float = 1.0, unit: str = 'deg') -> list[str]:
         return [name, *(elements.number(values[key][0] / scale, unit) for key in keys)]
 
     rms = ('cross_elevation_rms_deg', 'elevation_rms_deg', 'pointing_rms_deg')
     largest = ('cross_elevation_max_deg', 'elevation_max_deg', 'pointing_max_deg')
-    joints = run_data.table(bag, 'joint_states')
+    joints, run = figures.existing(run_data.table(bag, 'joint_states')), figures.existing(data.run)
     by_encoders = [row(f'pointing error by the encoders, {name}', *(f'encoder_{key}' for key in keys))
-                   for name, keys in (('rms', rms), ('largest', largest))] if data.run.has_encoders else []
+                   for name, keys in (('rms', rms), ('largest', largest))] if run.has_encoders else []
     return [row('pointing error, rms', *rms), row('pointing error, largest', *largest), *by_encoders,
             row("rms / receiver's single-sample noise", *rms, scale=noise, unit=''),
             row("largest / receiver's single-sample noise", *largest, scale=noise, unit=''),
@@ -92,14 +96,14 @@ def _pointing(bag, data, values):
             *_torques(data)]
 
 
-def _torques(data):
+def _torques(data: run_data.RunData) -> list[list[str]]:
     """Return the rows of the motor torques, [] without them."""
     return [_of_axes(f'torque of motor {i}, rms of the run',
                      [(tracking.known_rms(data.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
             for i in (1, 2)] if data.motors else []
 
 
-def _labelled(parts, *names):
+def _labelled(parts: Mapping[str, object], *names: str) -> list[list[str]]:
     """Return rows [label, number] of results with a label; parts: see results.measured.
 
     They are the results in names or, without names, all of them.
@@ -109,11 +113,11 @@ def _labelled(parts, *names):
             if results.RESULT_BY_NAME[name].label]
 
 
-def _loop(bag, check):
+def _loop(bag: bags.Bag, check: Report) -> list[list[str]]:
     """Return rows on the control loop: its rate by the time of the drive, lost steps, and steps missing in the
     recording.
 
-    In realtime they also state the rate and the jitter by the wall time. check: verify.Report.
+    In realtime they also state the rate and the jitter by the wall time.
     """
     rows = []
     joints = run_data.table(bag, 'joint_states')
@@ -140,8 +144,8 @@ def _loop(bag, check):
              'NOT complete, see below']]
 
 
-def _not_evaluated(run):
-    """Return the sentence that states why a tracking.Tracking has no evaluated part."""
+def _not_evaluated(run: tracking.Tracking) -> str:
+    """Return the sentence that states why a run has no evaluated part."""
     unknown = run.t.size - np.sum(run.known_mode)
     if unknown == run.t.size:
         return 'The recording does not state the mode of the ACU, so nothing was evaluated.'
@@ -150,9 +154,10 @@ def _not_evaluated(run):
             'evaluated.')
 
 
-def _results(bag, data, check):
+def _results(bag: bags.Bag, data: run_data.RunData, check: Report) -> list[str]:
     """Return the section on the results of the run, against the truth if it was recorded, and on its control loop."""
-    parts, rows = ['<h2 id="results">Results</h2>'], []
+    parts = ['<h2 id="results">Results</h2>']
+    rows: list[list[str]] = []
     if data.run is None:
         parts.append(f'<p class="bad">No comparison with the truth: {html.escape(data.no_truth)}.</p>')
         if data.motors:
@@ -174,8 +179,8 @@ def _results(bag, data, check):
     return [*parts, elements.table(None, rows + _loop(bag, check), 'n')]
 
 
-def _gaps(bag, check):
-    """Return the section on the problems in a verify.Report, and on topics without a message."""
+def _gaps(bag: bags.Bag, check: Report) -> list[str]:
+    """Return the section on the problems of the recording, and on topics without a message."""
     parts = []
     if not check.complete:
         problems = check.problems + [f'{topic.name}: {problem}' for topic in check.topics
@@ -188,19 +193,19 @@ def _gaps(bag, check):
     return parts
 
 
-def _warnings(check):
+def _warnings(check: Report) -> list[str]:
     """Return the warnings at the head of the page: aborted run, lost steps, foreign messages."""
     return [line for line in (check.ending, check.loss, *check.foreign) if line]
 
 
-def _figures(module, data, of_paper=False):
+def _figures(module: types.ModuleType, data: run_data.RunData, of_paper: bool = False) -> list[str]:
     """Return the figures of a module; of_paper: True if their titles name the figures of the paper."""
     return [elements.figure(spec._replace(title=f'{spec.title} (figure {spec.paper} of the paper)')
                             if of_paper and spec.paper else spec, data, data.lacks(spec.needs))
             for spec in module.FIGURES]
 
 
-def _events(bag, data):
+def _events(bag: bags.Bag, data: run_data.RunData) -> list[str]:
     """Return the section with the table of the events."""
     title = '<h2 id="events">What happened</h2>'
     if not data.events:
@@ -210,11 +215,11 @@ def _events(bag, data):
             '<p class="soft">The numbers mark these events on the curves below.</p>']
 
 
-def _consistency_table(known):
-    """Return the table of a consistency.Consistency, and its verdict as a sentence for each axis."""
+def _consistency_table(known: consistency.Consistency) -> str:
+    """Return the table of the consistency of the filter, and its verdict as a sentence for each axis."""
     judged = known.axes
 
-    def row(name, field, marks=(), unit='', scale=1.0):
+    def row(name: str, field: str, marks: Sequence[str] = (), unit: str = '', scale: float = 1.0) -> list[str]:
         return _of_axes(name, [(scale * getattr(axis, field), unit) for axis in judged], ', '.join(marks))
 
     marks = [[f'{name}: {mark}' for name, mark in zip(AXES, of_axes) if mark]
@@ -237,7 +242,7 @@ def _consistency_table(known):
         'of the INS, which the target filter does not model.</p>')
 
 
-def _deck(bag, data):
+def _deck(bag: bags.Bag, data: run_data.RunData) -> list[str]:
     """Return the section on the attitude of the INS and the isolation from the ship; [] for an antenna ashore."""
     if data.attitude is None:
         return []
@@ -247,13 +252,10 @@ def _deck(bag, data):
             *_figures(attitude_figures, data)]
 
 
-def _diagnostics(statuses):
-    """Return the section on diagnostics other than OK. A status that a node repeats is one row.
-
-    statuses: of run_data.RunData.
-    """
+def _diagnostics(statuses: Sequence[run_data.Status]) -> list[str]:
+    """Return the section on diagnostics other than OK. A status that a node repeats is one row."""
     title = '<h2 id="diagnostics">Diagnostics other than OK</h2>'
-    rows = {}
+    rows: dict[int, list[str]] = {}
     for node in dict.fromkeys(node for _, node, _, _ in statuses):
         own = [(place, status) for place, status in enumerate(statuses) if status[1] == node]
         for (level, message), group in itertools.groupby(own, lambda row: row[1][2:]):
@@ -269,7 +271,7 @@ def _diagnostics(statuses):
             *([f'<p class="soft">and {hidden} more.</p>'] if hidden else [])]
 
 
-def _provenance_table(bag, data, author):
+def _provenance_table(bag: bags.Bag, data: run_data.RunData, author: str) -> str:
     """Return the table at the head of the page: author, subject, configuration, versions and file of a bag."""
     stamps = bag.index.log
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
@@ -285,7 +287,7 @@ def _provenance_table(bag, data, author):
     return elements.table(None, rows, 'meta')
 
 
-def _parameters(bag):
+def _parameters(bag: bags.Bag) -> list[str]:
     """Return the section on the parameters that differ from their defaults."""
     title = '<h2 id="parameters">Parameters that differ from their defaults</h2>'
     if not bag.configuration['parameters']:
@@ -294,8 +296,8 @@ def _parameters(bag):
     return [title, elements.table(['parameter', 'value', 'default', 'unit'], rows) if rows else '<p>None.</p>']
 
 
-def _page(bag, data, check, author):
-    """Return the text of the page; check: verify.Report of the bag."""
+def _page(bag: bags.Bag, data: run_data.RunData, check: Report, author: str) -> str:
+    """Return the text of the page."""
     scenario = bag.metadata.get('scenario', '')
     name = (scenario or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     of_paper = scenario in PAPER_SCENARIOS

@@ -24,7 +24,7 @@ def browser() -> str:
     return found
 
 
-def write(program, page, output):
+def write(program: str, page: pathlib.Path, output: pathlib.Path) -> None:
     """Print a page (path of an HTML file) by the browser `program` to a path. Raises ValueError if it fails."""
     with tempfile.TemporaryDirectory() as folder:
         printed = pathlib.Path(folder) / 'page.pdf'

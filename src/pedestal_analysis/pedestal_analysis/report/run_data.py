@@ -1,53 +1,52 @@
 """Data of the report on a recording: its run against the truth, if recorded, and its topics."""
 import dataclasses
-import typing
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from pedestal_analysis.report import events
 from pedestal_analysis.results import consistency, known_attitude, measured_direction, tracking
 from pedestal_common.graph import topics
+from pedestal_common.quantities import Pairs, Radians, Seconds, Table
 from pedestal_recording import bag as bags
+from pedestal_recording.recording import Recording
+
+
+class Status(NamedTuple):
+    """Status of a node in the diagnostics."""
+    t: Seconds
+    node: str
+    level: int  # 0 OK, 1 WARN, 2 ERROR, 3 STALE
+    message: str
 
 
 @dataclasses.dataclass
 class RunData:
-    """Data of a recording for the page and the figures of its report.
+    """Data of a recording for the page and the figures of its report."""
+    run: tracking.Tracking | None   # None if there is no truth
+    no_truth: str   # reason why there is no truth, or ''
+    raw_angles: Pairs | None    # measured earth angles of the target [rad], without the filter; None without `run`
+    motors: Table | None    # adu/motor_states, None without a message
+    receiver: Table | None  # tracking_receiver/angle_error, None without a message
+    modes: list[events.ModeSpan]    # of the ACU, in order
+    statuses: list[Status]
+    events: list[events.Event]  # in the order of time
+    beamwidth: Radians  # half-power, NaN if the bag does not state it
+    filter: consistency.Consistency | None = None   # None without acu/filter
+    attitude: known_attitude.KnownAttitude | None = None    # None ashore
 
-    run               tracking.Tracking, or None if there is no truth
-    no_truth          reason why there is no truth, or ''
-    raw_angles        (n, 2) measured earth angles of the target [rad], without the filter; None without `run`
-    motors, receiver  tables of adu/motor_states and tracking_receiver/angle_error, None without a message
-    modes             [(start [s], stop [s], mode)] of the modes of the ACU, in order
-    statuses          [(time [s], node, level, message)] of the diagnostics; level: 0 OK, 1 WARN, 2 ERROR, 3 STALE
-    events            [events.Event], in the order of time
-    beamwidth         half-power beamwidth [rad], NaN if the bag does not state it
-    filter            consistency.Consistency, None without acu/filter
-    attitude          known_attitude.KnownAttitude, None ashore
-    """
-    run: typing.Any
-    no_truth: str
-    raw_angles: typing.Any
-    motors: typing.Any
-    receiver: typing.Any
-    modes: list
-    statuses: list
-    events: list
-    beamwidth: float
-    filter: typing.Any = None
-    attitude: typing.Any = None
-
-    def lacks(self, needs):
+    def lacks(self, needs: Iterable[str]) -> str:
         """Return the reasons why a figure with some needs (keys of _NEEDS) cannot be drawn, '' if it can be drawn."""
         reasons = [_NEEDS[need](self) for need in needs]
         return '; '.join(dict.fromkeys(filter(None, reasons)))
 
 
-def _no_receiver(data):
+def _no_receiver(data: RunData) -> str:
     return '' if data.receiver else 'no message of tracking_receiver/angle_error'
 
 
-_NEEDS = {
+_NEEDS: dict[str, Callable[[RunData], str]] = {
     'truth': lambda data: data.no_truth,
     'motors': lambda data: '' if data.motors else 'no message of adu/motor_states',
     'modes': lambda data: '' if data.modes or data.statuses else 'no message of acu/mode or diagnostics',
@@ -56,20 +55,20 @@ _NEEDS = {
     'bank': lambda data: '' if data.filter is None or np.isfinite(data.filter.probability).sum(axis=2).max() > 1 else
     'the filter has only one motion model',
     'receiver': _no_receiver,
-    'lock': lambda data: _no_receiver(data) or (
-        '' if np.isfinite(data.receiver['x']).any() else 'the receiver never locked'),
+    'lock': lambda data: '' if data.receiver and np.isfinite(data.receiver['x']).any() else (
+        _no_receiver(data) or 'the receiver never locked'),
 }
 """{need of a figure: function of RunData -> reason why the need is not met, else ''}."""
 
 
-def read(bag) -> RunData:
-    """Return the RunData of a bag.Bag. Raises bag.BagError if stamps of the steps go back."""
+def read(bag: Recording) -> RunData:
+    """Return the RunData of a recording of one beam. Raises bag.BagError if stamps of the steps go back."""
     run, no_truth = _tracking(bag)
     raw = _raw_angles(run, table(bag, 'ship/truth')) if run is not None else None
     motors = table(bag, 'adu/motor_states')
     if motors and not {f'{motor}.effort' for motor in topics.MOTOR_NAMES} <= set(motors):
         motors = None
-    statuses = [((log - bag.start) / 1e9, status.name, int(status.level), status.message)
+    statuses = [Status((log - bag.start) / 1e9, status.name, int(status.level), status.message)
                 for _, log, _, array in bag.messages('diagnostics') for status in array.status
                 ] if table(bag, 'diagnostics') else []
     modes = _modes(bag)
@@ -77,8 +76,8 @@ def read(bag) -> RunData:
                    events.read(bag, modes), tracking.beamwidth(bag), _filter(bag, run), _attitude(bag))
 
 
-def table(bag, topic):
-    """Return the columns of a topic of a bag.Bag; None without a message or if the type is not that of the graph.
+def table(bag: Recording, topic: str) -> Table | None:
+    """Return the columns of a topic; None without a message or if the type is not that of the graph.
 
     Because a plot over stamps that go back would be wrong, raises bag.BagError for such a topic of the steps.
     """
@@ -88,13 +87,14 @@ def table(bag, topic):
     t = columns['t']
     back = np.flatnonzero(np.diff(t) < 0.0) if topics.TOPIC_BY_NAME[topic].rate == 'step' else np.zeros(0, int)
     if back.size:
-        raise bags.BagError(f'{bag.file}: the stamps of {topic} go back, the first from {t[back[0]]:.6f} to '
+        file = getattr(bag, 'file', bag.path)   # only a recording of files may have such stamps
+        raise bags.BagError(f'{file}: the stamps of {topic} go back, the first from {t[back[0]]:.6f} to '
                             f'{t[back[0] + 1]:.6f} s; `pedestal verify` lists all problems')
     return columns
 
 
-def _tracking(bag):
-    """Return (tracking.Tracking, '') of a bag.Bag, or (None, reason)."""
+def _tracking(bag: Recording) -> tuple[tracking.Tracking | None, str]:
+    """Return (Tracking, '') of a recording, or (None, reason)."""
     absent = [name for name in ('joint_states', 'target/truth') if table(bag, name) is None]
     if absent:
         return None, f'no message of {" and ".join(absent)}'
@@ -106,8 +106,8 @@ def _tracking(bag):
         return None, f'a topic has no number {error.args[0]}'
 
 
-def _raw_angles(run, ship):
-    """Return the measured earth angles (n, 2) [rad] of the target at the steps of a Tracking, without the filter.
+def _raw_angles(run: tracking.Tracking, ship: Table | None) -> Pairs:
+    """Return the measured earth angles [rad] of the target at the steps of a Tracking, without the filter.
 
     ship: table of ship/truth, None for an antenna ashore.
     """
@@ -115,33 +115,34 @@ def _raw_angles(run, ship):
     if ship is not None:
         at = np.searchsorted(ship['t'], run.t - 1e-9).clip(0, ship['t'].size - 1)
         quaternions = np.column_stack([ship[f'orientation.{axis}'][at] for axis in 'xyzw'])
-    return measured_direction.earth_angles(np.column_stack((run.azimuth, run.elevation)), run.measured, quaternions)
+    return measured_direction.earth_angles(run.encoders, run.measured, quaternions)
 
 
-def _filter(bag, run):
-    """Return the consistency.Consistency of a bag; None without truth, or without the numbers of the filter."""
+def _filter(bag: Recording, run: tracking.Tracking | None) -> consistency.Consistency | None:
+    """Return the Consistency of a recording; None without truth, or without the numbers of the filter."""
     try:
         return consistency.read(bag, run) if run is not None and table(bag, 'acu/filter') is not None else None
     except KeyError:
         return None
 
 
-def _attitude(bag):
-    """Return the known_attitude.KnownAttitude of a bag; None ashore, or without the numbers of the INS."""
+def _attitude(bag: Recording) -> known_attitude.KnownAttitude | None:
+    """Return the KnownAttitude of a recording; None ashore, or without the numbers of the INS."""
     try:
         return known_attitude.read(bag) if table(bag, 'ship/imu/data') is not None else None
     except KeyError:
         return None
 
 
-def _modes(bag):
-    """Return [(start [s], stop [s], mode)] of the modes of the ACU; the first begins with the recording."""
+def _modes(bag: Recording) -> list[events.ModeSpan]:
+    """Return the modes of the ACU; the first begins with the recording."""
     stated = table(bag, 'acu/mode')
     changes = list(zip(stated['t'].tolist(), stated['data'])) if stated else []
     joints = table(bag, 'joint_states')
     if joints is not None and (before := str(tracking.modes(bag, joints['t'][:1])[0])):
         changes.insert(0, (joints['t'][0].item(), before))
-    starts, names = [], []
+    starts: list[Seconds] = []
+    names: list[str] = []
     for start, name in changes:
         if not names or names[-1] != name:
             starts.append(start)

@@ -5,12 +5,14 @@ of matplotlib, and are also used by the overview.
 """
 import functools
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.projections.polar import PolarAxes
 
-from acu_tracker import modes
 from pedestal_analysis.report.figures import (
     FIGURE_WIDTH_INCH,
     FILTERED_COLOUR,
@@ -20,11 +22,17 @@ from pedestal_analysis.report.figures import (
     RAW_COLOUR,
     TRUTH_COLOUR,
     Spec,
+    Window,
     draw_line,
+    existing,
     new_panels,
     outside_legend,
     spans,
 )
+from pedestal_analysis.report.run_data import RunData
+from pedestal_analysis.results.tracking import Tracking
+from pedestal_common.graph import modes
+from pedestal_common.quantities import Bools, Floats, Ints, Pairs
 
 MODE_COLOURS = dict(zip(modes.MODES, itertools.cycle((
     '#9aa0a6', '#a87b51', '#8364c8', '#b9a3e3', '#e0ac00', '#2f9e5b', '#3aa6b9', '#d1495b', '#e58a95', '#f2b84b',
@@ -37,10 +45,10 @@ ZOOM_SPAN_S = 2.0  # span of a zoomed figure [s]
 SKY_POINTS = 3000  # largest number of points of a path in the sky plot
 
 
-def _continuous(angle, beside=None):
-    """Return an angle (n,) [rad] in degrees, without jumps at +-180.
+def _continuous(angle: Floats, beside: Floats | None = None) -> Floats:
+    """Return an angle [rad] in degrees, without jumps at +-180.
 
-    beside (n,): another angle without jumps [deg]. The result is then within half a turn of that angle.
+    beside: another angle without jumps [deg]. The result is then within half a turn of that angle.
     """
     angle = np.degrees(angle)
     if beside is not None:
@@ -51,8 +59,8 @@ def _continuous(angle, beside=None):
     return out
 
 
-def _middle(run):
-    """Return (first, last) time [s] of the ZOOM_SPAN_S in the middle of the evaluated part of a Tracking.
+def _middle(run: Tracking) -> Window:
+    """Return the ZOOM_SPAN_S in the middle of the evaluated part of a Tracking.
 
     Without an evaluated part it is the middle of the run.
     """
@@ -61,8 +69,8 @@ def _middle(run):
     return middle - 0.5 * ZOOM_SPAN_S, middle + 0.5 * ZOOM_SPAN_S
 
 
-def _slowest(run, angles):
-    """Return (first, last) time [s] of the ZOOM_SPAN_S of the evaluated part in which angles (n, 2) changed least."""
+def _slowest(run: Tracking, angles: Pairs) -> Window:
+    """Return the ZOOM_SPAN_S of the evaluated part in which angles changed least."""
     steps = round(ZOOM_SPAN_S / np.median(np.diff(run.t)))
     if run.tracking.sum() <= steps or not 0 < steps < run.t.size:
         return _middle(run)
@@ -72,10 +80,10 @@ def _slowest(run, angles):
     return start, start + ZOOM_SPAN_S
 
 
-def _scale_to(axes, curves, tracking, unit='°', centred=True):
-    """Scale the axes to the evaluated part of curves [(n,)]; add a note if values outside the part leave the frame.
+def _scale_to(axes: Axes, curves: Sequence[Floats], tracking: Bools, unit: str = '°', centred: bool = True) -> None:
+    """Scale the axes to the evaluated part of curves; add a note if values outside the part leave the frame.
 
-    tracking: mask (n,) of the evaluated part; centred: True for a frame with zero in the middle.
+    tracking: the evaluated part; centred: True for a frame with zero in the middle.
     """
     whole = np.concatenate([values[np.isfinite(values)] for values in curves])
     shown = np.concatenate([values[tracking & np.isfinite(values)] for values in curves])
@@ -90,8 +98,8 @@ def _scale_to(axes, curves, tracking, unit='°', centred=True):
                   fontsize=7.5, transform=axes.transAxes)
 
 
-def _frame(shown, centred):
-    """Return the (lowest, highest) value of a frame around values (m,), equal without a frame."""
+def _frame(shown: Floats, centred: bool) -> tuple[float, float]:
+    """Return the (lowest, highest) value of a frame around values, equal without a frame."""
     if not shown.size:
         return 0.0, 0.0
     if centred:
@@ -105,16 +113,16 @@ AXIS_TITLES = (('cross-elevation', 'azimuth'), ('elevation', 'elevation'))
 """(name of the error, name of the angle) of each axis."""
 
 
-def draw_errors(axes, data, i, window=None):
+def draw_errors(axes: Axes, data: RunData, i: int, window: Window | None = None) -> None:
     """Draw the receiver error and the filtered error [deg]; i: 0 cross-elevation, 1 elevation.
 
-    window: (first, last) time [s] to draw, then together with the true error; None for the whole run.
+    window: to draw, then together with the true error; None for the whole run.
     """
-    run = data.run
+    run = existing(data.run)
     raw, filtered = np.degrees(run.measured[:, i]), np.degrees(run.filtered[:, i])
     draw_line(axes, run.t, raw, window, color=RAW_COLOUR, linewidth=0.7, label='receiver, before the filter')
     if window is not None:
-        truth = np.degrees((run.cross_elevation, run.elevation_error)[i])
+        truth = np.degrees(run.error[:, i])
         draw_line(axes, run.t, truth, window, color=TRUTH_COLOUR, label='truth')
     else:
         _scale_to(axes, [raw], run.tracking)
@@ -123,7 +131,7 @@ def draw_errors(axes, data, i, window=None):
     axes.set_title(AXIS_TITLES[i][0])
 
 
-def error(data, window=None):
+def error(data: RunData, window: Window | None = None) -> Figure:
     """Return the figure of receiver error and filtered error on both axes [deg]; window: see `draw_errors`."""
     figure, panels = new_panels(2, sharex=True)
     for i in range(2):
@@ -131,17 +139,17 @@ def error(data, window=None):
     return outside_legend(figure, panels[0, 0])
 
 
-def error_zoom(data):
+def error_zoom(data: RunData) -> Figure:
     """Return the figure `error` over ZOOM_SPAN_S in the middle of the evaluated part, with the true error."""
-    return error(data, _middle(data.run))
+    return error(data, _middle(existing(data.run)))
 
 
-def angle(data, zoomed=False):
+def angle(data: RunData, zoomed: bool = False) -> Figure:
     """Return the figure of the measured and the filtered line of sight in earth angles [deg].
 
     zoomed: True for the ZOOM_SPAN_S in which the target moved least, with the true line of sight.
     """
-    run = data.run
+    run = existing(data.run)
     figure, panels = new_panels(2, y=[f'{name} [deg]' for _, name in AXIS_TITLES], sharex=True)
     # In azimuth the branch is that of the beam, as in `azimuth`.
     truth = np.column_stack((_continuous(run.target_earth[:, 0], _continuous(run.beam_earth[:, 0])),
@@ -149,7 +157,7 @@ def angle(data, zoomed=False):
     window = _slowest(run, truth) if zoomed else None
     for i, axes in enumerate(panels[:, 0]):
         filtered = _continuous(run.estimate_earth[:, i], truth[:, i])
-        measured = _continuous(data.raw_angles[:, i], truth[:, i])
+        measured = _continuous(existing(data.raw_angles)[:, i], truth[:, i])
         draw_line(axes, run.t, measured, window, color=RAW_COLOUR, linewidth=0.8 if zoomed else 2.5,
                   label='measured, before the filter')
         if zoomed:
@@ -160,9 +168,9 @@ def angle(data, zoomed=False):
     return outside_legend(figure, panels[0, 0])
 
 
-def draw_azimuth(axes, data):
+def draw_azimuth(axes: Axes, data: RunData) -> None:
     """Draw the azimuth of antenna and target in earth angles [deg]."""
-    run = data.run
+    run = existing(data.run)
     beam = _continuous(run.beam_earth[:, 0])
     draw_line(axes, run.t, _continuous(run.target_earth[:, 0], beam), color=TRUTH_COLOUR, linewidth=2.5,
               label='target')
@@ -171,26 +179,26 @@ def draw_azimuth(axes, data):
     axes.set_ylabel('azimuth [deg]')
 
 
-def azimuth(data):
+def azimuth(data: RunData) -> Figure:
     """Return the figure of the azimuth of antenna and target in earth angles [deg]."""
     figure, panels = new_panels(1, height=2.9)
     draw_azimuth(panels[0, 0], data)
     return outside_legend(figure, panels[0, 0])
 
 
-def _shade_modes(axes, data):
+def _shade_modes(axes: Axes, data: RunData) -> None:
     """Shade each time by the colour of its mode, and mark the changes of the mode by dotted lines."""
     for start, stop, mode in data.modes:
         axes.axvspan(start, stop, color=MODE_COLOURS.get(mode, RAW_COLOUR), alpha=0.10, linewidth=0.0)
 
 
-def draw_pointing(axes, data, i):
+def draw_pointing(axes: Axes, data: RunData, i: int) -> None:
     """Draw the true pointing error [deg]; i: 0 cross-elevation, 1 elevation.
 
     Dashed lines mark a tenth of the beamwidth.
     """
-    run = data.run
-    error = np.degrees((run.cross_elevation, run.elevation_error)[i])
+    run = existing(data.run)
+    error = np.degrees(run.error[:, i])
     draw_line(axes, run.t, error, color=TRUTH_COLOUR, linewidth=0.8)
     _scale_to(axes, [error], run.tracking)
     if np.isfinite(data.beamwidth):
@@ -200,14 +208,14 @@ def draw_pointing(axes, data, i):
     axes.set_ylabel('error [deg]')
 
 
-def pointing(data):
+def pointing(data: RunData) -> Figure:
     """Return the figure of the true pointing error on both axes, and of the angle from the beam to the target [deg].
 
     The background shows the modes of the ACU.
     """
-    run = data.run
+    run = existing(data.run)
     figure, panels = new_panels(3, sharex=True)
-    distance = np.degrees(np.hypot(run.cross_elevation, run.elevation_error))
+    distance = np.degrees(run.distance)
     for i in range(2):
         draw_pointing(panels[i, 0], data, i)
     axes = panels[2, 0]
@@ -221,19 +229,19 @@ def pointing(data):
     return figure
 
 
-def _mode_legend(figure, data):
+def _mode_legend(figure: Figure, data: RunData) -> None:
     names = dict.fromkeys(mode for _, _, mode in data.modes)
     if names:
         figure.legend([Patch(color=MODE_COLOURS.get(name, RAW_COLOUR), alpha=0.45, linewidth=0.0) for name in names],
                       list(names), loc='outside upper right', ncols=len(names))
 
 
-def draw_torques(axes, data, axis, window=None):
+def draw_torques(axes: Axes, data: RunData, axis: str, window: Window | None = None) -> None:
     """Draw the torques of both motors of an axis ('azimuth' or 'elevation'), and their bias torque [Nm].
 
-    window: (first, last) time [s] to draw. Without a window the axes show the torques of the evaluated part, if any.
+    Without a window the axes show the torques of the evaluated part, if any.
     """
-    motors = data.motors
+    motors = existing(data.motors)
     first, second = motors[f'{axis}_motor_1.effort'], motors[f'{axis}_motor_2.effort']
     width = 0.7 if window is None else 1.0
     draw_line(axes, motors['t'], first, window, color=MOTOR_1_COLOUR, linewidth=width, label='motor 1')
@@ -247,13 +255,13 @@ def draw_torques(axes, data, axis, window=None):
     axes.set_title(axis)
 
 
-def _start(data):
-    """Return (first, last) time [s] of the first ZOOM_SPAN_S of the motor torques."""
-    start = data.motors['t'][0]
+def _start(data: RunData) -> Window:
+    """Return the first ZOOM_SPAN_S of the motor torques."""
+    start = existing(data.motors)['t'][0]
     return start, start + ZOOM_SPAN_S
 
 
-def torques(data):
+def torques(data: RunData) -> Figure:
     """Return the figure of the torques of both motors of each axis [Nm]: whole run and first ZOOM_SPAN_S."""
     window = _start(data)
     figure, panels = new_panels(2, 2, height=4.5, sharex='col', width_ratios=(3, 2))
@@ -265,9 +273,9 @@ def torques(data):
     return outside_legend(figure, panels[0, 0])
 
 
-def draw_carrier(axes, data):
+def draw_carrier(axes: Axes, data: RunData) -> None:
     """Draw C/N0 [dB-Hz]; shade the times with a locked receiver."""
-    table = data.receiver
+    table = existing(data.receiver)
     draw_line(axes, table['t'], table['z'], color=RAW_COLOUR, linewidth=0.8, label='C/N0')
     for first, last in spans(np.isfinite(table['x'])):
         axes.axvspan(table['t'][first], table['t'][last], color=LOCKED_COLOUR, alpha=0.15, linewidth=0.0)
@@ -275,7 +283,7 @@ def draw_carrier(axes, data):
     axes.set_ylabel('C/N0 [dB-Hz]')
 
 
-def carrier(data):
+def carrier(data: RunData) -> Figure:
     """Return the figure of C/N0 [dB-Hz] and of the lock of the receiver."""
     figure, panels = new_panels(1, height=2.7)
     draw_carrier(panels[0, 0], data)
@@ -285,8 +293,8 @@ def carrier(data):
     return figure
 
 
-def _along(angles):
-    """Return the indices of at most SKY_POINTS of angles (n, 2) [rad], evenly spread over path and time together.
+def _along(angles: Pairs) -> Ints:
+    """Return the indices of at most SKY_POINTS of angles [rad], evenly spread over path and time together.
 
     A fast slew has few samples in a part of the time, so an even spread over time alone would draw it as chords.
     """
@@ -298,9 +306,10 @@ def _along(angles):
     return np.unique(np.searchsorted(both, np.linspace(0.0, both[-1], SKY_POINTS)))
 
 
-def draw_sky(axes, data):
+def draw_sky(axes: Axes, data: RunData) -> None:
     """Draw target and beam over the station, north up, on polar axes."""
-    run = data.run
+    run = existing(data.run)
+    assert isinstance(axes, PolarAxes)
     axes.set_theta_zero_location('N')
     axes.set_theta_direction(-1)
     for angles, colour, width, label in ((run.target_earth, TRUTH_COLOUR, 3.0, 'target'),
@@ -318,7 +327,7 @@ def draw_sky(axes, data):
     axes.set_thetagrids(range(0, 360, 45), ('N', 'NE', 'E', 'SE', 'S', 'SW', 'W', 'NW'))
 
 
-def sky(data):
+def sky(data: RunData) -> Figure:
     """Return the sky plot of target and beam over the station, north up."""
     figure = Figure(figsize=(FIGURE_WIDTH_INCH, 4.2), layout='constrained')
     axes = figure.subplots(subplot_kw={'projection': 'polar'})
@@ -327,7 +336,7 @@ def sky(data):
     return figure
 
 
-def timeline(data):
+def timeline(data: RunData) -> Figure:
     """Return the figure of the ACU mode, the lock of the receiver, and the reported level of each node."""
     rows = [('ACU mode', [(start, stop - start, MODE_COLOURS.get(mode, RAW_COLOUR))
                           for start, stop, mode in data.modes])] if data.modes else []
@@ -358,7 +367,7 @@ def timeline(data):
     return figure
 
 
-def overview(data):
+def overview(data: RunData) -> Figure:
     """Return one wide figure of a run: sky plot, error before and after the filter, pointing error, motor torques."""
     figure = Figure(figsize=(13.0, 7.0), layout='constrained')
     grid = figure.add_gridspec(4, 3, width_ratios=(1.05, 1.0, 1.0))

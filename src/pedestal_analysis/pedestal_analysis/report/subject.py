@@ -1,16 +1,21 @@
 """Subject of a recording in words, for the head of its report: target, date, station, changed parameters."""
 import datetime
 import math
+from collections.abc import Callable
 
 import numpy as np
 
+from pedestal_analysis.report.run_data import RunData
 from pedestal_analysis.results import beam_direction
 from pedestal_common import parameters
 from pedestal_common.geometry import orbit
+from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.graph import nodes
+from pedestal_common.quantities import Seconds
+from pedestal_recording.bag import Bag
 from tracking_receiver_sim.params import TargetParameters
 
-TARGET_DESCRIPTIONS = {
+TARGET_DESCRIPTIONS: dict[str, Callable[[TargetParameters], str]] = {
     'leo_pass': lambda target: (f'satellite {orbit.satellite(target.leo_pass).number}, from its '
                                 f'{"OMM" if target.leo_pass.omm else "TLE"}'),
     'track_file': lambda target: f'track of the file {target.track_file.path.rpartition("/")[2]}',
@@ -20,7 +25,7 @@ TARGET_DESCRIPTIONS = {
     'step': lambda target: f'step at {target.angle.start:g} s',
     'ramp': lambda target: f'constant rate from {target.angle.start:g} s on',
 }
-"""{kind of target: function of TargetParameters that returns a description}."""
+"""{kind of target: function that returns a description}."""
 
 STATION_TARGET_KINDS = ('leo_pass', 'track_file')  # kinds of target that depend on the position of the station
 
@@ -28,7 +33,7 @@ STATION_TARGET_KINDS = ('leo_pass', 'track_file')  # kinds of target that depend
 MAX_VALUE_CHARACTERS = 80  # length of a shown parameter value, above which its middle is left out [characters]
 
 
-def date(bag):
+def date(bag: Bag) -> str:
     """Return the date of a run as text: its first message in realtime, else the date of the file."""
     if bag.start and bag.index.size:
         return f'{_utc(bag.index.log.min() / 1e9)} UTC'
@@ -36,12 +41,12 @@ def date(bag):
     return f'{written}; a lockstep recording states no date' if bag.metadata.get('pacing') == 'lockstep' else written
 
 
-def _utc(seconds):
-    """Return a Unix time [s] as UTC text."""
+def _utc(seconds: Seconds) -> str:
+    """Return a Unix time as UTC text."""
     return f'{datetime.datetime.fromtimestamp(seconds, datetime.timezone.utc):%Y-%m-%d %H:%M:%S}'
 
 
-def changed_parameters(bag):
+def changed_parameters(bag: Bag) -> list[list[str]]:
     """Return rows [node.parameter, value, default, unit] of the recorded parameters that differ from the defaults."""
     rows = []
     for name, values in bag.configuration['parameters'].items():
@@ -55,20 +60,20 @@ def changed_parameters(bag):
     return rows
 
 
-def _shown(value):
+def _shown(value: object) -> str:
     """Return a parameter value as text, without the middle of a long text."""
     text = f'{value:.6g}' if isinstance(value, float) else str(value)
     half = MAX_VALUE_CHARACTERS // 2
     return text if len(text) <= MAX_VALUE_CHARACTERS else f'{text[:half]} ... {text[-half:]}'
 
 
-def place(station):
-    """Return the position in StationParameters as text."""
+def place(station: StationParameters) -> str:
+    """Return the position of a station as text."""
     return f'latitude {station.latitude_deg:g}, longitude {station.longitude_deg:g} deg, height {station.height:g} m'
 
 
-def rows(bag, data):
-    """Return rows [name, text] on a bag.Bag of one beam and its run_data.RunData, as far as the bag states them."""
+def rows(bag: Bag, data: RunData) -> list[list[str]]:
+    """Return rows [name, text] on a bag of one beam and its RunData, as far as the bag states them."""
     models = [['pointing model', title] for title in beam_direction.titles(bag)]
     beamwidth = [['beamwidth', f'{math.degrees(data.beamwidth):.4g} deg']] if math.isfinite(data.beamwidth) else []
     beamwidth = [*models, *beamwidth]
@@ -84,7 +89,7 @@ def rows(bag, data):
     return [['target', TARGET_DESCRIPTIONS[target.kind](target)], *_sky(bag, data), *station, *beamwidth]
 
 
-def _sky(bag, data):
+def _sky(bag: Bag, data: RunData) -> list[list[str]]:
     """Return rows [name, text] on the UTC at 0 s and on the highest elevation; [] for a target without a date."""
     try:
         begin = orbit.instant('stamp_0_utc', _begin(bag))
@@ -100,7 +105,7 @@ def _sky(bag, data):
     return [['0 s is', f'{begin:%Y-%m-%d %H:%M:%S} UTC'], *highest]
 
 
-def _begin(bag):
+def _begin(bag: Bag) -> str:
     """Return the text of the UTC at 0 s that the receiver states in its diagnostics, '' if it states none."""
     if 'diagnostics' not in bag.topics or not bag.rows('diagnostics').size:
         return ''

@@ -6,15 +6,19 @@ C/N0. The direction of the beam follows from the encoders and the pointing model
 a locked receiver are written. On a ship, the attitude of the INS rotates the deck angles to earth angles. Nothing is
 corrected for refraction. Times are UTC.
 """
+import datetime
 import json
 import pathlib
 import re
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from pedestal_analysis.results import beam_direction, measured_direction, tracking
 from pedestal_common.geometry import orbit
 from pedestal_common.graph import nodes
+from pedestal_common.quantities import Floats, Hertz, Pairs, Stamps
 from pedestal_recording import bag as bags
 from pedestal_recording import columns
 from pedestal_recording.export import atomic_file
@@ -39,10 +43,20 @@ TOPIC_COLUMNS = {'joint_states': ('azimuth.position', 'elevation.position'),
 """{topic: columns of its table that a record needs}."""
 
 
-def export(path, created, output=None, rate=10.0, participants=(), overwrite=False):
+class _Segment(NamedTuple):
+    """Exported steps of a run, which stand in one segment of the message."""
+    times: list[str]    # of the UTC
+    angles: Pairs       # azimuth and elevation [deg]
+    distance: Floats    # range [km], NaN if not measured
+    cn0: Floats         # [dB-Hz]
+
+
+def export(path: str | pathlib.Path, created: datetime.datetime, output: str | pathlib.Path | None = None,
+           rate: Hertz = 10.0, participants: Sequence[str] = (),
+           overwrite: bool = False) -> Iterator[tuple[pathlib.Path, int]]:
     """Write the tracking data of the bag at a path. Yield (file, number of records) for each beam.
 
-    created       creation date that the message states, datetime in UTC
+    created       creation date that the message states, in UTC
     output        file with the suffix .tdm, or folder; by default the folder `export` in the bag
     rate          largest number of records per second
     participants  names of the station and of the target; by default DEFAULT_STATION_NAME, and the international
@@ -64,15 +78,15 @@ def export(path, created, output=None, rate=10.0, participants=(), overwrite=Fal
         with atomic_file(file) as part, open(part, 'w', encoding='ascii', newline='') as stream:
             stream.write(_header(view, created))
             for segment in tracks.segments():
-                records += len(segment[0])
+                records += len(segment.times)
                 stream.write(_segment(segment, _participants(view, participants), models))
             if not records:
                 raise bags.BagError(f'{path}: nothing to export: no step is in autotrack with a locked receiver')
         yield file, records
 
 
-def _files(bag, output, overwrite):
-    """Return {file to write: bag.Bag of one beam}.
+def _files(bag: bags.Bag, output: str | pathlib.Path | None, overwrite: bool) -> dict[pathlib.Path, bags.Bag]:
+    """Return {file to write: the bag of one beam}.
 
     Raises FileExistsError, and ValueError for one file with several beams.
     """
@@ -92,14 +106,11 @@ def _files(bag, output, overwrite):
 
 
 class _Tracks:
-    """The exported steps of a bag of one beam, at most `rate` a second.
+    """The exported steps of a bag of one beam, at most `rate` a second."""
 
-    stamps        stamps of these steps [ns]
-    utc_of_zero   UTC of time 0 of the scenario, whose stamp is bag.start
-    """
-
-    def __init__(self, bag, rate):
-        self.bag, self.utc_of_zero = bag, _utc_of_zero(bag)
+    def __init__(self, bag: bags.Bag, rate: Hertz) -> None:
+        self.bag = bag
+        self.utc_of_zero = _utc_of_zero(bag)    # UTC of time 0 of the scenario, whose stamp is bag.start
         rows = {topic: bag.rows(topic) for topic in TOPIC_COLUMNS if topic in bag.topics}
         self.rows = {topic: of for topic, of in rows.items() if of.size}
         missing = [name for name in ('joint_states', 'tracking_receiver/angle_error') if name not in self.rows]
@@ -108,13 +119,10 @@ class _Tracks:
         stamps = np.unique(self.rows['joint_states'].stamp)
         # In each interval of 1 / rate, only the first step is exported.
         _, first = np.unique((stamps - stamps[:1]) * rate // 1e9, return_index=True)
-        self.stamps = stamps[first]
+        self.stamps: Stamps = stamps[first]     # of these steps
 
-    def segments(self):
-        """Yield (times, angles (n, 2), range (n,), C/N0 (n,)) of each segment that is not empty.
-
-        times: texts of the UTC; angles: azimuth and elevation [deg]; range [km], NaN if not measured; C/N0 [dB-Hz].
-        """
+    def segments(self) -> Iterator[_Segment]:
+        """Yield each segment that is not empty."""
         for at in range(0, len(self.stamps), SEGMENT_STEPS):
             stamps = self.stamps[at:at + SEGMENT_STEPS]
             beam, error = self._at('joint_states', stamps), self._at('tracking_receiver/angle_error', stamps)
@@ -128,16 +136,16 @@ class _Tracks:
             if exported.any():
                 passed = np.round((stamps[exported] - self.bag.start) / 1e3).astype('m8[us]')
                 range_m, cn0_dbhz = self._at('tracking_receiver/range', stamps)[:, 0], error[:, 2]
-                yield (instant.utc_texts(self.utc_of_zero, passed), angles[exported], 1e-3 * range_m[exported],
-                       cn0_dbhz[exported])
+                yield _Segment(instant.utc_texts(self.utc_of_zero, passed), angles[exported],
+                               1e-3 * range_m[exported], cn0_dbhz[exported])
 
-    def _at(self, topic, stamps):
-        """Return the k TOPIC_COLUMNS (n, k) of a topic at stamps (n,) [ns]; NaN where no message has the stamp."""
+    def _at(self, topic: str, stamps: Stamps) -> Floats:
+        """Return the k TOPIC_COLUMNS of a topic at n stamps, as (n, k); NaN where no message has the stamp."""
         out = np.full((len(stamps), len(TOPIC_COLUMNS[topic])), np.nan)
-        rows = self.rows.get(topic, self.bag.index[:0])
+        rows = self.rows.get(topic, self.bag.index[:0].view(np.recarray))
         _, here, there = np.intersect1d(stamps, rows.stamp, return_indices=True)
         if here.size:
-            chosen = rows[there]
+            chosen = rows[there].view(np.recarray)
             try:
                 table = columns.table([data for *_, data in self.bag.take(chosen)], self.bag.topics[topic], chosen.log)
             except ValueError as error:
@@ -147,8 +155,8 @@ class _Tracks:
         return out
 
 
-def _utc_of_zero(bag):
-    """Return the UTC of the time 0 of a bag of one beam, datetime64[us].
+def _utc_of_zero(bag: bags.Bag) -> np.datetime64:
+    """Return the UTC of the time 0 of a bag of one beam, in microseconds.
 
     For a target with a date (a satellite, a flight with a date), the receiver publishes this UTC. For another target
     it is the start stamp of a realtime recording, which is UTC. A lockstep recording starts at stamp 0, which is no
@@ -156,14 +164,15 @@ def _utc_of_zero(bag):
     """
     date = bag.last_values(f'{bag.beam}tracking_receiver').get('stamp_0_utc', '')
     if date:
-        return np.datetime64(orbit.instant(f'{bag.path}: stamp_0_utc', date), 'us')
+        begin: datetime.datetime = orbit.instant(f'{bag.path}: stamp_0_utc', date)
+        return np.datetime64(begin, 'us')
     if bag.start:
         return np.datetime64(bag.start // 1000, 'us')
     raise bags.BagError(f'{bag.path}: the bag has no date, which a tracking data message needs; a lockstep run has a '
                         'date only if its target is a satellite or a flight with a date')
 
 
-def _header(bag, created):
+def _header(bag: bags.Bag, created: datetime.datetime) -> str:
     """Return the text of the header of a message."""
     run = ', '.join(filter(None, (bag.metadata.get('scenario', ''), f'seed {bag.metadata.get("seed", "unknown")}',
                                   bag.metadata.get('pacing', ''))))
@@ -174,7 +183,7 @@ def _header(bag, created):
             'ORIGINATOR = PEDESTAL\n')
 
 
-def _participants(bag, names):
+def _participants(bag: bags.Bag, names: Sequence[str]) -> tuple[str, ...]:
     """Return (name of the station, name of the target): the names that were given, else the default names."""
     receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     target = str(receiver.get('target.kind', 'TARGET')).upper()[:80]
@@ -190,8 +199,8 @@ def _participants(bag, names):
                       if PARTICIPANT_PATTERN.fullmatch(target) else 'TARGET')[len(names):])
 
 
-def _segment(segment, participants, models):
-    """Return the text of a segment of _Tracks.segments, with the keywords in the order of table 3-3 of CCSDS
+def _segment(segment: _Segment, participants: Sequence[str], models: Sequence[str]) -> str:
+    """Return the text of a segment, with the keywords in the order of table 3-3 of CCSDS
     503.0-B-2.
 
     participants: names of station and target; models: pointing models in words.

@@ -2,8 +2,10 @@
 import dataclasses
 import html
 import math
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.report import elements
 from pedestal_analysis.report.figures import (
@@ -13,12 +15,17 @@ from pedestal_analysis.report.figures import (
     TRUTH_COLOUR,
     Spec,
     draw_line,
+    existing,
     new_panels,
 )
 from pedestal_analysis.results import tracking
 from pedestal_analysis.trials import statistics
+from pedestal_analysis.trials.comparison import Sides
+from pedestal_analysis.trials.plan import Plan
+from pedestal_analysis.trials.table import Table
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import nodes
+from pedestal_common.quantities import Floats, Row
 
 HISTOGRAM_RESULTS = ('pointing_rms_deg', 'pointing_max_deg', 'azimuth_following_rms_deg',
                      'elevation_following_rms_deg', 'lock_time_s', 'loss_s', 'azimuth_nis_mean', 'azimuth_nees_mean',
@@ -28,27 +35,19 @@ HISTOGRAM_RESULTS = ('pointing_rms_deg', 'pointing_max_deg', 'azimuth_following_
 
 @dataclasses.dataclass
 class Trials:
-    """Data of the page.
-
-    plan, table  plan.Plan of the trials and its table.Table
-    by           name of the result that ranks the trials
-    worst        numbers of the worst trials, the worst trial first
-    runs         [(title, tracking.Tracking)] of the worst and of the median trial
-    sides        comparison.Sides of the two best sides, or None
-    sentences    sentences on the comparison and on the requirements
-    command      command line that made the page
-    """
-    plan: object
-    table: object
-    by: str
-    worst: list
-    runs: list
-    sides: object
-    sentences: list
-    command: str
+    """Data of the page."""
+    plan: Plan
+    table: Table
+    by: str     # name of the result that ranks the trials
+    worst: list[int]    # numbers of the worst trials, the worst trial first
+    runs: list[tuple[str, tracking.Tracking]]   # titles and data of the worst and of the median trial
+    sides: Sides | None     # the two best sides
+    sentences: list[str]    # on the comparison and on the requirements
+    command: str    # command line that made the page
 
 
-def read(plan, table, by, sides, sentences, command, count=10) -> Trials:
+def read(plan: Plan, table: Table, by: str, sides: Sides | None, sentences: list[str], command: str,
+         count: int = 10) -> Trials:
     """Return the Trials of a plan and its table; count: number of worst trials on the page.
 
     The worst and the median trial run again, because the table does not hold their signals.
@@ -63,19 +62,19 @@ def read(plan, table, by, sides, sentences, command, count=10) -> Trials:
     return Trials(plan, table, by, places[:count], runs, sides, sentences, command)
 
 
-def _label(name):
+def _label(name: str) -> str:
     unit = statistics.unit(name)
     return f'{name} [{unit}]' if unit else name
 
 
-def _varying(table, names):
-    """Return [(name, values (n,))] of the columns in names whose values vary."""
+def _varying(table: Table, names: Iterable[str]) -> list[tuple[str, Floats]]:
+    """Return [(name, values)] of the columns in names whose values vary."""
     found = [(name, table.column(name)) for name in names]
     return [(name, values) for name, values in found
             if np.isfinite(values).any() and np.ptp(values[np.isfinite(values)]) > 0.0]
 
 
-def histograms(trials):
+def histograms(trials: Trials) -> Figure:
     """Return the figure with the histograms of the results, two in a row. A dashed line marks the median."""
     shown = _varying(trials.table, [name for name in trials.table.measured_results
                                     if nodes.plain(name) in HISTOGRAM_RESULTS])
@@ -92,7 +91,7 @@ def histograms(trials):
     return figure
 
 
-def scatter(trials):
+def scatter(trials: Trials) -> Figure:
     """Return the figure with the result `by` over each varied parameter. The worst trials are orange."""
     varied = _varying(trials.table, trials.table.varied)
     rows = max(1, -(-len(varied) // 2))
@@ -111,7 +110,7 @@ def scatter(trials):
     return figure
 
 
-def worst_and_median(trials):
+def worst_and_median(trials: Trials) -> Figure:
     """Return the figure with the pointing errors of the worst and of the median trial.
 
     Without a pointing error it shows the following errors.
@@ -120,7 +119,7 @@ def worst_and_median(trials):
     figure, panels = new_panels(2, 2, y='pointing error [deg]' if pointing else 'following error [deg]', sharex=True,
                                 sharey='row')
     for column, (title, run) in zip(panels.T, trials.runs):
-        errors = (np.degrees(np.column_stack((run.cross_elevation, run.elevation_error))) if pointing
+        errors = (np.degrees(run.error) if pointing
                   else run.following)
         if pointing:
             errors = np.where(run.since[:, np.newaxis], errors, np.nan)
@@ -130,24 +129,25 @@ def worst_and_median(trials):
     return figure
 
 
-def pairs(trials):
+def pairs(trials: Trials) -> Figure:
     """Return the figure with the result `by` of both sides, pair by pair, and the histogram of its difference."""
     figure, panels = new_panels(1, 2, height=3.3, x=('', 'difference of a pair'))
-    a, b = trials.sides.pairs(trials.by)
+    sides = existing(trials.sides)
+    a, b = sides.pairs(trials.by)
     left, right = panels[0]
     left.plot(b, a, '.', color=FILTERED_COLOUR, markersize=4)
     ends = [min(a.min(), b.min()), max(a.max(), b.max())]
     left.plot(ends, ends, color=INK_COLOUR, linewidth=0.8)
-    left.set_xlabel(trials.sides.name_b, fontsize=7)
-    left.set_ylabel(trials.sides.name_a, fontsize=7)
+    left.set_xlabel(sides.name_b, fontsize=7)
+    left.set_ylabel(sides.name_a, fontsize=7)
     left.set_title(_label(trials.by))
     right.hist(a - b, bins='auto', color=FILTERED_COLOUR, alpha=0.7)
     right.axvline(0.0, color=INK_COLOUR, linewidth=0.8)
     return figure
 
 
-def _figures(trials):
-    """Return [(figures.Spec, reason why the figure cannot be drawn, or '')]."""
+def _figures(trials: Trials) -> list[tuple[Spec, str]]:
+    """Return [(figure, reason why it cannot be drawn, or '')]."""
     nothing_varied = '' if _varying(trials.table, trials.table.varied) else 'no parameter was varied'
     found = [(Spec('histograms', 'Histograms', 'Distribution of each result over the trials in which it was measured; '
                    'dashed: the median.', (), histograms), ''),
@@ -162,8 +162,8 @@ def _figures(trials):
     return found
 
 
-def _estimates(rows, head):
-    """Return an HTML table of rows of --json with their values and intervals; head: texts of its header."""
+def _estimates(rows: Sequence[Row], head: Sequence[str]) -> str:
+    """Return an HTML table of rows of --json with their values and intervals; head: its header."""
     lines = [[row['case'], row['metric'], elements.number(row['value'] if row['value'] is not None else math.nan,
                                                           row['unit']),
               '' if row['ci_low'] is None and row['ci_high'] is None else
@@ -171,11 +171,11 @@ def _estimates(rows, head):
     return elements.table(head, lines)
 
 
-def _bound(value):
+def _bound(value: float | None) -> str:
     return '?' if value is None else f'{value:.4g}'
 
 
-def page(trials, rows):
+def page(trials: Trials, rows: Sequence[Row]) -> str:
     """Return the page of Trials as text; rows: their rows of --json."""
     title = f'{trials.plan.runs} trials: {trials.plan.name}'
     values = trials.table.column(trials.by)

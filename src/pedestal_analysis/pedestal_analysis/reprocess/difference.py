@@ -7,12 +7,16 @@ import dataclasses
 import fnmatch
 import itertools
 import math
+from collections.abc import Iterator, Sequence
+from typing import Annotated, TypeAlias
 
 import numpy as np
 
 from pedestal_common.graph import layouts, topics
+from pedestal_common.quantities import Bools, Floats, Message, Nanoseconds, Seconds, Stamps, Table
 from pedestal_common.wire import messages
 from pedestal_recording import columns
+from pedestal_recording.bag import Bag
 
 REST_FIELD = 'names, frames and the rest'
 """Name of a field in the report for all content of a message except its stamp and its numbers."""
@@ -23,69 +27,51 @@ RELATIVE_TOLERANCE = 1e-9
 
 @dataclasses.dataclass(frozen=True)
 class Tolerance:
-    """Allowed difference of numbers: absolute + relative * |recorded number|.
+    """Allowed difference of numbers: absolute + relative * |recorded number|."""
+    absolute: float | None = None   # in the unit of the column; None for the tolerance of the column
+    relative: float | None = None   # [-]; None for RELATIVE_TOLERANCE
+    ignored: tuple[str, ...] = ()   # patterns of the topics or TOPIC.FIELD not compared, such as 'acu/reference*'
 
-    absolute   in the unit of the column; None for the tolerance of the column
-    relative   [-]; None for RELATIVE_TOLERANCE
-    ignored    patterns of the topics or TOPIC.FIELD that are not compared, such as 'acu/reference*'
-    """
-    absolute: float | None = None
-    relative: float | None = None
-    ignored: tuple = ()
-
-    def of(self, column):
-        """Return (absolute, relative) for a layouts.Column."""
+    def of(self, column: layouts.Column) -> tuple[float, float]:
+        """Return (absolute, relative) for a column."""
         return (column.tolerance if self.absolute is None else self.absolute,
                 RELATIVE_TOLERANCE if self.relative is None else self.relative)
 
-    def ignores(self, name):
+    def ignores(self, name: str) -> bool:
         """Return True if a topic or TOPIC.FIELD is not compared."""
         return any(fnmatch.fnmatchcase(name, pattern) for pattern in self.ignored)
 
 
 @dataclasses.dataclass
 class FieldDifference:
-    """One field of a topic that differs.
-
-    name        name of the field
-    different   number of messages in which the field differs at all
-    beyond      number of messages in which it differs by more than the tolerance
-    largest     largest difference; infinite for a number against NaN, or for a text
-    first       stamp of the first difference [s]
-    """
+    """One field of a topic that differs."""
     name: str
-    different: int
-    beyond: int
-    largest: float
-    first: float
+    different: int  # number of messages in which the field differs at all
+    beyond: int     # number of messages in which it differs by more than the tolerance
+    largest: float  # difference; infinite for a number against NaN, or for a text
+    first: Seconds  # stamp of the first difference
 
 
 @dataclasses.dataclass
 class TopicDifference:
-    """Differences of a topic whose messages are paired by stamp.
-
-    name       name of the topic
-    was, now   number of recorded messages, number of new messages
-    problems   texts on their number and order
-    fields     [FieldDifference]
-    """
-    name: str
-    was: int
-    now: int
-    problems: list
-    fields: list
+    """Differences of a topic whose messages are paired by stamp."""
+    name: str   # of the topic
+    was: int    # number of recorded messages
+    now: int    # number of new messages
+    problems: list[str]     # on their number and order
+    fields: list[FieldDifference]
 
     @property
-    def equal(self):
+    def equal(self) -> bool:
         """True if nothing differs beyond its tolerance."""
         return not self.problems and not any(field.beyond for field in self.fields)
 
     @property
-    def identical(self):
+    def identical(self) -> bool:
         """True if nothing differs at all."""
         return not self.problems and not self.fields
 
-    def lines(self):
+    def lines(self) -> list[str]:
         """Return the differences of the topic as lines of text, one for each field that differs."""
         lines = [f'{self.name:34} {self.now:9} {self.was:9}  {"identical" if self.identical else ""}'.rstrip()]
         lines += [f'  {problem}' for problem in self.problems]
@@ -95,8 +81,8 @@ class TopicDifference:
         return lines
 
 
-def lines(differences) -> list:
-    """Return [TopicDifference] as the lines of a table."""
+def lines(differences: Sequence[TopicDifference]) -> list[str]:
+    """Return differences as the lines of a table."""
     text = [f'{"topic":34} {"computed":>9} {"recorded":>9}']
     if any(topic.fields for topic in differences):
         text.append(f'  {"field":32} {"differ":>9} {"beyond":>9} {"largest":>11} {"first s":>14}')
@@ -105,29 +91,24 @@ def lines(differences) -> list:
 
 @dataclasses.dataclass
 class Output:
-    """Messages of one topic as arrays.
+    """Messages of one topic as arrays."""
+    stamps: Stamps
+    values: Annotated[Floats, '(n, columns)']   # in the units of the topic; without columns for a text topic
+    texts: list[str] | None = None  # of a text topic, else None
+    # values as a subscriber uses them, NaN where their message marks them as no data. None if the type has no such
+    # mark, so that they equal `values`
+    read: Annotated[Floats, '(n, columns)'] | None = None
 
-    stamps   (n,) [ns]
-    values   (n, columns) in the units of the topic; without columns for a text topic
-    texts    [n] of a text topic, else None
-    read     (n, columns): values as a subscriber uses them, NaN where their message marks them as no data. None if the
-             type has no such mark, so that they equal `values`.
-    """
-    stamps: np.ndarray
-    values: np.ndarray
-    texts: list | None = None
-    read: np.ndarray | None = None
-
-    def table(self, topic):
-        """Return {column: array (n,)} with the names of pedestal_recording.columns.table; topic: name of the topic."""
+    def table(self, topic: str) -> Table:
+        """Return the columns with the names of pedestal_recording.columns.table; topic: name of the topic."""
         if self.texts is not None:
             return {'t': self.stamps / 1e9, 'data': self.texts}
         return {'t': self.stamps / 1e9,
                 **{column.name: values for column, values in zip(layouts.columns(topic), self.values.T)}}
 
 
-def recorded(data, log, topic) -> Output:
-    """Return the Output of messages of a topic: a list of CDR bytes, with their log times (n,) [ns].
+def recorded(data: Sequence[bytes], log: Stamps, topic: str) -> Output:
+    """Return the Output of messages of a topic, from their CDR bytes and log times.
 
     Raises ValueError for invalid messages.
     """
@@ -140,15 +121,16 @@ def recorded(data, log, topic) -> Output:
     return Output(columns.stamps(data, type_name, log), values, read=read)
 
 
-def _values(table, topic):
-    """Return the numbers (n, columns) of a topic from a table {column: array (n,)}; NaN for a missing column."""
+def _values(table: Table, topic: str) -> Floats:
+    """Return the numbers (n, columns) of a topic from a table; NaN for a missing column."""
     values = np.full((len(table['t']), len(layouts.columns(topic))), math.nan)
     for number, column in enumerate(layouts.columns(topic)):
         values[:, number] = table.get(column.name, math.nan)
     return values
 
 
-def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, template=None) -> TopicDifference:
+def compare(topic: str, was: Output, now: Output, tolerance: Tolerance = Tolerance(),
+            data: Sequence[bytes] | None = None, template: Message | None = None) -> TopicDifference:
     """Return the TopicDifference between the recorded messages `was` of a topic and the recomputed messages `now`.
 
     data, template: CDR bytes of the recorded messages, and a message that the node makes. With them, the content
@@ -159,7 +141,7 @@ def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, t
     _, here, there = np.intersect1d(was.stamps, now.stamps, return_indices=True)
     stamps = was.stamps[here]
 
-    def add(name, different, beyond, size, stamps=stamps):
+    def add(name: str, different: Bools, beyond: Bools, size: Floats, stamps: Stamps = stamps) -> None:
         if different.any() and not tolerance.ignores(f'{topic}.{name}'):
             difference.fields.append(FieldDifference(name, int(different.sum()), int(beyond.sum()), float(
                 size[different].max()), stamps[np.argmax(different)] / 1e9))
@@ -176,7 +158,7 @@ def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, t
             size = np.abs(b - a)
             beyond = different & ~(size <= absolute + relative * np.abs(a))
         add(column.name, different, beyond, np.where(np.isfinite(size), size, math.inf))
-    if template is not None:
+    if template is not None and data is not None:
         type_name = topics.TOPIC_BY_NAME[topic].type
         names = {column.name for column in layouts.columns(topic)}
         different = ~columns.alike(data, type_name, messages.serialize(template), names)
@@ -184,8 +166,8 @@ def compare(topic, was: Output, now: Output, tolerance=Tolerance(), data=None, t
     return difference
 
 
-def _order(was, now):
-    """Return texts on missing, doubled and descending stamps; was, now: recorded and recomputed stamps [ns]."""
+def _order(was: Stamps, now: Stamps) -> list[str]:
+    """Return texts on missing, doubled and descending stamps; was, now: recorded and recomputed stamps."""
     problems = []
     if len(was) != len(now):
         problems.append(f'{len(was)} messages recorded, {len(now)} recomputed')
@@ -204,24 +186,20 @@ def _order(was, now):
 
 @dataclasses.dataclass
 class MessageDifference:
-    """Differences of a topic whose messages are paired by position.
-
-    name        name of the topic
-    was, now    number of recorded messages, number of new messages
-    different   number of pairs that differ
-    first       log time of the first pair that differs [ns]
-    changes     texts on the differences of this pair
-    """
-    name: str
-    was: int
-    now: int
-    different: int
-    first: int
-    changes: list
+    """Differences of a topic whose messages are paired by position."""
+    name: str   # of the topic
+    was: int    # number of recorded messages
+    now: int    # number of new messages
+    different: int  # number of pairs that differ
+    first: Nanoseconds  # log time of the first pair that differs
+    changes: list[str]  # differences of this pair
 
 
-def compare_messages(name, was, now):
-    """Return the MessageDifference of a topic in two bags (bag.Bag); None if its messages have equal bytes."""
+_Timed: TypeAlias = tuple[Nanoseconds, bytes]   # log time and CDR bytes of a message
+
+
+def compare_messages(name: str, was: Bag, now: Bag) -> MessageDifference | None:
+    """Return the MessageDifference of a topic in two bags; None if its messages have equal bytes."""
     kinds = was.topics.get(name, 'none'), now.topics.get(name, 'none')
     old, new = ([(log, data) for _, log, _, data in bag.raw(name)] if name in bag.topics else []
                 for bag in (was, now))
@@ -236,10 +214,10 @@ def compare_messages(name, was, now):
     return None
 
 
-def compare_order(was, now):
+def compare_order(was: Bag, now: Bag) -> MessageDifference | None:
     """Return the MessageDifference at the first position at which the order of the messages differs, or None.
 
-    was, now: bag.Bags whose topics have equal messages.
+    was, now: bags whose topics have equal messages.
     """
     for old, new in zip(was.raw(), now.raw()):
         if old != new:
@@ -250,8 +228,8 @@ def compare_order(was, now):
     return None
 
 
-def _changes(was, now, kinds):
-    """Return texts on the differences of two messages (log time, bytes) of these types; None for a missing message."""
+def _changes(was: _Timed | None, now: _Timed | None, kinds: tuple[str, str]) -> list[str]:
+    """Return texts on the differences of two messages of these types; None for a missing message."""
     if was is None or now is None:
         return ['not recorded' if was is None else 'no new message']
     if was[0] != now[0]:
@@ -264,7 +242,7 @@ def _changes(was, now, kinds):
             if repr(old.get(key)) != repr(new.get(key))] or ['bytes outside all fields']
 
 
-def _leaves(message, prefix=''):
+def _leaves(message: Message, prefix: str = '') -> Iterator[tuple[str, object]]:
     """Yield (dotted name, value) of each number and text in a message."""
     for field in message.__dataclass_fields__:
         if field.isupper() or field == '__msgtype__':

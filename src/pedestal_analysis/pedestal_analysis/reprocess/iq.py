@@ -3,34 +3,38 @@ errors in a bag of the same run.
 
 The samples hold all inputs of the receiver. An equal version on the same machine therefore gives equal bytes.
 """
+import argparse
+from collections.abc import Iterator
+
 import numpy as np
 
 from pedestal_analysis.reprocess import recompute
 from pedestal_analysis.results.results import row
 from pedestal_common.graph import nodes
+from pedestal_common.quantities import Nanoseconds, Row
 from pedestal_common.wire import records
 from pedestal_hardware.monopulse import blocks, sigmf
-from pedestal_hardware.monopulse.unit import ANGLE_ERROR_TOPIC
+from pedestal_hardware.monopulse.params import MonopulseParameters
+from pedestal_hardware.monopulse.unit import ANGLE_ERROR_TOPIC, MonopulseReceiver
 
 
-def parameters_of(recording):
-    """Return the MonopulseParameters of a recompute.Recording. Raises RecomputeError for another receiver."""
+def parameters_of(recording: recompute.FedRecording) -> MonopulseParameters:
+    """Return the parameters of the receiver of a recording. Raises RecomputeError for another receiver."""
     if not recording.bag.iq:
         raise recompute.RecomputeError(f'{recording.bag.path}: --iq: the receiver of this recording had no I/Q '
                                        'samples')
-    return recompute.parameters_of(recording, nodes.MONOPULSE_RECEIVER.name)
+    parameters = recompute.parameters_of(recording, nodes.MONOPULSE_RECEIVER.name)
+    assert isinstance(parameters, MonopulseParameters)
+    return parameters
 
 
-def unit_of(parameters):
-    """Return a new unit of the receiver with MonopulseParameters."""
+def unit_of(parameters: MonopulseParameters) -> MonopulseReceiver:
+    """Return a new unit of the receiver."""
     return nodes.MONOPULSE_RECEIVER.unit_type()(parameters, nodes.MONOPULSE_RECEIVER.reads)
 
 
-def steps(unit, recording, epoch):
-    """Yield each blocks.Block of a sigmf.Recording after the unit has made its step.
-
-    epoch: stamp from which the unit counts [ns].
-    """
+def steps(unit: MonopulseReceiver, recording: sigmf.Recording, epoch: Nanoseconds) -> Iterator[blocks.Block]:
+    """Yield each block of a recording after the unit has made its step. epoch: stamp from which the unit counts."""
     made = blocks.Blocks(unit.parameters.source.rate, unit.parameters.block)
     for chunk in recording.chunks():
         for block in made.put(chunk):
@@ -39,10 +43,11 @@ def steps(unit, recording, epoch):
             yield block
 
 
-def angle_errors(recording, parameters, epoch):
-    """Return ({stamp [ns]: CDR bytes} of the angle errors of a recording, the unit after the last step).
+def angle_errors(recording: sigmf.Recording, parameters: MonopulseParameters,
+                 epoch: Nanoseconds) -> tuple[dict[Nanoseconds, bytes], MonopulseReceiver]:
+    """Return ({stamp: CDR bytes} of the angle errors of a recording, the unit after the last step).
 
-    recording: sigmf.Recording; parameters: MonopulseParameters; epoch: stamp from which the unit counts [ns].
+    epoch: stamp from which the unit counts.
     """
     unit = unit_of(parameters)
     encoder = records.Encoder(ANGLE_ERROR_TOPIC, unit.messages[ANGLE_ERROR_TOPIC], unit.outputs)
@@ -53,10 +58,10 @@ def angle_errors(recording, parameters, epoch):
     return found, unit
 
 
-def main(options):
+def main(options: argparse.Namespace) -> tuple[list[str], list[Row], bool]:
     """Return (lines to print, rows of --json, True if all errors in the bag are equal to the last bit). Raises
     ValueError for a bag or a file that does not fit."""
-    recording = recompute.Recording(options.bag)
+    recording = recompute.FedRecording(options.bag)
     node = nodes.MONOPULSE_RECEIVER.name
     if not recording.has(ANGLE_ERROR_TOPIC):
         raise recompute.RecomputeError(f'{options.bag}: no {ANGLE_ERROR_TOPIC} in the bag')

@@ -3,26 +3,34 @@
 The module starts the process of the node, and takes the place of all other nodes of the graph.
 """
 import collections
+import functools
 import os
 import pathlib
 import signal
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable, Collection, Iterable
 
 import numpy as np
 import rclpy
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.utilities import try_shutdown
 from std_srvs.srv import Trigger
 
 from pedestal_analysis.reprocess import difference, recompute
+from pedestal_analysis.reprocess.difference import Output
 from pedestal_bringup.graph.operator_node import Operator
 from pedestal_bringup.graph.processes import RunError, command_line
 from pedestal_common import parameters
 from pedestal_common.graph import domain, nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware
+from pedestal_common.node.unit import Unit
+from pedestal_common.quantities import Ints, Seconds
 from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import commands, messages, records
 
@@ -40,25 +48,22 @@ class Feeder(Operator):
     node      name of the node
     inputs    topics that the Feeder publishes
     written   output topics of the node
-    answers   {output topic: [CDR bytes]} received so far
-    replies   [CDR bytes] of the replies of the node to commands
-    readers   the other ROS nodes that `stand_in` made
     """
 
-    def __init__(self, node, inputs, written):
+    def __init__(self, node: str, inputs: Iterable[str], written: Iterable[str]) -> None:
         super().__init__()
         self.node = node
-        self.publishers_of = {name: self._publisher(self.links[name]) for name in inputs}
-        self.answers = {name: [] for name in written}
-        self.readers = []
+        self.input_publishers = {name: self._publisher(self.links[name]) for name in inputs}
+        self.answers: dict[str, list[bytes]] = {name: [] for name in written}   # received so far, by output topic
+        self.readers: list[Node] = []   # the other ROS nodes that `stand_in` made
         row = nodes.row(node)
-        self.replies = []
+        self.replies: list[bytes] = []  # of the node to commands
         if row.obeys:
             self.command_publisher = self._publisher(self.links[row.obeys])
             self.create_subscription(middleware.message_class(self.links[row.replies].type), row.replies,
                                      self.replies.append, middleware.qos(self.links[row.replies].rate), raw=True)
 
-    def stand_in(self, names):
+    def stand_in(self, names: Collection[str]) -> None:
         """Make a ROS node for each of these names, as a subscriber of the outputs of the node.
 
         Because a node in lockstep waits until all nodes in its parameter graph.nodes have subscribed, each needs such
@@ -75,36 +80,31 @@ class Feeder(Operator):
                             self.answers[link.name].append if kept else lambda data: None, middleware.qos(link.rate),
                             raw=True)
 
-    def _publisher(self, link):
+    def _publisher(self, link: nodes.Link) -> Publisher:
         return self.create_publisher(middleware.message_class(link.type), link.name, middleware.qos(link.rate))
 
-    def announce_now(self, name, data):
+    def announce_now(self, name: str, data: bytes) -> None:
         """Publish a message for which no step waits, and wait for its acknowledgement. Raises RunError without it."""
-        publisher = self.publishers_of[name]
+        publisher = self.input_publishers[name]
         publisher.publish(data)
         if not publisher.wait_for_all_acked(Duration(seconds=ANSWER_TIMEOUT_S)):
             raise RunError(f'{self.node} did not acknowledge {name} within {ANSWER_TIMEOUT_S:g} s')
 
 
 class Live:
-    """The process of the node together with the Feeder.
+    """The process of the node together with the Feeder. log: of the process; services: of the node."""
 
-    feeder     Feeder
-    process    subprocess.Popen of the node
-    log        path of the log of the process
-    services   names of the services of the node
-    """
-
-    def __init__(self, feeder, process, log, services):
+    def __init__(self, feeder: Feeder, process: subprocess.Popen[bytes], log: pathlib.Path,
+                 services: Collection[str]) -> None:
         self.feeder, self.process, self.log, self.services = feeder, process, log, services
         self.executor = SingleThreadedExecutor()
         for node in (feeder, *feeder.readers):
             self.executor.add_node(node)
 
-    def until(self, condition, limit, missing):
+    def until(self, condition: Callable[[], object], limit: Seconds, missing: Callable[[], str]) -> None:
         """Spin the ROS nodes of the Feeder until condition() is true.
 
-        limit: longest wait [s]; missing: function that returns the name of the missing message, for the error.
+        limit: longest wait; missing: function that returns the name of the missing message, for the error.
         Raises RunError if the node dies, or after the limit.
         """
         deadline = time.monotonic() + limit
@@ -116,8 +116,8 @@ class Live:
                 raise RunError(f'{self.feeder.node}: no {missing()} within {limit:g} s')
             self.executor.spin_once(timeout_sec=0.1)
 
-    def send_command(self, command):
-        """Send a commands.Command by its service or by the command topic, and wait for the reply. Raises RunError."""
+    def send_command(self, command: commands.Command) -> None:
+        """Send a command by its service or by the command topic, and wait for the reply. Raises RunError."""
         if command.verb not in self.services:
             before = len(self.feeder.replies)
             self.feeder.command_publisher.publish(messages.serialize(commands.message(command)))
@@ -131,10 +131,11 @@ class Live:
         self.feeder.destroy_client(client)
 
 
-def outputs(recording, done, params):
-    """Return {topic: Output} of the process of a node that is fed with the inputs of a recompute.Recomputed.
+def outputs(recording: recompute.FedRecording, done: recompute.Recomputed,
+            params: parameters.Parameters) -> dict[str, Output]:
+    """Return {topic: Output} of the process of a node that is fed with the inputs of the recomputation `done`.
 
-    done: the Recomputed, whose outputs give the number of messages due at each step; params: parameters of the node.
+    done: its outputs give the number of messages due at each step; params: parameters of the node.
     Raises RunError if messages are missing, RecomputeError for a recording in realtime.
     """
     if not recording.lockstep:
@@ -145,10 +146,10 @@ def outputs(recording, done, params):
         try:
             return _run(recording, done, params, pathlib.Path(folder))
         finally:
-            rclpy.try_shutdown()
+            try_shutdown()
 
 
-def _graph(recording, unit):
+def _graph(recording: recompute.FedRecording, unit: Unit) -> tuple[str, ...]:
     """Return the parameter graph.nodes of the process: the node, the recorder, and the optional nodes that feed it.
 
     Because the recorder subscribes to every output, the process publishes each of them.
@@ -158,7 +159,8 @@ def _graph(recording, unit):
     return (unit.NODE.name, 'recorder', *optional)
 
 
-def _run(recording, done, params, folder):
+def _run(recording: recompute.FedRecording, done: recompute.Recomputed, params: parameters.Parameters,
+         folder: pathlib.Path) -> dict[str, Output]:
     """Start the process of the node with its files in a folder, feed it, end it, and return its {topic: Output}."""
     file, log = folder / 'parameters.yaml', folder / 'log'
     names = _graph(recording, done.unit)
@@ -175,7 +177,7 @@ def _run(recording, done, params, folder):
                                    env={**os.environ, 'ROS_LOG_DIR': str(folder)})
         try:
             live = Live(feeder, process, log, done.unit.REQUESTS)
-            live.until(lambda: all(publisher.get_subscription_count() for publisher in feeder.publishers_of.values())
+            live.until(lambda: all(each.get_subscription_count() for each in feeder.input_publishers.values())
                        and feeder.count_publishers('diagnostics'), NODE_START_TIMEOUT_S,
                        lambda: 'subscriber of its inputs')
             # Because DDS discovers each direction separately, the node may not know the feeder yet.
@@ -191,21 +193,21 @@ def _run(recording, done, params, folder):
     return {name: _output(name, data, done, steps[name]) for name, data in feeder.answers.items()}
 
 
-def _feed(recording, done, live):
+def _feed(recording: recompute.FedRecording, done: recompute.Recomputed, live: Live) -> dict[str, list[int]]:
     """Feed all steps to the process. Return {output topic: [step at which each message came]}."""
     feed, feeder = done.feed, live.feeder
-    events = collections.defaultdict(list)
+    events: dict[int, list[tuple[str, int]]] = collections.defaultdict(list)
     for step, name, row in feed.events:
         events[step].append((name, row))
     due = {name: _due(done, name) for name in done.outputs}
-    steps = {name: [] for name in done.outputs}
+    steps: dict[str, list[int]] = {name: [] for name in done.outputs}
 
-    def answered(step):
+    def answered(step: int) -> bool:
         for name, answers in feeder.answers.items():
             steps[name] += [step] * (len(answers) - len(steps[name]))
         return all(len(feeder.answers[name]) >= count[step] for name, count in due.items())
 
-    def missing(step):
+    def missing(step: int) -> str:
         names = [name for name, count in due.items() if len(feeder.answers[name]) < count[step]]
         return f'{", ".join(names)} for step {feed.stamps[step] / NS_PER_SECOND:.6f} s'
 
@@ -215,21 +217,21 @@ def _feed(recording, done, live):
         for command, _ in done.requests.get(step, ()):
             live.send_command(command)
         for name, rows in feed.rows.items():
-            if rows[step] >= 0 and name in feeder.publishers_of:
-                feeder.publishers_of[name].publish(recording.data(name)[rows[step]])
-        live.until(lambda step=step: answered(step), NODE_START_TIMEOUT_S if step == 0 else ANSWER_TIMEOUT_S,
-                   lambda step=step: missing(step))
+            if rows[step] >= 0 and name in feeder.input_publishers:
+                feeder.input_publishers[name].publish(recording.data(name)[rows[step]])
+        live.until(functools.partial(answered, step), NODE_START_TIMEOUT_S if step == 0 else ANSWER_TIMEOUT_S,
+                   functools.partial(missing, step))
     return steps
 
 
-def _due(done, name):
-    """Return the number (n,) of messages of an output topic that are due up to each step, this step included."""
+def _due(done: recompute.Recomputed, name: str) -> Ints:
+    """Return the number of messages of an output topic that are due up to each step, this step included."""
     if records.is_text(name):
         return np.searchsorted(done.outputs[name].stamps, done.feed.stamps, side='right')
     return np.cumsum(done.steps[name]['stamp'] != records.NO_STAMP)
 
 
-def _output(name, data, done, steps):
+def _output(name: str, data: list[bytes], done: recompute.Recomputed, steps: list[int]) -> Output:
     """Return the Output of a topic from its CDR bytes and the step at which each message came."""
     log = done.feed.stamps[np.array(steps[:len(data)], np.int64)]
     return difference.recorded([bytes(message) for message in data[:len(log)]], log, name)

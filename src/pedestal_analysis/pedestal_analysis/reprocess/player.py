@@ -7,18 +7,25 @@ import contextlib
 import dataclasses
 import struct
 import time
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from pedestal_analysis.reprocess.playlist import latched, reads
-from pedestal_analysis.reprocess.terminal import RIGHT_ARROW_CODES, StatusLine
+from pedestal_analysis.reprocess.playlist import Playlist, latched, reads
+from pedestal_analysis.reprocess.terminal import RIGHT_ARROW_CODES, Keyboard, StatusLine
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.node import middleware, shell
+from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
+
+if TYPE_CHECKING:
+    from pedestal_analysis.reprocess.replay import ReplayOptions
 
 ANSWER_TOPICS = {node.name: (None if node.reads[0] in node.writes else node.reads[0], node.answer)
                  for node in nodes.NODES if node.answer}
@@ -59,39 +66,35 @@ STOPPED_ARRIVAL_TIMEOUT_S: time for which a stopped replay waits for acknowledge
 _stamp_of = struct.Struct('<iI').unpack_from
 
 
-def answer_of(node, graph):
-    """Return the row of ANSWER_TOPICS of a node, with the names of the topics in a graph {name: Link}.
+def answer_of(node: str, graph: Mapping[str, nodes.Link]) -> tuple[str | None, str]:
+    """Return the row of ANSWER_TOPICS of a node, with the names of the topics in a graph.
 
     An array answers by the topics of its first beam.
     """
-    return tuple(name if name is None or name in graph else f'{nodes.beam_of(node) or "beam_1"}/{name}'
-                 for name in ANSWER_TOPICS[nodes.plain(node)])
+    trigger, answer = ANSWER_TOPICS[nodes.plain(node)]
+
+    def of_beam(name: str) -> str:
+        return name if name in graph else f'{nodes.beam_of(node) or "beam_1"}/{name}'
+    return trigger and of_beam(trigger), of_beam(answer)
 
 
 @dataclasses.dataclass
 class NodeUnderTest:
-    """A live node that receives the replayed messages and must answer every step.
-
-    name                 name of the node
-    trigger              topic that begins a step, None for a node that begins the steps itself
-    answer               topic of its answers
-    triggered, answered  stamps [ns] of the last trigger and the last answer, -1 before the first
-    steps, answers       numbers of triggers and answers
-    """
+    """A live node that receives the replayed messages and must answer every step."""
     name: str
-    trigger: str | None
-    answer: str
-    triggered: int = -1
-    answered: int = -1
-    steps: int = 0
-    answers: int = 0
+    trigger: str | None     # topic that begins a step, None for a node that begins the steps itself
+    answer: str     # topic of its answers
+    triggered: Nanoseconds = -1     # stamp of the last trigger, -1 before the first
+    answered: Nanoseconds = -1      # stamp of the last answer, -1 before the first
+    steps: int = 0      # number of triggers
+    answers: int = 0    # number of answers
 
-    def owes(self, stamp=-1):
-        """Return True if the node must still answer before messages with a stamp [ns] may be published."""
+    def owes(self, stamp: Nanoseconds = -1) -> bool:
+        """Return True if the node must still answer before messages with a stamp may be published."""
         return self.answered < (stamp if self.trigger is None else self.triggered)
 
-    def silence(self, stamp, deadline):
-        """Return the GraphError for an answer that was missing for longer than the deadline [s]."""
+    def silence(self, stamp: Nanoseconds, deadline: Seconds) -> GraphError:
+        """Return the GraphError for an answer that was missing for longer than the deadline."""
         step = stamp if self.trigger is None else self.triggered
         return GraphError(f'no {self.answer} for step {step / NS_PER_SECOND:.6f} s after {deadline:g} s; silent: '
                           f'{self.name}')
@@ -103,13 +106,13 @@ class Pace:
     rate: multiples of real time, None if each message is due at once; paused, quit: states.
     """
 
-    def __init__(self, rate, paused):
+    def __init__(self, rate: float | None, paused: bool) -> None:
         self.rate, self.paused, self.quit = rate, paused, False
         self._steps = 0
-        self._base = None
+        self._base: tuple[Seconds, Nanoseconds] | None = None
 
-    def press(self, key):
-        """Apply a pressed key (bytes), see KEY_HELP."""
+    def press(self, key: bytes) -> None:
+        """Apply a pressed key, see KEY_HELP."""
         if key == b' ':
             self.paused, self._steps = not self.paused, 0
         elif key == b'n' or key in RIGHT_ARROW_CODES:
@@ -118,8 +121,8 @@ class Pace:
         elif key == b'q':
             self.quit = True
 
-    def wait(self, stamp, now):
-        """Return the time to wait until the messages of a stamp [ns] are due [s]; now: steady time [s].
+    def wait(self, stamp: Nanoseconds, now: Seconds) -> Seconds:
+        """Return the time to wait until the messages of a stamp are due; now: steady time.
 
         A single step that was requested by a key is used up.
         """
@@ -135,31 +138,29 @@ class Pace:
             self._base = now, stamp
         return self._base[0] + (stamp - self._base[1]) / NS_PER_SECOND / self.rate - now
 
-    def __str__(self):
+    def __str__(self) -> str:
         return 'paused' if self.paused else 'lockstep' if self.rate is None else f'{self.rate:g} x'
 
 
 @dataclasses.dataclass
 class Channel:
-    """A published topic: its publisher, number of sent messages, number of messages known as acknowledged."""
-    publisher: object
-    sent: int = 0
-    arrived: int = 0
+    """A published topic."""
+    publisher: Publisher
+    sent: int = 0   # number of messages
+    arrived: int = 0    # number of messages known as acknowledged
 
 
 class Player(Node):
     """ROS node that publishes a Playlist as the ReplayOptions state.
 
-    playlist    Playlist to publish
     companion   topic (the clock) that is published too if it has no other publisher; it needs no subscriber
-    options     ReplayOptions
-    keyboard    terminal.Keyboard
     stopped     function stopped() that returns True when the replay must end
 
     Each topic must have the nodes of the options as its subscribers or, without nodes, any subscriber.
     """
 
-    def __init__(self, playlist, companion, options, keyboard, stopped):
+    def __init__(self, playlist: Playlist, companion: str | None, options: 'ReplayOptions', keyboard: Keyboard,
+                 stopped: Callable[[], bool]) -> None:
         super().__init__(nodes.REPLAY_NODE)
         self.playlist, self.companion = playlist, companion
         self.nodes, self.deadline = options.nodes, options.deadline
@@ -177,7 +178,7 @@ class Player(Node):
         self.position = playlist.first
         self._next_refresh = self._next_subscriber_check = self._last_spin = 0.0    # monotonic [s]
 
-    def _publisher(self, name, type_name):
+    def _publisher(self, name: str, type_name: str) -> Publisher:
         """Return a publisher of a recorded topic. Raises BagError for a wrong type or a type that is not installed."""
         topic = self.graph.get(name)
         if topic is not None and topic.type != type_name:
@@ -189,11 +190,11 @@ class Player(Node):
                                 'choose other topics with --topics') from None
         return self.create_publisher(kind, name, middleware.qos(topic.rate if topic is not None else 'step'))
 
-    def _listen(self, topic):
+    def _listen(self, topic: nodes.Link) -> None:
         """Subscribe to an output of a node under test, as the missing nodes would."""
         node = next((node for node in self.under_test if node.answer == topic.name), None)
 
-        def take(data):
+        def take(data: bytes) -> None:
             if node is not None:
                 seconds, nanoseconds = _stamp_of(data, messages.CDR_HEADER_BYTES)
                 node.answered = max(node.answered, seconds * NS_PER_SECOND + nanoseconds)
@@ -201,11 +202,11 @@ class Player(Node):
         profile = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE)
         self.create_subscription(middleware.message_class(topic.type), topic.name, take, profile, raw=True)
 
-    def _spin(self, seconds):
+    def _spin(self, seconds: Seconds) -> None:
         self.spinner.spin_once(timeout_sec=seconds)
         self._last_spin = time.monotonic()
 
-    def _other_writers(self, name):
+    def _other_writers(self, name: str) -> list[str]:
         """Return the names of the other nodes that publish a topic.
 
         A topic with several publishers, such as the diagnostics, may have other publishers than the recorded nodes.
@@ -217,7 +218,7 @@ class Player(Node):
         topic = self.graph.get(name)
         return [node for node in others if topic is None or len(topic.writers) == 1 or node in topic.writers]
 
-    def _unread(self):
+    def _unread(self) -> tuple[str, str] | None:
         """Return (topic, its missing subscribers as a text) of the first topic without its subscribers, or None."""
         for name, channel in self.channels.items():
             if name == self.companion:
@@ -229,7 +230,7 @@ class Player(Node):
                 return name, ', '.join(lacking or wanted) or 'any node'
         return None
 
-    def connect(self):
+    def connect(self) -> bool:
         """Wait until each topic has its subscribers. Return True, or False if the replay ended meanwhile.
 
         Raises GraphError if a topic already has another publisher, or has no subscriber after the deadline. Because a
@@ -259,7 +260,7 @@ class Player(Node):
             self._spin(KEYBOARD_POLL_S)
         return False
 
-    def play(self):
+    def play(self) -> None:
         """Publish the messages until the end of the playlist, a key or a signal.
 
         Raises GraphError if a subscriber disappears, or if an answer in lockstep is missing after the deadline. Raises
@@ -276,14 +277,14 @@ class Player(Node):
                     else:
                         self._send(name, stamp, data)
 
-    def _announce(self, name, stamp, data):
+    def _announce(self, name: str, stamp: Nanoseconds, data: bytes) -> None:
         """Publish a message of a latched topic. All earlier messages arrive before it, all later messages after it."""
         for other in self.channels:
             self._await_arrival(other, self.deadline)
         self._send(name, stamp, data)
         self._await_arrival(name, self.deadline)
 
-    def _send(self, name, stamp, data):
+    def _send(self, name: str, stamp: Nanoseconds, data: bytes) -> None:
         """Publish a message. Before it, wait if too many messages are unacknowledged (MAX_UNACKNOWLEDGED_MESSAGES)."""
         channel = self.channels[name]
         if channel.sent - channel.arrived >= MAX_UNACKNOWLEDGED_MESSAGES:
@@ -294,8 +295,8 @@ class Player(Node):
             if name == node.trigger:
                 node.triggered, node.steps = stamp, node.steps + 1
 
-    def _await_arrival(self, name, limit):
-        """Wait until the subscribers of a topic have acknowledged all messages; limit: longest wait [s].
+    def _await_arrival(self, name: str, limit: Seconds) -> None:
+        """Wait until the subscribers of a topic have acknowledged all messages; limit: longest wait.
 
         Raises GraphError after the limit or if a subscriber died, and shell.Stopped after a signal.
         """
@@ -313,7 +314,7 @@ class Player(Node):
             raise GraphError(f'a subscriber of {name} died before it had acknowledged all messages')
         channel.arrived = channel.sent
 
-    def _await_turn(self, stamp):
+    def _await_turn(self, stamp: Nanoseconds) -> bool:
         """Wait until the messages of a stamp are due; return False if the replay ends instead."""
         since = time.monotonic()
         while True:
@@ -332,11 +333,11 @@ class Player(Node):
                 return True
             self._spin(min(wait, KEYBOARD_POLL_S))
 
-    def _ended(self):
+    def _ended(self) -> bool:
         return self.pace.quit or self.stopped()
 
-    def _time_to_wait(self, stamp, now, since):
-        """Return the time to wait for the messages of a stamp [ns], in s; now, since: now and start of the wait [s].
+    def _time_to_wait(self, stamp: Nanoseconds, now: Seconds, since: Seconds) -> Seconds:
+        """Return the time to wait for the messages of a stamp; now, since: now and start of the wait.
 
         Raises GraphError if an answer is missing after the deadline.
         """
@@ -347,12 +348,12 @@ class Player(Node):
             raise late.silence(stamp, self.deadline)
         return KEYBOARD_POLL_S
 
-    def _late(self, stamp=-1):
-        """Return the first node under test that must still answer before the messages of a stamp [ns], or None."""
+    def _late(self, stamp: Nanoseconds = -1) -> NodeUnderTest | None:
+        """Return the first node under test that must still answer before the messages of a stamp, or None."""
         return next((node for node in self.under_test if node.owes(stamp)), None)
 
-    def _show_position(self, now):
-        """Show the position, the pace and the keys in the status line; now: steady time [s]."""
+    def _show_position(self, now: Seconds) -> None:
+        """Show the position, the pace and the keys in the status line; now: steady time."""
         if now >= self._next_refresh:
             self._next_refresh = now + POSITION_REFRESH_S
             start, end = self.playlist.origin, self.playlist.end
@@ -360,7 +361,7 @@ class Player(Node):
             self.status.show(f'{position:.3f} / {length:.3f} s  {self.pace}'
                              + (f'   {KEY_HELP}' if self.keyboard.available else ''))
 
-    def _check_subscribers(self, now):
+    def _check_subscribers(self, now: Seconds) -> None:
         """Raise GraphError if a topic has lost a subscriber."""
         if now >= self._next_subscriber_check:
             self._next_subscriber_check = now + SUBSCRIBER_POLL_S
@@ -369,7 +370,7 @@ class Player(Node):
                 name, missing = unread
                 raise GraphError(f'{name} lost its subscriber at {self.position / NS_PER_SECOND:.6f} s: {missing}')
 
-    def finish(self):
+    def finish(self) -> None:
         """Wait until all messages are acknowledged and the nodes under test have answered.
 
         Raises GraphError after the deadline. After a key or a signal to end, wait for acknowledgement only, at most
@@ -384,17 +385,17 @@ class Player(Node):
             self._await_arrival(name, self.deadline)
         limit = self.deadline if self.pace.rate is None else ANSWER_QUIET_S
         count, since = -1, 0.0
-        while self._late() and not self._ended():
+        while (late := self._late()) and not self._ended():
             now, answers = time.monotonic(), sum(node.answers for node in self.under_test)
             if answers != count:
                 count, since = answers, now
             elif now - since > limit:
                 if self.pace.rate is None:
-                    raise self._late().silence(-1, self.deadline)
+                    raise late.silence(-1, self.deadline)
                 return
             self._spin(KEYBOARD_POLL_S)
 
-    def close(self):
+    def close(self) -> None:
         """Leave the graph."""
         self.status.clear()
         self.spinner.remove_node(self)

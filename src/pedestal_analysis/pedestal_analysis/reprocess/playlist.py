@@ -9,32 +9,35 @@ are in this order:
 4. within a topic, the order of the file
 """
 import itertools
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from pedestal_common.graph import nodes, topics
+from pedestal_common.graph.nodes import Link
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import did_you_mean
+from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_recording import bag as bags
 
 
-def reads(graph, node, name):
-    """Return True if a node of the graph {name: Link} subscribes to a topic; the recorder subscribes to all topics."""
+def reads(graph: Mapping[str, Link], node: str, name: str) -> bool:
+    """Return True if a node of the graph subscribes to a topic; the recorder subscribes to all topics."""
     return node == 'recorder' or name in graph and node in graph[name].readers
 
 
-def writes(graph, node, name):
-    """Return True if a node of the graph {name: Link} publishes a topic."""
+def writes(graph: Mapping[str, Link], node: str, name: str) -> bool:
+    """Return True if a node of the graph publishes a topic."""
     return name in graph and node in graph[name].writers
 
 
-def latched(graph, name):
-    """Return True if a topic of the graph {name: Link} is latched."""
+def latched(graph: Mapping[str, Link], name: str) -> bool:
+    """Return True if a topic of the graph is latched."""
     return name in graph and topics.QOS_BY_RATE[graph[name].rate].latched
 
 
-def selected_topics(bag, input_nodes, names):
-    """Return the topics of a bag.Bag that a replay publishes.
+def selected_topics(bag: bags.Bag, input_nodes: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Return the topics of a bag that a replay publishes.
 
     They are the topics in names. Without names they are the inputs of input_nodes that none of these nodes publishes.
     Without both they are all topics. Raises BagError for a topic that is not in the bag, an unknown node, or a node
@@ -44,7 +47,8 @@ def selected_topics(bag, input_nodes, names):
         return bags.chosen_topics(bag, names)
     if not input_nodes:
         return list(bag.topics)
-    chosen, graph, known = [], bag.graph, nodes.members(nodes.NODE_NAMES, bag.beams)
+    chosen: list[str] = []
+    graph, known = bag.graph, nodes.members(nodes.NODE_NAMES, bag.beams)
     for node in input_nodes:
         if node not in known:
             raise bags.BagError(f'--node {node}: unknown node;{did_you_mean(node, known)} must be one of '
@@ -59,29 +63,29 @@ def selected_topics(bag, input_nodes, names):
 
 
 class Playlist:
-    """Messages of a bag.Bag in the order that the module states.
+    """Messages of a bag in the order that the module states.
 
     names         topics
-    start         begin of the playlist [s], counted from `origin`
-    duration      length of the playlist [s], None to the end
-    origin, end   stamps [ns] of the first message of a topic that is not latched, and of the last message of the bag
-    first, last   stamps [ns] of the first and the last message of the playlist
+    start         begin of the playlist, counted from `origin`
+    duration      length of the playlist, None to the end
+    origin, end   stamps of the first message of a topic that is not latched, and of the last message of the bag
+    first, last   stamps of the first and the last message of the playlist
 
     Because a latched message stays valid, the last message of each latched topic before the start comes first.
     Raises BagError if there are no messages.
     """
 
-    def __init__(self, bag, names, start, duration):
+    def __init__(self, bag: bags.Bag, names: Sequence[str], start: Seconds, duration: Seconds | None) -> None:
         self.bag, self.names = bag, names
-        where, stamps, ranks = [], [], []
+        rows_of, stamps_of, ranks_of = [], [], []
         # The rank of a latched topic is negative, so latched topics come first among equal stamps.
         rank = {name: number - len(bag.graph) * latched(bag.graph, name) for number, name in enumerate(bag.graph)}
         for name in names:
             rows = bag.where(name)
-            where.append(rows)
-            stamps.append(bag.index.stamp[rows])
-            ranks.append(np.full(rows.size, rank.get(name, len(rank))))
-        where, stamps, ranks = map(np.concatenate, (where, stamps, ranks))
+            rows_of.append(rows)
+            stamps_of.append(bag.index.stamp[rows])
+            ranks_of.append(np.full(rows.size, rank.get(name, len(rank))))
+        where, stamps, ranks = np.concatenate(rows_of), np.concatenate(stamps_of), np.concatenate(ranks_of)
         if not where.size:
             raise bags.BagError(f'{bag.path}: no message of {", ".join(names)}')
         order = np.lexsort((where, ranks, stamps))
@@ -102,8 +106,8 @@ class Playlist:
         chosen = np.concatenate((held, inside))
         self._where, self._stamps = where[chosen], stamps[chosen]
 
-    def steps(self):
-        """Yield (stamp [ns], iterator of (topic, CDR bytes)) for each stamp in order."""
+    def steps(self) -> Iterator[tuple[Nanoseconds, Iterator[tuple[str, bytes]]]]:
+        """Yield (stamp, iterator of (topic, CDR bytes)) for each stamp in order."""
         rows = zip(self._stamps.tolist(), self.bag.take(self.bag.index[self._where]))
         for stamp, group in itertools.groupby(rows, lambda row: row[0]):
             yield stamp, ((name, data) for _, (name, _, _, data) in group)

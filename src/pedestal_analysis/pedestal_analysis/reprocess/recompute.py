@@ -15,7 +15,10 @@ both       Recorded commands and service calls are repeated before the step at w
            until the filter has converged.
 """
 import dataclasses
+import pathlib
 import time
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 
@@ -24,7 +27,8 @@ from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.steps import NS_PER_SECOND, GraphError, Steps
-from pedestal_common.node.unit import announced
+from pedestal_common.node.unit import Unit, announced
+from pedestal_common.quantities import Floats, Ints, Json, Nanoseconds, Records, Stamps
 from pedestal_common.wire import commands, messages, records
 from pedestal_recording import bag as bags
 
@@ -37,13 +41,13 @@ AFTER_LAST_STAMP = 2**63 - 1
 RECOMPUTABLE_NODES = tuple(node.name for node in nodes.NODES if node.unit)  # names of the nodes that can be recomputed
 
 
-def row_of(recording, node) -> nodes.Node:
+def row_of(recording: 'FedRecording', node: str) -> nodes.Node:
     """Return the nodes.Node of the name of a node, for a recording whose drive may be an array or servo drives, and
     whose receiver may be one of I/Q samples."""
     return nodes.row(node, recording.bag.beams > 0, recording.bag.servo, recording.bag.iq)
 
 
-def publishing_node(topic) -> nodes.Node:
+def publishing_node(topic: str) -> nodes.Node:
     """Return the nodes.Node that publishes a topic."""
     return next(node for node in nodes.NODES if topic in (*node.writes, node.replies))
 
@@ -52,48 +56,58 @@ class RecomputeError(ValueError):
     """Error of a bag without the data for a recomputation, or of an option that does not fit. Its text is one line."""
 
 
-class Recording:
+Values: TypeAlias = Mapping[str, Mapping[str, Json]]    # parameters: {node: {dotted name: value}}
+Made: TypeAlias = dict[int, list[tuple[commands.Command, bool]]]    # {step: [(request, True if granted)]}
+# step that follows a message, its topic and index; no step waits for the message
+Event: TypeAlias = tuple[int, str, int]
+# matched step: its stamp, index of the trigger message, {topic: index of its message, None for none}
+_Step: TypeAlias = tuple[Nanoseconds, int, Mapping[str, int | None]]
+
+
+class FedRecording:
     """The messages of a bag by topic. Each topic is read from the file once.
 
     lockstep: True to match messages to steps by stamp, False by arrival, None by the pacing that the bag states.
     beam: name of one of several beams, '' for the first.
     """
 
-    def __init__(self, path, lockstep=None, beam=''):
+    def __init__(self, path: str | pathlib.Path, lockstep: bool | None = None, beam: str = '') -> None:
         self.bag = bags.read(path, beam)
         self.lockstep = self.bag.metadata.get('pacing') == 'lockstep' if lockstep is None else lockstep
-        self._rows, self._data, self._outputs = {}, {}, {}
+        self._rows: dict[str, bags.Index] = {}
+        self._data: dict[str, list[bytes]] = {}
+        self._outputs: dict[str, difference.Output] = {}
 
-    def has(self, topic):
+    def has(self, topic: str) -> bool:
         """Return True if the bag has a message of a topic."""
         return topic in self.bag.topics and len(self.rows(topic)) > 0
 
-    def source(self, topic):
+    def source(self, topic: str) -> str:
         """Return the recorded topic that feeds a topic: the topic itself or, if missing, its substitute."""
         return topic if topic in self.bag.topics else SUBSTITUTE_TOPICS.get(topic, topic)
 
-    def feeds(self, topic):
+    def feeds(self, topic: str) -> bool:
         """Return True if the bag has messages that feed a topic, see `source`."""
         return self.has(self.source(topic))
 
-    def rows(self, topic):
+    def rows(self, topic: str) -> bags.Index:
         """Return the rows of Bag.index of a topic, or of its substitute."""
         if topic not in self._rows:
             self._rows[topic] = self.bag.rows(self.source(topic))
         return self._rows[topic]
 
-    def arrival(self, topic):
-        """Return numbers (n,) that increase in the order of arrival of the messages of a topic.
+    def arrival(self, topic: str) -> Ints:
+        """Return numbers that increase in the order of arrival of the messages of a topic.
 
-        They are the publish times [ns] by the clock of the machine. In a recording of another tool, they are the
+        They are the publish times by the clock of the machine. In a recording of another tool, they are the
         places in the file.
         """
         rows = self.rows(topic)
         # A place is the number of a chunk and the offset in the unpacked chunk, which is far below 2^40 bytes.
         return rows.publish if 'pacing' in self.bag.metadata else (rows.chunk << 40) + rows.start
 
-    def data(self, topic):
-        """Return [CDR bytes] of the messages of a topic. Raises RecomputeError for another type."""
+    def data(self, topic: str) -> list[bytes]:
+        """Return the CDR bytes of the messages of a topic. Raises RecomputeError for another type."""
         if topic not in self._data:
             wanted, source = topics.TOPIC_BY_NAME[topic].type, self.source(topic)
             if self.bag.topics[source] != wanted:
@@ -101,7 +115,7 @@ class Recording:
             self._data[topic] = [data for _, _, _, data in self.bag.raw(source)]
         return self._data[topic]
 
-    def output(self, topic) -> difference.Output:
+    def output(self, topic: str) -> difference.Output:
         """Return the messages of a topic as an Output of numbers or texts. Raises RecomputeError."""
         if topic not in self._outputs:
             try:
@@ -112,8 +126,8 @@ class Recording:
                 raise RecomputeError(f'{self.bag.path}: {topic}: {error}') from None
         return self._outputs[topic]
 
-    def steps(self, topic):
-        """Return the stamps (n,) [ns] of the steps to which the messages of a topic without stamps belong.
+    def steps(self, topic: str) -> Stamps:
+        """Return the stamps of the steps to which the messages of a topic without stamps belong.
 
         In a lockstep recording of this software this is the log time. In other recordings a message belongs to the
         step that its publisher answers next, and a message of rate `sample` to the step that its subscriber answers
@@ -129,13 +143,13 @@ class Recording:
         after = np.searchsorted(self.arrival(answer), self.arrival(topic))
         return np.append(self.output(answer).stamps, AFTER_LAST_STAMP)[after]
 
-    def commands(self, topic, stamps):
-        """Return {step: [Command]} of the commands in a topic of replies.
+    def commands(self, topic: str, stamps: Stamps) -> dict[int, list[commands.Command]]:
+        """Return the commands in a topic of replies, by step.
 
-        stamps (n,): stamps of the steps [ns]; a step is an index of them. Because the unit makes the commands of
+        stamps: of the steps; a step is an index of them. Because the unit makes the commands of
         schedules by itself, from its parameters, these are left out. Raises RecomputeError.
         """
-        found = {}
+        found: dict[int, list[commands.Command]] = {}
         rows = np.searchsorted(stamps, self.steps(topic)).tolist() if self.has(topic) else ()
         for step, data in zip(rows, self.data(topic) if self.has(topic) else ()):
             try:
@@ -146,40 +160,31 @@ class Recording:
                 found.setdefault(step, []).append(command)
         return found
 
-    def states(self, topic, stamps):
+    def states(self, topic: str, stamps: Stamps) -> dict[int, str]:
         """Return {step: text} of the changes of a recorded acu/mode or adu/state.
 
-        stamps (n,): stamps of the steps [ns]; a step is an index of them.
+        stamps: of the steps; a step is an index of them.
         """
         if not self.has(topic):
             return {}
         output = self.output(topic)
         steps = np.searchsorted(stamps, output.stamps)
-        return {int(step): text for step, stamp, text in zip(steps, output.stamps, output.texts)
+        return {int(step): text for step, stamp, text in zip(steps, output.stamps, output.texts or ())
                 if step < len(stamps) and stamps[step] == stamp}
 
 
 @dataclasses.dataclass
 class Feed:
-    """The recorded inputs of a unit, matched to its n steps.
-
-    inputs   (n,) records of the inputs, one per step
-    rows     {topic: (n,) index of its message at each step, -1 for none}
-    stamps   (n,) stamps of the steps [ns]
-    events   [(step that follows the message, topic, index of the message)] of the messages for which no step waits.
-             Texts among them are also in `inputs`.
-    problem  reason why the matching ended early, or ''
-    refused  number of messages that belong to no step
-    """
-    inputs: np.ndarray
-    rows: dict
-    stamps: np.ndarray
-    events: list
-    problem: str
-    refused: int
+    """The recorded inputs of a unit, matched to its n steps."""
+    inputs: Records     # one per step
+    rows: dict[str, Ints]   # index of the message of a topic at each step, -1 for none
+    stamps: Stamps  # of the steps
+    events: list[Event]     # texts among them are also in `inputs`
+    problem: str    # reason why the matching ended early, or ''
+    refused: int    # number of messages that belong to no step
 
 
-def feed(recording, unit) -> Feed:
+def feed(recording: FedRecording, unit: Unit) -> Feed:
     """Return the Feed of a unit: the recorded inputs, matched to the steps of the unit.
 
     The drive makes the steps itself, at the stamps of the recorded clock. Without a recorded clock, the stamps of
@@ -199,7 +204,7 @@ def feed(recording, unit) -> Feed:
     arrival = np.concatenate([recording.arrival(name) for name in names])
     order = np.lexsort((sources, stamps)) if recording.lockstep else np.argsort(arrival, kind='stable')
 
-    steps: list[tuple] = []
+    steps: list[_Step] = []
     taken: list[int] = []
     matched = Steps(trigger, {name: round(latency * NS_PER_SECOND) for name, latency in latencies.items()},
                     recording.lockstep, lambda *step: steps.append(step), prompt=paces, held=nodes.held(latencies))
@@ -212,21 +217,21 @@ def feed(recording, unit) -> Feed:
     except GraphError as error:
         problem = f'inputs: {error}'
     stamps = np.array([stamp for stamp, _, _ in steps], np.int64)
-    inputs, rows = _gathered(recording, unit, trigger, steps)
+    inputs, rows_of = _gathered(recording, unit, trigger, steps)
     events = _events(recording, unit, stamps, taken)
     for step, topic, row in events:
         if records.is_text(topic):
-            inputs[topic][step:] = records.code_of(topic, recording.output(topic).texts[row])
-    return Feed(inputs, rows, stamps, events, problem, matched.refused)
+            inputs[topic][step:] = records.code_of(topic, (recording.output(topic).texts or [])[row])
+    return Feed(inputs, rows_of, stamps, events, problem, matched.refused)
 
 
-def _events(recording, unit, stamps, taken):
+def _events(recording: FedRecording, unit: Unit, stamps: Stamps, taken: Sequence[int]) -> list[Event]:
     """Return the events of a Feed, in order.
 
-    stamps (n,): stamps of the steps [ns]; taken (n,): arrival of the last input of each step. A publisher whose step
+    stamps: of the steps; taken: arrival of the last input of each step. A publisher whose step
     topic has a latency publishes its other messages with an equal latency.
     """
-    events = []
+    events: list[Event] = []
     for name in unit.reads:
         if topics.TOPIC_BY_NAME[name].rate != 'step' and recording.has(name):
             if recording.has(unit.NODE.writes[0]) or recording.bag.metadata.get('pacing') == 'lockstep':
@@ -239,17 +244,15 @@ def _events(recording, unit, stamps, taken):
     return sorted(events, key=lambda event: event[0])
 
 
-def _gathered(recording, unit, trigger, steps):
-    """Return the fields (inputs, rows) of a Feed.
-
-    steps: matched steps [(stamp, index of the trigger message, {topic: index of its message})].
-    """
+def _gathered(recording: FedRecording, unit: Unit, trigger: str,
+              steps: Sequence[_Step]) -> tuple[Records, dict[str, Ints]]:
+    """Return the fields (inputs, rows) of a Feed."""
     rows = {trigger: np.array([row for _, row, _ in steps], np.int64)}
     for name in unit.latencies:
         rows[name] = np.array([-1 if row[name] is None else row[name] for _, _, row in steps], np.int64)
     inputs = records.empty(unit.inputs_type(), len(steps))
     for name, of_step in rows.items():
-        if name in inputs.dtype.names:
+        if name in (inputs.dtype.names or ()):
             came, output = of_step >= 0, recording.output(name)
             read = output.values if output.read is None else output.read
             inputs[name]['stamp'][came] = output.stamps[of_step[came]]
@@ -257,29 +260,32 @@ def _gathered(recording, unit, trigger, steps):
     return inputs, rows
 
 
-def state_of(unit) -> str:
+def state_of(unit: Unit) -> str:
     """Return the text topic with the state of a unit (acu/mode or adu/state); '' for a unit without services."""
     states = [name for name in unit.NODE.writes if records.is_text(name) and name not in unit.MOMENTARY]
     return states[0] if unit.REQUESTS else ''
 
 
-def compute(recording, unit, fed, states=None, requests=None):
-    """Run a unit on a Feed. Return (outputs (n,), {step: [(Command, True if granted)]} of the requests made).
+def compute(recording: FedRecording, unit: Unit, fed: Feed, states: Mapping[int, str] | None = None,
+            requests: Mapping[int, Sequence[commands.Command]] | None = None) -> tuple[Records, Made]:
+    """Run a unit on a Feed. Return its outputs and the requests made.
 
-    states     {step: text} of recorded states. If the unit does not reach such a state by itself, it is requested.
-    requests   {step: [Command]} that are requested in any case
+    states     recorded states by step. If the unit does not reach such a state by itself, it is requested.
+    requests   by step, made in any case
     """
-    states, requests, made, events = states or {}, requests or {}, {}, {}
+    states, requests = states or {}, requests or {}
+    made: Made = {}
+    events: dict[int, list[tuple[str, int]]] = {}
     state = state_of(unit)
     for step, topic, row in fed.events:
         if not records.is_text(topic):
             events.setdefault(step, []).append((topic, row))
     outputs = records.empty(unit.outputs_type(), len(fed.inputs))
 
-    def advance(first, last):
+    def advance(first: int, last: int) -> None:
         unit.step(fed.stamps[first:last], fed.inputs[first:last], outputs[first:last])
 
-    def request(requested, step):
+    def request(requested: Iterable[commands.Command], step: int) -> list[tuple[commands.Command, bool]]:
         unit.inputs[0] = fed.inputs[step]
         return [(command, unit.command(command).granted) for command in requested]
 
@@ -309,8 +315,8 @@ def compute(recording, unit, fed, states=None, requests=None):
     return outputs, {step: done for step, done in made.items() if done}
 
 
-def outputs_of(unit, fed, outputs):
-    """Return {topic: Output} of the outputs (n,) that `compute` returned for a unit and its Feed."""
+def outputs_of(unit: Unit, fed: Feed, outputs: Records) -> dict[str, difference.Output]:
+    """Return the outputs that `compute` returned for a unit and its Feed, by topic."""
     written = {}
     for name in unit.writes:
         if not records.is_text(name):
@@ -324,25 +330,17 @@ def outputs_of(unit, fed, outputs):
 
 @dataclasses.dataclass
 class Recomputed:
-    """One node, recomputed from one recording.
-
-    node       name of the node
-    unit       its unit after the last step
-    feed       its Feed of n steps
-    steps      (n,) records of its outputs at each step
-    outputs    {topic: Output}: these outputs, by topic
-    requests   {step: [(Command, True if granted)]} of the requests made
-    """
-    node: str
-    unit: object
+    """One node, recomputed from one recording."""
+    node: str   # its name
+    unit: Unit  # after the last step
     feed: Feed
-    steps: np.ndarray
-    outputs: dict
-    requests: dict
+    steps: Records  # its outputs at each step
+    outputs: dict[str, difference.Output]   # these outputs, by topic
+    requests: Made
 
 
-def unit_of(recording, node, params):
-    """Return a new unit of a node in the recorded graph; params: its parameters (dataclass)."""
+def unit_of(recording: FedRecording, node: str, params: parameters.Parameters) -> Unit:
+    """Return a new unit of a node in the recorded graph; params: its parameters."""
     row = row_of(recording, node)
     names = [other.name for other in nodes.NODES if any(map(recording.has, other.writes))]
     flags = [flag for flag in topics.TOPIC_FLAGS if getattr(params, flag, False)]
@@ -351,10 +349,11 @@ def unit_of(recording, node, params):
     return unit
 
 
-def recompute(recording, node, params, requests=None) -> Recomputed:
-    """Recompute a node; params: its parameters (dataclass).
+def recompute(recording: FedRecording, node: str, params: parameters.Parameters,
+              requests: Mapping[int, Sequence[commands.Command]] | None = None) -> Recomputed:
+    """Recompute a node; params: its parameters.
 
-    requests: {step: [Command]} to make. None: those of the recorded replies or, without replies, those that the
+    requests: to make, by step. None: those of the recorded replies or, without replies, those that the
     recorded states need.
     """
     unit = unit_of(recording, node, params)
@@ -368,12 +367,12 @@ def recompute(recording, node, params, requests=None) -> Recomputed:
     return Recomputed(node, unit, fed, outputs, outputs_of(unit, fed, outputs), made)
 
 
-def idle(recording, done) -> str:
+def idle(recording: FedRecording, done: Recomputed) -> str:
     """Return the reason why a recording does not exercise a node, such as a receiver without lock; '' if it does.
 
-    done: Recomputed. The unit judges the recorded outputs or, without these, the recomputed outputs.
+    The unit judges the recorded outputs or, without these, the recomputed outputs.
     """
-    numbers = {}
+    numbers: dict[str, Floats | list[str]] = {}
     for name, output in done.outputs.items():
         output = recording.output(name) if recording.has(name) else output
         numbers[name] = output.values if output.texts is None else output.texts
@@ -382,8 +381,9 @@ def idle(recording, done) -> str:
     return done.unit.idle(numbers)
 
 
-def compare(recording, outputs, unit, tolerance) -> list:
-    """Return [difference.TopicDifference] of the outputs {topic: Output} of a unit that were also recorded."""
+def compare(recording: FedRecording, outputs: Mapping[str, difference.Output], unit: Unit,
+            tolerance: difference.Tolerance) -> list[difference.TopicDifference]:
+    """Return the differences of the outputs of a unit that were also recorded."""
     compared = []
     for name, output in outputs.items():
         if recording.has(name) and not tolerance.ignores(name):
@@ -393,12 +393,12 @@ def compare(recording, outputs, unit, tolerance) -> list:
     return compared
 
 
-def chosen(recording, names, file_values):
+def chosen(recording: FedRecording, names: Iterable[str], file_values: Values | None) -> list[str]:
     """Return the nodes to recompute: the nodes in names or, if empty, all nodes that the recording allows.
 
     A recording allows a node if it contains parameters, inputs and outputs of the node; the ACU needs no outputs. A
-    recording without any parameters allows the ACU only. file_values: parameters in place of the recorded ones, or
-    None. Raises RecomputeError.
+    recording without any parameters allows the ACU only. file_values: parameters in place of the recorded ones.
+    Raises RecomputeError.
     """
     names = [name.removeprefix(recording.bag.beam) for name in names]
     for name in names:
@@ -414,7 +414,7 @@ def chosen(recording, names, file_values):
                                  'file with --iq')
     known = file_values if file_values is not None else recording.bag.configuration['parameters']
 
-    def able(name):
+    def able(name: str) -> bool:
         if (name == nodes.DRIVE_NODE and recording.bag.servo
                 or name == nodes.MONOPULSE_RECEIVER.name and recording.bag.iq):
             return False
@@ -428,8 +428,8 @@ def chosen(recording, names, file_values):
     return selected
 
 
-def file_parameters(path, beam=''):
-    """Return {node: {dotted name: value}} of a ROS 2 parameter file or a scenario; beam: prefix such as 'beam_2/'.
+def file_parameters(path: str | pathlib.Path, beam: str = '') -> Values:
+    """Return the parameters in a ROS 2 parameter file or a scenario; beam: prefix such as 'beam_2/'.
 
     Raises ScenarioError or ParameterFileError.
     """
@@ -442,46 +442,47 @@ def file_parameters(path, beam=''):
             if (node := name.removeprefix(beam)) in RECOMPUTABLE_NODES}
 
 
-def overrides(texts, names):
-    """Return {node: {key: value}} of texts node.key=value; names: the recomputed nodes.
+def overrides(texts: Iterable[str], names: Sequence[str]) -> dict[str, dict[str, Json]]:
+    """Return the parameters in texts node.key=value; names: the recomputed nodes.
 
     With only one node, a text may leave out its name. Raises RecomputeError.
     """
-    parameters = {}
+    found: dict[str, dict[str, Json]] = {}
     for text in texts:
         if text.partition('=')[0].partition('.')[0] not in scenario.SECTION_NODES and len(names) == 1:
             text = f'{names[0]}.{text}'
         node, key, value = scenario.parse_override(text)
         if node not in names:
             raise RecomputeError(f'--param {text}: {node} is not recomputed; must be one of {", ".join(names)}')
-        parameters.setdefault(node, {})[key] = value
-    return parameters
+        found.setdefault(node, {})[key] = value
+    return found
 
 
-def parameters_of(recording, node, file_values=None, changes=()):
-    """Return the parameters (dataclass) of a node: those of the file or, without a file, the recorded ones.
+def parameters_of(recording: FedRecording, node: str, file_values: Values | None = None,
+                  changes: Mapping[str, Json] | None = None) -> parameters.Parameters:
+    """Return the parameters of a node: those of the file or, without a file, the recorded ones.
 
-    file_values: {node: {key: value}} of the file, or None; changes: {key: value} that replace them. A parameter
+    file_values: of the file; changes: {key: value} that replace them. A parameter
     without a value has its default. Raises RecomputeError.
     """
     values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
     values = {key: value for key, value in values.items() if not key.startswith('graph.')}
     try:
         params = parameters.build(row_of(recording, node).parameters_type(),
-                                  parameters.without_ros({**values, **dict(changes)}))
+                                  parameters.without_ros({**values, **(changes or {})}))
         params.check_graph(recording.bag.beams, recording.bag.metadata.get('pacing') == 'lockstep')
         return params
     except parameters.ParameterError as error:
         raise RecomputeError(f'{node}: {error}') from None
 
 
-def measure(path, node='acu'):
+def measure(path: str | pathlib.Path, node: str = 'acu') -> float:
     """Return the recorded time of a bag, divided by the wall time to read it, recompute a node and compare.
 
     A first run, which compiles the laws, does not count.
     """
-    def run():
-        recording = Recording(path)
+    def run() -> float:
+        recording = FedRecording(path)
         done = recompute(recording, node, parameters_of(recording, node))
         compare(recording, done.outputs, done.unit, difference.Tolerance())
         return (done.feed.stamps[-1] - done.feed.stamps[0]) / NS_PER_SECOND

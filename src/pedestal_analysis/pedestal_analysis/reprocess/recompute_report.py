@@ -1,46 +1,45 @@
 """Report of `pedestal recompute`: its printed lines and verdicts, the rows of --json, and the bag of --output."""
+import argparse
 import dataclasses
 import math
+import pathlib
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from pedestal_analysis import console
 from pedestal_analysis.reprocess import difference, recompute, what_if
+from pedestal_analysis.reprocess.difference import Output
+from pedestal_analysis.reprocess.recompute import FedRecording, Recomputed
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.results import row
 from pedestal_common import parameters
 from pedestal_common.graph import topics
 from pedestal_common.graph.steps import NS_PER_SECOND
-from pedestal_common.wire import messages, records
+from pedestal_common.quantities import Json, Message, Row, Stamps
+from pedestal_common.wire import commands, messages, records
 from pedestal_recording.verify import steps_before
 from pedestal_recording.writer import Writer
 
 
 @dataclasses.dataclass
 class NodeReport:
-    """Report on one recomputed node.
-
-    lines       lines to print
-    rows        rows of --json
-    outputs     {topic: difference.Output} of the recomputed outputs
-    templates   {topic: message that the node makes}, from which `write` makes the messages
-    well        True if the outputs are as required
-    """
-    lines: list
-    rows: list
-    outputs: dict
-    templates: dict
-    well: bool = True
+    """Report on one recomputed node."""
+    lines: list[str]    # to print
+    rows: list[Row]
+    outputs: Mapping[str, Output]   # the recomputed outputs, by topic
+    templates: Mapping[str, Message]    # {topic: message that the node makes}, from which `write` makes the messages
+    well: bool = True   # True if the outputs are as required
 
 
-def main(options):
+def main(options: argparse.Namespace) -> tuple[list[str], list[Row], bool]:
     """Return (lines to print, rows of --json, True if the outputs of all nodes are as required).
 
     options: options of the verb.
     Raises ValueError for an option that does not fit the bag, RunError if a live node does not answer.
     """
     lockstep = None if options.pacing is None else options.pacing == 'lockstep'     # None: as the bag states
-    recording = recompute.Recording(options.bag, lockstep, options.beam)
+    recording = recompute.FedRecording(options.bag, lockstep, options.beam)
     given = recompute.file_parameters(options.params_file, recording.bag.beam) if options.params_file else None
     nodes = recompute.chosen(recording, options.node, given)
     changes = recompute.overrides(options.param, nodes)
@@ -54,7 +53,7 @@ def main(options):
     if options.output and options.output.exists():
         raise recompute.RecomputeError(f'--output {options.output} exists already; a recording is never overwritten')
     reports = [_node_report(recording, node, given, changes.get(node), options) for node in nodes]
-    lines = []
+    lines: list[str] = []
     for report in reports:
         lines += [*([''] if lines else []), *report.lines]
     if options.output:
@@ -65,11 +64,12 @@ def main(options):
     return lines, [row for report in reports for row in report.rows], all(report.well for report in reports)
 
 
-def _node_report(recording, node, given, changes, options):
+def _node_report(recording: FedRecording, node: str, given: recompute.Values | None,
+                 changes: Mapping[str, Json] | None, options: argparse.Namespace) -> NodeReport:
     """Return the NodeReport of a node.
 
-    given: {node: {key: value}} of --params-file, None for the recorded parameters; changes: {key: value} of --param,
-    None to compare with the recorded outputs; options: options of the verb.
+    given: of --params-file, None for the recorded parameters; changes: {key: value} of --param, None to compare with
+    the recorded outputs; options: of the verb.
     """
     params = recompute.parameters_of(recording, node, given)
     done = recompute.recompute(recording, node, params)
@@ -100,7 +100,7 @@ def _node_report(recording, node, given, changes, options):
     return report
 
 
-def _title(recording, done, params_file):
+def _title(recording: FedRecording, done: Recomputed, params_file: pathlib.Path | None) -> str:
     """Return the first line of a report: bag, node, steps, pacing and origin of the parameters."""
     stamps = done.feed.stamps / NS_PER_SECOND
     span = f'{stamps[0]:g} to {stamps[-1]:g} s' if len(stamps) else 'no step'
@@ -114,13 +114,13 @@ def _title(recording, done, params_file):
     return f'{recording.bag.path}: {recording.bag.beam}{done.node}: {len(stamps)} steps, {span}, {pacing}; {origin}'
 
 
-def _substitutes(recording, done):
+def _substitutes(recording: FedRecording, done: Recomputed) -> list[str]:
     """Return lines on the inputs that were not recorded, and on the topics that replace them."""
     return [f'no {topic} in the recording: {source} replaces it' for topic in done.feed.rows
             if (source := recording.source(topic)) != topic]
 
 
-def _input_problems(done):
+def _input_problems(done: Recomputed) -> list[str]:
     """Return lines on inputs that could not be matched to steps."""
     lines = []
     if done.feed.problem:
@@ -130,19 +130,20 @@ def _input_problems(done):
     return lines
 
 
-def _requests(done):
+def _requests(done: Recomputed) -> list[str]:
     """Return lines on the commands and service calls that were repeated."""
     lines = [line for step, made in done.requests.items() for line in _requests_of_step(done, step, made)]
     return lines + ([f'{len(lines)} requests repeated'] if lines else [])
 
 
-def _requests_of_step(done, step, made):
+def _requests_of_step(done: Recomputed, step: int, made: Sequence[tuple[commands.Command, bool]]) -> list[str]:
     return [f'{command} requested at {done.feed.stamps[step] / NS_PER_SECOND:.6f} s{"" if granted else ", refused"}'
             for command, granted in made]
 
 
-def _against_recorded(recording, outputs, done, tolerance):
-    """Return the NodeReport that compares outputs {topic: Output} of a node with its recorded outputs."""
+def _against_recorded(recording: FedRecording, outputs: Mapping[str, Output], done: Recomputed,
+                      tolerance: difference.Tolerance) -> NodeReport:
+    """Return the NodeReport that compares outputs of a node with its recorded outputs."""
     compared = recompute.compare(recording, outputs, done.unit, tolerance)
     if not compared:
         return _new_numbers(recording, outputs, done)
@@ -165,7 +166,7 @@ def _against_recorded(recording, outputs, done, tolerance):
                       equal and not done.feed.problem)
 
 
-def _new_numbers(recording, outputs, done):
+def _new_numbers(recording: FedRecording, outputs: Mapping[str, Output], done: Recomputed) -> NodeReport:
     """Return the NodeReport of a node without recorded outputs: the numbers of messages and, for the ACU, results."""
     lines = [f'{done.node}: the recording has no output of the node, so there is no comparison']
     lines += [f'{name:34} {len(output.stamps):9} messages' for name, output in done.outputs.items()]
@@ -178,13 +179,13 @@ def _new_numbers(recording, outputs, done):
     return NodeReport(lines, rows, outputs, done.unit.messages, not done.feed.problem)
 
 
-def _encoder_note(recording):
+def _encoder_note(recording: FedRecording) -> list[str]:
     """Return [the note tracking.ENCODER_BEAM_NOTE], or [] if the true direction of the dish was recorded."""
     return [f'note: {tracking.ENCODER_BEAM_NOTE}'] if tracking.by_encoders(recording.bag) else []
 
 
-def _changed(params, changes, params_file):
-    """Return the line on changes {key: value} of a parameter dataclass: which differ from its values and which do
+def _changed(params: parameters.Parameters, changes: Mapping[str, Json], params_file: pathlib.Path | None) -> str:
+    """Return the line on changes {key: value} of parameters: which differ from its values and which do
     not."""
     values, origin = parameters.as_dict(params), params_file or 'the recording'
     same = ', '.join(f'{key} = {value}' for key, value in changes.items() if value == values[key])
@@ -194,10 +195,11 @@ def _changed(params, changes, params_file):
     return f'changed: {different}' + (f'; the same as in {origin}: {same}' if same else '')
 
 
-def _old_against_new(recording, old, new, tolerance, changed):
+def _old_against_new(recording: FedRecording, old: Recomputed, new: Recomputed, tolerance: difference.Tolerance,
+                     changed: str) -> NodeReport:
     """Return the NodeReport of a node with changed parameters: old and new results, and differences of the messages.
 
-    old, new: Recomputed with the unchanged and with the changed parameters; changed: line about the changes.
+    old, new: with the unchanged and with the changed parameters; changed: line about the changes.
     """
     before = {name: recording.output(name) if recording.has(name) else output for name, output in old.outputs.items()}
     origin = 'recorded' if any(map(recording.has, old.outputs)) else 'recomputed with unchanged parameters'
@@ -216,10 +218,11 @@ def _old_against_new(recording, old, new, tolerance, changed):
     return NodeReport(lines, rows, new.outputs, new.unit.messages)
 
 
-def write(path, recording, outputs, templates, changes):
+def write(path: pathlib.Path, recording: FedRecording, outputs: Mapping[str, Output], templates: Mapping[str, Message],
+          changes: recompute.Values) -> None:
     """Write a bag at a path: the recording with the recomputed topics in place of the recorded ones.
 
-    outputs: {topic: Output}; templates: see NodeReport; changes: {node: {key: value}} for the metadata.
+    templates: see NodeReport; changes: of the parameters, for the metadata.
     In lockstep the log time of a message is its stamp. In realtime a recomputed message gets the log time of the
     newest recorded joint state whose stamp is not later than its own.
     """
@@ -241,14 +244,14 @@ def write(path, recording, outputs, templates, changes):
     writer.close()
 
 
-def _logged(recording, stamps):
-    """Return the log times (n,) [ns] of the joint states that are the newest at the stamps (n,) [ns]."""
+def _logged(recording: FedRecording, stamps: Stamps) -> Stamps:
+    """Return the log times of the joint states that are the newest at the stamps."""
     rows, output = recording.rows('joint_states'), recording.output('joint_states')
     return rows.log[np.clip(np.searchsorted(output.stamps, stamps, side='right') - 1, 0, None)]
 
 
-def _bytes(topic, output, templates):
-    """Return [CDR bytes] of the messages of an Output."""
+def _bytes(topic: str, output: Output, templates: Mapping[str, Message]) -> list[bytes]:
+    """Return the CDR bytes of the messages of an Output."""
     if output.texts is not None:
         return [messages.serialize(messages.String(data=text)) for text in output.texts]
     encoder = records.Encoder(topic, templates[topic])

@@ -5,43 +5,36 @@ playlist.py chooses and orders the messages, and player.py publishes them.
 import contextlib
 import dataclasses
 import math
+import pathlib
 import signal
 import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
-import rclpy
+from rclpy.utilities import try_shutdown
 
 from pedestal_analysis.reprocess.player import ANSWER_TOPICS, Player, answer_of
 from pedestal_analysis.reprocess.playlist import Playlist, selected_topics, writes
 from pedestal_analysis.reprocess.terminal import Keyboard
 from pedestal_common.graph import nodes
+from pedestal_common.graph.nodes import Link
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware, shell
+from pedestal_common.quantities import Seconds
 from pedestal_recording import bag as bags
 
 
 @dataclasses.dataclass(frozen=True)
 class ReplayOptions:
-    """Selection and pace of a replay.
+    """Selection and pace of a replay. Raises ValueError for a number out of range."""
+    nodes: list[str] = dataclasses.field(default_factory=list)  # their inputs are published
+    names: list[str] = dataclasses.field(default_factory=list)  # of published topics; without nodes and names, all
+    rate: float | None = 1.0    # speed of the replay, in multiples of real time; None: in lockstep with the nodes
+    start: Seconds = 0.0    # time after the first message at which the replay begins
+    duration: Seconds | None = None     # length of the replay, None to the end of the recording
+    paused: bool = False    # True to begin with a pause
+    deadline: Seconds = 60.0    # longest wait for a subscriber or for an answer
 
-    nodes      nodes whose inputs are published
-    names      topics that are published; without nodes and names, all topics
-    rate       speed of the replay, in multiples of real time; None: in lockstep with the nodes
-    start      time after the first message at which the replay begins [s]
-    duration   length of the replay [s], None to the end of the recording
-    paused     True to begin with a pause
-    deadline   longest wait for a subscriber or for an answer [s]
-
-    Raises ValueError for a number out of range.
-    """
-    nodes: list = dataclasses.field(default_factory=list)
-    names: list = dataclasses.field(default_factory=list)
-    rate: float | None = 1.0
-    start: float = 0.0
-    duration: float | None = None
-    paused: bool = False
-    deadline: float = 60.0
-
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for option in ('rate', 'duration', 'deadline'):
             value = getattr(self, option)
             if value is not None and not (0.0 < value < math.inf):
@@ -52,24 +45,16 @@ class ReplayOptions:
 
 @dataclasses.dataclass
 class ReplayResult:
-    """Result of a replay.
+    """Result of a replay."""
+    bag: str    # its path
+    sent: dict[str, int]    # number of sent messages of a topic
+    first: Seconds  # stamp of the first sent message
+    last: Seconds   # stamp of the last sent message
+    wall: Seconds   # wall time of the replay
+    answers: dict[str, tuple[int, int]]     # of a node: number of its answers, number of steps that it had to answer
+    ended: str  # 'whole', 'quit' (by a key) or 'stopped' (by a signal)
 
-    bag           path of the bag
-    sent          {topic: number of sent messages}
-    first, last   stamps of the first and the last sent message [s]
-    wall          wall time of the replay [s]
-    answers       {node: (number of its answers, number of steps that it had to answer)}
-    ended         'whole', 'quit' (by a key) or 'stopped' (by a signal)
-    """
-    bag: str
-    sent: dict
-    first: float
-    last: float
-    wall: float
-    answers: dict
-    ended: str
-
-    def lines(self):
+    def lines(self) -> list[str]:
         """Return the result as lines of text."""
         width = max(map(len, self.sent))
         lines = [f'{name:{width}} {count:9}' for name, count in self.sent.items()]
@@ -82,12 +67,12 @@ class ReplayResult:
 
 
 @contextlib.contextmanager
-def stop_by_signal():
+def stop_by_signal() -> Iterator[Callable[[], bool]]:
     """Yield a function stopped() that returns True after a signal to end the process.
 
     Without this handler the signal would interrupt a call of rclpy.
     """
-    signals = []
+    signals: list[bool] = []
     before = {number: signal.signal(number, lambda *_: signals.append(True))
               for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
               if signal.getsignal(number) is not signal.SIG_IGN}
@@ -98,7 +83,7 @@ def stop_by_signal():
             signal.signal(number, handler)
 
 
-def replay(path, options, ready=lambda: None) -> ReplayResult:
+def replay(path: str | pathlib.Path, options: ReplayOptions, ready: Callable[[], None] = lambda: None) -> ReplayResult:
     """Publish the bag at a path into the live graph of this ROS domain, as the ReplayOptions state.
 
     ready() is called before the first message. Raises BagError; ValueError for options that do not fit the bag;
@@ -137,10 +122,10 @@ def replay(path, options, ready=lambda: None) -> ReplayResult:
                 {node.name: (node.answers, node.steps) for node in player.under_test if node.trigger},
                 'stopped' if stopped() else 'quit' if player.pace.quit else 'whole')
     finally:
-        rclpy.try_shutdown()
+        try_shutdown()
 
 
-def _check_lockstep(under_test, chosen, graph):
+def _check_lockstep(under_test: Sequence[str], chosen: Sequence[str], graph: Mapping[str, Link]) -> None:
     """Raise ValueError if the nodes under test cannot answer the steps of a replay of the chosen topics."""
     answering = [node for node in under_test if nodes.plain(node) in ANSWER_TOPICS]
     if not answering:

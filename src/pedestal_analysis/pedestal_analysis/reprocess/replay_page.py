@@ -2,18 +2,20 @@
 
 The page takes the messages from the bag. No graph of ROS nodes runs.
 """
-import itertools
 import math
 import queue
 import threading
 import time
+from collections.abc import Callable
 
 import numpy as np
 
+from pedestal_analysis.reprocess.replay import ReplayOptions
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Json, Message, Nanoseconds, Seconds
 from pedestal_common.wire import commands, messages, records
 from pedestal_operator import remote_node
-from pedestal_operator.antenna import POINTING_TOPIC, Antenna
+from pedestal_operator.antenna import POINTING_TOPIC
 from pedestal_operator.page import page_log, page_sky, page_state
 from pedestal_operator.page.page_log import Log
 from pedestal_operator.page.page_passes import UpcomingPasses
@@ -37,14 +39,14 @@ LIST_TOPICS = ('acu/alarms', 'acu/program_track', 'diagnostics', 'acu/command_re
 """Topics of other kinds that the page shows."""
 
 
-class Recording(Antenna):
+class ShownRecording(page_state.PageAntenna):
     """A recording with the interface of a live Antenna: it has the newest messages at a position in the recording.
 
-    bag: bag.Bag of one beam. position: time since the first joint state [s]; length: length of the recording [s].
-    Raises BagError if the bag has no joint_states.
+    bag: of one beam. Raises BagError if the bag has no joint_states.
     """
 
-    def __init__(self, bag):
+    def __init__(self, bag: bags.Bag) -> None:
+        self.position: Seconds = 0.0    # time since the first joint state
         self._bag, self.beam = bag, bag.beam
         self._rows = {name: bag.rows(name) for name in (*NUMBER_TOPICS, *TEXT_TOPICS, *LIST_TOPICS)
                       if name in bag.topics and len(bag.rows(name))}
@@ -58,26 +60,28 @@ class Recording(Antenna):
         self.configuration = {name: value for node in page_state.SHOWN_PARAMETERS
                               for name, value in bag.configuration['parameters'].get(node, {}).items()}
         self.configuration['graph.start'] = bag.start
-        self.alarms, self.path, self.log = [], None, Log(most=MAX_EVENT_MESSAGES)
-        self.numbers, self.texts, self.status, self._received = {}, {}, {}, {}
+        self.alarms: list[Message] = []
+        self.path: Json = None  # program track, for the page
+        self.log = Log(most=MAX_EVENT_MESSAGES)
+        self._forget()
         self._read_log()
         self.move(0.0)
 
     @property
-    def now(self):
-        """Stamp of the position [s]; UTC in a recording in realtime."""
+    def now(self) -> Seconds:
+        """Stamp of the position; UTC in a recording in realtime."""
         return (self._begin + round(self.position * NS_PER_SECOND)) / NS_PER_SECOND
 
-    def age(self, name):
-        """Return the age of the last message of a topic or node [s], infinite before the first."""
+    def age(self, name: str) -> Seconds:
+        """Return the age of the last message of a topic or node, infinite before the first."""
         return self.now - self._received.get(name, -math.inf)
 
-    def lines(self):
+    def lines(self) -> list[dict[str, Json]]:
         """Return the lines of the event log up to the position."""
         return [line for line in self.log.lines if line['t'] <= self.now][-page_log.MAX_LOG_LINES:]
 
-    def move(self, position):
-        """Go to a position [s], with all topics."""
+    def move(self, position: Seconds) -> None:
+        """Go to a position, with all topics."""
         self.move_numbers(position)
         for name in TEXT_TOPICS:
             for text in self._messages(name, 1):
@@ -91,10 +95,10 @@ class Recording(Antenna):
             for status in array.status:
                 self.status[status.name], self._received[status.name] = status, time_of / NS_PER_SECOND
 
-    def move_numbers(self, position):
-        """Go to a position [s], with the topics of numbers only, which is faster."""
+    def move_numbers(self, position: Seconds) -> None:
+        """Go to a position, with the topics of numbers only, which is faster."""
         self.position = min(max(position, 0.0), self.length)
-        self.numbers, self.texts, self.status, self._received = {}, {}, {}, {}
+        self._forget()
         for text in self._messages(POINTING_TOPIC, 1):
             self.texts[POINTING_TOPIC] = text.data
         for name in NUMBER_TOPICS:
@@ -102,13 +106,19 @@ class Recording(Antenna):
                 self.numbers[name] = self._decoders[name].decoded(data)[1]
                 self._received[name] = time_of / NS_PER_SECOND
 
-    def _count(self, name):
+    def _forget(self) -> None:
+        self.numbers: dict[str, tuple[float, ...]] = {}
+        self.texts: dict[str, str] = {}
+        self.status: dict[str, Message] = {}
+        self._received: dict[str, Seconds] = {}     # time of the last message of a topic or node
+
+    def _count(self, name: str) -> int:
         """Return the number of messages of a topic up to the position."""
         moment = self._begin + round(self.position * NS_PER_SECOND)
         return int(np.searchsorted(self._times[name], moment, 'right')) if name in self._rows else 0
 
-    def _last(self, name, most):
-        """Return [(time [ns], CDR bytes)] of the last messages of a topic up to the position, at most `most`."""
+    def _last(self, name: str, most: int) -> list[tuple[Nanoseconds, bytes]]:
+        """Return [(time, CDR bytes)] of the last messages of a topic up to the position, at most `most`."""
         last = self._count(name)
         first = max(last - most, 0)
         if last == 0:
@@ -116,17 +126,18 @@ class Recording(Antenna):
         return [(int(at), data) for at, (*_, data) in zip(self._times[name][first:last],
                                                           self._bag.take(self._rows[name][first:last]))]
 
-    def _messages(self, name, most):
+    def _messages(self, name: str, most: int) -> list[Message]:
         """Return the messages of `_last`, deserialized."""
         return [messages.deserialize(data, self._bag.topics[name]) for _, data in self._last(name, most)]
 
-    def _read_log(self):
+    def _read_log(self) -> None:
         """Fill the event log with all events of the recording, in the order of their log times."""
-        events = []
+        events: list[tuple[Nanoseconds, str, Message]] = []
         for name in ('acu/mode', 'adu/state', 'acu/command_result', 'acu/alarms'):
-            rows = self._rows.get(name, ())[:MAX_EVENT_MESSAGES]
-            events += [(row_log, name, messages.deserialize(data, self._bag.topics[name]))
-                       for row_log, (*_, data) in zip(rows.log.tolist() if len(rows) else (), self._bag.take(rows))]
+            if name in self._rows:
+                rows = self._rows[name][:MAX_EVENT_MESSAGES].view(np.recarray)
+                events += [(row_log, name, messages.deserialize(data, self._bag.topics[name]))
+                           for row_log, (*_, data) in zip(rows.log.tolist(), self._bag.take(rows))]
         for log, name, message in sorted(events, key=lambda row: row[0]):
             if name == 'acu/command_result':
                 self.log.replied(log / NS_PER_SECOND, *commands.of_reply(message))
@@ -138,21 +149,21 @@ class Recording(Antenna):
 
 
 class Player:
-    """Player that shows a Recording on pages: play, pause, go to a position.
+    """Player that shows a recording on pages: play, pause, go to a position.
 
-    port: TCP port of the server of the pages; options: replay.ReplayOptions, of which start, rate and paused count.
+    port: TCP port of the server of the pages; options: start, rate and paused count.
     url: address of the page.
     """
 
-    def __init__(self, recording, port, options):
+    def __init__(self, recording: ShownRecording, port: int, options: ReplayOptions) -> None:
         self._recording, self._lock = recording, threading.Lock()
-        self._playing, self._rate = not options.paused, options.rate
+        self._playing, self._rate = not options.paused, options.rate or 1.0
         self._upcoming_passes = UpcomingPasses()
         recording.move(options.start)
         self._server = PageServer('127.0.0.1', port, names=(), most=MAX_PAGES, history=self._past)
         self.url = self._server.access.url(PAGE_ROLES[0])
 
-    def play(self, stopped):
+    def play(self, stopped: Callable[[], bool]) -> None:
         """Serve the pages until stopped() returns True."""
         before, last_slow = time.monotonic(), -math.inf
         while not stopped():
@@ -169,11 +180,11 @@ class Player:
         self._server.close()
         self._upcoming_passes.close()
 
-    def _go(self, position):
+    def _go(self, position: Seconds) -> None:
         self._recording.move(position)
         self._playing = self._playing and position < self._recording.length
 
-    def _receive(self):
+    def _receive(self) -> bool:
         """Execute the requests of the pages; return True if the position jumped."""
         moved = False
         while True:
@@ -197,7 +208,7 @@ class Player:
                 self._go(0.0 if again else self._recording.position)
                 self._playing, moved = wanted['playing'], moved or again
 
-    def _show(self, slowly):
+    def _show(self, slowly: bool) -> None:
         """Send the state at the position to the pages; slowly: True to send the sections that change slowly too."""
         recording = self._recording
         sections = {'now': page_state.now(recording), 'status': page_state.status_section(recording),
@@ -212,23 +223,22 @@ class Player:
                          'sky': page_state.sky(recording, self._upcoming_passes.look(recording))}
         self._server.publish(sections)
 
-    def _past(self):
+    def _past(self) -> list[Json]:
         """Return the rows of the strip charts before the position, for a page that connects."""
         with self._lock:
             return [page_state.history_row(frame) for frame in self._frames(page_state.CHART_PERIOD_S)]
 
-    def _frames(self, period):
-        """Return [page_state.now] every `period` [s] over the span of the strip charts up to the position."""
+    def _frames(self, period: Seconds) -> list[dict[str, Json]]:
+        """Return page_state.now every `period` over the span of the strip charts up to the position."""
         recording, position = self._recording, self._recording.position
         frames = []
-        for count in itertools.count(-round(page_state.CHART_SPAN_S / period)):
-            if position + count * period >= 0.0 and count <= 0:
+        for count in range(-round(page_state.CHART_SPAN_S / period), 1):
+            if position + count * period >= 0.0:
                 recording.move_numbers(position + count * period)
                 frames.append(page_state.now(recording))
-            if count >= 0:
-                recording.move(position)
-                return frames
+        recording.move(position)
+        return frames
 
 
-def _number(value):
+def _number(value: Json) -> bool:
     return type(value) in (int, float) and math.isfinite(value)

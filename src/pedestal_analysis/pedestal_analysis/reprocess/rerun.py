@@ -9,6 +9,7 @@ import pathlib
 from pedestal_analysis.reprocess import difference
 from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
+from pedestal_common.quantities import Nanoseconds
 from pedestal_common.text_files import files
 from pedestal_recording import bag as bags
 
@@ -17,29 +18,21 @@ MAX_SHOWN_FIELDS = 4  # largest number of fields that are shown of the first mes
 
 @dataclasses.dataclass
 class RerunResult:
-    """Comparison of a recording (the old one) with the recording of its rerun (the new one).
-
-    path      path of the new recording
-    topics    [difference.MessageDifference] of the topics that differ, the earliest difference first
-    metadata  {record: {key: (old value, new value)}} of the values that differ
-    end       last log time of the old recording [ns]
-    sha256    SHA-256 of the new file
-    same      True if the files are equal to the last byte
-    """
-    path: pathlib.Path
-    topics: list
-    metadata: dict
-    end: int
-    sha256: str
-    same: bool
+    """Comparison of a recording (the old one) with the recording of its rerun (the new one)."""
+    path: pathlib.Path  # of the new recording
+    topics: list[difference.MessageDifference]  # that differ, the earliest difference first
+    metadata: dict[str, dict[str, tuple[str | None, str | None]]]   # {record: {key: (old, new)}} of what differs
+    end: Nanoseconds    # last log time of the old recording
+    sha256: str     # of the new file
+    same: bool  # True if the files are equal to the last byte
 
     @property
-    def equal(self):
+    def equal(self) -> bool:
         """True if both recordings have the same messages, with the same bytes in the same order."""
         return not self.topics
 
     @property
-    def cut(self):
+    def cut(self) -> bool:
         """True if the old recording is equal up to its end, and only lacks the later messages.
 
         On each topic, the number of different messages then equals the number of missing messages.
@@ -47,11 +40,11 @@ class RerunResult:
         return all(topic.was < topic.now == topic.was + topic.different for topic in self.topics)
 
     @property
-    def other_version(self):
+    def other_version(self) -> bool:
         """True if another version of this software made the old recording."""
         return any(key == 'git' or key.startswith('version.') for key in self.metadata.get('pedestal', ()))
 
-    def lines(self):
+    def lines(self) -> list[str]:
         """Return the comparison as lines of text, the verdict last."""
         lines = [] if self.cut else list(map(_line, self.topics))
         lines += [f'{record}.{key}: {_short(was)} -> {_short(now)}'
@@ -68,23 +61,23 @@ class RerunResult:
         return [*lines, f'{self.path}: {verdict}']
 
 
-def _line(topic):
-    """Return a difference.MessageDifference as one line."""
+def _line(topic: difference.MessageDifference) -> str:
+    """Return a difference as one line."""
     counts = f'{topic.was} messages' if topic.was == topic.now else f'{topic.was} messages, now {topic.now}'
     more = f' and {len(topic.changes) - MAX_SHOWN_FIELDS} more fields' if len(topic.changes) > MAX_SHOWN_FIELDS else ''
     return (f'{topic.name}: {counts}, {topic.different} differ, the first at {topic.first / 1e9:.6f} s: '
             f'{", ".join(topic.changes[:MAX_SHOWN_FIELDS])}{more}')
 
 
-def _short(text):
+def _short(text: str | None) -> str:
     """Return a value of the metadata as one line: of a long text, such as the scenario, only its length."""
     if not text:
         return 'none'
     return text if len(text) < 60 and '\n' not in text else f'a text of {len(text)} characters'
 
 
-def scenario_of_recording(bag):
-    """Return the scenario.Scenario of a recording (bag.Bag).
+def scenario_of_recording(bag: bags.Bag) -> scenario.Scenario:
+    """Return the scenario of a recording.
 
     A parameter whose default has changed since the recording has its recorded value. Raises bag.BagError for a
     recording that cannot be rerun.
@@ -116,8 +109,8 @@ def scenario_of_recording(bag):
     return changed
 
 
-def result(was, now) -> RerunResult:
-    """Return the comparison of a recording `was` with the recording `now` of its rerun; both are a bag.Bag."""
+def result(was: bags.Bag, now: bags.Bag) -> RerunResult:
+    """Return the comparison of a recording `was` with the recording `now` of its rerun."""
     metadata = {}
     for record in dict.fromkeys((*was.metadata_records, *now.metadata_records)):
         old, new = (bag.metadata_records.get(record, {}) for bag in (was, now))

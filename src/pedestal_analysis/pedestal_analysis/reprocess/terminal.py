@@ -17,7 +17,7 @@ _KEY = re.compile(rb'\x1b[\[O][A-D]|.', re.DOTALL)  # bytes of one key: an arrow
 RIGHT_ARROW_CODES = (b'\x1b[C', b'\x1bOC')  # bytes of the right arrow key, in both modes of a terminal
 
 
-def _in_foreground():
+def _in_foreground() -> bool:
     """Return True if this process runs in the foreground of the terminal.
 
     Signals (SIGTTIN, SIGTTOU) would stop a process in the background that uses the terminal.
@@ -34,21 +34,21 @@ class Keyboard:
     available: False if standard input is no terminal, or if this process is in the background. There are no keys then.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.available = sys.stdin is not None and not sys.stdin.closed and sys.stdin.isatty() and _in_foreground()
 
-    def __enter__(self):
+    def __enter__(self) -> 'Keyboard':
         if self.available:
             self._before = termios.tcgetattr(sys.stdin)
             tty.setcbreak(sys.stdin)
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         if self.available:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
-    def pressed(self):
-        """Return [bytes of one key] of the keys that were pressed since the last call."""
+    def pressed(self) -> list[bytes]:
+        """Return the bytes of each key that was pressed since the last call."""
         if not self.available or not select.select([sys.stdin], [], [], 0)[0]:
             return []
         return _KEY.findall(os.read(sys.stdin.fileno(), 1024))
@@ -57,17 +57,17 @@ class Keyboard:
 class StatusLine:
     """A line on standard error; each new text replaces the last one. It has no effect without a terminal."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._on = sys.stderr.isatty()
         self._last = ''
 
-    def show(self, text):
+    def show(self, text: str) -> None:
         """Show a text in place of the last text."""
         if self._on and text != self._last:
             self._last = text
             sys.stderr.write(f'\r\x1b[K{text}')
             sys.stderr.flush()
 
-    def clear(self):
+    def clear(self) -> None:
         """Empty the line."""
         self.show('')

@@ -8,13 +8,30 @@ noise and the lag of the estimate, and the noise of the command.
 import dataclasses
 import functools
 import math
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from pedestal_analysis.reprocess.difference import Output
 from pedestal_analysis.results import results, sensor_frame, tracking
 from pedestal_analysis.results.results import Result
 from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
 from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import (
+    Bools,
+    Floats,
+    Ints,
+    Message,
+    Nanoseconds,
+    Pairs,
+    Radians,
+    RadiansPerSecond,
+    Records,
+    Seconds,
+    Table,
+    Times,
+)
+from pedestal_recording.recording import Recording
 
 RIPPLE_WINDOW_S = 0.25  # length of the moving mean of a rate [s]. The rate minus this mean counts as noise.
 
@@ -25,57 +42,60 @@ COMPARISON_NOTE = ('the recorded antenna does not move with the recomputed comma
 
 
 class Overlay:
-    """A recording in which the outputs of one node are replaced.
+    """A Recording in which the outputs of one node are replaced; outputs: by topic."""
 
-    It has the part of the interface of bag.Bag that the results need. bag: bag.Bag; outputs: {topic:
-    difference.Output}.
-    """
-
-    def __init__(self, bag, outputs):
+    def __init__(self, bag: Recording, outputs: Mapping[str, Output]) -> None:
         self.path, self.beam, self.beams, self.metadata = bag.path, bag.beam, bag.beams, bag.metadata
         self.configuration = bag.configuration
         self._bag, self._outputs = bag, outputs
         self.topics = {**bag.topics, **dict.fromkeys(outputs, '')}
 
-    def table(self, topic):
-        """Return {column: array (n,)} of a topic, as Bag.table."""
+    def table(self, topic: str) -> Table:
+        """Return the columns of a topic, as Bag.table."""
         return self._outputs[topic].table(topic) if topic in self._outputs else self._bag.table(topic)
 
     @property
-    def start(self):
-        """Stamp of time 0 of the scenario [ns]."""
+    def start(self) -> Nanoseconds:
+        """Stamp of time 0 of the scenario."""
         return self._bag.start
 
-    def messages(self, topic):
-        """Return an iterator of (topic, log time, publish time [ns], message) of a recorded topic, as Bag.messages."""
+    @property
+    def end(self) -> Seconds:
+        """Time of the last message of the recording."""
+        return self._bag.end
+
+    def rows(self, topic: str) -> Records | Ints:
+        """Return one element per message of a topic."""
+        return np.arange(len(self._outputs[topic].stamps)) if topic in self._outputs else self._bag.rows(topic)
+
+    def last_values(self, node: str) -> dict[str, str]:
+        """Return {key: value} of the last recorded diagnostics of a node."""
+        return self._bag.last_values(node)
+
+    def messages(self, topic: str) -> Iterator[tuple[str, Nanoseconds, Nanoseconds, Message]]:
+        """Return an iterator of (topic, log time, publish time, message) of a recorded topic, as Bag.messages."""
         return self._bag.messages(topic)
 
 
 class RecomputedAcu:
-    """Outputs of an ACU in an Overlay: recorded, or recomputed with some parameters.
+    """Outputs of an ACU in an Overlay: recorded, or recomputed with some parameters."""
 
-    estimate    table of acu/estimate
-    command     table of acu/rate_command
-    autotrack   stamps of the estimates in autotrack [s]
-    known       number of the estimates with a known mode
-    common      stamps at which the ACU is evaluated [s], set by `numbers`
-    """
-
-    def __init__(self, overlay):
+    def __init__(self, overlay: Overlay) -> None:
         self.estimate, self.command = overlay.table('acu/estimate'), overlay.table('acu/rate_command')
-        t = self.estimate['t']
+        t: Times = self.estimate['t']
         mode = tracking.modes(overlay, t)
-        self.autotrack, self.known = t[mode == 'autotrack'], int(np.sum(mode != ''))
-        self.common = t[:0]
+        self.autotrack = t[mode == 'autotrack']     # stamps of the estimates in autotrack
+        self.known = int(np.sum(mode != ''))    # number of the estimates with a known mode
+        self.common = t[:0]     # stamps at which the ACU is evaluated, set by `numbers`
 
-    def ripple(self, table):
-        """Return the rms of the velocities in a table minus their moving mean over RIPPLE_WINDOW_S [rad/s]."""
+    def ripple(self, table: Table) -> RadiansPerSecond:
+        """Return the rms of the velocities in a table minus their moving mean over RIPPLE_WINDOW_S."""
         return known_rms(np.concatenate([_ripple(table['t'], table[f'{axis}.velocity'], self.common)
                                          for axis in AXES]))
 
 
-def _ripple(t, values, common):
-    """Return values (n,) minus their moving mean, at the stamps t (n,) [s] that are in `common`."""
+def _ripple(t: Times, values: Floats, common: Times) -> Floats:
+    """Return values minus their moving mean, at the stamps t that are in `common`."""
     values = values[np.isin(t, common)]
     length = max(1, round(RIPPLE_WINDOW_S / np.median(np.diff(t)))) if t.size > 1 else 1
     if values.size < 2 * length:
@@ -86,36 +106,33 @@ def _ripple(t, values, common):
 
 @dataclasses.dataclass
 class TruthComparison:
-    """Estimate of an ACU, and pointing of the recorded antenna, against the recorded truth.
-
-    acu: RecomputedAcu; run: tracking.Tracking of its Overlay.
-    """
+    """Estimate of an ACU, and pointing of the recorded antenna, against the recorded truth. run: of its Overlay."""
     acu: RecomputedAcu
     run: tracking.Tracking
 
     @functools.cached_property
-    def evaluated(self):
-        """Mask (n,) bool of the steps of the run that are evaluated."""
+    def evaluated(self) -> Bools:
+        """The steps of the run that are evaluated."""
         return np.isin(self.run.t, self.acu.common)
 
     @functools.cached_property
-    def true(self):
-        """True pointing error (k, 2) [rad] of the recorded antenna: cross-elevation, elevation."""
-        return np.column_stack((self.run.cross_elevation, self.run.elevation_error))[self.evaluated]
+    def true(self) -> Pairs:
+        """True pointing error [rad] of the recorded antenna: cross-elevation, elevation."""
+        return self.run.error[self.evaluated]
 
     @functools.cached_property
-    def error(self):
-        """Estimate minus its truth (k, 2) [rad]: cross-elevation, elevation."""
+    def error(self) -> Pairs:
+        """Estimate minus its truth [rad]: cross-elevation, elevation."""
         return self.run.estimate_error[self.evaluated]
 
     @property
-    def noise(self):
-        """Rms difference between receiver error and true pointing error minus boresight offset [rad]."""
+    def noise(self) -> Radians:
+        """Rms difference between receiver error and true pointing error minus boresight offset."""
         return known_rms(self.run.measured[self.evaluated] - (self.true - self.run.boresight))
 
     @functools.cached_property
-    def motion(self):
-        """(lag [s] of the estimate behind the true direction, rms error of its rate [rad/s]), in earth angles.
+    def motion(self) -> tuple[Seconds, RadiansPerSecond]:
+        """(lag of the estimate behind the true direction, rms error of its rate), in earth angles.
 
         The lag is the least-squares fit of the error e of the angle to the true rate w: lag = - sum(e w) / sum(w w).
         The error e is against the truth in the frame of the sensors.
@@ -174,10 +191,10 @@ COMPARISON_RESULTS = (
 )
 
 
-def numbers(bag, versions) -> dict:
+def numbers(bag: Recording, versions: Sequence[Mapping[str, Output]]) -> dict[str, tuple[list[float], str]]:
     """Return {metric: ([value of each version], unit)} of several versions of the outputs of an ACU.
 
-    versions: [{topic: difference.Output}]. All versions are evaluated on the same samples: those in which all of them
+    versions: outputs by topic. All versions are evaluated on the same samples: those in which all of them
     are in settled autotrack.
     """
     overlays = [Overlay(bag, outputs) for outputs in versions]

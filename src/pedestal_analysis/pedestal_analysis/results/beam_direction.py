@@ -2,13 +2,15 @@
 import numpy as np
 
 from pedestal_common.geometry import pointing_report
+from pedestal_common.quantities import Pairs, Seconds, Times
 from pedestal_recording import bag as bags
+from pedestal_recording.recording import Recording
 
 POINTING_TOPIC = 'acu/pointing'
 
 
-def reports(bag):
-    """Return [(time [s], pointing_report.Report)] of a bag.Bag of one beam, [] without a pointing model.
+def reports(bag: Recording) -> list[tuple[Seconds, pointing_report.Report]]:
+    """Return [(time, report)] of a recording of one beam, [] without a pointing model.
 
     Raises bag.BagError for a text that is no report.
     """
@@ -19,8 +21,8 @@ def reports(bag):
         raise bags.BagError(f'{bag.path}: {error}') from None
 
 
-def on_sky(bag, times, angles):
-    """Return the directions (n, 2) [rad] of encoder angles (n, 2) [rad] at times (n,) [s]; both are deck angles.
+def on_sky(bag: Recording, times: Times, angles: Pairs) -> Pairs:
+    """Return the directions of encoder angles at times; both are deck angles [rad].
 
     Before its first report a recording has the model of this report: such a recording began during the run.
     """
@@ -36,6 +38,6 @@ def on_sky(bag, times, angles):
     return on_sky
 
 
-def titles(bag):
+def titles(bag: Recording) -> list[str]:
     """Return the pointing models of a recording in words, each once, in ASCII; [] without a model."""
     return list(dict.fromkeys(report.title.encode('ascii', 'replace').decode() for _, report in reports(bag)))

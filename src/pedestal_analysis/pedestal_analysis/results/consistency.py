@@ -13,6 +13,7 @@ sensor_frame.
 import dataclasses
 import functools
 import math
+from typing import Annotated, TypeAlias
 
 import numpy as np
 from scipy import special
@@ -24,6 +25,18 @@ from pedestal_analysis.results import tracking
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
+from pedestal_common.quantities import (
+    Bools,
+    Floats,
+    Ints,
+    Pairs,
+    Quaternions,
+    Radians,
+    RadiansPerSecond,
+    Times,
+    Vectors3,
+)
+from pedestal_recording.recording import Recording
 
 NEES_FREEDOMS = 2  # degrees of freedom of the NEES: angle and rate
 BAND_PROBABILITY = 0.95  # probability that the mean NIS or NEES of a consistent filter lies inside its band [-]
@@ -39,54 +52,45 @@ FILTER_NUMBERS = ('innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma',
 """Numbers of the topic acu/filter that this module reads, for each axis; their units are in topics.FILTER_UNITS."""
 
 
+Band: TypeAlias = tuple[float, float]   # low, high: BAND_PROBABILITY of the consistent filters lie between them
+
+
 @dataclasses.dataclass
 class Consistency:
-    """Numbers of the target filter at the n steps of a Tracking.
-
-    The arrays are (n, 2) for azimuth and elevation, NaN where missing.
-
-    t                                (n,) time of the step [s]
-    innovation, rate_innovation      measurement minus prediction, of angle [rad] and rate [rad/s]
-    nis                              normalised innovation squared [-]
-    sigma, rate_sigma, correlation   standard deviations of angle [rad] and rate [rad/s] that the filter states, and
-                                     their correlation [-]
-    probability                      (n, 2, m): probability of each of the m topics.MOTION_MODELS
-    error, rate_error                estimate minus truth in the frame of the sensors, of angle [rad] and rate [rad/s]
-    nees                             normalised estimation error squared [-]
-    tracking                         (n,) bool: the evaluated part of the run, see Tracking
-    """
-    t: np.ndarray
-    innovation: np.ndarray
-    rate_innovation: np.ndarray
-    nis: np.ndarray
-    sigma: np.ndarray
-    rate_sigma: np.ndarray
-    correlation: np.ndarray
-    probability: np.ndarray
-    error: np.ndarray
-    rate_error: np.ndarray
-    nees: np.ndarray
-    tracking: np.ndarray
+    """Numbers of the target filter at the steps of a Tracking. Pairs are azimuth and elevation. NaN where missing."""
+    t: Times    # of the step
+    innovation: Pairs   # measurement minus prediction, of the angle [rad]
+    rate_innovation: Pairs  # the same of the rate [rad/s]
+    nis: Pairs  # normalised innovation squared [-]
+    sigma: Pairs    # standard deviation of the angle that the filter states [rad]
+    rate_sigma: Pairs   # the same of the rate [rad/s]
+    correlation: Pairs  # of angle and rate, stated by the filter [-]
+    probability: Annotated[Floats, '(n, 2, m)']     # of each of the m topics.MOTION_MODELS
+    error: Pairs    # estimate minus truth in the frame of the sensors, of the angle [rad]
+    rate_error: Pairs   # the same of the rate [rad/s]
+    nees: Pairs     # normalised estimation error squared [-]
+    tracking: Bools     # the evaluated part of the run, see Tracking
 
     @property
-    def freedoms(self):
-        """Degrees of freedom (n, 2) of the NIS."""
+    def freedoms(self) -> Pairs:
+        """Degrees of freedom of the NIS."""
         return 1.0 + np.isfinite(self.rate_innovation)
 
     @functools.cached_property
-    def axes(self):
+    def axes(self) -> tuple['Axis', 'Axis']:
         """The Axis objects of azimuth and elevation."""
         return Axis(self, 0), Axis(self, 1)
 
 
 @compiled
-def _rates(relative, velocity, attitude, ship_velocity, rates):
-    """Fill the rates (n, 2) [rad/s] of earth azimuth and elevation of a target seen from a ship.
+def _rates(relative: Vectors3, velocity: Vectors3, attitude: Quaternions, ship_velocity: Vectors3,
+           rates: Pairs) -> None:
+    """Fill the rates [rad/s] of earth azimuth and elevation of a target seen from a ship.
 
-    relative (n, 3)        vector from ship to target, ENU [m]
-    velocity (n, 3)        velocity of the target, ENU [m/s]
-    attitude (n, 4)        quaternion x, y, z, w of the rotation deck -> earth
-    ship_velocity (n, 3)   velocity of the ship in its own frame, FLU [m/s]
+    relative        vector from ship to target, ENU [m]
+    velocity        velocity of the target, ENU [m/s]
+    attitude        rotation deck -> earth
+    ship_velocity   velocity of the ship in its own frame, FLU [m/s]
     """
     for k in range(len(relative)):
         q = attitude[k]
@@ -96,8 +100,8 @@ def _rates(relative, velocity, attitude, ship_velocity, rates):
 
 
 @compiled
-def _turn_rates(angles, turned, rates):
-    """Turn the rates (n, 2) [rad/s] of earth angles (n, 2) [rad] in place, to those at the `turned` angles (n, 2).
+def _turn_rates(angles: Pairs, turned: Pairs, rates: Pairs) -> None:
+    """Turn the rates [rad/s] of earth angles [rad] in place, to those at the `turned` angles.
 
     Each row is turned as if its offset stood still. Because the filter takes the changes of a slow error for a random
     walk of the angle, they are no rate.
@@ -113,14 +117,14 @@ def _turn_rates(angles, turned, rates):
         rates[k, 0], rates[k, 1] = motion.azimuth.rate, motion.elevation.rate
 
 
-def read(bag, run):
-    """Return the Consistency of a bag.Bag whose tracking.Tracking is `run`; None if the bag has no acu/filter."""
+def read(bag: Recording, run: tracking.Tracking) -> Consistency | None:
+    """Return the Consistency of a recording whose Tracking is `run`; None without acu/filter."""
     if 'acu/filter' not in bag.topics or not bag.rows('acu/filter').size:
         return None
     t = run.t
     at_steps = functools.partial(tracking.on_grid, bag, t)
-    numbers = at_steps('acu/filter', [f'{axis}_{name}.position' for name in FILTER_NUMBERS for axis in topics.AXES])
-    numbers = dict(zip(FILTER_NUMBERS, np.split(numbers, len(FILTER_NUMBERS), axis=1)))
+    columns = at_steps('acu/filter', [f'{axis}_{name}.position' for name in FILTER_NUMBERS for axis in topics.AXES])
+    numbers = dict(zip(FILTER_NUMBERS, np.split(columns, len(FILTER_NUMBERS), axis=1)))
     probability = at_steps('acu/filter', [f'{axis}_{model}.position' for axis in topics.AXES
                                          for model in topics.MOTION_MODELS]).reshape(t.size, 2, -1)
     estimate = at_steps('acu/estimate', [f'{axis}.{field}' for field in ('position', 'velocity')
@@ -145,7 +149,7 @@ def read(bag, run):
                        tracking=run.tracking)
 
 
-def effective_count(values):
+def effective_count(values: Floats) -> float:
     """Return the number of independent samples whose mean is as accurate as the mean of a correlated series (n,).
 
     This number is n / (1 + 2 sum of the autocorrelations). The sum ends at the first pair of neighbours whose sum is
@@ -162,35 +166,39 @@ def effective_count(values):
     return float(n / max(2.0 * pairs[:stop].sum() - 1.0, 1.0))
 
 
-def bounds(freedoms):
+def bounds(freedoms: float | Floats | Ints) -> tuple[Floats, Floats]:
     """Return (low, high), between which a chi-square value lies with BAND_PROBABILITY.
 
-    freedoms: its degrees of freedom, a number or an array.
+    freedoms: its degrees of freedom.
     """
     # Because chdtri is slow and a long run has few different degrees of freedom, each of them is computed once.
     different, places = np.unique(freedoms, return_inverse=True)
     places = places.reshape(np.shape(freedoms))
     tails = 0.5 + 0.5 * BAND_PROBABILITY, 0.5 - 0.5 * BAND_PROBABILITY
-    return tuple(special.chdtri(different, tail)[places] for tail in tails)
+    low, high = (special.chdtri(different, tail)[places] for tail in tails)
+    return low, high
 
 
-def band(freedoms, count):
+def band(freedoms: float, count: float) -> Band:
     """Return (low, high), between which the mean of `count` chi-square values lies with BAND_PROBABILITY."""
-    return tuple(float(bound / count) for bound in bounds(freedoms * count))
+    low, high = bounds(freedoms * count)
+    return float(low / count), float(high / count)
 
 
 class Axis:
     """Statistics of one axis i, 0 azimuth or 1 elevation, of a Consistency over the evaluated part of the run.
 
-    nis, nees           mean NIS and mean NEES
-    nis_expected        expected mean NIS, the mean of its degrees of freedom
-    error, rate_error   rms errors of angle [rad] and rate [rad/s]
-    sigma, rate_sigma   rms of the stated standard deviations of angle [rad] and rate [rad/s]
-
     A value is NaN where nothing was measured.
     """
+    nis: float      # mean
+    nis_expected: float     # expected mean NIS, the mean of its degrees of freedom
+    nees: float     # mean
+    error: Radians  # rms of the angle
+    rate_error: RadiansPerSecond    # rms of the rate
+    sigma: Radians  # rms of the stated standard deviations of the angle
+    rate_sigma: RadiansPerSecond    # the same of the rate
 
-    def __init__(self, known, i):
+    def __init__(self, known: Consistency, i: int) -> None:
         on = known.tracking
         nis, freedoms, nees = known.nis[on, i], known.freedoms[on, i], known.nees[on, i]
         self._freedoms, self._nis = freedoms[np.isfinite(nis)], nis[np.isfinite(nis)]
@@ -201,7 +209,7 @@ class Axis:
             for values in (known.error, known.rate_error, known.sigma, known.rate_sigma))
 
     @functools.cached_property
-    def nis_inside(self):
+    def nis_inside(self) -> float:
         """Share of the values of the NIS between their `bounds` [-]."""
         if not self._nis.size:
             return math.nan
@@ -209,32 +217,32 @@ class Axis:
         return float(np.mean((self._nis >= low) & (self._nis <= high)))
 
     @functools.cached_property
-    def nis_band(self):
-        """Band (low, high) of the mean NIS."""
+    def nis_band(self) -> Band:
+        """Band of the mean NIS."""
         return band(self.nis_expected, effective_count(self._nis)) if self._nis.size else (math.nan, math.nan)
 
     @functools.cached_property
-    def count(self):
+    def count(self) -> float:
         """Number of independent errors in the mean NEES."""
         return effective_count(self._nees) if self._nees.size else math.nan
 
     @functools.cached_property
-    def nees_band(self):
-        """Band (low, high) of the mean NEES."""
+    def nees_band(self) -> Band:
+        """Band of the mean NEES."""
         return band(NEES_FREEDOMS, self.count) if self._nees.size else (math.nan, math.nan)
 
     @property
-    def nis_mark(self):
+    def nis_mark(self) -> str:
         """The note on the mean NIS, see `mark`."""
         return mark(self.nis, self.nis_expected, self.nis_band)
 
     @property
-    def nees_mark(self):
+    def nees_mark(self) -> str:
         """The note on the mean NEES, see `mark`."""
         return mark(self.nees, NEES_FREEDOMS, self.nees_band)
 
     @property
-    def verdict(self):
+    def verdict(self) -> str:
         """The sentence on the mean NEES: too sure, too careful or consistent."""
         if not math.isfinite(self.nees):
             return 'nothing was evaluated'
@@ -244,15 +252,15 @@ class Axis:
                 f'{self.nees:.3g}, {100.0 * BAND_PROBABILITY:g} % of consistent filters have {low:.3g} to {high:.3g})')
 
 
-def mark(mean, expected, band):
+def mark(mean: float, expected: float, band: Band) -> str:
     """Return 'too sure' or 'too careful' for a mean that is outside its band and off by more than NOTABLE_DEVIATION.
 
-    Return '' otherwise. mean: mean NIS or NEES; expected: its expectation; band: its band (low, high).
+    Return '' otherwise. mean: mean NIS or NEES; expected: its expectation.
     """
     if mean > max(band[1], (1.0 + NOTABLE_DEVIATION) * expected):
         return 'too sure'
     return 'too careful' if mean < min(band[0], (1.0 - NOTABLE_DEVIATION) * expected) else ''
 
 
-def _mean(values):
+def _mean(values: Floats) -> float:
     return float(np.mean(values)) if values.size else math.nan

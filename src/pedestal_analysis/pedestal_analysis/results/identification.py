@@ -15,15 +15,18 @@ acu_tracker.servo.feedforward.
 """
 import dataclasses
 import math
+from typing import Annotated
 
 import numpy as np
 
 from acu_tracker.servo import feedforward
 from adu_drive import drive_unit
-from adu_drive.params import WindParameters
+from adu_drive.params import AduParameters, WindParameters
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
 from pedestal_common.parameters import record
+from pedestal_common.quantities import Complexes, Floats, Pairs, Records, Seconds
 
 SINE_FREQUENCIES_HZ = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 2.5])
 """Frequencies of the sines [Hz]. Each has a whole number of periods in COMMON_PERIOD_S."""
@@ -41,43 +44,38 @@ SINE_PEAK_RAD_S = 0.004  # amplitude of each sine [rad/s]
 
 @dataclasses.dataclass(frozen=True)
 class RateLoop:
-    """Identified rate loop of one axis.
-
-    w (n,)              angular frequencies [rad/s]
-    W (n,)              complex response without the known delay [-]
-    f (SERIES_TERMS,)   terms of the series of 1 / W, see the module
-    """
-    w: np.ndarray
-    W: np.ndarray
-    f: np.ndarray
+    """Identified rate loop of one axis."""
+    w: Floats       # angular frequencies [rad/s]
+    W: Complexes    # response without the known delay at w [-]
+    f: Annotated[Floats, (SERIES_TERMS,)]   # terms of the series of 1 / W, see the module
 
     @property
-    def k_v(self):
+    def k_v(self) -> float:
         """Feed-forward gain of the reference's rate [-]."""
         return float(self.f[0])
 
     @property
-    def k_a(self):
-        """Feed-forward gain of the reference's acceleration [s]."""
+    def k_a(self) -> Seconds:
+        """Feed-forward gain of the reference's acceleration."""
         return float(self.f[1])
 
-    def error(self, k_v, k_a):
-        """Return |1 - (k_v + k_a jw) W| (n,), the relative angle error that a feed-forward leaves at w [-]."""
+    def error(self, k_v: float, k_a: Seconds) -> Floats:
+        """Return |1 - (k_v + k_a jw) W|, the relative angle error that a feed-forward leaves at w [-]."""
         return np.abs(1.0 - (k_v + 1j * k_a * self.w) * self.W)
 
 
-def series(w, W, terms=SERIES_TERMS):
-    """Return f (terms,) of the least-squares fit 1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + ... at w (n,) [rad/s]."""
+def series(w: Floats, W: Complexes, terms: int = SERIES_TERMS) -> Floats:
+    """Return f of the least-squares fit 1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + ... at w [rad/s]."""
     basis = (1j * w[:, np.newaxis]) ** np.arange(terms)
     wanted = 1.0 / W
     return np.linalg.lstsq(np.concatenate((basis.real, basis.imag)), np.concatenate((wanted.real, wanted.imag)),
                            rcond=None)[0]
 
 
-def response(commanded, position, T, delay, w):
-    """Return the response W (n,) of a rate loop at w (n,) [rad/s], without the delay and the hold of the commands.
+def response(commanded: Floats, position: Floats, T: Seconds, delay: Seconds, w: Floats) -> Complexes:
+    """Return the response W of a rate loop at w [rad/s], without the delay and the hold of the commands.
 
-    commanded (m,): rate commands [rad/s]; command k acts from t_k + delay [s] on, for the period T [s].
+    commanded (m,): rate commands [rad/s]; command k acts from t_k + delay on, for the period T.
     position (m,): angle of the axis [rad] at t_k.
     The m samples contain a whole number of periods of each w. A linear trend is removed.
     """
@@ -90,10 +88,11 @@ def response(commanded, position, T, delay, w):
 
 
 @compiled
-def _drive(state, constants, inputs, outputs, rate, torque, position, motors):
-    """Run the drive with n commands. Fill position (n, 2) with the encoder angles [rad] before each command.
+def _drive(state: Records, constants: Records, inputs: Records, outputs: Records, rate: Pairs, torque: Pairs,
+           position: Pairs, motors: Floats) -> None:
+    """Run the drive with n commands. Fill position with the encoder angles [rad] before each command.
 
-    rate (n, 2): rate commands [rad/s]; torque (n, 2): torque feed-forward [Nm]. The columns are azimuth and elevation.
+    rate: rate commands [rad/s]; torque: torque feed-forward [Nm]. Pairs are azimuth and elevation.
     motors (n, 2, 4): filled for both axes with angles [rad] and torques [Nm] of motors 1 and 2 on the motor shaft.
     The other arguments are the records of the unit of the drive, each in an array of one.
     """
@@ -108,12 +107,11 @@ def _drive(state, constants, inputs, outputs, rate, torque, position, motors):
         drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
-def respond(drive, rate, torque):
-    """Return (encoder angles (n, 2) [rad], motors (n, 2, 4)) of a drive that receives n commands in still air.
+def respond(drive: AduParameters, rate: Pairs, torque: Pairs) -> tuple[Pairs, Floats]:
+    """Return (encoder angles [rad], motors (n, 2, 4)) of a drive that receives n commands in still air.
 
-    drive: AduParameters with the angles at the start; rate (n, 2): rate commands [rad/s]; torque (n, 2): torque
-    feed-forward [Nm]; motors: angles [rad] and torques [Nm] of motors 1 and 2 of both axes. Row k is the time of
-    command k.
+    drive: with the angles at the start; rate: rate commands [rad/s]; torque: torque feed-forward [Nm]; motors: angles
+    [rad] and torques [Nm] of motors 1 and 2 of both axes. Row k is the time of command k.
     """
     drive = dataclasses.replace(drive, wind=WindParameters(), initially_enabled=True)
     state, constants = drive_unit.initial_state(drive), drive_unit.constants(drive)
@@ -125,8 +123,8 @@ def respond(drive, rate, torque):
     return position, motors
 
 
-def identify(scenario, torque=True) -> dict:
-    """Return {axis: RateLoop} of the drive in a scenario.Scenario, in still air.
+def identify(scenario: Scenario, torque: bool = True) -> dict[str, RateLoop]:
+    """Return the RateLoop of each axis of the drive in a scenario, in still air.
 
     torque: True if the commands include the torque feed-forward of the ACU. Raises ValueError if the period of the
     drive does not divide COMMON_PERIOD_S or if the travel is too short.

@@ -3,15 +3,22 @@
 The trials and the studies use this module.
 """
 import math
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import stdtrit
+
+from pedestal_common.quantities import Estimate, Floats, Row
+
+_P = TypeVar('_P')      # part of the runs
 
 CONFIDENCE_LEVEL = 0.95  # confidence level of the interval of a mean [-]
 
 
-def interval(values):
-    """Return (mean, low, high) of a result in n independent runs, from its values (n,): mean and confidence interval.
+def interval(values: ArrayLike) -> Estimate:
+    """Return the Estimate of the mean of a result in n independent runs, from its values.
 
         low, high = mean -+ t_(n-1) s / sqrt(n)
 
@@ -28,10 +35,10 @@ def interval(values):
     return mean, mean - half, mean + half
 
 
-def pseudo_values(parts, statistic):
-    """Return values (n,) for `interval` of a statistic that is taken over all runs together, such as an rms.
+def pseudo_values(parts: list[_P], statistic: Callable[[list[_P]], float | Floats]) -> Floats:
+    """Return values for `interval` of a statistic that is taken over all runs together, such as an rms.
 
-    parts: n about equal parts of the runs; statistic(parts) -> number. The method is Tukey's jackknife (Efron and
+    parts: n about equal parts of the runs. The method is Tukey's jackknife (Efron and
     Stein, Annals of Statistics 9 (1981) 586):
 
         value i = n theta - (n - 1) theta_-i
@@ -43,44 +50,48 @@ def pseudo_values(parts, statistic):
                      for i in range(n)])
 
 
-def row(case, metric, value, unit='', paper=None, target=None, runs=None):
+def row(case: str, metric: str, value: ArrayLike, unit: str = '', paper: float | None = None,
+        target: str | None = None, runs: int | None = None) -> Row:
     """Return one row of a --json file.
 
-    value: a number, or the values (n,) of n random runs. For values, the row states their mean, its interval and the
+    value: a number, or the values of n random runs. For values, the row states their mean, its interval and the
     number of runs. This number is n, or `runs` if each value belongs to several runs.
-    paper: number that a paper prints, or None; target: text for `meets`, or None.
+    paper: number that a paper prints; target: text for `meets`.
     """
-    if np.ndim(value):
-        return estimated(case, metric, interval(value), unit, runs or len(value), paper, target)
-    return {'case': case, 'metric': metric, 'value': _finite(value), 'unit': unit, 'paper': paper, 'target': target}
+    values = np.asarray(value, float)
+    if values.ndim:
+        return estimated(case, metric, interval(values), unit, runs or len(values), paper, target)
+    return {'case': case, 'metric': metric, 'value': _finite(float(values)), 'unit': unit, 'paper': paper,
+            'target': target}
 
 
-def estimated(case, metric, estimate, unit, runs, paper=None, target=None):
-    """Return the `row` of an estimate (value, low, high) from a number of runs; low, high: its confidence interval."""
+def estimated(case: str, metric: str, estimate: Estimate, unit: str, runs: int, paper: float | None = None,
+              target: str | None = None) -> Row:
+    """Return the `row` of an estimate from a number of runs."""
     value, low, high = estimate
     return {**row(case, metric, value, unit, paper, target), 'ci_low': _finite(low), 'ci_high': _finite(high),
             'runs': runs}
 
 
-def _finite(value):
+def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def meets(value, target):
+def meets(value: float | None, target: str) -> bool:
     """Return True if a value meets a target: '<= 1', '>= 1', '< 1', '> 1', '1 +- 0.1' or '1 to 2'.
 
     The value None meets no target.
     """
     if value is None:
         return False
-    first, word, last = ('', *target.split()) if len(target.split()) == 2 else target.split()
-    last = float(last)
+    first, word, end = ('', *target.split()) if len(target.split()) == 2 else target.split()
+    last = float(end)
     return {'<=': lambda: value <= last, '>=': lambda: value >= last, '<': lambda: value < last,
             '>': lambda: value > last, '+-': lambda: abs(value - float(first)) <= last,
             'to': lambda: float(first) <= value <= last}[word]()
 
 
-def missed(row):
+def missed(row: Row) -> bool:
     """Return True if a row misses its target. Of a random value, the whole interval must meet the target."""
     judged = ('ci_low', 'ci_high') if 'runs' in row else ('value',)
     return row['target'] is not None and not all(meets(row[key], row['target']) for key in judged)

@@ -29,6 +29,8 @@ import math
 import numpy as np
 
 from pedestal_analysis.results import tracking
+from pedestal_common.quantities import Decibels, Floats, Pairs, Quaternions, Radians, Seconds, Vectors3
+from pedestal_recording.recording import Recording
 
 SMOOTHING_HALF_WIDTH_HZ = 0.02
 """Half the width over which the power spectrum of the remainder of the fit is averaged [Hz]."""
@@ -37,28 +39,28 @@ MIN_TRACKED_TIME_S = 20.0  # shortest evaluated time for an isolation: a few per
 
 @dataclasses.dataclass(frozen=True)
 class Isolation:
-    """Isolation of a run, from motion, coherent and floor: rms [rad], see the module."""
-    motion: float
-    coherent: float
-    floor: float
+    """Isolation of a run, from three rms values, see the module."""
+    motion: Radians
+    coherent: Radians
+    floor: Radians
 
     @property
-    def isolation(self):
-        """Isolation [dB]; NaN without motion."""
+    def isolation(self) -> Decibels:
+        """Isolation; NaN without motion."""
         return _decibels(self.motion, self.coherent)
 
     @property
-    def limit(self):
-        """Highest isolation that a run of this length and noise can show [dB]."""
+    def limit(self) -> Decibels:
+        """Highest isolation that a run of this length and noise can show."""
         return _decibels(self.motion, self.floor)
 
 
-def _decibels(large, small):
+def _decibels(large: float, small: float) -> Decibels:
     return 20.0 * math.log10(large / small) if large > 0.0 and small > 0.0 else math.nan
 
 
-def _beam_axes(direction):
-    """Return the axes (n, 3, 3) of beams in the directions (n, 3) FLU.
+def _beam_axes(direction: Vectors3) -> Floats:
+    """Return the axes (n, 3, 3) of beams in the directions FLU.
 
     The three rows are unit vectors FLU in cross-elevation, in elevation and along the beam.
     """
@@ -70,13 +72,13 @@ def _beam_axes(direction):
                     ).transpose(2, 0, 1)
 
 
-def measure(dt, error, target, attitude, deck_rate) -> Isolation:
-    """Return the Isolation of n samples at intervals of dt [s].
+def measure(dt: Seconds, error: Pairs, target: Vectors3, attitude: Quaternions, deck_rate: Vectors3) -> Isolation:
+    """Return the Isolation of samples at intervals of dt.
 
-    error (n, 2)       true pointing error in cross-elevation and elevation [rad]
-    target (n, 3)      vector from ship to target, ENU, of any length
-    attitude (n, 4)    true quaternions x, y, z, w of the rotation deck -> earth
-    deck_rate (n, 3)   true angular velocity of the deck, FLU [rad/s]
+    error       true pointing error in cross-elevation and elevation [rad]
+    target      vector from ship to target, ENU, of any length
+    attitude    true rotation deck -> earth
+    deck_rate   true angular velocity of the deck, FLU [rad/s]
     """
     # Because the import is slow and most runs are ashore, it is made here.
     from scipy import ndimage
@@ -85,7 +87,7 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
     mean = turns.mean()
     axes = _beam_axes(mean.inv().apply(target))
 
-    def in_beam(vectors):
+    def in_beam(vectors: Vectors3) -> Vectors3:
         return np.einsum('nij,nj->ni', axes, vectors)
 
     direction = in_beam(turns.inv().apply(target))
@@ -109,8 +111,8 @@ def measure(dt, error, target, attitude, deck_rate) -> Isolation:
                      math.sqrt(np.sum(power * weight) / (2 * n)))
 
 
-def read(bag, run):
-    """Return the Isolation of a bag.Bag whose tracking.Tracking is `run`.
+def read(bag: Recording, run: tracking.Tracking) -> Isolation | None:
+    """Return the Isolation of a recording whose Tracking is `run`.
 
     Return None for an antenna ashore, or if the evaluated time is below MIN_TRACKED_TIME_S.
     """
@@ -121,7 +123,7 @@ def read(bag, run):
     azimuth, elevation = run.target_earth.T
     target = np.column_stack((np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation),
                               np.sin(elevation)))
-    error = np.column_stack((run.cross_elevation, run.elevation_error))
+    error = run.error
     on = run.tracking & np.isfinite(np.column_stack((ship, target, error))).all(axis=1)
     if math.isfinite(run.beamwidth):
         on &= np.hypot(*error.T) <= 0.5 * run.beamwidth

@@ -5,50 +5,48 @@ import math
 import numpy as np
 
 from pedestal_analysis.results import tracking
+from pedestal_common.quantities import Bools, Floats, Pairs, Radians, Seconds, Times, Vectors3
+from pedestal_recording.recording import Recording
 
 ATTITUDE_TOPIC, INS_STATE_TOPIC = 'ship/imu/data', 'ins/state'
 
 
 @dataclasses.dataclass
 class KnownAttitude:
-    """Errors of the INS at its stamps t (n,) [s].
-
-    error    (n, 3) [rad]: rotation from the true to the reported attitude. Columns: about east and about north (level
-             errors), and about up, clockwise (heading error).
-    sigma    (n, 2) [rad]: standard deviations of level and heading that the INS states
-    aligned  stamp [s] at which ins/state became `aligned`; NaN if it never did. In a bag without ins/state, the first
-             stamp.
-    """
-    t: np.ndarray
-    error: np.ndarray
-    sigma: np.ndarray
-    aligned: float
+    """Errors of the INS at its stamps."""
+    t: Times
+    # rotation from the true to the reported attitude [rad]: about east and about north (level errors), and about up,
+    # clockwise (heading error)
+    error: Vectors3
+    sigma: Pairs    # standard deviations of level and heading that the INS states [rad]
+    # stamp at which ins/state became `aligned`; NaN if it never did. In a bag without ins/state, the first stamp
+    aligned: Seconds
 
     @property
-    def level(self):
-        """Level error (n,) [rad], both axes together."""
+    def level(self) -> Floats:
+        """Level error [rad], both axes together."""
         return np.hypot(self.error[:, 0], self.error[:, 1])
 
     @property
-    def heading(self):
-        """Heading error (n,) [rad], clockwise."""
+    def heading(self) -> Floats:
+        """Heading error [rad], clockwise."""
         return self.error[:, 2]
 
     @property
-    def is_aligned(self):
-        """Mask (n,) bool of the rows after alignment."""
+    def is_aligned(self) -> Bools:
+        """The rows after alignment."""
         return self.t >= self.aligned
 
     @property
-    def at_alignment(self):
-        """(heading error, stated standard deviation of heading) [rad] at alignment; NaN without alignment."""
+    def at_alignment(self) -> tuple[Radians, Radians]:
+        """(heading error, stated standard deviation of heading) at alignment; NaN without alignment."""
         first = np.argmax(self.is_aligned)
         return ((float(self.heading[first]), float(self.sigma[first, 1])) if self.is_aligned.any()
                 else (math.nan, math.nan))
 
 
-def read(bag):
-    """Return the KnownAttitude of a bag.Bag; None for an antenna ashore."""
+def read(bag: Recording) -> KnownAttitude | None:
+    """Return the KnownAttitude of a recording; None for an antenna ashore."""
     if any(topic not in bag.topics or not bag.rows(topic).size for topic in ('ship/truth', ATTITUDE_TOPIC)):
         return None
     table = bag.table(ATTITUDE_TOPIC)
@@ -67,9 +65,9 @@ def read(bag):
     return KnownAttitude(t, error, sigma, aligned_from(bag, t[0]))
 
 
-def aligned_from(bag, first):
-    """Return the stamp [s] at which the INS became aligned, as KnownAttitude.aligned; first: first stamp of the
-    attitude [s]."""
+def aligned_from(bag: Recording, first: Seconds) -> Seconds:
+    """Return the stamp at which the INS became aligned, as KnownAttitude.aligned; first: first stamp of the
+    attitude."""
     if INS_STATE_TOPIC not in bag.topics or not bag.rows(INS_STATE_TOPIC).size:
         return float(first)
     states = bag.table(INS_STATE_TOPIC)

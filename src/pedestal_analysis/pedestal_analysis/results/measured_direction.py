@@ -6,13 +6,13 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.quantities import Floats, Pairs, Quaternions
 
 
 @compiled
-def _displaced(azimuth, elevation, errors, quaternions, earth):
-    """Fill earth (n, 2) with the earth angles [rad] of a target, as `earth_angles` states.
-
-    azimuth, elevation (n,): deck angles of the beam; errors (n, 2) and quaternions (n, 4): see `earth_angles`.
+def _displaced(azimuth: Floats, elevation: Floats, errors: Pairs, quaternions: Quaternions, earth: Pairs) -> None:
+    """Fill earth with the earth angles [rad] of a target. azimuth, elevation: deck angles of the beam; the rest as in
+    `earth_angles`.
     """
     mat_ed = np.empty((3, 3))
     for k in range(azimuth.size):
@@ -23,12 +23,12 @@ def _displaced(azimuth, elevation, errors, quaternions, earth):
         earth[k, 0], earth[k, 1] = line_of_sight.earth_angles(east, north, height)
 
 
-def earth_angles(beam, errors, quaternions=None):
-    """Return the earth angles (n, 2) [rad] of the target: azimuth in (-pi, pi] and elevation.
+def earth_angles(beam: Pairs, errors: Pairs, quaternions: Quaternions | None = None) -> Pairs:
+    """Return the earth angles [rad] of the target: azimuth in (-pi, pi] and elevation.
 
-    beam (n, 2)          azimuth and elevation of the beam on the deck [rad]
-    errors (n, 2)        receiver errors in cross-elevation and elevation [rad]
-    quaternions (n, 4)   attitude x, y, z, w of the rotation deck -> earth, None ashore
+    beam          azimuth and elevation of the beam on the deck [rad]
+    errors        receiver errors in cross-elevation and elevation [rad]
+    quaternions   rotation deck -> earth, None ashore
 
     The result is NaN where an input is NaN.
     """

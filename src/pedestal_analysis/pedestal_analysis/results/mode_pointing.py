@@ -10,31 +10,37 @@ than MAX_DRIFT beamwidths per second for SETTLING_TIME_S. In `preset` and `slave
 each slew is left out. Because step track moves the beam on purpose, its settled part begins HANDOVER_SETTLING_S after
 the begin of the mode.
 """
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
+
 import numpy as np
 
 from acu_tracker.operating.command_table import ACU_COMMANDS
 from acu_tracker.program.air import WEATHER_QUANTITIES, Air, RefractionParameters
 from acu_tracker.program.prediction import PredictionParameters, Predictor
 from pedestal_analysis.results import tracking
-from pedestal_analysis.results.tracking import DEG_PER_RAD
+from pedestal_analysis.results.tracking import DEG_PER_RAD, Tracking
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph.topics import AXES, TOPIC_BY_NAME
 from pedestal_common.parameters import ParameterError, build
+from pedestal_common.quantities import Bools, Floats, Json, Pairs
 from pedestal_common.wire import commands, messages
+from pedestal_recording.recording import Recording
 
 FOLLOWED_DIRECTIONS = {'program': 'true target', 'tle': 'true target', 'preset': 'requested angles',
                        'steptrack': 'true target', 'slave': 'commanded direction', 'sun': 'direction of the sun'}
 """{mode with results of its own, and with a row of _PARTS: the direction that it follows}."""
 SETTLING_TIME_S = 0.5  # time for which the error must be still before a mode counts as settled [s]
 MAX_DRIFT = 0.25  # largest motion of a still error [beamwidths/s]
+_Part: TypeAlias = tuple[Pairs, Bools]  # error (cross-elevation, elevation) [rad], the settled steps of a mode
 MAX_REFERENCE_STEP_RAD = 1e-5  # largest motion within SETTLING_TIME_S of a reference that counts as standing [rad]
 
 
-def read(bag, run) -> dict:
-    """Return {mode: pointing errors (k, 2) [deg]} in the settled part of each mode; run: Tracking of the bag.Bag.
+def read(bag: Recording, run: Tracking) -> dict[str, Pairs]:
+    """Return {mode: pointing errors [deg]} in the settled part of each mode; run: Tracking of the recording.
 
-    Columns: cross-elevation, elevation. An electronic beam has two rows per step: at the end and at the beginning of
+    Pairs are cross-elevation, elevation. An electronic beam has two rows per step: at the end and at the beginning of
     the interval. A mode without a settled part is left out.
     """
     found = {}
@@ -49,48 +55,40 @@ def read(bag, run) -> dict:
     return found
 
 
-def _window(run):
+def _window(run: Tracking) -> int:
     """Return SETTLING_TIME_S as a number of steps."""
     return max(1, round(SETTLING_TIME_S / run.period))
 
 
-def _moved(values, window):
-    """Return the distance (n,) that values (n, 2) moved in the last `window` steps; infinite in the first rows."""
+def _moved(values: Pairs, window: int) -> Floats:
+    """Return the distance that values moved in the last `window` steps; infinite in the first rows."""
     out = np.full(len(values), np.inf)
     out[window:] = np.hypot(*(values[window:] - values[:-window]).T)
     return out
 
 
-def _to_target(run):
-    """Return the true pointing error (n, 2) (cross-elevation, elevation) [rad] of a tracking.Tracking."""
-    return np.column_stack((run.cross_elevation, run.elevation_error))
-
-
 @compiled
-def fill_offsets(beam, directions, error):
-    """Fill error (n, 2) [rad] with the offsets of earth directions (n, 2) from the beam (n, 2)."""
+def fill_offsets(beam: Pairs, directions: Pairs, error: Pairs) -> None:
+    """Fill error with the offsets of earth directions from the beam [rad]."""
     for k in range(len(beam)):
         x, y, z = line_of_sight.direction(directions[k, 0], directions[k, 1])
         error[k, 0], error[k, 1] = line_of_sight.offsets(beam[k, 0], beam[k, 1], x, y, z)
 
 
-def _to_earth_direction(run, directions):
-    """Return the error (n, 2) [rad] of the true beam against earth angles (n, 2)."""
+def _to_earth_direction(run: Tracking, directions: Pairs) -> Pairs:
+    """Return the error [rad] of the true beam against earth angles."""
     error = np.empty_like(directions)
     fill_offsets(run.beam_earth, directions, error)
     return error
 
 
-def _of_table(_, run, inside):
-    """Return (error (n, 2) [rad], mask (n,) of the settled steps) of a mode that follows a table of directions.
-
-    inside (n,): mask of the steps in the mode.
-    """
-    return _after_slew(_to_target(run), run, inside)
+def _of_table(_: Recording, run: Tracking, inside: Bools) -> _Part:
+    """Return the part of a mode that follows a table of directions; inside: the steps in the mode."""
+    return _after_slew(run.error, run, inside)
 
 
-def _after_slew(error, run, inside):
-    """Return (error (n, 2) [rad], mask (n,) of the steps after the first slew of each stretch)."""
+def _after_slew(error: Pairs, run: Tracking, inside: Bools) -> _Part:
+    """Return the error, and the steps after the first slew of each stretch."""
     on = np.zeros(run.t.size, bool)
     for first, last in tracking.stretches(inside):
         settled = np.flatnonzero(_settled(error[first:last], run))
@@ -99,27 +97,24 @@ def _after_slew(error, run, inside):
     return error, on
 
 
-def _settled(error, run):
-    """Return the mask (n,) of the steps at which the error (n, 2) [rad] has been still for SETTLING_TIME_S."""
+def _settled(error: Pairs, run: Tracking) -> Bools:
+    """Return the steps at which the error has been still for SETTLING_TIME_S."""
     window = _window(run)
     return np.convolve(_still(error, run), np.ones(window, int))[:len(error)] == window
 
 
-def _still(error, run):
-    """Return the mask (n,) of the steps at which the error (n, 2) [rad] drifts by less than MAX_DRIFT."""
+def _still(error: Pairs, run: Tracking) -> Bools:
+    """Return the steps at which the error drifts by less than MAX_DRIFT."""
     return _moved(error, _window(run)) < MAX_DRIFT * SETTLING_TIME_S * run.beamwidth
 
 
-def _of_steps(_, run, inside):
-    """Return (error (n, 2) [rad], mask (n,) of the settled steps) of step track, whose steps are the mask `inside`."""
-    return _to_target(run), tracking.settled(inside, run.t)
+def _of_steps(_: Recording, run: Tracking, inside: Bools) -> _Part:
+    """Return the part of step track."""
+    return run.error, tracking.settled(inside, run.t)
 
 
-def _of_preset(bag, run, inside):
-    """Return (reference minus beam (n, 2) [rad], mask (n,) of the settled steps) of the mode `preset`.
-
-    inside (n,): mask of the steps in the mode. Columns: cross-elevation, elevation.
-    """
+def _of_preset(bag: Recording, run: Tracking, inside: Bools) -> _Part:
+    """Return the part of the mode `preset`: reference minus beam."""
     columns, window = ('azimuth.position', 'elevation.position'), _window(run)
     beam = tracking.on_grid(bag, run.t, 'adu/truth' if 'adu/truth' in bag.topics else 'joint_states', columns)
     error, on = run.reference - beam, np.zeros(run.t.size, bool)
@@ -131,8 +126,8 @@ def _of_preset(bag, run, inside):
     return error, on
 
 
-def _of_slave(bag, run, inside):
-    """Return (error (n, 2) [rad] against the commanded direction, mask (n,) of its settled steps)."""
+def _of_slave(bag: Recording, run: Tracking, inside: Bools) -> _Part:
+    """Return the part of the mode `slave`: the error against the commanded direction."""
     directions, air = np.full((run.t.size, 2), np.nan), None
     known = bag.configuration['parameters'].get('acu', {})
     if known.get('refraction.slave') != 'apparent':
@@ -153,21 +148,21 @@ def _of_slave(bag, run, inside):
     return error, on
 
 
-def air_of(bag, known):
+def air_of(bag: Recording, known: Mapping[str, Json]) -> Air:
     """Return the Air of a recorded run, with the weather that was published; known: parameters of the ACU."""
     air = Air(build(RefractionParameters, {key: value for key, value in known.items()
                                            if key.startswith('refraction.')}, 'refraction.'))
-    readings = [(bag.rows(topic).log[row], topic, data) for topic in WEATHER_QUANTITIES if topic in bag.topics
-                for row, (_, _, _, data) in enumerate(bag.raw(topic))]
-    for log, topic, data in sorted(readings, key=lambda reading: reading[0]):
-        message, now = messages.deserialize(data, TOPIC_BY_NAME[topic].type), (log - bag.start) * 1e-9
+    readings = [(log, topic, message) for topic in WEATHER_QUANTITIES
+                if bag.topics.get(topic) == TOPIC_BY_NAME[topic].type for _, log, _, message in bag.messages(topic)]
+    for log, topic, message in sorted(readings, key=lambda reading: reading[0]):
+        now = (log - bag.start) * 1e-9
         stamp = messages.nanoseconds(message.header.stamp)
         air.take(topic, (stamp - bag.start) * 1e-9 if stamp else None, message, now)
         air.update(now)
     return air
 
 
-def predictor_of(bag, known):
+def predictor_of(bag: Recording, known: Mapping[str, Json]) -> Predictor:
     """Return the Predictor of a recorded run; known: parameters of the ACU.
 
     Raises ParameterError, for example for a file of the earth's orientation that is not on this machine.
@@ -176,8 +171,8 @@ def predictor_of(bag, known):
     return Predictor(build(PredictionParameters, given, 'prediction.'), bag.start, air_of(bag, known))
 
 
-def _of_sun(bag, run, inside):
-    """Return (error (n, 2) [rad] against the sun, mask (n,) of its settled steps); NaN without recorded parameters."""
+def _of_sun(bag: Recording, run: Tracking, inside: Bools) -> _Part:
+    """Return the part of the mode `sun`: the error against the sun, NaN without recorded parameters."""
     known = bag.configuration['parameters'].get('acu', {})
     if not known:
         return np.full((run.t.size, 2), np.nan), inside
@@ -188,6 +183,7 @@ def _of_sun(bag, run, inside):
     return _after_slew(_to_earth_direction(run, predictor.sun_angles(run.t)), run, inside)
 
 
-_PARTS = {'program': _of_table, 'tle': _of_table, 'preset': _of_preset, 'steptrack': _of_steps, 'slave': _of_slave,
-          'sun': _of_sun}
-"""{mode: function(bag, run, mask of the steps in the mode) -> (error (n, 2) [rad], mask of the settled steps)}."""
+_PARTS: dict[str, Callable[[Recording, Tracking, Bools], _Part]] = {
+    'program': _of_table, 'tle': _of_table, 'preset': _of_preset, 'steptrack': _of_steps, 'slave': _of_slave,
+    'sun': _of_sun}
+"""{mode: function(bag, run, the steps in the mode)}."""

@@ -7,7 +7,9 @@ import math
 
 import numpy as np
 
+from pedestal_analysis.results.tracking import Tracking
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Decibels, Floats, Pairs, Radians
 from tracking_receiver_sim.monopulse import sum_pattern
 
 LEAST_POWER = 1e-12
@@ -15,18 +17,17 @@ LEAST_POWER = 1e-12
 
 
 @compiled
-def _fill(error, beamwidth, power):
-    """Fill power (n,): received power over that on the beam axis [-].
-
-    error (n, 2): pointing errors in cross-elevation and elevation [rad]; beamwidth [rad].
+def _fill(error: Pairs, beamwidth: Radians, power: Floats) -> None:
+    """Fill power: received power over that on the beam axis [-]. error: pointing errors in cross-elevation and
+    elevation [rad].
     """
     for k in range(len(error)):
         voltage = sum_pattern(error[k, 0] / beamwidth) * sum_pattern(error[k, 1] / beamwidth)
         power[k] = voltage * voltage
 
 
-def _power(run):
-    """Return the received power (k,) over that on the beam axis [-], in the evaluated part of a tracking.Tracking.
+def _power(run: Tracking) -> Floats:
+    """Return the received power over that on the beam axis [-], in the evaluated part of a run.
 
     Return an empty array without a beamwidth.
     """
@@ -39,13 +40,13 @@ def _power(run):
     return np.maximum(power, LEAST_POWER)
 
 
-def mean_db(run) -> float:
-    """Return the loss [dB] of the mean received power of a tracking.Tracking; NaN without an evaluated part."""
+def mean_db(run: Tracking) -> Decibels:
+    """Return the loss of the mean received power of a run; NaN without an evaluated part."""
     power = _power(run)
     return -10.0 * math.log10(power.mean()) if power.size else math.nan
 
 
-def max_db(run) -> float:
-    """Return the largest loss [dB] of received power of a tracking.Tracking; NaN without an evaluated part."""
+def max_db(run: Tracking) -> Decibels:
+    """Return the largest loss of received power of a run; NaN without an evaluated part."""
     power = _power(run)
     return -10.0 * math.log10(power.min()) if power.size else math.nan

@@ -18,6 +18,8 @@ between beam and target.
 import itertools
 import math
 import typing
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TypeAlias
 
 from pedestal_analysis.results import (
     consistency,
@@ -29,29 +31,23 @@ from pedestal_analysis.results import (
     tracking,
 )
 from pedestal_analysis.results.tracking import DEG_PER_RAD, known_rms, largest
+from pedestal_common.quantities import Row
+from pedestal_recording.recording import Recording
+
+Values: TypeAlias = dict[str, tuple[float, str]]    # {name of a result: (value, unit)}
 
 
 class Result(typing.NamedTuple):
-    """A result: a row of the table RESULTS.
-
-    name, unit     name and unit of the value
-    part           name of the part of the data on which the result is measured, see the module
-    measure        measure(part) -> value, NaN if not measured
-    sentence       definition of the result
-    label          name in the report, '' if the report does not show the result
-    target         required value as a text for intervals.meets, such as '<= 0.4', or None
-    mark           mark(part) -> note on a value that is not as expected, else ''
-    brief          True for a result that a run prints by default
-    """
+    """A result: a row of the table RESULTS."""
     name: str
-    unit: str
-    part: str
-    measure: typing.Callable
-    sentence: str
-    label: str = ''
-    target: str | None = None
-    mark: typing.Callable = lambda part: ''
-    brief: bool = False
+    unit: str   # of the value
+    part: str   # name of the part of the data on which the result is measured, see the module
+    measure: Callable[..., float]   # measure(part) -> value, NaN if not measured
+    sentence: str   # definition of the result
+    label: str = ''     # name in the report, '' if the report does not show the result
+    target: str | None = None   # required value as a text for intervals.meets, such as '<= 0.4'
+    mark: Callable[..., str] = lambda part: ''  # mark(part) -> note on a value that is not as expected, else ''
+    brief: bool = False     # True for a result that a run prints by default
 
 
 BRIEF_COUNT = 8  # number of results that a run prints by default
@@ -64,7 +60,7 @@ ENCODER_DEFINITION = 'This result includes all errors between dish and encoders,
 """Sentence in the definitions of the results by the encoders."""
 
 
-def _of_mode(mode):
+def _of_mode(mode: str) -> tuple[Result, Result]:
     """Return the two Results of the pointing error in a mode of mode_pointing.FOLLOWED_DIRECTIONS: rms, maximum."""
     against = f'{mode_pointing.FOLLOWED_DIRECTIONS[mode]} minus true beam'
     return (Result(f'{mode}_pointing_rms_deg', 'deg', mode, known_rms,
@@ -207,13 +203,13 @@ RESULTS = (
 RESULT_BY_NAME = {result.name: result for result in RESULTS}
 
 
-def of_tracking(run):
-    """Return the parts {name of the part: its data} that a tracking.Tracking provides, None for a missing part."""
+def of_tracking(run: tracking.Tracking) -> dict[str, object]:
+    """Return the parts by name that a Tracking provides, None for a missing part."""
     return {'motors': None if run.electronic else run, 'encoders': run if run.has_encoders else None, 'tracking': run}
 
 
-def of_bag(bag):
-    """Return the parts {name of the part: its data} of a bag.Bag with one beam (Bag.view).
+def of_bag(bag: Recording) -> dict[str, object]:
+    """Return the parts by name of a recording of one beam.
 
     A missing part is absent, None or empty.
 
@@ -222,35 +218,35 @@ def of_bag(bag):
     return of_run(bag, tracking.read(bag))
 
 
-def of_run(bag, run):
-    """Return the parts of `of_bag`, from a bag.Bag with one beam and its tracking.Tracking `run`."""
+def of_run(bag: Recording, run: tracking.Tracking) -> dict[str, object]:
+    """Return the parts of `of_bag`, from a recording of one beam and its Tracking `run`."""
     return {**of_tracking(run), **mode_pointing.read(bag, run), 'filter': consistency.read(bag, run),
             'keyholes': tracking.keyholes(bag), 'isolation': isolation.read(bag, run),
             'attitude': known_attitude.read(bag)}
 
 
-def measured(parts, table=RESULTS) -> dict:
-    """Return {name: (value, unit)} of the Results in a table whose part exists, in the order of the table."""
+def measured(parts: Mapping[str, object], table: Sequence[Result] = RESULTS) -> Values:
+    """Return the values of the Results in a table whose part exists, in the order of the table."""
     return {result.name: (result.measure(parts[result.part]), result.unit) for result in table
             if _exists(parts, result)}
 
 
-def _exists(parts, result):
+def _exists(parts: Mapping[str, object], result: Result) -> bool:
     """Return True if the part of a Result exists and is not empty."""
     part = parts.get(result.part)
     return part is not None and (not isinstance(part, list | dict) or bool(part))
 
 
-def marks(parts, table=RESULTS) -> dict:
+def marks(parts: Mapping[str, object], table: Sequence[Result] = RESULTS) -> dict[str, str]:
     """Return {name: note} of the results whose value is not as expected (Result.mark)."""
     found = {result.name: result.mark(parts[result.part]) for result in table if _exists(parts, result)}
     return {name: text for name, text in found.items() if text}
 
 
-def brief(columns, count=BRIEF_COUNT) -> list:
+def brief(columns: Iterable[Values], count: int = BRIEF_COUNT) -> list[str]:
     """Return the names of the results that are printed by default, in the order of the table.
 
-    columns: list of {name: (value, unit)} of `measured`, for each beam and for the run. At most `count` names are
+    columns: of `measured`, for each beam and for the run. At most `count` names are
     returned. Results with the flag `brief` have precedence; other measured results fill the remaining places.
     """
     found = [result for result in RESULTS
@@ -260,8 +256,8 @@ def brief(columns, count=BRIEF_COUNT) -> list:
     return [result.name for result in found if result in chosen]
 
 
-def remarks(noted, values) -> list:
-    """Return a line for each note on the filter; noted: {name: note} of `marks`, values: as from `measured`."""
+def remarks(noted: Mapping[str, str], values: Values) -> list[str]:
+    """Return a line for each note on the filter; noted: of `marks`, values: of `measured`."""
     found: dict[str, list[str]] = {}
     for name, note in noted.items():
         found.setdefault(note, []).append(f'{name} {values[name][0]:.3g}')
@@ -269,17 +265,17 @@ def remarks(noted, values) -> list:
             for note, names in found.items()]
 
 
-def row(case, metric, value, unit='', target=None):
+def row(case: str, metric: str, value: float, unit: str = '', target: str | None = None) -> Row:
     """Return a row of a --json file. Its value is None if the result could not be measured."""
     return {'case': case, 'metric': metric, 'value': value if math.isfinite(value) else None, 'unit': unit,
             'paper': None, 'target': target}
 
 
-def rows(case, values):
+def rows(case: str, values: Values) -> list[Row]:
     """Return the rows of a --json file for the values that `measured` returns."""
     return [row(case, name, value, unit, RESULT_BY_NAME[name].target) for name, (value, unit) in values.items()]
 
 
-def documented(table=RESULTS):
+def documented(table: Sequence[Result] = RESULTS) -> list[tuple[str, str, str, str]]:
     """Return [(name, unit, sentence, target or '')] of all results of a table, for the docs."""
     return [(result.name, result.unit, result.sentence, result.target or '') for result in table]

@@ -11,6 +11,8 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.quantities import Pair, Pairs, Quaternions, Seconds, Times
+from pedestal_recording.recording import Recording
 
 SLOW_ERROR_TIME_S = 1.0
 """Time over which the errors of the sensors are averaged to find their slow part [s].
@@ -23,14 +25,14 @@ DEFINITION = 'Slow errors of the sensors, such as the bend between dish and enco
 
 
 @compiled
-def _offsets_of_sensors(deck, error, known_attitude, target, offsets):
-    """Fill offsets (n, 2) (cross-elevation, elevation) [rad]: the direction that the sensors measure without noise,
-    seen from the true direction.
+def _offsets_of_sensors(deck: Pairs, error: Pairs, known_attitude: Quaternions, target: Pairs, offsets: Pairs) -> None:
+    """Fill offsets (cross-elevation, elevation) [rad]: the direction that the sensors measure without noise, seen from
+    the true direction.
 
-    deck (n, 2)             angles of the encoders [rad]
-    error (n, 2)            error that the receiver measures without noise (cross-elevation, elevation) [rad]
-    known_attitude (n, 4)   attitude of the INS
-    target (n, 2)           true earth angles of the target [rad]
+    deck             angles of the encoders [rad]
+    error            error that the receiver measures without noise (cross-elevation, elevation) [rad]
+    known_attitude   attitude of the INS
+    target           true earth angles of the target [rad]
     """
     mat = np.empty((3, 3))
     for k in range(len(deck)):
@@ -44,14 +46,14 @@ def _offsets_of_sensors(deck, error, known_attitude, target, offsets):
 
 
 @compiled
-def _displace_rows(angles, offsets):
-    """Displace earth angles (n, 2) [rad] in place by offsets (n, 2) (cross-elevation, elevation) [rad]."""
+def _displace_rows(angles: Pairs, offsets: Pairs) -> None:
+    """Displace earth angles [rad] in place by offsets (cross-elevation, elevation) [rad]."""
     for k in range(len(angles)):
         angles[k, 0], angles[k, 1] = line_of_sight.displaced(angles[k, 0], angles[k, 1], offsets[k, 0], offsets[k, 1])
 
 
-def _slow(values, period):
-    """Return values (n, 2) averaged over SLOW_ERROR_TIME_S about each row, without NaN; period of the rows [s].
+def _slow(values: Pairs, period: Seconds) -> Pairs:
+    """Return values averaged over SLOW_ERROR_TIME_S about each row, without NaN; period: of the rows.
 
     In a shorter recording the average is over at most its rows.
     """
@@ -65,9 +67,8 @@ def _slow(values, period):
             for column, there in zip(values.T, known.T)])
 
 
-def boresight(bag):
-    """Return the boresight offset (2,) (cross-elevation, elevation) [rad] of the receiver, from the parameters of a
-    bag.
+def boresight(bag: Recording) -> Pair:
+    """Return the boresight offset (cross-elevation, elevation) [rad] of the receiver, from the recorded parameters.
 
     It is the direction in which the receiver measures no error, seen from the beam.
     """
@@ -75,14 +76,14 @@ def boresight(bag):
     return np.array([of_receiver.get(f'antenna.boresight_{axis}', 0.0) for axis in ('cross_elevation', 'elevation')])
 
 
-def truth(t, encoders, error, known_attitude, target):
-    """Return the earth angles (n, 2) [rad] of a target in the frame of the sensors, at the times t (n,) [s].
+def truth(t: Times, encoders: Pairs, error: Pairs, known_attitude: Quaternions, target: Pairs) -> Pairs:
+    """Return the earth angles [rad] of a target in the frame of the sensors, at the times t.
 
-    encoders (n, 2)         deck angles of the beam by the encoders [rad]
-    error (n, 2)            error that the receiver measures without noise (cross-elevation, elevation) [rad]: the true
-                            pointing error without the `boresight`
-    known_attitude (n, 4)   attitude that the INS reports
-    target (n, 2)           true earth angles of the target [rad]
+    encoders         deck angles of the beam by the encoders [rad]
+    error            error that the receiver measures without noise (cross-elevation, elevation) [rad]: the true
+                     pointing error without the `boresight`
+    known_attitude   attitude that the INS reports
+    target           true earth angles of the target [rad]
     """
     if not t.size:
         return target.copy()

@@ -8,6 +8,8 @@ import contextlib
 import dataclasses
 import functools
 import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -16,7 +18,23 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import build
+from pedestal_common.quantities import (
+    Bools,
+    Degrees,
+    Floats,
+    Matrix3,
+    Pair,
+    Pairs,
+    Quaternions,
+    Radians,
+    Seconds,
+    Table,
+    Texts,
+    Times,
+    Vectors3,
+)
 from pedestal_common.wire import commands
+from pedestal_recording.recording import Recording
 from tracking_receiver_sim.path import arrival
 from tracking_receiver_sim.path.params import PathParameters
 
@@ -37,11 +55,10 @@ MIN_ON_GRID_SHARE = 0.5
 
 
 @compiled
-def _true_error(direction, relative, attitude, error):
-    """Fill error (n, 2) (cross-elevation, elevation) [rad]: target minus direction.
+def _true_error(direction: Pairs, relative: Vectors3, attitude: Quaternions, error: Pairs) -> None:
+    """Fill error (cross-elevation, elevation) [rad]: target minus direction.
 
-    direction (n, 2): deck angles [rad]; relative (n, 3): ENU [m] from the antenna to the target;
-    attitude (n, 4): true attitude of the deck.
+    direction: deck angles [rad]; relative: ENU [m] from the antenna to the target; attitude: of the deck, true.
     """
     mat_ed = np.empty((3, 3))
     for k in range(len(direction)):
@@ -51,31 +68,32 @@ def _true_error(direction, relative, attitude, error):
 
 
 @compiled
-def _deck_direction(mat_ed, azimuth, elevation):
-    """Return the unit vector FLU of earth angles [rad] on a deck; mat_ed: rotation deck -> earth."""
+def _deck_direction(mat_ed: Matrix3, azimuth: Radians, elevation: Radians) -> tuple[float, float, float]:
+    """Return the unit vector FLU of earth angles on a deck; mat_ed: rotation deck -> earth."""
     east, north, up = line_of_sight.earth_direction(azimuth, elevation)
     return line_of_sight.to_deck(mat_ed, east, north, up)
 
 
 @compiled
-def _earth_angles(mat_ed, x, y, z):
-    """Return the earth angles [rad] of a vector FLU; mat_ed: rotation deck -> earth."""
+def _earth_angles(mat_ed: Matrix3, x: float, y: float, z: float) -> tuple[Radians, Radians]:
+    """Return the earth angles of a vector FLU; mat_ed: rotation deck -> earth."""
     east, north, up = line_of_sight.to_earth(mat_ed, x, y, z)
     return line_of_sight.earth_angles(east, north, up)
 
 
 @compiled
-def _view_from_beam(beam, attitude, known_attitude, estimate, truth, error, beam_earth, estimate_earth):
-    """Fill error, beam_earth and estimate_earth (n, 2) [rad].
+def _view_from_beam(beam: Pairs, attitude: Quaternions, known_attitude: Quaternions, estimate: Pairs, truth: Pairs,
+                    error: Pairs, beam_earth: Pairs, estimate_earth: Pairs) -> None:
+    """Fill error, beam_earth and estimate_earth; all angles in rad.
 
-    error                   estimate minus its truth (cross-elevation, elevation), seen from the beam
-    beam_earth              earth angles of the beam
-    estimate_earth          true earth angles of the estimate's direction on the deck
-    beam (n, 2)             deck angles [rad]
-    attitude (n, 4)         true attitude
-    known_attitude (n, 4)   attitude that the INS reports
-    estimate (n, 2)         earth angles [rad], computed with the attitude that the INS reports
-    truth (n, 2)            earth angles [rad] of the target in the frame of the sensors
+    error            estimate minus its truth (cross-elevation, elevation), seen from the beam
+    beam_earth       earth angles of the beam
+    estimate_earth   true earth angles of the estimate's direction on the deck
+    beam             deck angles
+    attitude         true attitude
+    known_attitude   attitude that the INS reports
+    estimate         earth angles, computed with the attitude that the INS reports
+    truth            earth angles of the target in the frame of the sensors
     """
     mat_ed, known = np.empty((3, 3)), np.empty((3, 3))
     for k in range(len(beam)):
@@ -94,21 +112,21 @@ def _view_from_beam(beam, attitude, known_attitude, estimate, truth, error, beam
 
 
 @compiled
-def _interval_start_error(beam, error, out):
-    """Fill `out` (n, 2) as interval_start_error states."""
+def _interval_start_error(beam: Pairs, error: Pairs, out: Pairs) -> None:
+    """Fill `out` as interval_start_error states."""
     for k in range(1, len(beam)):
         azimuth, elevation = line_of_sight.displaced(beam[k - 1, 0], beam[k - 1, 1], error[k - 1, 0], error[k - 1, 1])
         x, y, z = line_of_sight.direction(azimuth, elevation)
         out[k, 0], out[k, 1] = line_of_sight.offsets(beam[k, 0], beam[k, 1], x, y, z)
 
 
-def interval_start_error(beam, error):
-    """Return the pointing error (n, 2) [rad] of an electronic beam at the beginning of the interval before each stamp.
+def interval_start_error(beam: Pairs, error: Pairs) -> Pairs:
+    """Return the pointing error [rad] of an electronic beam at the beginning of the interval before each stamp.
 
     The beam of an array jumps at each step, and stands during the interval until the next step.
 
-    beam (n, 2)    its deck angles in the interval that ends at stamp k [rad]
-    error (n, 2)   pointing error at stamp k [rad]
+    beam    its deck angles in the interval that ends at stamp k [rad]
+    error   pointing error at stamp k [rad]
 
     At the beginning of this interval the beam is already beam k, but the target is still that of stamp k - 1. The
     first row is NaN.
@@ -118,91 +136,80 @@ def interval_start_error(beam, error):
     return out
 
 
-@dataclasses.dataclass
+class Slew(NamedTuple):
+    """Slew through a keyhole, as the ACU predicted it."""
+    begin: Seconds
+    end: Seconds
+    loss: Seconds   # time with the target off the beam
+
+
+@dataclasses.dataclass(kw_only=True)
 class Tracking:
-    """A recorded run as arrays, one row per step of the drive. Angles are in rad; NaN where nothing was measured.
+    """A recorded run as arrays, one row per step of the drive. NaN where nothing was measured.
 
-    The two columns of an array (n, 2) are azimuth and elevation, or for errors cross-elevation and elevation. An
-    electronic beam is that of an array. Its reference is meant for a later interval than the measured beam, so it has
-    no following error.
-
-    t                               (n,) time of the step [s]
-    azimuth, elevation              (n,) deck angles of the beam by encoders and pointing model, or of an
-                                    electronic beam
-    reference                       (n, 2) the same of the ACU's reference; NaN in standby or for an electronic beam
-    cross_elevation,
-    elevation_error                 (n,) true pointing error at the stamps: target minus direction of the beam
-    encoder_error                   (n, 2) true target minus `azimuth`, `elevation`, with all errors of the encoders;
-                                    NaN for an electronic beam, and for a bag without adu/truth
-    measured, cn0                   (n, 2) receiver error; (n,) C/N0 [dB-Hz]
-    estimate_error                  (n, 2) the filter's estimate minus `sensor_truth`, in the axes of the beam
-    beam_earth, target_earth        (n, 2) earth angles of the beam and of the target
-    estimate_earth                  (n, 2) true earth angles of the direction on the deck that the filter states
-    sensor_truth                    (n, 2) earth angles of the target in the frame of the sensors, see sensor_frame
-    range                           (n,) distance to the target [m]
-    mode                            (n,) mode of the ACU as a text, '' if unknown
-    tracking                        (n,) bool: the evaluated part of the run, which is settled autotrack
-    since                           (n,) bool: all steps from the first evaluated step on, in any mode
-    beamwidth                       half-power beamwidth, NaN if the bag does not state it
-    boresight                       (2,) boresight offset of the receiver (cross-elevation, elevation)
-    begun                           (n, 2) true pointing error of an electronic beam at the beginning of the interval
-                                    that ends at the stamp, else NaN
+    Pairs are azimuth and elevation, or for errors cross-elevation and elevation [rad]. An electronic beam is that of
+    an array. Its reference is meant for a later interval than the measured beam, so it has no following error.
     """
-    t: np.ndarray
-    azimuth: np.ndarray
-    elevation: np.ndarray
-    reference: np.ndarray
-    cross_elevation: np.ndarray
-    elevation_error: np.ndarray
-    encoder_error: np.ndarray
-    measured: np.ndarray
-    cn0: np.ndarray
-    estimate_error: np.ndarray
-    beam_earth: np.ndarray
-    target_earth: np.ndarray
-    estimate_earth: np.ndarray
-    sensor_truth: np.ndarray
-    range: np.ndarray
-    mode: np.ndarray
-    tracking: np.ndarray
-    since: np.ndarray
-    beamwidth: float
-    boresight: np.ndarray
-    begun: np.ndarray
+    t: Times        # of the step
+    encoders: Pairs         # deck angles of the beam by encoders and pointing model, or of an electronic beam
+    reference: Pairs        # the same of the ACU's reference; NaN in standby or for an electronic beam
+    error: Pairs    # true pointing error at the stamps: target minus direction of the beam
+    # true target minus `encoders`, with all errors of the encoders; NaN for an electronic beam or without adu/truth
+    encoder_error: Pairs
+    measured: Pairs         # receiver error
+    cn0: Floats     # C/N0 [dB-Hz]
+    estimate_error: Pairs   # the filter's estimate minus `sensor_truth`, in the axes of the beam
+    beam_earth: Pairs       # earth angles of the beam
+    target_earth: Pairs     # earth angles of the target
+    estimate_earth: Pairs   # true earth angles of the direction on the deck that the filter states
+    sensor_truth: Pairs     # earth angles of the target in the frame of the sensors, see sensor_frame
+    range: Floats   # distance to the target [m]
+    mode: Texts     # mode of the ACU, '' if unknown
+    tracking: Bools         # the evaluated part of the run, which is settled autotrack
+    since: Bools    # all steps from the first evaluated step on, in any mode
+    beamwidth: Radians      # half-power, NaN if the bag does not state it
+    boresight: Pair         # boresight offset of the receiver
+    # true pointing error of an electronic beam at the beginning of the interval that ends at the stamp, else NaN
+    begun: Pairs
 
     @property
-    def period(self):
-        """Period of the drive [s]."""
+    def period(self) -> Seconds:
+        """Period of the drive."""
         return np.median(np.diff(self.t))
 
     @property
-    def electronic(self):
+    def electronic(self) -> bool:
         """True for the beam of an array, which jumps at each step and stands between two steps."""
-        return np.isfinite(self.begun).any()
+        return bool(np.isfinite(self.begun).any())
 
     @property
-    def following(self):
-        """Following error: reference minus encoder (n, 2) [deg]."""
-        return (self.reference - np.column_stack((self.azimuth, self.elevation))) * DEG_PER_RAD
+    def following(self) -> Pairs:
+        """Following error: reference minus encoder [deg]."""
+        return (self.reference - self.encoders) * DEG_PER_RAD
+
+    @property
+    def distance(self) -> Floats:
+        """Angle from the beam to the target [rad]."""
+        return np.hypot(self.error[:, 0], self.error[:, 1])
 
     @functools.cached_property
-    def true(self):
-        """True pointing error (k, 2) [rad] in the k steps of the evaluated part."""
-        return np.column_stack((self.cross_elevation, self.elevation_error))[self.tracking]
+    def true(self) -> Pairs:
+        """True pointing error [rad] in the steps of the evaluated part."""
+        return self.error[self.tracking]
 
     @property
-    def has_encoders(self):
+    def has_encoders(self) -> bool:
         """True if the bag holds both the encoders and the true direction of the beam."""
-        return np.isfinite(self.encoder_error).any()
+        return bool(np.isfinite(self.encoder_error).any())
 
     @functools.cached_property
-    def by_encoders(self):
-        """Pointing error computed from the encoders (k, 2) [deg] over the evaluated part."""
+    def by_encoders(self) -> Pairs:
+        """Pointing error computed from the encoders [deg] over the evaluated part."""
         return self.encoder_error[self.tracking] * DEG_PER_RAD
 
     @functools.cached_property
-    def noise(self):
-        """Receiver error minus the error without noise (k, 2) [deg] over the evaluated part.
+    def noise(self) -> Pairs:
+        """Receiver error minus the error without noise [deg] over the evaluated part.
 
         The error without noise is the true error minus the boresight offset. The receiver of an electronic beam
         measures the error in the middle of the interval between two steps. The true error there is the mean of those
@@ -212,17 +219,17 @@ class Tracking:
         return (self.measured[self.tracking] - (true - self.boresight)) * DEG_PER_RAD
 
     @functools.cached_property
-    def filtered(self):
-        """Pointing error by the filter (n, 2) [rad]: true pointing error plus error of the estimate."""
-        return np.column_stack((self.cross_elevation, self.elevation_error)) + self.estimate_error
+    def filtered(self) -> Pairs:
+        """Pointing error by the filter [rad]: true pointing error plus error of the estimate."""
+        return self.error + self.estimate_error
 
     @functools.cached_property
-    def filter_error(self):
-        """Error of the filter, estimate minus its truth (k, 2) [deg], over the evaluated part."""
+    def filter_error(self) -> Pairs:
+        """Error of the filter, estimate minus its truth [deg], over the evaluated part."""
         return self.estimate_error[self.tracking] * DEG_PER_RAD
 
-    def pointing(self, measure, axis=slice(None)):
-        """Return a statistic of the true pointing error over the evaluated part [deg].
+    def pointing(self, measure: Callable[[Floats], float], axis: int | slice = slice(None)) -> Degrees:
+        """Return a statistic of the true pointing error over the evaluated part.
 
         measure: function of the errors, such as known_rms; axis: 0 cross-elevation, 1 elevation, by default both. For
         an electronic beam, return the larger of the two values at the beginnings and at the ends of the intervals.
@@ -231,66 +238,65 @@ class Tracking:
         return max(measure(error[:, axis]) for error in errors) * DEG_PER_RAD
 
     @property
-    def lock_time(self):
-        """Stamp [s] of the receiver's first error; NaN without an error, and in a recording that begins during the run
+    def lock_time(self) -> Seconds:
+        """Stamp of the receiver's first error; NaN without an error, and in a recording that begins during the run
         with a locked receiver."""
         locked = np.isfinite(self.measured[:, 0])
         unknown = locked[:1].any() and self.t.size > 1 and self.t[0] > self.period
         return float(self.t[locked][0]) if locked.any() and not unknown else math.nan
 
     @property
-    def known_mode(self):
-        """Mask (n,) of the steps whose mode the recording states."""
+    def known_mode(self) -> Bools:
+        """The steps whose mode the recording states."""
         return self.mode != ''
 
     @property
-    def autotrack_time(self):
-        """Time in autotrack [s]; NaN without a known mode."""
+    def autotrack_time(self) -> Seconds:
+        """Time in autotrack; NaN without a known mode."""
         return float(np.sum(self.mode == 'autotrack') * self.period) if self.known_mode.any() else math.nan
 
     @property
-    def evaluated_time(self):
-        """Duration of the evaluated part [s]; NaN without a known mode."""
+    def evaluated_time(self) -> Seconds:
+        """Duration of the evaluated part; NaN without a known mode."""
         return float(np.sum(self.tracking) * self.period) if self.known_mode.any() else math.nan
 
     @property
-    def tracked_percent(self):
+    def tracked_percent(self) -> float:
         """Share in autotrack of the steps with a known mode [%]; NaN without a known mode."""
         return 100.0 * float(np.mean(self.mode[self.known_mode] == 'autotrack')) if self.known_mode.any() else math.nan
 
     @property
-    def loss(self):
-        """Time [s], in any mode from the first evaluated step on, with the target further than half a beamwidth off.
+    def loss(self) -> Seconds:
+        """Time, in any mode from the first evaluated step on, with the target further than half a beamwidth off.
 
         NaN without an evaluated step or without a beamwidth.
         """
         if not (self.since.any() and math.isfinite(self.beamwidth)):
             return math.nan
-        distance = np.hypot(self.cross_elevation, self.elevation_error)[self.since]
-        return float(np.sum(distance > 0.5 * self.beamwidth) * self.period)
+        return float(np.sum(self.distance[self.since] > 0.5 * self.beamwidth) * self.period)
 
 
-def beamwidth(bag):
-    """Return the beamwidth [rad] that a bag states, NaN if it states none."""
+def beamwidth(bag: Recording) -> Radians:
+    """Return the beamwidth that a bag states, NaN if it states none."""
     try:
         return float(bag.metadata.get('beamwidth', 'nan'))
     except ValueError:
         return math.nan
 
 
-def error_matrix(bag):
-    """Return the matrix (2, 2) [-] with which the control unit of a bag.Bag multiplied the errors of the receiver."""
+def error_matrix(bag: Recording) -> Annotated[Floats, (2, 2)]:
+    """Return the matrix [-] with which the control unit multiplied the errors of the receiver."""
     known = bag.configuration['parameters'].get('acu', {})
     return np.array([[known.get(f'tracker.matrix.{name}', float(i == j)) for j, name in enumerate(names)]
                      for i, names in enumerate(ERROR_MATRIX_NAMES)])
 
 
-def on_grid(bag, t, topic, columns):
-    """Return columns (n, m) of a topic, by their m names, at the stamps t (n,) [s].
+def on_grid(bag: Recording, t: Times, topic: str, columns: Sequence[str]) -> Floats:
+    """Return m columns of a topic, by their names, at n stamps, as (n, m).
 
     The value is NaN where the topic has no message, and in a column that the recording of an older version lacks.
     """
-    table = bag.table(topic) if topic in bag.topics else {'t': ()}
+    table: Table = bag.table(topic) if topic in bag.topics else {'t': ()}
     if np.array_equal(table['t'], t) and (np.diff(t) > 1e-9).all():     # a message in every step
         return np.column_stack([table[column] if column in table else np.full(t.size, np.nan) for column in columns])
     out = np.full((t.size, len(columns)), np.nan)
@@ -302,8 +308,8 @@ def on_grid(bag, t, topic, columns):
     return out
 
 
-def of_equipment(bag, t, topic, columns):
-    """Return columns (n, m) of a topic of the receiver or of the INS, by their m names, at the stamps t (n,) [s].
+def of_equipment(bag: Recording, t: Times, topic: str, columns: Sequence[str]) -> Floats:
+    """Return m columns of a topic of the receiver or of the INS, by their names, at n stamps, as (n, m).
 
     Simulated equipment stamps its messages with the steps; the result is that of on_grid. Real equipment has stamps
     or an interval of its own; the result is then that of its newest message, NaN where this message is too old.
@@ -325,22 +331,23 @@ def of_equipment(bag, t, topic, columns):
     return out
 
 
-def _lever_arm(bag, attitude):
-    """Return the lever arm (n, 3) ENU [m] from base_link to the antenna at attitudes (n, 4); without one, 0."""
+def _lever_arm(bag: Recording, attitude: Quaternions) -> Vectors3:
+    """Return the lever arm ENU [m] from base_link to the antenna at each attitude; without one, 0."""
     parameters = bag.configuration['parameters'].get('tracking_receiver', {})
     arm = np.array([parameters.get(f'lever_arm.{axis}', 0.0) for axis in 'xyz'], float)
     enu, mat_ed = np.zeros((len(attitude), 3)), np.empty((3, 3))
     if arm.any():
         for row, quaternion in zip(enu, attitude):
-            line_of_sight.rotation(*quaternion, mat_ed)
+            x, y, z, w = quaternion
+            line_of_sight.rotation(x, y, z, w, mat_ed)
             row[:] = mat_ed @ arm
     return enu
 
 
-def _arriving(bag, relative, velocity):
-    """Return the vector (n, 3) ENU [m] from the antenna to the apparent position of the target.
+def _arriving(bag: Recording, relative: Vectors3, velocity: Vectors3) -> Vectors3:
+    """Return the vector ENU [m] from the antenna to the apparent position of the target.
 
-    relative (n, 3): vector to its true position, ENU [m]; velocity (n, 3): its velocity, ENU [m/s]. Refraction and
+    relative: vector to its true position, ENU [m]; velocity: its velocity, ENU [m/s]. Refraction and
     light time of the signal, by the parameters in the bag, shift the apparent position.
     """
     of_receiver = bag.configuration['parameters'].get('tracking_receiver', {})
@@ -349,7 +356,7 @@ def _arriving(bag, relative, velocity):
     return arrival.all_seen(path, relative, velocity) if given else relative
 
 
-def by_encoders(bag):
+def by_encoders(bag: Recording) -> bool:
     """Return True if Tracking takes the direction of the beam from the encoders, because the bag has no adu/truth.
 
     ENCODER_BEAM_NOTE is the note for this case. An array has no encoders: the angles to which it steers its beam are
@@ -358,8 +365,8 @@ def by_encoders(bag):
     return not bag.beams and 'adu/truth' not in bag.topics
 
 
-def read(bag) -> Tracking:
-    """Return the Tracking of a bag.Bag. Raises ValueError if the bag has no joint_states or no target/truth."""
+def read(bag: Recording) -> Tracking:
+    """Return the Tracking of a recording of one beam. Raises ValueError without joint_states or target/truth."""
     missing = [name for name in ('joint_states', 'target/truth') if name not in bag.topics]
     if missing:
         raise ValueError(f'{bag.path}: no {" and no ".join(missing)} in the bag, so no comparison with the truth is '
@@ -402,14 +409,16 @@ def read(bag) -> Tracking:
     start = t[automatic][0] + HANDOVER_SETTLING_S if automatic.any() else math.inf
     reference = beam_direction.on_sky(bag, t, at_steps('acu/reference', ('azimuth.position', 'elevation.position')))
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
-    return Tracking(t, encoders[:, 0], encoders[:, 1], reference, error[:, 0], error[:, 1], encoder_error,
-                    measured[:, :2], measured[:, 2], estimate_error, beam_earth, target_earth, estimate_earth,
-                    sensor_truth, np.linalg.norm(relative, axis=1), mode, automatic & (t >= start), t >= start,
-                    beamwidth(bag), boresight,
-                    interval_start_error(beam, error) if bag.beams else np.full_like(error, np.nan))
+    return Tracking(t=t, encoders=encoders, reference=reference, error=error, encoder_error=encoder_error,
+                    measured=measured[:, :2], cn0=measured[:, 2], estimate_error=estimate_error,
+                    beam_earth=beam_earth, target_earth=target_earth, estimate_earth=estimate_earth,
+                    sensor_truth=sensor_truth, range=np.linalg.norm(relative, axis=1), mode=mode,
+                    tracking=automatic & (t >= start), since=t >= start, beamwidth=beamwidth(bag),
+                    boresight=boresight,
+                    begun=interval_start_error(beam, error) if bag.beams else np.full_like(error, np.nan))
 
 
-def modes(bag, t):
+def modes(bag: Recording, t: Times) -> Texts:
     """Return the mode of the ACU at every stamp t, '' where the recording does not state it.
 
     acu/mode states each change. In a recording that begins during a run, the first diagnostics of the ACU state the
@@ -423,8 +432,8 @@ def modes(bag, t):
     return np.array([first, *table['data']])[index + 1]
 
 
-def _first_mode(bag, change):
-    """Return the mode in the first diagnostics of the ACU before the first change [s]; '' without them."""
+def _first_mode(bag: Recording, change: Seconds) -> str:
+    """Return the mode in the first diagnostics of the ACU before the first change; '' without them."""
     for _, log, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
         for status in array.status:
             if status.name == f'{bag.beam}acu' and (log - bag.start) / NS_PER_SECOND < change:
@@ -432,21 +441,21 @@ def _first_mode(bag, change):
     return ''
 
 
-def replies(bag, topic):
-    """Yield (time [s], Command, Reply) of the replies on a topic of a bag; nothing for a topic of another type."""
+def replies(bag: Recording, topic: str) -> Iterator[tuple[Seconds, commands.Command, commands.Reply]]:
+    """Yield (time, Command, Reply) of the replies on a topic; nothing for a topic of another type."""
     there = bag.topics.get(topic) == 'diagnostic_msgs/msg/DiagnosticStatus'
     for _, log, _, message in bag.messages(topic) if there else ():
         with contextlib.suppress(ValueError):  # the message is no reply
             yield ((log - bag.start) / NS_PER_SECOND, *commands.of_reply(message))
 
 
-def keyholes(bag):
-    """Return [(begin, end, loss)] of the slews through a keyhole that the ACU predicted in its diagnostics, each once.
+def keyholes(bag: Recording) -> list[Slew]:
+    """Return the slews through a keyhole that the ACU predicted in its diagnostics, each once.
 
-    begin, end: times of the slew [s]; loss: predicted time with the target off the beam [s]. A renewed plan replaces
-    the earlier plan of the same slew. A plan that is cancelled before its slew begins does not count.
+    A renewed plan replaces the earlier plan of the same slew. A plan that is cancelled before its slew begins
+    does not count.
     """
-    slews = []
+    slews: list[Slew] = []
     for _, log, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
         for status in array.status:
             values = {value.key: value.value for value in status.values}
@@ -456,39 +465,36 @@ def keyholes(bag):
                 begin, end, loss = (float(values[f'keyhole_{name}_s']) for name in ('begins', 'ends', 'loss'))
                 if slews and begin < slews[-1][1]:
                     slews.pop()
-                slews.append((begin, end, loss))
+                slews.append(Slew(begin, end, loss))
     return slews
 
 
-def stretches(flags):
-    """Return [(first, last + 1)] of the stretches of neighbouring rows in which flags (n,) bool are true."""
+def stretches(flags: Bools) -> list[tuple[int, int]]:
+    """Return [(first, last + 1)] of the stretches of neighbouring rows in which flags are true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(int), [0]))))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
 
 
-def settled(inside, t):
-    """Return the mask (n,) of the rows of `inside` (n,) bool without the first HANDOVER_SETTLING_S of each stretch.
-
-    t (n,): times [s].
-    """
+def settled(inside: Bools, t: Times) -> Bools:
+    """Return the rows of `inside` without the first HANDOVER_SETTLING_S of each stretch; t: of the rows."""
     mask = np.zeros(t.size, bool)
     for first, last in stretches(inside):
         mask[first:last] = t[first:last] >= t[first] + HANDOVER_SETTLING_S
     return mask
 
 
-def rms(values, axis=None):
+def rms(values: Floats, axis: int | None = None) -> Floats:
     """Return the root mean square of all values, or along an axis; NaN where a value is NaN."""
     return np.sqrt(np.mean(np.square(values), axis=axis))
 
 
-def known_rms(values):
+def known_rms(values: Floats) -> float:
     """Return the root mean square of the finite values; NaN if there are none."""
     values = values[np.isfinite(values)]
     return float(rms(values)) if values.size else math.nan
 
 
-def largest(values):
+def largest(values: Floats) -> float:
     """Return the largest absolute value of the finite values; NaN if there are none."""
     values = values[np.isfinite(values)]
     return float(np.max(np.abs(values))) if values.size else math.nan

@@ -6,15 +6,18 @@ commanded mode tracks, or if the run ended on the way to the target, before the 
 """
 import math
 import typing
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from acu_tracker.modes import REASON_TEXTS
 from acu_tracker.operating.command_table import ACU_COMMANDS
-from pedestal_analysis.results.tracking import DEG_PER_RAD, replies
+from pedestal_analysis.results.tracking import DEG_PER_RAD, Tracking, replies
 from pedestal_common.graph import modes, nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Bools, Floats, Json, Seconds
 from pedestal_common.wire import commands
+from pedestal_recording.recording import Recording
 
 TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED = 'tripped', 'refused', 'never locked', 'never tracked'
 TRACKED, ON_THE_WAY, NO_TARGET = 'tracked', 'ended on the way', 'no target'  # words of the verdicts
@@ -63,8 +66,8 @@ class Verdict(typing.NamedTuple):
         return '' if self.word == TRACKED else f'{self.word}: {self.text.removeprefix(f"{self.word}: ")}'
 
 
-def of(bag, run) -> Verdict:
-    """Return the Verdict on a bag.Bag of one beam (Bag.view) and its tracking.Tracking."""
+def of(bag: Recording, run: Tracking) -> Verdict:
+    """Return the Verdict on a recording of one beam and its Tracking."""
     trip, refused = _trip(bag), _refusals(bag)
     word, text = _tracking(bag, run)
     if not (trip or refused):
@@ -76,7 +79,7 @@ def of(bag, run) -> Verdict:
     return Verdict(REFUSED, '; '.join((*refused, *[text] * (word != NO_TARGET))))
 
 
-def _trip(bag) -> str:
+def _trip(bag: Recording) -> str:
     """Return the text of the first fault on which the drive tripped, with its time; '' without a trip."""
     if DRIVE_STATE_TOPIC not in bag.topics:
         return ''
@@ -87,24 +90,24 @@ def _trip(bag) -> str:
     return ''
 
 
-def _replies(bag):
-    """Yield (time [s], Command, Reply) of all replies in a bag."""
+def _replies(bag: Recording) -> Iterator[tuple[Seconds, commands.Command, commands.Reply]]:
+    """Yield (time, Command, Reply) of all replies in a bag."""
     for topic in REPLY_TOPICS:
         yield from replies(bag, topic)
 
 
-def _refusals(bag) -> list[str]:
+def _refusals(bag: Recording) -> list[str]:
     """Return a text for each refused command of the scenario."""
     return [f'{command.verb} at {t:.4g} s refused: {_reason(reply.text)}' for t, command, reply in _replies(bag)
             if command.who == commands.SCHEDULE_CLIENT and not reply.granted]
 
 
-def _reason(text):
+def _reason(text: str) -> str:
     """Return the reason in the text of a refusal."""
     return text.removeprefix('refused: ').partition('; mode is ')[0]
 
 
-def _leads_to_tracking(mode, handover):
+def _leads_to_tracking(mode: str, handover: bool) -> bool:
     """Return True if a mode tracks, or hands over to a mode that leads to tracking.
 
     handover: True if the modes of a predicted track (`program`, `tle`) may hand over, by the parameter
@@ -116,13 +119,13 @@ def _leads_to_tracking(mode, handover):
     return bool(row.handover) and (handover or not row.table) and _leads_to_tracking(row.handover, handover)
 
 
-def _tracking(bag, run) -> tuple[str, str]:
+def _tracking(bag: Recording, run: Tracking) -> tuple[str, str]:
     """Return (word, sentence) on the tracking of a run, without its faults and refusals."""
     acu = bag.configuration['parameters'].get('acu', {})
     wanted = {acu.get('initial_mode', 'standby'), *(command.verb for _, command, _ in _replies(bag)),
               *np.unique(run.mode[run.known_mode]).tolist()}
     shares = {mode: 100.0 * float(np.mean(run.mode == mode)) for mode in modes.MODES if (run.mode == mode).any()}
-    distance = np.hypot(run.cross_elevation, run.elevation_error)
+    distance = run.distance
     near = distance < 0.5 * run.beamwidth
     by_level = run.mode == 'steptrack'
     if 'autotrack' in shares:
@@ -136,10 +139,10 @@ def _tracking(bag, run) -> tuple[str, str]:
     return _never_tracked(bag, run, distance, near, acu)
 
 
-def _autotracked(bag, run, distance, near):
+def _autotracked(bag: Recording, run: Tracking, distance: Floats, near: Bools) -> tuple[str, str]:
     """Return (word, sentence) on a run with autotrack.
 
-    distance (n,): angle from beam to target [rad]; near (n,): True with the target within half a beamwidth.
+    distance: angle from beam to target [rad]; near: True with the target within half a beamwidth.
     """
     auto = run.mode == 'autotrack'
     off = auto & (distance > run.beamwidth)
@@ -159,7 +162,7 @@ def _autotracked(bag, run, distance, near):
     return TRACKED, text
 
 
-def _without_target(shares, acu):
+def _without_target(shares: Mapping[str, float], acu: Mapping[str, Json]) -> str:
     """Return the sentence on a run in which no mode should track; shares: {mode: share of the steps [%]}."""
     begun = acu.get('initial_mode', 'standby')
     if not shares:
@@ -168,7 +171,7 @@ def _without_target(shares, acu):
             + ('' if begun in shares else f'; {begun} was never entered'))
 
 
-def _never_began(bag, mode):
+def _never_began(bag: Recording, mode: str) -> tuple[str, str]:
     """Return (word, sentence) on a run that never entered a mode that follows a target; mode: the initial mode."""
     values = bag.last_values(f'{bag.beam}acu')
     reason = values.get(f'refused {mode}', '')
@@ -177,11 +180,12 @@ def _never_began(bag, mode):
     return NOT_TRACKED, f'tracked 0 %: mode {mode} was never entered: {reason}'
 
 
-def _never_tracked(bag, run, distance, near, acu):
+def _never_tracked(bag: Recording, run: Tracking, distance: Floats, near: Bools,
+                   acu: Mapping[str, Json]) -> tuple[str, str]:
     """Return (word, sentence) on a run that followed a direction to the target, but never tracked by the receiver.
 
-    distance (n,): angle from beam to target [rad]; near (n,): True with the target within half a beamwidth; acu: the
-    parameters of the control unit.
+    distance: angle from beam to target [rad]; near: True with the target within half a beamwidth; acu: the parameters
+    of the control unit.
     """
     receiver = bag.configuration['parameters'].get('tracking_receiver', {})
     count = acu.get('tracker.lock_count', 0) * run.period
@@ -212,8 +216,8 @@ def _never_tracked(bag, run, distance, near, acu):
     return NOT_LOCKED, f'{best}; the beam came within {np.nanmin(distance) * DEG_PER_RAD:.3g} deg of the target'
 
 
-def _next_command(acu, end):
-    """Return the next scheduled command after the end [s] of a run that leads to tracking, with its time, or ''."""
+def _next_command(acu: Mapping[str, Json], end: Seconds) -> str:
+    """Return the next scheduled command after the end of a run that leads to tracking, with its time, or ''."""
     for due, command in commands.schedule('acu.commands', acu.get('commands', ''), ACU_COMMANDS):
         at = due / NS_PER_SECOND
         if at > end and _leads_to_tracking(command.verb, acu.get('tracker.handover', True)):
@@ -221,10 +225,10 @@ def _next_command(acu, end):
     return ''
 
 
-def _approaches(run, distance):
+def _approaches(run: Tracking, distance: Floats) -> bool:
     """Return True if the beam approaches the target at the end, and has not come near and gone away again before.
 
-    distance (n,): angle from beam to target [rad].
+    distance: angle from beam to target [rad].
     """
     window = round(APPROACH_WINDOW_S / run.period)
     if not (distance.size > window and run.mode[-1] not in ('', 'standby')

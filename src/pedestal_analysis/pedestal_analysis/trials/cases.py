@@ -5,44 +5,41 @@ The studies describe their runs as cases.
 import dataclasses
 import math
 import shlex
+from collections.abc import Mapping
 
 from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.scenario import Scenario
+from pedestal_common.quantities import Json, RadiansPerSecond, Seconds
 
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A scenario with changed parameters.
+    """A scenario with changed parameters."""
+    name: str       # of the case in the results
+    scenario: str   # its name or path
+    parameters: Mapping[str, Json] = dataclasses.field(default_factory=dict)    # {'node.key': changed value}
+    duration: Seconds | None = None     # None for that of the scenario
+    seed: int | None = None             # None for that of the scenario
 
-    name         name of the case in the results
-    scenario     name or path of the scenario
-    parameters   {'node.key': value} of the changed parameters
-    duration     [s]; None for that of the scenario
-    seed         None for that of the scenario
-    """
-    name: str
-    scenario: str
-    parameters: dict = dataclasses.field(default_factory=dict)
-    duration: float | None = None
-    seed: int | None = None
-
-    def with_seed(self, seed):
-        """Return this Case with another seed."""
+    def with_seed(self, seed: int | None) -> 'Case':
+        """Return this case with another seed."""
         return dataclasses.replace(self, seed=seed)
 
-    def loaded(self):
-        """Return the scenario.Scenario of this case."""
+    def loaded(self) -> Scenario:
+        """Return the scenario of this case."""
         return scenario.load(self.scenario, self.overrides(), duration=self.duration, seed=self.seed)
 
-    def run(self):
-        """Run the closed loop of this case and return its closed_loop.Run."""
+    def run(self) -> Run:
+        """Run the closed loop of this case."""
         return closed_loop.Loop(self.loaded()).run()
 
-    def overrides(self):
+    def overrides(self) -> list[str]:
         """Return the parameters as texts node.key=value."""
         return [f'{key}={value}' for key, value in self.parameters.items()]
 
-    def command(self):
+    def command(self) -> str:
         """Return the command that runs this case in the graph."""
         duration = [] if self.duration is None else ['--duration', f'{self.duration:g}']
         parameters = [part for override in self.overrides() for part in ('--param', override)]
@@ -50,8 +47,8 @@ class Case:
         return shlex.join(['pedestal', 'run', self.scenario, *duration, *seed, *parameters])
 
 
-def sine_case(case, w, periods):
-    """Return the Case with a target that moves in a sine of w [rad/s] for a number of periods.
+def sine_case(case: Case, w: RadiansPerSecond, periods: float) -> Case:
+    """Return the case with a target that moves in a sine of w for a number of periods.
 
     The duration is up to 12 ms longer, so that the last period is complete.
     """

@@ -13,41 +13,48 @@ gain        improvement of the mean of a over the mean of b [%], with a 95 % int
 wins        share of the pairs in which A is better [%], with a 95 % interval by Clopper and Pearson. Equal values are
             no win.
 """
-import typing
+from collections.abc import Sequence
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from pedestal_analysis.results.intervals import estimated, interval
 from pedestal_analysis.trials import plan as trial_plans
 from pedestal_analysis.trials import statistics
+from pedestal_analysis.trials.plan import Plan
+from pedestal_analysis.trials.table import Table
+from pedestal_bringup.scenario.scenario import Scenario
+from pedestal_common.quantities import Estimate, Floats, Row
+
+_Sum = TypeVar('_Sum', float, Floats)
 
 
-class Sides(typing.NamedTuple):
-    """The two compared sides: their names, and their table.Tables a and b."""
+class Sides(NamedTuple):
+    """The two compared sides: their names and their trials."""
     name_a: str
     name_b: str
-    a: object
-    b: object
+    a: Table
+    b: Table
 
     @property
-    def case(self):
+    def case(self) -> str:
         """Case of the rows of the comparison, as a text."""
         return f'{self.name_a} against {self.name_b}'
 
     @property
-    def results(self):
+    def results(self) -> list[str]:
         """Names of the results that both sides have."""
         return [name for name in self.a.measured_results if name in self.b.measured_results]
 
-    def pairs(self, result):
+    def pairs(self, result: str) -> tuple[Floats, Floats]:
         """Return the values a, b (n,) of a result in the trials in which both sides have the result."""
         both = self.a.column(result), self.b.column(result)
         known = np.isfinite(both).all(axis=0)
         return both[0][known], both[1][known]
 
 
-def names(*plans) -> tuple:
-    """Return a name for each of several plan.Plans.
+def names(*plans: Plan) -> tuple[str, ...]:
+    """Return a name for each of several plans.
 
     The name states the scenario, if the plans have different scenarios, and the parameters of --param that differ
     between the plans. Plans that do not differ have the name of their scenario.
@@ -62,8 +69,8 @@ def names(*plans) -> tuple:
                                                    if values[i]]) or plan.name for i, plan in enumerate(plans))
 
 
-def unchanged(first, second) -> str:
-    """Return a sentence if two plan.Plans have the same parameters in every trial, else ''."""
+def unchanged(first: Plan, second: Plan) -> str:
+    """Return a sentence if two plans have the same parameters in every trial, else ''."""
     a, b = first.scenario(0), second.scenario(0)
     members = [node for node in a.nodes if node != 'operator']  # the operator has only the parameters of the header
     if not (a.nodes == b.nodes and a.header == b.header and first.varied == second.varied and
@@ -74,8 +81,8 @@ def unchanged(first, second) -> str:
     return 'Both sides have the same parameters' + (f': {" ".join(texts)} changes nothing.' if texts else '.')
 
 
-def _value(chosen, key):
-    """Return the text of a parameter node.key in a scenario.Scenario, '' for a node that takes no part."""
+def _value(chosen: Scenario, key: str) -> str:
+    """Return the text of a parameter node.key in a scenario, '' for a node that takes no part."""
     try:
         value = trial_plans.value_in(chosen, key)
     except (KeyError, ValueError):
@@ -83,8 +90,8 @@ def _value(chosen, key):
     return f'{value:.7g}' if isinstance(value, float) else str(value)
 
 
-def ranked(tables, by) -> list:
-    """Return the indices of table.Tables from the best to the worst, by the mean of the result `by`.
+def ranked(tables: Sequence[Table], by: str) -> list[int]:
+    """Return the indices of tables from the best to the worst, by the mean of the result `by`.
 
     Only trials count in which all tables have the result. Without such a trial the order stays.
     """
@@ -96,12 +103,12 @@ def ranked(tables, by) -> list:
     return [int(place) for place in np.argsort(-means if statistics.larger_is_better(by) else means, kind='stable')]
 
 
-def gain(a, b, larger):
-    """Return (gain, low, high) [%] of a (n,) over b (n,), as the module states; low, high: 95 % interval.
+def gain(a: Floats, b: Floats, larger: bool) -> Estimate:
+    """Return the gain [%] of a (n,) over b (n,), as the module states, with its 95 % interval.
 
     a and b must not contain a value below 0. larger: True if larger values are better.
     """
-    def gain_of_sums(sum_a, sum_b):
+    def gain_of_sums(sum_a: _Sum, sum_b: _Sum) -> _Sum:
         return 100.0 * (sum_a / sum_b - 1.0 if larger else 1.0 - sum_a / sum_b)
 
     n, whole = len(a), gain_of_sums(a.sum(), b.sum())
@@ -111,21 +118,22 @@ def gain(a, b, larger):
     return whole, low, high
 
 
-def wins(a, b, larger):
-    """Return (share, low, high) [%] of the pairs in which a (n,) is better than b (n,); low, high: 95 % interval."""
+def wins(a: Floats, b: Floats, larger: bool) -> Estimate:
+    """Return the share [%] of the pairs in which a (n,) is better than b (n,), with its 95 % interval."""
     return statistics.rate(int(np.sum(a > b if larger else a < b)), len(a))
 
 
-def has_gain(result, a, b):
+def has_gain(result: str, a: Floats, b: Floats) -> bool:
     """Return True if a gain in percent of b has a meaning for a result.
 
     A gain needs at least two pairs, and at least two values of b above 0. There is no gain for dB or negative values,
     because a ratio has no meaning on these scales.
     """
-    return len(a) > 1 and statistics.unit(result) != 'dB' and min(a.min(), b.min()) >= 0.0 and np.sum(b > 0.0) > 1
+    return bool(len(a) > 1 and statistics.unit(result) != 'dB' and min(a.min(), b.min()) >= 0.0
+                and np.sum(b > 0.0) > 1)
 
 
-def rows(sides):
+def rows(sides: Sides) -> list[Row]:
     """Return the rows of --json: difference a - b, gain and wins of each result that both sides have."""
     found = []
     for name in sides.results:
@@ -141,7 +149,7 @@ def rows(sides):
     return found
 
 
-def sentence(sides, by):
+def sentence(sides: Sides, by: str) -> str:
     """Return one sentence on which side is better by a result; the better side is named first."""
     if ranked((sides.a, sides.b), by)[0] == 1:
         sides = Sides(sides.name_b, sides.name_a, sides.b, sides.a)

@@ -5,32 +5,34 @@ factor of the value in the scenario. Each draw is the quantile of a number u bet
 or a coordinate of a point of a Sobol sequence; the functions of this module serve both.
 """
 import re
-import typing
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 from scipy import special
 
 from pedestal_common.parameters import did_you_mean
+from pedestal_common.quantities import Floats, Json
 from pedestal_common.text_files import plain_yaml
 
+Values: TypeAlias = NDArray[Any]  # numbers, or the values of a `choice`, which may be texts
 
-class Kind(typing.NamedTuple):
+
+class Kind(NamedTuple):
     """A kind of distribution: a row of DISTRIBUTION_KINDS.
 
-    usage      text of its syntax
-    arguments  number of its arguments, None for one or more
-    quantile   quantile(u (n,), arguments) -> values (n,)
-    extremes   extremes(arguments) -> values that must all be in the range of the parameter: low and high, or all
-               options of a `choice`. None for a distribution without bounds.
+    extremes(arguments) returns values that must all be in the range of the parameter: low and high, or all options of
+    a `choice`. It returns None for a distribution without bounds.
     """
-    usage: str
-    arguments: int | None
-    quantile: typing.Callable
-    extremes: typing.Callable
+    usage: str                  # text of its syntax
+    arguments: int | None       # their number, None for one or more
+    quantile: Callable[[Floats, tuple[Json, ...]], Values]  # quantile(u (n,), arguments) returns values (n,)
+    extremes: Callable[[tuple[Json, ...]], tuple[Json, ...] | None]
 
 
-DISTRIBUTION_KINDS = {
+DISTRIBUTION_KINDS: dict[str, Kind] = {
     'uniform': Kind('uniform(low, high)', 2, lambda u, ends: ends[0] + u * (ends[1] - ends[0]), lambda ends: ends),
     'normal': Kind('normal(mean, sigma)', 2, lambda u, moments: moments[0] + special.ndtri(u) * moments[1],
                    lambda moments: None),
@@ -38,7 +40,7 @@ DISTRIBUTION_KINDS = {
                    lambda u, options: np.array(options, object)[(u * len(options)).astype(int)],
                    lambda options: options),
 }
-"""{name of a distribution: Kind}."""
+"""{name of a distribution: its kind}."""
 
 _TEXT_PATTERN = re.compile(r'(\w+)\((.*)\)(x?)')
 """Pattern of the text of a distribution: name, arguments, x for a factor."""
@@ -48,20 +50,14 @@ class VaryError(ValueError):
     """Error of an invalid --vary. Its text is one line that names the --vary."""
 
 
-class Distribution(typing.NamedTuple):
-    """The distribution of one parameter.
+class Distribution(NamedTuple):
+    """The distribution of one parameter."""
+    text: str       # as the user gave it
+    kind: str       # key of DISTRIBUTION_KINDS
+    arguments: tuple[Json, ...]     # numbers of the distribution, or the values of a `choice`
+    factor: bool    # True if a draw is a factor of the value in the scenario
 
-    text       text that the user gave
-    kind       key of DISTRIBUTION_KINDS
-    arguments  numbers of the distribution, or the values of a `choice`
-    factor     True if a draw is a factor of the value in the scenario
-    """
-    text: str
-    kind: str
-    arguments: tuple
-    factor: bool
-
-    def draw(self, u, whole=False):
+    def draw(self, u: Floats, whole: bool = False) -> Values:
         """Return values (n,) at the numbers u (n,) between 0 and 1.
 
         whole: True for an integer parameter. A uniform distribution then includes low and high.
@@ -72,13 +68,13 @@ class Distribution(typing.NamedTuple):
         return DISTRIBUTION_KINDS[self.kind].quantile(u, self.arguments)
 
     @property
-    def extremes(self):
+    def extremes(self) -> tuple[Json, ...] | None:
         """Values (or factors) that bound or list all draws, see Kind.extremes; None without bounds."""
         return DISTRIBUTION_KINDS[self.kind].extremes(self.arguments)
 
 
-def parse(text) -> Distribution:
-    """Return the Distribution of a text such as 'normal(1, 0.1)x'. Raises VaryError."""
+def parse(text: str) -> Distribution:
+    """Return the distribution of a text such as 'normal(1, 0.1)x'. Raises VaryError."""
     match = _TEXT_PATTERN.fullmatch(text.strip())
     usage = ', '.join(kind.usage for kind in DISTRIBUTION_KINDS.values())
     if not match:
@@ -102,7 +98,7 @@ def parse(text) -> Distribution:
     return Distribution(text.strip(), name, arguments, factor)
 
 
-def _number(text, value):
+def _number(text: str, value: Json) -> float:
     """Return a value as a float. Raises VaryError if it is not a finite number. text: of the distribution, for the
     error."""
     try:

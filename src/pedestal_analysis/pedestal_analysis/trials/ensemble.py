@@ -7,14 +7,18 @@ or with an array run one after the other.
 """
 import contextlib
 import functools
+import pathlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
 from pedestal_analysis.results import results, tracking, verdict
 from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.plan import Plan
 from pedestal_analysis.trials.statistics import WHY
 from pedestal_analysis.trials.table import Table
 from pedestal_bringup.loop import closed_loop, memory_recording, side_by_side
+from pedestal_common.quantities import Json, Records
 from pedestal_common.wire import records
 
 MIN_BATCH_TRIALS = 4
@@ -39,8 +43,8 @@ class TrialError(ValueError):
     """Error of a trial that cannot be run. Its text is one line that names the trial."""
 
 
-def open_table(plan, folder, name='trials') -> Table:
-    """Return the table.Table of the trials of a plan.Plan in a folder; `with` opens its files.
+def open_table(plan: Plan, folder: str | pathlib.Path, name: str = 'trials') -> Table:
+    """Return the table of the trials of a plan in a folder; `with` opens its files.
 
     name: name of the files without extension.
     """
@@ -51,13 +55,13 @@ def open_table(plan, folder, name='trials') -> Table:
                  [[plan.seed + i, *own] for i, own in enumerate(_drawn(plan))])
 
 
-def _drawn(plan):
-    """Return [values of the varied parameters] of each trial of a plan.Plan."""
+def _drawn(plan: Plan) -> Iterable[Sequence[Json]]:
+    """Return the values of the varied parameters of each trial of a plan."""
     return zip(*plan.varied.values()) if plan.varied else [()] * plan.runs
 
 
 @contextlib.contextmanager
-def _trial(plan, i):
+def _trial(plan: Plan, i: int) -> Iterator[None]:
     """Convert a ValueError to a TrialError that names trial i."""
     try:
         yield
@@ -66,7 +70,7 @@ def _trial(plan, i):
 
 
 @functools.lru_cache(maxsize=1)
-def _memory(trials, steps):
+def _memory(trials: int, steps: int) -> Records:
     """Return the memory (trials, steps) of the records of trials that run side by side; all batches use it again.
 
     Because new memory costs up to a tenth of the time of the trials, one memory serves all batches.
@@ -74,12 +78,14 @@ def _memory(trials, steps):
     return np.empty((trials, steps), records.of(*MEASURED_TOPICS))
 
 
-def _batch(plan):
-    """Return [values of a trial] for the trials of a Plan, which is the part of a plan that one worker receives.
+def _batch(plan: Plan) -> list[list[Json]]:
+    """Return the values of each trial of a plan, which is the part of a plan that one worker receives.
 
     The values are the TRIAL_RESULTS of each beam, None for a missing result, then the text of WHY of each beam.
     """
-    scenarios, found, whys = [], [[] for _ in range(plan.runs)], [[] for _ in range(plan.runs)]
+    scenarios = []
+    found: list[list[Json]] = [[] for _ in range(plan.runs)]
+    whys: list[list[str]] = [[] for _ in range(plan.runs)]
     for i in range(plan.runs):
         with _trial(plan, i):
             scenarios.append(plan.scenario(i))
@@ -101,16 +107,16 @@ def _batch(plan):
     return [values + why for values, why in zip(found, whys)]
 
 
-def _batch_size(plan):
-    """Return the number of trials of a plan in a batch."""
+def _batch_size(plan: Plan) -> int:
     return max(MIN_BATCH_TRIALS, side_by_side.max_parallel_trials(plan.scenario(0), MEASURED_TOPICS))
 
 
-def run_missing_trials(plans, tables, pool, progress=lambda done, total: None):
+def run_missing_trials(plans: Sequence[Plan], tables: Sequence[Table], pool: monte_carlo.Pool,
+                       progress: Callable[[int, int], object] = lambda done, total: None) -> None:
     """Run the trials of plans that are missing in their tables, and append their rows to the tables.
 
-    The batches of several plans alternate, so all plans advance together. pool: monte_carlo.Pool. progress(number of
-    trials done, number of all trials) is called after each batch. Raises TrialError.
+    The batches of several plans alternate, so all plans advance together. progress(number of trials done, number of
+    all trials) is called after each batch. Raises TrialError.
     """
     pieces, size = [], min(map(_batch_size, plans))
     for first in range(0, max(plan.runs for plan in plans), size):

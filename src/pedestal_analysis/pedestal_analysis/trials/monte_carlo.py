@@ -14,12 +14,22 @@ import pathlib
 import re
 import signal
 import threading
+import types
+import typing
 import warnings
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from typing import TypeAlias, TypeVar
 
 import joblib
 import numba
 import numpy as np
 from joblib.externals import loky
+from numpy.typing import ArrayLike
+
+from pedestal_common.quantities import Floats
+
+if typing.TYPE_CHECKING:
+    import distributed
 
 PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
             'pedestal_hardware', 'pedestal_bringup', 'pedestal_analysis', 'pedestal_studies')
@@ -28,9 +38,15 @@ PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_
 SCHEDULER_TIMEOUT_S = 10.0  # longest wait for the Dask scheduler, and for its first worker [s]
 
 
-def batches(runs, size):
-    """Return [(number of the first run, number of runs)] of the batches of at most `size` runs."""
+def batches(runs: int, size: int) -> list[tuple[int, int]]:
+    """Return the number of the first run and the number of runs of each batch of at most `size` runs."""
     return [(first, min(size, runs - first)) for first in range(0, runs, size)]
+
+
+_Item = TypeVar('_Item')
+_Result = TypeVar('_Result')
+_Case = TypeVar('_Case', bound=Hashable)
+Progress: TypeAlias = Callable[[float, str], object]    # progress(share of the work that is done [-], text)
 
 
 class Pool:
@@ -42,7 +58,7 @@ class Pool:
     worker, RuntimeError if Dask is missing or no scheduler answers.
     """
 
-    def __init__(self, workers=None, scheduler=None):
+    def __init__(self, workers: int | None = None, scheduler: str | None = None) -> None:
         if workers is not None and workers < 1:
             raise ValueError(f'--workers {workers}: must be at least 1')
         if scheduler is not None and not re.fullmatch(r'(\w+://)?.+:\d+', scheduler):
@@ -51,7 +67,7 @@ class Pool:
         self.scheduler = scheduler
         self._stack = contextlib.ExitStack()
 
-    def __enter__(self):
+    def __enter__(self) -> 'Pool':
         # joblib warns of lost work, even a while after a study was stopped on purpose.
         warnings.filterwarnings('ignore', '.*tasks (which were|have been)', UserWarning, r'joblib\.parallel')
         if self.scheduler is None:
@@ -63,26 +79,29 @@ class Pool:
             self._stack.enter_context(joblib.parallel_config(backend='dask', client=client))
         return self
 
-    def __exit__(self, *raised):
-        return self._stack.__exit__(*raised)
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 traceback: types.TracebackType | None) -> bool | None:
+        return self._stack.__exit__(kind, error, traceback)
 
-    def map(self, function, items, progress=lambda share, text: None):
+    def map(self, function: Callable[[_Item], _Result], items: Iterable[_Item],
+            progress: Progress = lambda share, text: None) -> Iterator[_Result]:
         """Yield function(item) of each item, in their order.
 
-        function: a function of a module, because others cannot be sent to workers. progress(share of the items that
-        are done [-], text) is called after each item.
+        function: a function of a module, because others cannot be sent to workers. `progress` is called after each
+        item.
         """
         items = list(items)
-        options = {'n_jobs': -1} if self.scheduler else {'n_jobs': min(self.workers, len(items) or 1),
-                                                         'backend': 'loky'}
-        with _deferred_interrupt() if options['n_jobs'] > 1 else contextlib.nullcontext():
-            results = joblib.Parallel(return_as='generator', **options)(map(joblib.delayed(function), items))
+        jobs = -1 if self.scheduler else min(self.workers, len(items) or 1)
+        options = {} if self.scheduler else {'backend': 'loky'}
+        with _deferred_interrupt() if jobs > 1 else contextlib.nullcontext():
+            results = joblib.Parallel(jobs, return_as='generator', **options)(map(joblib.delayed(function), items))
             self._stack.callback(results.close)
         for done, result in enumerate(results, 1):
             progress(done / len(items), f'{done} of {len(items)} batches')
             yield result
 
-    def of_cases(self, function, cases, runs, size, progress=lambda share, text: None):
+    def of_cases(self, function: Callable[[tuple[_Case, int, int]], ArrayLike], cases: Sequence[_Case], runs: int,
+                 size: int, progress: Progress = lambda share, text: None) -> dict[_Case, Floats]:
         """Return {case: array (runs, ...) of the values of its runs}, for several cases of a study.
 
         function((case, number of the first run, number of runs)) returns the values of a batch of at most `size` runs.
@@ -93,7 +112,7 @@ class Pool:
 
 
 @contextlib.contextmanager
-def _deferred_interrupt():
+def _deferred_interrupt() -> Iterator[None]:
     """Protect the workers that start inside this context from Ctrl-C, whose signal reaches all processes of a
     terminal.
 
@@ -117,7 +136,7 @@ def _deferred_interrupt():
 
 
 @contextlib.contextmanager
-def _manager_in_silence():
+def _manager_in_silence() -> Iterator[None]:
     """Suppress the KeyError that a thread of loky (the process pool of joblib) prints while its workers are ended."""
     before = threading.excepthook
     threading.excepthook = lambda failure: (
@@ -128,11 +147,11 @@ def _manager_in_silence():
         threading.excepthook = before
 
 
-def _end_local():
+def _end_local() -> None:
     loky.get_reusable_executor(reuse=True).shutdown(kill_workers=True)
 
 
-def _client(address):
+def _client(address: str) -> 'distributed.Client':
     """Return the client of the Dask scheduler at an address. Raises RuntimeError.
 
     Its workers must have equal versions of the pedestal packages and of numba, because the numbers depend on them.

@@ -7,16 +7,21 @@ Complexity 14 (1998) 466). A plan of more trials therefore begins with the trial
 import dataclasses
 import hashlib
 import math
+import pathlib
 import shlex
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scipy.stats import qmc
 
 from pedestal_analysis.trials import distributions
-from pedestal_analysis.trials.distributions import VaryError
+from pedestal_analysis.trials.distributions import Distribution, VaryError
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
+from pedestal_common.parameters import Parameters
+from pedestal_common.quantities import Floats, Json, Seconds
 from pedestal_common.text_files import csv_table, plain_yaml
 
 PLAN_HEADER_KEYS = ('seed', 'duration', 'pacing', 'beam', 'beams')
@@ -28,70 +33,60 @@ Their values are equal for all trials, or follow from the number of the trial.
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Trials of a scenario.
+    """Trials of a scenario."""
+    source: str     # name or path of the scenario, as the user gave it
+    name: str       # of the scenario
+    content: str    # text of the scenario file
+    overrides: tuple[str, ...]      # texts 'node.key=value' of parameters that are changed in all trials
+    duration: Seconds | None        # None for that of the scenario
+    seed: int       # of the first trial
+    runs: int       # number of trials
+    varied: dict[str, list[Json]]   # {node.key: values in the trials}
+    texts: tuple[str, ...]          # of --vary, which are part of the identity
+    files: tuple[str | pathlib.Path, ...] = ()  # parameter files whose values begin `overrides`
+    file_changes: int = 0           # number of the texts in `overrides` that are from the files
 
-    source         name or path of the scenario, as the user gave it
-    name, content  name and text of the scenario file
-    overrides      texts 'node.key=value' of parameters that are changed in all trials
-    duration       [s], None for that of the scenario
-    seed           seed of the first trial
-    runs           number of trials
-    varied         {node.key: list of the values in the trials}
-    texts          texts of --vary, which are part of the identity
-    files          paths of the parameter files whose values begin `overrides`
-    file_changes   number of the texts in `overrides` that are from the files
-    """
-    source: str
-    name: str
-    content: str
-    overrides: tuple
-    duration: float | None
-    seed: int
-    runs: int
-    varied: dict
-    texts: tuple
-    files: tuple = ()
-    file_changes: int = 0
-
-    def changes(self, i):
+    def changes(self, i: int) -> tuple[str, ...]:
         """Return the texts 'node.key=value' of all changed and varied parameters of trial i."""
         return (*self.overrides, *(scenario.override(name, values[i]) for name, values in self.varied.items()))
 
-    def scenario(self, i):
-        """Return the scenario.Scenario of trial i. Raises ScenarioError."""
+    def scenario(self, i: int) -> Scenario:
+        """Return the scenario of trial i. Raises ScenarioError."""
         return scenario.parse(self.name, self.content, self.changes(i), self.seed + i, self.duration)
 
-    def command(self, i):
+    def command(self, i: int) -> str:
         """Return the command line that runs trial i with ROS nodes."""
         duration = [] if self.duration is None else ['--duration', repr(self.duration)]
         files = [part for file in self.files for part in ('--params-file', str(file))]
         changes = [part for change in self.changes(i)[self.file_changes:] for part in ('--param', change)]
         return shlex.join(['pedestal', 'run', self.source, '--seed', str(self.seed + i), *duration, *files, *changes])
 
-    def part(self, numbers):
-        """Return the Plan of some consecutive trials; numbers: range of their numbers, from 0 on."""
+    def part(self, numbers: range) -> 'Plan':
+        """Return the plan of some consecutive trials; numbers: from 0 on."""
         varied = {name: values[numbers.start:numbers.stop] for name, values in self.varied.items()}
         return dataclasses.replace(self, seed=self.seed + numbers.start, runs=len(numbers), varied=varied)
 
     @property
-    def identity(self):
+    def identity(self) -> dict[str, str]:
         """{name: text} that distinguishes the trials of this plan from others; it does not depend on their number."""
         return {'scenario': self.name, 'content': hashlib.sha256(self.content.encode()).hexdigest(),
                 '--param': ' '.join(self.overrides), '--vary': ' '.join(self.texts), '--seed': str(self.seed),
                 '--duration': str(self.duration)}
 
 
-def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sobol=False, files=()) -> Plan:
-    """Return the Plan of trials of a scenario.
+def plan(source: str, runs: int | None = None, vary: Sequence[str] = (), overrides: Iterable[str] = (),
+         seed: int | None = None, duration: Seconds | None = None, sobol: bool = False,
+         files: Iterable[str | pathlib.Path] = ()) -> Plan:
+    """Return the plan of trials of a scenario.
 
     source     name or path of the scenario
     runs       number of trials; None: the number of rows of the tables in `vary`, or 100 without a table
     vary       texts 'node.key=distribution', or paths of .csv tables with parameters as columns and trials as rows
     overrides  texts 'node.key=value' of parameters that are changed in all trials
     seed       seed of the first trial, None for that of the scenario
-    duration   [s], None for that of the scenario
+    duration   None for that of the scenario
     sobol      True for the points of a Sobol sequence instead of independent draws
-    files      paths of ROS 2 parameter files with parameters that are changed in all trials; `overrides` replace them
+    files      ROS 2 parameter files with parameters that are changed in all trials; `overrides` replace them
 
     Raises ScenarioError, ParameterFileError, VaryError or TableError if a trial could not be run.
     """
@@ -134,8 +129,8 @@ def plan(source, runs=None, vary=(), overrides=(), seed=None, duration=None, sob
     return made
 
 
-def _drawn(text):
-    """Return (node.key, Distribution) of the text of a --vary. Raises VaryError."""
+def _drawn(text: str) -> tuple[str, Distribution]:
+    """Return node.key and the distribution of the text of a --vary. Raises VaryError."""
     column, equals, distribution = text.partition('=')
     if not equals:
         raise VaryError(f'--vary {text!r}: must be NODE.KEY=DISTRIBUTION or the path of a .csv table')
@@ -145,10 +140,10 @@ def _drawn(text):
         raise VaryError(f'--vary {column}: {error}') from None
 
 
-def _table(path):
+def _table(path: str) -> dict[str, list[Json]]:
     """Return {node.key: values in the trials} of a CSV file. Raises TableError."""
     with csv_table.opened(path) as reader:
-        columns = {column: [] for column in reader.fieldnames or ()}
+        columns: dict[str, list[Json]] = {column: [] for column in reader.fieldnames or ()}
         for row in reader:
             if None in row or None in row.values():
                 raise csv_table.TableError(f'{path}: line {reader.line_num}: must have {len(columns)} cells')
@@ -159,7 +154,7 @@ def _table(path):
     return columns
 
 
-def _points(first, runs, count, sobol):
+def _points(first: int, runs: int, count: int, sobol: bool) -> Floats:
     """Return numbers between 0 and 1 (runs, count), for `count` varied parameters; first: seed of the first trial."""
     if sobol:
         return qmc.Sobol(count, seed=first).random_base2(math.ceil(math.log2(runs)))[:runs]
@@ -168,11 +163,11 @@ def _points(first, runs, count, sobol):
                      for i in range(runs)])
 
 
-def field(nominal, column, option='--vary'):
+def field(nominal: Scenario, column: str, option: str = '--vary') -> dataclasses.Field[Json]:
     """Return the dataclass field of a parameter node.key, after a check that trials can vary it.
 
-    nominal: scenario.Scenario of the unvaried trials; column: 'node.key'; option: name of the option for the error.
-    Raises VaryError, ScenarioError.
+    nominal: scenario of the unvaried trials; column: 'node.key'; option: name of the option for the error. Raises
+    VaryError, ScenarioError.
     """
     node, _, key = column.partition('.')
     scenario.parameters_of(node)
@@ -188,19 +183,19 @@ def field(nominal, column, option='--vary'):
     return fields[key]
 
 
-def _parameters(nominal, node):
-    """Return the parameters (dataclass) of a node in a scenario.Scenario, for the node 'scenario' its header."""
+def _parameters(nominal: Scenario, node: str) -> Parameters:
+    """Return the parameters of a node in a scenario, for the node 'scenario' its header."""
     return nominal.header if node == 'scenario' else nominal.node_parameters(node)
 
 
-def value_in(nominal, column):
-    """Return the value of the parameter `column`, a 'node.key', in a scenario.Scenario."""
+def value_in(nominal: Scenario, column: str) -> Json:
+    """Return the value of the parameter `column`, a 'node.key', in a scenario."""
     node, _, key = column.partition('.')
     return parameters.as_dict(_parameters(nominal, node))[key]
 
 
-def _values(nominal, column, distribution, u):
-    """Return the values of a parameter in the trials, drawn from a Distribution at the numbers u (runs,) in 0 to 1."""
+def _values(nominal: Scenario, column: str, distribution: Distribution, u: Floats) -> list[Json]:
+    """Return the values of a parameter in the trials, drawn from a distribution at the numbers u (runs,) in 0 to 1."""
     whole = field(nominal, column).type is int
     if distribution.factor:
         value = value_in(nominal, column)
@@ -212,18 +207,18 @@ def _values(nominal, column, distribution, u):
     return _rounded(values.tolist(), whole)
 
 
-def _rounded(values, whole):
-    """Return a list of values, rounded if `whole` (for an integer parameter).
+def _rounded(values: Iterable[Json], whole: bool) -> list[Json]:
+    """Return values, rounded if `whole` (for an integer parameter).
 
     Texts stay unchanged, because the later check of the parameter refuses them.
     """
     return [round(value) if whole and isinstance(value, float) else value for value in values]
 
 
-def _check(nominal, made, column, distribution):
+def _check(nominal: Scenario, made: Plan, column: str, distribution: Distribution | None) -> None:
     """Raise VaryError unless each value of a varied parameter is allowed with the other parameters of the scenario.
 
-    nominal: Scenario without the variation; made: the Plan; column: 'node.key'; distribution: None for a table.
+    nominal: scenario without the variation; made: the plan; column: 'node.key'; distribution: None for a table.
     """
     values = made.varied[column]
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)

@@ -13,15 +13,23 @@ the control law itself has a jump.
 import contextlib
 import itertools
 import math
-import typing
+import pathlib
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from pedestal_analysis.results import intervals
 from pedestal_analysis.trials import ensemble, statistics
 from pedestal_analysis.trials import plan as plans
+from pedestal_analysis.trials.distributions import VaryError
+from pedestal_analysis.trials.monte_carlo import Pool
+from pedestal_analysis.trials.plan import Plan
+from pedestal_analysis.trials.table import Table
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.graph import nodes
+from pedestal_common.quantities import Row
 
 DEFAULT_RUNS = 12  # number of trials at each value, unless the user gives another
 GRID_COUNT, MAX_BISECTIONS = 9, 12  # number of values that fill the range; largest number of bisections
@@ -38,49 +46,47 @@ MIN_MEASURED_SHARE = 0.5
 """Smallest share of the trials at a value that must have the result, so that the mean at this value counts [-]."""
 
 
-class Goal(typing.NamedTuple):
+class Goal(NamedTuple):
     """Name of a result, and limit that its mean should reach."""
     result: str
     limit: float
 
 
-class Range(typing.NamedTuple):
-    """Range of the search. key: parameter 'node.key'; low, high: ends; whole: True for an integer parameter; unit."""
-    key: str
+class Range(NamedTuple):
+    """Range of the search."""
+    key: str        # parameter 'node.key'
     low: float
     high: float
-    whole: bool
+    whole: bool     # True for an integer parameter
     unit: str
 
 
-class Tried(typing.NamedTuple):
+class Tried(NamedTuple):
     """Trials at one value of the parameter.
 
-    row        row of --json of the mean (intervals.estimated), with the field `tracked_percent`: mean share of the run
-               in autotrack [%], None where it is not measured. None if the scenario refused the value
-    why        text of the refusal, or ''
-    measured   True if the mean counts, see MIN_MEASURED_SHARE
+    The row is that of the mean (intervals.estimated), with the field `tracked_percent`: mean share of the run in
+    autotrack [%], None where it is not measured.
     """
     value: float
-    row: dict | None
-    why: str
-    measured: bool
+    row: Row            # {} if the scenario refused the value
+    why: str            # text of the refusal, or ''
+    measured: bool      # True if the mean counts, see MIN_MEASURED_SHARE
 
     @property
-    def mean(self):
+    def mean(self) -> float:
         """Mean of the result, NaN if it does not count."""
         return self.row['value'] if self.measured else math.nan
 
 
-class Solution(typing.NamedTuple):
-    """Outcome of a search. value: found value, or NaN; tried: all Tried by rising value; sentence: the outcome."""
-    value: float
-    tried: list
-    sentence: str
+class Solution(NamedTuple):
+    """Outcome of a search."""
+    value: float            # found value, or NaN
+    tried: list[Tried]      # by rising value
+    sentence: str           # the outcome
 
 
-def goal(text, known) -> Goal:
-    """Return the Goal of a text such as 'pointing_rms_deg = 0.02'; known: names of results. Raises ValueError."""
+def goal(text: str, known: Iterable[str]) -> Goal:
+    """Return the goal of a text such as 'pointing_rms_deg = 0.02'; known: names of results. Raises ValueError."""
     name, _, rest = map(str.strip, text.partition('='))
     limit = statistics.number(rest)
     if not (name and math.isfinite(limit)):
@@ -89,40 +95,40 @@ def goal(text, known) -> Goal:
     return Goal(name, limit)
 
 
-def search_range(text, chosen) -> Range:
-    """Return the Range of a text NODE.KEY=LOW:HIGH; `chosen`: scenario.Scenario. Raises VaryError.
+def search_range(text: str, chosen: Scenario) -> Range:
+    """Return the range of a text NODE.KEY=LOW:HIGH. Raises VaryError.
 
-    The Range of a text NODE.KEY is the range of the parameter.
+    The range of a text NODE.KEY is the range of the parameter.
     """
     key, equals, ends = text.partition('=')
     field = plans.field(chosen, key, '--solve')
     if field.type not in (int, float):
-        raise plans.VaryError(f'--solve {key}: must be a parameter with a number')
+        raise VaryError(f'--solve {key}: must be a parameter with a number')
     low, high = (statistics.number(end) for end in ends.split(':', 1)) if ends.count(':') == 1 else (math.nan,) * 2
     if not equals:
         low, high = field.metadata.get('low', -math.inf), field.metadata.get('high', math.inf)
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise plans.VaryError(f'--solve {text}: must be NODE.KEY=LOW:HIGH, LOW below HIGH')
+        raise VaryError(f'--solve {text}: must be NODE.KEY=LOW:HIGH, LOW below HIGH')
     return Range(key, float(low), float(high), field.type is int, field.metadata.get('unit', ''))
 
 
-def table_prefix(key):
+def table_prefix(key: str) -> str:
     """Return the prefix of the file names of the tables of trials, for a search over the parameter `key`."""
     return f'solve_{key.replace("/", "_")}_'
 
 
-def _between(low, high, ratio):
+def _between(low: float, high: float, ratio: bool) -> float:
     """Return the middle of two values: the geometric mean if `ratio` is True, else the arithmetic mean."""
     return math.sqrt(low * high) if ratio else 0.5 * (low + high)
 
 
-def _in_ratios(wanted):
-    """Return True if the values in a Range have equal ratios, see MAX_LINEAR_RATIO."""
+def _in_ratios(wanted: Range) -> bool:
+    """Return True if the values in a range have equal ratios, see MAX_LINEAR_RATIO."""
     return wanted.low > 0.0 and wanted.high / wanted.low > MAX_LINEAR_RATIO
 
 
-def _grid(wanted):
-    """Return the GRID_COUNT values that fill a Range, in order; fewer for a short range of integers."""
+def _grid(wanted: Range) -> list[float]:
+    """Return the GRID_COUNT values that fill a range, in order; fewer for a short range of integers."""
     fill = np.geomspace if _in_ratios(wanted) else np.linspace
     values = fill(wanted.low, wanted.high, GRID_COUNT)
     values[[0, -1]] = wanted.low, wanted.high
@@ -130,28 +136,28 @@ def _grid(wanted):
 
 
 class Search:
-    """Search over the Range `wanted` for the Goal `aim`.
+    """Search over a range for a goal.
 
-    make_plan   make_plan(overrides) -> plan.Plan of the trials with these changed parameters
+    make_plan   make_plan(overrides) returns the plan of the trials with these changed parameters
     folder      folder of the tables of trials, one table for each value
-    pool        monte_carlo.Pool
     progress    function, see ensemble.run_missing_trials
     """
 
-    def __init__(self, make_plan, wanted, aim, folder, pool, progress=lambda done, total: None):
+    def __init__(self, make_plan: Callable[[list[str]], Plan], wanted: Range, aim: Goal, folder: str | pathlib.Path,
+                 pool: Pool, progress: Callable[[int, int], object] = lambda done, total: None) -> None:
         self._make_plan, self._wanted, self._aim = make_plan, wanted, aim
         self._folder, self._pool, self._progress = folder, pool, progress
-        self.tried: list = []
+        self.tried: list[Tried] = []
 
-    def _try(self, values):
-        """Run the trials at several values at once. Return the Tried of each value."""
+    def _try(self, values: Iterable[float]) -> list[Tried]:
+        """Run the trials at several values at once."""
         made, refused = {}, {}
         for value in values:
             try:
                 made[value] = self._make_plan([scenario.override(self._wanted.key, value)])
             except scenario.ScenarioError as error:
                 refused[value] = str(error)
-        found = [Tried(value, None, text, False) for value, text in refused.items()]
+        found = [Tried(value, {}, text, False) for value, text in refused.items()]
         with contextlib.ExitStack() as stack:
             tables = [stack.enter_context(ensemble.open_table(plan, self._folder, self._name(value)))
                       for value, plan in made.items()]
@@ -161,11 +167,10 @@ class Search:
         self.tried = sorted((*self.tried, *found), key=lambda one: one.value)
         return sorted(found, key=lambda one: one.value)
 
-    def _name(self, value):
+    def _name(self, value: float) -> str:
         return f'{table_prefix(self._wanted.key)}{value!r}'
 
-    def _tried(self, value, table):
-        """Return the Tried of a value from the table.Table of its trials."""
+    def _tried(self, value: float, table: Table) -> Tried:
         name = next(name for name in table.results if self._aim.result in (name, nodes.plain(name)))
         values = table.column(name)
         known = np.isfinite(values)
@@ -176,7 +181,7 @@ class Search:
         return Tried(value, row, '', bool(known.mean() >= MIN_MEASURED_SHARE))
 
     def run(self) -> Solution:
-        """Search and return the Solution."""
+        """Search and return the outcome."""
         wanted, aim = self._wanted, self._aim
         crossings = self._crossings(self._try(_grid(wanted))) or self._at_edges()
         what = f'{aim.result} = {aim.limit:g}'
@@ -184,9 +189,10 @@ class Search:
             return self._never(what)
         if len(crossings) > 1:
             return self._unsteady(what, crossings)
-        low, high = self._bisected(*crossings[0])
-        if low is None:
+        bisected = self._bisected(*crossings[0])
+        if bisected is None:
             return self._unsteady(what, crossings)
+        low, high = bisected
         if len(self._crossings(self.tried)) > 1:
             return self._unsteady(what, self._crossings(self.tried))
         slope = high.mean - low.mean
@@ -196,15 +202,15 @@ class Search:
                         + f': {what} is reached between {low.value:.4g} and {high.value:.4g}, with '
                         f'{statistics.coverage(low.row)} trials{_losses(low, high)}{self._gaps()}')
 
-    def _crossings(self, tried):
-        """Return the pairs of neighbouring Tried whose means lie on different sides of the limit.
+    def _crossings(self, tried: Sequence[Tried]) -> list[tuple[Tried, Tried]]:
+        """Return the pairs of neighbours whose means lie on different sides of the limit.
 
         A mean equal to the limit counts as above the limit.
         """
         return [(a, b) for a, b in zip(tried, tried[1:]) if a.measured and b.measured
                 and (a.mean < self._aim.limit) != (b.mean < self._aim.limit)]
 
-    def _at_edges(self):
+    def _at_edges(self) -> list[tuple[Tried, Tried]]:
         """Bisect between each value with the result and a neighbouring value without the result.
 
         Return the first pairs of `_crossings` that appear, [] if none appears.
@@ -217,17 +223,17 @@ class Search:
                 a, b = (one, b) if one.measured == a.measured else (a, one)
         return []
 
-    def _middle(self, low, high):
-        """Return the middle value between two Tried, None if their distance is within BRACKET_TOLERANCE."""
+    def _middle(self, low: Tried, high: Tried) -> float | None:
+        """Return the middle of two values, None if their distance is within BRACKET_TOLERANCE."""
         middle = _between(low.value, high.value, _in_ratios(self._wanted))
         middle = round(middle) if self._wanted.whole else float(f'{middle:.6g}')
         near = high.value - low.value <= BRACKET_TOLERANCE * max(abs(low.value), abs(high.value))
         return None if near or not low.value < middle < high.value else middle
 
-    def _bisected(self, low, high):
-        """Return the narrowest pair (Tried, Tried) around the limit, inside a pair of neighbours.
+    def _bisected(self, low: Tried, high: Tried) -> tuple[Tried, Tried] | None:
+        """Return the narrowest pair around the limit, inside a pair of neighbours.
 
-        Return (None, None) if most trials at a value between them have no result.
+        Return None if most trials at a value between them have no result.
         """
         for _ in range(MAX_BISECTIONS):
             middle = self._middle(low, high)
@@ -235,15 +241,15 @@ class Search:
                 break
             one, = self._try([middle])
             if not one.measured:
-                return None, None
+                return None
             if (one.mean < self._aim.limit) == (low.mean < self._aim.limit):
                 low = one
             else:
                 high = one
         return low, high
 
-    def _never(self, what):
-        """Return the Solution of a result that does not reach its limit."""
+    def _never(self, what: str) -> Solution:
+        """Return the outcome for a result that does not reach its limit."""
         wanted, known = self._wanted, [one for one in self.tried if one.measured]
         text = f'{what} is not reached for {wanted.key} from {wanted.low:g} to {wanted.high:g} {wanted.unit}'.rstrip()
         if known:
@@ -251,14 +257,14 @@ class Search:
             text += f': the mean is {least.mean:.3g} at {least.value:.4g} to {most.mean:.3g} at {most.value:.4g}'
         return Solution(math.nan, self.tried, text + self._gaps())
 
-    def _unsteady(self, what, crossings):
-        """Return the Solution of a result that reaches its limit at several values, or next to values without a
+    def _unsteady(self, what: str, crossings: Iterable[tuple[Tried, Tried]]) -> Solution:
+        """Return the outcome for a result that reaches its limit at several values, or next to values without a
         result.
         """
         places = ', '.join(f'between {a.value:.4g} and {b.value:.4g}' for a, b in crossings)
         return Solution(math.nan, self.tried, f'{what} is not reached steadily: {places}{self._gaps()}')
 
-    def _gaps(self):
+    def _gaps(self) -> str:
         """Return the text about the values at which most trials have no result, '' if there are none."""
         parts = []
         for measured, group in itertools.groupby(self.tried, key=lambda one: one.measured):
@@ -268,8 +274,8 @@ class Search:
         return f'; most trials have no {self._aim.result} {", ".join(parts)}' if parts else ''
 
 
-def _losses(low, high):
-    """Return a warning for a pair of Tried whose trials have lost the target for a part of the time, else ''."""
+def _losses(low: Tried, high: Tried) -> str:
+    """Return a warning if the trials at one of two values have lost the target for a part of the time, else ''."""
     known = [one for one in (low, high) if one.row['tracked_percent'] is not None]
     worst = min(known, key=lambda one: one.row['tracked_percent'], default=None)
     if worst is None or worst.row['tracked_percent'] >= MIN_TRACKED_PERCENT:
@@ -277,14 +283,14 @@ def _losses(low, high):
     return f'; at {worst.value:.4g} the target is tracked for {worst.row["tracked_percent"]:.3g} % of the time only'
 
 
-def _tracked(table, name):
-    """Return the mean of tracked_percent [%] over the trials of a table.Table, for the beam of the result `name`; None
-    if the trials do not measure it."""
+def _tracked(table: Table, name: str) -> float | None:
+    """Return the mean of tracked_percent [%] over the trials of a table, for the beam of the result `name`; None if
+    the trials do not measure it."""
     column = f'{nodes.beam_of(name)}/{TRACKED_RESULT}'.lstrip('/')
     values = table.column(column) if column in table.results else np.full(1, math.nan)
     return float(np.nanmean(values)) if np.isfinite(values).any() else None
 
 
-def reason(one):
-    """Return the text on the trials of a Tried: the refusal of its value, or the number of trials with the result."""
+def reason(one: Tried) -> str:
+    """Return the text on the trials at a value: the refusal of the value, or the number of trials with the result."""
     return one.why or statistics.coverage(one.row)

@@ -23,14 +23,17 @@ sensitivity  Dependence of a result on a varied parameter. For a parameter with 
 import collections
 import math
 import re
-import typing
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 import numpy as np
 from scipy import optimize, stats
 
 from pedestal_analysis.results import intervals, results, verdict
+from pedestal_analysis.trials.table import Table
 from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
+from pedestal_common.quantities import Bools, Estimate, Floats, Ints, Json, Row
 
 PERCENTILES = (1, 5, 25, 50, 75, 95, 99)  # reported percentiles [%]
 Z = float(stats.norm.ppf(0.5 + 0.5 * intervals.CONFIDENCE_LEVEL))
@@ -41,20 +44,19 @@ WHY = 'why'
 """Name of the column with the verdict on a trial that did not track, '' for a trial that tracked; one per beam."""
 
 
-class Question(typing.NamedTuple):
+class Question(NamedTuple):
     """A statement that is true or false for each trial.
-
-    name       name of the statement
-    result     name of the result that decides
-    holds      holds(values of the result (n,)) -> (n,) bool, True where the statement is true
-    sentence   the statement
 
     A trial without the result has the value NaN, for which `holds` is False.
     """
-    name: str
-    result: str
-    holds: typing.Callable
-    sentence: str
+    name: str           # of the statement
+    result: str         # name of the result that decides
+    holds: Callable[[Floats], Bools]    # holds(values of the result (n,)) is True where the statement is true
+    sentence: str       # the statement
+
+
+def _meeting(target: str) -> Callable[[Floats], Bools]:
+    return lambda values: np.array([intervals.meets(value, target) for value in values])
 
 
 TRIAL_QUESTIONS = (
@@ -64,27 +66,24 @@ TRIAL_QUESTIONS = (
              'After the first evaluated step the target was never further than half a beamwidth off.'),
     Question('aligned', 'aligned_s', np.isfinite, 'The INS reported `aligned`.'),
     *(Question(f'{result.name}_met', result.name,
-               lambda values, target=result.target: np.array([intervals.meets(value, target) for value in values]),
+               _meeting(result.target),
                f'{result.name} is {result.target}.')
       for result in results.RESULTS if result.target and result.part not in ('run', 'supervised')),
 )
 
 
-class Requirement(typing.NamedTuple):
-    """Criterion of the user for a result (--require).
-
-    text: the criterion; result: name of the result; target: text for intervals.meets.
-    """
-    text: str
-    result: str
-    target: str
+class Requirement(NamedTuple):
+    """Criterion of the user for a result (--require)."""
+    text: str       # the criterion
+    result: str     # name of the result
+    target: str     # for intervals.meets
 
 
 _REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')
 """Pattern of the text of a Requirement: name of the result, sign, limit."""
 
 
-def check_result(option, name, known):
+def check_result(option: str, name: str, known: Iterable[str]) -> None:
     """Raise ValueError unless a name is in `known`, the names of the results, with or without the name of a beam.
 
     option: option with its value, for the text of the error.
@@ -94,8 +93,8 @@ def check_result(option, name, known):
                          '`pedestal run --all --explain` explains the results')
 
 
-def requirement(text, known) -> Requirement:
-    """Return the Requirement of a text such as 'pointing_max_deg < 0.1'. Raises ValueError.
+def requirement(text: str, known: Iterable[str]) -> Requirement:
+    """Return the criterion of a text such as 'pointing_max_deg < 0.1'. Raises ValueError.
 
     known: names of the results.
     """
@@ -110,7 +109,7 @@ def requirement(text, known) -> Requirement:
     return Requirement(f'{name} {sign} {limit}', name, f'{sign} {limit}')
 
 
-def number(text) -> float:
+def number(text: str) -> float:
     """Return the number in a text, NaN if the text is no number."""
     try:
         return float(text)
@@ -118,10 +117,10 @@ def number(text) -> float:
         return math.nan
 
 
-def of_requirements(case, table, requirements):
-    """Return the rows of --json: the rate at which the trials of a table.Table meet each of some Requirements.
+def of_requirements(case: str, table: Table, requirements: Iterable[Requirement]) -> list[Row]:
+    """Return the rows of --json: the rate at which trials meet each of some criteria.
 
-    A trial without the result does not meet its requirement. Each row also has the fields of coverage_fields.
+    A trial without the result does not meet its criterion. Each row also has the fields of coverage_fields.
     """
     found = []
     for required in requirements:
@@ -136,25 +135,25 @@ def of_requirements(case, table, requirements):
     return found
 
 
-def percentile(values, share):
-    """Return (value, low, high) of a percentile `share` [%] of values (n,); low, high: 95 % interval.
+def percentile(values: Floats, share: float) -> Estimate:
+    """Return a percentile `share` [%] of values (n,), with its 95 % interval.
 
-    A bound is NaN if n is too small for it.
+    An end is NaN if n is too small for it.
     """
     interval = stats.quantile_test(values, p=share / 100.0).confidence_interval(intervals.CONFIDENCE_LEVEL)
     return np.percentile(values, share), interval.low, interval.high
 
 
-def rate(count, n):
-    """Return (share, low, high) [%] of `count` out of n trials; low, high: 95 % interval."""
+def rate(count: int, n: int) -> Estimate:
+    """Return the share [%] of `count` out of n trials, with its 95 % interval."""
     interval = stats.binomtest(count, n).proportion_ci(intervals.CONFIDENCE_LEVEL, method='exact')
     return 100.0 * count / n, 100.0 * interval.low, 100.0 * interval.high
 
 
-def rank_correlation(x, y):
-    """Return (r, low, high) of Spearman's rank correlation of x and y (n,); low, high: 95 % interval.
+def rank_correlation(x: Floats, y: Floats) -> Estimate:
+    """Return Spearman's rank correlation r of x and y (n,), with its 95 % interval.
 
-    All are NaN if x or y does not vary; low and high are NaN for n below four.
+    All are NaN if x or y does not vary; the interval is NaN for n below four.
     """
     n = len(x)
     if n < 2 or not (np.ptp(x) > 0.0 and np.ptp(y) > 0.0):
@@ -166,10 +165,10 @@ def rank_correlation(x, y):
     return r, math.tanh(middle - half), math.tanh(middle + half)
 
 
-def eta_squared(x, y):
-    """Return (eta squared, low, high) of the ranks of y (n,) over the categories x (n,); low, high: 95 % interval.
+def eta_squared(x: Floats, y: Floats) -> Estimate:
+    """Return eta squared of the ranks of y (n,) over the categories x (n,), with its 95 % interval.
 
-    All are NaN if x or y does not vary, or if each trial has a category of its own; low and high are NaN if the
+    All are NaN if x or y does not vary, or if each trial has a category of its own; the interval is NaN if the
     categories explain everything.
     """
     n, kinds = len(x), np.unique(x)
@@ -183,9 +182,9 @@ def eta_squared(x, y):
         return share, math.nan, math.nan
     f = (1.0 - unexplained) / (k - 1) / (unexplained / (n - k))
 
-    def bound(probability):
+    def bound(probability: float) -> float:
         """Return the eta squared for which the noncentral F distribution is below f with a probability."""
-        def excess(noncentrality):
+        def excess(noncentrality: float) -> float:
             return stats.ncf.cdf(f, k - 1, n - k, noncentrality) - probability
         high = 1.0
         if stats.f.cdf(f, k - 1, n - k) < probability:
@@ -198,35 +197,34 @@ def eta_squared(x, y):
     return share, bound(0.5 + 0.5 * intervals.CONFIDENCE_LEVEL), bound(0.5 - 0.5 * intervals.CONFIDENCE_LEVEL)
 
 
-def unit(name):
+def unit(name: str) -> str:
     """Return the unit of a result by its column in a table of trials, such as beam_2/loss_s."""
     return results.RESULT_BY_NAME[nodes.plain(name)].unit
 
 
-def case_of(case, name):
+def case_of(case: str, name: str) -> tuple[str, str]:
     """Return (case, metric) of the rows for a column of a table; the case contains the beam, as in `pedestal run`."""
     beam, plain = nodes.beam_of(name), nodes.plain(name)
     return f'{case}/{beam}'.rstrip('/'), plain
 
 
-def coverage_fields(table, name, known):
+def coverage_fields(table: Table, name: str, known: Bools) -> dict[str, Json]:
     """Return the fields `of` and `left_out` of a row of --json, which state how many trials have a result.
 
-    table: table.Table; name: column of the result; known: mask (n,) of the trials with the result.
-    `of` is the number of all trials. `left_out` is {first word of the column `why`: number of trials}, for the trials
-    without the result.
+    name: column of the result; known: mask (n,) of the trials with the result. `of` is the number of all trials.
+    `left_out` is {first word of the column `why`: number of trials}, for the trials without the result.
     """
     words = collections.Counter(why.partition(':')[0] or 'not measured'
                                 for why, is_known in zip(table.text(why_column(name)), known) if not is_known)
     return {'of': known.size, 'left_out': dict(words.most_common())}
 
 
-def why_column(name):
+def why_column(name: str) -> str:
     """Return the name of the column WHY for the beam of a column of results."""
     return f'{nodes.beam_of(name)}/{WHY}'.lstrip('/')
 
 
-def coverage(row):
+def coverage(row: Row) -> str:
     """Return the text of the number of trials behind a row, such as '23 of 24, 1 tripped'."""
     if row.get('of', row['runs']) == row['runs']:
         return str(row['runs'])
@@ -234,16 +232,16 @@ def coverage(row):
     return ', '.join((f'{row["runs"]} of {row["of"]}', *reasons))
 
 
-def failures(table):
-    """Return one line on the trials of a table.Table that failed, '' for none."""
+def failures(table: Table) -> str:
+    """Return one line on the trials that failed, '' for none."""
     words = [text.partition(':')[0] for name in table.texts for text in table.text(name)]
     count = collections.Counter(word for word in words if word in verdict.FAILURE_WORDS)
     listed = ', '.join(f'{number} {word}' for word, number in count.most_common())
     return f'{sum(count.values())} of {len(words)} runs failed: {listed}; column `{WHY}` of the table' if count else ''
 
 
-def of_results(case, table):
-    """Return the rows of mean, smallest value, percentiles and largest value of each result of a table.Table.
+def of_results(case: str, table: Table) -> list[Row]:
+    """Return the rows of mean, smallest value, percentiles and largest value of each result.
 
     Each row also has the fields of coverage_fields.
     """
@@ -264,8 +262,8 @@ def of_results(case, table):
     return found
 
 
-def of_questions(case, table):
-    """Return the rows of the rates of the statements TRIAL_QUESTIONS over a table.Table.
+def of_questions(case: str, table: Table) -> list[Row]:
+    """Return the rows of the rates of the statements TRIAL_QUESTIONS over all trials.
 
     A statement is false for a trial without its result.
     """
@@ -280,8 +278,8 @@ def of_questions(case, table):
     return found
 
 
-def of_sensitivity(case, table):
-    """Return the rows of the sensitivity of each result to each varied parameter of a table.Table.
+def of_sensitivity(case: str, table: Table) -> list[Row]:
+    """Return the rows of the sensitivity of each result to each varied parameter.
 
     The sensitivity is eta_squared for a parameter of texts, else rank_correlation. A result that does not vary has no
     row.
@@ -301,19 +299,19 @@ def of_sensitivity(case, table):
     return found
 
 
-def larger_is_better(name):
+def larger_is_better(name: str) -> bool:
     """Return True if a larger value of a result is better, by the sign of its target."""
     return (results.RESULT_BY_NAME[nodes.plain(name)].target or '').startswith('>')
 
 
-def ranking(name, values):
-    """Return the indices (n,) of the values (n,) of a result, from the worst to the best; NaN is the worst."""
+def ranking(name: str, values: Floats) -> Ints:
+    """Return the indices of the values (n,) of a result, from the worst to the best; NaN is the worst."""
     badness = -values if larger_is_better(name) else values
     return np.argsort(-np.where(np.isfinite(badness), badness, math.inf), kind='stable')
 
 
-def ranked_by(table, result=None):
-    """Return the column of the result that ranks the trials of a table.Table.
+def ranked_by(table: Table, result: str | None = None) -> str:
+    """Return the column of the result that ranks the trials.
 
     It is the column of `result`, even if all its values are NaN. With None it is the rms pointing error, or, if no
     trial has measured that, the rms following error in azimuth. Raises ValueError if no trial has the result.

@@ -11,8 +11,11 @@ import json
 import math
 import os
 import pathlib
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
+
+from pedestal_common.quantities import Floats, Json
 
 LEADING_COLUMNS = ('trial', 'seed')  # columns before the varied parameters and the results
 
@@ -24,7 +27,7 @@ class TableError(ValueError):
 
 
 class Table:
-    """Rows of the trials of a plan.Plan in the file FOLDER/NAME.csv; FOLDER/NAME.json describes the trials.
+    """Rows of the trials of a plan in the file FOLDER/NAME.csv; FOLDER/NAME.json describes the trials.
 
     identity   {key: text} that distinguishes these trials from others
     varied     heads of the columns of varied parameters
@@ -36,20 +39,23 @@ class Table:
     Raises TableError if the file exists and is damaged or belongs to other trials.
     """
 
-    def __init__(self, folder, name, identity, varied, results, texts=(), planned=()):
+    _stream: io.BufferedRandom  # of the file, open inside the context
+
+    def __init__(self, folder: str | pathlib.Path, name: str, identity: Mapping[str, str], varied: Iterable[str],
+                 results: Iterable[str], texts: Iterable[str] = (), planned: Sequence[Sequence[Json]] = ()) -> None:
         folder = pathlib.Path(folder)
         self.file, self._description_file = folder / f'{name}.csv', folder / f'{name}.json'
         self.varied, self.results, self.texts = list(varied), list(results), list(texts)
         self._planned = planned
         self._identity = {**identity, 'columns': ' '.join(self.head)}
-        self._stream, self.rows = None, []
+        self.rows: list[list[str]] = []
 
     @property
-    def head(self):
+    def head(self) -> list[str]:
         """Heads of all columns, in order."""
         return [*LEADING_COLUMNS, *self.varied, *self.results, *self.texts]
 
-    def __enter__(self):
+    def __enter__(self) -> 'Table':
         self.file.parent.mkdir(parents=True, exist_ok=True)
         self._stream = open(self.file, 'a+b')
         try:
@@ -62,10 +68,10 @@ class Table:
             raise
         return self
 
-    def __exit__(self, *raised):
+    def __exit__(self, *raised: object) -> None:
         self._stream.close()
 
-    def _begin(self):
+    def _begin(self) -> None:
         """Read the complete rows of the file, or begin a new file."""
         self._stream.seek(0)
         content = self._stream.read()
@@ -81,7 +87,7 @@ class Table:
         os.truncate(self.file, 0)
         self._write([self.head])
 
-    def _compare(self):
+    def _compare(self) -> None:
         """Raise TableError if the file belongs to other trials."""
         try:
             found = json.loads(self._description_file.read_text())
@@ -96,14 +102,14 @@ class Table:
                 raise TableError(f'{self.file} contains other trials ({difference}): use another --output, or delete '
                                  'the file')
 
-    def _checked(self, content):
+    def _checked(self, content: bytes) -> list[list[str]]:
         """Return the rows of trials in the bytes of the file. Raises TableError for a damaged row."""
         try:
             text = content.decode('utf-8-sig')
         except UnicodeDecodeError as error:
             line = 1 + content.count(b'\n', 0, error.start)
             raise self._damage(line, f'byte {content[error.start]:#04x}: must be text in UTF-8') from None
-        reader, rows = csv.reader(io.StringIO(text, newline='')), []
+        reader, rows = csv.reader(io.StringIO(text, newline='')), list[list[str]]()
         try:
             if next(reader, []) != self.head:
                 raise self._damage(1, 'must hold the names of the columns, as this program writes them')
@@ -114,8 +120,8 @@ class Table:
             raise self._damage(reader.line_num, f'is no line of a CSV file: {error}') from None
         return rows
 
-    def _check(self, row, i, line):
-        """Raise TableError unless a row [text of a cell] is that of trial i. line: number of the line in the file."""
+    def _check(self, row: Sequence[str], i: int, line: int) -> None:
+        """Raise TableError unless the cells of a row are those of trial i. line: number of the line in the file."""
         if len(row) != len(self.head):
             raise self._damage(line, f'{len(row)} cells: must be {len(self.head)} as in line 1')
         planned = [i, *(self._planned[i] if i < len(self._planned) else ())]
@@ -128,29 +134,28 @@ class Table:
             elif first <= k < first + len(self.results) and cell and _number(cell) is None:
                 raise self._damage(line, f'{name} = {cell!r:.60}: must be a number, or empty for no result')
 
-    def _damage(self, line, text):
-        """Return the TableError of a damaged line."""
+    def _damage(self, line: int, text: str) -> TableError:
         return TableError(f'{self.file}: line {line}: {text}; mend the line, or delete the file to run its trials '
                           'again')
 
-    def append(self, rows):
-        """Write rows to the file. A row is a list of values in the order of `head`, None for a missing value."""
-        rows = [[_written(value) for value in row] for row in rows]
-        self._write(rows)
-        self.rows += rows
+    def append(self, rows: Iterable[Iterable[Json]]) -> None:
+        """Write rows to the file. A row holds values in the order of `head`, None for a missing value."""
+        written = [[_written(value) for value in row] for row in rows]
+        self._write(written)
+        self.rows += written
 
     @property
-    def count_in_file(self):
+    def count_in_file(self) -> int:
         """Number of the rows in the file; a stopped `append` may have written rows that `rows` does not hold."""
         return max(self.file.read_bytes().count(b'\n') - 1, 0)
 
-    def _write(self, rows):
+    def _write(self, rows: Iterable[Iterable[str]]) -> None:
         text = io.StringIO()
         csv.writer(text, lineterminator='\n').writerows(rows)
         self._stream.write(text.getvalue().encode())
         self._stream.flush()
 
-    def column(self, name):
+    def column(self, name: str) -> Floats:
         """Return the numbers (n,) of a column, NaN for a result that was not measured.
 
         For a column of texts, return the index of each text in the order of first appearance.
@@ -163,7 +168,7 @@ class Table:
             categories = self.categories(name)
             return np.array([float(categories.index(cell)) for cell in cells])
 
-    def categories(self, name):
+    def categories(self, name: str) -> list[str]:
         """Return the different texts of a column in the order of first appearance; [] for a column of numbers."""
         cells = [row[self.head.index(name)] for row in self.rows]
         try:
@@ -172,20 +177,20 @@ class Table:
             return list(dict.fromkeys(cells))
         return []
 
-    def text(self, name):
-        """Return the texts [n] of a column of sentences; '' for each trial in a table without that column."""
+    def text(self, name: str) -> list[str]:
+        """Return the text of each trial in a column of sentences; '' for each in a table without that column."""
         if name not in self.texts:
             return [''] * len(self.rows)
         return [row[self.head.index(name)] for row in self.rows]
 
     @property
-    def measured_results(self):
+    def measured_results(self) -> list[str]:
         """Names of the results that at least one trial has."""
         first = len(LEADING_COLUMNS) + len(self.varied)
         return [name for i, name in enumerate(self.results, first) if any(row[i] for row in self.rows)]
 
 
-def _number(cell):
+def _number(cell: str) -> float | None:
     """Return the number in a cell, None if the cell holds no number."""
     try:
         return None if '_' in cell else float(cell)
@@ -193,7 +198,7 @@ def _number(cell):
         return None
 
 
-def _written(value):
+def _written(value: Json) -> str:
     """Return the text of a cell: '' for None, a number as the shortest text that reads back as the same number."""
     if value is None:
         return ''

@@ -20,15 +20,23 @@ import dataclasses
 import functools
 import math
 import shlex
+import typing
+from collections.abc import Iterable, Iterator, Mapping
 
 from acu_tracker.servo import ends
-from adu_drive.params import PLANT_PERIOD_S, AduParameters, mesh_inertia
+from adu_drive.params import PLANT_PERIOD_S, AduParameters, MotorParameters, mesh_inertia
 from pedestal_analysis.tuning import data_sheet_limits
+from pedestal_analysis.tuning.data_sheet_format import DataSheet
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import ParameterError, as_dict, build, flatten
+from pedestal_common.quantities import DecibelHertz, Json, Radians
 from pedestal_common.text_files import parameter_file
+from tracking_receiver_sim.params import TrackingReceiverParameters
+
+if typing.TYPE_CHECKING:
+    from pedestal_analysis.tuning.loops import Plant
 
 BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033, 0.24
 """Shares of the phase voltage of a motor [-].
@@ -40,8 +48,8 @@ KNOWN_MIRROR_M = 2.4  # diameter of the mirror for which the C/N0 of the scenari
 RATE_SHARE = 0.9  # share of the rate that an axis reaches, which replaces an unreachable rate of the data sheet [-]
 
 
-def motor(sheet, known):
-    """Return {key: value} of a motor of a DataSheet, scaled from the parameters {key: value} of the default motor."""
+def motor(sheet: DataSheet, known: Mapping[str, float]) -> dict[str, float]:
+    """Return {key: value} of a motor, scaled from the parameters {key: value} of the default motor."""
     share, pairs, voltage = sheet.motor_torque / 30.0, known['pole_pairs'], known['voltage']
     electrical = pairs * sheet.motor_speed * math.pi / 30.0
     flux = BACK_EMF_SHARE * voltage / electrical
@@ -53,8 +61,8 @@ def motor(sheet, known):
             'viscous': known['viscous'] * share, 'brake': known['brake'] * share}
 
 
-def axis(sheet, name):
-    """Return {key: value} of an axis of the drive for a DataSheet, without the gains of its loops; name: the axis."""
+def axis(sheet: DataSheet, name: str) -> dict[str, float]:
+    """Return {key: value} of an axis of the drive, without the gains of its loops; name: the axis."""
     known = as_dict(getattr(AduParameters(), name))
     inertia, ratio, rate = (getattr(sheet, f'{what}_{name}') for what in ('inertia', 'ratio', 'rate'))
     share = inertia / known['load.inertia']
@@ -77,7 +85,7 @@ def axis(sheet, name):
     return values | _softer(name, values)
 
 
-def _softer(name, values):
+def _softer(name: str, values: Mapping[str, float]) -> dict[str, float]:
     """Return {key: value} of stiffness and damping of the gear meshes, limited for the step of the simulated plant.
 
     Because the stiffness is scaled with the load, it is too large for small motors under a heavy load.
@@ -89,8 +97,8 @@ def _softer(name, values):
             'gear_train.stiffness': min(values['gear_train.stiffness'], M / h**2)}
 
 
-def _plant(sheet, name, values):
-    """Return the loops.Plant of the axis `name` with parameters `values` {key: value}.
+def _plant(sheet: DataSheet, name: str, values: Mapping[str, float]) -> 'Plant':
+    """Return the plant of the axis `name` with parameters `values` {key: value}.
 
     Raises ParameterError, LoopError.
     """
@@ -103,8 +111,8 @@ def _plant(sheet, name, values):
         raise ParameterError(f'adu.{name}: {error}') from None
 
 
-def attainable(sheet):
-    """Return (DataSheet with rates that its axes reach, [line about each changed rate]).
+def attainable(sheet: DataSheet) -> tuple[DataSheet, list[str]]:
+    """Return (data sheet with rates that its axes reach, line about each changed rate).
 
     Two limits apply to the rate of an axis. The motors must reach it with their voltage, and they must be able to stop
     the axis from it within half of its travel. Raises ScenarioError, ParameterError, LoopError.
@@ -126,12 +134,13 @@ def attainable(sheet):
             why = (f'the motors reach {reached:.3g} deg/s at ratio {ratio:g}' if turning <= stopping else
                    f'the motors can stop the axis within half of its travel from {reached:.3g} deg/s')
             remarks.append(f'--rate-{name} {math.degrees(asked):.4g}: {why}; {taken:g} deg/s is taken')
-            sheet = dataclasses.replace(sheet, **{f'rate_{name}': taken})
+            changes: dict[str, Json] = {f'rate_{name}': taken}
+            sheet = dataclasses.replace(sheet, **changes)
     return sheet, remarks
 
 
-def _motors(name, values):
-    """Yield both MotorParameters of an axis by its name and its parameters {key: value}. Raises ParameterError."""
+def _motors(name: str, values: Mapping[str, float]) -> Iterator[MotorParameters]:
+    """Yield both motors of an axis by its name and its parameters {key: value}. Raises ParameterError."""
     known = getattr(AduParameters(), name)
     for number in (1, 2):
         own = {key.partition('.')[2]: value for key, value in values.items() if key.startswith(f'motor_{number}.')}
@@ -142,20 +151,19 @@ def _motors(name, values):
             raise ParameterError(f'adu.{name}: motor_{number}.{error}') from None
 
 
-def cn0(sheet):
-    """Return the C/N0 [dB-Hz] on the beam axis at the reference range: of the DataSheet, else by the area of the
-    mirror."""
+def cn0(sheet: DataSheet) -> DecibelHertz:
+    """Return the C/N0 on the beam axis at the reference range: of the data sheet, else by the area of the mirror."""
     known = _receiver(sheet.like).receiver.cn0_dbhz
     return sheet.cn0 or float(f'{known + 20.0 * math.log10(sheet.mirror / KNOWN_MIRROR_M):.4g}')
 
 
 @functools.cache
-def _receiver(name):
-    """Return the TrackingReceiverParameters of the scenario of this name."""
+def _receiver(name: str) -> TrackingReceiverParameters:
+    """Return the parameters of the receiver in the scenario of this name."""
     return scenario.load(name).node_parameters('tracking_receiver')
 
 
-def _assumed(sheet):
+def _assumed(sheet: DataSheet) -> list[str]:
     """Return a line for each assumed value."""
     lines = []
     if not sheet.cn0:
@@ -169,8 +177,8 @@ def _assumed(sheet):
     return lines
 
 
-def sections(sheet, title):
-    """Return {node: {key: value}} of the scenario of a DataSheet; title: of the scenario.
+def sections(sheet: DataSheet, title: str) -> dict[str, dict[str, Json]]:
+    """Return {node: {key: value}} of the scenario; title: of the scenario.
 
     Raises ScenarioError, ParameterError, LoopError.
     """
@@ -198,8 +206,8 @@ def sections(sheet, title):
     return rounded
 
 
-def _at_the_target(sheet, found):
-    """Return {key of adu: initial angle [rad]}, three beamwidths from the predicted target.
+def _at_the_target(sheet: DataSheet, found: Mapping[str, Mapping[str, Json]]) -> dict[str, Radians]:
+    """Return {key of adu: initial angle}, three beamwidths from the predicted target.
 
     A slow antenna then reaches the target soon. The angles of a wide beam end at the travel of the axis.
     found: {node: {key: value}} of the scenario.
@@ -211,7 +219,7 @@ def _at_the_target(sheet, found):
             for name, angle, travel in zip(AXES, angles[0], travels)}
 
 
-def text(found, head):
+def text(found: Mapping[str, Mapping[str, Json]], head: Iterable[str]) -> str:
     """Return the text of a scenario file from {node: {key: value}}; head: lines of comment at its beginning.
 
     Each value has its unit and meaning in a comment.
@@ -228,8 +236,8 @@ def text(found, head):
     return '\n'.join(lines) + '\n'
 
 
-def new(sheet, name, command):
-    """Return (text of the scenario file of a DataSheet, [line about each changed or assumed value]).
+def new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
+    """Return (text of the scenario file, line about each changed or assumed value).
 
     name: name of the scenario; command: the command line, for the head of the file. Raises SheetError for values
     that contradict each other, which names the options of `pedestal new` to change.
@@ -240,7 +248,7 @@ def new(sheet, name, command):
         raise data_sheet_limits.refusal(sheet, error, lambda other: _new(other, name, command)) from None
 
 
-def _new(sheet, name, command):
+def _new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
     """Return the values of `new`. Raises ScenarioError, ParameterError, LoopError for values that contradict each
     other."""
     sheet, remarks = attainable(sheet)

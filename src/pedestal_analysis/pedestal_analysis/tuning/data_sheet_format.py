@@ -3,6 +3,7 @@ import dataclasses
 import math
 
 from pedestal_common.parameters import ParameterError, Parameters, choice, parameter
+from pedestal_common.quantities import Hertz, Radians
 
 LIGHT_SPEED_M_GHZ = 0.299792458  # speed of light [m GHz]
 MIN_MODE_HZ, MAX_MODE_HZ = 1.0, 200.0  # smallest and largest structural frequency that the simulated plant allows [Hz]
@@ -37,7 +38,7 @@ class DataSheet(Parameters):
     encoder_bits: int = parameter(22, 8, 32, 'bit', 'resolution of the load encoders, per turn')
     like: str = choice('leo_pass', TEMPLATE_SCENARIOS, 'scenario that provides target and site')
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Check all fields. The range of `mode` excludes the numbers between 0 and the smallest frequency."""
         if self.mode != 0.0 and not MIN_MODE_HZ <= self.mode <= MAX_MODE_HZ:
             raise ParameterError(f'mode = {self.mode:g} Hz: must be {MIN_MODE_HZ:g} to {MAX_MODE_HZ:g}, or 0 for the '
@@ -45,8 +46,8 @@ class DataSheet(Parameters):
         super().__post_init__()
 
     @property
-    def structural_frequency(self):
-        """Lowest frequency of the structure with locked motors [Hz].
+    def structural_frequency(self) -> Hertz:
+        """Lowest frequency of the structure with locked motors.
 
         Without `mode` it is the average of antennas of this diameter d [m], 20 Hz d^-0.7. Source: W. Gawronski,
         Control and Pointing Challenges of Antennas and (Radio) Telescopes, IPN Progress Report 42-159 (JPL, 2004), and
@@ -56,6 +57,6 @@ class DataSheet(Parameters):
         return self.mode or 20.0 * self.mirror**-0.7
 
     @property
-    def theta(self):
-        """Half-power beamwidth [rad]."""
+    def theta(self) -> Radians:
+        """Half-power beamwidth."""
         return math.radians(self.beamwidth or 70.0 * LIGHT_SPEED_M_GHZ / self.frequency / self.mirror)

@@ -21,14 +21,28 @@ this error, the current and the speed loop are measured with SUB_STEP_COUNT step
 """
 import dataclasses
 import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 
 from adu_drive import axis, drive_unit
+from adu_drive.params import SPEED_LOOP_PERIOD_S, AduParameters, AxisParameters
 from pedestal_analysis.trials.cases import Case
 from pedestal_bringup.loop import closed_loop
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import (
+    AnyRecord,
+    Complexes,
+    Floats,
+    Hertz,
+    Ints,
+    Json,
+    Pairs,
+    RadiansPerSecond,
+    Seconds,
+)
 
 MOTOR_FIELDS = ('motor_1', 'motor_2')  # names of both motors in the state of an axis
 SWEEP_START_ANGLES_RAD = (-2.0, 0.15)  # angles of azimuth and elevation at the beginning of a measurement [rad]
@@ -49,34 +63,30 @@ PEAK_SHARE: largest ratio of the peak of the multisine to the rate of the measur
 SUB_STEP_COUNT = 10  # number of plant steps in a current period while the current and the speed loop are measured
 
 
+Margins: TypeAlias = dict[str, tuple[float, str]]  # {metric of a loop: (value, unit)}, see `margins`
+
+
 @dataclasses.dataclass(frozen=True)
 class Sweep:
-    """A multisine: the sum of sines that is added to a loop.
+    """A multisine: the sum of sines that is added to a loop."""
+    period: Seconds     # time after which the sum repeats; each sine has a whole number of periods in it
+    lowest: Hertz       # lowest frequency
+    highest: Hertz      # highest frequency
+    points: int         # number of frequencies, logarithmically spaced
+    dropped: int        # number of periods for settling
+    kept: int           # number of measured periods
+    peak: float         # largest value of the sum, in the unit of the signal of the loop
 
-    period            time after which the sum repeats [s]; each sine has a whole number of periods in it
-    lowest, highest   lowest and highest frequency [Hz]
-    points            number of frequencies, logarithmically spaced
-    dropped, kept     number of periods for settling, number of measured periods
-    peak              largest value of the sum, in the unit of the signal of the loop
-    """
-    period: float
-    lowest: float
-    highest: float
-    points: int
-    dropped: int
-    kept: int
-    peak: float
-
-    def bins(self):
+    def bins(self) -> Ints:
         """Return the frequencies as integer multiples of 1 / period [-]."""
         return np.unique(np.round(np.geomspace(self.lowest, self.highest, self.points) * self.period).astype(int))
 
-    def frequencies(self):
+    def frequencies(self) -> Floats:
         """Return the frequencies of the sines [Hz]: `points` of them, fewer if several round to one frequency."""
         return self.bins() / self.period
 
-    def signal(self, step):
-        """Return the whole record (n,) with one value per `step` [s].
+    def signal(self, step: Seconds) -> Floats:
+        """Return the whole record (n,) with one value per step.
 
         All sines have equal amplitudes. The phases of Schroeder (IEEE Trans. Information Theory 16 (1970) 85) keep the
         peak of the sum low.
@@ -109,26 +119,22 @@ The peak is half of the value at which the teeth lose contact with the bias torq
 class Response:
     """Measured frequency response of a loop.
 
-    frequency   (n,) [Hz]
-    open_loop   (n,) complex open loop L [-]
-    deviation   (n,) standard deviation of L over the measured periods, divided by |L| [-]
-    lowest      lowest frequency of a crossover [Hz]. In a speed loop it is that of the structure on a free axis:
-                at the frequency of the structure on locked motors the dish holds the axis, and |L| falls below 1 long
-                before the crossover
+    In a speed loop the lowest frequency of a crossover is that of the structure on a free axis. At the frequency of
+    the structure on locked motors the dish holds the axis. There |L| falls below 1 long before the crossover.
     """
-    frequency: np.ndarray
-    open_loop: np.ndarray
-    deviation: np.ndarray
-    lowest: float = 0.0
+    frequency: Floats       # (n,) [Hz]
+    open_loop: Complexes    # (n,) open loop L [-]
+    deviation: Floats       # (n,) standard deviation of L over the measured periods, divided by |L| [-]
+    lowest: Hertz = 0.0     # lowest frequency of a crossover
 
     @property
-    def closed_loop(self):
-        """Closed loop T = L / (1 + L) (n,), complex [-]."""
+    def closed_loop(self) -> Complexes:
+        """Closed loop T = L / (1 + L) (n,) [-]."""
         return self.open_loop / (1.0 + self.open_loop)
 
 
-def response(sweep, sent, returned):
-    """Return the Response of a loop from the records (n,) of its signals E (`sent`) and Y (`returned`)."""
+def response(sweep: Sweep, sent: Floats, returned: Floats) -> Response:
+    """Return the response of a loop from the records (n,) of its signals E (`sent`) and Y (`returned`)."""
     E, Y = (np.fft.rfft(x.reshape(sweep.dropped + sweep.kept, -1)[sweep.dropped:], axis=1)[:, sweep.bins()]
             for x in (sent, returned))
     with np.errstate(invalid='ignore'):  # a tripped drive returns no signal
@@ -137,21 +143,23 @@ def response(sweep, sent, returned):
 
 
 @compiled
-def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
+def _inner_loops(state: AnyRecord, constants: AnyRecord, substeps: int, rate: Floats, current: Floats, speed: Floats,
+                 wanted: Pairs, made: Pairs) -> None:
     """Run one axis from rest, and fill the records of its signals.
 
-    s, c            state and constants of the axis
     substeps        number of plant steps in a period of the current loop
     rate (n,)       rate command in each period of the speed loop [rad/s]
     current (5 n,)  current that is added to the references i_ref of both motors, in each period of the current loop
-    [A] speed (n,)      filled: mean speed of the motors, at the load [rad/s]
+                    [A]
+    speed (n,)      filled: mean speed of the motors, at the load [rad/s]
     wanted, made    filled: i_ref and i_q of both motors (5 n, 2) [A]
     """
-    m1, m2, k1, k2 = s.motor_1, s.motor_2, c.motor_1, c.motor_2
-    axis.begin_period(s, c, False)        # brakes off; the windings stay cold
+    m1, m2, k1, k2 = state.motor_1, state.motor_2, constants.motor_1, constants.motor_2
+    axis.begin_period(state, constants, False)        # brakes off; the windings stay cold
     for n in range(len(rate)):
-        axis.speed_control(s, c, rate[n], 0.0, 1, True, True)    # feed-forward torque, enable, powered, no brake
-        speed[n] = c.per_2N * (m1.measured + m2.measured)
+        # feed-forward torque, enable, powered, no brake
+        axis.speed_control(state, constants, rate[n], 0.0, 1, True, True)
+        speed[n] = constants.per_2N * (m1.measured + m2.measured)
         i_1, i_2 = m1.i_ref, m2.i_ref
         for k in range(n * axis.CURRENT_LOOP_STEP_COUNT, (n + 1) * axis.CURRENT_LOOP_STEP_COUNT):
             m1.i_ref, m2.i_ref = i_1 + current[k], i_2 + current[k]
@@ -159,29 +167,29 @@ def _inner_loops(s, c, substeps, rate, current, speed, wanted, made):
             axis.current_control(m1, k1)
             axis.current_control(m2, k2)
             for _ in range(substeps):
-                axis.plant_step(s, c, 0.0)
+                axis.plant_step(state, constants, 0.0)
 
 
-def _rate(index, *largest):
-    """Return the rate [rad/s] at which the axis `index` of AXES is measured; largest: its rate limits [rad/s]."""
+def _rate(index: int, *largest: RadiansPerSecond) -> RadiansPerSecond:
+    """Return the rate at which the axis `index` of AXES is measured; largest: its rate limits."""
     return min(SWEEP_RATES_RAD_S[index], RATE_SHARE * min(largest))
 
 
-def _run_inner(drive, index, rate, current):
+def _run_inner(drive: AduParameters, index: int, rate: Floats, current: Floats) -> tuple[Floats, Pairs, Pairs]:
     """Return (speed (n,) [rad/s], i_ref, i_q (5 n, 2) [A]) of the axis `index` of AXES, see _inner_loops.
 
-    drive: AduParameters; rate (n,): rate commands [rad/s]; current (5 n,): added to the current references [A].
+    rate (n,): rate commands [rad/s]; current (5 n,): added to the current references [A].
     """
     drive = dataclasses.replace(drive, initial_azimuth=SWEEP_START_ANGLES_RAD[0],
                                 initial_elevation=SWEEP_START_ANGLES_RAD[1])
     speed, wanted, made = np.zeros(len(rate)), np.zeros((len(current), 2)), np.zeros((len(current), 2))
-    [s], [c] = drive_unit.initial_state(drive), drive_unit.constants(drive, SUB_STEP_COUNT)
-    _inner_loops(s[AXES[index]], c[AXES[index]], c['substeps'], rate, current, speed, wanted, made)
+    [state], [constants] = drive_unit.initial_state(drive), drive_unit.constants(drive, SUB_STEP_COUNT)
+    _inner_loops(state[AXES[index]], constants[AXES[index]], constants['substeps'], rate, current, speed, wanted, made)
     return speed, wanted, made
 
 
-def current(drive, sweep=CURRENT_SWEEP):
-    """Return {'current/MOTOR': Response} of the current loops of both azimuth motors; drive: AduParameters."""
+def current(drive: AduParameters, sweep: Sweep = CURRENT_SWEEP) -> dict[str, Response]:
+    """Return {'current/MOTOR': response} of the current loops of both azimuth motors."""
     added = sweep.signal(axis.CURRENT_LOOP_PERIOD_S)
     rate = np.full(len(added) // axis.CURRENT_LOOP_STEP_COUNT, _rate(0, drive.azimuth.limits.rate))
     _, wanted, made = _run_inner(drive, 0, rate, added)
@@ -189,26 +197,26 @@ def current(drive, sweep=CURRENT_SWEEP):
             for j, motor in enumerate(MOTOR_FIELDS)}
 
 
-def speed(drive, sweep=SPEED_SWEEP, axes=AXES):
-    """Return {'speed/AXIS': Response} of the speed loops of some axes; drive: AduParameters."""
+def speed(drive: AduParameters, sweep: Sweep = SPEED_SWEEP, axes: Iterable[str] = AXES) -> dict[str, Response]:
+    """Return {'speed/AXIS': response} of the speed loops of some axes."""
     responses = {}
     for i, name in ((AXES.index(name), name) for name in axes):
         rate = _rate(i, getattr(drive, name).limits.rate)
-        command = rate + _at_most(sweep, rate).signal(axis.SPEED_LOOP_PERIOD_S)
+        command = rate + _at_most(sweep, rate).signal(SPEED_LOOP_PERIOD_S)
         measured, _, _ = _run_inner(drive, i, command, np.zeros(len(command) * axis.CURRENT_LOOP_STEP_COUNT))
         responses[f'speed/{name}'] = dataclasses.replace(response(sweep, command - measured, measured),
                                                          lowest=free_frequency(getattr(drive, name)))
     return responses
 
 
-def free_frequency(axis_parameters):
-    """Return the frequency of the structure on a free axis [Hz], 0 if no structure is declared."""
+def free_frequency(axis_parameters: AxisParameters) -> Hertz:
+    """Return the frequency of the structure on a free axis, 0 if no structure is declared."""
     structure = axis_parameters.structure
     return structure.frequency / math.sqrt(1.0 - structure.inertia_share) if structure.inertia_share > 0.0 else 0.0
 
 
-def _at_most(sweep, *rates):
-    """Return a Sweep whose peak is limited for axes that move at `rates` [rad/s]."""
+def _at_most(sweep: Sweep, *rates: RadiansPerSecond) -> Sweep:
+    """Return a sweep whose peak is limited for axes that move at `rates`."""
     return dataclasses.replace(sweep, peak=min(sweep.peak, PEAK_SHARE * min(rates)))
 
 
@@ -221,13 +229,13 @@ MOVING_CASE_PARAMETERS = {
 """Changed parameters of a scenario for a program track of constant rates on both axes; `position` sets the rates."""
 
 
-def case(name, scenario, parameters):
-    """Return the Case for the measurement of position loops: a scenario with changed parameters, at constant rates."""
+def case(name: str, scenario: str, parameters: Mapping[str, Json]) -> Case:
+    """Return the case for the measurement of position loops: a scenario with changed parameters, at constant rates."""
     return Case(name, scenario, {**MOVING_CASE_PARAMETERS, **parameters})
 
 
-def _moving(case):
-    """Return (the Case whose target moves at the rates of the measurement, these rates [rad/s] of both axes)."""
+def _moving(case: Case) -> tuple[Case, list[RadiansPerSecond]]:
+    """Return (case whose target moves at the rates of the measurement, these rates of both axes)."""
     loaded = case.loaded()
     drive, acu = (loaded.node_parameters(node) for node in ('adu', 'acu'))
     rates = [_rate(i, getattr(drive, name).limits.rate, getattr(acu, name).limits.rate,
@@ -236,8 +244,8 @@ def _moving(case):
     return dataclasses.replace(case, parameters={**case.parameters, **moved}), rates
 
 
-def position(case, axes=AXES, sweep=POSITION_SWEEP):
-    """Return {'position/AXIS/CASE': Response} of the position loops of a Case of the function `case`."""
+def position(case: Case, axes: Collection[str] = AXES, sweep: Sweep = POSITION_SWEEP) -> dict[str, Response]:
+    """Return {'position/AXIS/CASE': response} of the position loops of a case of the function `case`."""
     case, rates = _moving(case)
     loaded = dataclasses.replace(case, duration=(sweep.dropped + sweep.kept) * sweep.period).loaded()
     loop = closed_loop.Loop(loaded)
@@ -248,7 +256,7 @@ def position(case, axes=AXES, sweep=POSITION_SWEEP):
             for i, name in enumerate(AXES) if name in axes}
 
 
-def _crossings(f, y, angle):
+def _crossings(f: Floats, y: Floats, angle: Floats) -> tuple[Floats, Floats]:
     """Return (frequencies [Hz], angles [rad]) at the zeros of y (n,), both interpolated linearly in log f.
 
     The angle between two frequencies changes by less than half a turn.
@@ -259,16 +267,16 @@ def _crossings(f, y, angle):
     return f[i] * (f[i + 1] / f[i]) ** share, angle[i] + share * change
 
 
-def without_gain_margin(names):
-    """Return a line on the loops of these names, which have no gain margin; [] without a name."""
+def without_gain_margin(names: Sequence[str]) -> list[str]:
+    """Return a line on the loops of these names, which have no gain margin; no line without a name."""
     if not names:
         return []
     return [f'no gain margin of {", ".join(names)}: the open loop does not reach -180 deg in the measured band, so no '
             'higher gain makes the loop unstable there']
 
 
-def margins(measured):
-    """Return {metric: (value, unit)} of a Response; NaN if the measured band has no such frequency.
+def margins(measured: Response) -> Margins:
+    """Return the metrics of a response; NaN if the measured band has no such frequency.
 
     crossover_hz       first frequency from `lowest` on at which the open loop |L| falls below 1
     phase_margin_deg   smallest phase shift, of either sign, that moves a point with |L| = 1 to -1

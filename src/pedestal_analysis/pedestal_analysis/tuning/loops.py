@@ -41,19 +41,37 @@ Of the two designs the smaller value counts, of h0 the larger. The margins are t
 plant. They are measured again with the load inertia changed by 30 % and f by 20 %, within the ranges of these
 parameters. The smallest margins count.
 """
+import argparse
 import dataclasses
 import math
 import pathlib
 import shlex
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from acu_tracker.estimation.params import FilterParameters, ImmParameters
 from adu_drive.params import SPEED_LOOP_PERIOD_S, AxisParameters
+from pedestal_analysis.trials.cases import Case
 from pedestal_analysis.tuning import frequency_response as frequency
+from pedestal_analysis.tuning.frequency_response import Margins
 from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
 from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import (
+    DecibelHertz,
+    Decibels,
+    Degrees,
+    Hertz,
+    Json,
+    KilogramMeters2,
+    NewtonMeters,
+    Radians,
+    RadiansPerSecond,
+    RadiansPerSecond2,
+    Seconds,
+)
 from pedestal_common.text_files import parameter_file
 from pedestal_recording import configuration
 
@@ -109,18 +127,13 @@ REQUIREMENT_OPTIONS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'positi
 
 @dataclasses.dataclass(frozen=True)
 class LoopRequirements:
-    """Required properties of the loops.
+    """Required properties of the loops."""
+    speed: Hertz | None = None      # crossover of the speed loop; None: derived from the other loop, or the default
+    position: Hertz | None = None   # crossover of the position loop; None likewise
+    phase_margin: Degrees = 45.0    # smallest phase margin
+    gain_margin: Decibels = 6.0     # smallest gain margin
 
-    speed, position   crossovers of speed and position loop [Hz]; None: derived from the other loop, or the default
-    phase_margin      smallest phase margin [deg]
-    gain_margin       smallest gain margin [dB]
-    """
-    speed: float | None = None
-    position: float | None = None
-    phase_margin: float = 45.0
-    gain_margin: float = 6.0
-
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name, low, high, unit in (('speed', 0.1, 500.0, 'Hz'), ('position', 0.01, 50.0, 'Hz'),
                                       ('phase_margin', 20.0, 80.0, 'deg'), ('gain_margin', 3.0, 20.0, 'dB')):
             value = getattr(self, name)
@@ -130,53 +143,43 @@ class LoopRequirements:
 
 @dataclasses.dataclass(frozen=True)
 class Plant:
-    """Plant of one axis for the design of its loops.
+    """Plant of one axis for the design of its loops. Raises LoopError if the motors cannot move the axis."""
+    name: str       # of the axis
+    axis: AxisParameters
+    wind: NewtonMeters = 0.0        # mean wind torque at the load
+    beamwidth: Radians = math.inf   # half-power beamwidth of the antenna
+    noise: float = math.inf         # root density of the receiver's noise on the beam axis [rad/sqrt(Hz)]
+    bank: ImmParameters = FilterParameters().imm    # of the axis's filter
 
-    name        name of the axis
-    axis        its adu_drive.params.AxisParameters
-    wind        mean wind torque at the load [Nm]
-    beamwidth   half-power beamwidth of the antenna [rad]
-    noise       root density of the receiver's noise on the beam axis [rad/sqrt(Hz)], see receiver_noise
-    bank        ImmParameters of the axis's filter
-
-    Raises LoopError if the motors cannot move the axis.
-    """
-    name: str
-    axis: object
-    wind: float = 0.0
-    beamwidth: float = math.inf
-    noise: float = math.inf
-    bank: ImmParameters = FilterParameters().imm
-
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.acceleration <= 0.0:
             raise LoopError(f'adu.{self.name}: the motors cannot move the axis: friction, unbalance and wind need '
                             'more torque than both torque limits')
 
     @property
-    def motor_inertia(self):
-        """Inertia J_m of a motor, the mean of both [kg m2]."""
+    def motor_inertia(self) -> KilogramMeters2:
+        """Inertia J_m of a motor, the mean of both."""
         return 0.5 * (self.axis.motor_1.inertia + self.axis.motor_2.inertia)
 
     @property
-    def ratio(self):
+    def ratio(self) -> float:
         """Gear ratio N from motor to load [-]."""
         return self.axis.gear_train.ratio
 
     @property
-    def inertia(self):
-        """Inertia J that one motor moves, on its shaft [kg m2]."""
+    def inertia(self) -> KilogramMeters2:
+        """Inertia J that one motor moves, on its shaft."""
         return self.motor_inertia + self.axis.load.inertia / (2.0 * self.ratio**2)
 
     @property
-    def mode(self):
-        """Frequency f of the structure on locked motors [Hz], 0 if no structure is declared."""
+    def mode(self) -> Hertz:
+        """Frequency f of the structure on locked motors, 0 if no structure is declared."""
         structure = self.axis.structure
         return structure.frequency if structure.inertia_share > 0.0 else 0.0
 
     @property
-    def gear_inertia(self):
-        """Inertia J without the share of the dish [kg m2].
+    def gear_inertia(self) -> KilogramMeters2:
+        """Inertia J without the share of the dish.
 
         One motor moves this inertia above the frequency of the structure.
         """
@@ -184,27 +187,27 @@ class Plant:
         return self.motor_inertia + on_gear / (2.0 * self.ratio**2)
 
     @property
-    def whole_inertia(self):
-        """Inertia J_A of load and motors, at the load [kg m2]."""
+    def whole_inertia(self) -> KilogramMeters2:
+        """Inertia J_A of load and motors, at the load."""
         return 2.0 * self.inertia * self.ratio**2
 
     @property
-    def acceleration(self):
-        """Acceleration of the load by both torque limits, less friction, unbalance and wind [rad/s2]."""
+    def acceleration(self) -> RadiansPerSecond2:
+        """Acceleration of the load by both torque limits, less friction, unbalance and wind."""
         torque = (self.axis.motor_1.torque_limit + self.axis.motor_2.torque_limit) * self.ratio
         return (torque - self.axis.friction.coulomb - abs(self.axis.load.unbalance) - abs(self.wind)
                 ) / self.whole_inertia
 
 
-def receiver_noise(beamwidth, slope, cn0_dbhz):
+def receiver_noise(beamwidth: Radians, slope: float, cn0_dbhz: DecibelHertz) -> float:
     """Return the root density of the noise of a receiver's error on the beam axis [rad/sqrt(Hz)].
 
-    beamwidth [rad]; slope: monopulse slope [-]; cn0_dbhz: C/N0 [dB-Hz].
+    slope: monopulse slope [-].
     """
     return beamwidth / (slope * math.sqrt(2.0 * 10.0**(0.1 * cn0_dbhz)))
 
 
-def filter_gains(plant):
+def filter_gains(plant: Plant) -> dict[str, int]:
     """Return {key of acu.AXIS: value} of the target filter: the number of models that do not follow the structure."""
     if not plant.mode:
         return {}
@@ -214,30 +217,30 @@ def filter_gains(plant):
     return {'filter.imm.rungs': max(1, int(np.sum(noises <= fastest)))}
 
 
-def rate_slope(plant):
-    """Return the largest slope of the rate command (`limits.acceleration`) [rad/s2].
+def rate_slope(plant: Plant) -> RadiansPerSecond2:
+    """Return the largest slope of the rate command (`limits.acceleration`).
 
     It is 1.3 times the acceleration of the shaper of a rigid axis.
     """
     return 1.3 * TORQUE_SHARE * plant.acceleration
 
 
-def drive_gains(plant, w_s):
-    """Return {key of adu.AXIS: value} of the drive for a crossover w_s [rad/s] of the speed loop."""
+def drive_gains(plant: Plant, w_s: RadiansPerSecond) -> dict[str, float]:
+    """Return {key of adu.AXIS: value} of the drive for a crossover w_s of the speed loop."""
     K_p, rated = w_s * plant.gear_inertia, plant.axis.thermal.rated_torque
     return {'speed_loop.proportional': K_p, 'speed_loop.integral': K_p * w_s / 5.0,
             'speed_loop.load_inertia': plant.axis.load.inertia, 'bias.torque': 0.4 * rated, 'bias.hold': 0.47 * rated,
             'bias.out': 1.5 * rated, 'limits.deceleration': 0.5 * plant.acceleration}
 
 
-def position_crossover(plant, w_s):
-    """Return the crossover w_p [rad/s] of the position loop for a crossover w_s [rad/s] of the speed loop."""
+def position_crossover(plant: Plant, w_s: RadiansPerSecond) -> RadiansPerSecond:
+    """Return the crossover w_p of the position loop for a crossover w_s of the speed loop."""
     w_p = w_s / CROSSOVER_RATIO
     return min(w_p, 2.0 * math.pi * plant.mode / MODE_RATIO) if plant.mode else w_p
 
 
-def shaper_gains(plant, w_s):
-    """Return {key of acu.AXIS.shaper: value} for a crossover w_s [rad/s] of the speed loop."""
+def shaper_gains(plant: Plant, w_s: RadiansPerSecond) -> dict[str, float]:
+    """Return {key of acu.AXIS.shaper: value} for a crossover w_s of the speed loop."""
     a, f = TORQUE_SHARE * plant.acceleration, plant.mode
     if not f:
         return {'acceleration': a, 'jerk': 0.75 * a * w_s, 'h0': 3.5 / w_s}
@@ -246,8 +249,8 @@ def shaper_gains(plant, w_s):
     return {'acceleration': a, 'jerk': a * min(0.75 * w_s, f), 'h0': max(3.5 / w_s, MODE_H0 / f)}
 
 
-def control_gains(plant, w_s, w_p):
-    """Return {key of acu.AXIS: value} of the control unit; w_s, w_p: crossovers of speed and position loop [rad/s]."""
+def control_gains(plant: Plant, w_s: RadiansPerSecond, w_p: RadiansPerSecond) -> dict[str, Json]:
+    """Return {key of acu.AXIS: value} of the control unit; w_s, w_p: crossovers of speed and position loop."""
     shaper = {f'shaper.{key}': value for key, value in shaper_gains(plant, w_s).items()}
     return {'controller': 'feedforward', 'feedforward.bandwidth': w_p, 'feedforward.inertia': plant.whole_inertia,
             'feedforward.friction': plant.axis.friction.coulomb,
@@ -258,23 +261,23 @@ def control_gains(plant, w_s, w_p):
 _AXIS_FIELDS = dict(parameters.flatten(AxisParameters))  # {key of adu.AXIS: dataclass field}
 
 
-def _allowed(key, value):
+def _allowed(key: str, value: float) -> float:
     """Return the value of a parameter of adu.AXIS that is nearest to `value` in the range of the parameter."""
     allowed = _AXIS_FIELDS[key].metadata
     return min(max(value, allowed['low']), allowed['high'])
 
 
-def _rounded(gains):
+def _rounded(gains: Mapping[str, Json]) -> dict[str, Json]:
     return {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in gains.items()}
 
 
-def smallest(every):
-    """Return the smallest value of each metric in several results of frequency.margins; NaN if none has the metric."""
+def smallest(every: Sequence[Margins]) -> Margins:
+    """Return the smallest value of each metric in several results; NaN if none has the metric."""
     return {key: (np.fmin.reduce([margins[key][0] for margins in every]), unit) for key, (_, unit) in every[0].items()}
 
 
-def meets_margins(margins, required):
-    """Return True if the margins of frequency.margins meet the LoopRequirements.
+def meets_margins(margins: Margins, required: LoopRequirements) -> bool:
+    """Return True if the margins of a loop meet the requirements.
 
     A gain margin outside the measured band (NaN) meets its requirement. A loop whose gain is never above 1 has no
     phase margin (NaN), and does not meet its requirement.
@@ -283,18 +286,26 @@ def meets_margins(margins, required):
     return phase >= required.phase_margin and not gain < required.gain_margin
 
 
+class LoopRow(NamedTuple):
+    """A row of the table of the loops."""
+    loop: str
+    axis: str
+    wanted: Hertz       # required crossover or bandwidth
+    margins: Margins
+
+
 class Loops:
     """The loops of a scenario during their design.
 
     source      name or path of the scenario
     overrides   texts 'node.key=value' of changed parameters
-    plants      {axis: Plant}
+    plants      {axis: its plant}
     gains       present gains, such as {'adu.azimuth.speed_loop.proportional': value}
 
     Raises LoopError for a drive without motors.
     """
 
-    def __init__(self, source, overrides=()):
+    def __init__(self, source: str, overrides: Iterable[str] = ()) -> None:
         chosen = scenario.load(source, overrides)
         if chosen.header.beam:
             raise LoopError(f'scenario {chosen.name}: an electronic beam has no loops to tune')
@@ -305,30 +316,30 @@ class Loops:
         control = chosen.node_parameters('acu')
         self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), known.antenna.beamwidth,
                                    noise, getattr(control, name).filter.imm) for name in AXES}
-        self.gains = {}
+        self.gains: dict[str, Json] = {}
 
-    def set(self, node, name, gains):
+    def set(self, node: str, name: str, gains: Mapping[str, Json]) -> None:
         """Set gains {key: value} of a node for the axis `name`, rounded to four digits."""
         self.gains |= {f'{node}.{name}.{key}': value for key, value in _rounded(gains).items()}
 
-    def designed(self, loop, name):
-        """Return the crossover [rad/s] for which the gains of a loop, speed or position, were designed."""
+    def designed(self, loop: str, name: str) -> RadiansPerSecond:
+        """Return the crossover for which the gains of a loop, speed or position, were designed."""
         if loop == 'position':
             return self.gains[f'acu.{name}.feedforward.bandwidth']
         return self.gains[f'adu.{name}.speed_loop.proportional'] / self.plants[name].gear_inertia
 
-    def _case(self, corner=(1.0, 1.0)):
-        """Return the cases.Case of a measurement; corner: factors for axes with a structure, see PLANT_CORNERS."""
+    def _case(self, corner: tuple[float, float] = (1.0, 1.0)) -> Case:
+        """Return the case of a measurement; corner: factors for axes with a structure, see PLANT_CORNERS."""
         given = dict(text.split('=', 1) for text in self.overrides)
-        changed = {}
+        changed: dict[str, float] = {}
         for name, plant in self.plants.items():
             if plant.mode and corner != (1.0, 1.0):
                 changed |= {f'adu.{name}.load.inertia': _allowed('load.inertia', corner[0] * plant.axis.load.inertia),
                             f'adu.{name}.structure.frequency': _allowed('structure.frequency', corner[1] * plant.mode)}
         return frequency.case(self.name, self.source, {**given, **self.gains, **changed, **STILL_AIR_PARAMETERS})
 
-    def _sweep(self, axis, sweep, period):
-        """Return a frequency.Sweep with limited peak and frequency; period: sampling period of the loop [s].
+    def _sweep(self, axis: AxisParameters, sweep: frequency.Sweep, period: Seconds) -> frequency.Sweep:
+        """Return a sweep with limited peak and frequency; period: sampling period of the loop.
 
         To keep the teeth in contact, the torque of the sweep stays below half of the bias torque. The highest
         frequency stays below half of the sampling rate.
@@ -337,11 +348,11 @@ class Loops:
         return dataclasses.replace(sweep, peak=min(sweep.peak, peak or sweep.peak),
                                    highest=min(sweep.highest, 0.475 / period))
 
-    def response(self, loop, name, corner=(1.0, 1.0)):
-        """Return the frequency.Response of a loop of the axis `name` with the present gains, None if the drive trips.
+    def response(self, loop: str, name: str, corner: tuple[float, float] = (1.0, 1.0)) -> frequency.Response | None:
+        """Return the response of a loop of the axis `name` with the present gains, None if the drive trips.
 
         loop: 'current', 'speed' or 'position'; corner: factors of the plant, see PLANT_CORNERS. For the current loop
-        it is the Response of the motor with the smaller phase margin.
+        it is the response of the motor with the smaller phase margin.
         """
         case = self._case(corner)
         drive = case.loaded().node_parameters('adu')
@@ -350,8 +361,8 @@ class Loops:
             # frequency.current measures the azimuth, so this axis takes its place, with the travel of the azimuth.
             travel = drive.azimuth.limits
             limits = dataclasses.replace(axis.limits, lower=travel.lower, upper=travel.upper)
-            found = frequency.current(dataclasses.replace(drive, azimuth=dataclasses.replace(axis, limits=limits)))
-            return min(found.values(), key=lambda response: frequency.margins(response)['phase_margin_deg'][0])
+            motors = frequency.current(dataclasses.replace(drive, azimuth=dataclasses.replace(axis, limits=limits)))
+            return min(motors.values(), key=lambda response: frequency.margins(response)['phase_margin_deg'][0])
         if loop == 'speed':
             sweep = frequency.FLEXIBLE_SPEED_SWEEP if self.plants[name].mode else frequency.SPEED_SWEEP
             return frequency.speed(drive, self._sweep(axis, sweep, SPEED_LOOP_PERIOD_S), (name,))[f'speed/{name}']
@@ -360,27 +371,28 @@ class Loops:
         # A tripped drive returns no signal.
         return found if np.isfinite(found.open_loop).all() and found.open_loop.all() else None
 
-    def measured(self, loop, name, corner=(1.0, 1.0)):
-        """Return the frequency.margins of `response`, None if the drive trips."""
+    def measured(self, loop: str, name: str, corner: tuple[float, float] = (1.0, 1.0)) -> Margins | None:
+        """Return the margins of `response`, None if the drive trips."""
         found = self.response(loop, name, corner)
         return frequency.margins(found) if found is not None else None
 
-    def close(self, loop, name, required, set_to, fastest):
-        """Return (w, rows) of the fastest loop that meets the LoopRequirements `required`; w: its crossover [rad/s].
+    def close(self, loop: str, name: str, required: LoopRequirements, set_to: Callable[[RadiansPerSecond], None],
+              fastest: RadiansPerSecond) -> tuple[RadiansPerSecond, list[tuple[str, Margins]]]:
+        """Return (w, rows) of the fastest loop that meets the requirements; w: its crossover.
 
-        loop: 'speed' or 'position'; name: axis; set_to: function set_to(w) that sets the gains for a crossover;
-        fastest: first tried crossover [rad/s].
-        rows: [(name of the loop, margins)]. If a structure is declared, a second row has the smallest margins in all
-        PLANT_CORNERS. Raises LoopError if no tried loop meets the requirements.
+        loop: 'speed' or 'position'; name: axis; set_to: function that sets the gains for a crossover; fastest: first
+        tried crossover.
+        rows: names of the loop and their margins. If a structure is declared, a second row has the smallest margins in
+        all PLANT_CORNERS. Raises LoopError if no tried loop meets the requirements.
         """
         for w in fastest * SLOWDOWN_FACTOR**np.arange(MAX_SLOWDOWNS):
             set_to(w)
-            every = []
+            every: list[Margins] = []
             for corner in ((1.0, 1.0), *(PLANT_CORNERS if self.plants[name].mode else ())):
                 margins = self.measured(loop, name, corner)
-                every.append(margins)
                 if not (margins and meets_margins(margins, required)):
                     break
+                every.append(margins)
             else:
                 return w, [(loop, every[0]), (f'{loop}{WORST_SUFFIX}', smallest(every))][:1 + (len(every) > 1)]
         found = 'the drive trips'
@@ -391,11 +403,12 @@ class Loops:
                         f'and {required.gain_margin:g} dB: at {w / (2.0 * math.pi):.3g} Hz {found}')
 
 
-def design(loops, axes, required, progress):
-    """Design the loops of some axes for the LoopRequirements `required`; the gains are then in the Loops.
+def design(loops: Loops, axes: Sequence[str], required: LoopRequirements,
+           progress: Callable[[float, str], object]) -> list[LoopRow]:
+    """Design the loops of some axes for the requirements; the gains are then in the loops.
 
-    Return the rows of the table: [(loop, axis, required crossover or bandwidth [Hz], margins)]. progress(share of the
-    work that is done, text) is called for each loop. Raises LoopError.
+    Return the rows of the table. progress(share of the work that is done, text) is called for each loop. Raises
+    LoopError.
     """
     speed_hz = required.speed or CROSSOVER_RATIO * (required.position or DEFAULT_SPEED_CROSSOVER_HZ / CROSSOVER_RATIO)
     wanted_s = 2.0 * math.pi * speed_hz
@@ -408,35 +421,38 @@ def design(loops, axes, required, progress):
         plant = loops.plants[name]
         progress(i / len(axes), f'{name}: current and speed loop')
         current = plant.axis.current_loop.bandwidth
-        rows.append(('current', name, current, loops.measured('current', name)))
+        measured = loops.measured('current', name)
+        assert measured is not None     # only a measurement of the position loop runs a drive that can trip
+        rows.append(LoopRow('current', name, current, measured))
 
-        def set_speed(w, name=name, plant=plant):
+        def set_speed(w: RadiansPerSecond, name: str = name, plant: Plant = plant) -> None:
             loops.set('adu', name, drive_gains(plant, w))
         reached[name], closed = loops.close('speed', name, required, set_speed, wanted_s)
-        rows += [(loop, name, wanted_s / (2.0 * math.pi), margins) for loop, margins in closed]
+        rows += [LoopRow(loop, name, wanted_s / (2.0 * math.pi), margins) for loop, margins in closed]
     for i, name in enumerate(axes):
         progress((i + 0.5) / len(axes), f'{name}: position loop')
         plant, w_s = loops.plants[name], reached[name]
         w_p = (min(2.0 * math.pi * required.position, wanted_s / CROSSOVER_RATIO) if required.position
                else position_crossover(plant, w_s))
 
-        def set_position(w, name=name, plant=plant, w_s=w_s):
+        def set_position(w: RadiansPerSecond, name: str = name, plant: Plant = plant,
+                         w_s: RadiansPerSecond = w_s) -> None:
             loops.set('acu', name, control_gains(plant, w_s, w))
         _, closed = loops.close('position', name, required, set_position, w_p)
         wanted = required.position or w_p / (2.0 * math.pi)
-        rows += [(loop, name, wanted, margins) for loop, margins in closed]
+        rows += [LoopRow(loop, name, wanted, margins) for loop, margins in closed]
     return rows
 
 
-def refuse_outside(loops):
+def refuse_outside(loops: Loops) -> None:
     """Raise ScenarioError if a gain is outside its range."""
     scenario.load(loops.source, [*loops.overrides, *(scenario.override(*gain) for gain in loops.gains.items())])
 
 
-def table(rows, required):
+def table(rows: Iterable[LoopRow], required: LoopRequirements) -> list[str]:
     """Return the table of the loops as lines of text, with measured and required values.
 
-    rows: as of `design`; required: LoopRequirements.
+    rows: as of `design`.
     """
     width = max(20, *(len(f'{name} {loop}') for loop, name, *_ in rows))
     lines = [f'{"loop":{width}} {"required":>9} {"crossover":>10} {"bandwidth":>10} {"phase margin":>21} '
@@ -451,11 +467,11 @@ def table(rows, required):
     return lines
 
 
-def _text(value, unit, width):
+def _text(value: float, unit: str, width: int) -> str:
     return f'{f"{value:.3g} {unit}" if math.isfinite(value) else "none":>{width}}'
 
 
-def remarks(loops, rows):
+def remarks(loops: Loops, rows: Sequence[LoopRow]) -> list[str]:
     """Return lines on the rows of `design`: loops that are slower than required, with the reason, and loops without a
     gain margin."""
     lines = []
@@ -475,7 +491,7 @@ def remarks(loops, rows):
                                                     if math.isnan(margins['gain_margin_db'][0])])]
 
 
-def main(options, progress):
+def main(options: argparse.Namespace, progress: Callable[[float, str], object]) -> list[str]:
     """Design the loops for the options of the verb, write the parameter file and return the lines to print.
 
     progress: function, see `design`. Raises LoopError.

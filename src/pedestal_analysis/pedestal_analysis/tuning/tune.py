@@ -16,14 +16,18 @@ feed-forward               The rate loop of the drive is identified (identificat
 
 The search is that of parameter_search.py. The result is a ROS 2 parameter file for nodes and for `pedestal run`.
 """
+import argparse
 import dataclasses
 import math
 import pathlib
 import shlex
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
+from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import RANGE_TOPIC
@@ -34,9 +38,12 @@ from pedestal_analysis.results.tracking import HANDOVER_SETTLING_S
 from pedestal_analysis.tuning import loops, parameter_search
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common import parameters
 from pedestal_common.graph import layouts, topics
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.node.unit import Unit
+from pedestal_common.quantities import Floats, Json, Pair, Pairs, Records
 from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import records
 from pedestal_recording import configuration
@@ -58,32 +65,25 @@ class TuneError(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Score:
-    """Score of a set of parameters. The arrays are (2,) for azimuth and elevation.
-
-    searched   criterion on the part of the data on which the search runs; smaller is better
-    kept       criterion on the part that is reserved for the validation
-    nis        mean NIS (normalised innovation squared) on the reserved part [-]
-    pointing   {metric: (value, unit)} of further results
-    """
-    searched: np.ndarray
-    kept: np.ndarray
-    nis: np.ndarray
-    pointing: dict
+    """Score of a set of parameters, of azimuth and elevation."""
+    searched: Pair      # criterion on the part of the data on which the search runs; smaller is better
+    kept: Pair          # criterion on the part that is reserved for the validation
+    nis: Pair           # mean NIS (normalised innovation squared) on the reserved part [-]
+    pointing: dict[str, tuple[float, str]]      # {metric: (value, unit)} of further results
 
 
-def log_density(innovation, sigma):
-    """Return the log-density log N(nu; 0, sigma^2) of innovations nu (n, 2), without its constant.
+def log_density(innovation: Pairs, sigma: Pairs) -> Pairs:
+    """Return the log-density log N(nu; 0, sigma^2) of innovations nu, without its constant.
 
-    sigma (n, 2): standard deviations of the innovations. Beyond HUBER_LIMIT_SIGMAS the log-density is linear (Huber
-    1964).
+    sigma: standard deviations of the innovations. Beyond HUBER_LIMIT_SIGMAS the log-density is linear (Huber 1964).
     """
     z = np.abs(innovation / sigma)
     return -np.where(z <= HUBER_LIMIT_SIGMAS, 0.5 * z * z, HUBER_LIMIT_SIGMAS
                      * (z - 0.5 * HUBER_LIMIT_SIGMAS)) - np.log(sigma)
 
 
-def _mean(values):
-    """Return the mean (2,) of the finite values of each column; infinite for a column without finite values."""
+def _mean(values: Pairs) -> Pair:
+    """Return the mean of the finite values of each column; infinite for a column without finite values."""
     return np.array([column[np.isfinite(column)].mean() if np.isfinite(column).any() else math.inf
                      for column in values.T])
 
@@ -91,7 +91,7 @@ def _mean(values):
 class RecordedSource:
     """A recording as the source of the tuning. The criterion is the negative mean log-density of the innovations.
 
-    params      AcuParameters of the recording
+    params      parameters of the recorded control unit
     searched    mask (n,) of the steps in the pieces for the search
     reserved    mask (n,) of the steps in the pieces for the validation
     ranged      True if the recording has a measured range
@@ -103,9 +103,11 @@ class RecordedSource:
 
     criterion_name, unit, kept = 'negative log-likelihood of an error', '', 'on the reserved pieces'
 
-    def __init__(self, path):
-        self.recording = recompute.Recording(path)
-        self.params = recompute.parameters_of(self.recording, 'acu')
+    def __init__(self, path: pathlib.Path) -> None:
+        self.recording = recompute.FedRecording(path)
+        params = recompute.parameters_of(self.recording, 'acu')
+        assert isinstance(params, AcuParameters)
+        self.params = params
         self.of_beams = self.recording.bag.beam != ''
         done = recompute.recompute(self.recording, 'acu', self.params)
         self.feed = done.feed
@@ -124,25 +126,25 @@ class RecordedSource:
             raise TuneError(f'{path}: receiver errors span {np.ptp(t[compared]):.3g} s; must be at least '
                             f'{CONVERGENCE_TIME_S + 2.0 * PIECE_LENGTH_S:g} s')
 
-    def _innovations(self, steps):
+    def _innovations(self, steps: Records) -> Floats:
         """Return (3, n, 2): innovation [rad], its standard deviation [rad] and NIS [-] of both axes.
 
-        steps (n,): records of the outputs of the control unit.
+        steps (n,): outputs of the control unit.
         """
         return np.array([layouts.of_filter(steps, name) for name in ('innovation', 'innovation_sigma', 'nis')])
 
-    def _run(self, params):
-        """Return (unit of the control unit, its outputs at each step (n,)) for AcuParameters."""
+    def _run(self, params: AcuParameters) -> tuple[Unit, Records]:
+        """Return (unit of the control unit, its outputs at each step (n,))."""
         unit = recompute.unit_of(self.recording, 'acu', params)
         return unit, recompute.compute(self.recording, unit, self.feed, requests=self.requests)[0]
 
-    def criterion(self, params):
-        """Return the criterion (2,) of both axes for AcuParameters, on the pieces for the search."""
+    def criterion(self, params: AcuParameters) -> Pair:
+        """Return the criterion of both axes, on the pieces for the search."""
         innovation, sigma, _ = self._innovations(self._run(params)[1])
         return _mean(-log_density(innovation, sigma)[self.searched])
 
-    def score(self, params) -> Score:
-        """Return the Score of AcuParameters."""
+    def score(self, params: AcuParameters) -> Score:
+        """Return the score of parameters."""
         unit, steps = self._run(params)
         innovation, sigma, nis = self._innovations(steps)
         density = log_density(innovation, sigma)
@@ -150,8 +152,8 @@ class RecordedSource:
         pointing = {}
         for name in ESTIMATE_ERRORS:
             if name in numbers:
-                [value], unit = numbers[name]
-                pointing[name] = value, unit
+                [value], of_value = numbers[name]
+                pointing[name] = value, of_value
         return Score(searched=_mean(-density[self.searched]), kept=_mean(-density[self.reserved]),
                      nis=_mean(nis[self.reserved]), pointing=pointing)
 
@@ -165,10 +167,10 @@ class SimulatedSource:
 
     criterion_name, unit, kept = 'pointing error rms', 'deg', 'on the reserved seed'
 
-    def __init__(self, load, seed, runs, any_mode):
+    def __init__(self, load: Callable[[int | None], Scenario], seed: int | None, runs: int, any_mode: bool) -> None:
         """Load the scenarios, one for each seed.
 
-        load       load(seed) -> Scenario
+        load       function of the seed
         seed       first seed, None for that of the scenario
         runs       number of seeds for the search; the next seed validates
         any_mode   True for all modes except standby
@@ -185,8 +187,8 @@ class SimulatedSource:
             mode = 'out of standby' if any_mode else 'in autotrack'
             raise TuneError(f'scenario {chosen.name}: never {mode} for more than {HANDOVER_SETTLING_S:g} s')
 
-    def runs(self, params, seeds):
-        """Return (steps, truth) of the settled parts of the runs with these AcuParameters and seeds.
+    def runs(self, params: AcuParameters, seeds: Iterable[int]) -> tuple[Records, Records]:
+        """Return (steps, truth) of the settled parts of the runs with these parameters and seeds.
 
         They are records of closed_loop.STEP and of closed_loop.TRUTH, of all runs one after the other.
         """
@@ -197,15 +199,16 @@ class SimulatedSource:
             start = run.t[on][0] + HANDOVER_SETTLING_S if on.any() else math.inf
             settled = on & (run.t >= start)
             parts.append((run.steps[settled], run.truth[settled]))
-        return tuple(map(np.concatenate, zip(*parts)))
+        steps, truth = map(np.concatenate, zip(*parts))
+        return steps, truth
 
-    def criterion(self, params):
-        """Return the criterion (2,) [deg] of both axes for AcuParameters, with the seeds for the search."""
+    def criterion(self, params: AcuParameters) -> Pair:
+        """Return the criterion [deg] of both axes, with the seeds for the search."""
         _, truth = self.runs(params, self.seeds)
         return np.degrees(np.sqrt(_mean(truth['error']**2)))
 
-    def score(self, params) -> Score:
-        """Return the Score of AcuParameters."""
+    def score(self, params: AcuParameters) -> Score:
+        """Return the score of parameters."""
         kept, truth = self.runs(params, self.kept_seeds)
         rms = np.degrees(np.sqrt(_mean(truth['error']**2)))
         difference = kept['acu/reference']['position'] - kept['joint_states']['position']
@@ -215,20 +218,24 @@ class SimulatedSource:
             **{f'{axis}_following_rms_deg': (value, 'deg') for axis, value in zip(AXES, following)}})
 
 
-def _with_filter(params, axis, changed):
-    """Return AcuParameters with other FilterParameters of an axis."""
+Source: TypeAlias = RecordedSource | SimulatedSource
+_Params = TypeVar('_Params', bound=parameters.Parameters)
+
+
+def _with_filter(params: AcuParameters, axis: str, changed: FilterParameters) -> AcuParameters:
     return dataclasses.replace(params, **{axis: dataclasses.replace(getattr(params, axis), filter=changed)})
 
 
-def filters(source, kind, axes, progress):
-    """Return (AcuParameters with the tuned filter, {name: value} of the tuned parameters).
+def filters(source: Source, kind: str, axes: Sequence[str],
+            progress: Callable[[float, str], object]) -> tuple[AcuParameters, dict[str, Json]]:
+    """Return (parameters with the tuned filter, {name: value} of the tuned parameters).
 
-    source: RecordedSource or SimulatedSource; kind: kind of the filter; axes: names of the tuned axes; progress:
-    progress(share of the work that is done, text). Raises TuneError.
+    kind: kind of the filter; axes: names of the tuned axes; progress: progress(share of the work that is done, text).
+    Raises TuneError.
     """
     count = 0
 
-    def counted(criterion, part):
+    def counted(criterion: float, part: int) -> float:
         nonlocal count
         count += 1
         # Because the number of tries is not known in advance, the progress bar of an axis slows down toward its end.
@@ -245,7 +252,7 @@ def filters(source, kind, axes, progress):
                             'without range the filter equals imm')
         rows = [AXES.index(axis) for axis in axes]
 
-        def with_ukf(ukf):
+        def with_ukf(ukf: UkfParameters) -> AcuParameters:
             return dataclasses.replace(params, tracker=dataclasses.replace(params.tracker, ukf=ukf))
 
         best, _ = parameter_search.tuned(params.tracker.ukf,
@@ -257,7 +264,8 @@ def filters(source, kind, axes, progress):
     for part, axis in enumerate(axes):
         count, i = 0, AXES.index(axis)
 
-        def cost(changed, axis=axis, i=i, part=part, params=params):
+        def cost(changed: FilterParameters, axis: str = axis, i: int = i, part: int = part,
+                 params: AcuParameters = params) -> float:
             return counted(source.criterion(_with_filter(params, axis, changed))[i], part)
 
         given = getattr(params, axis).filter
@@ -269,19 +277,21 @@ def filters(source, kind, axes, progress):
     return params, settings
 
 
-def _rounded(params, names):
+def _rounded(params: _Params, names: Iterable[str]) -> _Params:
     """Return parameters, in which those of some names are rounded to four digits."""
     values = parameters.as_dict(params)
     return parameters.build(type(params), {**values, **{name: float(f'{values[name]:.4g}') for name in names}})
 
 
-def feedforward(chosen, source, axes, progress):
-    """Return (AcuParameters with identified feed-forward gains, {name: value} of the gains).
+def feedforward(chosen: Scenario, source: Source, axes: Iterable[str],
+                progress: Callable[[float, str], object]) -> tuple[AcuParameters, dict[str, float]]:
+    """Return (parameters with identified feed-forward gains, {name: value} of the gains).
 
-    chosen: scenario.Scenario whose drive is identified; source: SimulatedSource; axes: names of the tuned axes.
+    chosen: scenario whose drive is identified; axes: names of the tuned axes.
     """
     progress(0.1, 'identifying the rate loop')
-    loops, params, settings = identification.identify(chosen), source.params, {}
+    loops, params = identification.identify(chosen), source.params
+    settings: dict[str, float] = {}
     for axis in axes:
         old = getattr(params, axis)
         new = dataclasses.replace(old.feedforward, rate_feedforward=float(f'{loops[axis].k_v:.5g}'),
@@ -292,7 +302,7 @@ def feedforward(chosen, source, axes, progress):
     return params, settings
 
 
-def main(options, command, progress):
+def main(options: argparse.Namespace, command: str, progress: Callable[[float, str], object]) -> list[str]:
     """Tune for the options of the verb, write the parameter file and return the lines to print.
 
     command: the whole command line, for the head of the file. Raises TuneError.
@@ -302,11 +312,12 @@ def main(options, command, progress):
     target = options.filter or 'feedforward'
     file = options.output or pathlib.Path(f'{pathlib.Path(options.source).stem}-{target}.yaml')
     _check(options, is_bag, file)
+    source: Source
     progress(0.0, 'reading' if is_bag else 'compiling the laws (first time only)')
     if is_bag:
         source = RecordedSource(pathlib.Path(options.source))
     else:
-        def load(seed):
+        def load(seed: int | None) -> Scenario:
             return scenario.load(options.source, options.param, seed, options.duration)
         source = SimulatedSource(load, options.seed, options.runs or DEFAULT_SEED_COUNT, options.feedforward)
     if options.feedforward:
@@ -329,7 +340,7 @@ def main(options, command, progress):
     return [*lines, '', *values, f'written: {file}  ({hint})']
 
 
-def _check(options, is_bag, file):
+def _check(options: argparse.Namespace, is_bag: bool, file: pathlib.Path) -> None:
     """Raise TuneError for options that do not fit together, or for an existing file."""
     if bool(options.filter) == options.feedforward:
         raise TuneError('one of --filter KIND and --feedforward must be given')
@@ -351,8 +362,8 @@ def _check(options, is_bag, file):
         raise TuneError(f'--output {file}: must be a file in a directory that exists')
 
 
-def _table(source, old, new, axes):
-    """Return lines that compare the old Score with the new Score."""
+def _table(source: Source, old: Score, new: Score, axes: Collection[str]) -> list[str]:
+    """Return lines that compare the old with the new score."""
     rows = []
     for i, axis in enumerate(AXES):
         if axis in axes:
@@ -364,7 +375,7 @@ def _table(source, old, new, axes):
     return lines + [f'{name:52} {_text(a):>11} {_text(b):>11} {unit}'.rstrip() for name, a, b, unit in rows]
 
 
-def _remarks(source, old, new, axes, settings):
+def _remarks(source: Source, old: Score, new: Score, axes: Iterable[str], settings: Mapping[str, Json]) -> list[str]:
     """Return lines with reasons to doubt the result."""
     doubts = []
     for axis in axes:
@@ -380,5 +391,5 @@ def _remarks(source, old, new, axes, settings):
     return doubts
 
 
-def _text(value):
+def _text(value: float) -> str:
     return f'{value:.5g}' if math.isfinite(value) else 'none'

@@ -31,7 +31,7 @@ STATUS_TEXT_BY_CODE = tuple(STATUS_TEXTS.values())
 Status = codes(STATUS_TEXTS)
 
 State = np.dtype([
-    *detector.STATE_FIELDS,
+    *((name, detector.State.dtype[name]) for name in detector.State.dtype.names),
     ('phase', 'f8'), ('turn', 'f8'), ('rate', 'f8'), ('last_real', 'f8'), ('last_imag', 'f8'), ('error', 'f8'),
     ('carrier', 'i8'), ('unlocked_ns', 'i8'), ('noise', 'f8'), ('blocks', 'i8'), ('bad', 'i8'),
     ('ratio_real', 'f8', 2), ('ratio_imag', 'f8', 2), ('skew', 'f8', 2)], align=True)
@@ -49,7 +49,7 @@ State = np.dtype([
 """
 
 Constants = np.dtype([
-    *detector.CONSTANTS_FIELDS,
+    *((name, detector.Constants.dtype[name]) for name in detector.Constants.dtype.names),
     ('part', 'i8'), ('block_ns', 'i8'), ('loop_gain', 'f8'), ('error_gain', 'f8'), ('noise_gain', 'f8'),
     ('largest_error', 'f8'), ('give_up_ns', 'i8'), ('ratio_gain', 'f8'),
     ('matrix_real', 'f8', (2, 2)), ('matrix_imag', 'f8', (2, 2))], align=True)

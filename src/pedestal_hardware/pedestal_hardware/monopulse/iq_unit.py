@@ -25,7 +25,7 @@ SIGNAL_FAULTS = {THREE_CHANNELS: ('fade', 'wrong_slope', 'phase_180'),
                  ONE_CHANNEL: ('fade', 'wrong_slope', 'phase_180'), CONICAL_SCAN: ('fade',)}
 """{kind of a feed: injected faults of the receiver that its samples can have}. A conical scan has no differences."""
 
-Record = np.dtype([('state', receiver.State), ('constants', receiver.Constants),
+Record = np.dtype([('state', receiver.State.dtype), ('constants', receiver.Constants.dtype),
                          ('inputs', receiver.Inputs.dtype), ('outputs', receiver.Outputs.dtype), ('row', 'i8'),
                          ('schedule', schedule.Schedule.dtype), ('injected', injected.Injected.dtype),
                          ('closing', 'f8'), ('feed', feed.Feed.dtype)], align=True)

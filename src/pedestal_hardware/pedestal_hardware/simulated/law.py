@@ -53,7 +53,7 @@ rate, sum           speed reference [rad/s]; integral part [Nm]
 # The own fields come first. Numba takes a record that begins with the fields of the drive unit for its subtype, and
 # warns about it.
 Record = np.dtype([('drive', DRIVE_DTYPE, (pdo.DRIVE_COUNT,)), ('tick', 'i8'), ('period', 'i8'),
-                         ('state', drive_unit.State), ('constants', drive_unit.Constants),
+                         ('state', drive_unit.State.dtype), ('constants', drive_unit.Constants.dtype),
                          ('inputs', drive_unit.Inputs.dtype), ('outputs', drive_unit.Outputs.dtype),
                          ('link', adu_unit.Link.dtype), ('schedule', schedule.Schedule.dtype),
                          ('injected', injected.DriveInjected.dtype)], align=True)

@@ -3,12 +3,13 @@
 A separate thread finds the passes, so the page does not wait for them.
 """
 import datetime
-import typing
 from concurrent import futures
+from typing import NamedTuple
 
 from pedestal_common.geometry import orbit, passes
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.quantities import Json, Seconds
 from pedestal_operator.page import page_state
 
 MAX_PASSES = 4  # largest number of passes shown
@@ -19,24 +20,19 @@ SEARCH_SPAN_DAYS, SEARCH_VALIDITY_DAYS = 2.0, 1.0
 MIN_UTC_S = 1e8  # smallest time that is UTC [s]; a smaller time counts from the start of a run
 
 
-class PassQuery(typing.NamedTuple):
-    """Satellite, station and day of a search.
-
-    line_1, line_2, omm   elements of the satellite
-    ahead                 UTC for which the satellite is computed, minus the time of the graph [s]; 0 except in a
-                          simulation of another day
-    day                   number of the interval of SEARCH_VALIDITY_DAYS since 1970
-    """
-    line_1: str
+class PassQuery(NamedTuple):
+    """Satellite, station and day of a search."""
+    line_1: str         # elements of the satellite
     line_2: str
     omm: str
     station: StationParameters
-    ahead: float
-    day: int
+    ahead: Seconds      # UTC for which the satellite is computed, minus the time of the graph; 0 except in a
+                        # simulation of another day
+    day: int            # number of the interval of SEARCH_VALIDITY_DAYS since 1970
 
 
-def pass_query(antenna):
-    """Return the PassQuery of an antenna (see page_state), None without elements, station or UTC.
+def pass_query(antenna: page_state.PageAntenna) -> PassQuery | None:
+    """Return the query of an antenna, None without elements, station or UTC.
 
     The elements are those of mode tle, else those of a simulated satellite on the day of its scenario.
     """
@@ -45,7 +41,7 @@ def pass_query(antenna):
     simulated = [target.get(f'target.leo_pass.{name}', '') for name in page_state.ELEMENT_PARAMETERS]
     lines = [acu.get(name, '') for name in page_state.ELEMENT_PARAMETERS]
     lines = lines if any(lines) else simulated
-    station = [p.get(f'prediction.station.{name}') for name in page_state.STATION_PARAMETERS]
+    station: list[Json] = [p.get(f'prediction.station.{name}') for name in page_state.STATION_PARAMETERS]
     if not any(lines) or None in station:
         return None
     start = p.get('prediction.start_time')
@@ -53,12 +49,13 @@ def pass_query(antenna):
         start = antenna.diagnostics_of('tracking_receiver').get('stamp_0_utc')
     ahead = _seconds(orbit.instant('start_time', start)) - page_state.epoch(antenna) if start else 0.0
     utc = antenna.now + ahead
-    return PassQuery(*lines, StationParameters(*station), ahead,
+    line_1, line_2, omm = lines
+    return PassQuery(line_1, line_2, omm, StationParameters(*station), ahead,
                      int(utc / SECONDS_PER_DAY / SEARCH_VALIDITY_DAYS)) if utc > MIN_UTC_S else None
 
 
-def upcoming_passes(query):
-    """Return a list of the passes from the day of a PassQuery on, each a dict.
+def upcoming_passes(query: PassQuery) -> list[dict[str, float]]:
+    """Return the passes from the day of a query on.
 
     aos, los: rise and set [s], in the time of the graph; highest: elevation, from, to: azimuth at rise and set [deg].
     The list is empty if the elements are too old for the day, or if the satellite does not rise and set.
@@ -75,26 +72,28 @@ def upcoming_passes(query):
              'to': round(each.set_azimuth, 1) % 360.0} for each in known if each.rise and each.set]
 
 
-def _seconds(utc):
-    """Return the time since 1970 [s] of a datetime in UTC."""
+def _seconds(utc: datetime.datetime) -> Seconds:
+    """Return the time since 1970 of a datetime in UTC."""
     return (utc - datetime.datetime(1970, 1, 1)).total_seconds()
 
 
 class UpcomingPasses:
     """Search for the next passes of an antenna in a thread."""
+    _query: PassQuery | None
+    _future: futures.Future[list[dict[str, float]]] | None
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._worker = futures.ThreadPoolExecutor(1, 'passes')
         self._query, self._future = None, None
 
-    def look(self, antenna) -> list:
+    def look(self, antenna: page_state.PageAntenna) -> list[dict[str, float]]:
         """Return the next passes in the form of `upcoming_passes`, [] during the search."""
         query = pass_query(antenna)
         if query != self._query:
-            self._query, self._future = query, query and self._worker.submit(upcoming_passes, query)
+            self._query, self._future = query, self._worker.submit(upcoming_passes, query) if query else None
         known = self._future.result() if self._future and self._future.done() else []
         return [each for each in known if each['aos'] > antenna.now][:MAX_PASSES]
 
-    def close(self):
+    def close(self) -> None:
         """End without waiting for a search."""
         self._worker.shutdown(wait=False, cancel_futures=True)

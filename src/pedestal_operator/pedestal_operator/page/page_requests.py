@@ -6,11 +6,14 @@ page that jogs is silent for JOG_TIMEOUT_S or has left, this module stops the ax
 axes 0.5 s after the last jog.
 """
 import math
+from collections.abc import Callable, Mapping, Sequence
 
 from pedestal_common.graph import topics
+from pedestal_common.quantities import Json, Seconds
 from pedestal_common.wire import commands
 from pedestal_common.wire.commands import Reply
 from pedestal_operator.page import page_security
+from pedestal_operator.page.page_server import Client, PageMessage
 
 MAX_STATE_AGE_S = 0.5  # largest age of the last state that a page received, for a jog of the page [s]
 JOG_TIMEOUT_S = 0.4  # time after the last jog of a page at which the axes are stopped [s]
@@ -28,12 +31,16 @@ class PageRequests:
     is_jogging()                            return True while the antenna follows a jog
     """
 
-    def __init__(self, request, replied, send, is_jogging):
+    def __init__(self, request: Callable[[str, str, Mapping[str, object]], str],
+                 replied: Callable[[str], Reply | None], send: Callable[[Client, Mapping[str, object]], None],
+                 is_jogging: Callable[[], bool]) -> None:
         self._request, self._replied, self._send, self._is_jogging = request, replied, send, is_jogging
-        self._waiting, self._jogs = {}, {}
+        # _waiting: {number of a request: (page, number on the page, command, time)}; _jogs: {page: last time}.
+        self._waiting: dict[str, tuple[Client, Json, str, Seconds]] = {}
+        self._jogs: dict[Client, Seconds] = {}
 
-    def take(self, received, now):
-        """Take a page_server.PageMessage at the time now [s]."""
+    def take(self, received: PageMessage, now: Seconds) -> None:
+        """Take a message of a page at the time now."""
         client, message, age = received
         if message is None:
             self._end_jog(client, now)
@@ -44,7 +51,7 @@ class PageRequests:
         else:
             self._send(client, {'error': 'unknown message: must have jog or ask'})
 
-    def _forward(self, client, message, now):
+    def _forward(self, client: Client, message: Mapping[str, Json], now: Seconds) -> None:
         """Check a command of a page, and forward it to the control unit."""
         verb, given, number = message['ask'], message.get('arguments') or {}, message.get('id')
         if not (isinstance(given, dict) and len(given) <= MAX_ARGUMENTS and _is_allowed(verb) and all(
@@ -59,9 +66,9 @@ class PageRequests:
         self._jogs.pop(client, None)
         self._waiting[self._request(str(client), verb, given)] = client, number, verb, now
 
-    def _jog(self, client, rates, now, age):
+    def _jog(self, client: Client, rates: Json, now: Seconds, age: Seconds) -> None:
         """Check a jog of a page, and forward it. rates: (azimuth, elevation) [deg/s], both 0 at its end; age: age of
-        the last state on the page [s]."""
+        the last state on the page."""
         refusal = page_security.refusal_reason(client.role, 'rate', {})
         if refusal:
             self._send(client, {'verb': 'rate', 'granted': False, 'reply': refusal})
@@ -79,17 +86,17 @@ class PageRequests:
             self._jogs[client] = now
             self._rate(client, rates, now)
 
-    def _rate(self, client, rates, now):
+    def _rate(self, client: Client, rates: Sequence[float], now: Seconds) -> None:
         number = self._request(str(client), 'rate', dict(zip(topics.AXES, map(math.radians, map(float, rates)))))
         self._waiting[number] = client, None, 'rate', now
 
-    def _end_jog(self, client, now):
+    def _end_jog(self, client: Client, now: Seconds) -> None:
         """Stop the axes if the page jogs and the antenna still follows a jog."""
         if self._jogs.pop(client, None) is not None and self._is_jogging():
             self._rate(client, (0.0, 0.0), now)
 
-    def look(self, now):
-        """Forward replies, end the jogs of silent pages, and report missing replies, at the time now [s]."""
+    def look(self, now: Seconds) -> None:
+        """Forward replies, end the jogs of silent pages, and report missing replies, at the time now."""
         for client in [client for client, at in self._jogs.items() if now - at > JOG_TIMEOUT_S]:
             self._end_jog(client, now)
         for number, (client, page_number, verb, at) in list(self._waiting.items()):
@@ -100,14 +107,14 @@ class PageRequests:
                 del self._waiting[number]
                 self._forward_reply(client, page_number, verb, reply, now)
 
-    def _forward_reply(self, client, page_number, verb, reply, now):
-        """Send a Reply to the page that sent the command; the Reply to an accepted jog is left out."""
+    def _forward_reply(self, client: Client, page_number: Json, verb: str, reply: Reply, now: Seconds) -> None:
+        """Send a reply to the page that sent the command; the reply to an accepted jog is left out."""
         if verb == 'stop' and not reply.granted:  # standby is the fallback if the control unit cannot hold the axes
             self._waiting[self._request(str(client), 'standby', {})] = client, page_number, 'standby', now
         if verb != 'rate' or not reply.granted:
             self._send(client, {'id': page_number, 'verb': verb, 'granted': reply.granted, 'reply': reply.text})
 
 
-def _is_allowed(text):
+def _is_allowed(text: str) -> bool:
     """Return True if a text may be part of a command."""
     return len(text) <= commands.MAX_TEXT_CHARACTERS and text.isprintable()

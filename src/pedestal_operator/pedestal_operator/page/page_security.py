@@ -12,8 +12,9 @@ import hmac
 import ipaddress
 import re
 import secrets
-import typing
+from collections.abc import Iterable, Mapping
 from http import cookies
+from typing import NamedTuple
 
 from pedestal_operator import state
 
@@ -33,23 +34,19 @@ MAX_SHOWN_CHARACTERS = 100  # longest part of a request in a refusal [characters
 class Refused(Exception):  # noqa: N818  no error of the server
     """A refused request. status: status code of HTTP; reason: one line."""
 
-    def __init__(self, status, reason):
+    def __init__(self, status: int, reason: str) -> None:
         super().__init__(reason)
         self.status, self.reason = status, reason
 
 
-class Request(typing.NamedTuple):
-    """Parts of an HTTP request that decide about access.
-
-    host, origin, cookie: its headers; path: without the query; token: from the query; changes_state: True for a web
-    socket, and for all methods except GET and HEAD.
-    """
-    host: str
-    origin: str
-    cookie: str
-    token: str
-    path: str
-    changes_state: bool
+class Request(NamedTuple):
+    """Parts of an HTTP request that decide about access."""
+    host: str               # header
+    origin: str             # header
+    cookie: str             # header
+    token: str              # from the query
+    path: str               # without the query
+    changes_state: bool     # True for a web socket, and for all methods except GET and HEAD
 
 
 class Access:
@@ -59,7 +56,7 @@ class Access:
     host.
     """
 
-    def __init__(self, address, port, names=()):
+    def __init__(self, address: str, port: int, names: Iterable[str] = ()) -> None:
         for name in names:
             if not _is_host(name):
                 raise ValueError(f'names: {name}: must be names of hosts without scheme and port, separated by commas')
@@ -70,17 +67,17 @@ class Access:
         self._names = {_bracketed(name).lower() for name in known}
         self._url = f'http://{_bracketed(address)}:{port}/'
 
-    def url(self, role):
+    def url(self, role: str) -> str:
         """Return the address of the page for a role, with its token."""
         return f'{self._url}?token={self.tokens[role]}'
 
     @staticmethod
-    def cookie(host):
+    def cookie(host: str) -> str:
         """Return the name of the cookie for a `Host`, with its port, because browsers send a cookie to all ports."""
         return f'pedestal_page_{host.rpartition("]")[2].partition(":")[2]}'
 
-    def role(self, request):
-        """Return the role of a Request. Raises Refused: 400 wrong host, 403 foreign page, 401 no valid token."""
+    def role(self, request: Request) -> str:
+        """Return the role of a request. Raises Refused: 400 wrong host, 403 foreign page, 401 no valid token."""
         host, origin = request.host.lower(), request.origin.lower()
         parts = HOST.fullmatch(host)
         if not parts or parts[1] not in self._names:
@@ -95,7 +92,7 @@ class Access:
                 return role
         raise Refused(401, 'missing or wrong token: open the address that the server printed at its start')
 
-    def _of_cookie(self, host, header):
+    def _of_cookie(self, host: str, header: str) -> str:
         try:
             jar = cookies.SimpleCookie(header)
         except cookies.CookieError:
@@ -104,7 +101,7 @@ class Access:
         return jar[name].value if name in jar else ''
 
 
-def refusal_reason(role, verb, arguments) -> str:
+def refusal_reason(role: str, verb: str, arguments: Mapping[str, object]) -> str:
     """Return the reason why a role may not send a command with {argument: value}, '' if it may."""
     if verb in UNRESTRICTED_VERBS:
         return ''
@@ -116,12 +113,12 @@ def refusal_reason(role, verb, arguments) -> str:
     return ''
 
 
-def refusals(role) -> dict:
+def refusals(role: str) -> dict[str, str]:
     """Return {command: reason} of the commands of an operator that a role may not send."""
     return {command: reason for command in state.OPERATOR_COMMANDS if (reason := refusal_reason(role, command, {}))}
 
 
-def is_loopback(address):
+def is_loopback(address: str) -> bool:
     """Return True if an address is reachable from this machine only."""
     try:
         return ipaddress.ip_address(address).is_loopback
@@ -129,24 +126,24 @@ def is_loopback(address):
         return address == 'localhost'
 
 
-def shown(text):
+def shown(text: str) -> str:
     """Return a part of a request for the text of a refusal: printable, and not longer than MAX_SHOWN_CHARACTERS."""
     return ascii(text)[1:-1][:MAX_SHOWN_CHARACTERS] or '(none)'
 
 
-def _is_host(name):
+def _is_host(name: str) -> bool:
     try:
         return bool(re.fullmatch(r'[\w.-]+', name) or ipaddress.IPv6Address(name))
     except ValueError:
         return False
 
 
-def _bracketed(name):
+def _bracketed(name: str) -> str:
     return f'[{name}]' if ':' in name else name
 
 
-def headers(host):
-    """Return the headers [(name, value)] of every answer. They allow content of this site only, require the browser to
+def headers(host: str) -> list[tuple[str, str]]:
+    """Return the headers (name, value) of every answer. They allow content of this site only, require the browser to
     check its cache, and forbid frames. host: `Host` of the request."""
     return [('content-security-policy',
              "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "

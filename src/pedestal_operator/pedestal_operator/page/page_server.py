@@ -17,15 +17,19 @@ import pathlib
 import queue
 import threading
 import time
-import typing
+from collections.abc import Callable, Iterable, Mapping, MutableMapping
+from typing import NamedTuple
 
 import uvicorn
 from starlette.applications import Starlette
+from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
-from starlette.websockets import WebSocketDisconnect
+from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from pedestal_common.quantities import Json, Seconds
 from pedestal_operator import tcp_port
 from pedestal_operator.page import page_security
 from pedestal_operator.page.page_security import Refused
@@ -42,33 +46,41 @@ MAX_QUEUED_REQUESTS, MAX_QUEUED_REPLIES = 200, 50
 REQUEST_BURST_LIMIT, REQUEST_BURST_PERIOD_S = 40, 1.0
 """Largest number of messages from a page in a period, and the period [s]; a jog needs five in 1 s."""
 
-SHUTDOWN_TIMEOUT_S = 1.0  # grace period of the pages when the server ends [s]
+SHUTDOWN_TIMEOUT_S = 1  # grace period of the pages when the server ends, in whole seconds for uvicorn [s]
 
 
-class PageMessage(typing.NamedTuple):
-    """Message from a page. message: its content, None when the page has left; age: age of the last state that the page
-    acknowledged [s]."""
+class PageMessage(NamedTuple):
+    """Message from a page."""
     client: 'Client'
-    message: dict | None
-    age: float
+    message: dict[str, Json] | None     # its content, None when the page has left
+    age: Seconds                        # of the last state that the page acknowledged
 
 
 class Client:
-    """An open page. name: of its user; role: one of page_security.PAGE_ROLES; address: of its host."""
+    """An open page."""
+    name: str                           # of its user
+    role: str                           # one of page_security.PAGE_ROLES
+    address: str                        # of its host
+    replies: collections.deque[str]     # messages that wait to be sent, as JSON
+    _revisions: dict[str, int]          # {section: revision that the page has}
+    _message_times: collections.deque[Seconds]  # of the last messages from the page
+    _sent: dict[int, Seconds]           # {number of an unacknowledged message: time of its sending}
 
-    def __init__(self, name, role, address):
+    def __init__(self, name: str, role: str, address: str) -> None:
         self.name, self.role, self.address = name, role, address
         self.replies = collections.deque(maxlen=MAX_QUEUED_REPLIES)
         self.wake = asyncio.Event()
         self._revisions, self._message_times = {}, collections.deque(maxlen=REQUEST_BURST_LIMIT)
         self._number, self._sent, self._acknowledged = 0, {}, time.monotonic()
 
-    def __str__(self):
+    def __str__(self) -> str:
         return f'{self.name}@page {self.address}'
 
-    def newest(self, sections):
-        """Return the next message to the page: JSON with the changed sections and the replies. sections: {name:
-        (revision, JSON)}."""
+    def newest(self, sections: Mapping[str, tuple[int, str]]) -> str:
+        """Return the next message to the page: JSON with the changed sections and the replies.
+
+        sections: {name: (revision, JSON)}.
+        """
         self._number += 1
         self._sent[self._number] = time.monotonic()
         parts = [f'"number":{self._number}', *(f'"{name}":{text}' for name, (revision, text) in sections.items()
@@ -79,7 +91,7 @@ class Client:
             self.replies.clear()
         return '{' + ','.join(parts) + '}'
 
-    def acknowledge(self, number):
+    def acknowledge(self, number: Json) -> None:
         """Take the acknowledgement of a message by its number."""
         if type(number) is int and number in self._sent:
             self._acknowledged = self._sent[number]
@@ -87,21 +99,21 @@ class Client:
             self.wake.set()
 
     @property
-    def busy(self):
+    def busy(self) -> bool:
         """True while the page may receive no further message."""
         return len(self._sent) >= MAX_UNSEEN_MESSAGES
 
     @property
-    def gone(self):
+    def gone(self) -> bool:
         """True if MAX_UNSEEN_MESSAGES are unacknowledged and the oldest of these is older than PAGE_TIMEOUT_S."""
         return self.busy and time.monotonic() - next(iter(self._sent.values())) > PAGE_TIMEOUT_S
 
     @property
-    def age(self):
-        """Age of the last acknowledged state [s]."""
+    def age(self) -> Seconds:
+        """Age of the last acknowledged state."""
         return time.monotonic() - self._acknowledged
 
-    def too_fast(self):
+    def too_fast(self) -> bool:
         """Count a message. Return True above REQUEST_BURST_LIMIT messages in REQUEST_BURST_PERIOD_S."""
         self._message_times.append(time.monotonic())
         times = self._message_times
@@ -114,19 +126,21 @@ class PageServer:
     names       further names of the server, see page_security.Access
     most        largest number of open pages
     history()   return the past of the charts for a new page; called in a thread of the server
-
-    requests    queue of PageMessage, for the node
-    pages       number of open pages
     """
+    requests: queue.Queue[PageMessage]      # for the node
+    pages: int                              # number of open pages
+    # Only the thread of the server uses _clients and _sections. Only the thread of the node uses _published.
+    _clients: set[Client]
+    _sections: dict[str, tuple[int, str]]   # {name: (revision, JSON)}
+    _published: dict[str, str]              # {name of a section: JSON}
 
-    def __init__(self, address, port, names, most, history):
+    def __init__(self, address: str, port: int, names: Iterable[str], most: int,
+                 history: Callable[[], Iterable[object]]) -> None:
         self.pages, self.requests = 0, queue.Queue(MAX_QUEUED_REQUESTS)
         self._socket = tcp_port.listen(address, port)
         self.access = page_security.Access(address, self._socket.getsockname()[1], names)
         self._most, self._history = most, history
         self._clients, self._sections, self._revision, self._named = set(), {}, 0, 0
-        # Only the thread of the server uses _clients and _sections. Only the thread of the node uses _published, the
-        # JSON of each section.
         self._published = {}
         app = Starlette(routes=[Route('/', self._index), Route('/history', self._history_answer),
                                 WebSocketRoute('/socket', self._serve_page),
@@ -139,46 +153,46 @@ class PageServer:
         self._thread = threading.Thread(target=self._run, name='page_server', daemon=True)
         self._thread.start()
 
-    def _run(self):
+    def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
         with contextlib.closing(self._loop):
             self._loop.run_until_complete(self._server.serve([self._socket]))
 
-    def publish(self, sections):
+    def publish(self, sections: Mapping[str, object]) -> None:
         """Send the changed sections of {name: content} to every page; called from the thread of the node."""
         texts = {name: encoded(content) for name, content in sections.items()}
         fresh = {name: text for name, text in texts.items() if self._published.get(name) != text}
         self._published |= fresh
         self._call(self._update_sections, fresh)
 
-    def reply(self, client, message):
+    def reply(self, client: Client, message: Mapping[str, object]) -> None:
         """Send a message to one page; called from the thread of the node."""
         self._call(self._queue_reply, client, json.dumps(message))
 
-    def _call(self, function, *arguments):
+    def _call(self, function: Callable[..., None], *arguments: object) -> None:
         with contextlib.suppress(RuntimeError):  # the loop is closed after the end of the server
             self._loop.call_soon_threadsafe(function, *arguments)
 
-    def _update_sections(self, sections):
+    def _update_sections(self, sections: Mapping[str, str]) -> None:
         self._revision += 1
         self._sections |= {name: (self._revision, text) for name, text in sections.items()}
         for client in self._clients:
             client.wake.set()
 
     @staticmethod
-    def _queue_reply(client, text):
+    def _queue_reply(client: Client, text: str) -> None:
         client.replies.append(text)
         client.wake.set()
 
-    def close(self):
+    def close(self) -> None:
         """Close the connections to all pages, by force after SHUTDOWN_TIMEOUT_S."""
         self._server.should_exit = True
         self._thread.join(3.0 * SHUTDOWN_TIMEOUT_S)
 
-    def _guarded(self, app):
+    def _guarded(self, app: ASGIApp) -> ASGIApp:
         """Return an ASGI app that checks each request by page_security before `app` answers, and adds headers to each
         answer."""
-        async def guarded(scope, receive, send):
+        async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
             request = _request(scope)
             try:
                 scope['role'] = self.access.role(request)
@@ -189,7 +203,7 @@ class PageServer:
             await app(scope, receive, _adding(send, request.host))
         return guarded
 
-    async def _index(self, request):
+    async def _index(self, request: Request) -> Response:
         """Answer with the page. An address with a token only sets the cookie; the token stays out of the history."""
         if 'token' not in request.query_params:
             return await StaticFiles(directory=STATIC_FOLDER).get_response('index.html', request.scope)
@@ -198,11 +212,11 @@ class PageServer:
                           httponly=True, samesite='strict')
         return answer
 
-    async def _history_answer(self, _):
+    async def _history_answer(self, _: Request) -> Response:
         """Answer with the past of the charts."""
         return Response(await asyncio.to_thread(lambda: encoded(list(self._history()))), media_type='application/json')
 
-    async def _serve_page(self, websocket):
+    async def _serve_page(self, websocket: WebSocket) -> None:
         """Serve a page until it leaves."""
         if len(self._clients) >= self._most:
             await websocket.send_denial_response(PlainTextResponse(
@@ -211,7 +225,7 @@ class PageServer:
         self._named += 1
         role = websocket.scope['role']
         client = Client(_name(websocket.query_params.get('name', '')) or f'{role}-{self._named}', role,
-                        websocket.client.host)
+                        websocket.client.host if websocket.client else '')
         client.replies.append(json.dumps({'you': client.name, 'role': role, 'refused': page_security.refusals(role)}))
         await websocket.accept()
         self._clients.add(client)
@@ -229,14 +243,14 @@ class PageServer:
             await asyncio.gather(*tasks, return_exceptions=True)
             self._put(PageMessage(client, None, client.age))
 
-    async def _send_states(self, websocket, client):
+    async def _send_states(self, websocket: WebSocket, client: Client) -> None:
         while not client.gone:
             await client.wake.wait()
             client.wake.clear()
             if not client.busy:
                 await asyncio.wait_for(websocket.send_text(client.newest(self._sections)), PAGE_TIMEOUT_S)
 
-    async def _receive(self, websocket, client):
+    async def _receive(self, websocket: WebSocket, client: Client) -> None:
         with contextlib.suppress(WebSocketDisconnect):
             while True:
                 message = _parsed(await websocket.receive())
@@ -251,8 +265,8 @@ class PageServer:
                     self._queue_reply(client, json.dumps({
                         'error': f'too many waiting commands: must be at most {MAX_QUEUED_REQUESTS}'}))
 
-    def _put(self, message):
-        """Queue a PageMessage for the node. Return True if the queue had room."""
+    def _put(self, message: PageMessage) -> bool:
+        """Queue a message for the node. Return True if the queue had room."""
         try:
             self.requests.put_nowait(message)
         except queue.Full:
@@ -260,12 +274,12 @@ class PageServer:
         return True
 
 
-def encoded(value):
+def encoded(value: object) -> str:
     """Return a value as JSON, with null for a number that is not finite, because JSON has no NaN."""
     return json.dumps(_plain(value), separators=(',', ':'), allow_nan=False)
 
 
-def _plain(value):
+def _plain(value: object) -> object:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -273,9 +287,9 @@ def _plain(value):
     return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
 
 
-def _request(scope):
+def _request(scope: Scope) -> page_security.Request:
     """Return the page_security.Request of an ASGI scope."""
-    given = {}
+    given: dict[str, str] = {}
     for key, value in scope['headers']:
         given.setdefault(key.decode('latin-1'), value.decode('latin-1'))
     query = dict(part.split('=', 1) for part in scope['query_string'].decode('latin-1').split('&') if '=' in part)
@@ -284,23 +298,23 @@ def _request(scope):
                                  query.get('token', ''), scope['path'], changes_state)
 
 
-def _adding(send, host):
+def _adding(send: Send, host: str) -> Send:
     """Return a `send` that adds page_security.headers to the start of an answer."""
     extra = [(name.encode(), value.encode('latin-1')) for name, value in page_security.headers(host)]
 
-    async def adding(message):
+    async def adding(message: MutableMapping[str, Json]) -> None:
         if message['type'].endswith('http.response.start'):
             message = {**message, 'headers': [*message.get('headers', ()), *extra]}
         await send(message)
     return adding
 
 
-def _name(text):
+def _name(text: str) -> str:
     """Return the name of a user without characters that are not allowed in a name."""
     return ''.join(letter for letter in text if letter.isalnum() or letter in '.-_')[:32]
 
 
-def _parsed(message):
+def _parsed(message: Mapping[str, Json]) -> dict[str, Json] | None:
     """Return the dict in a message of a web socket, None without a dict. Raises WebSocketDisconnect at its end."""
     if message['type'] == 'websocket.disconnect':
         raise WebSocketDisconnect(message.get('code', 1005))

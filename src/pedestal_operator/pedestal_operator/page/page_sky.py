@@ -1,12 +1,14 @@
 """Content of the sky plot of the page. Its angles are earth angles [deg], also on a moving deck. No ROS here."""
 import collections
 import math
-import typing
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
+from pedestal_common.quantities import Degrees, Matrix3, Message, Pairs, Seconds, Times
 from pedestal_common.wire import messages
 
 HORIZON_STEP_DEG = 5.0  # difference in azimuth between two points of a line around the horizon [deg]
@@ -16,16 +18,15 @@ MIN_HISTORY_STEP_DEG = 0.3
 """Smallest distance between two points of the beam history, less than the width of a line [deg]."""
 
 
-class Path(typing.NamedTuple):
-    """A program track: times (n,) in UTC [s], angles (n, 2) [deg]: earth azimuth without jumps of 360 deg, elevation.
+class Path(NamedTuple):
+    """A program track."""
+    times: Times    # UTC
+    angles: Pairs   # [deg]: earth azimuth without jumps of 360 deg, elevation
+
+
+def path(message: Message, midnight: Seconds) -> Path | None:
+    """Return the path of a message of acu/program_track, None for a preset. midnight: UTC for which a stamp 0 stands.
     """
-    times: np.ndarray
-    angles: np.ndarray
-
-
-def path(message, midnight):
-    """Return the Path of a message of acu/program_track, None for a preset. midnight: UTC for which a stamp 0 stands
-    [s]."""
     if len(message.points) < 2 or not set(topics.AXES) <= set(message.joint_names):
         return None
     start = messages.nanoseconds(message.header.stamp) * 1e-9 or midnight
@@ -35,16 +36,16 @@ def path(message, midnight):
     return Path(np.array(times), np.degrees(angles))
 
 
-def thinned(path):
-    """Return [[azimuth, elevation, time], ...] of a Path, MAX_PATH_POINTS rows at most."""
+def thinned(path: Path | None) -> list[list[float]]:
+    """Return [[azimuth, elevation, time], ...] of a path, MAX_PATH_POINTS rows at most."""
     if path is None:
         return []
     rows = np.unique(np.linspace(0, len(path.times) - 1, MAX_PATH_POINTS).astype(int))
     return np.column_stack((path.angles[rows], path.times[rows])).round(3).tolist()
 
 
-def passage(path, loss):
-    """Return a list with the pass of a Path, [] if the path stays below the horizon.
+def passage(path: Path | None, loss: str) -> list[dict[str, object]]:
+    """Return a list with the pass of a path, [] if the path stays below the horizon.
 
     aos, los    UTC of rise and set [s]
     highest     highest elevation [deg]
@@ -67,13 +68,14 @@ def passage(path, loss):
 
 
 class BeamHistory:
-    """Past directions of the beam in the last `span` seconds. places: [[azimuth, elevation], ...] [deg]."""
+    """Past directions of the beam in the last `span`."""
+    _rows: collections.deque[tuple[Seconds, Sequence[Degrees]]]     # time, (azimuth, elevation)
 
-    def __init__(self, span):
+    def __init__(self, span: Seconds) -> None:
         self._span, self._rows = span, collections.deque()
 
-    def add(self, t, place):
-        """Add the direction of the beam at a time t [s]; an unknown direction is NaN."""
+    def add(self, t: Seconds, place: Sequence[Degrees]) -> None:
+        """Add the direction of the beam at a time t; an unknown direction is NaN."""
         while self._rows and self._rows[0][0] < t - self._span:
             self._rows.popleft()
         last = self._rows[-1][1] if self._rows else (math.inf, math.inf)
@@ -81,44 +83,46 @@ class BeamHistory:
             self._rows.append((t, place))
 
     @property
-    def places(self):
-        """Points of the history, in order of time."""
+    def places(self) -> list[Sequence[Degrees]]:
+        """Points (azimuth, elevation) of the history, in order of time."""
         return [place for _, place in self._rows]
 
 
 class Deck:
     """Deck at an attitude, a quaternion deck -> earth (x, y, z, w); None ashore (deck and earth angles are equal)."""
+    _to_earth: Matrix3 | None
 
-    def __init__(self, quaternion):
+    def __init__(self, quaternion: Sequence[float] | None) -> None:
         self._to_earth = None
         if quaternion is not None:
             self._to_earth = np.zeros((3, 3))
-            line_of_sight.rotation(*quaternion, self._to_earth)
+            x, y, z, w = quaternion
+            line_of_sight.rotation(x, y, z, w, self._to_earth)
 
-    def seen(self, azimuth, elevation):
-        """Return earth angles [azimuth, elevation] [deg] of deck angles [deg]; NaN stays NaN."""
+    def seen(self, azimuth: Degrees, elevation: Degrees) -> list[Degrees]:
+        """Return earth angles [azimuth, elevation] of deck angles; NaN stays NaN."""
         if self._to_earth is None or not math.isfinite(azimuth + elevation):
             return [round(azimuth, 3), round(elevation, 3)]
         deck = line_of_sight.direction(math.radians(azimuth), math.radians(elevation))
         earth = line_of_sight.earth_angles(*line_of_sight.to_earth(self._to_earth, *deck))
         return [round(math.degrees(angle), 3) for angle in earth]
 
-    def line(self, points):
-        """Return a line in earth angles [[azimuth, elevation], ...] [deg], with a point every HORIZON_STEP_DEG.
+    def line(self, points: Sequence[Sequence[Degrees]]) -> list[list[Degrees]]:
+        """Return a line in earth angles [[azimuth, elevation], ...], with a point every HORIZON_STEP_DEG.
 
-        points: corners of the line in deck angles [deg].
+        points: corners of the line in deck angles.
         """
-        found = []
+        found: list[list[Degrees]] = []
         for (A, E), (B, F) in zip(points, points[1:]):     # azimuth and elevation of two neighbours
             count = max(int(abs(B - A) / HORIZON_STEP_DEG), 1)
             found += [self.seen(A + (B - A) * i / count, E + (F - E) * i / count) for i in range(count)]
         return found + [self.seen(*points[-1])] if points else found
 
-    def sector(self, low, high, top):
-        """Return the outline of a hidden sector of the deck, azimuth low to high and elevation 0 to top [deg]."""
+    def sector(self, low: Degrees, high: Degrees, top: Degrees) -> list[list[Degrees]]:
+        """Return the outline of a hidden sector of the deck, azimuth low to high and elevation 0 to top."""
         return self.line([(low, 0.0), (low, top), (high, top), (high, 0.0)])
 
 
-def numbers(text):
-    """Return [[number [deg], ...], ...] of a parameter 'a b; c d' [rad]."""
+def numbers(text: str) -> list[list[Degrees]]:
+    """Return [[number, ...], ...] of a parameter 'a b; c d' [rad]."""
     return [[math.degrees(float(word)) for word in part.split()] for part in text.split(';') if part.strip()]

@@ -1,16 +1,14 @@
 """Content of the page of the operator: the sections of the state, of a running antenna or of a recording. No ROS here.
-
-The functions take an antenna.Antenna with three further attributes:
-
-now             UTC [s]
-configuration   {name of a parameter of SHOWN_PARAMETERS: value}
-path            page_sky.Path of the program track, or None
 """
+import abc
 import math
+from collections.abc import Iterable, Mapping
 
 from pedestal_common.geometry import pointing_report
 from pedestal_common.graph import topics
+from pedestal_common.quantities import Degrees, Json, Seconds
 from pedestal_operator import state
+from pedestal_operator.antenna import Antenna
 from pedestal_operator.page import page_sky
 
 ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
@@ -40,12 +38,23 @@ HISTORY_COLUMNS = ('t', 'cross_elevation', 'elevation', 'azimuth_error', 'elevat
 """Columns of the strip charts."""
 
 
-def _deck(antenna):
-    """Return the page_sky.Deck at the last attitude; without an attitude, the deck ashore."""
+class PageAntenna(Antenna):
+    """What the page needs of an antenna."""
+    configuration: dict[str, Json]      # {name of a parameter of SHOWN_PARAMETERS: value}
+    path: page_sky.Path | None          # program track
+
+    @property
+    @abc.abstractmethod
+    def now(self) -> Seconds:
+        """Time in UTC."""
+
+
+def _deck(antenna: PageAntenna) -> page_sky.Deck:
+    """Return the deck at the last attitude; without an attitude, the deck ashore."""
     return page_sky.Deck(antenna.numbers[ATTITUDE_TOPIC][:4] if antenna.present(ATTITUDE_TOPIC) else None)
 
 
-def now(antenna) -> dict:
+def now(antenna: PageAntenna) -> dict[str, Json]:
     """Return the present numbers: angles and errors [deg], rates [deg/s], level [dB-Hz], torques of the motors [Nm].
 
     `axes` are deck angles of the beam on the sky, with the encoder angles; `beam` are its earth angles.
@@ -66,7 +75,7 @@ def now(antenna) -> dict:
             'beam': _deck(antenna).seen(*actual)}
 
 
-def history_row(frame) -> list:
+def history_row(frame: Mapping[str, Json]) -> list[float]:
     """Return a row of HISTORY_COLUMNS from the numbers of `now`."""
     azimuth, elevation = frame['axes']
     x, y, level = frame['receiver']
@@ -75,7 +84,7 @@ def history_row(frame) -> list:
     return [round(frame['t'], 2), *(round(float(value), 5) for value in row)]
 
 
-def status_section(antenna) -> dict:
+def status_section(antenna: PageAntenna) -> dict[str, Json]:
     """Return the state of the antenna for the header, the axes and the buttons: see the module `state`.
 
     The item `refused` has {command: reason} for three kinds of client: `holder` has control, `other` has no control,
@@ -94,32 +103,32 @@ def status_section(antenna) -> dict:
                         'supervisor': state.refusals(antenna, False, may_take=True)}}
 
 
-def alarms(antenna) -> list:
+def alarms(antenna: PageAntenna) -> list[dict[str, Json]]:
     """Return the list of acu/alarms in its order, with times in UTC [s]."""
     return [_dated(antenna, state.alarm(status)) for status in antenna.alarms]
 
 
-def first_alarm(antenna):
+def first_alarm(antenna: PageAntenna) -> dict[str, Json] | None:
     """Return state.first_alarm with its time in UTC [s]."""
     first = state.first_alarm(antenna)
     return first and _dated(antenna, first)
 
 
-def _dated(antenna, alarm):
+def _dated(antenna: PageAntenna, alarm: Mapping[str, Json]) -> dict[str, Json]:
     return {**alarm, 'raised': epoch(antenna) + alarm['raised_s']}
 
 
-def epoch(antenna):
+def epoch(antenna: PageAntenna) -> Seconds:
     """Return the UTC at which the time of the graph is 0 [s]: graph.start, or the start of the day."""
     return antenna.configuration.get('graph.start', 0) * 1e-9 or antenna.now // 86400.0 * 86400.0
 
 
-def fixed(antenna) -> dict:
+def fixed(antenna: PageAntenna) -> dict[str, Json]:
     """Return the constants of a run: beamwidth and limits [deg], thresholds of the level [dB-Hz], axes of the charts.
     """
     p = antenna.configuration
 
-    def degrees(name):
+    def degrees(name: str) -> Degrees:
         return math.degrees(p.get(name, math.nan))
     return {'beamwidth': degrees('tracker.receiver.beamwidth'), 'history': HISTORY_COLUMNS, 'span': CHART_SPAN_S,
             'modes': state.BUTTON_MODES,
@@ -128,7 +137,7 @@ def fixed(antenna) -> dict:
             'detect': p.get('receiver.acquire_level_dbhz'), 'loss': p.get('receiver.lose_level_dbhz')}
 
 
-def sky(antenna, coming) -> dict:
+def sky(antenna: PageAntenna, coming: Iterable[Mapping[str, float]]) -> dict[str, Json]:
     """Return the content of the sky plot in earth angles [deg]: path, hidden sectors, lines, sun and passes.
 
     `floor` and `top` are the lines of the lowest and the highest elevation that the antenna can reach; `hole` is the

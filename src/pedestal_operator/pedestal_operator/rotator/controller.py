@@ -5,8 +5,11 @@ program leaves or sends another command. Some programs open a connection for eac
 control until its motion ends.
 """
 import math
+from collections.abc import Callable, Iterable, Sequence
 
+from pedestal_common.quantities import Degrees, RadiansPerSecond, Seconds
 from pedestal_common.wire.commands import HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL
+from pedestal_operator.remote_node import Remote
 from pedestal_operator.requests import JOG_REPEAT_PERIOD_S
 from pedestal_operator.rotator.line_server import address_of
 from pedestal_operator.rotator.outcomes import (
@@ -24,19 +27,18 @@ CONTROL_TIMEOUT_S = 10.0  # time without a command of a client after which its c
 
 
 class PendingRequest:
-    """Pending request of a client.
+    """Pending request of a client."""
+    numbers: list[str]      # of its commands without a reply
+    deadline: Seconds       # time after which no reply is awaited
+    outcome: int | None     # one of the outcomes in `outcomes`, None before it is known
+    reason: str             # of a refusal, one line
 
-    numbers   numbers of its commands without a reply
-    deadline  time after which no reply is awaited [s]
-    outcome   one of the outcomes in `outcomes`, None before it is known
-    reason    reason of a refusal, one line
-    """
-
-    def __init__(self, numbers, deadline, outcome=None, reason=''):
+    def __init__(self, numbers: Iterable[str], deadline: Seconds, outcome: int | None = None,
+                 reason: str = '') -> None:
         self.numbers, self.deadline, self.outcome, self.reason = list(numbers), deadline, outcome, reason
 
-    def look(self, remote, now):
-        """Take the replies at the time now [s]. Return the outcome, None before it is known."""
+    def look(self, remote: Remote, now: Seconds) -> int | None:
+        """Take the replies at the time now. Return the outcome, None before it is known."""
         for number in list(self.numbers):
             reply = remote.replied(number)
             if reply is not None:
@@ -50,7 +52,7 @@ class PendingRequest:
         return self.outcome
 
 
-def _outcome(refusal):
+def _outcome(refusal: str) -> int:
     if not refusal:
         return OUTCOME_DONE
     if HELD_REFUSAL in refusal:
@@ -59,48 +61,49 @@ def _outcome(refusal):
 
 
 class Controller:
-    """Control of the antenna by the clients of a server. remote: the remote_node.Remote that sends the commands.
+    """Control of the antenna by the clients of a server.
 
-    In all methods client is the name of a client, and now a time of the monotonic clock [s].
+    In all methods client is the name of a client, and now a time of the monotonic clock.
     """
+    _jog: Sequence[float] | None    # rates (azimuth, elevation) [deg/s]
 
-    def __init__(self, remote):
+    def __init__(self, remote: Remote) -> None:
         self._remote = remote
         self.pointing = Pointing(remote)
         self._holder, self._has_left, self._last_command_time = '', False, 0.0
         self._jog, self._last_jog_time, self._was_jogging = None, 0.0, False
 
     @property
-    def holder(self):
+    def holder(self) -> str:
         """Name of the client in control, '' without one. A client that has left stays in control of its motion."""
         return self._holder
 
-    def go(self, client, azimuth, elevation, now) -> PendingRequest:
-        """Point the antenna to a direction [deg]."""
+    def go(self, client: str, azimuth: Degrees, elevation: Degrees, now: Seconds) -> PendingRequest:
+        """Point the antenna to a direction."""
         try:
             target = self.pointing.target(azimuth, elevation, now)
         except Refused as refused:
             return PendingRequest([], now, refused.outcome, refused.reason)
         return self._request(client, now, lambda: self.pointing.go(target, now))
 
-    def do(self, client, verb, now) -> PendingRequest:
+    def do(self, client: str, verb: str, now: Seconds) -> PendingRequest:
         """Send a command without arguments."""
         return self._request(client, now, lambda: self._remote.request(verb), continues=False)
 
-    def jog(self, client, rates, now) -> PendingRequest:
+    def jog(self, client: str, rates: Sequence[float], now: Seconds) -> PendingRequest:
         """Move at rates (azimuth, elevation) [deg/s] until the next command, or until the client leaves."""
         pending = self._request(client, now, lambda: self._remote.request('rate', _rates(rates)), continues=False)
         if pending.outcome is None:
             self._jog, self._last_jog_time, self._was_jogging = rates, now, False
         return pending
 
-    def stop(self, client, now) -> PendingRequest:
+    def stop(self, client: str, now: Seconds) -> PendingRequest:
         """Stop the axes; every client may stop them."""
         self.pointing.reset()
         self._jog, self._remote.who = None, client
         return PendingRequest([self._remote.request('stop')], now + CLIENT_REPLY_TIMEOUT_S)
 
-    def look(self, now):
+    def look(self, now: Seconds) -> None:
         """Repeat a jog, end a motion without further set-points, and release control that is no longer used."""
         self._remote.who = self._holder
         self.pointing.look(now)
@@ -115,12 +118,12 @@ class Controller:
             self._last_jog_time = self._last_command_time = now
             self._remote.request('rate', _rates(self._jog))
 
-    def leave(self, client):
+    def leave(self, client: str) -> None:
         """Note that a client has left. Its control is released as soon as its motion has ended."""
         if client == self._holder:
             self._has_left = True
 
-    def release(self, now):
+    def release(self, now: Seconds) -> None:
         """Stop the jog or the motion of the client in control, and release its control."""
         if not self._holder:
             return
@@ -131,13 +134,13 @@ class Controller:
         self._jog = None
         self._release()
 
-    def _release(self):
+    def _release(self) -> None:
         """Release control, and leave the motion as it is."""
         self._remote.who = self._holder
         self._holder, self._has_left = '', False
         self._remote.request('release')
 
-    def _request(self, client, now, send, continues=True):
+    def _request(self, client: str, now: Seconds, send: Callable[[], str], continues: bool = True) -> PendingRequest:
         """Return the pending request of send(), which sends a command; take control first if necessary.
 
         continues: False for a command that ends the motion of the set-points.
@@ -154,5 +157,5 @@ class Controller:
         return PendingRequest([*numbers, send()], now + CLIENT_REPLY_TIMEOUT_S)
 
 
-def _rates(rates):
+def _rates(rates: Sequence[float]) -> dict[str, RadiansPerSecond]:
     return dict(zip(('azimuth', 'elevation'), map(math.radians, rates)))

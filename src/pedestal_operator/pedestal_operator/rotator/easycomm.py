@@ -5,8 +5,10 @@ is answered with the same letters and the value (azimuth 0 to 360 deg). All othe
 answered (hamlib/rotators/easycomm, easycomm.txt). A line with a word that cannot be read is refused as a whole.
 """
 import re
-import typing
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeVar
 
+from pedestal_common.quantities import Degrees
 from pedestal_operator.rotator.numerals import number
 
 MAX_LINE_BYTES = 256  # largest length of a line [bytes]
@@ -29,29 +31,27 @@ RADIO_MODE_PATTERN = '[A-Z]{1,6}(-[A-Z]{1,3})?'  # pattern of the mode of a radi
 STATUS_IDLE, STATUS_MOVING, STATUS_POINTING, STATUS_ERROR = 1, 2, 4, 8  # status numbers in the answer to GS
 
 
-class LineRequest(typing.NamedTuple):
-    """Content of a line.
-
-    queries              words to answer, in order
-    azimuth, elevation   of a set-point [deg], None if missing
-    verb                 command of the control unit
-    rates                of a jog (azimuth, elevation) [deg/s], None for no jog
-    scaled               True if the rates are not in deg/s, but multiples of the jog rate of the server
-    """
-    queries: tuple = ()
-    azimuth: float | None = None
-    elevation: float | None = None
-    verb: str = ''
-    rates: tuple | None = None
-    scaled: bool = True
+class LineRequest(NamedTuple):
+    """Content of a line."""
+    queries: tuple[str, ...] = ()           # words to answer, in order
+    azimuth: Degrees | None = None          # of a set-point
+    elevation: Degrees | None = None
+    verb: str = ''                          # command of the control unit
+    rates: tuple[float, float] | None = None    # of a jog (azimuth, elevation) [deg/s], None for no jog
+    scaled: bool = True     # True if the rates are not in deg/s, but multiples of the jog rate of the server
 
 
-def read(line) -> LineRequest:
-    """Return the LineRequest of a line. Raises ValueError with the word that cannot be read, for the whole line."""
-    queries, verbs, before = [], set(), ''
-    angles: dict = {}
-    moves: dict = {}
-    velocities: dict = {}
+_K = TypeVar('_K', int, str)
+
+
+def read(line: str) -> LineRequest:
+    """Return the content of a line. Raises ValueError with the word that cannot be read, for the whole line."""
+    queries: list[str] = []
+    verbs: set[str] = set()
+    before = ''
+    angles: dict[str, Degrees] = {}
+    moves: dict[int, float] = {}
+    velocities: dict[int, float] = {}
     for word in line.replace(';', ' ').upper().split():
         name = word[:2]
         if word in QUERY_WORDS:
@@ -62,10 +62,10 @@ def read(line) -> LineRequest:
             _put(angles, name, word, number)
         elif name[:1] == 'V' and name[1:] in RATE_DIRECTIONS:
             axis, sign = RATE_DIRECTIONS[name[1]]
-            _put(velocities, axis, word, lambda text, sign=sign: sign * _speed(text))
+            _put(velocities, axis, word, _speed, sign)
         elif word[:1] == 'M' and word[1:] in RATE_DIRECTIONS:
             axis, sign = RATE_DIRECTIONS[word[1]]
-            _put(moves, axis, word, lambda text, sign=sign: sign)
+            _put(moves, axis, word, lambda _: 1, sign)
         elif name not in IGNORED_WORDS and not (before in IGNORED_WORDS and re.fullmatch(RADIO_MODE_PATTERN, word)):
             raise ValueError(f'{word!r} is unknown')
         before = name
@@ -76,27 +76,28 @@ def read(line) -> LineRequest:
                        (rates.get(0, 0), rates.get(1, 0)) if rates else None, not velocities)
 
 
-def _put(values, key, word, convert):
+def _put(values: dict[_K, float], key: _K, word: str, convert: Callable[[str], float],
+         sign: int = 1) -> None:
     """Put the value of a word under a key. Raises ValueError for a wrong value, and for a second value."""
     if key in values:
         raise ValueError(f'{word!r} is the second value of its axis')
     try:
-        values[key] = convert(word[2:])
+        values[key] = sign * convert(word[2:])
     except ValueError as error:
         raise ValueError(f'{word!r}: {error}') from None
 
 
-def _speed(text):
+def _speed(text: str) -> float:
     """Return the value of a velocity [deg/s]."""
     if not re.fullmatch('[0-9]{1,6}', text):
         raise ValueError(f'{text!r} is not a whole number of mdeg/s')
     return int(text) / 1000.0
 
 
-def answer(request, angles, status, errors, version) -> bytes:
-    """Return the answer to a LineRequest.
+def answer(request: LineRequest, angles: Sequence[Degrees] | None, status: int, errors: int, version: str) -> bytes:
+    """Return the answer to a line.
 
-    angles: (azimuth, elevation) [deg], or None if unknown: then AZ and EL are not answered. status, errors, version:
+    angles: (azimuth, elevation), or None if unknown: then AZ and EL are not answered. status, errors, version:
     values in the answers to GS, GE and VE.
     """
     values = {'GS': f'GS{status}', 'GE': f'GE{errors}', 'VE': f'VE{version}'}

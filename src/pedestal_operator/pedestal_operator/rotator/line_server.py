@@ -1,10 +1,14 @@
 """Server of text lines over TCP and a serial device, for the rotator protocols; it never waits for a client."""
-import collections
 import contextlib
+import io
 import os
 import selectors
+import socket
 import time
 import tty
+from collections import deque
+from collections.abc import Callable
+from typing import Generic, TypeAlias, TypeVar
 
 from pedestal_operator import tcp_port
 
@@ -16,8 +20,10 @@ LINE_END_TIMEOUT_S = 0.05
 
 READ_CHUNK_BYTES = 65_536  # largest size of one read [bytes]
 
+Stream: TypeAlias = socket.socket | io.FileIO   # connection to a program, or a serial device
 
-def address_of(name):
+
+def address_of(name: str) -> str:
     """Return the name of a client without its TCP port. All connections from one address have this name in common."""
     return name.rsplit(':', 1)[0]
 
@@ -25,11 +31,11 @@ def address_of(name):
 class Lines:
     """Splitter of bytes into lines of at most `longest` bytes; a longer line is dropped."""
 
-    def __init__(self, longest):
+    def __init__(self, longest: int) -> None:
         self._longest, self._remainder, self._skips_line = longest, b'', False
         self._has_line_ends = False
 
-    def take(self, data):
+    def take(self, data: bytes) -> list[str | None]:
         """Return a list of the lines that these bytes complete; None stands for a line that is too long."""
         *lines, self._remainder = (self._remainder + data).replace(b'\r', b'\n').split(b'\n')
         found, self._has_line_ends = [], self._has_line_ends or bool(lines)
@@ -40,7 +46,7 @@ class Lines:
             self._remainder, self._skips_line = b'', True
         return found
 
-    def take_unterminated(self, is_complete):
+    def take_unterminated(self, is_complete: Callable[[str], bool]) -> list[str]:
         """Return a list with the received text without a line end, if is_complete(text) and if the program has never
         sent a line end; else []."""
         line = self._remainder.decode('ascii', 'replace')
@@ -51,22 +57,21 @@ class Lines:
 
 
 class Client:
-    """A connected program.
+    """A connected program."""
+    stream: Stream
+    name: str                   # in recordings
+    lines: deque[str | None]    # unanswered lines; None: a line that was too long
+    dropped: int                # number of answers dropped because they were not read
+    gone: str | None            # reason of its end, None while it is connected
+    refusals: dict[str, str]    # {command: reason of its last logged refusal}
 
-    name      its name in recordings
-    lines     unanswered lines
-    dropped   number of answers dropped because they were not read
-    gone      reason of its end, None while it is connected
-    refusals  {command: reason of its last logged refusal}
-    """
-
-    def __init__(self, stream, name, longest):
+    def __init__(self, stream: Stream, name: str, longest: int) -> None:
         self.stream, self.name = stream, name
-        self.lines, self.dropped, self.gone = collections.deque(), 0, None
+        self.lines, self.dropped, self.gone = deque(), 0, None
         self._splitter, self._out, self._receive_time = Lines(longest), bytearray(), 0.0
         self.refusals = {}
 
-    def receive(self):
+    def receive(self) -> None:
         """Read the available bytes."""
         try:
             data = os.read(self.stream.fileno(), READ_CHUNK_BYTES)
@@ -81,7 +86,7 @@ class Client:
         else:
             self.gone = ''
 
-    def end_line(self, is_complete):
+    def end_line(self, is_complete: Callable[[str], bool]) -> None:
         """Take the bytes of a program without line ends after LINE_END_TIMEOUT_S as a line, if is_complete(line).
 
         This serves gpredict for Windows.
@@ -89,14 +94,14 @@ class Client:
         if not self.lines and time.monotonic() - self._receive_time > LINE_END_TIMEOUT_S:
             self.lines += self._splitter.take_unterminated(is_complete)
 
-    def queue_answer(self, data):
+    def queue_answer(self, data: bytes) -> None:
         """Queue an answer behind the waiting answers."""
         if len(self._out) + len(data) > MAX_UNREAD_BYTES:
             self.dropped += 1
         else:
             self._out += data
 
-    def send(self):
+    def send(self) -> None:
         """Send as many bytes as the client takes."""
         if self._out:
             try:
@@ -107,14 +112,20 @@ class Client:
                 self.gone = error.strerror
 
 
-class LineServer:
+AnyClient = TypeVar('AnyClient', bound=Client)
+
+
+class LineServer(Generic[AnyClient]):
     """Clients of one TCP port, and of a serial device ('': none). Raises OSError.
 
     kind: start of the names of the clients; most: largest number of clients; longest: largest length of a line
-    [bytes]; make_client(stream, name, longest) -> a Client.
+    [bytes]; make_client(stream, name, longest) makes a client.
     """
+    clients: list[AnyClient]
+    refused_count: int
 
-    def __init__(self, kind, address, port, most, longest, device='', make_client=Client):
+    def __init__(self, kind: str, address: str, port: int, most: int, longest: int, device: str,
+                 make_client: Callable[[Stream, str, int], AnyClient]) -> None:
         self._most, self._longest, self._make = most, longest, make_client
         self._selector, self.clients, self.refused_count = selectors.DefaultSelector(), [], 0
         self._server, self._device_name = tcp_port.listen(address, port, most), f'{kind} {device}'
@@ -124,19 +135,19 @@ class LineServer:
         if device:
             stream = open(device, 'r+b', buffering=0, opener=lambda path, flags: os.open(
                 path, flags | os.O_NOCTTY | os.O_NONBLOCK))
-            tty.setraw(stream)
+            tty.setraw(stream.fileno())
             self._add(stream, self._device_name)
 
     @property
-    def port(self):
+    def port(self) -> int:
         """Number of the TCP port."""
         return self._server.getsockname()[1]
 
-    def is_own(self, name):
+    def is_own(self, name: str) -> bool:
         """Return True if a name is that of a client of this server, or of an earlier process with the same port."""
         return name.startswith(self._prefix) or name == self._device_name
 
-    def look(self):
+    def look(self) -> None:
         """Accept new clients, and read from all clients."""
         for key, _ in self._selector.select(0):
             if key.fileobj is self._server:
@@ -144,7 +155,7 @@ class LineServer:
             elif len(key.data.lines) <= MAX_WAITING_LINES:
                 key.data.receive()
 
-    def send(self):
+    def send(self) -> list[AnyClient]:
         """Send the waiting answers. Return the clients that have left, after their removal."""
         left = []
         for client in list(self.clients):
@@ -154,13 +165,13 @@ class LineServer:
                 left.append(client)
         return left
 
-    def close(self):
+    def close(self) -> None:
         """Close every connection and the port."""
         for client in list(self.clients):
             self._drop(client)
         self._server.close()
 
-    def _accept(self):
+    def _accept(self) -> None:
         with contextlib.suppress(OSError):
             connection, (host, port, *_) = self._server.accept()
             if len(self.clients) >= self._most:
@@ -170,12 +181,12 @@ class LineServer:
             connection.setblocking(False)
             self._add(connection, f'{self._prefix}{host}:{port}')
 
-    def _add(self, stream, name):
+    def _add(self, stream: Stream, name: str) -> None:
         client = self._make(stream, name, self._longest)
         self.clients.append(client)
         self._selector.register(stream, selectors.EVENT_READ, client)
 
-    def _drop(self, client):
+    def _drop(self, client: AnyClient) -> None:
         """Remove a client and close its connection."""
         self.clients.remove(client)
         self._selector.unregister(client.stream)

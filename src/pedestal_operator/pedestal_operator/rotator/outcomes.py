@@ -9,6 +9,6 @@ position, or its limits are unknown."""
 class Refused(Exception):  # noqa: N818  no error of the server
     """A refused request. outcome: one of the outcomes above; reason: one line."""
 
-    def __init__(self, outcome, reason):
+    def __init__(self, outcome: int, reason: str) -> None:
         super().__init__(reason)
         self.outcome, self.reason = outcome, reason

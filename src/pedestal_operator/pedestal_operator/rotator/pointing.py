@@ -6,11 +6,14 @@ becomes a command `slave` in earth angles. Successive set-points become one moti
 last set-point.
 """
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
+from pedestal_common.quantities import Degrees, Pair, Seconds
+from pedestal_operator.remote_node import Remote
 from pedestal_operator.rotator.outcomes import OUTCOME_NO_POSITION, OUTCOME_OUT_OF_REACH, Refused
 from pedestal_operator.rotator.rotctld import Limits, turn
 from pedestal_operator.rotator.set_point_filter import SetPointFilter
@@ -37,51 +40,56 @@ LIMIT_PARAMETERS = tuple(f'{axis}.limits.{end}' for axis in topics.AXES for end 
 """Parameters of the control unit with the limits of the axes."""
 
 
-class Pointing:
-    """Pointing of the antenna of a remote_node.Remote by set-points."""
+def _out_of_reach(name: str, angle: Degrees, low: Degrees, high: Degrees) -> Refused:
+    return Refused(OUTCOME_OUT_OF_REACH, f'{name} {angle:g} deg: must be {low:g} to {high:g}')
 
-    def __init__(self, remote):
+
+class Pointing:
+    """Pointing of an antenna by set-points."""
+
+    def __init__(self, remote: Remote) -> None:
         self._remote = remote
         self._filter = SetPointFilter()
         self._query = remote.query(LIMIT_PARAMETERS)
         remote.subscribe_numbers(ATTITUDE_TOPIC)
 
     @property
-    def on_ship(self):
+    def on_ship(self) -> bool:
         """True if the antenna is on a ship, also while the attitude is stale."""
         return self._remote.exists(ATTITUDE_TOPIC)
 
     @property
-    def _mode(self):
+    def _mode(self) -> str:
         return 'slave' if self.on_ship else 'preset'
 
     @property
-    def limits(self):
-        """Limits of the axes [deg] from the parameters of the control unit. Raises Refused before its reply."""
+    def limits(self) -> Limits:
+        """Limits of the axes from the parameters of the control unit. Raises Refused before its reply."""
         if self._query.values is None:
             raise Refused(OUTCOME_NO_POSITION, 'the limits of the antenna are unknown: no reply of the control unit')
-        angles = [math.degrees(angle) for angle in self._query.values]
-        return Limits(tuple(angles[:2]), tuple(angles[2:]))
+        low_az, high_az, low_el, high_el = (math.degrees(angle) for angle in self._query.values)
+        return Limits((low_az, high_az), (low_el, high_el))
 
-    def look(self, now):
+    def look(self, now: Seconds) -> None:
         """Take the limits of the control unit, and settle if no set-point has followed the last one in time."""
         self._query.look()
         if not self.continues(now):
             self.settle(now)
 
-    def continues(self, now):
-        """Return True if a set-point at the time now [s] continues the motion."""
+    def continues(self, now: Seconds) -> bool:
+        """Return True if a set-point at the time now continues the motion."""
         return self._filter.continues(now)
 
-    def set_point(self, now):
-        """Return the last set-point (azimuth, elevation) [deg] of the motion, None if no motion continues."""
-        if not self.continues(now):
+    def set_point(self, now: Seconds) -> tuple[Degrees, Degrees] | None:
+        """Return the last set-point (azimuth, elevation) of the motion, None if no motion continues."""
+        last = self._filter.set_point
+        if last is None or not self.continues(now):
             return None
-        azimuth, elevation = self._filter.set_point
+        azimuth, elevation = last
         return azimuth % 360.0, elevation
 
-    def earth_angles(self):
-        """Return earth angles (azimuth, elevation) [deg] of the antenna. Raises Refused if they are stale."""
+    def earth_angles(self) -> tuple[Degrees, Degrees]:
+        """Return earth angles (azimuth, elevation) of the antenna. Raises Refused if they are stale."""
         stale = [topic for topic in ('joint_states', *([ATTITUDE_TOPIC] if self.on_ship else []))
                  if not self._remote.present(topic, MAX_ANGLE_AGE_S)]
         angles = self._remote.directions('joint_states')
@@ -91,12 +99,14 @@ class Pointing:
         if not self.on_ship:
             return angles
         deck_to_earth = np.zeros((3, 3))
-        line_of_sight.rotation(*self._remote.numbers[ATTITUDE_TOPIC][:4], deck_to_earth)
+        x, y, z, w = self._remote.numbers[ATTITUDE_TOPIC][:4]
+        line_of_sight.rotation(x, y, z, w, deck_to_earth)
         beam = line_of_sight.direction(*np.radians(angles))
-        return tuple(np.degrees(line_of_sight.earth_angles(*(deck_to_earth @ beam))))
+        azimuth, elevation = np.degrees(line_of_sight.earth_angles(*(deck_to_earth @ beam)))
+        return azimuth, elevation
 
-    def target(self, azimuth, elevation, now):
-        """Return the set-point (azimuth, elevation) [deg] for a direction at the time now [s], on the nearest turn.
+    def target(self, azimuth: Degrees, elevation: Degrees, now: Seconds) -> tuple[Degrees, Degrees]:
+        """Return the set-point (azimuth, elevation) for a direction at the time now, on the nearest turn.
 
         Raises Refused if it is out of reach, or if the position or the limits of the antenna are unknown.
         """
@@ -107,36 +117,37 @@ class Pointing:
         self.earth_angles()     # Only for its check: it raises Refused without a fresh position.
         # On a ship the first `near` is a deck angle and not an earth angle. This is sufficient, because the whole
         # turns of an earth azimuth matter only from one set-point to the next.
-        near = (self._filter.set_point if self.continues(now) else self._remote.directions('joint_states'))[0]
+        last = self._filter.set_point
+        near = last[0] if last is not None and self.continues(now) else self._remote.directions('joint_states')[0]
         if self.on_ship:
             return near + (azimuth - near + 180.0) % 360.0 - 180.0, elevation
         turned = turn(azimuth, near, limits.azimuth)
         if turned is None:
-            self._check('azimuth', azimuth, *limits.azimuth)
+            raise _out_of_reach('azimuth', azimuth, *limits.azimuth)
         return turned, elevation
 
-    def go(self, target, now):
-        """Command a set-point of `target` at the time now [s]. Return the number of the request."""
+    def go(self, target: tuple[Degrees, Degrees], now: Seconds) -> str:
+        """Command a set-point of `target` at the time now. Return the number of the request."""
         return self._request(*self._filter.take(target, now))
 
     @staticmethod
-    def _check(name, angle, low, high):
+    def _check(name: str, angle: Degrees, low: Degrees, high: Degrees) -> None:
         if not low <= angle <= high:
-            raise Refused(OUTCOME_OUT_OF_REACH, f'{name} {angle:g} deg: must be {low:g} to {high:g}')
+            raise _out_of_reach(name, angle, low, high)
 
-    def settle(self, now):
+    def settle(self, now: Seconds) -> None:
         """Stop at the last set-point, because no other follows; do nothing after a change of mode."""
         last, mode = self._filter.set_point, self._remote.texts.get('acu/mode')
         if last is not None and mode == self._mode and (self._filter.place(now) != last).any():
             self._request(last)
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         """Begin a new motion with the next set-point."""
         self._filter = SetPointFilter()
 
-    def _request(self, angles, rates=(0.0, 0.0), moves=0.0):
-        """Command angles [deg] that move at rates [deg/s] for the time `moves` [s]. Return the number of the request.
+    def _request(self, angles: Pair, rates: Sequence[float] | Pair = (0.0, 0.0), moves: Seconds = 0.0) -> str:
+        """Command angles [deg] that move at rates [deg/s] for the time `moves`. Return the number of the request.
 
         On a ship the command is valid for SLAVE_DURATION_S.
         """

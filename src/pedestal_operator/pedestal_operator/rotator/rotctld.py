@@ -4,8 +4,11 @@ The module is written for Hamlib 4.5.4 (rotctl -m 2, rotctld -m 1) and gpredict.
 this module reads line by line. There are three differences. A command with too few arguments is refused at once and
 does not take the next line. An unknown command is answered. Numbers must be finite.
 """
-import typing
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from pedestal_common.quantities import Degrees
 from pedestal_operator.rotator.numerals import number
 
 MAX_LINE_BYTES = 256  # largest length of a line [bytes]
@@ -19,12 +22,12 @@ ERROR_REASONS = {RESULT_INVALID: 'invalid arguments', RESULT_NOT_IMPLEMENTED: 'u
 """{result of a refused line: its reason in the log}."""
 
 
-class Row(typing.NamedTuple):
-    """A command: letter, long name, number of arguments. sets: True if the answer is RPRT only."""
+class Row(NamedTuple):
+    """A command."""
     letter: str
     name: str
-    arguments: int = 0
-    sets: bool = False
+    arguments: int = 0      # number of its arguments
+    sets: bool = False      # True if the answer is RPRT only
 
 
 COMMANDS = (Row('p', 'get_pos'), Row('P', 'set_pos', 2, True), Row('S', 'stop', 0, True), Row('K', 'park', 0, True),
@@ -49,30 +52,23 @@ _DIRECTION_NUMBERS = {'UP': 2, 'DOWN': 4, 'LEFT': 8, 'CCW': 8, 'RIGHT': 16, 'CW'
                       'DOWN_CW': 256}
 
 
-class Limits(typing.NamedTuple):
-    """Limits (low, high) of the axes [deg]."""
-    azimuth: tuple
-    elevation: tuple
+class Limits(NamedTuple):
+    """Limits (low, high) of the axes."""
+    azimuth: tuple[Degrees, Degrees]
+    elevation: tuple[Degrees, Degrees]
 
 
-class Request(typing.NamedTuple):
-    """Content of a line.
-
-    name        name of the command
-    values      its arguments
-    separator   character between the lines of an extended response (see rotctld), '' for a plain response
-    header      first line of an extended response
-    error       result of a refusal, RESULT_OK without one
-    """
-    name: str
-    values: tuple = ()
-    separator: str = ''
-    header: str = ''
-    error: int = RESULT_OK
+class Request(NamedTuple):
+    """Content of a line."""
+    name: str                       # of the command
+    values: tuple[float, ...] = ()  # its arguments
+    separator: str = ''             # between the lines of an extended response (see rotctld), '' for a plain response
+    header: str = ''                # first line of an extended response
+    error: int = RESULT_OK          # result of a refusal, RESULT_OK without one
 
 
-def read(line) -> Request | None:
-    """Return the Request of a line (without its line end), None for a line that has no answer."""
+def read(line: str) -> Request | None:
+    """Return the content of a line (without its line end), None for a line that has no answer."""
     line = line.strip()
     if not line or line.startswith('#'):
         return None
@@ -101,7 +97,7 @@ def read(line) -> Request | None:
     return Request(row.name, values, separator, header)
 
 
-def _values(name, given):
+def _values(name: str, given: Sequence[str]) -> tuple[float, ...]:
     """Return the arguments of a command as numbers. Raises ValueError."""
     if name == 'move':
         direction = _DIRECTION_NUMBERS.get(given[0].upper()) or int(given[0])
@@ -112,14 +108,14 @@ def _values(name, given):
     return tuple(number(text) for text in given)
 
 
-def is_complete(line) -> bool:
+def is_complete(line: str) -> bool:
     """Return True if a line (without its line end) is a valid command with all its arguments."""
     request = read(line)
     return request is not None and request.error == RESULT_OK
 
 
-def answer(request, result, lines=()) -> bytes:
-    """Return the answer to a Request. lines: [(name in extended responses, text)] of its values."""
+def answer(request: Request, result: int, lines: Sequence[tuple[str, str]] = ()) -> bytes:
+    """Return the answer to a request. lines: (name in extended responses, text) of its values."""
     if not request.separator:
         text = ''.join(f'{value}\n' for _, value in lines) if lines and result == RESULT_OK else f'RPRT {result}\n'
         return text.encode()
@@ -129,13 +125,13 @@ def answer(request, result, lines=()) -> bytes:
     return (request.separator.join((*parts, f'RPRT {result}')) + '\n').encode()
 
 
-def position(azimuth, elevation, raw=False):
-    """Return the lines of the answer to get_pos [deg]. The azimuth is from 0 to 360 deg, or unchanged if raw."""
+def position(azimuth: Degrees, elevation: Degrees, raw: bool = False) -> list[tuple[str, str]]:
+    """Return the lines of the answer to get_pos. The azimuth is from 0 to 360 deg, or unchanged if raw."""
     shown = azimuth if raw else round(azimuth % 360.0, 2) % 360.0
     return [('Azimuth', f'{shown:.2f}'), ('Elevation', f'{elevation:.2f}')]
 
 
-def state(limits, extended):
+def state(limits: Limits, extended: bool) -> list[tuple[str, str]]:
     """Return the lines of the answer to dump_state."""
     (low_az, high_az), (low_el, high_el) = limits
     if extended:
@@ -146,8 +142,8 @@ def state(limits, extended):
                                     f'max_el={high_el:.6f}', 'south_zero=0', 'rot_type=AzEl', 'done')]
 
 
-def flags(rates, angles, limits):
-    """Return the status words of axes that move and of axes at a limit. rates [deg/s], angles [deg]: of both axes."""
+def flags(rates: Sequence[float], angles: Sequence[Degrees], limits: Limits) -> str:
+    """Return the status words of axes that move and of axes at a limit. rates [deg/s], angles: of both axes."""
     words, moving = [], [abs(rate) > 0.01 for rate in rates]
     if any(moving):
         words.append('MOVING')
@@ -161,8 +157,8 @@ def flags(rates, angles, limits):
     return ' '.join(words)
 
 
-def turn(azimuth, near, limits):
-    """Return the azimuth [deg] on the turn nearest to `near` inside the limits, None if no turn is inside."""
+def turn(azimuth: Degrees, near: Degrees, limits: tuple[Degrees, Degrees]) -> Degrees | None:
+    """Return the azimuth on the turn nearest to `near` inside the limits, None if no turn is inside."""
     low, high = limits
     candidates = [azimuth + 360.0 * k for k in range(-4, 5) if low <= azimuth + 360.0 * k <= high]
     return min(candidates, key=lambda candidate: abs(candidate - near), default=None)

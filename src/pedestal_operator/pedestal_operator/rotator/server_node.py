@@ -1,40 +1,44 @@
 """Base class of the nodes that serve a rotator protocol, line by line, to other programs (rotctld, EasyComm)."""
 import dataclasses
 import time
+from collections.abc import Callable
+from typing import Generic
 
 from pedestal_common import parameters
+from pedestal_common.quantities import Seconds
 from pedestal_operator.remote_node import Remote
 from pedestal_operator.rotator.controller import Controller
-from pedestal_operator.rotator.line_server import LineServer
+from pedestal_operator.rotator.line_server import AnyClient, LineServer, Stream
 
 POLL_PERIOD_S = 0.005  # period at which the node reads from and answers its clients [s]
 
 
-@dataclasses.dataclass(frozen=True)
-class ServerParameters(parameters.Parameters):
-    """Common parameters of the servers; each server adds its `port`."""
-    address: str = parameters.text('127.0.0.1', 'address of the server; programs that reach it can move the antenna')
-    clients: int = parameters.parameter(8, 1, 64, '', 'largest number of connected clients')
-
-
-def tcp_port(default):
+def tcp_port(default: int) -> int:
     """Return the parameter `port` of a server."""
     return parameters.parameter(default, 0, 65535, '', 'TCP port; 0: a free port, which the node prints')
 
 
-class ServerNode(Remote):
+@dataclasses.dataclass(frozen=True)
+class ServerParameters(parameters.Parameters):
+    """Common parameters of the servers; each server has its own default of `port`."""
+    address: str = parameters.text('127.0.0.1', 'address of the server; programs that reach it can move the antenna')
+    clients: int = parameters.parameter(8, 1, 64, '', 'largest number of connected clients')
+    port: int = tcp_port(0)
+
+
+class ServerNode(Remote, Generic[AnyClient]):
     """Node that serves its clients from a timer.
 
-    parameters_type: its ServerParameters; longest: largest length of a line [bytes]; make_client: see
-    line_server.LineServer.
+    longest: largest length of a line [bytes]; make_client: see line_server.LineServer.
     """
     awaits = 'clients'
     """What the node waits for, in the line that it logs when it is ready (Shell.awaits)."""
 
-    device = ''
-    """Serial device of a further client, '' for none; overridden by servers with serial devices."""
+    parameters: ServerParameters
+    _checked_arrival: Seconds | None
 
-    def __init__(self, name, parameters_type, longest, make_client):
+    def __init__(self, name: str, parameters_type: type[ServerParameters], longest: int,
+                 make_client: Callable[[Stream, str, int], AnyClient]) -> None:
         super().__init__(name, name, parameters_type=parameters_type)
         p = self.parameters
         self.controller = Controller(self)
@@ -43,11 +47,16 @@ class ServerNode(Remote):
         print(f'{name}: {p.address}:{self._server.port}' + (f' and {self.device}' if self.device else ''), flush=True)
         self.every(POLL_PERIOD_S, self._serve_clients)
 
-    def serve(self, client, now):
-        """Answer the lines of a client at the time now [s]; overridden."""
+    @property
+    def device(self) -> str:
+        """Path of the serial device of a further client, '' for none; overridden by servers with serial devices."""
+        return ''
+
+    def serve(self, client: AnyClient, now: Seconds) -> None:
+        """Answer the lines of a client at the time now; overridden."""
         raise NotImplementedError
 
-    def _serve_clients(self):
+    def _serve_clients(self) -> None:
         now = time.monotonic()
         self._server.look()
         self._release_lost_control()
@@ -60,7 +69,7 @@ class ServerNode(Remote):
             if client.gone or dropped:
                 self.get_logger().warning(f'{client.name}: {", ".join(filter(None, (client.gone, dropped)))}')
 
-    def _release_lost_control(self):
+    def _release_lost_control(self) -> None:
         """Release control that the control unit holds for a client of an earlier process of this server.
 
         Each arrival of the diagnostics is checked once.
@@ -73,7 +82,7 @@ class ServerNode(Remote):
             self.who = holder     # releases in the name of the client that holds control
             self.request('release')
 
-    def refuse(self, client, command, line, reason):
+    def refuse(self, client: AnyClient, command: str, line: str | None, reason: str) -> None:
         """Log the refusal of a line of a client. line: its text, None for a line that was too long.
 
         A reason that repeats is logged once. It is logged again after the next success of the command: the subclass
@@ -84,7 +93,7 @@ class ServerNode(Remote):
             refused = 'refused a line' if line is None else f'refused {line!r}'
             self.get_logger().warning(f'{client.name}: {refused}: {reason.removeprefix("refused: ")}')
 
-    def close(self):
+    def close(self) -> None:
         """Release the control of the clients, then close the port and the node."""
         self.controller.release(time.monotonic())
         self._server.close()

@@ -1,9 +1,12 @@
 """Source of the coordinate frames of a running antenna, from the messages of its encoders and its INS."""
 import contextlib
+from collections.abc import Sequence
 
 import numpy as np
 
 from pedestal_common.graph import nodes
+from pedestal_common.node.shell import Shell
+from pedestal_common.quantities import Nanoseconds
 from pedestal_common.wire import records
 from pedestal_operator.viewers import frames
 from pedestal_operator.viewers.on_demand import OnDemand
@@ -11,17 +14,19 @@ from pedestal_operator.viewers.on_demand import OnDemand
 
 class _Latest:
     """Last message of a stamped topic, decoded when it is read."""
+    _data: bytes | None                                     # received since the last reading
+    _read: tuple[Nanoseconds, Sequence[float]] | None       # result of the last reading
 
-    def __init__(self, node, prefix, topic):
+    def __init__(self, node: Shell, prefix: str, topic: str) -> None:
         self._decoder = records.Decoder(topic, records.empty(records.of(topic), 1))
         self._data = self._read = None
         self.topic = OnDemand(node, node.links[prefix + topic], self._take)
 
-    def _take(self, data, _info):
+    def _take(self, data: bytes, _info: object) -> None:
         self._data = data
 
-    def read(self):
-        """Return (stamp [ns], numbers) of the last readable message, None before the first."""
+    def read(self) -> tuple[Nanoseconds, Sequence[float]] | None:
+        """Return (stamp, numbers) of the last readable message, None before the first."""
         if self._data is not None:
             with contextlib.suppress(ValueError):
                 self._read = self._decoder.decoded(self._data)
@@ -30,22 +35,19 @@ class _Latest:
 
 
 class FrameSource:
-    """Frames from the last messages of joint_states (of every beam) and ship/imu/data, subscribed while active.
+    """Frames from the last messages of joint_states (of every beam) and ship/imu/data, subscribed while active."""
 
-    node: a shell.Shell.
-    """
-
-    def __init__(self, node):
+    def __init__(self, node: Shell) -> None:
         self._attitude = _Latest(node, '', 'ship/imu/data')
         self._angles = {prefix: _Latest(node, prefix, 'joint_states') for prefix in nodes.prefixes(node.graph.beams)}
 
-    def set_active(self, active):
+    def set_active(self, active: bool) -> None:
         """Subscribe to the antenna if active, else end the subscriptions."""
         for latest in (self._attitude, *self._angles.values()):
             latest.topic.set_active(active)
 
-    def read(self):
-        """Return (stamp of the last angles [ns], their frames.Transforms), (0, []) before the first.
+    def read(self) -> tuple[Nanoseconds, list[frames.Transform]]:
+        """Return (stamp of the last angles, their transforms), (0, []) before the first.
 
         The deck is ashore before the first message of the INS. A deck without an attitude has no transform.
         """

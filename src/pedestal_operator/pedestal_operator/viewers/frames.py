@@ -13,11 +13,13 @@ upwards.
 """
 import importlib.resources
 import math
-import typing
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 from pedestal_common.graph import topics
+from pedestal_common.quantities import Message, Nanoseconds, Radians, Xyz, Xyzw
 from pedestal_common.wire import messages
 
 VIEWER_FOLDER = importlib.resources.files('pedestal_operator.viewers') / 'files'
@@ -27,33 +29,30 @@ PEDESTAL_URDF = (VIEWER_FOLDER / 'pedestal.urdf').read_text()
 """Model of the pedestal, the text of the topic robot_description."""
 
 
-class Transform(typing.NamedTuple):
-    """Frame `child` in its `parent`: place of its origin [m], rotation as quaternion (x, y, z, w)."""
+class Transform(NamedTuple):
+    """Frame `child` in its `parent`."""
     parent: str
     child: str
-    translation: tuple
-    rotation: tuple
+    translation: Xyz        # place of its origin [m]
+    rotation: Xyzw
 
 
-class Joint(typing.NamedTuple):
-    """A joint of the model.
-
-    origin    place of the child in the parent [m]
-    axis      axis of its turn in the frame of its child, None for a fixed joint
-    """
+class Joint(NamedTuple):
+    """A joint of the model."""
     name: str
     parent: str
     child: str
-    origin: tuple
-    axis: tuple | None
+    origin: Xyz             # place of the child in the parent [m]
+    axis: Xyz | None        # axis of its turn in the frame of its child, None for a fixed joint
 
 
-def _numbers(text):
-    return tuple(float(word) for word in text.split())
+def _numbers(text: str) -> Xyz:
+    x, y, z = (float(word) for word in text.split())
+    return x, y, z
 
 
-def joints(description=PEDESTAL_URDF) -> tuple:
-    """Return the Joints of a URDF in its order. At angle 0 all frames must be parallel: the URDF has no `rpy`."""
+def joints(description: str = PEDESTAL_URDF) -> tuple[Joint, ...]:
+    """Return the joints of a URDF in its order. At angle 0 all frames must be parallel: the URDF has no `rpy`."""
     found = []
     for joint in ElementTree.fromstring(description).iter('joint'):
         parts = {part.tag: part.attrib for part in joint}
@@ -66,21 +65,22 @@ def joints(description=PEDESTAL_URDF) -> tuple:
 PEDESTAL_JOINTS = joints()
 
 
-def _rotation(axis, angle):
-    """Return the quaternion (x, y, z, w) of a turn about a unit vector by an angle [rad]."""
+def _rotation(axis: Xyz, angle: Radians) -> Xyzw:
+    """Return the quaternion of a turn about a unit vector by an angle."""
     sine = math.sin(0.5 * angle)
-    return *(sine * part for part in axis), math.cos(0.5 * angle)
+    return sine * axis[0], sine * axis[1], sine * axis[2], math.cos(0.5 * angle)
 
 
-def of_deck(attitude=ASHORE_ATTITUDE) -> Transform:
-    """Return the Transform of the deck in the earth frame. attitude: quaternion (x, y, z, w) deck -> earth."""
-    return Transform('earth', 'base_link', (0.0, 0.0, 0.0), tuple(attitude))
+def of_deck(attitude: Sequence[float] = ASHORE_ATTITUDE) -> Transform:
+    """Return the transform of the deck in the earth frame. attitude: quaternion (x, y, z, w) deck -> earth."""
+    x, y, z, w = attitude
+    return Transform('earth', 'base_link', (0.0, 0.0, 0.0), (x, y, z, w))
 
 
-def of_pedestal(angles, prefix='') -> list:
-    """Return the Transforms from the deck to the beam.
+def of_pedestal(angles: Sequence[Radians], prefix: str = '') -> list[Transform]:
+    """Return the transforms from the deck to the beam.
 
-    angles: azimuth and elevation of joint_states [rad]; prefix: prefix of one of several beams, as in the frame
+    angles: azimuth and elevation of joint_states; prefix: prefix of one of several beams, as in the frame
     beam_2/azimuth.
     """
     turned = dict(zip(topics.AXES, angles))
@@ -89,8 +89,8 @@ def of_pedestal(angles, prefix='') -> list:
             for joint in PEDESTAL_JOINTS]
 
 
-def tf_message(stamp, transforms):
-    """Return the tf2_msgs/msg/TFMessage of Transforms at a stamp [ns]."""
+def tf_message(stamp: Nanoseconds, transforms: Iterable[Transform]) -> Message:
+    """Return the tf2_msgs/msg/TFMessage of transforms at a stamp."""
     types = messages.ROS_TYPESTORE.types
     stamped, transform = (types[f'geometry_msgs/msg/{name}'] for name in ('TransformStamped', 'Transform'))
     messages_of_frames = []

@@ -167,7 +167,7 @@ def drive_rows():
     The trial speed is the simulated time of all lanes over the CPU time of one core.
     """
     params = AduParameters(initial_elevation=0.7)
-    one = np.zeros(1, adu_unit.Record)
+    one = adu_unit.DriveRecord.zeros()
     one['state'], one['constants'] = drive_unit.initial_state(params), drive_unit.constants(params)
     one['inputs']['azimuth']['rate'], one['inputs']['elevation']['rate'], one['inputs']['enable'] = 0.02, -0.01, 1
     drives, (state, constants, inputs, outputs) = lanes.to_lanes(one), (

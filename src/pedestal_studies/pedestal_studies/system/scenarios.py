@@ -146,12 +146,11 @@ def flyby_figure():
     case = CASES['uav_flyby'].with_seed(FIRST_SEED)
     flown = tracking.read(MemoryRecording(case.loaded(), case.run()))
     middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5
-    true = np.column_stack((flown.cross_elevation, flown.elevation_error))
-    cross_elevations, elevation_errors = zip(*(errors.T for errors in (flown.measured, flown.filtered, true)))
+    cross_elevations, elevation_errors = zip(*(errors.T for errors in (flown.measured, flown.filtered, flown.error)))
     # The measured elevation of the target is its true elevation plus the measured error minus the true error. The
     # filtered elevation follows in the same way from the filtered error.
     _, target_elevation = flown.target_earth.T
-    elevations = [error - flown.elevation_error + target_elevation for error in elevation_errors]
+    elevations = [error - flown.error[:, 1] + target_elevation for error in elevation_errors]
     for panel, curves, title in ((axes[0, 0], cross_elevations, 'error in cross-elevation (figures 7, 8)'),
                                  (axes[1, 0], elevations, 'elevation of the target (figures 9, 10)')):
         for values, colour, label in zip(curves, (RAW_COLOUR, FILTERED_COLOUR, INK_COLOUR),
@@ -159,7 +158,7 @@ def flyby_figure():
             panel.plot(flown.t[middle], np.degrees(values[middle]), color=colour, label=label,
                        linewidth=0.6 if label == 'receiver' else 1.2)
         panel.set_title(title)
-    axes[2, 0].plot(flown.t, np.degrees(flown.azimuth), color=FILTERED_COLOUR)
+    axes[2, 0].plot(flown.t, np.degrees(flown.encoders[:, 0]), color=FILTERED_COLOUR)
     axes[2, 0].set_title('azimuth of the antenna over the flight (figure 11)')
     return drawing.legend(figure)
 

@@ -21,44 +21,45 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Pair, Vector3
+from pedestal_common.quantities import MetersPerSecond, Pair, Radians, RadiansPerSecond, Records, Seconds, Vector3
 from pedestal_common.record import Record
 from pedestal_common.reproducible import solution
 from ship_motion_sim.alignment import extended_observer, levelling, slope, steady_state
-from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD
+from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD, Conditions
+from ship_motion_sim.params import AdrcParameters
 
 
 class Constants(Record):
-    """Record."""
-    w_o: float
-    w_c: float  # bandwidth of observer and of level control [rad/s]
-    start: float  # time after which the azimuth uses the commands [s]
-    velocity_variance: float  # variance of the velocity in the settled loop [m2/s2]
-    innovation_variance: float  # variance of the innovations in the settled loop [m2/s2]
-    swell: float  # variance of velocity divided by that of innovations [-]
-    level: float  # 1 sigma of level of the settled loop [rad]
+    """Bandwidths of the loop and its accuracy once it has settled."""
+    w_o: RadiansPerSecond       # bandwidth of the observer
+    w_c: RadiansPerSecond       # bandwidth of the level control
+    start: Seconds              # time after which the azimuth uses the commands
+    velocity_variance: float    # [m2/s2]
+    innovation_variance: float  # [m2/s2]
+    swell: float                # variance of velocity divided by that of innovations [-]
+    level: Radians              # 1 sigma of level
 
 
 class State(Record):
-    """Record."""
-    t: float  # time since power-up [s]
+    """State of the method."""
+    t: Seconds                  # since power-up
     observer: extended_observer.State
-    v1: Pair
-    v2: Pair  # tracking differentiator: reference of velocity and of its rate
-    first: Pair
+    v1: Pair                    # tracking differentiator: reference of velocity [m/s]
+    v2: Pair                    # and of its rate [m/s2]
+    first: Pair                 # running sums of slope.added for w_cE, w_cN
     second: Pair
-    count: int  # running sums of slope.added for w_cE, w_cN
-    command: Vector3
-    azimuth: float
-    azimuth_sigma: float
-    level_sigma: float
+    count: int
+    command: Vector3            # rate of n' about east, north and up [rad/s]
+    azimuth: Radians            # estimated misalignment
+    azimuth_sigma: Radians      # stated 1 sigmas
+    level_sigma: Radians
 
 
-def constants(k, p, h) -> np.ndarray:
-    """Return the constants, one record of Constants; p: AdrcParameters; h: step [s]; k: Conditions."""
+def constants(conditions: Records, p: AdrcParameters, h: Seconds) -> Records:
+    """Return the Constants (), one record, for steps of h."""
     record = np.zeros((), Constants.dtype)
     record['w_o'], record['w_c'], record['start'] = p.observer, p.control, p.start
-    g, r = float(k['gravity']), float(k['velocity_density']) / h
+    g, r = float(conditions['gravity']), float(conditions['velocity_density']) / h
     # Model of one channel (east or north) while the function fhan of its level command is linear. The state is
     # (v, x2, z1, z2, z3): velocity error, its rate, and the estimates of the observer for v, x2 and the rate of x2
     # without command. The noises are those of the velocity (variance r [m2/s2]) and the random walk of the gyros. F,
@@ -75,7 +76,7 @@ def constants(k, p, h) -> np.ndarray:
     A[2:] += np.outer(gain, innovation)
     noise = np.concatenate(([0.0, 0.0], gain))
     Q = np.outer(noise, noise) * r
-    Q[1, 1] += (g * float(k['gyro_noise']))**2 * h
+    Q[1, 1] += (g * float(conditions['gyro_noise']))**2 * h
     P = steady_state.covariance(A, Q)
     record['velocity_variance'] = P[0, 0]
     record['innovation_variance'] = np.sum(np.outer(innovation, innovation) * P) + r
@@ -83,15 +84,14 @@ def constants(k, p, h) -> np.ndarray:
     z = cmath.exp(1j * extended_observer.MIN_SWELL_FREQUENCY_RAD_S * h)
     state = solution(z * np.eye(5) - A, noise)
     record['swell'] = abs(state[0] / (state[0] - state[2] + 1.0))**2
-    record['level'] = math.sqrt(P[1, 1] + float(k['accelerometer_bias'])**2) / g
+    record['level'] = math.sqrt(P[1, 1] + float(conditions['accelerometer_bias'])**2) / g
     return record
 
 
 @compiled
-def azimuth_sigma(c, k, o, window):
-    """Return the 1 sigma [rad] of the azimuth from the slope over a window [s]; o: extended_observer.State.
-
-    c, k: records Constants, Conditions. The variance of the slope has two parts:
+def azimuth_sigma(constants: Constants, conditions: Conditions, observer: extended_observer.State,
+                  window: Seconds) -> Radians:
+    """Return the 1 sigma of the azimuth from the slope over a window. The variance of the slope has two parts:
 
     - The random walk of the gyros, gyro_noise, adds 1.2 gyro_noise^2 / window, because the slope is a mean of the
       commands with the weights of a parabola.
@@ -99,49 +99,52 @@ def azimuth_sigma(c, k, o, window):
       velocity at the two ends of the window remains. It adds 2 x 6^2 / (g window^2)^2 times the velocity variance.
 
     If the innovations are larger than expected, the excess of their variance counts as swell. The velocity variance
-    grows by c.swell times this excess.
+    grows by constants.swell times this excess.
     """
-    g, w_north = k.gravity, k.earth_rate[1]
-    variance = c.velocity_variance + c.swell * extended_observer.swell_variance(o, c.innovation_variance)
+    g, w_north = conditions.gravity, conditions.earth_rate[1]
+    swell = extended_observer.swell_variance(observer, constants.innovation_variance)
+    variance = constants.velocity_variance + constants.swell * swell
     noise = 72.0 * variance / (g * window * window)**2
-    return min(math.sqrt(noise + 1.2 * k.gyro_noise**2 / window + k.gyro_bias**2) / w_north, UNKNOWN_AZIMUTH_SIGMA_RAD)
+    return min(math.sqrt(noise + 1.2 * conditions.gyro_noise**2 / window + conditions.gyro_bias**2) / w_north,
+               UNKNOWN_AZIMUTH_SIGMA_RAD)
 
 
 @compiled
-def level_sigma(c, k, o, t):
-    """Return the 1 sigma [rad] of level t [s] after power-up; other arguments as of `azimuth_sigma`.
+def level_sigma(constants: Constants, conditions: Conditions, observer: extended_observer.State,
+                t: Seconds) -> Radians:
+    """Return the 1 sigma of level at the time t after power-up.
 
     The result is the root sum square of two parts. The first part is the observed tilt or the 1 sigma of the settled
     loop, whichever is larger. Innovations above the expected ones increase that 1 sigma. The second part is the share
     of the initial tilt that the observer, with all poles at w_o, has not observed yet.
     """
-    x = c.w_o * t
+    x = constants.w_o * t
     unobserved = extended_observer.INITIAL_LEVEL_SIGMA_RAD * (1.0 + x + 0.5 * x * x) * math.exp(-x)
-    settled = math.sqrt(max(o.innovation_ratio, 1.0)) * c.level
-    return math.hypot(max(settled, extended_observer.tilt(o, k)), unobserved)
+    settled = math.sqrt(max(observer.innovation_ratio, 1.0)) * constants.level
+    return math.hypot(max(settled, extended_observer.tilt(observer, conditions)), unobserved)
 
 
 @compiled
-def step(s, c, k, v_east, v_north, h):
-    """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
-
-    s, c, k: records State, Constants, Conditions.
-    """
-    s.t += h
-    o = s.observer
+def step(state: State, constants: Constants, conditions: Conditions, v_east: MetersPerSecond, v_north: MetersPerSecond,
+         h: Seconds) -> None:
+    """Execute one step h after the last; v_east, v_north: velocity error in n'."""
+    state.t += h
+    observer = state.observer
     for i in range(2):
-        s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
-    l1, l2, l3 = extended_observer.gains(c.w_o, h)
-    extended_observer.predict(o, h)
-    extended_observer.correct(o, v_east, v_north, l1, l2, l3, c.innovation_variance, h)
-    levelling.level(o, k, s.v1, s.v2, c.w_c, s.command)
-    s.azimuth_sigma, s.level_sigma = UNKNOWN_AZIMUTH_SIGMA_RAD, level_sigma(c, k, o, s.t)
-    if s.t < c.start:
+        state.v1[i], state.v2[i] = levelling.differentiated(state.v1[i], state.v2[i], 0.0, h)
+    l1, l2, l3 = extended_observer.gains(constants.w_o, h)
+    extended_observer.predict(observer, h)
+    extended_observer.correct(observer, v_east, v_north, l1, l2, l3, constants.innovation_variance, h)
+    levelling.level(observer, conditions, state.v1, state.v2, constants.w_c, state.command)
+    state.azimuth_sigma = UNKNOWN_AZIMUTH_SIGMA_RAD
+    state.level_sigma = level_sigma(constants, conditions, observer, state.t)
+    if state.t < constants.start:
         return
     for i in range(2):
-        s.first[i], s.second[i], count = slope.added(s.first[i], s.second[i], s.count, s.command[i])
-    s.count = count
-    w_east = slope.slope(s.first[0], s.second[0], count)
-    w_north = slope.slope(s.first[1], s.second[1], count)
-    s.azimuth = math.atan2(w_east, k.earth_rate[1] + w_north)
-    s.azimuth_sigma = azimuth_sigma(c, k, o, count * h)
+        state.first[i], state.second[i], count = slope.added(
+            state.first[i], state.second[i], state.count, state.command[i])
+    state.count = count
+    w_east = slope.slope(state.first[0], state.second[0], count)
+    w_north = slope.slope(state.first[1], state.second[1], count)
+    state.azimuth = math.atan2(w_east, conditions.earth_rate[1] + w_north)
+    state.azimuth_sigma = azimuth_sigma(constants, conditions, observer, count * h)

@@ -11,9 +11,10 @@ later.
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Pair, Vector3
+from pedestal_common.quantities import MetersPerSecond, Pair, Radians, RadiansPerSecond, Seconds, Vector3
 from pedestal_common.record import Record
 from ship_motion_sim.alignment import extended_observer, levelling
+from ship_motion_sim.alignment.conditions import Conditions
 
 BANDWIDTH_TIME_PRODUCT = 6.0  # product of observer bandwidth and time, w_o t [-]
 MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1
@@ -21,40 +22,37 @@ MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1
 
 
 class State(Record):
-    """Record."""
-    t: float  # time since power-up [s]
+    """State of the method."""
+    t: Seconds              # since power-up
     observer: extended_observer.State
-    v1: Pair
-    v2: Pair  # tracking differentiator: reference of velocity and of its rate
-    command: Vector3
-    azimuth: float
-    azimuth_sigma: float
-    level_sigma: float
+    v1: Pair                # tracking differentiator: reference of velocity [m/s]
+    v2: Pair                # and of its rate [m/s2]
+    command: Vector3        # rate of n' about east, north and up [rad/s]
+    azimuth: Radians        # estimated misalignment
+    azimuth_sigma: Radians  # stated 1 sigmas
+    level_sigma: Radians
 
 
 @compiled
-def bandwidth(t):
-    """Return w_o [rad/s] at t [s] > 0 since power-up."""
+def bandwidth(t: Seconds) -> RadiansPerSecond:
+    """Return w_o at t > 0 since power-up."""
     return min(MAX_OBSERVER_BANDWIDTH_RAD_S, BANDWIDTH_TIME_PRODUCT / t)
 
 
 @compiled
-def step(s, k, v_east, v_north, h):
-    """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
-
-    s, k: records State, Conditions.
-    """
-    o, r = s.observer, k.velocity_density / h
-    s.t += h
-    w_o = bandwidth(s.t)
+def step(state: State, conditions: Conditions, v_east: MetersPerSecond, v_north: MetersPerSecond, h: Seconds) -> None:
+    """Execute one step h after the last; v_east, v_north: velocity error in n'."""
+    observer, r = state.observer, conditions.velocity_density / h
+    state.t += h
+    w_o = bandwidth(state.t)
     for i in range(2):
-        s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
+        state.v1[i], state.v2[i] = levelling.differentiated(state.v1[i], state.v2[i], 0.0, h)
     l1, l2, l3 = extended_observer.gains(w_o, h)
-    extended_observer.predict(o, h)
-    extended_observer.predict_covariance(o, k, h)
-    extended_observer.correct(o, v_east, v_north, l1, l2, l3, o.p[0] + r, h)
-    extended_observer.correct_covariance(o, l1, l2, l3, r)
-    levelling.level(o, k, s.v1, s.v2, max(MIN_CONTROL_BANDWIDTH_RAD_S, w_o), s.command)
-    s.azimuth = extended_observer.azimuth(o, k)
-    s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k, 0.0)
-    s.level_sigma = math.hypot(level_sigma, extended_observer.tilt(o, k))
+    extended_observer.predict(observer, h)
+    extended_observer.predict_covariance(observer, conditions, h)
+    extended_observer.correct(observer, v_east, v_north, l1, l2, l3, observer.p[0] + r, h)
+    extended_observer.correct_covariance(observer, l1, l2, l3, r)
+    levelling.level(observer, conditions, state.v1, state.v2, max(MIN_CONTROL_BANDWIDTH_RAD_S, w_o), state.command)
+    state.azimuth = extended_observer.azimuth(observer, conditions)
+    state.azimuth_sigma, level_sigma = extended_observer.sigmas(observer, conditions, 0.0)
+    state.level_sigma = math.hypot(level_sigma, extended_observer.tilt(observer, conditions))

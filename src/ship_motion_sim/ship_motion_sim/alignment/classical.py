@@ -19,43 +19,52 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Pair, Vector3
+from pedestal_common.quantities import (
+    Meters,
+    MetersPerSecond,
+    Pair,
+    Radians,
+    RadiansPerSecond,
+    Records,
+    Seconds,
+    Vector3,
+)
 from pedestal_common.record import Record
 from ship_motion_sim.alignment import steady_state
-from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD
+from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD, Conditions
 
 MAX_AZIMUTH_RATE_RAD_S = 0.1
 """Limit of the azimuth command [rad/s]; without it the first levelling would reach 0.2 rad/s."""
 
 
 class Constants(Record):
-    """Record."""
-    s0: float  # bandwidth [rad/s]
+    """Gains of the loop and its accuracy."""
+    s0: RadiansPerSecond    # bandwidth
     K1: float
     k2: float
     K3: float
     K4: float
-    azimuth_sigma: float
-    level_sigma: float
-    residual: float  # 1 sigmas in the settled loop [rad]
+    azimuth_sigma: Radians  # 1 sigmas in the settled loop
+    level_sigma: Radians
+    residual: Radians
 
 
 class State(Record):
-    """Record."""
-    t: float  # time since power-up [s]
-    lagged: float  # v_N / (s + K4) [m]
-    residual: float  # azimuth that the loop still corrects, smoothed [rad]
-    correction: Pair  # to subtract from v_E, v_N in this step [m/s]
-    command: Vector3
-    azimuth: float
-    azimuth_sigma: float
-    level_sigma: float
+    """State of the method."""
+    t: Seconds              # since power-up
+    lagged: Meters          # v_N / (s + K4)
+    residual: Radians       # azimuth that the loop still corrects, smoothed
+    correction: Pair        # to subtract from v_E, v_N in this step [m/s]
+    command: Vector3        # rate of n' about east, north and up [rad/s]
+    azimuth: Radians        # estimated misalignment
+    azimuth_sigma: Radians  # stated 1 sigmas
+    level_sigma: Radians
 
 
-def constants(k, s0, h) -> np.ndarray:
-    """Return one record of Constants for the bandwidth s0 [rad/s] and steps of h [s]; k: Conditions."""
+def constants(conditions: Records, s0: RadiansPerSecond, h: Seconds) -> Records:
+    """Return the Constants (), one record, for the bandwidth s0 and steps of h."""
     record = np.zeros((), Constants.dtype)
-    g, w_north = float(k['gravity']), float(k['earth_rate'][1])
+    g, w_north = float(conditions['gravity']), float(conditions['earth_rate'][1])
     K1 = K4 = 2.0 * s0
     k2, K3 = 4.0 * s0**2 / g, 4.0 * s0**4 / g
     # rates: d/dt of the state (v, a_x, lagged, az, residual) of the north channel. Its noises are the velocity noise
@@ -63,38 +72,37 @@ def constants(k, s0, h) -> np.ndarray:
     rates = np.array([[-K1, g, 0.0, 0.0, 0.0], [-k2, 0.0, 0.0, -w_north, 0.0], [1.0, 0.0, -K4, 0.0, 0.0],
                       [0.0, 0.0, K3 / w_north, 0.0, 0.0], [0.0, 0.0, K3 / w_north, 0.0, -0.5 * s0]])
     noise = h * rates[:, 0]
-    Q = np.outer(noise, noise) * float(k['velocity_density']) / h
-    Q += np.diag([0.0, 1.0, 0.0, 1.0, 0.0]) * float(k['gyro_noise'])**2 * h
+    Q = np.outer(noise, noise) * float(conditions['velocity_density']) / h
+    Q += np.diag([0.0, 1.0, 0.0, 1.0, 0.0]) * float(conditions['gyro_noise'])**2 * h
     P = steady_state.covariance(np.eye(5) + h * rates, Q)
     record['residual'] = math.sqrt(P[4, 4])
     record['s0'], record['K1'], record['k2'], record['K3'], record['K4'] = s0, K1, k2, K3, K4
-    record['azimuth_sigma'] = math.sqrt(P[3, 3] + (float(k['gyro_bias']) / w_north)**2)
-    record['level_sigma'] = math.sqrt(P[1, 1] + (float(k['accelerometer_bias']) / g)**2)
+    record['azimuth_sigma'] = math.sqrt(P[3, 3] + (float(conditions['gyro_bias']) / w_north)**2)
+    record['level_sigma'] = math.sqrt(P[1, 1] + (float(conditions['accelerometer_bias']) / g)**2)
     return record
 
 
 @compiled
-def envelope(x):
+def envelope(x: float) -> float:
     """Return the decay from 1 after x = s0 t [-], by the slower pair of poles of the loop."""
     return (1.0 + x) * math.exp(-x)
 
 
 @compiled
-def step(s, c, k, v_east, v_north, h):
-    """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
-
-    s, c, k: records State, Constants, Conditions.
-    """
-    s.t += h
-    s.lagged += h * (v_north - c.K4 * s.lagged)
+def step(state: State, constants: Constants, conditions: Conditions, v_east: MetersPerSecond, v_north: MetersPerSecond,
+         h: Seconds) -> None:
+    """Execute one step h after the last; v_east, v_north: velocity error in n'."""
+    state.t += h
+    state.lagged += h * (v_north - constants.K4 * state.lagged)
     # The correction has the damping, and removes the term w_c x v that the strapdown has just added.
-    s.correction[0] = h * (c.K1 * v_east + s.command[2] * v_north)
-    s.correction[1] = h * (c.K1 * v_north - s.command[2] * v_east)
-    s.command[0], s.command[1] = -c.k2 * v_north, c.k2 * v_east
-    s.command[2] = min(max(c.K3 / k.earth_rate[1] * s.lagged, -MAX_AZIMUTH_RATE_RAD_S), MAX_AZIMUTH_RATE_RAD_S)
+    state.correction[0] = h * (constants.K1 * v_east + state.command[2] * v_north)
+    state.correction[1] = h * (constants.K1 * v_north - state.command[2] * v_east)
+    state.command[0], state.command[1] = -constants.k2 * v_north, constants.k2 * v_east
+    state.command[2] = min(max(constants.K3 / conditions.earth_rate[1] * state.lagged, -MAX_AZIMUTH_RATE_RAD_S),
+                           MAX_AZIMUTH_RATE_RAD_S)
     # The loop corrects a steady az with the rate az s0 / 2, except at 180 deg, which the envelope covers.
-    s.residual += h * (s.command[2] - 0.5 * c.s0 * s.residual)
-    transient = UNKNOWN_AZIMUTH_SIGMA_RAD * envelope(c.s0 * s.t)
-    moving = max(s.residual**2 - 9.0 * c.residual**2, 0.0)      # beyond three sigma of its noise
-    s.azimuth_sigma = min(math.sqrt(c.azimuth_sigma**2 + moving + transient**2), UNKNOWN_AZIMUTH_SIGMA_RAD)
-    s.level_sigma = c.level_sigma + transient
+    state.residual += h * (state.command[2] - 0.5 * constants.s0 * state.residual)
+    transient = UNKNOWN_AZIMUTH_SIGMA_RAD * envelope(constants.s0 * state.t)
+    moving = max(state.residual**2 - 9.0 * constants.residual**2, 0.0)      # beyond three sigma of its noise
+    state.azimuth_sigma = min(math.sqrt(constants.azimuth_sigma**2 + moving + transient**2), UNKNOWN_AZIMUTH_SIGMA_RAD)
+    state.level_sigma = constants.level_sigma + transient

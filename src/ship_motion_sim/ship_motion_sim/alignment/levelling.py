@@ -14,6 +14,9 @@ high.
 """
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan
+from pedestal_common.quantities import MetersPerSecond, MetersPerSecond2, Pair, RadiansPerSecond, Seconds, Vector3
+from ship_motion_sim.alignment import extended_observer
+from ship_motion_sim.alignment.conditions import Conditions
 
 DAMPING_COEFFICIENT = 0.8  # damping coefficient c1 [-]
 FHAN_LIMIT_M_S3 = 1e3  # limit r1 of the function fhan [m/s3], which is linear for errors within r1 / w_c^2
@@ -21,8 +24,9 @@ MAX_LEVELLING_RATE_RAD_S = 0.5  # limit of a level command [rad/s]
 
 
 @compiled
-def differentiated(v1, v2, reference, h):
-    """Return (v1 [m/s], v2 [m/s2]) of the tracking differentiator one step h [s] later; reference [m/s].
+def differentiated(v1: MetersPerSecond, v2: MetersPerSecond2, reference: MetersPerSecond,
+                   h: Seconds) -> tuple[MetersPerSecond, MetersPerSecond2]:
+    """Return (v1, v2) of the tracking differentiator one step h later.
 
     With the parameters r0 = 1/h^2, h0 = h, c0 = 1 of the paper, it reaches the reference in two steps.
     """
@@ -30,10 +34,11 @@ def differentiated(v1, v2, reference, h):
 
 
 @compiled
-def command(z1, z2, z3, v1, v2, b0, w_c):
-    """Return the command u [rad/s] of a channel, within MAX_LEVELLING_RATE_RAD_S.
+def command(z1: MetersPerSecond, z2: MetersPerSecond2, z3: float, v1: MetersPerSecond, v2: MetersPerSecond2, b0: float,
+            w_c: RadiansPerSecond) -> RadiansPerSecond:
+    """Return the command u of a channel, within MAX_LEVELLING_RATE_RAD_S.
 
-    The command brings z1, z2 to the references v1, v2 with the bandwidth w_c [rad/s], and cancels z3. b0: effect of u
+    The command brings z1, z2 to the references v1, v2 with the bandwidth w_c, and cancels z3. b0: effect of u
     on the rate of x2 [m/s2 per rad].
     """
     u0 = fhan(z1 - v1, DAMPING_COEFFICIENT * (z2 - v2), FHAN_LIMIT_M_S3, 1.0 / w_c)
@@ -41,14 +46,14 @@ def command(z1, z2, z3, v1, v2, b0, w_c):
 
 
 @compiled
-def level(o, k, v1, v2, w_c, out):
-    """Put the commands of both channels of o, extended_observer.State, into out (3,) (w_cE, w_cN, w_cU) [rad/s].
+def level(observer: extended_observer.State, conditions: Conditions, v1: Pair, v2: Pair, w_c: RadiansPerSecond,
+          out: Vector3) -> None:
+    """Put the commands of both channels into out (w_cE, w_cN, w_cU) [rad/s].
 
-    k: record of Conditions;
-    v1, v2 (2,): references; w_c: bandwidth [rad/s]. The observer receives the limited command.
+    v1, v2: references [m/s, m/s2]; w_c: bandwidth. The observer receives the limited command.
     """
-    g = k.gravity
-    out[1] = command(o.z[0, 0], o.z[0, 1], o.z[0, 2], v1[0], v2[0], -g, w_c)
-    out[0] = command(o.z[1, 0], o.z[1, 1], o.z[1, 2], v1[1], v2[1], g, w_c)
+    g = conditions.gravity
+    out[1] = command(observer.z[0, 0], observer.z[0, 1], observer.z[0, 2], v1[0], v2[0], -g, w_c)
+    out[0] = command(observer.z[1, 0], observer.z[1, 1], observer.z[1, 2], v1[1], v2[1], g, w_c)
     out[2] = 0.0
-    o.input[0], o.input[1] = -g * out[1], g * out[0]
+    observer.input[0], observer.input[1] = -g * out[1], g * out[0]

@@ -18,83 +18,89 @@ import math
 from typing import Annotated
 
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry.line_of_sight import cross
 from pedestal_common.geometry.quaternion import product
-from pedestal_common.quantities import Floats, Matrix3, Vector3
+from pedestal_common.quantities import Floats, Matrix3, MetersPerSecond, Radians, Seconds, Vector3
 from pedestal_common.record import Record
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import extended_observer, riccati_eso
+from ship_motion_sim.alignment.conditions import Conditions
 
 MAX_JACOBI_SWEEPS = 12  # largest number of sweeps of Jacobi rotations; 4 to 6 are enough
 
 
 class State(Record):
-    """State of the method. The observer does not change the attitude. Its covariance is the information limit: the least
-    that any linear method can reach with these measurements (module riccati_eso).
+    """State of the method.
+
+    The observer does not change the attitude. Its covariance is the information limit: the least that any linear
+    method can reach with these measurements (module riccati_eso).
     """
-    t: float  # time since power-up [s]
-    observer: extended_observer.State  # gives the 1 sigmas from the x, y parts of a
-    coriolis: Vector3  # int w_ie x v dt [m/s]
-    count: float  # number of pairs (a, b)
-    sum_a: Vector3
+    t: Seconds                          # since power-up
+    observer: extended_observer.State   # gives the 1 sigmas from the x, y parts of a
+    coriolis: Vector3                   # int w_ie x v dt [m/s]
+    count: float                        # number of pairs (a, b)
+    sum_a: Vector3                      # sums of a, b, a b^T
     sum_b: Vector3
-    sum_ab: Matrix3  # sums of a, b, a b^T
-    matrix: Annotated[Floats, (4, 4)]
-    vectors: Annotated[Floats, (4, 4)]  # matrix of Horn; its eigenvectors, in columns
-    azimuth_sigma: float
-    level_sigma: float
+    sum_ab: Matrix3
+    matrix: Annotated[Floats, (4, 4)]   # of Horn
+    vectors: Annotated[Floats, (4, 4)]  # its eigenvectors, in columns
+    azimuth_sigma: Radians              # stated 1 sigmas
+    level_sigma: Radians
 
 
 @compiled
-def gravity_integral(t, k):
-    """Return b [m/s] in n0 after t [s], in closed form; k: record of Conditions.
+def gravity_integral(t: Seconds, conditions: Conditions) -> tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond]:
+    """Return b in n0 after t, in closed form.
 
     b is the integral of the reaction to gravity, which turns with the earth.
     """
-    north, up = k.earth_rate[1], k.earth_rate[2]
+    north, up = conditions.earth_rate[1], conditions.earth_rate[2]
     w = math.sqrt(north * north + up * up)
     n, u = north / w, up / w
     s, c = math.sin(w * t) / w, 2.0 * math.sin(0.5 * w * t)**2 / w
-    return k.gravity * n * c, k.gravity * n * u * (t - s), k.gravity * (u * u * t + n * n * s)
+    g = conditions.gravity
+    return g * n * c, g * n * u * (t - s), g * (u * u * t + n * n * s)
 
 
 @compiled
-def step(s, k, a, v, h):
-    """Add one pair of vectors, h [s] after the last; s, k: records State, Conditions.
+def step(state: State, conditions: Conditions, a: tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond],
+         v: tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond], h: Seconds) -> None:
+    """Add one pair of vectors, h after the last.
 
-    a: int C_b^b0 f dt in b0, three floats [m/s]; if the ship has a speed log, its velocity is subtracted. v: velocity
-    in n by GNSS [m/s], zeros without GNSS. With a speed log, the model omits the Coriolis force: at 7 m/s the level
+    a: int C_b^b0 f dt in b0; if the ship has a speed log, its velocity is subtracted. v: velocity in n by GNSS, zeros
+    without GNSS. With a speed log, the model omits the Coriolis force: at 7 m/s the level
     then has an error of 0.1 arcmin.
     """
-    s.t += h
-    o = s.observer
-    l1, l2, l3, variance = riccati_eso.advance_covariance(o, k, h)
+    state.t += h
+    observer = state.observer
+    l1, l2, l3, variance = riccati_eso.advance_covariance(observer, conditions, h)
     if v[0] == 0.0 and v[1] == 0.0:
         # The innovations show how far the sea differs from the expected one. With a GNSS, b contains the motion of the
         # ship, so a alone gives no innovation.
-        extended_observer.predict(o, h)
-        extended_observer.correct(o, a[0], a[1], l1, l2, l3, variance, h)
-    s.azimuth_sigma, s.level_sigma = extended_observer.sigmas(o, k, 0.0)
-    north, up = k.earth_rate[1], k.earth_rate[2]
-    cx, cy, cz = strapdown.cross(0.0, north, up, v[0], v[1], v[2])
-    s.coriolis[0] += h * cx
-    s.coriolis[1] += h * cy
-    s.coriolis[2] += h * cz
-    bx, by, bz = gravity_integral(s.t, k)
+        extended_observer.predict(observer, h)
+        extended_observer.correct(observer, a[0], a[1], l1, l2, l3, variance, h)
+    state.azimuth_sigma, state.level_sigma = extended_observer.sigmas(observer, conditions, 0.0)
+    north, up = conditions.earth_rate[1], conditions.earth_rate[2]
+    cx, cy, cz = cross(0.0, north, up, v[0], v[1], v[2])
+    state.coriolis[0] += h * cx
+    state.coriolis[1] += h * cy
+    state.coriolis[2] += h * cz
+    bx, by, bz = gravity_integral(state.t, conditions)
     # The rotation from n back to n0 is taken to first order, because w_ie t is small.
-    bx += v[0] + s.t * cx + s.coriolis[0]
-    by += v[1] + s.t * cy + s.coriolis[1]
-    bz += v[2] + s.t * cz + s.coriolis[2]
-    s.count += 1.0
+    bx += v[0] + state.t * cx + state.coriolis[0]
+    by += v[1] + state.t * cy + state.coriolis[1]
+    bz += v[2] + state.t * cz + state.coriolis[2]
+    state.count += 1.0
     for i in range(3):
-        s.sum_a[i] += a[i]
-        s.sum_b[i] += bx if i == 0 else by if i == 1 else bz
-        s.sum_ab[i, 0] += a[i] * bx
-        s.sum_ab[i, 1] += a[i] * by
-        s.sum_ab[i, 2] += a[i] * bz
+        state.sum_a[i] += a[i]
+        state.sum_b[i] += bx if i == 0 else by if i == 1 else bz
+        state.sum_ab[i, 0] += a[i] * bx
+        state.sum_ab[i, 1] += a[i] * by
+        state.sum_ab[i, 2] += a[i] * bz
 
 
 @compiled
-def jacobi(m, v):
+def jacobi(m: Floats, v: Floats) -> None:
     """Diagonalise a symmetric m (4, 4) in place by Jacobi rotations; v (4, 4) receives the eigenvectors as columns."""
     for i in range(4):
         for j in range(4):
@@ -120,38 +126,37 @@ def jacobi(m, v):
 
 
 @compiled
-def centred(s, i, j):
+def centred(state: State, i: int, j: int) -> float:
     """Return sum (a_i - mean a_i)(b_j - mean b_j) of all pairs [m2/s2]; i, j: axes."""
-    return s.sum_ab[i, j] - s.sum_a[i] * s.sum_b[j] / s.count
+    return state.sum_ab[i, j] - state.sum_a[i] * state.sum_b[j] / state.count
 
 
 @compiled
-def solve(s):
+def solve(state: State) -> tuple[float, float, float, float]:
     """Return the quaternion (x, y, z, w) b0 -> n0 that maps the vectors a of all pairs onto b with least squares."""
-    m = s.matrix
-    xx, xy, xz = centred(s, 0, 0), centred(s, 0, 1), centred(s, 0, 2)
-    yx, yy, yz = centred(s, 1, 0), centred(s, 1, 1), centred(s, 1, 2)
-    zx, zy, zz = centred(s, 2, 0), centred(s, 2, 1), centred(s, 2, 2)
+    m = state.matrix
+    xx, xy, xz = centred(state, 0, 0), centred(state, 0, 1), centred(state, 0, 2)
+    yx, yy, yz = centred(state, 1, 0), centred(state, 1, 1), centred(state, 1, 2)
+    zx, zy, zz = centred(state, 2, 0), centred(state, 2, 1), centred(state, 2, 2)
     m[0, 0], m[1, 1], m[2, 2], m[3, 3] = xx + yy + zz, xx - yy - zz, yy - xx - zz, zz - xx - yy
     m[0, 1], m[0, 2], m[0, 3] = yz - zy, zx - xz, xy - yx
     m[1, 2], m[1, 3], m[2, 3] = xy + yx, zx + xz, yz + zy
     for i in range(3):
         for j in range(i + 1, 4):
             m[j, i] = m[i, j]
-    jacobi(m, s.vectors)
+    jacobi(m, state.vectors)
     best = 0
     for i in range(1, 4):
         if m[i, i] > m[best, best]:
             best = i
-    v = s.vectors
+    v = state.vectors
     return v[1, best], v[2, best], v[3, best], v[0, best]
 
 
 @compiled
-def attitude(s, k, qx, qy, qz, qw):
-    """Return the present quaternion (x, y, z, w) deck -> n.
-
-    s, k: records State, Conditions; qx, qy, qz, qw: quaternion deck -> b0 from the gyros.
-    """
-    turned = strapdown.from_rotvec(-s.t * k.earth_rate[0], -s.t * k.earth_rate[1], -s.t * k.earth_rate[2])
-    return product(turned, product(solve(s), (qx, qy, qz, qw)))
+def attitude(state: State, conditions: Conditions, qx: float, qy: float, qz: float,
+             qw: float) -> tuple[float, float, float, float]:
+    """Return the present quaternion (x, y, z, w) deck -> n; qx, qy, qz, qw: deck -> b0 from the gyros."""
+    t, w = state.t, conditions.earth_rate
+    turned = strapdown.from_rotvec(-t * w[0], -t * w[1], -t * w[2])
+    return product(turned, product(solve(state), (qx, qy, qz, qw)))

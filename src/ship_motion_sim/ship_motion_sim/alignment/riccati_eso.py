@@ -13,61 +13,62 @@ walks at random by q.
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Pair, Vector3
+from pedestal_common.quantities import MetersPerSecond, Pair, Radians, RadiansPerSecond, Seconds, Vector3
 from pedestal_common.record import Record
 from ship_motion_sim.alignment import extended_observer, levelling
+from ship_motion_sim.alignment.conditions import Conditions
 
 ALIGNING_BANDWIDTH_RAD_S, NAVIGATING_BANDWIDTH_RAD_S = 1.0, 0.1
 """Bandwidth of the level control [rad/s]: high to level a deck, low in navigation with only noise to follow."""
 
 
 class State(Record):
-    """State. v1, v2: references of x1 [m/s] and x2 [m/s2] of both channels; command: rate of n' about east, north and up
-    [rad/s]; azimuth: estimated misalignment [rad]; azimuth_sigma, level_sigma: stated 1 sigma [rad].
-    """
+    """State of the method."""
     observer: extended_observer.State
-    v1: Pair
-    v2: Pair
-    command: Vector3
-    azimuth: float
-    azimuth_sigma: float
-    level_sigma: float
+    v1: Pair                # references of x1 of both channels [m/s]
+    v2: Pair                # and of x2 [m/s2]
+    command: Vector3        # rate of n' about east, north and up [rad/s]
+    azimuth: Radians        # estimated misalignment
+    azimuth_sigma: Radians  # stated 1 sigmas
+    level_sigma: Radians
 
 
 @compiled
-def advance_covariance(o, k, h):
-    """Advance the covariance of the observer o by one step h [s] with its measurement; k: record of Conditions.
+def advance_covariance(observer: extended_observer.State, conditions: Conditions,
+                       h: Seconds) -> tuple[float, float, float, float]:
+    """Advance the covariance of the observer by one step h with its measurement.
 
     Return (l1, l2, l3, expected variance of the innovation [m2/s2]).
     """
-    r = k.velocity_density / h
-    extended_observer.predict_covariance(o, k, h)
-    s = o.p[0] + r
-    l1, l2, l3 = extended_observer.kalman_gains(o.p[0], o.p[1], o.p[2], r)
-    extended_observer.correct_covariance(o, l1, l2, l3, r)
+    r = conditions.velocity_density / h
+    extended_observer.predict_covariance(observer, conditions, h)
+    s = observer.p[0] + r
+    l1, l2, l3 = extended_observer.kalman_gains(observer.p[0], observer.p[1], observer.p[2], r)
+    extended_observer.correct_covariance(observer, l1, l2, l3, r)
     return l1, l2, l3, s
 
 
 @compiled
-def step(s, k, v_east, v_north, h, w_c):
-    """Execute one step h [s] after the last; v_east, v_north: velocity error in n' [m/s].
+def step(state: State, conditions: Conditions, v_east: MetersPerSecond, v_north: MetersPerSecond, h: Seconds,
+         w_c: RadiansPerSecond) -> None:
+    """Execute one step h after the last; v_east, v_north: velocity error in n'.
 
-    s, k: records State, Conditions; w_c: bandwidth of the level control [rad/s]. The level control does
-    not affect the estimate, because the observer receives its exact commands.
+    w_c: bandwidth of the level control. The level control does not affect the estimate, because the observer receives
+    its exact commands.
     """
-    o = s.observer
+    observer = state.observer
     # The wanted velocity error is zero, so v1 and v2 start at zero and stay there. The differentiator is part of the
     # ADRC of paper 001.
     for i in range(2):
-        s.v1[i], s.v2[i] = levelling.differentiated(s.v1[i], s.v2[i], 0.0, h)
-    extended_observer.predict(o, h)
-    l1, l2, l3, variance = advance_covariance(o, k, h)
-    extended_observer.correct(o, v_east, v_north, l1, l2, l3, variance, h)
-    levelling.level(o, k, s.v1, s.v2, w_c, s.command)
-    s.azimuth = extended_observer.azimuth(o, k)
+        state.v1[i], state.v2[i] = levelling.differentiated(state.v1[i], state.v2[i], 0.0, h)
+    extended_observer.predict(observer, h)
+    l1, l2, l3, variance = advance_covariance(observer, conditions, h)
+    extended_observer.correct(observer, v_east, v_north, l1, l2, l3, variance, h)
+    levelling.level(observer, conditions, state.v1, state.v2, w_c, state.command)
+    state.azimuth = extended_observer.azimuth(observer, conditions)
     # z3 is the integral of l3 / h times the innovations. Swell is the part of the innovations above the expected sea.
     # The slowest swell, of 16 s, gives z3 its largest oscillation, because an integral divides by the frequency.
     swing = l3 / (h * extended_observer.MIN_SWELL_FREQUENCY_RAD_S)
-    swell = swing * swing * extended_observer.swell_variance(o, variance)
-    s.azimuth_sigma, level_sigma = extended_observer.sigmas(o, k, swell)
-    s.level_sigma = math.hypot(level_sigma, extended_observer.tilt(o, k))
+    swell = swing * swing * extended_observer.swell_variance(observer, variance)
+    state.azimuth_sigma, level_sigma = extended_observer.sigmas(observer, conditions, swell)
+    state.level_sigma = math.hypot(level_sigma, extended_observer.tilt(observer, conditions))

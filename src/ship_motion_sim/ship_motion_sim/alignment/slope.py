@@ -8,13 +8,13 @@ from pedestal_common.compiled import compiled
 
 
 @compiled
-def added(first, second, n, x):
+def added(first: float, second: float, n: int, x: float) -> tuple[float, float, int]:
     """Return (sum k x, sum k^2 x, number of values) after the value x with the index n, from 0 on; k = n + 1."""
     k = n + 1.0
     return first + k * x, second + k * k * x, n + 1
 
 
 @compiled
-def slope(first, second, n):
+def slope(first: float, second: float, n: int) -> float:
     """Return the slope per step after n values; NaN for n = 0. first, second: sums of `added`."""
     return ((n + 1.0) * first - second) / (n * (n + 1.0) * (n + 2.0) / 6.0)

@@ -7,10 +7,11 @@ whose last bits differ between processors.
 """
 import numpy as np
 
+from pedestal_common.quantities import Floats
 from pedestal_common.reproducible import solution
 
 
-def covariance(A, Q):
+def covariance(A: Floats, Q: Floats) -> Floats:
     """Return the P that solves P = A P A^T + Q, all (n, n).
 
     The equation is linear in the elements of P, stacked to a vector: (1 - kron(A, A)) P = Q.

@@ -22,7 +22,9 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.interval import interval
+from pedestal_common.quantities import Floats, Seconds, Times
 from pedestal_common.text_files import csv_table
+from ship_motion_sim.params import RecordedParameters
 
 MIN_ROWS, MAX_ROWS = 4, 16384
 """Least number of rows of a recording, which a not-a-knot spline needs, and largest number of rows.
@@ -40,17 +42,14 @@ DISPLACEMENT_RANGES = {'surge_m': (-1e3, 1e3), 'sway_m': (-1e3, 1e3), 'heave_m':
 
 
 class Recording(typing.NamedTuple):
-    """A recorded motion: times (n,) [s] from stamp 0 on, freedoms (n, 6), and csv_table.Rows.description.
-
-    freedoms: surge, sway, heave [m], roll, pitch, yaw [rad], REP 103, yaw unwrapped.
-    """
-    times: np.ndarray
-    freedoms: np.ndarray
-    description: str
+    """A recorded motion."""
+    times: Times        # from stamp 0 on
+    freedoms: Floats    # (n, 6): surge, sway, heave [m], roll, pitch, yaw [rad], REP 103, yaw unwrapped
+    description: str    # csv_table.Rows.description
 
 
-def read(params) -> Recording:
-    """Return the Recording of a RecordedParameters. Raises csv_table.TableError."""
+def read(params: RecordedParameters) -> Recording:
+    """Return the recorded motion. Raises csv_table.TableError."""
     rows, description = csv_table.read(params.path, COLUMN_RANGES, MIN_ROWS, params.max_gap,
                                        'ship.recorded.max_gap', DISPLACEMENT_RANGES)
     if len(rows) > MAX_ROWS:
@@ -68,9 +67,9 @@ def read(params) -> Recording:
         np.unwrap(np.radians(90.0 - column['heading_deg'])))), description)
 
 
-def spline_with_ends(times, freedoms):
-    """Return (breaks (n + 2,), coefficients (n + 1, 6, COEFFICIENTS_PER_PIECE)) of freedoms (n, 6) at times (n,), with
-    the pieces that lead to rest."""
+def spline_with_ends(times: Times, freedoms: Floats) -> tuple[Times, Floats]:
+    """Return (breaks (n + 2,), coefficients (n + 1, 6, COEFFICIENTS_PER_PIECE)) of freedoms (n, 6) at times, with the
+    pieces that lead to rest."""
     from scipy.interpolate import BPoly, CubicSpline, PPoly  # slow to import, and only a recorded motion needs it
     spline = CubicSpline(times, freedoms)
     first, last = times[0], times[-1]
@@ -88,8 +87,8 @@ def spline_with_ends(times, freedoms):
 
 
 @compiled
-def evaluate(breaks, coefficients, count, t, freedoms):
-    """Fill freedoms (3, 6) from the first `count` pieces at t [s]: value, first and second derivative of the six.
+def evaluate(breaks: Times, coefficients: Floats, count: int, t: Seconds, freedoms: Floats) -> None:
+    """Fill freedoms (3, 6) from the first `count` pieces at t: value, first and second derivative of the six.
 
     Outside the pieces, the values are those at the nearest end, where the ship is at rest.
     """

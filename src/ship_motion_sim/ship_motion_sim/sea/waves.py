@@ -9,6 +9,15 @@ import typing
 
 import numpy as np
 
+from pedestal_common.quantities import (
+    Complexes,
+    Floats,
+    Meters,
+    MetersPerSecond,
+    MetersPerSecond2,
+    RadiansPerSecond,
+    Seconds,
+)
 from pedestal_common.reproducible import cos, exp, power, sin
 from pedestal_common.text_files import csv_table
 from ship_motion_sim import earth
@@ -26,61 +35,57 @@ _GRID_STEPS_PER_COMPONENT = 100  # grid steps per component in the integration o
 
 
 class Waves(typing.NamedTuple):
-    """Components of the motion of the ship.
-
-    frequency: w_e (n,) [rad/s]; phase (n,) [rad]; response: X (n, 6), complex, of surge, sway, heave [m], roll, pitch,
-    yaw [rad].
-    """
-    frequency: np.ndarray
-    phase: np.ndarray
-    response: np.ndarray
+    """Components (n,) of the motion of the ship."""
+    frequency: Floats       # w_e [rad/s]
+    phase: Floats           # [rad]
+    response: Complexes     # X (n, 6) of surge, sway, heave [m], roll, pitch, yaw [rad]
 
 
-def shape(w, tp, gamma):
+def shape(w: Floats, tp: Seconds, gamma: float) -> Floats:
     """Return the density of JONSWAP at w [rad/s] > 0, apart from a constant factor (Hasselmann et al. 1973).
 
-    tp: peak period [s]; gamma: peak enhancement [-].
+    tp: peak period; gamma: peak enhancement.
     """
     wp = 2.0 * math.pi / tp
     width = np.where(w <= wp, 0.07, 0.09)
     return power(w, -5.0) * exp(-1.25 * power(wp / w, 4.0)) * power(gamma, exp(-0.5 * ((w - wp) / (width * wp)) ** 2))
 
 
-def band(tp):
-    """Return the (lowest, highest) frequency [rad/s] of the components: 0.55 wp to 4 wp, at most 2.2 rad/s; tp [s]."""
+def band(tp: Seconds) -> tuple[RadiansPerSecond, RadiansPerSecond]:
+    """Return the (lowest, highest) frequency of the components: 0.55 wp to 4 wp, at most 2.2 rad/s."""
     wp = 2.0 * math.pi / tp
     return 0.55 * wp, min(4.0 * wp, 2.2)
 
 
-def _grid(tp):
-    """Return the frequencies [rad/s] at which a spectrum of peak period tp [s] is integrated."""
+def _grid(tp: Seconds) -> Floats:
+    """Return the frequencies [rad/s] at which a spectrum of peak period tp is integrated."""
     return np.linspace(*band(tp), WAVE_COMPONENT_COUNT * _GRID_STEPS_PER_COMPONENT + 1)
 
 
-def _integral(x, y):
-    """Return the integral of y (n,) over x (n,) from x[0] to each x, by the trapezoidal rule."""
+def _integral(x: Floats, y: Floats) -> Floats:
+    """Return the integral of y over x from x[0] to each x, by the trapezoidal rule."""
     return np.concatenate(((0.0,), np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(x))))
 
 
-def spectrum(w, hs, tp, gamma):
-    """Return S(w) [m2 s/rad] at w [rad/s], zero outside the band; its integral is Hs^2/16. hs [m], tp [s], gamma
-    [-]."""
+def spectrum(w: Floats, hs: Meters, tp: Seconds, gamma: float) -> Floats:
+    """Return S(w) [m2 s/rad] at w [rad/s], zero outside the band; its integral is Hs^2/16."""
     low, high = band(tp)
     grid = _grid(tp)
     level = hs ** 2 / 16.0 / _integral(grid, shape(grid, tp, gamma))[-1]
     return np.where((w >= low) & (w <= high), level * shape(w, tp, gamma), 0.0)
 
 
-def _second_order(w, period, damping):
+def _second_order(w: Floats, period: Seconds, damping: float) -> Complexes:
     """Return w_n^2 / (w_n^2 - w^2 + 2 j z w_n w), the response of an oscillator to e^{jwt}; 1 at w = 0.
 
-    period: 2 pi / w_n [s]; damping: ratio z [-].
+    period: 2 pi / w_n; damping: ratio z.
     """
     wn = 2.0 * math.pi / period
-    return wn ** 2 / (wn ** 2 - w ** 2 + 2j * damping * wn * w)
+    stiffness: Complexes = wn ** 2 - w ** 2 + 2j * damping * wn * w
+    return wn ** 2 / stiffness
 
 
-def _mean_over(u):
+def _mean_over(u: Floats) -> Floats:
     """Return sin u / u: the mean of a sine wave over a length, relative to the value in the middle.
 
     u: half of the phase of the wave along the length [rad].
@@ -89,7 +94,7 @@ def _mean_over(u):
     return np.where(u == 0.0, 1.0, sin(v) / v)
 
 
-def _slope_over(u):
+def _slope_over(u: Floats) -> Floats:
     """Return 3 (sin u - u cos u) / u^3: the slope of the best straight line through a sine wave over a length.
 
     The result is relative to the slope of the wave in the middle. u: half of the phase of the wave along the length
@@ -100,11 +105,12 @@ def _slope_over(u):
     return np.where(small, 1.0 - u ** 2 / 10.0, 3.0 * (sin(v) - v * cos(v)) / (v * v * v))
 
 
-def transfer(hull: HullParameters, w, mu, speed, gravity):
-    """Return (w_e, RAO): encounter frequency [rad/s] and response amplitude operator (..., 6), complex.
+def transfer(hull: HullParameters, w: Floats, mu: Floats, speed: MetersPerSecond,
+             gravity: MetersPerSecond2) -> tuple[Floats, Complexes]:
+    """Return (w_e, RAO): encounter frequency [rad/s] and response amplitude operator (..., 6).
 
     The RAO is the response to a wave of amplitude 1 m: surge, sway, heave [m], roll, pitch, yaw [rad]. w, mu:
-    frequency [rad/s] and direction [rad] of the wave; speed [m/s]; gravity [m/s2].
+    frequency [rad/s] and direction [rad] of the wave.
 
     The pressure of a wave falls with the depth (Smith correction e^{-k draught / 2}) and averages over length and beam
     of the hull. Roll and pitch follow the slope of the wave. Surge and sway are the orbital motion of the water. At a
@@ -136,7 +142,7 @@ def measured(params: ShipParameters) -> csv_table.Rows:
     return csv_table.read(params.spectrum_file, SPECTRUM_COLUMN_RANGES)
 
 
-def density(params: ShipParameters):
+def density(params: ShipParameters) -> tuple[Floats, Floats]:
     """Return (w [rad/s], S [m2 s/rad]) of the sea state or the measured spectrum. Raises csv_table.TableError.
 
     The grid has WAVE_COMPONENT_COUNT bins of _GRID_STEPS_PER_COMPONENT steps each. A measured density is interpolated
@@ -152,7 +158,7 @@ def density(params: ShipParameters):
     return grid, spectrum(grid, hs, tp, params.gamma)
 
 
-def seaway(params: ShipParameters):
+def seaway(params: ShipParameters) -> tuple[Floats, Floats, Floats, Floats]:
     """Return the waves: (w [rad/s], amplitude [m], phase [rad], mu [rad]), each (WAVE_COMPONENT_COUNT,).
 
     The band is divided into WAVE_COMPONENT_COUNT equal bins with one wave each, at a random frequency within the bin.

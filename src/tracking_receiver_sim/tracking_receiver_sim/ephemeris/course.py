@@ -5,14 +5,18 @@ spline is within 1 mm of the orbit. A table of directions becomes the cubic spli
 range target.angle.range. Because of the unit vectors, this spline is smooth at the zenith and through north.
 """
 import math
+from collections.abc import Collection
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from pedestal_common import parameters
+from pedestal_common.quantities import Meters, MetersPerSecond2, Seconds
 from pedestal_common.reproducible import arctan2, cos, sin
 from pedestal_common.text_files import csv_table
-from tracking_receiver_sim.ephemeris import horizon
+from tracking_receiver_sim.ephemeris import horizon, states
+from tracking_receiver_sim.ephemeris.directions import Directions
+from tracking_receiver_sim.params import TargetParameters
 from tracking_receiver_sim.track import instant
 from tracking_receiver_sim.track.flight import Flight
 
@@ -20,9 +24,10 @@ MAX_KNOT_SPACING_S = 10.0  # largest time between two knots of the spline of an 
 MAX_DURATION_S = 86400.0  # largest duration of a run [s]
 
 
-def flight_of_orbit(ephemeris, target, duration, margin) -> Flight:
-    """Return the Flight of a states.Ephemeris for a run of `duration` [s], with `margin` [s] more at both ends as far
-    as the file goes; target: TargetParameters. Raises csv_table.TableError."""
+def flight_of_orbit(ephemeris: states.Ephemeris, target: TargetParameters, duration: Seconds,
+                    margin: Seconds) -> Flight:
+    """Return the Flight of an orbit for a run of `duration`, with `margin` more at both ends as far as the file goes.
+    Raises csv_table.TableError."""
     zero = ephemeris.begin + target.track_file.start
     horizon.require(ephemeris, zero, zero + duration)
     begin, end = max(-margin, ephemeris.begin - zero), min(duration + margin, ephemeris.end - zero)
@@ -46,10 +51,11 @@ def flight_of_orbit(ephemeris, target, duration, margin) -> Flight:
         float(np.linalg.norm(v[finite], axis=1).max()), float(distance.max()))
 
 
-def _check_acceleration(ephemeris, spline, zero, limit):
-    """Raise TableError, with the line of the state nearest to the peak, if the acceleration exceeds limit [m/s2].
+def _check_acceleration(ephemeris: states.Ephemeris, spline: CubicHermiteSpline, zero: Seconds,
+                        limit: MetersPerSecond2) -> None:
+    """Raise TableError, with the line of the state nearest to the peak, if the acceleration exceeds limit.
 
-    A wrong digit in the file causes such an acceleration. zero: t of stamp 0 [s].
+    A wrong digit in the file causes such an acceleration. zero: t of stamp 0.
     """
     size = np.linalg.norm(spline(spline.x, 2), axis=1)
     worst = int(np.argmax(size))
@@ -61,7 +67,8 @@ def _check_acceleration(ephemeris, spline, zero, limit):
                                    f'{limit:g} m/s2')
 
 
-def run_parameters_of_orbit(ephemeris, target, given):
+def run_parameters_of_orbit(ephemeris: states.Ephemeris, target: TargetParameters,
+                            given: Collection[str]) -> dict[str, float]:
     """Return {parameter: value} of a run that covers the first pass above horizon.MIN_CULMINATION_DEG.
 
     The run begins at a whole second after the rise of the satellite and ends when it sets. given: names of the
@@ -79,8 +86,9 @@ def run_parameters_of_orbit(ephemeris, target, given):
             'receiver.reference_range': _upwards(np.nanmax(np.linalg.norm(r, axis=1)))}
 
 
-def flight_of_directions(directions, target, _duration, _margin) -> Flight:
-    """Return the Flight of all rows of a directions.Directions. Raises csv_table.TableError."""
+def flight_of_directions(directions: Directions, target: TargetParameters, _duration: Seconds,
+                         _margin: Seconds) -> Flight:
+    """Return the Flight of all rows of a table. Raises csv_table.TableError."""
     zero = directions.t[0] + target.track_file.start
     t = directions.t - zero
     if t[-1] <= 0.0:
@@ -89,27 +97,27 @@ def flight_of_directions(directions, target, _duration, _margin) -> Flight:
     a, e = directions.azimuth, directions.elevation
     unit = np.column_stack((cos(e) * sin(a), cos(e) * cos(a), sin(e)))
     spline = CubicSpline(t, target.angle.range * unit)
-    dated = directions.midnight is not None
-    start_time = instant.iso(directions.midnight + zero) if dated else ''
+    start_time = '' if directions.midnight is None else instant.iso(directions.midnight + zero)
     top = int(np.argmax(e))
     return Flight(spline.x, spline.c, start_time, (
         f'{directions.path.rpartition("/")[2]}: {directions.description}',
-        f'{t[-1]:.10g} s{" from " + start_time if dated else ""}, highest {np.degrees(e[top]):.1f} deg after '
+        f'{t[-1]:.10g} s{" from " + start_time if start_time else ""}, highest {np.degrees(e[top]):.1f} deg after '
         f'{t[top]:.0f} s, at the range {target.angle.range / 1e3:g} km'), 0.0, target.angle.range)
 
 
-def run_parameters_of_directions(directions, target, _given):
+def run_parameters_of_directions(directions: Directions, target: TargetParameters,
+                                 _given: Collection[str]) -> dict[str, float]:
     """Return {parameter: value} of a run from the first row, or from track_file.start, to the last row."""
     last = directions.t[-1] - directions.t[0] - target.track_file.start
     return {**_station(target), 'duration': max(0.1, min(MAX_DURATION_S, (math.ceil(10.0 * last) - 1) / 10.0)),
             'receiver.reference_range': target.angle.range}
 
 
-def _station(target):
+def _station(target: TargetParameters) -> dict[str, float]:
     """Return {parameter: value} of the station of the scenario, which the file does not change."""
     return {f'target.station.{name}': value for name, value in parameters.as_dict(target.station).items()}
 
 
-def _upwards(distance):
-    """Return a distance [m] rounded up to 10 m."""
+def _upwards(distance: Meters) -> Meters:
+    """Return a distance rounded up to 10 m."""
     return max(10.0, 10.0 * math.ceil(0.1 * distance))

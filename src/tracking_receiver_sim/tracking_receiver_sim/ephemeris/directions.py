@@ -6,10 +6,12 @@ three columns: time, azimuth, elevation [deg]. All times are UTC, or all are num
 repeats the row before is passed over and counted.
 """
 import array
-import typing
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from pedestal_common.quantities import Floats, Ints, Seconds, Times
 from pedestal_common.text_files import columns, csv_table
 from tracking_receiver_sim.ephemeris import lines, states
 from tracking_receiver_sim.track import tables, times
@@ -25,25 +27,18 @@ MIN_ROWS = 4  # least number of rows of a table
 MAX_STEP_DEG = 20.0  # largest angle between two rows [deg], because the path between distant rows is not known
 
 
-class Directions(typing.NamedTuple):
-    """A table of n rows.
-
-        line                (n,) line in the file
-        t                   (n,) [s] after midnight, growing
-        azimuth, elevation  (n,) [rad]
-        midnight            instant (see track.instant) of t = 0, None if the file has no date
-        description         format and number of rows
-    """
+class Directions(NamedTuple):
+    """A table of n rows."""
     path: str
-    line: np.ndarray
-    t: np.ndarray
-    azimuth: np.ndarray
-    elevation: np.ndarray
-    midnight: float | None
-    description: str
+    line: Ints                  # in the file
+    t: Times                    # after midnight, growing
+    azimuth: Floats             # [rad]
+    elevation: Floats           # [rad]
+    midnight: Seconds | None    # instant (see track.instant) of t = 0, None if the file has no date
+    description: str            # format and number of rows
 
 
-def is_program(beginning):
+def is_program(beginning: str) -> bool:
     """Return True if the first lines of a text are those of a program.txt."""
     for text in beginning.splitlines():
         words = text.split('#', 1)[0].split()
@@ -53,7 +48,7 @@ def is_program(beginning):
     return False
 
 
-def is_table(beginning):
+def is_table(beginning: str) -> bool:
     """Return True if a text begins with the names, or a row, of a table of directions as CSV."""
     try:
         names = csv_table.Table('', beginning, BARE_NAMES).fieldnames
@@ -62,7 +57,7 @@ def is_table(beginning):
     return columns.named(names, AZIMUTH) and not _is_flight(names)
 
 
-def _is_flight(names):
+def _is_flight(names: Sequence[str]) -> bool:
     """Return True for latitude and longitude without an elevation, or with one that is a height in a length unit."""
     if not (columns.named(names, tables.LATITUDE) and columns.named(names, tables.LONGITUDE)):
         return False
@@ -74,7 +69,7 @@ def _is_flight(names):
         return False
 
 
-def read_program(path, _wanted='') -> Directions:
+def read_program(path: str, _wanted: str = '') -> Directions:
     """Return the Directions of a program.txt. Raises TableError."""
     rows, limits = array.array('d'), {'Julian date': times.JULIAN_DATE_LIMITS, **ANGLE_LIMITS_DEG}
     for line, text in lines.read(path):
@@ -85,7 +80,7 @@ def read_program(path, _wanted='') -> Directions:
     return _directions(path, rows, True, 'sat-nms program')
 
 
-def read_table(path, _wanted='') -> Directions:
+def read_table(path: str, _wanted: str = '') -> Directions:
     """Return the Directions of a CSV file. Raises TableError."""
     rows = array.array('d')
     with csv_table.opened(path, BARE_NAMES) as table:
@@ -107,7 +102,7 @@ def read_table(path, _wanted='') -> Directions:
     return _directions(path, rows, bool(clock.dated), f'table of azimuth and elevation, columns {described}')
 
 
-def _directions(path, rows, dated, form):
+def _directions(path: str, rows: 'array.array[float]', dated: bool, form: str) -> Directions:
     """Return the Directions of rows, flat: line, time [s], azimuth and elevation [deg] of each. Raises TableError."""
     table = np.array(rows).reshape(-1, NUMBERS_PER_ROW)
     # fresh: False for a row that repeats time, azimuth and elevation of the row before.

@@ -13,6 +13,7 @@ import numpy as np
 
 from pedestal_common.geometry.geodesy import EARTH_RATE
 from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.quantities import Floats, Times, Vectors3
 from tracking_receiver_sim.track import instant
 
 EARTH_FIXED_PATTERN = re.compile(r'ITRF(?:-?\d{2}|-?\d{4})?|WGS84')
@@ -24,18 +25,18 @@ TDB differs from TT by up to 2 ms, see instants."""
 NUTATION_BATCH_SIZE = 2000  # number of instants whose nutation is computed at once: each takes 30 kB
 
 
-def known(frame):
+def known(frame: str) -> bool:
     """Return True if earth_fixed supports a frame."""
     return frame in INERTIAL_FRAMES or bool(EARTH_FIXED_PATTERN.fullmatch(frame))
 
 
-def names():
+def names() -> str:
     """Return a text for an error message that lists the supported frames."""
     return f'{", ".join(INERTIAL_FRAMES)} or ITRF with or without its year'
 
 
-def instants(system, days, seconds):
-    """Return the instants (n,) [s] of days since 1970 and seconds of the day (n,) in a time system.
+def instants(system: str, days: Floats, seconds: Times) -> Times:
+    """Return the instants of days since 1970 and seconds of the day in a time system.
 
     system: key of TIME_SYSTEM_OFFSETS_S. Raises ValueError(index of the row) if the seconds of the day are 86400 or
     more on a day without a leap second. Only UTC has leap seconds.
@@ -57,10 +58,10 @@ def instants(system, days, seconds):
     return time
 
 
-def earth_fixed(frame, time, r, v):
-    """Return earth-fixed positions [m] and velocities relative to the rotating earth [m/s], (n, 3) each.
+def earth_fixed(frame: str, time: Times, r: Vectors3, v: Vectors3) -> tuple[Vectors3, Vectors3]:
+    """Return earth-fixed positions [m] and velocities relative to the rotating earth [m/s].
 
-    r, v (n, 3): positions and velocities in a supported frame; time (n,): instants [s].
+    r, v: positions and velocities in a supported frame; time: instants.
     """
     if EARTH_FIXED_PATTERN.fullmatch(frame):
         return r, v
@@ -73,8 +74,8 @@ def earth_fixed(frame, time, r, v):
     return positions, velocities
 
 
-def _to_fixed(frame, time):
-    """Return the rotations (3, 3, n) from a frame to the earth-fixed frame at instants (n,) [s]."""
+def _to_fixed(frame: str, time: Times) -> Floats:
+    """Return the rotations (3, 3, n) from a frame to the earth-fixed frame at instants."""
     from skyfield.framelib import ICRS_to_J2000, itrs, true_equator_and_equinox_of_date
     from skyfield.sgp4lib import TEME
     days = np.floor(time / SECONDS_PER_DAY)

@@ -1,11 +1,12 @@
 """An orbit seen from a station: position, time range that a run may use, and passes above the horizon.
 
-Arguments: ephemeris: states.Ephemeris; station: StationParameters; t: times [s] after ephemeris.midnight.
+A time t counts from ephemeris.midnight.
 """
 import numpy as np
 from scipy.optimize import brentq
 
-from pedestal_common.geometry.geodesy import station_frame
+from pedestal_common.geometry.geodesy import StationParameters, station_frame
+from pedestal_common.quantities import Floats, Seconds, Times, Vectors3
 from pedestal_common.reproducible import arctan2, turned
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import frames, interpolation, states
@@ -18,8 +19,8 @@ MIN_CULMINATION_DEG = 10.0
 SEGMENT_GAP_TOLERANCE_S = 1e-3  # largest time between two segments [s] that does not count as a gap
 
 
-def enu(ephemeris, station, t):
-    """Return position [m] and velocity relative to the earth [m/s], ENU of the station, (n, 3) each, at t (n,).
+def enu(ephemeris: states.Ephemeris, station: StationParameters, t: Times) -> tuple[Vectors3, Vectors3]:
+    """Return position [m] and velocity relative to the earth [m/s], ENU of the station, at t.
 
     The numbers are NaN outside all segments.
     """
@@ -34,15 +35,15 @@ def enu(ephemeris, station, t):
     return turned(to_enu, r - origin), turned(to_enu, v)
 
 
-def elevation(ephemeris, station, t):
-    """Return the elevation [rad] (n,) at t (n,); NaN outside all segments."""
+def elevation(ephemeris: states.Ephemeris, station: StationParameters, t: Times | Seconds) -> Floats:
+    """Return the elevation [rad] at t; NaN outside all segments."""
     east, north, up = enu(ephemeris, station, np.atleast_1d(t))[0].T
     return arctan2(up, np.hypot(east, north))
 
 
-def require(ephemeris, begin, end):
-    """Raise csv_table.TableError if an orbit does not cover all of the time from begin to end [s]."""
-    def utc(t):
+def require(ephemeris: states.Ephemeris, begin: Seconds, end: Seconds) -> None:
+    """Raise csv_table.TableError if an orbit does not cover all of the time from begin to end."""
+    def utc(t: Seconds) -> str:
         return instant.iso(ephemeris.midnight + t)
 
     first, last = ephemeris.segments[0], ephemeris.segments[-1]
@@ -61,7 +62,8 @@ def require(ephemeris, begin, end):
                                        f'in the run from {utc(begin)} to {utc(end)}')
 
 
-def passage(ephemeris, station, start=None):
+def passage(ephemeris: states.Ephemeris, station: StationParameters,
+            start: Seconds | None = None) -> tuple[Seconds, Seconds]:
     """Return (t of the beginning, t of the end) of the first pass that climbs above MIN_CULMINATION_DEG.
 
     The pass lasts from rise to set, or as far as the file goes. start: t at which the run begins, which is then
@@ -86,7 +88,8 @@ def passage(ephemeris, station, start=None):
                                f'{instant.iso(ephemeris.midnight + ephemeris.end)}')
 
 
-def _ends(ephemeris, station, t, seen, pass_of, start):
+def _ends(ephemeris: states.Ephemeris, station: StationParameters, t: Times, seen: Floats, pass_of: tuple[int, int],
+          start: Seconds | None) -> tuple[Seconds, Seconds]:
     """Return (rise, or start if given, and set) of a pass in the search steps [i, j).
 
     Rise and set are exact to a millisecond if the steps before and after the pass are below the horizon.
@@ -100,6 +103,6 @@ def _ends(ephemeris, station, t, seen, pass_of, start):
     return rise, down
 
 
-def _crossing(ephemeris, station, before, after):
+def _crossing(ephemeris: states.Ephemeris, station: StationParameters, before: Seconds, after: Seconds) -> Seconds:
     """Return the t between two steps at which the orbit crosses the horizon."""
     return brentq(lambda t: elevation(ephemeris, station, t)[0], before, after, xtol=1e-3)

@@ -8,10 +8,12 @@ scaled to -1 ... 1 over the states, takes the place of t, because this reduces t
 import numpy as np
 from scipy.interpolate import KroghInterpolator
 
+from pedestal_common.quantities import Times, Vectors3
+from tracking_receiver_sim.ephemeris.states import Segment
 
-def at(segment, t):
-    """Return position [m] and velocity [m/s], (n, 3) each, in the frame of a states.Segment at times t (n,) [s] within
-    the segment."""
+
+def at(segment: Segment, t: Times) -> tuple[Vectors3, Vectors3]:
+    """Return position [m] and velocity [m/s] in the frame of a segment at times t within the segment."""
     # middles: mean time of each group of `nodes` consecutive states; first: index of the first state of the group
     # whose middle is nearest to t.
     nodes = segment.nodes
@@ -25,6 +27,7 @@ def at(segment, t):
         centre, half = 0.5 * (segment.t[i] + segment.t[i + nodes - 1]), 0.5 * (segment.t[i + nodes - 1] - segment.t[i])
         u, values = (segment.t[chosen] - centre) / half, segment.r[chosen]
         if segment.method == 'HERMITE':
+            assert segment.v is not None
             u, values = np.repeat(u, 2), np.stack((values, half * segment.v[chosen]), axis=1).reshape(-1, 3)
         r[covered], scaled = KroghInterpolator(u, values).derivatives((t[covered] - centre) / half, 2)
         v[covered] = scaled / half

@@ -7,7 +7,10 @@ import datetime
 import functools
 import io
 import re
+from collections.abc import Iterator, Mapping
+from typing import TypeAlias
 
+from pedestal_common.quantities import Seconds
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import instant as instants
 
@@ -18,20 +21,22 @@ NUMBER_PATTERN = re.compile(r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?', re.ASC
 CCSDS_TIME_PATTERN = re.compile(r'(\d{4}-(?:\d\d-\d\d|\d{3}))[T ](\d\d):(\d\d):(\d\d)(?:\.(\d{1,18}))?Z?', re.ASCII)
 YEAR_LIMITS = 1957, 2199  # range of the years of a time
 
+Limits: TypeAlias = Mapping[str, tuple[float, float]]   # {name of a number: (lowest, highest)}
 
-def begins_with(beginning, signature):
+
+def begins_with(beginning: str, signature: str) -> bool:
     """Return True if the first line of a text that is no COMMENT of the CCSDS books begins with a signature."""
     texts = map(str.strip, beginning.splitlines())
     first = next((text for text in texts if text and text.split()[0] != 'COMMENT'), '')
     return first.startswith(signature)
 
 
-def wrong(path, line, column, problem):
+def wrong(path: str, line: int, column: int, problem: str) -> csv_table.TableError:
     """Return a TableError at a line and column of a file, both counted from 1."""
     return csv_table.TableError(f'{path}: line {line}, column {column}: {problem}')
 
 
-def read(path):
+def read(path: str) -> Iterator[tuple[int, str]]:
     """Yield (number, text) of each line of a text file that is not empty, see csv_table.text. Raises TableError, also
     for a line that is too long."""
     stream = io.StringIO(csv_table.text(path), newline=None)
@@ -46,10 +51,10 @@ def read(path):
             yield number, text
 
 
-def numbers(path, line, text, limits):
+def numbers(path: str, line: int, text: str, limits: Limits) -> list[float]:
     """Return the numbers in the text of a line. Raises TableError.
 
-    limits: {name: (low, high)} of each number. The function passes over further words.
+    The function passes over further words.
     """
     if '_' not in text:
         with contextlib.suppress(ValueError):
@@ -71,7 +76,7 @@ def numbers(path, line, text, limits):
     return values
 
 
-def instant(path, line, column, name, text):
+def instant(path: str, line: int, column: int, name: str, text: str) -> tuple[int, Seconds]:
     """Return (days since 1970, seconds of the day) of a CCSDS time, YYYY-MM-DDThh:mm:ss or YYYY-DDDThh:mm:ss, in any
     time system. Raises TableError."""
     match = CCSDS_TIME_PATTERN.fullmatch(text)
@@ -86,7 +91,7 @@ def instant(path, line, column, name, text):
 
 
 @functools.lru_cache(64)
-def _days(text):
+def _days(text: str) -> int:
     """Return the days since 1970 of YYYY-MM-DD or YYYY-DDD. Raises ValueError."""
     year, *rest = map(int, text.split('-'))
     date = (datetime.date(year, *rest) if len(rest) == 2 else
@@ -96,7 +101,7 @@ def _days(text):
     return (date - datetime.date(1970, 1, 1)).days
 
 
-def text(day, second):
+def text(day: int, second: Seconds) -> str:
     """Return ISO 8601 to the microsecond of a time in the form that `instant` returns."""
     begin = datetime.datetime(1970, 1, 1) + datetime.timedelta(days=day)
     return (begin + datetime.timedelta(microseconds=round(second * 1e6))).isoformat(timespec='microseconds')

@@ -1,9 +1,12 @@
 """Reader of CCSDS Orbit Ephemeris Messages (OEM): 502.0-B in the notation KEYWORD = value, versions 1 to 3."""
 import array
 import re
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from pedestal_common.quantities import Floats, Seconds, Times
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import frames, lines, states
 from tracking_receiver_sim.track import instant
@@ -22,26 +25,38 @@ REQUIRED_KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'CENTER_NAME', 'REF_FRAME', 'TI
 
 
 class _Entry(str):
-    """The value of a keyword; line, column: its place in the file."""
+    """The value of a keyword."""
+    line: int       # its place in the file
+    column: int
 
-    def __new__(cls, value, line, column):
+    def __new__(cls, value: str, line: int, column: int) -> '_Entry':
         entry = super().__new__(cls, value)
         entry.line, entry.column = line, column
         return entry
 
 
-def read(path, wanted='') -> states.Ephemeris:
+_Entries: TypeAlias = dict[str, _Entry]     # {keyword: value}
+
+
+class _Block(NamedTuple):
+    """A segment of the file."""
+    line: int       # at which the metadata end
+    meta: _Entries
+    rows: Floats    # (n, COLUMN_COUNT)
+
+
+def read(path: str, wanted: str = '') -> states.Ephemeris:
     """Return the Ephemeris of one object in an OEM. Raises TableError.
 
     wanted: name or international designator of the object; it may be empty for a file of one object.
     """
-    objects: dict[tuple, list] = {}
+    objects: dict[tuple[str, str], list[_Block]] = {}
     midnight = 0.0
-    for meta, rows in _blocks(path):
-        names = meta['OBJECT_NAME'].upper(), meta['OBJECT_ID'].upper()
+    for block in _blocks(path):
+        names = block.meta['OBJECT_NAME'].upper(), block.meta['OBJECT_ID'].upper()
         if not objects:
-            midnight = instant.of_day(int(rows[0, DAY_COLUMN]), 0.0) if len(rows) else 0.0
-        objects.setdefault(names, []).append((meta, rows))
+            midnight = instant.of_day(int(block.rows[0, DAY_COLUMN]), 0.0) if len(block.rows) else 0.0
+        objects.setdefault(names, []).append(block)
     if not objects:
         raise csv_table.TableError(f'{path}: META_START is missing')
     wanted = wanted.strip().upper()
@@ -50,23 +65,23 @@ def read(path, wanted='') -> states.Ephemeris:
         raise csv_table.TableError(f'{path}: aircraft = {wanted!r:.60}: must name one of the {len(objects)} objects '
                                    f'in the file: {", ".join(" ".join(names)[:60] for names in list(objects)[:12])}')
     of_object = objects[found[0]]
-    segments = tuple(_segment(path, meta, rows, midnight) for meta, rows in of_object)
-    for before, after, (meta, _) in zip(segments, segments[1:], of_object[1:]):
+    segments = tuple(_segment(path, block, midnight) for block in of_object)
+    for before, after, block in zip(segments, segments[1:], of_object[1:]):
         if after.begin < before.end:
-            place = meta.get('USEABLE_START_TIME', meta['OBJECT_NAME'])
+            place = block.meta.get('USEABLE_START_TIME', block.meta['OBJECT_NAME'])
             raise lines.wrong(path, place.line, place.column, 'the segment begins before the end of the one above')
-    first = of_object[0][0]
-    count, given = sum(len(segment.t) for segment in segments), sum(len(rows) for _, rows in of_object)
+    first = of_object[0].meta
+    count, given = sum(len(segment.t) for segment in segments), sum(len(block.rows) for block in of_object)
     passed_over = f', passed over {given - count} x {REPEATED_STATE}' if given > count else ''
     return states.Ephemeris(path, midnight, segments,
                             f'CCSDS OEM of {first["OBJECT_NAME"]:.40} ({first["OBJECT_ID"]:.40}): {count} states in '
                             f'{first["REF_FRAME"]}, {segments[0].method} of degree {segments[0].degree}{passed_over}')
 
 
-def _blocks(path):
-    """Yield ({keyword: _Entry}, table (n, COLUMN_COUNT)) of each segment."""
-    # begun: line of the last META_START; state: part of the file that contains the line.
-    meta, rows, begun, state, count = {}, array.array('d'), 0, 'header', 0
+def _blocks(path: str) -> Iterator[_Block]:
+    # begun: line of the last META_START; ended: of the last META_STOP; state: part of the file that contains the line.
+    meta: _Entries = {}
+    rows, begun, ended, state, count = array.array('d'), 0, 0, 'header', 0
     for line, text in lines.read(path):
         word = text.split(None, 1)[0]
         if state == 'covariance':
@@ -75,7 +90,7 @@ def _blocks(path):
             if state == 'meta':
                 raise lines.wrong(path, line, 1, f'META_START inside the metadata of line {begun}')
             if state == 'data':
-                yield meta, _table(rows)
+                yield _Block(ended, meta, _table(rows))
             count += 1
             if count > MAX_SEGMENTS:
                 raise csv_table.TableError(f'{path}: line {line}: must be at most {MAX_SEGMENTS} segments')
@@ -84,7 +99,7 @@ def _blocks(path):
             missing = [name for name in REQUIRED_KEYWORDS if name not in meta]
             if missing:
                 raise csv_table.TableError(f'{path}: line {line}: {missing[0]} is missing in the metadata above')
-            meta['line'], state = line, 'data'
+            ended, state = line, 'data'
         elif word == 'COVARIANCE_START' and state == 'data':
             state = 'covariance'
         elif state == 'data' and word != 'COMMENT':
@@ -97,15 +112,15 @@ def _blocks(path):
     if state == 'meta':
         raise csv_table.TableError(f'{path}: the file ends inside the metadata of line {begun}')
     if state in ('data', 'covariance'):
-        yield meta, _table(rows)
+        yield _Block(ended, meta, _table(rows))
 
 
-def _table(rows):
-    """Return an array (n, COLUMN_COUNT) of the flat numbers of rows."""
+def _table(rows: 'array.array[float]') -> Floats:
+    """Return the flat numbers of rows as an array (n, COLUMN_COUNT)."""
     return np.array(rows).reshape(-1, COLUMN_COUNT)
 
 
-def _row(path, line, text):
+def _row(path: str, line: int, text: str) -> tuple[float, ...]:
     """Return the numbers of a line of data, in the columns of COLUMN_COUNT. Raises TableError."""
     # rest: the line with blanks in place of the epoch, so that errors name the right column.
     epoch = text.split(None, 1)[0]
@@ -114,11 +129,12 @@ def _row(path, line, text):
     return line, *lines.instant(path, line, at + 1, 'epoch', epoch), *lines.numbers(path, line, rest, STATE_LIMITS)
 
 
-def _segment(path, meta, rows, midnight):
-    """Return the states.Segment of the metadata {keyword: _Entry} and a table (n, COLUMN_COUNT). Raises TableError.
+def _segment(path: str, block: _Block, midnight: Seconds) -> states.Segment:
+    """Return the states of a block. Raises TableError.
 
     midnight: instant of t = 0, see states.Ephemeris.
     """
+    meta, rows = block.meta, block.rows
     _one_of(path, meta, 'CENTER_NAME', ('EARTH',))
     frame, system = meta['REF_FRAME'].upper(), meta['TIME_SYSTEM'].upper()
     if not frames.known(frame):
@@ -130,8 +146,8 @@ def _segment(path, meta, rows, midnight):
                           'date are supported')
     _one_of(path, meta, 'TIME_SYSTEM', tuple(frames.TIME_SYSTEM_OFFSETS_S))
 
-    def seconds(line, column, days, of_day):
-        """Return the times t (n,) of days since 1970 and seconds of the day (n,) in lines (n,) of the file."""
+    def seconds(line: Floats, column: int, days: Floats, of_day: Floats) -> Times:
+        """Return the times t of days since 1970 and seconds of the day in lines of the file."""
         try:
             return frames.instants(system, days, of_day) - midnight
         except ValueError as error:
@@ -139,21 +155,21 @@ def _segment(path, meta, rows, midnight):
             raise lines.wrong(path, int(line[i]), column, f'second 60: TIME_SYSTEM {system} has no leap second at the '
                               'end of this minute') from None
 
-    def bound(name):
+    def bound(name: str) -> Seconds:
         """Return the time t of a keyword."""
         entry = meta[name]
         day, second = lines.instant(path, entry.line, entry.column, name, entry)
-        return seconds([entry.line], entry.column, np.array([day]), np.array([second]))[0]
+        return float(seconds(np.array([entry.line]), entry.column, np.array([day]), np.array([second]))[0])
 
     span = [bound(name) if name in meta else None for name in ('USEABLE_START_TIME', 'USEABLE_STOP_TIME')]
     method, degree = _interpolation(path, meta)
     lines_of_rows, metres = rows[:, LINE_COLUMN], 1e3 * rows[:, FIRST_NUMBER_COLUMN:]
     times = seconds(lines_of_rows, 1, rows[:, DAY_COLUMN], rows[:, SECOND_COLUMN])
     table = _without_repetitions(path, np.column_stack((lines_of_rows, times, metres)))
-    return states.segment(path, meta['line'], table, frame, method, degree, *span)
+    return states.segment(path, block.line, table, frame, method, degree, *span)
 
 
-def _without_repetitions(path, table):
+def _without_repetitions(path: str, table: Floats) -> Floats:
     """Return the rows (line, time, numbers) without those that repeat time and numbers of the row above. Raises
     TableError for different states at one time."""
     step = np.diff(table[:, 1:], axis=0)
@@ -167,23 +183,24 @@ def _without_repetitions(path, table):
     return table[np.append(True, ~repeated)[:len(table)]]
 
 
-def _interpolation(path, meta):
+def _interpolation(path: str, meta: _Entries) -> tuple[str, int | None]:
     """Return (method, degree); '' and None if the file gives none."""
     if 'INTERPOLATION' not in meta:
         return '', None
-    method, degree = _one_of(path, meta, 'INTERPOLATION', states.INTERPOLATION_METHODS), None
+    method = _one_of(path, meta, 'INTERPOLATION', states.INTERPOLATION_METHODS)
     entry = meta.get('INTERPOLATION_DEGREE')
-    if entry is not None:
-        low, high = states.DEGREE_LIMITS
-        degree = int(entry) if entry.isdecimal() and len(entry) < 4 else 0
-        odd = method == 'HERMITE'
-        if not low + 2 * odd <= degree <= high or odd and degree % 2 == 0:
-            raise lines.wrong(path, entry.line, entry.column, f'INTERPOLATION_DEGREE = {entry!s:.20}: must be an '
-                              f'{"odd" if odd else "integer"} number from {low + 2 * odd} to {high}')
+    if entry is None:
+        return method, None
+    low, high = states.DEGREE_LIMITS
+    degree = int(entry) if entry.isdecimal() and len(entry) < 4 else 0
+    odd = method == 'HERMITE'
+    if not low + 2 * odd <= degree <= high or odd and degree % 2 == 0:
+        raise lines.wrong(path, entry.line, entry.column, f'INTERPOLATION_DEGREE = {entry!s:.20}: must be an '
+                          f'{"odd" if odd else "integer"} number from {low + 2 * odd} to {high}')
     return method, degree
 
 
-def _one_of(path, meta, name, allowed):
+def _one_of(path: str, meta: _Entries, name: str, allowed: Sequence[str]) -> str:
     """Return the value of a keyword in capitals. Raises TableError unless it is one of the allowed values."""
     entry = meta[name]
     if entry.upper() not in allowed:

@@ -2,10 +2,12 @@
 
 A segment has a frame, and the degree of the polynomials that join its states.
 """
-import typing
+
+from typing import NamedTuple
 
 import numpy as np
 
+from pedestal_common.quantities import Bools, Floats, Ints, Seconds, Times, Vectors3
 from pedestal_common.text_files import csv_table
 
 INTERPOLATION_METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')
@@ -19,8 +21,8 @@ RADIUS_LIMITS_M = 6.3e6, 2e9
 GAP_STEP_RATIO = 3.0  # ratio of a step in time to each of its neighbours above which the step is a gap
 
 
-def gaps(t):
-    """Return a mask (n - 1,) of the steps between the times t (n,): True for a gap.
+def gaps(t: Times) -> Bools:
+    """Return a mask (n - 1,) of the steps between the times t: True for a gap.
 
     A gap is longer than GAP_STEP_RATIO times each of its neighbours.
     """
@@ -29,61 +31,53 @@ def gaps(t):
     return (step > GAP_STEP_RATIO * longest) & (longest > 0.0)
 
 
-class Segment(typing.NamedTuple):
-    """States that consecutive polynomials join.
-
-        line        (n,) line of each state in the file
-        t           (n,) times of the states after Ephemeris.midnight [s], growing
-        r, v        (n, 3) positions [m] and velocities [m/s] in `frame`; v is None if the file has no velocities
-        frame       name of a frame that frames.earth_fixed supports
-        method      HERMITE or LAGRANGE, see interpolation.py; degree: of the polynomials
-        begin, end  usable range of t [s]
-    """
-    line: np.ndarray
-    t: np.ndarray
-    r: np.ndarray
-    v: np.ndarray | None
-    frame: str
-    method: str
-    degree: int
-    begin: float
-    end: float
+class Segment(NamedTuple):
+    """States that consecutive polynomials join."""
+    line: Ints          # of each state in the file
+    t: Times            # of the states after Ephemeris.midnight, growing
+    r: Vectors3         # positions in `frame` [m]
+    v: Vectors3 | None  # velocities in `frame` [m/s], None if the file has none; HERMITE needs them
+    frame: str          # name of a frame that frames.earth_fixed supports
+    method: str         # HERMITE or LAGRANGE, see interpolation.py
+    degree: int         # of the polynomials
+    begin: Seconds      # usable range of t
+    end: Seconds
 
     @property
-    def nodes(self):
+    def nodes(self) -> int:
         """Number of states that one polynomial joins."""
         return (self.degree + 1) // 2 if self.method == 'HERMITE' else self.degree + 1
 
 
-class Ephemeris(typing.NamedTuple):
-    """The orbit of one object. midnight: instant of t = 0 [s], in the time scale of track files (module
-    track.instant); segments: in order of time; description: format, number of states, frame and interpolation."""
+class Ephemeris(NamedTuple):
+    """The orbit of one object."""
     path: str
-    midnight: float
-    segments: tuple
-    description: str
+    midnight: Seconds               # instant of t = 0, in the time scale of track files (module track.instant)
+    segments: tuple[Segment, ...]   # in order of time
+    description: str                # format, number of states, frame and interpolation
 
     @property
-    def begin(self):
-        """First usable time t [s]."""
+    def begin(self) -> Seconds:
+        """First usable time t."""
         return self.segments[0].begin
 
     @property
-    def end(self):
-        """Last usable time t [s]."""
+    def end(self) -> Seconds:
+        """Last usable time t."""
         return self.segments[-1].end
 
 
-def has_velocities(table):
+def has_velocities(table: Floats) -> bool:
     """Return True if a table of states, see `segment`, has velocities."""
     return table.shape[1] == 8
 
 
-def segment(path, first_line, table, frame, method, degree, begin=None, end=None) -> Segment:
+def segment(path: str, first_line: int, table: Floats, frame: str, method: str, degree: int | None,
+            begin: Seconds | None = None, end: Seconds | None = None) -> Segment:
     """Return a Segment of a table (n, 8) of line, t, x, y, z [m], vx, vy, vz [m/s]; (n, 5) without velocities.
 
     first_line: line in which the segment begins; method, degree: '' and None if the file gives none; begin, end:
-    usable range of t [s], None: all states. Raises TableError if the time does not grow, a state is outside
+    usable range of t, None: all states. Raises TableError if the time does not grow, a state is outside
     RADIUS_LIMITS_M, or the states are too few.
     """
     if not len(table):

@@ -8,9 +8,12 @@ passed over.
 import array
 import datetime
 import re
+from collections.abc import Mapping
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
+from pedestal_common.quantities import Floats, Meters, Seconds
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.ephemeris import lines, states
 from tracking_receiver_sim.track import dates, instant
@@ -32,13 +35,16 @@ IGNORED_KEYWORDS = ('blockingfactor', 'coordinatesystemepoch', 'messagelevel', '
 MAX_SEGMENTS = 1000  # largest number of segments of a file
 EPOCH_PATTERN = re.compile(r'(\d{1,2}) ([a-z]{3})[a-z]* (\d{4}) (\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)', re.ASCII)
 
+_R = TypeVar('_R')
+_Head: TypeAlias = dict[str, tuple[int, int, str]]  # {keyword: (line, column, value)}
 
-def read(path, _wanted='') -> states.Ephemeris:
+
+def read(path: str, _wanted: str = '') -> states.Ephemeris:
     """Return the Ephemeris of an STK ephemeris file. Raises TableError."""
-    # head: {keyword: (line, column, value)}; limits: of the numbers of a state, None before the states begin; skipped:
-    # name of the block that is passed over.
-    head: dict[str, tuple] = {}
-    limits, rows, skipped = None, array.array('d'), ''
+    # limits: of the numbers of a state, None before the states begin; skipped: name of the block that is passed over.
+    head: _Head = {}
+    limits: lines.Limits | None = None
+    rows, skipped = array.array('d'), ''
     for line, text in lines.read(path):
         text = text.split('#', 1)[0].rstrip()
         words = text.lower().split(None, 2)
@@ -72,8 +78,8 @@ def read(path, _wanted='') -> states.Ephemeris:
     return _ephemeris(path, head, table)
 
 
-def _limits(path, head, with_velocity):
-    """Return (unit [m], {name of a number in a line: (lowest, highest)})."""
+def _limits(path: str, head: _Head, with_velocity: bool) -> tuple[Meters, dict[str, tuple[float, float]]]:
+    """Return (unit, limits of the numbers in a line)."""
     unit = _choice(path, head, 'distanceunit', METRES_PER_UNIT, 'meters')
     limits = {'time': (-1e9, 1e9), **dict.fromkeys('xyz', (-2e9 / unit, 2e9 / unit))}
     if with_velocity:
@@ -81,9 +87,9 @@ def _limits(path, head, with_velocity):
     return unit, limits
 
 
-def _ephemeris(path, head, table):
-    """Return the Ephemeris from the keywords {keyword: (line, column, value)} and a table. The table has the columns
-    of states.segment, and its times count from ScenarioEpoch. Raises TableError."""
+def _ephemeris(path: str, head: _Head, table: Floats) -> states.Ephemeris:
+    """Return the Ephemeris from the keywords and a table. The table has the columns of states.segment, and its times
+    count from ScenarioEpoch. Raises TableError."""
     if 'scenarioepoch' not in head:
         raise csv_table.TableError(f'{path}: ScenarioEpoch is missing')
     begin, second = _epoch(path, *head['scenarioepoch'])
@@ -106,24 +112,24 @@ def _ephemeris(path, head, table):
                             f'{segments[0].method} of degree {segments[0].degree}')
 
 
-def _epoch(path, line, column, text):
+def _epoch(path: str, line: int, column: int, text: str) -> tuple[Seconds, Seconds]:
     """Return (instant of midnight, seconds of the day) of a UTC in the form of STK, as 1 Jun 2026 12:00:00.0."""
     match = EPOCH_PATTERN.fullmatch(' '.join(text.lower().split()))
     try:
-        day, month, year, hours, minutes, seconds = match.groups()
+        day, month, year, hours, minutes, seconds = match.groups() if match else [''] * 6
         date = datetime.date(int(year), dates.MONTH_NAMES.index(month) + 1, int(day))
         if not lines.YEAR_LIMITS[0] <= date.year <= lines.YEAR_LIMITS[1]:
             raise ValueError
         days, second = ((date - datetime.date(1970, 1, 1)).days,
                         instant.second_of_day(int(hours), int(minutes), float(seconds)))
         instant.of_day(days, second)
-    except (AttributeError, ValueError):
+    except ValueError:
         raise lines.wrong(path, line, column, f'ScenarioEpoch = {text!r:.60}: must be UTC such as 1 Jun 2026 '
                           '12:00:00.0') from None
     return instant.of_day(days, 0.0), second
 
 
-def _choice(path, head, name, choices, default):
+def _choice(path: str, head: _Head, name: str, choices: Mapping[str, _R], default: str) -> _R:
     """Return choices[value] of a keyword. Raises TableError for a value that is no key of choices {text: result}."""
     line, column, text = head.get(name, (0, 0, default))
     if text.lower() not in choices:
@@ -131,7 +137,7 @@ def _choice(path, head, name, choices, default):
     return choices[text.lower()]
 
 
-def _degree(path, head, method):
+def _degree(path: str, head: _Head, method: str) -> int | None:
     """Return the degree of the polynomials, None if the file gives none. Raises TableError.
 
     InterpolationSamplesM1 is the number of states of a polynomial minus 1.

@@ -14,27 +14,27 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
+from pedestal_common.quantities import Bit, Radians, Records, Vectors3, Xyz
 from pedestal_common.record import Record
+from tracking_receiver_sim.path.params import PathParameters
 
 MIN_ELEVATION_RAD = math.radians(1.0)  # elevation [rad] below which the refraction stays constant
 
 
 class Path(Record):
-    """Constants of the path. refractivity: N, 0: no refraction; light_time: 1 to include the travel time of
-    the wave.
-    """
-    refractivity: float
-    light_time: int
+    """Constants of the path."""
+    refractivity: float     # N; 0: no refraction
+    light_time: Bit         # 1 to include the travel time of the wave
 
 
-def constants(p) -> np.ndarray:
-    """Return Path (1,) of PathParameters p."""
-    return np.array([(p.refractivity, p.light_time)], Path.dtype)
+def constants(params: PathParameters) -> Records:
+    """Return the Path (1,)."""
+    return np.array([(params.refractivity, params.light_time)], Path.dtype)
 
 
 @compiled
-def refraction(N, elevation):
-    """Return (R [rad], its derivative by the elevation [-]) at a true elevation [rad] and a refractivity N."""
+def refraction(N: float, elevation: Radians) -> tuple[Radians, float]:
+    """Return (R, its derivative by the elevation) at a true elevation and a refractivity N."""
     E = min(max(elevation, MIN_ELEVATION_RAD), 0.5 * math.pi)
     degrees, scale = math.degrees(E), 0.57295787e-4 * N
     bent = scale * (1.0 / math.tan(E) - 42.5 / (degrees + 0.4)**2.64) - 40.0 / (degrees + 2.7)**4
@@ -44,8 +44,8 @@ def refraction(N, elevation):
 
 
 @compiled
-def _bent(N, r, v):
-    """Return a vector r [m] and its velocity v [m/s], ENU from the antenna, turned up by the refraction for N."""
+def _bent(N: float, r: Xyz, v: Xyz) -> tuple[Xyz, Xyz]:
+    """Return a vector r and its velocity v, ENU from the antenna, turned up by the refraction for N."""
     (e, n, u), (ve, vn, vu) = r, v
     # h: horizontal distance [m]; vh: its rate [m/s]; .._seen: values after the rotation by R in the vertical plane,
     # which keeps the azimuth.
@@ -65,26 +65,24 @@ def _bent(N, r, v):
 
 
 @compiled
-def seen(c, r, v):
-    """Return the apparent (vector [m], velocity [m/s]) of a target at r with velocity v, ENU from the antenna; three
-    floats each; c: record of Path."""
-    if c.light_time != 0:
+def seen(path: Path, r: Xyz, v: Xyz) -> tuple[Xyz, Xyz]:
+    """Return the apparent (vector [m], velocity [m/s]) of a target at r with velocity v, ENU from the antenna."""
+    if path.light_time != 0:
         t = math.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]) / SPEED_OF_LIGHT_M_S
         r = r[0] - v[0] * t, r[1] - v[1] * t, r[2] - v[2] * t
-    if c.refractivity > 0.0:
-        r, v = _bent(c.refractivity, r, v)
+    if path.refractivity > 0.0:
+        r, v = _bent(path.refractivity, r, v)
     return r, v
 
 
 @compiled
-def _all_seen(c, r, v, out):
-    """Write the apparent vectors into `out` (n, 3) [m]; c: (1,) of Path; r, v: as in `all_seen`."""
+def _all_seen(paths: Records, r: Vectors3, v: Vectors3, out: Vectors3) -> None:
     for k in range(len(r)):
-        out[k, 0], out[k, 1], out[k, 2] = seen(c[0], (r[k, 0], r[k, 1], r[k, 2]), (v[k, 0], v[k, 1], v[k, 2]))[0]
+        out[k, 0], out[k, 1], out[k, 2] = seen(paths[0], (r[k, 0], r[k, 1], r[k, 2]), (v[k, 0], v[k, 1], v[k, 2]))[0]
 
 
-def all_seen(p, r, v):
-    """Return the apparent vectors (n, 3) [m] of targets at r (n, 3) with velocities v (n, 3), for PathParameters."""
+def all_seen(params: PathParameters, r: Vectors3, v: Vectors3) -> Vectors3:
+    """Return the apparent vectors [m] of targets at r with velocities v, ENU from the antenna."""
     out = np.empty(r.shape)
-    _all_seen(constants(p), np.ascontiguousarray(r), np.ascontiguousarray(v), out)
+    _all_seen(constants(params), np.ascontiguousarray(r), np.ascontiguousarray(v), out)
     return out

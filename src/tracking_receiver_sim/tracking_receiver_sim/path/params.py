@@ -27,7 +27,7 @@ class ScintillationParameters(Parameters):
     time_constant: float = parameter(1.0, 1e-3, 1000.0, 's', 'time constant of level and direction')
 
     @property
-    def on(self):
+    def on(self) -> bool:
         """True if level or direction scintillates."""
         return self.level_db > 0.0 or self.angle > 0.0
 

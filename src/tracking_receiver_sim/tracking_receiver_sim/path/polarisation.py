@@ -8,9 +8,11 @@ chapter on antenna-wave interaction. The formula holds for circular, elliptical 
 """
 import math
 
+from tracking_receiver_sim.path.params import PolarisationParameters
 
-def efficiency(wave, antenna):
-    """Return eta of two PolarisationParameters; 1 if both are equal."""
+
+def efficiency(wave: PolarisationParameters, antenna: PolarisationParameters) -> float:
+    """Return eta; 1 if both are equal."""
     r_1, r_2 = (10.0**(0.05 * p.axial_ratio_db) * (1.0 if p.sense == 'right' else -1.0) for p in (wave, antenna))
     return max(0.5 + (4.0 * r_1 * r_2 + (r_1**2 - 1.0) * (r_2**2 - 1.0) * math.cos(2.0 * (wave.tilt - antenna.tilt)))
                / (2.0 * (r_1**2 + 1.0) * (r_2**2 + 1.0)), 0.0)

@@ -15,7 +15,9 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Bit, Decibels, Floats, Radians, Records, Seconds, Vector3
 from pedestal_common.record import Record
+from tracking_receiver_sim.path.params import ScintillationParameters
 
 NORMALS_PER_STEP = 3  # number of standard normals of a step: level, two axes
 
@@ -24,31 +26,30 @@ MIN_SIN_ELEVATION = math.sin(math.radians(4.0))
 
 
 class Scintillation(Record):
-    """Constants of the scintillation. level, angle: 1-sigma at the zenith [dB], [rad]; keep, draw: factors of the process
-    of unit variance, x = keep x + draw w.
-    """
-    level: float
-    angle: float
+    """Constants of the scintillation. A process of unit variance is x = keep x + draw w."""
+    level: Decibels     # 1-sigma at the zenith
+    angle: Radians      # 1-sigma at the zenith
     keep: float
     draw: float
-    on: int
+    on: Bit
 
 
-def constants(p, period) -> np.ndarray:
-    """Return Scintillation (1,) of ScintillationParameters, for steps of period [s]."""
-    keep = math.exp(-period / p.time_constant)
-    return np.array([(p.level_db, p.angle, keep, math.sqrt(1.0 - keep * keep), p.on)], Scintillation.dtype)
+def constants(params: ScintillationParameters, period: Seconds) -> Records:
+    """Return the Scintillation (1,) for steps of `period`."""
+    keep = math.exp(-period / params.time_constant)
+    return np.array([(params.level_db, params.angle, keep, math.sqrt(1.0 - keep * keep), params.on)],
+                    Scintillation.dtype)
 
 
 @compiled
-def wander(c, x, sin_E, normals, first):
-    """Return (factor of the amplitude, deflection of the wave in cross-elevation, elevation [rad]) one step later.
+def wander(air: Scintillation, x: Vector3, sin_E: float, normals: Floats,
+           first: int) -> tuple[float, Radians, Radians]:
+    """Return (factor of the amplitude, deflection of the wave in cross-elevation, in elevation) one step later.
 
-    c: record of Scintillation; sin_E: sine of the elevation; x (3,): state of the process, updated; normals:
-    used from index `first` on.
+    x: state of the process, updated; sin_E: sine of the elevation; normals: used from index `first` on.
     """
     for i in range(NORMALS_PER_STEP):
-        x[i] = c.keep * x[i] + c.draw * normals[first + i]
+        x[i] = air.keep * x[i] + air.draw * normals[first + i]
     s = max(sin_E, MIN_SIN_ELEVATION)
-    angle = c.angle / math.sqrt(s)
-    return 10.0**(0.05 * c.level * x[0] / s**1.2), angle * x[1], angle * x[2]
+    angle = air.angle / math.sqrt(s)
+    return 10.0**(0.05 * air.level * x[0] / s**1.2), angle * x[1], angle * x[2]

@@ -24,7 +24,7 @@ DATE_EXAMPLES = ('2018-07-23T10:00:00Z, 2018/07/23 10:00:00, 23.07.2018 10:00:00
                  '23 Jul 2018 10:00:00')
 
 
-def iso(text):
+def iso(text: str | None) -> str:
     """Return a date with a time of day in ISO 8601; the zone stays as it is written, in capitals.
 
     A text in no known notation is returned with single spaces.

@@ -3,70 +3,72 @@
 A reader of a format (tables.rows, gpx.rows, nmea.rows) yields the fixes of all aircraft; `read` selects one aircraft.
 """
 import array
-import collections
 import pathlib
-import typing
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
+from pedestal_common.quantities import Degrees, Floats, Ints, Meters, Seconds, Times
 from pedestal_common.text_files import csv_table
+from tracking_receiver_sim.params import TrackFileParameters
 from tracking_receiver_sim.track import instant
 
 MAX_LISTED_AIRCRAFT = 12  # number of aircraft that an error lists for a file with several
 MAX_AIRCRAFT = 10_000  # largest number of aircraft in a file
 MIN_FIXES = 4  # least number of fixes of a track
 
-
 FIX_COLUMNS = ('line', 'aircraft', 'time', 'latitude', 'longitude', 'altitude')
 """Numbers of a fix while a file is read; `aircraft` is Aircraft.number."""
 
 
-class Aircraft(typing.NamedTuple):
-    """An aircraft of a file. number: from 0, in the order of the first fixes; names: all its names in the file."""
-    number: int
-    names: set
+class Fix(NamedTuple):
+    """A fix as a reader yields it."""
+    line: int                   # in the file
+    names: tuple[str, ...]      # of the aircraft
+    time: Seconds               # an instant (see track.instant) if the log is dated
+    latitude: Degrees           # WGS84
+    longitude: Degrees
+    altitude: Meters            # above the ellipsoid
+
+
+class Aircraft(NamedTuple):
+    """An aircraft of a file."""
+    number: int         # from 0, in the order of the first fixes
+    names: set[str]     # all its names in the file
 
 
 class Log:
-    """Description of a log, which its reader fills in.
+    """Description of a log, which its reader fills in."""
+    form: str                       # name of the format
+    time_name: str                  # name of the time in the file
+    dated: bool                     # True if the time is an instant (see track.instant)
+    remarks: list[str]              # sentences about the numbers
+    passed_over: Counter[str]       # {kind of row or sentence: its number}
+    nothing: str                    # reason why the file has no fix, '' if it has one
 
-        form            name of the format
-        time_name       name of the time in the file
-        dated           True if the time is an instant (see track.instant)
-        remarks         sentences about the numbers
-        passed_over     {kind of row or sentence: its number}
-        nothing         reason why the file has no fix, '' if it has one
-    """
-
-    def __init__(self):
+    def __init__(self) -> None:
         self.form, self.time_name, self.dated, self.nothing = '', '', False, ''
-        self.remarks, self.passed_over = [], collections.Counter()
+        self.remarks, self.passed_over = [], Counter()
 
 
-class Fixes(typing.NamedTuple):
-    """The fixes of one aircraft, n of them.
-
-    line: (n,) in the file; time: (n,) [s], growing, instants (see track.instant) if `dated`; latitude, longitude: (n,)
-    WGS84 [deg]; altitude: (n,) above the ellipsoid [m]; description: format, remarks and the number of rows passed
-    over.
-    """
+class Fixes(NamedTuple):
+    """The fixes of one aircraft."""
     path: str
-    line: np.ndarray
-    time: np.ndarray
-    latitude: np.ndarray
-    longitude: np.ndarray
-    altitude: np.ndarray
+    line: Ints          # in the file
+    time: Times         # growing; instants (see track.instant) if `dated`
+    latitude: Floats    # WGS84 [deg]
+    longitude: Floats   # WGS84 [deg]
+    altitude: Floats    # above the ellipsoid [m]
     dated: bool
-    description: str
+    description: str    # format, remarks and the number of rows passed over
 
 
-def read(track, rows) -> Fixes:
-    """Return the Fixes of the file of a TrackFileParameters. Raises csv_table.TableError.
-
-    rows: reader of its format, a function (path, Log) that yields (line, names of the aircraft, *numbers of a fix).
-    """
+def read(track: TrackFileParameters, rows: Callable[[str, Log], Iterator[Fix]]) -> Fixes:
+    """Return the fixes of a track file; rows: reader of its format. Raises csv_table.TableError."""
     log, numbers = Log(), array.array('d')
-    aircraft_by_identity: dict[tuple, Aircraft] = {}
+    aircraft_by_identity: dict[tuple[str, ...], Aircraft] = {}
     for line, identities, *fix in rows(track.path, log):
         if len(numbers) >= len(FIX_COLUMNS) * csv_table.MAX_CSV_ROWS:
             raise csv_table.too_long(track.path, line)
@@ -91,10 +93,10 @@ def read(track, rows) -> Fixes:
     return fixes
 
 
-def _without_repetitions(table, log):
+def _without_repetitions(table: Floats, log: Log) -> Floats:
     """Return the rows (line, time, place) without those that repeat time and place of the row before.
 
-    The Log receives the number of repetitions.
+    The log receives the number of repetitions.
     """
     repeated = np.append(False, (np.diff(table[:, 1:], axis=0) == 0.0).all(axis=1))[:len(table)]
     if repeated.any():
@@ -102,8 +104,8 @@ def _without_repetitions(table, log):
     return table[~repeated]
 
 
-def _chosen_aircraft(track, all_aircraft):
-    """Return (' of' its names, its number) of the Aircraft that `track` names, or of the only one.
+def _chosen_aircraft(track: TrackFileParameters, all_aircraft: Collection[Aircraft]) -> tuple[str, int]:
+    """Return (' of' its names, its number) of the aircraft that `track` names, or of the only one.
 
     Raises TableError if no aircraft or several match.
     """
@@ -121,18 +123,18 @@ def _chosen_aircraft(track, all_aircraft):
                                f'in the file: {", ".join(labels[:MAX_LISTED_AIRCRAFT])}{more}')
 
 
-def _label(aircraft):
-    """Return the names of an Aircraft in one text, '' without a name."""
+def _label(aircraft: Aircraft) -> str:
+    """Return the names of an aircraft in one text, '' without a name."""
     return ' '.join(sorted(name[:40] for name in aircraft.names if name)[:MAX_LISTED_AIRCRAFT])
 
 
-def _passed_over(log):
-    """Return a part of the description with the rows of a Log that were passed over."""
+def _passed_over(log: Log) -> str:
+    """Return a part of the description with the rows that were passed over."""
     return ''.join(f', passed over {count} x {kind}' for kind, count in sorted(log.passed_over.items()))
 
 
-def _check_order(fixes, track, log):
-    """Raise TableError, with the line, if the time of Fixes falls, stays or jumps by more than max_gap."""
+def _check_order(fixes: Fixes, track: TrackFileParameters, log: Log) -> None:
+    """Raise TableError, with the line, if the time falls, stays or jumps by more than max_gap."""
     step = np.diff(fixes.time)
     wrong = ~((step > 0.0) & (step <= track.max_gap))
     if wrong.any():

@@ -13,15 +13,20 @@ this model, started without prior knowledge, equals the natural cubic spline f t
 (Wahba, J. R. Stat. Soc. B 40 (1978) 364-372; Kohn and Ansley, SIAM J. Sci. Stat. Comput. 8 (1987) 33-48). scipy solves
 it in a time proportional to the number of fixes. Without smoothing the spline runs through every fix.
 """
-import typing
+
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
 
 from pedestal_common.geometry import geodesy
+from pedestal_common.geometry.geodesy import StationParameters
+from pedestal_common.quantities import Floats, Meters, MetersPerSecond, MetersPerSecond2, Seconds, Times, Vectors3
 from pedestal_common.reproducible import arctan2, turned
 from pedestal_common.text_files import csv_table
+from tracking_receiver_sim.params import TrackFileParameters
 from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.track.fixes import Fixes
 
 SAMPLES_PER_PIECE = 4  # number of samples of a piece of the spline, for peak speed and range
 
@@ -30,22 +35,18 @@ ALTITUDE_STEPS_M = (('100 ft', 30.48), ('25 ft', 7.62))
 ALTITUDE_TOLERANCE_M = 0.06  # largest distance from a multiple of a step [m]: logs are rounded to 0.1 m
 
 
-class Flight(typing.NamedTuple):
-    """A flight of a target.
-
-    breaks, coefficients, start_time, summary: as in target.Target; speed: peak speed [m/s]; greatest_range: from the
-    station [m].
-    """
-    breaks: np.ndarray
-    coefficients: np.ndarray
+class Flight(NamedTuple):
+    """A flight of a target. The first four fields are those of target.Target."""
+    breaks: Times
+    coefficients: Floats
     start_time: str
-    summary: tuple
-    speed: float
-    greatest_range: float
+    summary: tuple[str, ...]
+    speed: MetersPerSecond      # peak speed
+    greatest_range: Meters      # from the station
 
 
-def lay_out(fixes, track, station) -> Flight:
-    """Return the Flight of Fixes, a TrackFileParameters and a StationParameters; raises csv_table.TableError."""
+def lay_out(fixes: Fixes, track: TrackFileParameters, station: StationParameters) -> Flight:
+    """Return the Flight seen from a station; raises csv_table.TableError."""
     kept, dropped = without_held(fixes, track.max_gap)
     origin, to_enu = geodesy.station_frame(station)
     earth_fixed = geodesy.geocentric(np.radians(kept.latitude), np.radians(kept.longitude), kept.altitude)
@@ -71,19 +72,20 @@ def lay_out(fixes, track, station) -> Flight:
     return Flight(spline.x, spline.c, start_time, (log, path), float(speed), float(distance.max()))
 
 
-def without_held(fixes, max_gap):
-    """Return (Fixes without held positions, number of dropped fixes)."""
+def without_held(fixes: Fixes, max_gap: Seconds) -> tuple[Fixes, int]:
+    """Return (fixes without held positions, number of dropped fixes)."""
     moved = np.append(True, (np.diff(fixes.latitude) != 0.0) | (np.diff(fixes.longitude) != 0.0))
     first = np.flatnonzero(moved)
     last = np.append(first[1:], len(moved)) - 1
     stands = fixes.time[last] - fixes.time[first] >= max_gap
     keep = moved | np.repeat(stands, last - first + 1) | (len(first) == 1)
-    return fixes._replace(**{name: getattr(fixes, name)[keep]
-                             for name in ('line', 'time', 'latitude', 'longitude', 'altitude')}), int((~keep).sum())
+    kept = fixes._replace(line=fixes.line[keep], time=fixes.time[keep], latitude=fixes.latitude[keep],
+                          longitude=fixes.longitude[keep], altitude=fixes.altitude[keep])
+    return kept, int((~keep).sum())
 
 
-def smoothed(time, enu, track):
-    """Return the smoothing spline, a PPoly, of positions enu (n, 3) [m] at times (n,) [s]; raises TableError."""
+def smoothed(time: Times, enu: Vectors3, track: TrackFileParameters) -> PPoly:
+    """Return the smoothing spline of positions enu [m] at times; raises TableError."""
     if len(time) < 5:
         raise csv_table.TableError(f'{track.path}: {len(time)} fixes, must be at least 5 to be smoothed')
     sigmas = track.sigma_horizontal, track.sigma_horizontal, track.sigma_vertical
@@ -93,14 +95,14 @@ def smoothed(time, enu, track):
     return PPoly(np.stack([axis.c[:, pieces] for axis in axes], axis=-1), axes[0].x[pieces])
 
 
-def _samples(breaks):
-    """Return SAMPLES_PER_PIECE times [s] of each piece of a spline, and its end."""
+def _samples(breaks: Times) -> Times:
+    """Return SAMPLES_PER_PIECE times of each piece of a spline, and its end."""
     return np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(SAMPLES_PER_PIECE)
                       / SAMPLES_PER_PIECE).ravel(), breaks[-1])
 
 
-def _check_limits(fixes, spline, track):
-    """Return (peak speed [m/s], peak acceleration [m/s2]) of a spline.
+def _check_limits(fixes: Fixes, spline: PPoly, track: TrackFileParameters) -> tuple[MetersPerSecond, MetersPerSecond2]:
+    """Return (peak speed, peak acceleration) of a spline.
 
     Raises TableError, with the line of the fix nearest to the peak, if a peak is above its limit. The acceleration is
     linear between the breaks, so its peak is at a break.
@@ -120,8 +122,8 @@ def _check_limits(fixes, spline, track):
     return peaks['speed'], peaks['acceleration']
 
 
-def _quantisation(fixes, speed):
-    """Return a part of the summary that states whether times and altitudes of Fixes are coarse; speed: peak [m/s]."""
+def _quantisation(fixes: Fixes, speed: MetersPerSecond) -> str:
+    """Return a part of the summary that states whether times and altitudes are coarse; speed: peak."""
     whole = bool((fixes.time == np.round(fixes.time)).all())
     steps = next((name for name, step in ALTITUDE_STEPS_M if len(np.unique(fixes.altitude)) >= 3 and
                   np.abs(fixes.altitude - step * np.round(fixes.altitude / step)).max() < ALTITUDE_TOLERANCE_M), None)
@@ -129,8 +131,8 @@ def _quantisation(fixes, speed):
             + (f', altitudes in steps of {steps}' if steps else ''))
 
 
-def _residual(difference):
-    """Return a part of the summary with the difference (n, 3) [m] of the smoothed track to its fixes."""
+def _residual(difference: Vectors3) -> str:
+    """Return a part of the summary with the difference [m] of the smoothed track to its fixes."""
     size = np.linalg.norm(difference, axis=1)
     return f', smoothed: off the fixes by {np.sqrt(np.mean(size**2)):.3g} m rms, {size.max():.3g} m at most'
 

@@ -5,11 +5,13 @@ memory. The reader stops at a document type declaration. This avoids the expansi
 files. ele is above mean sea level. The height above the ellipsoid is ele + geoidheight. Without geoidheight ele takes
 its place, with a remark in the log. The byte order mark or the XML declaration states the encoding.
 """
-import collections
+from collections import Counter
+from collections.abc import Iterator
 from xml.parsers import expat
 
 from pedestal_common.text_files import content, csv_table
 from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.track.fixes import Fix, Log
 
 PARSE_CHUNK_BYTES = 1 << 20
 """Number of bytes that are parsed at once; expat reads an incomplete token again with each piece."""
@@ -23,10 +25,10 @@ OTHER_POINTS = ('rtept', 'wpt')  # points of a planned route and marks, which ar
 TEXT_ELEMENTS = ('ele', 'time', 'geoidheight', 'name')  # elements whose text the reader takes
 
 
-def rows(path, log):
-    """Yield the fixes (line, (name of the track,), UTC [s], latitude, longitude [deg], altitude [m]) of a GPX file.
+def rows(path: str, log: Log) -> Iterator[Fix]:
+    """Yield the fixes of a GPX file; the name of an aircraft is that of its track.
 
-    log: fixes.Log, which receives the description of the file. Raises TableError.
+    The log receives the description of the file. Raises TableError.
     """
     log.form, log.time_name, log.dated = 'GPX', 'time', True
     points = _Points(path, log)
@@ -53,22 +55,26 @@ def rows(path, log):
 
 
 class _Points:
-    """Handlers of expat.
+    """Handlers of expat."""
+    path_of_elements: list[str]     # names of the open elements, the outermost first
+    texts: dict[str, str]           # {name: text} of the elements of the open point
+    fixes: list[Fix]                # since the last `taken_fixes`
+    tracks: int                     # number of trk
+    track: str                      # name of the open track
+    with_ele: bool                  # True if a point had no geoidheight, so that ele took the place of the height
+    count: int                      # number of trkpt
+    others: Counter[str]            # {name of OTHER_POINTS: number}
+    declared: str                   # encoding of the XML declaration
+    line: int                       # of the open point
+    place: dict[str, str]           # attributes of the open point
 
-        path_of_elements    names of the open elements, the outermost first
-        texts               {name: text} of the elements of the open point
-        fixes               fixes since the last `taken_fixes`
-        with_ele            True if a point had no geoidheight, so that ele took the place of the height
-        count, others       number of trkpt; {name of OTHER_POINTS: number}
-    """
-
-    def __init__(self, path, log):
+    def __init__(self, path: str, log: Log) -> None:
         self.path, self.log = path, log
         self.path_of_elements, self.texts, self.fixes = [], {}, []
         self.tracks, self.track, self.with_ele = 0, '', False
-        self.count, self.others, self.declared = 0, collections.Counter(), ''
+        self.count, self.others, self.declared = 0, Counter(), ''
 
-    def parse_with(self, parser):
+    def parse_with(self, parser: expat.XMLParserType) -> None:
         """Receive the elements of an expat parser."""
         self.parser = parser
         self.parser.buffer_text = True
@@ -77,25 +83,25 @@ class _Points:
         self.parser.StartElementHandler, self.parser.EndElementHandler = self.start, self.end
         self.parser.CharacterDataHandler = self.text
 
-    def taken_fixes(self):
+    def taken_fixes(self) -> list[Fix]:
         """Return the fixes since the last call, and remove them."""
         fixes, self.fixes = self.fixes, []
         return fixes
 
-    def declaration(self, _version, encoding, _standalone):
+    def declaration(self, _version: str, encoding: str | None, _standalone: int) -> None:
         """Store the encoding of the XML declaration."""
         self.declared = encoding or ''
 
-    def encoding(self):
+    def encoding(self) -> str:
         """Return the encoding of the file, as a part of an error."""
         return f' (encoding {self.declared or "UTF-8":.40})'
 
-    def doctype(self, *_):
+    def doctype(self, *_: object) -> None:
         """Raise TableError for a document type declaration."""
         raise csv_table.TableError(f'{self.path}: line {self.parser.CurrentLineNumber}: a document type declaration: '
                                    'GPX has none')
 
-    def start(self, name, attributes):
+    def start(self, name: str, attributes: dict[str, str]) -> None:
         """Begin an element. Raises TableError for a file that is no GPX or is nested too deeply."""
         name = name.rpartition(':')[2]
         self.path_of_elements.append(name)
@@ -114,13 +120,13 @@ class _Points:
         elif name in OTHER_POINTS:
             self.others[name] += 1
 
-    def text(self, text):
+    def text(self, text: str) -> None:
         """Add a part of the text of the open element."""
         parent, name = ['', '', *self.path_of_elements][-2:]
         if name in TEXT_ELEMENTS and parent == ('trk' if name == 'name' else 'trkpt'):
             self.texts[name] = (self.texts.get(name, '') + text[:MAX_TEXT_CHARS])[:MAX_TEXT_CHARS]
 
-    def end(self, name):
+    def end(self, name: str) -> None:
         """End an element: take the name of a track, or the fix of a point."""
         name = self.path_of_elements.pop()
         if name == 'name' and self.path_of_elements[-1:] == ['trk']:
@@ -128,7 +134,7 @@ class _Points:
         elif name == 'trkpt':
             self.point()
 
-    def point(self):
+    def point(self) -> None:
         """Take the fix of the open point, or count a point without time or elevation. Raises TableError."""
         path, line, texts = self.path, self.line, self.texts
         missing = next((name for name in ('time', 'ele') if not texts.get(name, '').strip()), '')
@@ -138,6 +144,6 @@ class _Points:
         ele = csv_table.number(path, line, 'ele', texts['ele'], -1000.0, 1e8)
         geoid = csv_table.number(path, line, 'geoidheight', texts.get('geoidheight', '0'), -150.0, 150.0)
         self.with_ele = self.with_ele or 'geoidheight' not in texts
-        self.fixes.append((line, (self.track,), instant.seconds(path, line, 'time', texts['time']),
-                           csv_table.number(path, line, 'lat', self.place.get('lat'), -90.0, 90.0),
-                           csv_table.number(path, line, 'lon', self.place.get('lon'), -180.0, 360.0), ele + geoid))
+        self.fixes.append(Fix(line, (self.track,), instant.seconds(path, line, 'time', texts['time']),
+                              csv_table.number(path, line, 'lat', self.place.get('lat'), -90.0, 90.0),
+                              csv_table.number(path, line, 'lon', self.place.get('lon'), -180.0, 360.0), ele + geoid))

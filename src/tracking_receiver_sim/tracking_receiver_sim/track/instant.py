@@ -7,12 +7,18 @@ skyfield.
 import datetime
 import functools
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.quantities import Seconds, Texts
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.track import dates
+
+if TYPE_CHECKING:   # slow to import
+    from skyfield.timelib import Timescale
 
 UNIX_TIME_LIMITS_S = (0.0, 4102444800.0)  # range of the seconds since 1970 without leap seconds: until 2100
 TAI_OFFSET_S = 37.0  # TAI minus an instant [s]: TAI - UTC since 2017
@@ -27,19 +33,19 @@ FINE_UNIX_TIME_PATTERN = re.compile(r'[1-9](?:\d{12}|\d{15})(?:\.0*)?', re.ASCII
 
 
 @functools.cache
-def timescale():
+def timescale() -> 'Timescale':
     """Return the timescale of skyfield."""
     from skyfield.api import load  # slow to import; a file without a date does not need it
     return load.timescale(builtin=True)
 
 
 @functools.lru_cache(4096)
-def tai_offset(day):
-    """Return TAI - UTC [s] on a day since 1970."""
+def tai_offset(day: int) -> Seconds:
+    """Return TAI - UTC on a day since 1970."""
     return float(round((timescale().utc(1970, 1, 1 + day).tai - UNIX_EPOCH_JULIAN_DATE - day) * SECONDS_PER_DAY))
 
 
-def of_day(day, second):
+def of_day(day: int, second: Seconds) -> Seconds:
     """Return the instant of a day since 1970 and seconds of the day, UTC. Raises ValueError for second 86400 of a day
     without a leap second."""
     if second >= SECONDS_PER_DAY and second >= SECONDS_PER_DAY + tai_offset(day + 1) - tai_offset(day):
@@ -47,19 +53,19 @@ def of_day(day, second):
     return SECONDS_PER_DAY * day + second + tai_offset(day) - TAI_OFFSET_S
 
 
-def of_unix_time(value):
+def of_unix_time(value: Seconds) -> Seconds:
     """Return the instant of seconds since 1970 that omit leap seconds."""
     return value + tai_offset(int(value // SECONDS_PER_DAY)) - TAI_OFFSET_S
 
 
-def second_of_day(hours, minutes, seconds):
+def second_of_day(hours: int, minutes: int, seconds: Seconds) -> Seconds:
     """Return the seconds since midnight of a time of day. Raises ValueError; 23:59:60 is valid."""
     if hours > 23 or minutes > 59 or seconds >= (61.0 if (hours, minutes) == (23, 59) else 60.0):
         raise ValueError('no time of day')
     return 3600.0 * hours + 60.0 * minutes + seconds
 
 
-def seconds(path, line, name, text):
+def seconds(path: str, line: int, name: str, text: str | None) -> Seconds:
     """Return the instant of a text. Raises TableError.
 
     The text is a date, see `dates` (without a zone: UTC), or a number of seconds since 1970 without leap seconds. A
@@ -83,7 +89,8 @@ def seconds(path, line, name, text):
                                    f'example {dates.DATE_EXAMPLES}, or as seconds since 1970') from None
 
 
-def _of_iso(date, hours, minutes, second, fraction, sign, zone_hours, zone_minutes):
+def _of_iso(date: str, hours: str, minutes: str, second: str, fraction: str | None, sign: str | None,
+            zone_hours: str | None, zone_minutes: str | None) -> Seconds:
     """Return the instant of the groups of ISO_TIME_PATTERN. Raises ValueError."""
     leap = int(second) == 60
     zone = f'{sign}{zone_hours}:{zone_minutes}' if sign else '+00:00'
@@ -96,7 +103,7 @@ def _of_iso(date, hours, minutes, second, fraction, sign, zone_hours, zone_minut
     return of_day(int(day), whole + leap + float(f'0.{fraction or 0}'))
 
 
-def iso(value):
+def iso(value: Seconds) -> str:
     """Return an instant as ISO 8601 to the millisecond, UTC."""
     ms = round(value * 1e3)
     day = int(ms // (1000 * SECONDS_PER_DAY)) + 1
@@ -108,12 +115,12 @@ def iso(value):
     return f'{date}T{minutes // 60:02}:{minutes % 60:02}:{(ms - 60_000 * minutes) / 1e3:06.3f}Z'
 
 
-def utc_texts(begin, passed):
+def utc_texts(begin: np.datetime64, passed: NDArray[np.timedelta64]) -> Texts:
     """Return ISO 8601 to the microsecond of times, UTC.
 
-    begin: datetime64[us], UTC; passed (n,): timedelta64[us] after begin, growing.
+    begin: UTC, in us; passed: times after begin, growing, in us.
     """
-    times = begin + passed
+    times: NDArray[np.datetime64] = np.add(begin, passed)
     texts = np.datetime_as_string(times)
     first, last = (int(time.astype('M8[D]').astype(int)) for time in (begin, times[-1])) if len(times) else (0, 0)
     for day in range(first + 1, last + 1):

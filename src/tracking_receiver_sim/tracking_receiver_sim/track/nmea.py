@@ -5,15 +5,17 @@ the $ of a line and behind the checksum is passed over: the time of a logger, a 
 Android. Cut sentences, sentences with a wrong checksum, and GGA without fix, time or altitude (2D) are passed over and
 counted.
 """
-import collections
 import contextlib
 import datetime
 import io
 import re
+from collections import Counter
+from collections.abc import Iterator
 
 import pynmea2
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.quantities import Degrees, Seconds
 from pedestal_common.text_files import content, csv_table
 from tracking_receiver_sim.track import fixes, instant
 
@@ -27,11 +29,11 @@ MAX_LISTED_TYPES = 8  # number of types of sentences that an error lists
 MAX_LINE_CHARS = 1024  # largest number of characters of a line; the standard allows 82
 
 
-def rows(path, log):
-    """Yield the fixes (line, (), time [s], latitude, longitude [deg], altitude [m]) of a log.
+def rows(path: str, log: fixes.Log) -> Iterator[fixes.Fix]:
+    """Yield the fixes of a log.
 
-    log: fixes.Log, which receives the description of the file. The time is an instant if an RMC has a date, otherwise
-    it counts from midnight. The names of the aircraft are (), because NMEA has none. Raises TableError.
+    The log receives the description of the file. The time is an instant if an RMC has a date, otherwise it counts from
+    midnight. The names of the aircraft are (), because NMEA has none. Raises TableError.
     """
     first_day = _first_day(path)
     log.form, log.time_name, log.dated = 'NMEA', 'time', first_day is not None
@@ -48,25 +50,26 @@ def rows(path, log):
                                        '235960 only for a leap second') from None
         without_separation = without_separation or not sentence.geo_sep
         separation = csv_table.number(path, line, 'geoidal separation', sentence.geo_sep or '0', -150.0, 150.0)
-        yield (line, (), time,
-               _angle(path, line, 'latitude', sentence.lat, sentence.lat_dir, 'NS', 90.0),
-               _angle(path, line, 'longitude', sentence.lon, sentence.lon_dir, 'EW', 180.0),
-               separation + csv_table.number(path, line, 'altitude', sentence.altitude, -1000.0, 1e8))
+        yield fixes.Fix(line, (), time,
+                        _angle(path, line, 'latitude', sentence.lat, sentence.lat_dir, 'NS', 90.0),
+                        _angle(path, line, 'longitude', sentence.lon, sentence.lon_dir, 'EW', 180.0),
+                        separation + csv_table.number(path, line, 'altitude', sentence.altitude, -1000.0, 1e8))
     if without_separation:
         log.remarks.append('altitude without geoidal separation taken as height above the ellipsoid')
 
 
-def is_log(beginning):
+def is_log(beginning: str) -> bool:
     """Return True if a text is the beginning of a log: a sentence first, or GGA and the like after other text."""
     return beginning.startswith(('$', '!')) or bool(SENTENCE_PATTERN.search(beginning))
 
 
-def _sentences(path, log):
+def _sentences(path: str, log: fixes.Log) -> Iterator[tuple[int, pynmea2.NMEASentence]]:
     """Yield (line, sentence) of each RMC and GGA with a fix; a GGA also has time and altitude.
 
-    The counts of damaged sentences and of other GGA go into `log`, a fixes.Log.
+    The counts of damaged sentences and of other GGA go into the log.
     """
-    types, with_checksum = collections.Counter(), False
+    types: Counter[str] = Counter()
+    with_checksum = False
     for line, text in _lines(path):
         if CUT_SENTENCE_PATTERN.fullmatch(text) and not text.startswith('#'):
             log.passed_over['damaged sentence'] += 1
@@ -94,13 +97,13 @@ def _sentences(path, log):
         log.nothing = f'no GGA in it{f" ({listed})" if listed else ""}'
 
 
-def _missing(gga):
+def _missing(gga: pynmea2.NMEASentence) -> str:
     """Return the part that a GGA lacks, '' if it has all."""
     parts = {'a fix': gga.gps_qual and gga.lat and gga.lon, 'time': gga.data[0], 'altitude': gga.altitude is not None}
     return next((name for name, value in parts.items() if not value), '')
 
 
-def _lines(path):
+def _lines(path: str) -> Iterator[tuple[int, str]]:
     """Yield (number, text) of each line; noise between the sentences becomes replacement characters."""
     with csv_table.stream(path) as stream:
         encoding = content.marked_encoding(stream.read(content.MAX_MARK_BYTES)) or 'ascii'
@@ -117,17 +120,17 @@ class _Clock:
     """Time of consecutive sentences, which hold only the time of day.
 
     Where the time of day jumps by more than half a day, midnight lies between two sentences.
-
-        first   day since 1970 of the first sentence, None if it is unknown
-        days    midnights since the first sentence
-        leaps   leap seconds (235960) since the first sentence, for a log without a date
     """
+    first: int | None       # day since 1970 of the first sentence, None if it is unknown
+    days: int               # midnights since the first sentence
+    leaps: int              # leap seconds (235960) since the first sentence, for a log without a date
+    _last: Seconds | None   # second of the day of the last sentence
 
-    def __init__(self, first=None):
+    def __init__(self, first: int | None = None) -> None:
         self.first, self.days, self.leaps, self._last = first, 0, 0, None
 
-    def advance(self, second, day=None):
-        """Move on to a sentence. Return its instant (see track.instant), without a date the time since midnight [s].
+    def advance(self, second: Seconds, day: int | None = None) -> Seconds:
+        """Move on to a sentence. Return its instant (see track.instant), without a date the time since midnight.
 
         second: of the day; day: since 1970, if the sentence has a date. A date moves the time only forward. Raises
         ValueError for a leap second on a day that has none.
@@ -145,7 +148,7 @@ class _Clock:
         return instant.of_day(self.first + self.days, second)
 
 
-def _first_day(path):
+def _first_day(path: str) -> int | None:
     """Return the day since 1970 of the first sentence with a fix, None if no RMC has a date.
 
     The date of an RMC belongs to the time of the same RMC, which may lie on the other side of midnight.
@@ -154,18 +157,18 @@ def _first_day(path):
     for _, sentence in _sentences(path, fixes.Log()):
         with contextlib.suppress(ValueError):
             clock.advance(_second_of_day(sentence))
-            if sentence.sentence_type == 'RMC' and _day(sentence) is not None:
-                return _day(sentence) - clock.days
+            if sentence.sentence_type == 'RMC' and (day := _day(sentence)) is not None:
+                return day - clock.days
     return None
 
 
-def _day(sentence):
+def _day(sentence: pynmea2.NMEASentence) -> int | None:
     """Return the day since 1970 of an RMC, None without a valid date."""
     date = sentence.datestamp
     return (date - datetime.date(1970, 1, 1)).days if isinstance(date, datetime.date) else None
 
 
-def _second_of_day(sentence):
+def _second_of_day(sentence: pynmea2.NMEASentence) -> Seconds:
     """Return the seconds since midnight of a sentence. Raises ValueError."""
     match = TIME_PATTERN.fullmatch(sentence.data[0])
     if not match:
@@ -173,10 +176,10 @@ def _second_of_day(sentence):
     return instant.second_of_day(int(match[1]), int(match[2]), float(match[3]))
 
 
-def _angle(path, line, name, text, side, sides, limit):
-    """Return the angle [deg] of a text ddmm.mm (degrees and minutes) and its side. Raises TableError.
+def _angle(path: str, line: int, name: str, text: str, side: str, sides: str, limit: Degrees) -> Degrees:
+    """Return the angle of a text ddmm.mm (degrees and minutes) and its side. Raises TableError.
 
-    sides: letters of the positive and of the negative side, such as NS; limit: largest angle [deg].
+    sides: letters of the positive and of the negative side, such as NS; limit: largest angle.
     """
     value = csv_table.number(path, line, name, text, 0.0, 100.0 * limit)
     degrees, minutes = divmod(value, 100.0)

@@ -11,12 +11,16 @@ most MAX_STATION_HEIGHT_M.
 """
 import dataclasses
 import math
+from collections.abc import Collection
 
 import numpy as np
 
 from pedestal_common.geometry import geodesy
 from pedestal_common.geometry.geodesy import StationParameters
+from pedestal_common.quantities import Floats, Meters
+from tracking_receiver_sim.params import TargetParameters, TrackFileParameters
 from tracking_receiver_sim.track import flight
+from tracking_receiver_sim.track.fixes import Fixes
 
 MAX_AZIMUTH_RATE_RAD_S = 0.05  # largest azimuth rate of a flight seen from the station [rad/s]
 MIN_RANGE_M = 100.0  # lower limit of the least range over ground [m]
@@ -28,8 +32,8 @@ STATION_FIELDS = {f'target.station.{field.name}': field.name for field in datacl
 """{parameter: field of StationParameters}."""
 
 
-def station_for(fixes, track) -> StationParameters:
-    """Return a station for Fixes; track: TrackFileParameters. Raises csv_table.TableError."""
+def station_for(fixes: Fixes, track: TrackFileParameters) -> StationParameters:
+    """Return a station for fixes. Raises csv_table.TableError."""
     middle = int(np.argmin(np.abs(fixes.time - 0.5 * (fixes.time[0] + fixes.time[-1]))))
     under_middle_fix = StationParameters(latitude_deg=float(fixes.latitude[middle]),
                                          longitude_deg=float(fixes.longitude[middle]))
@@ -49,10 +53,10 @@ def station_for(fixes, track) -> StationParameters:
                              height=round(height, 1))
 
 
-def _clear_of(along, across, least_range):
+def _clear_of(along: Floats, across: Floats, least_range: Meters) -> Meters:
     """Return the least s >= 0 at which the place (0, s) has the distance least_range or more from all points.
 
-    along, across (n,): coordinates of the points; all lengths in m.
+    along, across: coordinates of the points [m].
     """
     near = np.abs(along) < least_range
     half = np.sqrt(least_range**2 - along[near]**2)
@@ -64,8 +68,8 @@ def _clear_of(along, across, least_range):
     return float(s)
 
 
-def run_parameters(fixes, target, given):
-    """Return {parameter: value} that Fixes give for a run. target: TargetParameters. Raises csv_table.TableError.
+def run_parameters(fixes: Fixes, target: TargetParameters, given: Collection[str]) -> dict[str, float]:
+    """Return {parameter: value} that fixes give for a run. Raises csv_table.TableError.
 
     given: names of the parameters that the scenario sets; only those of the station matter here. The reference range
     is the greatest range of the flight, so the C/N0 of the parameter is the lowest of the run. The run ends at the

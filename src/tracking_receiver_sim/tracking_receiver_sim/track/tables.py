@@ -8,10 +8,14 @@
 The geometric altitude of ADS-B is above the ellipsoid. If a file has only the barometric altitude, it is taken
 instead, with a remark in the log. Rows of ADS-B logs without a position are passed over and counted.
 """
-import typing
 
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from pedestal_common.quantities import Meters
 from pedestal_common.text_files import columns, csv_table
 from tracking_receiver_sim.track import times
+from tracking_receiver_sim.track.fixes import Fix, Log
 
 ALTITUDE_LIMITS_FT_IN_M = -3000.0 * columns.METRES_PER_FOOT, 500_000.0 * columns.METRES_PER_FOOT
 ALTITUDE_LIMITS_M = -1000.0, 150_000.0
@@ -28,27 +32,19 @@ POSITION = columns.Quantity('position', {'position': 'deg'}, 'deg')
 """Quantities of a flight; an altitude must name its unit."""
 
 
-
-class CsvLayout(typing.NamedTuple):
-    """Layout of a CSV file.
-
-        time, latitude, longitude   Quantity of each; latitude and longitude are POSITION if one column holds both
-        altitudes                   Quantities of the altitude, the best first
-        limits                      range of an altitude [m]
-        adsb                        True: UTC, and cells of the needed columns may be empty
-        barometric                  index of the first barometric altitude in `altitudes`
-    """
+class CsvLayout(NamedTuple):
+    """Layout of a CSV file."""
     name: str
     time: columns.Quantity
-    latitude: columns.Quantity
+    latitude: columns.Quantity                  # POSITION if one column holds latitude and longitude
     longitude: columns.Quantity
-    altitudes: tuple
-    limits: tuple
-    adsb: bool
-    barometric: int
+    altitudes: tuple[columns.Quantity, ...]     # the best first
+    limits: tuple[Meters, Meters]               # range of an altitude
+    adsb: bool                                  # True: UTC, and cells of the needed columns may be empty
+    barometric: int                             # index of the first barometric altitude in `altitudes`
 
-    def matches(self, table):
-        """Return True if a csv_table.Table has a column for each quantity."""
+    def matches(self, table: csv_table.Table) -> bool:
+        """Return True if a table has a column for each quantity."""
         names = table.fieldnames
         if not all(columns.named(names, wanted) for wanted in (self.time, self.latitude, self.longitude)):
             return False
@@ -56,7 +52,7 @@ class CsvLayout(typing.NamedTuple):
                 and not (self.adsb and table.column(self.time).unit not in ('s', columns.UTC)))
 
 
-def _named(name, default, unit=''):
+def _named(name: str, default: str, unit: str = '') -> columns.Quantity:
     """Return the Quantity of a column of one name.
 
     default: unit of the values if the name states none; unit: unit in which the reader takes them, '': `default`.
@@ -75,10 +71,10 @@ CSV_LAYOUTS = (
 """Known layouts; the last one is for every other file."""
 
 
-def rows(path, log):
-    """Yield the fixes (line, (icao24, callsign), time [s], latitude, longitude [deg], altitude [m]) of a CSV file.
+def rows(path: str, log: Log) -> Iterator[Fix]:
+    """Yield the fixes of a CSV file; the names of an aircraft are icao24 and callsign.
 
-    log: fixes.Log, which receives the description of the file. Raises TableError.
+    The log receives the description of the file. Raises TableError.
     """
     with csv_table.opened(path) as table:
         layout = _layout(table)
@@ -96,19 +92,19 @@ def rows(path, log):
                 log.passed_over['row without time, position or aircraft'] += 1
                 continue
             t = clock.seconds(row)
-            log.dated = clock.dated
+            log.dated = bool(clock.dated)
             north, east = (_position(table, row, latitude) if latitude == longitude else
                            (row[latitude.name], row[longitude.name]))
-            yield (table.line_num, tuple(row[name] or '' for name in identities), t,
-                   table.number(latitude, north, -90.0, 90.0), table.number(longitude, east, -180.0, 360.0),
-                   table.number(altitude, row[altitude.name], *layout.limits))
+            yield Fix(table.line_num, tuple(row[name] or '' for name in identities), t,
+                      table.number(latitude, north, -90.0, 90.0), table.number(longitude, east, -180.0, 360.0),
+                      table.number(altitude, row[altitude.name], *layout.limits))
         clock.check()
         described = (column.described() for column in dict.fromkeys((latitude, longitude, altitude)))
         log.remarks.insert(0, f'columns {", ".join((clock.described(), *described))}')
 
 
-def _layout(table):
-    """Return the layout of a Table: the first that matches, else the ADS-B layout whose time column the table has.
+def _layout(table: csv_table.Table) -> CsvLayout:
+    """Return the layout of a table: the first that matches, else the ADS-B layout whose time column the table has.
 
     The error about a missing column then names the columns of that layout.
     """
@@ -117,7 +113,7 @@ def _layout(table):
         (layout for layout in CSV_LAYOUTS[1:] if layout.adsb and layout.time.label in names), CSV_LAYOUTS[-1])
 
 
-def _position(table, row, column):
+def _position(table: csv_table.Table, row: Mapping[str, str], column: columns.Column) -> list[str]:
     """Return the texts of latitude and longitude in a cell of both. Raises TableError."""
     cell = row[column.name] or ''
     parts = [part.strip() for part in cell.split(',')]

@@ -2,7 +2,10 @@
 
 A table may also have two columns: one of the date and one of the time of day, both UTC.
 """
+from collections.abc import Mapping, Sequence
+
 from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.quantities import Seconds
 from pedestal_common.text_files import columns, csv_table
 from tracking_receiver_sim.track import dates, instant
 
@@ -32,17 +35,17 @@ A pass lasts less than 3 days. A column of days therefore spans less than 3.
 
 
 class Times:
-    """The times of a csv_table.Table, all with a date or all without.
+    """The times of a table, all with a date or all without."""
+    column: columns.Column      # of the time, or of the time of day
+    date: str                   # name of the column of the date beside it, '' if there is none
+    dated: bool | None          # True: instants, see track.instant; False: seconds from any origin; None: no row yet
+    first: Seconds | None       # time of the first row
+    last: Seconds | None        # time of the last row
 
-        column      columns.Column of the time, or of the time of day
-        date        name of the column of the date beside it, '' if there is none
-        dated       True: instants, see track.instant; False: seconds from any origin; None before the first row
-    """
-
-    def __init__(self, table, wanted, unit=''):
+    def __init__(self, table: csv_table.Table, wanted: columns.Quantity, unit: str = '') -> None:
         """Find the column of the time. Raises TableError.
 
-        wanted: columns.Quantity of the time; unit: of its values; '': the unit that the name of the column states.
+        wanted: the time; unit: of its values; '': the unit that the name of the column states.
         """
         self.table, self.date, self.dated = table, _date(table.fieldnames, wanted), None
         unit = columns.UTC if self.date else unit
@@ -51,12 +54,12 @@ class Times:
         self.first = self.last = None
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name of the column, or names of the two columns."""
         return f'{self.date} and {self.column.name}' if self.date else self.column.name
 
-    def seconds(self, row):
-        """Return the time of a row [s]: an instant if the times are dated, otherwise seconds from any origin.
+    def seconds(self, row: Mapping[str, str]) -> Seconds:
+        """Return the time of a row: an instant if the times are dated, otherwise seconds from any origin.
 
         Raises TableError.
         """
@@ -65,8 +68,8 @@ class Times:
         self.first, self.last = value if self.first is None else self.first, value
         return value
 
-    def _seconds(self, cell):
-        """Return the time [s] of the text of a cell. Raises TableError."""
+    def _seconds(self, cell: str) -> Seconds:
+        """Return the time of the text of a cell. Raises TableError."""
         table, column = self.table, self.column
         place = table.path, table.line_num, self.name
         if column.unit in (columns.JULIAN_DATE, columns.MODIFIED_JULIAN_DATE):
@@ -91,13 +94,15 @@ class Times:
                                        'since 1970; for seconds from another origin, name the column time_s')
         return value
 
-    def described(self):
+    def described(self) -> str:
         """Return the name of the column with the unit that was taken."""
         return self.column._replace(name=self.name, unit=columns.UTC if self.dated else self.column.unit).described()
 
-    def check(self):
+    def check(self) -> None:
         """Raise TableError after the last row if times taken as seconds look like days of a Julian date."""
-        if self.dated or self.column.unit != 's' or self.first is None or self.last - self.first >= MIN_SPAN_S:
+        if self.dated or self.column.unit != 's' or self.first is None or self.last is None:
+            return
+        if self.last - self.first >= MIN_SPAN_S:
             return
         for unit, zero in (('JD', 0.0), ('MJD', MODIFIED_JULIAN_DATE_ZERO)):
             if FIRST_EXPECTED_JULIAN_DATE <= self.first + zero <= JULIAN_DATE_LIMITS[1]:
@@ -107,10 +112,10 @@ class Times:
                     f'Julian date in days: name the column {unit}; write the dates of a spreadsheet as text')
 
 
-def _date(names, wanted):
+def _date(names: Sequence[str], wanted: columns.Quantity) -> str:
     """Return the name of the only column of dates if the table also has one column of the time of day, else ''.
 
-    wanted: Quantity of the time; its names include those of DATE if a table may have both columns.
+    wanted: the time; its names include those of DATE if a table may have both columns.
     """
     if not DATE.names.keys() <= wanted.names.keys():
         return ''
@@ -119,7 +124,7 @@ def _date(names, wanted):
     return found[0] if len(found) == len(clocks) == 1 else ''
 
 
-def julian(path, line, name, text, modified=False):
+def julian(path: str, line: int, name: str, text: str, modified: bool = False) -> Seconds:
     """Return the instant, see track.instant, of a Julian date, or a modified one, in days. Raises TableError."""
     zero = MODIFIED_JULIAN_DATE_ZERO if modified else 0.0
     low, high = JULIAN_DATE_LIMITS

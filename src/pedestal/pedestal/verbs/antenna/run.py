@@ -147,7 +147,7 @@ def _cure(priority: int) -> str:
                                   '(docs/station.md)')
 
 
-def _some(values: dict[str, tuple], names: Collection[str]) -> dict[str, tuple]:
+def _some(values: dict[str, tuple[float, str]], names: Collection[str]) -> dict[str, tuple[float, str]]:
     """Return the part of the results {name: (value, unit)} whose names are in `names`."""
     return {name: value for name, value in values.items() if name in names}
 

@@ -1,9 +1,9 @@
 """list the parameters of a node: default, range, unit, meaning"""
 import argparse
-import typing
 from collections.abc import Mapping
 
 from pedestal_analysis import console
+from pedestal_common.quantities import Json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,7 +27,7 @@ def main(options: argparse.Namespace) -> int:
     return 0
 
 
-def _columns(meta: Mapping[str, typing.Any], value: object) -> tuple[str, str, str]:
+def _columns(meta: Mapping[str, Json], value: object) -> tuple[str, str, str]:
     """Return default, range or options, and meaning with unit of a parameter, as texts."""
     allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ' | '.join(meta.get('options', ()))
     unit = f' [{meta["unit"]}]' if meta.get('unit') else ''

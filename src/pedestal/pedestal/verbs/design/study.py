@@ -16,6 +16,9 @@ from pedestal.verbs import arguments
 from pedestal_analysis import console
 from pedestal_common.parameters import did_you_mean
 
+if typing.TYPE_CHECKING:
+    from pedestal_studies.rigs.rows import Result
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add name, output folder, number of runs and their processes."""
@@ -72,7 +75,7 @@ def main(options: argparse.Namespace) -> int:
     return 0
 
 
-def _of_scenario(options: argparse.Namespace) -> Callable[..., typing.Any]:
+def _of_scenario(options: argparse.Namespace) -> 'Callable[..., Result]':
     """Return the function(progress) that runs the study for the plant of --scenario."""
     from pedestal_studies import plant_studies
     if options.name not in plant_studies.PLANT_STUDIES:
@@ -85,7 +88,7 @@ def _of_scenario(options: argparse.Namespace) -> Callable[..., typing.Any]:
 
 
 def _many_runs(options: argparse.Namespace, study: types.ModuleType,
-               stack: contextlib.ExitStack) -> dict[str, typing.Any]:
+               stack: contextlib.ExitStack) -> dict[str, object]:
     """Return the keyword arguments of a study of many runs, except its progress. The stack closes the pool."""
     given = {name: getattr(options, name) for name in ('runs', 'workers', 'scheduler')}
     if 'runs' not in inspect.signature(study.run).parameters:

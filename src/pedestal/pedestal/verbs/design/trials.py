@@ -28,13 +28,15 @@ import pathlib
 import re
 import sys
 import typing
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from pedestal.verbs import arguments
 from pedestal_analysis import console
+from pedestal_common.quantities import Row
 
 if typing.TYPE_CHECKING:
     from pedestal_analysis.trials.plan import Plan
+    from pedestal_analysis.trials.statistics import Requirement
 
 WORST_TRIAL_COUNT = 10  # number of the worst trials whose commands are printed
 BASE_SIDE = 'base'  # label of the side with the parameters of --param alone, beside labels of --side
@@ -216,7 +218,7 @@ def _result_names(plan: 'Plan') -> list[str]:
     return [f'{prefix}{result}' for prefix in plan.scenario(0).prefixes for result in TRIAL_RESULTS]
 
 
-def _requirement_lines(rows: Iterable[Mapping[str, typing.Any]], required: Iterable[typing.Any]) -> list[str]:
+def _requirement_lines(rows: Iterable[Row], required: 'Iterable[Requirement]') -> list[str]:
     """Return a line for each requirement and case: the share of the trials that meet it, and the trials without the
     result."""
     found = []
@@ -231,7 +233,7 @@ def _requirement_lines(rows: Iterable[Mapping[str, typing.Any]], required: Itera
     return found
 
 
-def _sensitivity_lines(rows: Iterable[Mapping[str, typing.Any]], ranking: str) -> list[str]:
+def _sensitivity_lines(rows: Iterable[Row], ranking: str) -> list[str]:
     """Return lines with the sensitivity of the ranking result to each varied parameter, the strongest first. A line
     names its case if there are several."""
     # Because eta_squared is the square of a correlation, its square root is compared with a rank correlation.

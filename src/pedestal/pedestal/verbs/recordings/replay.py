@@ -58,7 +58,7 @@ def _on_the_page(options: argparse.Namespace) -> int:
         raise ValueError('--page: goes only with --start, --rate and --paused; other options are for a replay into a '
                          'graph')
     wanted = replay.ReplayOptions(rate=options.rate, start=options.start, paused=options.paused)
-    player = replay_page.Player(replay_page.Recording(bag.read(options.bag, '')), options.page, wanted)
+    player = replay_page.Player(replay_page.ShownRecording(bag.read(options.bag, '')), options.page, wanted)
     with replay.stop_by_signal() as stopped:
         print(f'page: {player.url}', flush=True)
         player.play(stopped)

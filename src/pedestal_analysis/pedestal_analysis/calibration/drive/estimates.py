@@ -1,16 +1,24 @@
 """Estimates of an axis from its Motion: friction, lash, bias, encoder.
 
 Each estimate has an interval by the jackknife over parts of the data (results.intervals). The function of an estimate
-returns {name: (value, low, high)}, and {} for a property that the motions do not show.
+returns {} for a property that the motions do not show.
 """
 import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeAlias, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.ndimage import binary_erosion
 from scipy.optimize import least_squares
 
+from pedestal_analysis.calibration.drive.motion_data import Motion
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import interval, pseudo_values
+from pedestal_common.quantities import Estimate, Floats, NewtonMeters, Pairs, RadiansPerSecond, Vectors3
+
+Estimates: TypeAlias = dict[str, Estimate]  # {name of a property: its estimate}
+_Part = TypeVar('_Part')
 
 PART_COUNT, BLOCK_COUNT = 10, 80
 """Numbers of parts of the jackknife, and of blocks of neighbouring steps that are distributed over the parts."""
@@ -29,14 +37,14 @@ TABLE_STEP_RAD = math.radians(5.0)
 """Step of the table of the encoder, and width of the angles whose mean is one row [rad]."""
 
 
-def interleaved(rows):
+def interleaved(rows: Floats) -> list[Floats]:
     """Return PART_COUNT parts of rows: each has every PART_COUNT-th of BLOCK_COUNT blocks, so that parts are alike."""
     blocks = np.array_split(rows, BLOCK_COUNT)
     return [np.concatenate(blocks[k::PART_COUNT]) for k in range(PART_COUNT)]
 
 
-def jackknife(names, parts, statistic):
-    """Return {name: (value, low, high)} of a vector statistic(list of parts) -> (len(names),) over parts."""
+def jackknife(names: Sequence[str], parts: list[_Part], statistic: Callable[[list[_Part]], ArrayLike]) -> Estimates:
+    """Return the estimates of a vector statistic(parts) -> (len(names),) over parts."""
     whole = np.asarray(statistic(parts))
     values = pseudo_values(parts, lambda kept: np.asarray(statistic(kept)))
     found = {}
@@ -46,8 +54,8 @@ def jackknife(names, parts, statistic):
     return found
 
 
-def plateaus(motion, torque):
-    """Return (k, 3) mean rate [rad/s], torque [Nm] and angle [rad] of the pieces of constant rate of a Motion.
+def plateaus(motion: Motion, torque: Floats) -> Vectors3:
+    """Return mean rate [rad/s], torque [Nm] and angle [rad] of the pieces of constant rate of a motion.
 
     torque (n,): torque on the load [Nm].
     """
@@ -63,10 +71,11 @@ def plateaus(motion, torque):
     return np.array(pieces).reshape(-1, 3)
 
 
-def friction_torque(v, coulomb, breakaway, stribeck_rate, viscous):
+def friction_torque(v: Floats, coulomb: NewtonMeters, breakaway: NewtonMeters, stribeck_rate: RadiansPerSecond,
+                    viscous: float) -> Floats:
     """Return the friction torque [Nm] of the load at constant rates v [rad/s]: Coulomb, Stribeck and viscous parts.
 
-    Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419, at a constant rate.
+    viscous [Nms/rad]. Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419, at a constant rate.
     """
     static = (breakaway - coulomb) * np.exp(-(v / stribeck_rate)**2)
     return np.sign(v) * (coulomb + static) + viscous * v
@@ -75,8 +84,8 @@ def friction_torque(v, coulomb, breakaway, stribeck_rate, viscous):
 FRICTION_NAMES = 'coulomb', 'breakaway', 'stribeck_rate', 'viscous', 'unbalance', 'offset'
 
 
-def friction(pieces, gravity):
-    """Return the estimates FRICTION_NAMES from pieces of constant rate (k, 3); raise ValueError for too few of them.
+def friction(pieces: Vectors3, gravity: bool) -> Estimates:
+    """Return the estimates FRICTION_NAMES from pieces of constant rate; raise ValueError for too few of them.
 
     gravity: True if a torque of gravity at angle 0, `unbalance`, is fitted. `offset` is a torque that does not depend
     on the rate, such as that of the wind.
@@ -88,12 +97,12 @@ def friction(pieces, gravity):
     if not (pieces[:, 0].min() < 0.0 < pieces[:, 0].max()):
         raise ValueError('all rates have one sign; the motions must go both ways')
 
-    def statistic(parts):
+    def statistic(parts: list[Floats]) -> tuple[float, ...]:
         rows = np.concatenate(parts)
         v, torque, theta = rows.T
         level = np.abs(torque).mean()
 
-        def residual(x):
+        def residual(x: Floats) -> Floats:
             gravity_torque = x[4] * np.cos(theta) if gravity else 0.0
             # Each rate has about the same number of pieces; a relative noise of the rate is a noise of the torque.
             return (friction_torque(v, x[0], x[0] + abs(x[1]), math.exp(x[2]), x[3]) + gravity_torque + x[5]
@@ -113,12 +122,12 @@ def friction(pieces, gravity):
     return found
 
 
-def lash(parts, ratio):
+def lash(parts: Iterable[tuple[Motion, Pairs]], ratio: float) -> Estimates:
     """Return the estimates `lash` [rad] and `stiffness` [Nm/rad] of a mesh on the load axis.
 
         theta_i / N - theta = z_i + lash / 2 sign(T_i) + N T_i / k
 
-    parts: [(Motion, T)] of the recordings, with the torques T (n, 2) of the motors on the gear [Nm]; ratio: N.
+    parts: motion and torques T of the motors on the gear [Nm] of each recording; ratio: N.
     theta_i: angle of motor i; z_i: zero of its encoder; k: stiffness. A motor shows the lash only in a recording in
     which its torque changes the sign: without bias torque, or at an acceleration above it. Then the teeth touch with
     both flanks.
@@ -144,7 +153,7 @@ def lash(parts, ratio):
     A = np.concatenate(rows)
     shares = interleaved(A[np.argsort(np.concatenate(times), kind='stable')][:, np.abs(A).sum(0) > 0.0])
 
-    def statistic(kept):
+    def statistic(kept: list[Floats]) -> ArrayLike:
         table = np.concatenate(kept)
         return np.linalg.lstsq(table[:, :-1], table[:, -1], rcond=None)[0][:2]
 
@@ -155,10 +164,10 @@ def lash(parts, ratio):
     return found
 
 
-def bias(motion, hold):
+def bias(motion: Motion, hold: NewtonMeters) -> Estimates:
     """Return the estimate `torque` of the bias [Nm]: half the difference of the motors at a small common torque.
 
-    hold: torque demand per motor up to which the bias is full [Nm].
+    hold: torque demand per motor up to which the bias is full.
     """
     common = np.abs(motion.motor_torque.mean(1))
     small = np.flatnonzero(common < 0.5 * hold)
@@ -169,27 +178,26 @@ def bias(motion, hold):
     return jackknife(('torque',), parts, lambda kept: (np.median(np.concatenate(kept)),))
 
 
-def encoder(motion, pinion_ratio):
+def encoder(motion: Motion, pinion_ratio: float) -> tuple[Estimates, Pairs]:
     """Return (estimates, table) of the error of the load encoder against the motors, over a turn.
 
-    The estimates are eccentricity_sin and eccentricity_cos [rad]. The table (m, 2) holds angle [rad] and error [rad]
-    at every 5 deg. This error is the mean of both directions, less the mean over the turn. The error of the pinions,
-    once per turn of them, is removed with pinion_ratio (bull gear to pinion). Without a turn both ways, the result is
-    ({}, empty table).
+    The estimates are eccentricity_sin and eccentricity_cos [rad]. The table holds angle [rad] and error [rad] at every
+    5 deg. This error is the mean of both directions, less the mean over the turn. The error of the pinions, once per
+    turn of them, is removed with pinion_ratio (bull gear to pinion). Without a turn both ways, the result is ({},
+    empty table).
     """
-    ways = [_turn(motion, sign) for sign in (1.0, -1.0)]
-    if any(way is None for way in ways):
+    forth, back = _turn(motion, 1.0), _turn(motion, -1.0)
+    if forth is None or back is None:
         return {}, np.zeros((0, 2))
-    rows = []
+    ways, rows = (forth, back), []
     for sign, part in zip((1.0, -1.0), ways):
         theta = motion.theta[part]
         error = theta - motion.motor_angle[part].mean(1)
         rows.append(np.column_stack((np.sin(theta), np.cos(theta), np.ones_like(theta), np.full_like(theta, sign),
                                      np.sin(pinion_ratio * theta), np.cos(pinion_ratio * theta), error)))
-    rows = np.concatenate(rows)
-    parts = interleaved(rows)
+    parts = interleaved(np.concatenate(rows))
 
-    def statistic(kept):
+    def statistic(kept: list[Floats]) -> ArrayLike:
         table = np.concatenate(kept)
         return np.linalg.lstsq(table[:, :-1], table[:, -1], rcond=None)[0][:2]
 
@@ -197,7 +205,7 @@ def encoder(motion, pinion_ratio):
     return found, _table(motion, ways)
 
 
-def _turn(motion, sign):
+def _turn(motion: Motion, sign: float) -> slice | None:
     """Return the slice of the longest stretch in one direction, of at least MIN_TURN_RAD; None if there is none.
 
     The accelerations at its ends are left out, because their torques twist the gears.
@@ -212,8 +220,8 @@ def _turn(motion, sign):
     return longest and longest[1]
 
 
-def _table(motion, ways):
-    """Return the table of `encoder` from the two slices of the turn."""
+def _table(motion: Motion, ways: Sequence[slice]) -> Pairs:
+    """Return the table of `encoder` from the two parts of the turn."""
     half = 0.5 * TABLE_STEP_RAD
     low = max(motion.theta[part].min() for part in ways) + half
     high = min(motion.theta[part].max() for part in ways) - half

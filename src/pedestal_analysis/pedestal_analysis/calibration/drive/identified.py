@@ -3,21 +3,28 @@
 The result is a table with nominal and identified values, rows for --json, a page, and a ROS 2 parameter file with
 acu.AXIS.feedforward.* and adu.AXIS.*. The twin with these values must reproduce the torques of the recording.
 """
+import argparse
 import dataclasses
 import math
+import pathlib
 import shlex
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
 from adu_drive.params import AduParameters
 from pedestal_analysis.calibration import output_files
 from pedestal_analysis.calibration.drive import estimates, identified_page, motion_data, motions, twin
+from pedestal_analysis.calibration.drive.estimates import Estimates
+from pedestal_analysis.calibration.drive.twin import Errors
 from pedestal_analysis.results import intervals
 from pedestal_analysis.results.intervals import estimated, row
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario as scenarios
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import as_dict, build, defaults
+from pedestal_common.quantities import Json, Pairs, Row
 from pedestal_common.text_files import parameter_file
 from pedestal_recording import bag as bags
 
@@ -40,33 +47,21 @@ QUANTITIES = {
 
 @dataclasses.dataclass(frozen=True)
 class Identified:
-    """Result of a calibration of the drive.
-
-    source       names of the recordings
-    recordings   [twin.Recording]
-    first        {axis: {name: (value, low, high)}} before the correction by the twin
-    found        {axis: {name: (value, low, high)}} in the order of QUANTITIES
-    maps         {axis: (m, 2) error of the load encoder [rad] over the angle [rad]}, empty without a turn
-    changes      {name: value} of the parameters of adu: identified values, or nominal values of the names in `kept`
-    kept         {axis: parameters that keep their nominal values}
-    before       {axis: torque error of the nominal twin [-]}
-    identified   {axis: torque error of the twin with all identified values [-]}
-    after        {axis: torque error of the twin with `changes` [-]}
-    """
-    source: str
-    recordings: list
-    first: dict
-    found: dict
-    maps: dict
-    changes: dict
-    kept: dict
-    before: dict
-    identified: dict
-    after: dict
+    """Result of a calibration of the drive. The dictionaries have the names of the axes as keys, except `changes`."""
+    source: str                         # names of the recordings
+    recordings: Sequence[twin.DriveRecording]
+    first: dict[str, Estimates]         # before the correction by the twin
+    found: dict[str, Estimates]         # in the order of QUANTITIES
+    maps: dict[str, Pairs]              # error of the load encoder [rad] over the angle [rad], empty without a turn
+    changes: dict[str, float]           # {parameter of adu: identified value, or nominal value of a name in `kept`}
+    kept: dict[str, set[str]]           # parameters that keep their nominal values
+    before: Errors                      # of the nominal twin
+    identified: Errors                  # of the twin with all identified values
+    after: Errors                       # of the twin with `changes`
 
 
-def calibrate(recordings, source) -> Identified:
-    """Return the Identified of twin.Recordings. Raises ValueError."""
+def calibrate(recordings: Sequence[twin.DriveRecording], source: str) -> Identified:
+    """Return the result of a calibration; source: names of the recordings. Raises ValueError."""
     found, maps = {}, {}
     first, corrected = twin.estimated(recordings)
     for name in AXES:
@@ -90,7 +85,8 @@ def calibrate(recordings, source) -> Identified:
                       twin.torque_errors(recordings, changes))
 
 
-def _chosen(recordings, found, identified):
+def _chosen(recordings: Sequence[twin.DriveRecording], found: Mapping[str, Estimates],
+            identified: Mapping[str, float]) -> tuple[dict[str, float], dict[str, set[str]], Errors, Errors]:
     """Return (changes, kept, before, identified) of an Identified; identified: {parameter: value} of adu.
 
     An axis keeps its nominal values if the twin fits the recording at least as well with them. The torque does not
@@ -102,7 +98,7 @@ def _chosen(recordings, found, identified):
         shown = {name for name, (_, low, high) in direct.items() if not low <= nominal[name] <= high}
         names[axis] = {name for name in identified if name.startswith(f'{axis}.')} - shown
 
-    def values(kept):
+    def values(kept: Collection[str]) -> dict[str, float]:
         return {name: nominal[name] if name in kept else value for name, value in identified.items()}
 
     before, after = (twin.torque_errors(recordings, values(kept)) for kept in (set().union(*names.values()), ()))
@@ -111,12 +107,12 @@ def _chosen(recordings, found, identified):
     return values(set().union(*kept.values())), kept, before, after
 
 
-def _rounded(value):
+def _rounded(value: float) -> float:
     return float(f'{value:.{VALUE_DIGITS}g}')
 
 
-def rows(result):
-    """Return the rows of an Identified for --json."""
+def rows(result: Identified) -> list[Row]:
+    """Return the rows for --json."""
     listed = []
     for name, found in result.found.items():
         listed += [estimated(CASE_NAME, f'{name}_{key}', estimate, QUANTITIES[key][0], estimates.PART_COUNT)
@@ -128,13 +124,13 @@ def rows(result):
     return listed
 
 
-def passed(result):
-    """Return True if the twin of an Identified reproduces the recorded torques."""
+def passed(result: Identified) -> bool:
+    """Return True if the twin reproduces the recorded torques."""
     return not any(intervals.missed(item) for item in rows(result))
 
 
-def lines(result):
-    """Return the lines of the table of an Identified, with the torque errors and remarks."""
+def lines(result: Identified) -> list[str]:
+    """Return the lines of the table, with the torque errors and remarks."""
     drive, listed = as_dict(result.recordings[0].drive), []
     for name, found in result.found.items():
         listed += [f'{name:17} {"nominal":>11} {"identified":>11}  {"95 % interval":26} {"unit":8} meaning']
@@ -155,7 +151,7 @@ def lines(result):
     return listed
 
 
-def remarks(result, name):
+def remarks(result: Identified, name: str) -> list[str]:
     """Return sentences on the kept values of an axis, and on its properties that the motions do not show."""
     found, kept = result.found[name], result.kept[name]
     missing = []
@@ -174,8 +170,8 @@ def remarks(result, name):
     return missing
 
 
-def acu_parameters(result):
-    """Return the parameters {name: value} of acu for an Identified: inertia of load and motors, friction of the load.
+def acu_parameters(result: Identified) -> dict[str, float]:
+    """Return the parameters {name: value} of acu: inertia of load and motors, friction of the load.
 
     The friction of the motors rises over a wider range of rates than the feed-forward knows. With it, the following
     error of a slow pass doubled, so the integral of the speed loop takes it.
@@ -191,8 +187,8 @@ def acu_parameters(result):
     return values
 
 
-def content(result):
-    """Return the content of the --json file of an Identified."""
+def content(result: Identified) -> dict[str, Json]:
+    """Return the content of the --json file."""
     return {'name': 'calibrate drive', 'rows': rows(result), 'source': result.source, 'verified': passed(result),
             'remarks': {name: remarks(result, name) for name in result.found},
             'encoder_map_deg': {name: np.degrees(table).tolist() for name, table in result.maps.items()},
@@ -200,8 +196,8 @@ def content(result):
             'parameters': {'acu': acu_parameters(result), 'adu': result.changes}}
 
 
-def plan_parameters(chosen):
-    """Return (motions.Plan, {node: {parameter: value}}) that let a scenario.Scenario make the motions."""
+def plan_parameters(chosen: Scenario) -> tuple[motions.Plan, dict[str, dict[str, Json]]]:
+    """Return (plan, {node: {parameter: value}}) that let a scenario make the motions."""
     plan = motions.plan(chosen.node_parameters('acu'))
     start = dict(zip(AXES, plan.start))
     return plan, {'scenario': {'duration': plan.duration, 'program.source': 'none'},
@@ -210,8 +206,8 @@ def plan_parameters(chosen):
                   'adu': {f'initial_{name}': angle for name, angle in start.items()}}
 
 
-def write_plan(chosen, given, path):
-    """Write the motions for the antenna of a scenario.Scenario to a new parameter file. Return lines for the user.
+def write_plan(chosen: Scenario, given: str, path: pathlib.Path) -> list[str]:
+    """Write the motions for the antenna of a scenario to a new parameter file. Return lines for the user.
 
     given: name or path of the scenario, as the user gave it.
     """
@@ -224,8 +220,8 @@ def write_plan(chosen, given, path):
             f'    {run} --param adu.azimuth.bias.schedule=off --param adu.elevation.bias.schedule=off --bag drive_2']
 
 
-def in_memory(name, overrides):
-    """Return [twin.Recording] of two runs of a scenario in memory, the second without bias torque.
+def in_memory(name: str, overrides: Sequence[str]) -> list[twin.DriveRecording]:
+    """Return two runs of a scenario in memory, the second without bias torque.
 
     name: of the scenario; overrides: changed parameters 'node.key=value', the true values of the simulated drive.
     The nominal values are those of the scenario itself.
@@ -244,8 +240,8 @@ def in_memory(name, overrides):
     return found
 
 
-def of_bags(paths):
-    """Return [twin.Recording] of recordings. Raises ValueError for recordings of different drives."""
+def of_bags(paths: Iterable[pathlib.Path]) -> list[twin.DriveRecording]:
+    """Return what a calibration takes from recordings. Raises ValueError for recordings of different drives."""
     found, first = [], None
     for path in paths:
         bag = bags.read(path, '')
@@ -268,7 +264,7 @@ def of_bags(paths):
     return found
 
 
-def main(options, changes):
+def main(options: argparse.Namespace, changes: Sequence[str]) -> tuple[list[str], dict[str, Json], bool]:
     """Calibrate for the options of the verb, write its files, and return (lines, content, verified).
 
     changes: texts 'node.key=value' of --params-file and --param. Raises ValueError.

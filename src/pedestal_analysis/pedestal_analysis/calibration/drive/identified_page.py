@@ -1,14 +1,20 @@
 """HTML page of `pedestal calibrate drive`: friction, torques of recording and twin, and error of the encoder."""
 import html
+import typing
+from collections.abc import Iterable
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.calibration.drive import estimates, twin
 from pedestal_analysis.report import elements, figures
 from pedestal_analysis.report.figures import FILTERED_COLOUR, RAW_COLOUR, TRUTH_COLOUR, Spec, new_panels, thin
 
+if typing.TYPE_CHECKING:
+    from pedestal_analysis.calibration.drive.identified import Identified
 
-def friction(result):
+
+def friction(result: 'Identified') -> Figure:
     """Return the figure with the torque at constant rates over the rate, and the fitted friction."""
     figure, panels = new_panels(1, 2, height=2.8, x=[f'{name} rate [rad/s]' for name in result.found],
                                 y='torque on the load [Nm]')
@@ -20,13 +26,14 @@ def friction(result):
         known = {'breakaway': known['coulomb'], 'stribeck_rate': 1.0, **known}
         constant = first['offset'][0] + (first['unbalance'][0] * np.cos(pieces[:, 2]) if 'unbalance' in first else 0.0)
         axes.semilogx(np.abs(pieces[:, 0]), np.sign(pieces[:, 0]) * (pieces[:, 1] - constant), '.', color=RAW_COLOUR)
-        rates = np.geomspace(*np.quantile(np.abs(pieces[:, 0]), (0.0, 1.0)), 100)
+        low, high = np.quantile(np.abs(pieces[:, 0]), (0.0, 1.0))
+        rates = np.geomspace(low, high, 100)
         axes.semilogx(rates, estimates.friction_torque(rates, **known), color=FILTERED_COLOUR)
         axes.margins(0.05)
     return figure
 
 
-def torques(result):
+def torques(result: 'Identified') -> Figure:
     """Return the figure with the torque of the motors in the recording and in the twin, of both axes."""
     figure, panels = new_panels(len(result.found), y=[f'{name}\nmotor torque [Nm]' for name in result.found])
     twins = twin.replayed(result.recordings[0], result.changes)
@@ -36,7 +43,7 @@ def torques(result):
     return figures.outside_legend(figure, panels[0, 0])
 
 
-def encoder(result):
+def encoder(result: 'Identified') -> Figure:
     """Return the figure with the error of the load encoders over the angle; the axes without a turn stay empty."""
     figure, panels = new_panels(1, 2, height=2.6, x=[f'{name} [deg]' for name in result.maps],
                                 y='load encoder less motors [mdeg]')
@@ -57,8 +64,8 @@ FIGURES = (
 """Figures of the page."""
 
 
-def page(result, printed, command):
-    """Return the HTML page of an identified.Identified; printed: lines of its table; command: the command line."""
+def page(result: 'Identified', printed: Iterable[str], command: str) -> str:
+    """Return the HTML page of a calibration; printed: lines of its table; command: the command line."""
     return elements.page('Drive calibration', [
         f'<h1>Drive calibration: {html.escape(result.source)}</h1>', f'<p class="soft">{html.escape(command)}</p>',
         f'<pre style="font-size: .72rem; white-space: pre-wrap">{html.escape(chr(10).join(printed))}</pre>',

@@ -14,12 +14,21 @@ projection, Golub and Pereyra, SIAM J. Numerical Analysis 10 (1973) 413). The co
 relation.
 """
 import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from scipy import signal
 from scipy.optimize import minimize
 
-from pedestal_analysis.calibration.drive.estimates import PART_COUNT, friction_torque, interleaved, jackknife
+from pedestal_analysis.calibration.drive.estimates import (
+    PART_COUNT,
+    Estimates,
+    friction_torque,
+    interleaved,
+    jackknife,
+)
+from pedestal_analysis.calibration.drive.motion_data import Motion
+from pedestal_common.quantities import Floats, Ints, RadiansPerSecond, Seconds
 
 FREQUENCY_RANGE_HZ, FREQUENCY_COUNT = (2.0, 30.0), 90
 """Range of the searched frequencies [Hz] and number of trial frequencies."""
@@ -34,10 +43,11 @@ ROW_STEP, MIN_ROWS = 2, 200
 """Step from one used row to the next, which the smoothing allows, and smallest number of rows."""
 
 
-def identify(parts, friction, gravity, flexible=True):
+def identify(parts: Iterable[tuple[Motion, Floats]], friction: Estimates, gravity: bool,
+             flexible: bool = True) -> Estimates:
     """Return the estimates `inertia` [kg m2], and with a mode `dish_inertia` [kg m2], `frequency` [Hz] and `damping`.
 
-    parts      [(Motion, torque on the load (n,) [Nm])] of the recordings
+    parts      motion and torque on the load [Nm] of each recording
     friction   estimates.friction, whose torque at constant rate is subtracted
     gravity    True if the torque of gravity depends on the angle
     flexible   False for a structure without a mode
@@ -50,10 +60,10 @@ def identify(parts, friction, gravity, flexible=True):
     if not flexible:
         return _rigid(rows)
 
-    def dish(w, zeta):
+    def dish(w: float, zeta: float) -> Floats:
         return np.concatenate([_swing(period, a, used, w, zeta) for period, a, used, _ in data])
 
-    def cost(x):
+    def cost(x: Sequence[float]) -> float:
         return _cost(rows, dish(math.exp(x[0]), min(math.exp(x[1]), MAX_DAMPING)))
 
     trials = np.log(2.0 * math.pi * np.geomspace(*FREQUENCY_RANGE_HZ, FREQUENCY_COUNT))
@@ -68,13 +78,12 @@ def identify(parts, friction, gravity, flexible=True):
     return _rigid(rows)
 
 
-def _rigid(rows):
-    """Return the estimate `inertia` of a rigid structure."""
+def _rigid(rows: Floats) -> Estimates:
     return jackknife(('inertia',), interleaved(rows), lambda kept: _solved(np.concatenate(kept))[:1])
 
 
-def inertia_torque(motion, found):
-    """Return the torque (n,) [Nm] that accelerates base and dish of a Motion; found: estimates of `identify`."""
+def inertia_torque(motion: Motion, found: Estimates) -> Floats:
+    """Return the torque (n,) [Nm] that accelerates base and dish of a motion; found: estimates of `identify`."""
     if 'frequency' not in found:
         return found['inertia'][0] * motion.a if 'inertia' in found else np.zeros_like(motion.a)
     J, J_d, f, zeta = (found[name][0] for name in ('inertia', 'dish_inertia', 'frequency', 'damping'))
@@ -82,13 +91,13 @@ def inertia_torque(motion, found):
     return (J - J_d) * motion.a + J_d * _swing(period, motion.a, slice(None), 2.0 * math.pi * f, zeta)
 
 
-def _flexible(rows, dish, w, zeta):
-    """Return the estimates of a flexible structure near w [rad/s], zeta; dish(w, zeta): acceleration of the dish."""
+def _flexible(rows: Floats, dish: Callable[[float, float], Floats], w: RadiansPerSecond, zeta: float) -> Estimates:
+    """Return the estimates of a flexible structure near w, zeta; dish(w, zeta): acceleration of the dish."""
     # Around the optimum the cost of each part is a parabola over the frequency, so each part gives its frequency.
     around = [interleaved(np.column_stack((dish(w * math.exp(k * FREQUENCY_STEP), zeta), rows)))
               for k in (-1, 0, 1)]
 
-    def statistic(kept):
+    def statistic(kept: list[int]) -> tuple[float, float, float]:
         tables = [np.concatenate([parts[k] for k in kept]) for parts in around]
         low, middle, high = (_cost(table[:, 1:], table[:, 0]) for table in tables)
         curvature = low - 2.0 * middle + high
@@ -100,7 +109,8 @@ def _flexible(rows, dish, w, zeta):
     return {**found, 'damping': (zeta, math.nan, math.nan)}
 
 
-def _rows(motion, torque, known, gravity):
+def _rows(motion: Motion, torque: Floats, known: Mapping[str, float],
+          gravity: bool) -> tuple[Seconds, Floats, Ints, Floats]:
     """Return (period, acceleration (n,), indices of the used steps (k,), rows (k, 4)) of a recording.
 
     Columns of the rows: acceleration, sign of the rate, rate, torque less friction.
@@ -118,7 +128,7 @@ def _rows(motion, torque, known, gravity):
     return period, motion.a, used, np.column_stack((motion.a, np.sign(v), v, rest))[used]
 
 
-def _swing(period, a, used, w, zeta):
+def _swing(period: Seconds, a: Floats, used: Ints | slice, w: RadiansPerSecond, zeta: float) -> Floats:
     """Return the acceleration [rad/s2] of the dish at the used steps; a (n,): of the base at all steps."""
     # Bilinear transform that is exact at w.
     K = w / math.tan(0.5 * w * period)
@@ -128,7 +138,7 @@ def _swing(period, a, used, w, zeta):
     return signal.lfilter(b, den, a)[used]
 
 
-def _normal(rows, dish):
+def _normal(rows: Floats, dish: Floats | None) -> tuple[Floats, Floats, float]:
     """Return the normal equations (matrix, right side) and the sum of the squared torques of rows."""
     columns = rows[:, :-1] if dish is None else np.column_stack((rows[:, :-1], dish))
     torque = rows[:, -1]
@@ -137,14 +147,14 @@ def _normal(rows, dish):
             float(np.einsum('i,i->', torque, torque)))
 
 
-def _solved(rows, dish=None):
+def _solved(rows: Floats, dish: Floats | None = None) -> Floats:
     """Return the unknowns of rows by least squares: J_b, corrections of the friction, and J_d if `dish` is given."""
     matrix, right, _ = _normal(rows, dish)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     return scale * (np.linalg.pinv(matrix * np.outer(scale, scale), hermitian=True) @ (scale * right))
 
 
-def _cost(rows, dish=None):
+def _cost(rows: Floats, dish: Floats | None = None) -> float:
     """Return the sum of the squared residuals of rows."""
     _, right, whole = _normal(rows, dish)
     return max(whole - float(right @ _solved(rows, dish)), 0.0)

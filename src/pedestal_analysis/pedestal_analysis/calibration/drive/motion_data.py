@@ -9,7 +9,10 @@ import dataclasses
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from adu_drive.params import AxisParameters
 from pedestal_analysis.results import tracking
+from pedestal_common.quantities import Floats, Pairs, Times
+from pedestal_recording.recording import Recording
 
 SMOOTHING_S = 0.012  # standard deviation of the Gaussian of the smoothing filter [s]
 MOVING_RATE_RAD_S = 2e-4  # least rate of a moving axis [rad/s]
@@ -21,28 +24,20 @@ class MotionError(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """Motion of one axis over n steps, after the smoothing filter.
+    """Motion of one axis over n steps, after the smoothing filter."""
+    t: Times
+    theta: Floats               # angle (n,) by the load encoder [rad]
+    v: Floats                   # its rate [rad/s]
+    a: Floats                   # its acceleration [rad/s2]
+    motor_angle: Pairs          # of both motors on the load axis, by the motor encoders [rad]
+    motor_rate: Pairs           # of both motors on the motor shaft [rad/s]
+    motor_acceleration: Pairs   # the same [rad/s2]
+    motor_torque: Pairs         # of both motors on the motor shaft [Nm]
 
-    t                   (n,) time [s]
-    theta, v, a         (n,) angle [rad], rate [rad/s], acceleration [rad/s2] by the load encoder
-    motor_angle         (n, 2) angles of the motors on the load axis, by the motor encoders [rad]
-    motor_rate          (n, 2) rates of the motors on the motor shaft [rad/s]
-    motor_acceleration  (n, 2) the same [rad/s2]
-    motor_torque        (n, 2) torques of the motors on the motor shaft [Nm]
-    """
-    t: np.ndarray
-    theta: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    motor_angle: np.ndarray
-    motor_rate: np.ndarray
-    motor_acceleration: np.ndarray
-    motor_torque: np.ndarray
+    def mesh_torque(self, axis: AxisParameters) -> Pairs:
+        """Return the torques [Nm] on the motor shaft that the gears get from the motors.
 
-    def mesh_torque(self, axis):
-        """Return the torques (n, 2) [Nm] on the motor shaft that the gears get from the motors.
-
-        axis: adu_drive.params.AxisParameters, from which inertia and friction of the motors come.
+        axis: inertia and friction of the motors.
         """
         motors = axis.motor_1, axis.motor_2
         return np.column_stack([
@@ -50,13 +45,13 @@ class Motion:
             - m.friction * np.tanh(self.motor_rate[:, k] / m.friction_speed) - m.viscous * self.motor_rate[:, k]
             for k, m in enumerate(motors)])
 
-    def load_torque(self, axis):
-        """Return the torque (n,) [Nm] of both gears on the load; axis: AxisParameters."""
+    def load_torque(self, axis: AxisParameters) -> Floats:
+        """Return the torque (n,) [Nm] of both gears on the load."""
         return axis.gear_train.ratio * self.mesh_torque(axis).sum(1)
 
 
-def read(bag, name, axis) -> Motion:
-    """Return the Motion of the axis `name` in a bag.Bag; axis: its AxisParameters. Raises MotionError."""
+def read(bag: Recording, name: str, axis: AxisParameters) -> Motion:
+    """Return the motion of the axis `name` in a recording. Raises MotionError."""
     missing = [topic for topic in ('joint_states', 'adu/motor_states') if topic not in bag.topics]
     if missing:
         raise MotionError(f'the recording holds no {" and no ".join(missing)}')
@@ -71,10 +66,9 @@ def read(bag, name, axis) -> Motion:
     return smoothed(t, theta, motors, axis.gear_train.ratio)
 
 
-def smoothed(t, theta, motors, ratio) -> Motion:
-    """Return the Motion of an axis from its raw numbers.
+def smoothed(t: Times, theta: Floats, motors: Floats, ratio: float) -> Motion:
+    """Return the motion of an axis from its raw numbers.
 
-    t (n,)         times [s]
     theta (n,)     load encoder [rad]
     motors (n, 4)  angles [rad] and torques [Nm] of motors 1 and 2 on the motor shaft
     ratio          turns of the motor per turn of the axis

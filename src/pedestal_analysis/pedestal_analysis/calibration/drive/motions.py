@@ -13,8 +13,10 @@ and the travel less MARGIN_SHARE at each end. The elevation stays above the high
 import dataclasses
 import math
 
+from acu_tracker.params import AcuParameters
 from acu_tracker.servo import floor
 from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Radians, RadiansPerSecond, RadiansPerSecond2, Seconds
 
 MAX_RATE_SHARE, MARGIN_SHARE = 0.5, 0.05  # shares of the shaper's rate and of the travel [-]
 SLOW_RATES_RAD_S = (0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3, 0.02, 0.05, 0.15, 0.4)  # rates below the largest one [rad/s]
@@ -37,30 +39,26 @@ LONG_TIME_S, MAX_TIME_S = 3600.0, 86400.0  # duration that is remarked, and long
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Motions of a calibration of the drive.
-
-    commands   text for the parameter acu.commands
-    start      (azimuth, elevation) at the start [rad]
-    duration   of the run [s]
-    limits     lines that state the limits of the motions, and the reason of a long duration
-    """
-    commands: str
-    start: tuple
-    duration: float
-    limits: tuple
+    """Motions of a calibration of the drive."""
+    commands: str           # text for the parameter acu.commands
+    start: tuple[Radians, ...]      # azimuth, elevation
+    duration: Seconds       # of the run
+    limits: tuple[str, ...]     # lines that state the limits of the motions, and the reason of a long duration
 
 
 class _Schedule:
     """Commands of the mode preset for one axis after another."""
 
-    def __init__(self, acu):
-        self.acu, self.parts, self.t = acu, [], 2.0
+    def __init__(self, acu: AcuParameters) -> None:
+        self.acu, self.t = acu, 2.0
+        self.parts: list[str] = []
         self.ranges = [_range(acu, name) for name in AXES]
         self.angles = [0.5 * (low + high) for low, high in self.ranges]
         self.start = tuple(self.angles)
 
-    def command(self, i, angle, wait, rate=0.0, moves=0.0):
-        """Command axis i to an angle [rad], from which it moves at a rate [rad/s] for `moves` [s]; then `wait` [s]."""
+    def command(self, i: int, angle: Radians, wait: Seconds, rate: RadiansPerSecond = 0.0,
+                moves: Seconds = 0.0) -> None:
+        """Command axis i to an angle, from which it moves at a rate for the time `moves`; then wait."""
         self.angles[i] = angle
         text = f'{self.t:.3f} preset ' + ' '.join(f'{name}={at:.6f}' for name, at in zip(AXES, self.angles))
         if rate:
@@ -69,8 +67,8 @@ class _Schedule:
         self.angles[i] += rate * moves
         self.t += moves + wait
 
-    def slew(self, i, angle):
-        """Move axis i to an angle [rad] and wait for its arrival."""
+    def slew(self, i: int, angle: Radians) -> None:
+        """Move axis i to an angle and wait for its arrival."""
         shaper = (self.acu.azimuth, self.acu.elevation)[i].shaper
         way, rate = abs(angle - self.angles[i]), MAX_RATE_SHARE * shaper.rate
         if way > 0.0:
@@ -80,8 +78,8 @@ class _Schedule:
             self.angles[i] = angle
 
 
-def _range(acu, name):
-    """Return (low, high) angle [rad] of the motions of an axis. Raises ValueError for a travel that is too short."""
+def _range(acu: AcuParameters, name: str) -> tuple[Radians, Radians]:
+    """Return the lowest and highest angle of the motions of an axis. Raises ValueError for a too short travel."""
     limits, cause = getattr(acu, name).limits, f'acu.{name}.limits'
     low, high = limits.low, limits.high
     _, heights = floor.points(acu.floor)
@@ -94,7 +92,7 @@ def _range(acu, name):
     return low + margin, high - margin
 
 
-def time_text(seconds):
+def time_text(seconds: Seconds) -> str:
     """Return a duration as '260 s', or as '10 h 44 min' from LONG_TIME_S on."""
     if seconds < LONG_TIME_S:
         return f'{seconds:g} s'
@@ -102,8 +100,8 @@ def time_text(seconds):
     return f'{hours} h {minutes} min'
 
 
-def plan(acu) -> Plan:
-    """Return the Plan for the limits of AcuParameters. Raises ValueError for a short travel or too long motions."""
+def plan(acu: AcuParameters) -> Plan:
+    """Return the plan for the limits of a control unit. Raises ValueError for a short travel or too long motions."""
     schedule, limits, times = _Schedule(acu), [], {}
     for i, (name, axis) in enumerate(zip(AXES, (acu.azimuth, acu.elevation))):
         (low, high), begin = schedule.ranges[i], schedule.t
@@ -131,8 +129,9 @@ def plan(acu) -> Plan:
     return Plan('; '.join(schedule.parts), schedule.start, math.ceil(schedule.t + 1.0), tuple(limits))
 
 
-def _rates(schedule, i, middle, travel, largest, acceleration):
-    """Add constant rates both ways about the middle [rad]; travel [rad], largest [rad/s], acceleration [rad/s2]."""
+def _rates(schedule: _Schedule, i: int, middle: Radians, travel: Radians, largest: RadiansPerSecond,
+           acceleration: RadiansPerSecond2) -> None:
+    """Add constant rates both ways about the middle."""
     for rate in (*(rate for rate in SLOW_RATES_RAD_S if rate < 0.8 * largest), largest):
         time = min(max(RATE_TIME_S, SLOWEST_TRAVEL_RAD / rate), travel / rate)
         schedule.slew(i, middle - 0.5 * rate * time)
@@ -140,8 +139,8 @@ def _rates(schedule, i, middle, travel, largest, acceleration):
             schedule.command(i, schedule.angles[i], SETTLING_TIME_S + rate / acceleration, sign * rate, time)
 
 
-def _reversals(schedule, i, middle, rate):
-    """Add reversals of a rate [rad/s] about the middle [rad], without a stop between them."""
+def _reversals(schedule: _Schedule, i: int, middle: Radians, rate: RadiansPerSecond) -> None:
+    """Add reversals of a rate about the middle, without a stop between them."""
     schedule.slew(i, middle - 0.5 * rate * REVERSAL_TIME_S)
     for k in range(REVERSAL_COUNT):
         last = k == REVERSAL_COUNT - 1
@@ -149,8 +148,9 @@ def _reversals(schedule, i, middle, rate):
                          REVERSAL_TIME_S)
 
 
-def _pulses(schedule, i, middle, rate, acceleration):
-    """Add small steps on a constant rate [rad/s] about the middle [rad]; acceleration [rad/s2]."""
+def _pulses(schedule: _Schedule, i: int, middle: Radians, rate: RadiansPerSecond,
+            acceleration: RadiansPerSecond2) -> None:
+    """Add small steps on a constant rate about the middle."""
     # A step of this size keeps the sign of the rate, and takes about PULSE_TIME_S.
     step = min(acceleration * (0.5 * PULSE_TIME_S)**2, 0.25 * rate * rate / acceleration)
     begin = middle - 0.5 * rate * PULSES_TIME_S

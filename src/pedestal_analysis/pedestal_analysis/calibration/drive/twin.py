@@ -7,14 +7,21 @@ same estimate from the twin, until both agree (indirect inference: Gourieroux, M
 J. Applied Econometrics 8 (1993) S85).
 """
 import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 
+from adu_drive.params import AduParameters
 from adu_drive.plant import gimbal
 from pedestal_analysis.calibration.drive import estimates, mode, motion_data
+from pedestal_analysis.calibration.drive.estimates import Estimates
+from pedestal_analysis.calibration.drive.motion_data import Motion
 from pedestal_analysis.results import identification, tracking
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import as_dict, build
+from pedestal_common.quantities import Estimate, Floats, Json, KilogramMeters2, Pair, Pairs, Radians, Vectors3
+from pedestal_recording.recording import Recording
 
 PARAMETER_NAMES = {
     'inertia': 'load.inertia', 'viscous': 'load.viscous', 'unbalance': 'load.unbalance',
@@ -32,27 +39,21 @@ PASS_COUNT = 2  # number of passes of the estimates of friction and inertia
 MAX_SHARE = 0.85  # largest share of the dish in the inertia of the load [-]
 RIGID = {f'{name}.structure.inertia_share': 0.0 for name in AXES}
 """Parameters of adu of a drive without a flexible structure."""
+Errors: TypeAlias = dict[str, float]  # {axis: error of the torques of a twin [-]}
 
 
 @dataclasses.dataclass(frozen=True)
-class Recording:
-    """What a calibration of the drive takes from a recording.
-
-    drive      AduParameters of its drive
-    motions    {axis: motion_data.Motion}
-    rate       (n, 2) rate commands of azimuth and elevation [rad/s]
-    torque     (n, 2) torque feed-forward [Nm]
-    start      (2,) encoder angles at the first step [rad]
-    """
-    drive: object
-    motions: dict
-    rate: np.ndarray
-    torque: np.ndarray
-    start: np.ndarray
+class DriveRecording:
+    """What a calibration of the drive takes from a recording."""
+    drive: AduParameters
+    motions: dict[str, Motion]  # {axis: its motion}
+    rate: Pairs                 # rate commands of azimuth and elevation [rad/s]
+    torque: Pairs               # torque feed-forward [Nm]
+    start: Pair                 # encoder angles at the first step [rad]
 
 
-def read(bag, drive) -> Recording:
-    """Return the Recording of a bag.Bag of one beam; drive: its AduParameters. Raises MotionError."""
+def read(bag: Recording, drive: AduParameters) -> DriveRecording:
+    """Return what a calibration takes from a recording of one beam. Raises MotionError."""
     if 'ship/imu/data' in bag.topics:
         raise motion_data.MotionError('the recording is of a ship, whose motion moves the axes too')
     states = bag.table('adu/state')['data'] if 'adu/state' in bag.topics else ()
@@ -65,11 +66,11 @@ def read(bag, drive) -> Recording:
     # Before the first command of the control unit the drive holds its angles.
     commands = np.nan_to_num(tracking.on_grid(bag, joints['t'], 'acu/rate_command', columns))
     start = np.array([joints[f'{name}.position'][0] for name in AXES])
-    return Recording(drive, motions, commands[:, :2].copy(), commands[:, 2:].copy(), start)
+    return DriveRecording(drive, motions, commands[:, :2].copy(), commands[:, 2:].copy(), start)
 
 
-def replayed(recording, changes) -> dict:
-    """Return {axis: Motion} of the twin of a Recording; changes: {parameter: value} of adu that replace its values."""
+def replayed(recording: DriveRecording, changes: Mapping[str, float]) -> dict[str, Motion]:
+    """Return {axis: motion} of the twin of a recording; changes: {parameter: value} of adu that replace its values."""
     drive = changed(recording.drive, changes)
     zero = np.array([getattr(drive, name).encoder.error.zero for name in AXES])
     at = dict(zip(('initial_azimuth', 'initial_elevation'), (recording.start - zero).tolist()))
@@ -79,39 +80,40 @@ def replayed(recording, changes) -> dict:
             for i, name in enumerate(AXES)}
 
 
-def changed(drive, changes):
-    """Return AduParameters with changes {parameter: value}."""
+def changed(drive: AduParameters, changes: Mapping[str, Json]) -> AduParameters:
+    """Return the parameters of a drive with changes {parameter: value}."""
     return build(type(drive), {**as_dict(drive), **changes})
 
 
-def load_inertia_change(drive, elevation):
-    """Return the inertia [kg m2] about azimuth at an elevation [rad] less the parameter azimuth.load.inertia."""
+def load_inertia_change(drive: AduParameters, elevation: Radians) -> KilogramMeters2:
+    """Return the inertia about azimuth at an elevation less the parameter azimuth.load.inertia."""
     if drive.elevating.about_beam <= 0.0:
         return 0.0
-    bodies = gimbal.constants(drive)
+    bodies = gimbal.constants(drive)[0]
     s, k = np.sin(elevation), np.cos(elevation)
     about = np.array((-s, 0.0, -k))
     return float(about @ bodies['I'] @ about + bodies['J_yoke'] - drive.azimuth.load.inertia)
 
 
-def constant_rates(motion, load, found):
-    """Return the estimates.plateaus of a Motion, without the torques that accelerate its base and dish.
+def constant_rates(motion: Motion, load: Floats, found: Estimates) -> Vectors3:
+    """Return the estimates.plateaus of a motion, without the torques that accelerate its base and dish.
 
     load (n,): torque on the load [Nm]; found: estimates of mode.identify.
     """
     return estimates.plateaus(motion, load - mode.inertia_torque(motion, found))
 
 
-def estimate(recordings, motions, name, flexible=True) -> dict:
-    """Return the estimates {name: (value, low, high)} of an axis. Raises ValueError, which names too few motions.
+def estimate(recordings: Sequence[DriveRecording], motions: Sequence[Motion], name: str,
+             flexible: bool = True) -> Estimates:
+    """Return the estimates of an axis. Raises ValueError, which names too few motions.
 
-    recordings: Recordings, of which the parameters are used; motions: [Motion] in their place, recorded or replayed;
-    flexible: False for a rigid structure.
+    recordings: their parameters are used; motions: of each recording, recorded or replayed; flexible: False for a
+    rigid structure.
     """
     axes = [getattr(recording.drive, name) for recording in recordings]
     gravity = name == 'elevation'
     loads = [motion.load_torque(axis) for motion, axis in zip(motions, axes)]
-    found: dict = {}
+    found: Estimates = {}
     for _ in range(PASS_COUNT):
         # At a constant rate a dish may swing for seconds, so the friction needs the inertias and the inertias need it.
         pieces = np.concatenate([constant_rates(motion, load, found) for motion, load in zip(motions, loads)])
@@ -122,8 +124,8 @@ def estimate(recordings, motions, name, flexible=True) -> dict:
     return found
 
 
-def estimated(recordings):
-    """Return (first estimates, corrected estimates), each {axis: {name: (value, low, high)}}. Raises ValueError."""
+def estimated(recordings: Sequence[DriveRecording]) -> tuple[dict[str, Estimates], dict[str, Estimates]]:
+    """Return {axis: first estimates} and {axis: corrected estimates}. Raises ValueError."""
     true = {name: [recording.motions[name] for recording in recordings] for name in AXES}
     first = {name: estimate(recordings, true[name], name) for name in AXES}
     extra = extra_inertia(recordings)
@@ -161,14 +163,14 @@ def estimated(recordings):
     return first, corrected
 
 
-def extra_inertia(recordings):
-    """Return {axis: inertia [kg m2]} that the elevating part adds to load.inertia at the elevation of the motions."""
+def extra_inertia(recordings: Sequence[DriveRecording]) -> dict[str, KilogramMeters2]:
+    """Return {axis: inertia} that the elevating part adds to load.inertia at the elevation of the motions."""
     elevation = float(np.median(recordings[0].motions['elevation'].theta))
     return {'azimuth': load_inertia_change(recordings[0].drive, elevation), 'elevation': 0.0}
 
 
-def _moved(value, first, low, high, rattling):
-    """Return (value, low, high) with the width of the interval of a first estimate, scaled if the value is larger.
+def _moved(value: float, first: float, low: float, high: float, rattling: bool) -> Estimate:
+    """Return the estimate `value` with the width of the interval of a first estimate, scaled if the value is larger.
 
     rattling: True for an estimate of a mesh. Teeth that rattle make its correction by the twin uncertain, so the
     interval also covers the first estimate.
@@ -177,9 +179,10 @@ def _moved(value, first, low, high, rattling):
     return value, value + scale * (low - first) - more, value + scale * (high - first) + more
 
 
-def parameters(recordings, values):
-    """Return the parameters {name: value} of adu for the estimates {axis: {name: value}} from Recordings."""
-    drive, extra, found = recordings[0].drive, extra_inertia(recordings), {}
+def parameters(recordings: Sequence[DriveRecording], values: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
+    """Return the parameters {name: value} of adu for the estimates {axis: {name: value}} from recordings."""
+    drive, extra = recordings[0].drive, extra_inertia(recordings)
+    found: dict[str, float] = {}
     for name, known in values.items():
         nominal = getattr(drive, name)
         known = {**known, 'inertia': known['inertia'] - extra[name]} if 'inertia' in known else known
@@ -193,12 +196,12 @@ def parameters(recordings, values):
     return found
 
 
-def torque_errors(recordings, changes):
-    """Return {axis: rms difference of the torques of recording and twin, over the rms torque of the recording} [-].
+def torque_errors(recordings: Sequence[DriveRecording], changes: Mapping[str, float]) -> Errors:
+    """Return the rms difference of the torques of recording and twin, over the rms torque of the recording.
 
     changes: {parameter: value} of adu for the twin. Only moving steps count.
     """
-    squares = {name: [] for name in AXES}
+    squares: dict[str, list[list[float]]] = {name: [] for name in AXES}
     for recording in recordings:
         twins = replayed(recording, changes)
         for name, true in recording.motions.items():

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from pedestal_analysis.calibration.receiver import matrix
+from pedestal_common.quantities import Complexes, Floats, Pairs
 
 MAX_INTERVAL_SHARE = 0.5
 """Largest half of the interval of a slope, over the smallest singular value of C [-]. Above it the ratios hardly
@@ -21,8 +22,8 @@ PHASE_OFF_DEG, REVERSED_DEG = 10.0, 135.0
 """Phases of a slope above which a wrong phase, and above which a reversed sign is named [deg]."""
 
 
-def fit(offsets, ratios) -> matrix.Slopes:
-    """Return the Slopes of complex ratios (n, 2) over k_m at offsets (n, 2) [beamwidths]. Raises MatrixError."""
+def fit(offsets: Pairs, ratios: Complexes) -> matrix.ComplexSlopes:
+    """Return the slopes of complex ratios (n, 2) over k_m at offsets [beamwidths]. Raises MatrixError."""
     found = matrix.least_squares(offsets, ratios)
     smallest = np.linalg.svd(found.C, compute_uv=False)[-1]
     if not found.half.max() <= MAX_INTERVAL_SHARE * smallest:
@@ -32,13 +33,13 @@ def fit(offsets, ratios) -> matrix.Slopes:
     return found
 
 
-def half_of_inverse(slopes):
+def half_of_inverse(slopes: matrix.ComplexSlopes) -> Floats:
     """Return half of the confidence interval (2, 2) of the elements of the inverse of C, real or imaginary part."""
     size = np.abs(slopes.matrix)**2
     return np.sqrt(size @ slopes.half**2 @ size)
 
 
-def phase_half(values, half):
+def phase_half(values: Complexes, half: Floats) -> Floats:
     """Return half of the confidence interval of the phases of complex values [rad], pi if a phase is unknown.
 
     half: half of the interval of their real or imaginary part.
@@ -47,8 +48,8 @@ def phase_half(values, half):
     return np.where(share < 1.0, np.arcsin(np.minimum(share, 1.0)), math.pi)
 
 
-def faults(slopes, in_force):
-    """Return sentences that name the faults of a receiver with Slopes and the matrix in force (2, 2): exchanged
+def faults(slopes: matrix.ComplexSlopes, in_force: Complexes) -> list[str]:
+    """Return sentences that name the faults of a receiver with slopes and the matrix in force (2, 2): exchanged
     channels, reversed signs, wrong phases, turned axes, weak slopes."""
     E, exchanged = matrix.unexchanged(in_force @ slopes.C)
     found = []
@@ -75,6 +76,6 @@ def faults(slopes, in_force):
     return found
 
 
-def skew(multiplied, offsets):
+def skew(multiplied: Complexes, offsets: Pairs) -> float:
     """Return the largest imaginary part of multiplied ratios (n, 2) over k_m, per mean radius of their offsets."""
     return float(np.abs(multiplied.imag).max() / np.hypot(*offsets.T).mean())

@@ -5,9 +5,12 @@ run. The result is a table of the elements, the named faults, the verification o
 --json, a page, and a ROS 2 parameter file. It holds tracking_receiver.calibration.*. The errors then need no further
 matrix, so the file sets acu.tracker.matrix.* to the identity. acu.tracker.receiver.slope is the measured slope.
 """
+import argparse
 import cmath
 import dataclasses
 import math
+import pathlib
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -18,8 +21,10 @@ from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import estimated, row
 from pedestal_bringup.loop import iq_run, memory_recording
 from pedestal_common.graph import nodes
+from pedestal_common.quantities import Complexes, Floats, Json, Pair, Pairs, Radians, Row
 from pedestal_hardware.monopulse import sigmf
-from pedestal_hardware.monopulse.params import THREE_CHANNELS
+from pedestal_hardware.monopulse.params import THREE_CHANNELS, MonopulseParameters
+from pedestal_recording.recording import Recording
 
 ELEMENT_NAMES = ('x_from_x', 'x_from_e'), ('e_from_x', 'e_from_e')
 """Names of the elements of the calibration matrix, by row and column."""
@@ -29,49 +34,39 @@ MAX_DEVIATION_BEAMWIDTHS = 0.05
 
 @dataclasses.dataclass(frozen=True)
 class IqPhasing:
-    """Calibration of a receiver of I/Q samples.
-
-    source          name of the recording or scenario
-    points          offsets.Points
-    ratios          (n, 2) complex ratios of difference and sum at the points, over k_m [beamwidths]
-    slopes          matrix.Slopes, complex
-    k_m             slope of the multiplied differences [-]
-    in_force        (2, 2) calibration matrix of the receiver in the run
-    of_unit         (2, 2) matrix with which the control unit multiplied the errors
-    before, after   matrix.Verification with the matrices in force and with the new one
-    """
-    source: str
+    """Calibration of a receiver of I/Q samples."""
+    source: str             # name of the recording or scenario
     points: offsets.Points
-    ratios: np.ndarray
-    slopes: matrix.Slopes
-    k_m: float
-    in_force: np.ndarray
-    of_unit: np.ndarray
-    before: matrix.Verification
-    after: matrix.Verification
+    ratios: Complexes       # (n, 2) of difference and sum at the points, over k_m [beamwidths]
+    slopes: matrix.ComplexSlopes
+    k_m: float              # slope of the multiplied differences [-]
+    in_force: Complexes     # (2, 2) calibration matrix of the receiver in the run
+    of_unit: Floats         # (2, 2) matrix with which the control unit multiplied the errors
+    before: matrix.Verification     # with the matrices in force
+    after: matrix.Verification      # with the new matrix
 
     @property
-    def faults(self):
+    def faults(self) -> list[str]:
         """Return the sentences that name the faults of the receiver with the matrix in force."""
         return complex_matrix.faults(self.slopes, self.in_force)
 
     @property
-    def null(self):
-        """Return the offset (2,) at which the errors are 0 [beamwidths]."""
+    def null(self) -> Pair:
+        """Return the offset at which the errors are 0 [beamwidths]."""
         return -(self.slopes.matrix @ self.slopes.null).real
 
-    def multiplied(self, used):
+    def multiplied(self, used: Complexes) -> Complexes:
         """Return the ratios (n, 2) over k_m less their null, multiplied with a matrix (2, 2)."""
         return (self.ratios - self.slopes.null) @ used.T
 
     @property
-    def corrected(self):
-        """Return the errors (n, 2) that the control unit sees [beamwidths]: (in force, with the new matrix)."""
+    def corrected(self) -> tuple[Pairs, Pairs]:
+        """Return the errors that the control unit sees [beamwidths]: in force, with the new matrix."""
         return (self.multiplied(self.in_force).real @ self.of_unit.T, self.multiplied(self.slopes.matrix).real)
 
 
-def calibrate(bag, source, samples, recorded) -> IqPhasing:
-    """Return the IqPhasing of a bag.Bag of one beam and its ratios.Samples. Raises OffsetError and MatrixError.
+def calibrate(bag: Recording, source: str, samples: ratios.Samples, recorded: bool) -> IqPhasing:
+    """Return the result for a recording of one beam and its samples. Raises OffsetError and MatrixError.
 
     recorded: True if the errors in the bag were made of these samples.
     """
@@ -91,8 +86,8 @@ def calibrate(bag, source, samples, recorded) -> IqPhasing:
     return IqPhasing(source, points, measured, slopes, antenna.slope, in_force, of_unit, before, after)
 
 
-def _check_errors(points, errors, meta):
-    """Raise OffsetError if errors (n, 2) by the samples of a file differ from those of the recording [beamwidths]."""
+def _check_errors(points: offsets.Points, errors: Pairs, meta: pathlib.Path) -> None:
+    """Raise OffsetError if errors by the samples of a file differ from those of the recording [beamwidths]."""
     deviation = np.where(points.fitted | points.circle, np.abs(errors - points.errors).max(1), 0.0)
     k = int(deviation.argmax())
     if not deviation[k] <= MAX_DEVIATION_BEAMWIDTHS:
@@ -101,8 +96,8 @@ def _check_errors(points, errors, meta):
                                   'must be of the same run')
 
 
-def _elements(found):
-    """Yield (name, new element, half of its interval, half of the interval of its phase [rad], element in force)."""
+def _elements(found: IqPhasing) -> Iterator[tuple[str, complex, float, Radians, complex]]:
+    """Yield (name, new element, half of its interval, half of the interval of its phase, element in force)."""
     new, half = found.slopes.matrix, complex_matrix.half_of_inverse(found.slopes)
     phase = complex_matrix.phase_half(new, half)
     for i, names in enumerate(ELEMENT_NAMES):
@@ -110,8 +105,8 @@ def _elements(found):
             yield (name, complex(new[i, j]), float(half[i, j]), float(phase[i, j]), complex(found.in_force[i, j]))
 
 
-def rows(found):
-    """Return the rows of an IqPhasing for --json."""
+def rows(found: IqPhasing) -> list[Row]:
+    """Return the rows for --json."""
     case, points, listed = phasing.CASE_NAME, found.points, []
     count = int(points.fitted.sum())
     for name, value, half, phase_half, _ in _elements(found):
@@ -126,7 +121,7 @@ def rows(found):
             row(case, 'circle_points', int(points.circle.sum()))]
 
 
-def table(found):
+def table(found: IqPhasing) -> list[str]:
     """Return the lines of the table of the calibration matrix: in force, new, and the intervals of the new one."""
     lines = [f'{"element":8} {"in force: gain":>15} {"phase":>9}   {"new: gain":>9}  {"95 % interval":16} '
              f'{"phase":>11}  95 % interval']
@@ -139,13 +134,13 @@ def table(found):
     return lines
 
 
-def summary(found):
-    """Return the lines on faults and verification of an IqPhasing."""
+def summary(found: IqPhasing) -> list[str]:
+    """Return the lines on faults and verification."""
     return phasing.summary_of(found, found.faults)
 
 
-def parameters(found):
-    """Return the parameters {node: {name: value}} of receiver and control unit for an IqPhasing."""
+def parameters(found: IqPhasing) -> dict[str, dict[str, float]]:
+    """Return the parameters {node: {name: value}} of receiver and control unit."""
     calibration = {}
     for name, value, *_ in _elements(found):
         calibration[f'calibration.{name}_gain'] = round(abs(value), phasing.ELEMENT_DECIMALS)
@@ -157,20 +152,20 @@ def parameters(found):
     return {'tracking_receiver': calibration, 'acu': {**identity, 'tracker.receiver.slope': slope}}
 
 
-def content(found):
-    """Return the content of the --json file of an IqPhasing."""
+def content(found: IqPhasing) -> dict[str, Json]:
+    """Return the content of the --json file."""
     return {'name': 'calibrate receiver', 'rows': rows(found), 'source': found.source, 'faults': found.faults,
             'verified': phasing.passed(found), 'parameters': parameters(found)}
 
 
-def opened(options, changes):
-    """Return (bag.Bag or MemoryRecording, its name, ratios.Samples) of the options of the verb. Raises ValueError.
+def opened(options: argparse.Namespace, changes: Sequence[str]) -> tuple[Recording, str, ratios.Samples]:
+    """Return (recording, its name, samples) of the options of the verb. Raises ValueError.
 
     changes: texts 'node.key=value' of a scenario. Its samples are those of `pedestal simulate receiver --output` with
     the same scenario and the same changes.
     """
     if options.bag is not None:
-        recording = recompute.Recording(options.bag)
+        recording = recompute.FedRecording(options.bag)
         bag, source, epoch = recording.bag, str(options.bag), recording.bag.start
         parameters = _of_three_channels(iq.parameters_of(recording), source)
     else:
@@ -182,15 +177,15 @@ def opened(options, changes):
     return bag, source, ratios.Samples(file, parameters, epoch)
 
 
-def _of_three_channels(parameters, source):
-    """Return MonopulseParameters of three channels. Raises ValueError for a feed with one output."""
+def _of_three_channels(parameters: MonopulseParameters, source: str) -> MonopulseParameters:
+    """Return the parameters of a receiver of three channels. Raises ValueError for a feed with one output."""
     if parameters.feed.scanned:
         raise ValueError(f'{source}: feed.kind = {parameters.feed.kind}: must be {THREE_CHANNELS} with --iq; a feed '
                          'with one output has no phases, so calibrate it without --iq')
     return parameters
 
 
-def main(options, changes):
+def main(options: argparse.Namespace, changes: Sequence[str]) -> tuple[list[str], dict[str, Json], bool]:
     """Calibrate by the options of the verb, write their files, and return (lines, content, verified).
 
     changes: texts 'node.key=value' of a scenario. Raises ValueError.

@@ -1,12 +1,19 @@
 """HTML page of `pedestal calibrate receiver --iq`: the complex ratios over the offsets, and the circle before and
 after."""
+import typing
+from collections.abc import Iterable
+
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.calibration.receiver import phasing_page
 from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, Spec, new_panels
 
+if typing.TYPE_CHECKING:
+    from pedestal_analysis.calibration.receiver.iq_phasing import IqPhasing
 
-def ratios(found):
+
+def ratios(found: 'IqPhasing') -> Figure:
     """Return the figure with the ratios of both channels in the complex plane: received, and multiplied with the new
     matrix."""
     points = found.points
@@ -38,9 +45,9 @@ FIGURES = (
 """Figures of the page."""
 
 
-def page(found, table, summary, command):
-    """Return the HTML page of an iq_phasing.IqPhasing; table, summary: printed lines; command: the command line."""
-    def polar(value):
+def page(found: 'IqPhasing', table: Iterable[str], summary: Iterable[str], command: str) -> str:
+    """Return the HTML page of a calibration; table, summary: printed lines; command: the command line."""
+    def polar(value: complex) -> tuple[str, str]:
         return f'{abs(value):.4f}', f'{np.degrees(np.angle(value)):.1f} deg'
     points = [[f'{time:.1f} s', *(f'{value:.4f}' for value in offset), *polar(values[0]), *polar(values[1]),
                'circle' if on else 'fit']

@@ -17,11 +17,14 @@ Barton, Monopulse Principles and Techniques, 2nd ed., chapters 7 and 9.
 import dataclasses
 import itertools
 import math
+from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from pedestal_analysis.results.intervals import CONFIDENCE_LEVEL
+from pedestal_common.quantities import Complexes, Decibels, Floats, Pair, Pairs, Radians
 
 SMALLEST_OFFSET_BEAMWIDTHS = 0.05  # offset below which the weight of a point does not grow further [beamwidths]
 MIN_SLOPE = 0.2  # least root of the determinant of C [-]. Below it the receiver hardly measures the offsets.
@@ -44,36 +47,35 @@ class MatrixError(ValueError):
     """Error of offsets from which no matrix can be computed. Its text is one line."""
 
 
+_Number = TypeVar('_Number', np.float64, np.complex128)
+
+
 @dataclasses.dataclass(frozen=True)
-class Slopes:
-    """Fit of the slopes to n offsets.
-
-    C            (2, 2) slopes and cross-talk [-]
-    null         (2,) error at the offset 0 [beamwidths]
-    half         (2, 2) half of the confidence interval of C, or of its real and imaginary part [-]
-    residuals    (n, 2) measured minus fitted errors, per offset [-]
-
-    All except `half` are complex for complex errors.
-    """
-    C: np.ndarray
-    null: np.ndarray
-    half: np.ndarray
-    residuals: np.ndarray
+class Slopes(Generic[_Number]):
+    """Fit of the slopes to n offsets, for real or complex errors."""
+    C: NDArray[_Number]     # (2, 2) slopes and cross-talk [-]
+    null: NDArray[_Number]  # (2,) error at the offset 0 [beamwidths]
+    half: Floats            # (2, 2) half of the confidence interval of C, or of its real and imaginary part [-]
+    residuals: NDArray[_Number]     # (n, 2) measured minus fitted errors, per offset [-]
 
     @property
-    def matrix(self):
+    def matrix(self) -> NDArray[_Number]:
         """Return M = C^-1 (2, 2) [-], with which the control unit multiplies the errors."""
-        return np.linalg.inv(self.C)
+        return np.asarray(np.linalg.inv(self.C), self.C.dtype)
 
     @property
-    def gain(self):
+    def gain(self) -> float:
         """Return the root of the size of the determinant of C, the mean slope [-]."""
         return math.sqrt(abs(np.linalg.det(self.C)))
 
 
-def least_squares(offsets, errors) -> Slopes:
-    """Return the Slopes of real or complex errors (n, 2) at offsets (n, 2), both [beamwidths]. Raises MatrixError for
-    offsets on one line."""
+RealSlopes: TypeAlias = Slopes[np.float64]
+ComplexSlopes: TypeAlias = Slopes[np.complex128]
+
+
+def least_squares(offsets: Pairs, errors: NDArray[_Number]) -> Slopes[_Number]:
+    """Return the slopes of real or complex errors (n, 2) at offsets, both [beamwidths]. Raises MatrixError for offsets
+    on one line."""
     size = np.maximum(np.hypot(*offsets.T), SMALLEST_OFFSET_BEAMWIDTHS)[:, np.newaxis]
     A = np.column_stack((offsets, np.ones(len(offsets)))) / size
     solution, _, rank, _ = np.linalg.lstsq(A, errors / size, rcond=None)
@@ -88,8 +90,8 @@ def least_squares(offsets, errors) -> Slopes:
     return Slopes(solution[:2].T, solution[2], quantile * np.outer(sigma, np.sqrt(variance)), residuals)
 
 
-def fit(offsets, errors) -> Slopes:
-    """Return the Slopes of errors (n, 2) at offsets (n, 2), both [beamwidths]. Raises MatrixError."""
+def fit(offsets: Pairs, errors: Pairs) -> RealSlopes:
+    """Return the slopes of errors at offsets, both [beamwidths]. Raises MatrixError."""
     found = least_squares(offsets, errors)
     if found.gain < MIN_SLOPE:
         raise MatrixError(f'the errors hardly follow the offsets: mean slope {found.gain:.3g}, must be at least '
@@ -98,19 +100,26 @@ def fit(offsets, errors) -> Slopes:
     return found
 
 
-def unexchanged(C):
+class Explanation(NamedTuple):
+    """Faults that explain the slopes of a receiver."""
+    exchanged: bool         # channels
+    signs: list[int]        # 1 or -1 of both axes
+    angle: Radians          # by which the axes are turned
+
+
+def unexchanged(C: Complexes) -> tuple[Complexes, bool]:
     """Return (C with its rows in the right order, True if the channels are exchanged)."""
     exchanged = abs(C[0, 1]) + abs(C[1, 0]) > abs(C[0, 0]) + abs(C[1, 1])
     return (C[::-1], True) if exchanged else (C, False)
 
 
-def explained(C):
-    """Return (exchanged, signs (2,), angle [rad]): the likeliest faults of channels, signs and axes of a real C.
+def explained(C: Floats) -> Explanation:
+    """Return the likeliest faults of channels, signs and axes of a real C.
 
     Several faults have the same effect: axes turned by 90 deg, and exchanged channels with one reversed sign. The
     explanation with the fewest faults is taken; a turn counts by TURN_OF_A_FAULT_RAD.
     """
-    def cost(case):
+    def cost(case: Explanation) -> float:
         exchanged, signs, angle = case
         return exchanged + (min(signs) < 0) + abs(angle) / TURN_OF_A_FAULT_RAD
 
@@ -119,16 +128,16 @@ def explained(C):
         right = np.diag(signs) @ (C[::-1] if exchanged else C)
         if np.linalg.det(right) > 0.0:
             angle = math.atan2(right[1, 0] - right[0, 1], right[0, 0] + right[1, 1])
-            cases.append((exchanged, signs, angle))
+            cases.append(Explanation(exchanged, signs, angle))
     return min(cases, key=cost)
 
 
-def turn(C):
-    """Return the angle [rad] by which a matrix C turns the axes of the errors, after signs and channels are right."""
-    return explained(C)[2]
+def turn(C: Floats) -> Radians:
+    """Return the angle by which a matrix C turns the axes of the errors, after signs and channels are right."""
+    return explained(C).angle
 
 
-def turned_axes(C):
+def turned_axes(C: Floats) -> list[str]:
     """Return a list with the sentence on the turn of a matrix C, empty up to TURNED_AXES_DEG."""
     angle = math.degrees(turn(C))
     if not abs(angle) > TURNED_AXES_DEG:
@@ -136,8 +145,8 @@ def turned_axes(C):
     return [f'turned axes: the axes of the errors are turned by {angle:.1f} deg']
 
 
-def faults(slopes):
-    """Return sentences that name the faults of Slopes: exchanged channels, signs, turned axes, weak slopes."""
+def faults(slopes: RealSlopes) -> list[str]:
+    """Return sentences that name the faults of slopes: exchanged channels, signs, turned axes, weak slopes."""
     exchanged, signs, _ = explained(slopes.C)
     found = []
     if exchanged:
@@ -160,24 +169,20 @@ def faults(slopes):
 
 @dataclasses.dataclass(frozen=True)
 class Verification:
-    """Quality of a matrix on the circle.
-
-    error        largest distance between corrected error and offset, per radius [-]
-    cross_talk   largest cross-talk of the corrected errors, per slope [-]
-    """
-    error: float
-    cross_talk: float
+    """Quality of a matrix on the circle."""
+    error: float        # largest distance between corrected error and offset, per radius [-]
+    cross_talk: float   # largest cross-talk of the corrected errors, per slope [-]
 
     @property
-    def cross_talk_db(self):
-        """Return the cross-talk [dB], at least -100 dB."""
+    def cross_talk_db(self) -> Decibels:
+        """Return the cross-talk, at least -100 dB."""
         return 20.0 * math.log10(max(self.cross_talk, 1e-5))
 
 
-def verify(matrix, null, offsets, errors) -> Verification:
-    """Return the Verification of a matrix (2, 2) at points (n, 2) of the circle [beamwidths].
+def verify(matrix: Floats, null: Pair, offsets: Pairs, errors: Pairs) -> Verification:
+    """Return the quality of a matrix (2, 2) at points of the circle [beamwidths].
 
-    null (2,): error at the offset 0 [beamwidths].
+    null: error at the offset 0 [beamwidths].
     """
     corrected = (errors - null) @ matrix.T
     radius = float(np.hypot(*offsets.T).mean())

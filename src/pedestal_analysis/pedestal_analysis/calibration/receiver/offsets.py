@@ -11,11 +11,14 @@ matrix is fitted to all other points, and verified on the circle.
 """
 import dataclasses
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from pedestal_analysis.calibration import predicted
 from pedestal_analysis.results import beam_direction, mode_pointing, tracking
+from pedestal_common.quantities import Bools, DecibelHertz, Floats, Pair, Pairs, Radians, Seconds, Times, Vectors3
+from pedestal_recording.recording import Recording
 
 CIRCLE_BEAMWIDTHS, CIRCLE_TOLERANCE_BEAMWIDTHS = 0.2, 0.03
 """Radius of the circle on which the matrix is verified, and its tolerance [beamwidths]."""
@@ -35,35 +38,27 @@ class OffsetError(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Points:
-    """Points of a recording, in the order of time; columns of an array (n, 2): cross-elevation, elevation.
-
-    spans      (n, 2) first and last time of each point [s]
-    offsets    (n, 2) beacon minus beam [beamwidths]
-    errors     (n, 2) mean error of the receiver [beamwidths]
-    sigma      (n, 2) standard deviation of this mean [beamwidths]
-    level      (n,) mean C/N0 [dB-Hz]
-    circle     (n,) bool: the point belongs to the circle
-    """
-    spans: np.ndarray
-    offsets: np.ndarray
-    errors: np.ndarray
-    sigma: np.ndarray
-    level: np.ndarray
-    circle: np.ndarray
+    """Points of a recording, in the order of time; columns: cross-elevation, elevation."""
+    spans: Pairs        # first and last time of each point [s]
+    offsets: Pairs      # beacon minus beam [beamwidths]
+    errors: Pairs       # mean error of the receiver [beamwidths]
+    sigma: Pairs        # standard deviation of this mean [beamwidths]
+    level: Floats       # mean C/N0 (n,) [dB-Hz]
+    circle: Bools       # (n,) True if the point belongs to the circle
 
     @property
-    def times(self):
-        """Return the middle (n,) of each point [s]."""
+    def times(self) -> Times:
+        """Return the middle of each point."""
         return self.spans.mean(1)
 
     @property
-    def fitted(self):
+    def fitted(self) -> Bools:
         """Return the mask (n,) of the points to which the matrix is fitted."""
         return ~self.circle & (np.hypot(*self.offsets.T) <= MAX_OFFSET_BEAMWIDTHS)
 
 
-def read(bag) -> Points:
-    """Return the Points of a bag.Bag of one beam. Raises OffsetError."""
+def read(bag: Recording) -> Points:
+    """Return the points of a recording of one beam. Raises OffsetError."""
     missing = [name for name in ('joint_states', 'tracking_receiver/angle_error') if name not in bag.topics]
     if missing:
         raise OffsetError(f'the recording holds no {" and no ".join(missing)}')
@@ -90,10 +85,10 @@ def read(bag) -> Points:
     return _checked(Points(spans, means, errors, sigma, level, _circle(radius)))
 
 
-def _from_beacon(bag, t, beam):
-    """Return (offsets (n, 2) [rad] of the beacon from the beam, True if the place of the beacon is not known yet).
+def _from_beacon(bag: Recording, t: Times, beam: Pairs) -> tuple[Pairs, bool]:
+    """Return (offsets [rad] of the beacon from the beam, True if the place of the beacon is not known yet).
 
-    The offsets are NaN outside the modes preset and program; beam (n, 2): directions [rad].
+    The offsets are NaN outside the modes preset and program; beam: directions [rad].
     """
     modes = tracking.modes(bag, t)
     usable = (modes == 'preset') | (modes == 'program')
@@ -114,7 +109,7 @@ def _from_beacon(bag, t, beam):
     return offsets, plain
 
 
-def _still(t, offsets, beamwidth):
+def _still(t: Times, offsets: Pairs, beamwidth: Radians) -> Iterator[tuple[int, int]]:
     """Yield (first, last + 1) of the points: rows at which the beam stands still off the beacon."""
     period = float(np.median(np.diff(t)))
     window = max(1, round(STILL_WINDOW_S / period))
@@ -128,10 +123,11 @@ def _still(t, offsets, beamwidth):
             yield first + settling, last
 
 
-def _point(t, offsets, errors, beamwidth):
+def _point(t: Times, offsets: Pairs, errors: Vectors3,
+           beamwidth: Radians) -> tuple[tuple[Seconds, Seconds], Pair, Pair, Pair, DecibelHertz]:
     """Return ((first, last time), mean offset, mean error, its standard deviation, C/N0) of a point.
 
-    Raises OffsetError. offsets [beamwidths], errors (k, 3) [rad, rad, dB-Hz]: rows of the point.
+    Raises OffsetError. offsets [beamwidths], errors [rad, rad, dB-Hz]: rows of the point.
     """
     known = np.isfinite(errors[:, :2]).all(1)
     if (~known).mean() > MAX_MISSING_SHARE:
@@ -144,7 +140,7 @@ def _point(t, offsets, errors, beamwidth):
             float(np.mean(errors[known, 2])))
 
 
-def _circle(radius):
+def _circle(radius: Floats) -> Bools:
     """Return the mask (n,) of the points on the circle, by their radius (n,) [beamwidths]."""
     on, mask = np.abs(radius - CIRCLE_BEAMWIDTHS) <= CIRCLE_TOLERANCE_BEAMWIDTHS, np.zeros(radius.size, bool)
     for first, last in tracking.stretches(on):
@@ -153,8 +149,8 @@ def _circle(radius):
     return mask
 
 
-def _checked(points):
-    """Return Points that suffice for fit and verification. Raises OffsetError."""
+def _checked(points: Points) -> Points:
+    """Return points that suffice for fit and verification. Raises OffsetError."""
     fitted = points.offsets[points.fitted]
     if len(fitted) < MIN_FITTED_POINTS:
         raise OffsetError(f'{len(fitted)} offsets outside the circle, must be at least {MIN_FITTED_POINTS}: to both '

@@ -3,8 +3,11 @@
 The result is a table of the elements, the named faults, the verification on the circle before and after, rows for
 --json, a page, and a ROS 2 parameter file with acu.tracker.matrix.* and acu.tracker.receiver.slope.
 """
+import argparse
 import dataclasses
 import math
+import typing
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,6 +16,11 @@ from pedestal_analysis.calibration import output_files
 from pedestal_analysis.calibration.receiver import matrix, offsets, phasing_page
 from pedestal_analysis.results import intervals, tracking
 from pedestal_analysis.results.intervals import estimated, row
+from pedestal_common.quantities import Floats, Json, Pair, Row
+from pedestal_recording.recording import Recording
+
+if typing.TYPE_CHECKING:
+    from pedestal_analysis.calibration.receiver.iq_phasing import IqPhasing
 
 CASE_NAME = 'receiver'  # case of the rows
 ERROR_TARGET, CROSS_TALK_TARGET = '< 5', '< -20'  # targets of the error on the circle [%] and of the cross-talk [dB]
@@ -22,31 +30,23 @@ ELEMENT_DECIMALS = 6  # decimals of the elements in a parameter file
 
 @dataclasses.dataclass(frozen=True)
 class Phasing:
-    """Calibration of a receiver.
-
-    source          name of the recording or scenario
-    points          offsets.Points
-    slopes          matrix.Slopes
-    in_force        (2, 2) matrix that the control unit used in the recording
-    noise_slope     slope that the control unit used for the noise of the receiver [-]
-    before, after   matrix.Verification with the matrix in force and with the new one
-    """
-    source: str
+    """Calibration of a receiver."""
+    source: str             # name of the recording or scenario
     points: offsets.Points
-    slopes: matrix.Slopes
-    in_force: np.ndarray
-    noise_slope: float
-    before: matrix.Verification
-    after: matrix.Verification
+    slopes: matrix.RealSlopes
+    in_force: Floats        # (2, 2) matrix that the control unit used in the recording
+    noise_slope: float      # slope that the control unit used for the noise of the receiver [-]
+    before: matrix.Verification     # with the matrix in force
+    after: matrix.Verification      # with the new matrix
 
     @property
-    def null(self):
-        """Return the offset (2,) at which the errors are 0 [beamwidths]."""
+    def null(self) -> Pair:
+        """Return the offset at which the errors are 0 [beamwidths]."""
         return -self.slopes.matrix @ self.slopes.null
 
 
-def calibrate(bag, source) -> Phasing:
-    """Return the Phasing of a bag.Bag of one beam. Raises OffsetError and MatrixError."""
+def calibrate(bag: Recording, source: str) -> Phasing:
+    """Return the result for a recording of one beam. Raises OffsetError and MatrixError."""
     points = offsets.read(bag)
     slopes = matrix.fit(points.offsets[points.fitted], points.errors[points.fitted])
     known = bag.configuration['parameters'].get('acu', {})
@@ -57,8 +57,8 @@ def calibrate(bag, source) -> Phasing:
     return Phasing(source, points, slopes, in_force, slope, before, after)
 
 
-def rows(found):
-    """Return the rows of a Phasing for --json."""
+def rows(found: Phasing) -> list[Row]:
+    """Return the rows for --json."""
     slopes, points = found.slopes, found.points
     count = int(points.fitted.sum())
     listed = [estimated(CASE_NAME, f'slope_{name}', (value, value - half, value + half), '', count)
@@ -74,26 +74,26 @@ def rows(found):
             row(CASE_NAME, 'offsets', count), row(CASE_NAME, 'circle_points', int(points.circle.sum()))]
 
 
-def null_rows(null):
-    """Return the rows of the null of the errors (2,), the offset at which they are 0 [beamwidths]."""
+def null_rows(null: Pair) -> list[Row]:
+    """Return the rows of the null of the errors, the offset at which they are 0 [beamwidths]."""
     return [row(CASE_NAME, f'null_{axis}', value, 'beamwidths')
             for axis, value in zip(('cross_elevation', 'elevation'), null)]
 
 
-def verification_rows(before, after):
-    """Return the rows of the matrix.Verification before and after, with their targets."""
+def verification_rows(before: matrix.Verification, after: matrix.Verification) -> list[Row]:
+    """Return the rows of the verification before and after, with their targets."""
     return [row(CASE_NAME, 'circle_error_before_percent', 100.0 * before.error, '%'),
             row(CASE_NAME, 'circle_error_percent', 100.0 * after.error, '%', target=ERROR_TARGET),
             row(CASE_NAME, 'cross_talk_before_db', before.cross_talk_db, 'dB'),
             row(CASE_NAME, 'cross_talk_db', after.cross_talk_db, 'dB', target=CROSS_TALK_TARGET)]
 
 
-def passed(found):
-    """Return True if the new matrix of a calibration with the fields `before` and `after` passes the verification."""
+def passed(found: 'Phasing | IqPhasing') -> bool:
+    """Return True if the new matrix of a calibration passes the verification."""
     return not any(map(intervals.missed, verification_rows(found.before, found.after)))
 
 
-def table(found):
+def table(found: Phasing) -> list[str]:
     """Return the lines of the table of slopes, matrix in force and new matrix."""
     slopes = found.slopes
     lines = [f'{"element":8} {"slope C":>9}  {"95 % interval":19} {"in force":>9} {"new matrix":>11}  meaning']
@@ -108,14 +108,13 @@ def table(found):
     return lines
 
 
-def summary(found):
-    """Return the lines on faults and verification of a Phasing."""
+def summary(found: Phasing) -> list[str]:
+    """Return the lines on faults and verification."""
     return summary_of(found, matrix.faults(found.slopes))
 
 
-def summary_of(found, faults):
-    """Return the lines on the faults, sentences, on the null of the errors and on the verification of a calibration
-    with the fields `null`, `before` and `after`."""
+def summary_of(found: 'Phasing | IqPhasing', faults: Sequence[str]) -> list[str]:
+    """Return the lines on the faults, on the null of the errors and on the verification of a calibration."""
     lines = [f'FAULT {sentence}' for sentence in faults]
     x, y = np.round(found.null, 3) + 0.0    # without the sign of a zero
     lines.append(f'null of the errors                    cross-elevation {x:.3f}, elevation {y:.3f} beamwidths from '
@@ -133,8 +132,8 @@ def summary_of(found, faults):
     return lines
 
 
-def parameters(found):
-    """Return the parameters {name: value} of the control unit for a Phasing.
+def parameters(found: Phasing) -> dict[str, float]:
+    """Return the parameters {name: value} of the control unit.
 
     A slope f times as large makes the noise of the corrected errors f times as small. So the slope of the noise model
     is multiplied by the mean slope, after the effect of the matrix in force is removed.
@@ -146,19 +145,19 @@ def parameters(found):
     return {**elements, 'tracker.receiver.slope': noise_slope(uncorrected * found.slopes.gain)}
 
 
-def noise_slope(slope):
+def noise_slope(slope: float) -> float:
     """Return the value of acu.tracker.receiver.slope for a slope, within SLOPE_RANGE."""
     return round(min(max(slope, SLOPE_RANGE[0]), SLOPE_RANGE[1]), ELEMENT_DECIMALS)
 
 
-def content(found):
-    """Return the content of the --json file of a Phasing."""
+def content(found: Phasing) -> dict[str, Json]:
+    """Return the content of the --json file."""
     return {'name': 'calibrate receiver', 'rows': rows(found), 'source': found.source,
             'faults': matrix.faults(found.slopes), 'verified': passed(found), 'parameters': parameters(found)}
 
 
-def main(bag, source, options):
-    """Calibrate a bag.Bag, write the files of the options of the verb, and return (lines, content, verified).
+def main(bag: Recording, source: str, options: argparse.Namespace) -> tuple[list[str], dict[str, Json], bool]:
+    """Calibrate a recording, write the files of the options of the verb, and return (lines, content, verified).
 
     Raises ValueError.
     """

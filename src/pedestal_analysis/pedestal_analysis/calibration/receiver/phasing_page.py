@@ -1,13 +1,22 @@
 """HTML page of `pedestal calibrate receiver`: the errors over the offsets, and the circle before and after."""
 import html
+import typing
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
 
+from pedestal_analysis.calibration.receiver.offsets import Points
 from pedestal_analysis.report import elements
 from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, Spec, new_panels
+from pedestal_common.quantities import Pairs
+
+if typing.TYPE_CHECKING:
+    from pedestal_analysis.calibration.receiver.iq_phasing import IqPhasing
+    from pedestal_analysis.calibration.receiver.phasing import Phasing
 
 
-def curves(found):
+def curves(found: 'Phasing') -> Figure:
     """Return the figure with both errors over both offsets, and the fitted slopes."""
     points, slopes = found.points, found.slopes
     figure, panels = new_panels(2, 2, y=('cross-elevation error\n[beamwidths]', 'elevation error\n[beamwidths]'),
@@ -23,14 +32,14 @@ def curves(found):
     return figure
 
 
-def circle(found):
+def circle(found: 'Phasing') -> Figure:
     """Return the figure with the circle of offsets and the errors that the control unit sees, before and after."""
     errors = found.points.errors - found.slopes.null
     return circles(found.points, errors @ found.in_force.T, errors @ found.slopes.matrix.T)
 
 
-def circles(points, before, after):
-    """Return the figure with the circle of offsets.Points, and the errors (n, 2) before and after a calibration."""
+def circles(points: Points, before: Pairs, after: Pairs) -> Figure:
+    """Return the figure with the circle of offsets, and the errors before and after a calibration."""
     figure, panels = new_panels(1, 2, height=3.6, x='cross-elevation [beamwidths]', y='elevation [beamwidths]')
     offset = np.vstack((points.offsets[points.circle], points.offsets[points.circle][:1]))
     for axes, errors, title in zip(panels.flat, (before, after), ('matrix in force', 'new matrix')):
@@ -54,8 +63,8 @@ FIGURES = (
 """Figures of the page."""
 
 
-def page(found, table, summary, command):
-    """Return the HTML page of a phasing.Phasing; table, summary: printed lines; command: the command line."""
+def page(found: 'Phasing', table: Iterable[str], summary: Iterable[str], command: str) -> str:
+    """Return the HTML page of a calibration; table, summary: printed lines; command: the command line."""
     points = [[f'{time:.1f} s', *(f'{value:.4f}' for value in (*offset, *error, *sigma)), 'circle' if on else 'fit']
               for time, offset, error, sigma, on in zip(found.points.times, found.points.offsets, found.points.errors,
                                                         found.points.sigma, found.points.circle)]
@@ -63,10 +72,11 @@ def page(found, table, summary, command):
         'time', 'xel offset', 'el offset', 'xel error', 'el error', 'xel sigma', 'el sigma', 'use'), points)
 
 
-def laid_out(found, figures, printed, command, heading, columns, points):
-    """Return the HTML page of a calibration with the field `source`.
+def laid_out(found: 'Phasing | IqPhasing', figures: Iterable[Spec], printed: Iterable[str], command: str, heading: str,
+             columns: Iterable[str], points: Iterable[Sequence[str]]) -> str:
+    """Return the HTML page of a calibration.
 
-    figures: Specs; printed: printed lines; command: the command line; heading, columns, points: table of the points.
+    printed: printed lines; command: the command line; heading, columns, points: table of the points.
     """
     return elements.page('Receiver calibration', [
         f'<h1>Receiver calibration: {html.escape(found.source)}</h1>',

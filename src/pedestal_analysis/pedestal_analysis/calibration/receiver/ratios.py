@@ -15,35 +15,34 @@ import numpy as np
 from pedestal_analysis.calibration.receiver import offsets
 from pedestal_analysis.reprocess import iq
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Complexes, Nanoseconds, Pair, Pairs
 from pedestal_hardware.monopulse import sigmf
 from pedestal_hardware.monopulse.front_end import Status
 from pedestal_hardware.monopulse.params import MonopulseParameters
+from pedestal_hardware.monopulse.unit import MonopulseReceiver
 
 SMALLEST_POWER_OVER_NOISE = 1e-3  # smallest power of the sum of a point, over its noise power, for a ratio [-]
 
 
 @dataclasses.dataclass(frozen=True)
 class Samples:
-    """I/Q samples of the run of a recording.
-
-    file           sigmf.Recording
-    parameters     MonopulseParameters of the receiver
-    epoch          UTC of time 0 of the recording [ns]
-    """
+    """I/Q samples of the run of a recording."""
     file: sigmf.Recording
-    parameters: MonopulseParameters
-    epoch: int
+    parameters: MonopulseParameters     # of the receiver
+    epoch: Nanoseconds      # UTC of time 0 of the recording
 
 
 class _Sums:
-    """Sums over the integrals of a point: products (2,) of differences and conjugate sum, power of the sum and its
-    noise, number of steps and of steps without lock."""
+    """Sums over the integrals of a point."""
 
-    def __init__(self):
-        self.products, self.power, self.noise = np.zeros(2, complex), 0.0, 0.0
-        self.steps = self.unlocked = 0
+    def __init__(self) -> None:
+        self.products: Complexes = np.zeros(2, complex)     # of differences and conjugate sum
+        self.power = 0.0        # of the sum
+        self.noise = 0.0        # power of the noise of the sum
+        self.steps = 0
+        self.unlocked = 0       # number of steps without lock
 
-    def put(self, unit):
+    def put(self, unit: MonopulseReceiver) -> None:
         """Take the integrals of the last step of a unit."""
         self.steps += 1
         if unit.parts['outputs']['status'] != Status.LOCKED:
@@ -55,30 +54,31 @@ class _Sums:
         self.noise += len(dumps) * float(unit.parts['constants']['part'] * unit.parts['state']['noise'])
 
 
-def at_points(samples, spans):
-    """Return the ratios (n, 2) complex of the points with first and last times spans (n, 2) [s]: D_x / S, D_e / S.
+def at_points(samples: Samples, spans: Pairs) -> Complexes:
+    """Return the ratios (n, 2) of the points with first and last times spans [s]: D_x / S, D_e / S.
 
     Raises OffsetError for a point without samples or without lock.
     """
     unit = iq.unit_of(samples.parameters)
-    sums, first, last = [_Sums() for _ in spans], None, None
+    sums = [_Sums() for _ in spans]
+    ends: tuple[Nanoseconds, Nanoseconds] | None = None
     for block in iq.steps(unit, samples.file, samples.epoch):
-        first, last = block.middle if first is None else first, block.middle
+        ends = ends[0] if ends else block.middle, block.middle
         t = (block.middle - samples.epoch) / NS_PER_SECOND
         k = int(np.searchsorted(spans[:, 0], t, side='right')) - 1
         if k >= 0 and t <= spans[k, 1]:
             sums[k].put(unit)
     for found, span in zip(sums, spans):
-        _check(found, span, samples, (first, last))
+        _check(found, span, samples, ends)
     return np.array([found.products / (found.power - found.noise) for found in sums])
 
 
-def _check(found, span, samples, ends):
-    """Raise OffsetError for the _Sums of a point without samples or lock. ends: UTC of the first and the last step
-    of the samples [ns], None without a step."""
+def _check(found: _Sums, span: Pair, samples: Samples, ends: tuple[Nanoseconds, Nanoseconds] | None) -> None:
+    """Raise OffsetError for the sums of a point without samples or lock. ends: UTC of the first and the last step of
+    the samples, None without a step."""
     place, expected = f'{span[0]:.1f} to {span[1]:.1f} s', (span[1] - span[0]) / samples.parameters.period
     if found.steps < (1.0 - offsets.MAX_MISSING_SHARE) * expected:
-        covered = ('holds no whole step' if ends[0] is None else
+        covered = ('holds no whole step' if ends is None else
                    f'holds samples from {sigmf.text_of(ends[0])} to {sigmf.text_of(ends[1])}')
         raise offsets.OffsetError(f'samples are missing at {place}: {samples.file.meta} {covered}, and time 0 of the '
                                   f'recording is {sigmf.text_of(samples.epoch)}; both must be of the same run')

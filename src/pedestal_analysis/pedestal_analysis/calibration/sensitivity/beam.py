@@ -25,8 +25,9 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
-from pedestal_analysis.calibration.sensitivity.levels import LevelError
+from pedestal_analysis.calibration.sensitivity.levels import LevelError, Levels
 from pedestal_analysis.results.intervals import CONFIDENCE_LEVEL
+from pedestal_common.quantities import Bools, Decibels, Degrees, Floats, Hertz, Pair, Pairs
 
 MIN_SHARE = 0.25  # least power above P_0 that is fitted, as a share of the highest [-]
 MIN_LEVELS = 7  # smallest number of fitted levels: two more than the unknowns
@@ -40,34 +41,24 @@ SHAPE_NAMES = 'squint_x', 'squint_y', 'beamwidth_x', 'beamwidth_y'
 
 @dataclasses.dataclass(frozen=True)
 class Beam:
-    """Beam that was fitted to levels.
-
-    place        (2,) offset of the beam from the source at which the power is highest [deg]
-    width        (2,) half-power beamwidths in cross-elevation and elevation [deg]
-    half         {name: half of the confidence interval} of `amplitude`, relative, and of SHAPE_NAMES [deg]
-    amplitude    A [unit of the power]
-    floor        P_0 [unit of the power]; 0 for the power of the source alone
-    peak         highest power above P_0 of the fit [unit of the power]
-    residual     rms of the residuals over the power [-]
-    used         (n,) mask of the fitted levels
-    """
-    place: np.ndarray
-    width: np.ndarray
-    half: dict
-    amplitude: float
-    floor: float
-    peak: float
-    residual: float
-    used: np.ndarray
+    """Beam that was fitted to levels."""
+    place: Pair         # offset of the beam from the source at which the power is highest [deg]
+    width: Pair         # half-power beamwidths in cross-elevation and elevation [deg]
+    half: dict[str, float]  # half of the confidence interval of `amplitude`, relative, and of SHAPE_NAMES [deg]
+    amplitude: float    # A [unit of the power]
+    floor: float        # P_0 [unit of the power]; 0 for the power of the source alone
+    peak: float         # highest power above P_0 of the fit [unit of the power]
+    residual: float     # rms of the residuals over the power [-]
+    used: Bools         # mask (n,) of the fitted levels
 
     @property
-    def correction(self):
+    def correction(self) -> float:
         """Return L, the correction for the size of the source [-]."""
         return self.amplitude / self.peak
 
 
-def disk(diameter):
-    """Return points (n, 2) that fill a disk of a diameter [deg] evenly; one point for the diameter 0."""
+def disk(diameter: Degrees) -> Pairs:
+    """Return points that fill a disk of a diameter evenly; one point for the diameter 0."""
     if diameter == 0.0:
         return np.zeros((1, 2))
     # Ring k holds 6 k + 3 points on the middle of a ring of the area (2 k + 1) / RING_COUNT^2.
@@ -79,14 +70,14 @@ def disk(diameter):
     return np.concatenate(points)
 
 
-def pattern(offsets, place, width, points):
-    """Return the power (n,) of the disk at offsets (n, 2), with A = 1; points: of `disk`."""
+def pattern(offsets: Pairs, place: Pair, width: Pair, points: Pairs) -> Floats:
+    """Return the power (n,) of the disk at offsets [deg], with A = 1; points: of `disk`."""
     r = (offsets - place)[:, np.newaxis] - points
     return np.exp(-4.0 * math.log(2.0) * (r**2 / np.asarray(width)**2).sum(-1)).mean(1)
 
 
-def fit(levels, diameter) -> Beam:
-    """Return the Beam of levels.Levels about a source of a diameter [deg]. Raises LevelError."""
+def fit(levels: Levels, diameter: Degrees) -> Beam:
+    """Return the beam of levels about a source of a diameter. Raises LevelError."""
     points, offsets = disk(diameter), levels.offsets
     floor = 0.0 if levels.of_source else float(levels.power.min())
     found = _fit(offsets, levels.power, floor, points)
@@ -100,8 +91,8 @@ def fit(levels, diameter) -> Beam:
     return _fit(offsets, levels.power, float(levels.power[off].mean()), points)
 
 
-def _fit(offsets, power, floor, points):
-    """Return the Beam with P_0 = floor."""
+def _fit(offsets: Pairs, power: Floats, floor: float, points: Pairs) -> Beam:
+    """Return the beam with P_0 = floor."""
     above = power - floor
     used = above > MIN_SHARE * above.max()
     if floor and above.max() < (10.0**(0.1 * MIN_Y_DB) - 1.0) * floor:
@@ -118,7 +109,7 @@ def _fit(offsets, power, floor, points):
     spread = np.sqrt((((x - middle)**2) * P[:, np.newaxis]).sum(0) / P.sum())
     begin = np.concatenate(((math.log(P.max()),), middle, np.log(2.0 * spread)))
 
-    def residual(p):
+    def residual(p: Floats) -> Floats:
         return (math.exp(p[0]) * pattern(x, p[1:3], np.exp(p[3:]), points) - P) / (P + floor)
 
     solved = least_squares(residual, begin, x_scale=np.concatenate(((1.0,), spread, (1.0, 1.0))))
@@ -133,8 +124,8 @@ def _fit(offsets, power, floor, points):
     return Beam(place, width, dict(zip(('amplitude', *SHAPE_NAMES), half.tolist())), A, floor, peak, sigma, used)
 
 
-def null(levels, place, width):
-    """Return the offset (2,) [deg] at which both errors of the receiver are 0; None without enough errors.
+def null(levels: Levels, place: Pair, width: Pair) -> Pair | None:
+    """Return the offset [deg] at which both errors of the receiver are 0; None without enough errors.
 
     A linear fit to the errors of the levels within half a beamwidth of the highest power.
     """
@@ -148,11 +139,11 @@ def null(levels, place, width):
     return -np.linalg.solve(solved[:2].T, solved[2])
 
 
-def g_over_t_db(ratio, flux_sfu, frequency_hz, attenuation_db=0.0):
+def g_over_t_db(ratio: float, flux_sfu: float, frequency_hz: Hertz, attenuation_db: Decibels = 0.0) -> float:
     """Return G/T [dB/K] from ratio = (Y - 1) L.
 
     flux_sfu: flux density of the source [1e-22 W/m2/Hz], in random polarisation; attenuation_db: of the atmosphere
-    between source and antenna [dB].
+    between source and antenna.
     """
     S = flux_sfu * FLUX_UNIT_W_M2_HZ * 10.0**(-0.1 * attenuation_db)
     wavelength = LIGHT_SPEED_M_S / frequency_hz

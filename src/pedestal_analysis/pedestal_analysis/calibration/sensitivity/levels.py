@@ -6,15 +6,19 @@ is an offset in azimuth. Its level is the total power, of source and system nois
 In a recording the commands `offset` of the control unit move the antenna about the table that it follows. The level of
 the receiver is a C/N0 in dB-Hz: the power of the source alone over the noise power in 1 Hz.
 """
+import csv
 import dataclasses
 import itertools
 import math
+import pathlib
 
 import numpy as np
 
 from pedestal_analysis.calibration import scan
 from pedestal_analysis.results import tracking
+from pedestal_common.quantities import Degrees, Floats, Hertz, Pairs
 from pedestal_common.text_files import columns, csv_table
+from pedestal_recording.recording import Recording
 
 OFFSET_RANGE_DEG, LEVEL_RANGE_DB = (-30.0, 30.0), (-300.0, 300.0)  # ranges of the offsets and of the levels in a file
 MAX_FOLLOWING_BEAMWIDTHS = 0.1  # largest following error of an antenna at rest [beamwidths]
@@ -31,29 +35,20 @@ class LevelError(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Levels:
-    """Levels at n offsets.
-
-    offsets   (n, 2) cross-elevation and elevation of the beam from the source [deg]
-    power     (n,) total power, or of a recording the power of the source over the noise power in 1 Hz [Hz]
-    of_source True if the power is that of the source alone
-    errors    (n, 2) errors of the receiver [deg], NaN where there are none
-    bandwidth noise bandwidth of the receiver that the recording states [Hz], NaN if unknown
-    diameter  diameter of the source that the recording states [deg], NaN if unknown
-    source    name of the file or recording
-    """
-    offsets: np.ndarray
-    power: np.ndarray
-    of_source: bool
-    errors: np.ndarray
-    bandwidth: float
-    diameter: float
-    source: str
+    """Levels at n offsets."""
+    offsets: Pairs      # cross-elevation and elevation of the beam from the source [deg]
+    power: Floats       # (n,) total power, or of a recording the power of the source over the noise power in 1 Hz [Hz]
+    of_source: bool     # True if the power is that of the source alone
+    errors: Pairs       # of the receiver [deg], NaN where there are none
+    bandwidth: Hertz    # noise bandwidth of the receiver that the recording states, NaN if unknown
+    diameter: Degrees   # of the source, as the recording states it, NaN if unknown
+    source: str         # name of the file or recording
 
 
-def read(path, elevation=None) -> Levels:
-    """Return the Levels of a CSV file. Raises TableError and LevelError.
+def read(path: pathlib.Path, elevation: Degrees | None = None) -> Levels:
+    """Return the levels of a CSV file. Raises TableError and LevelError.
 
-    elevation: of the source [deg], with which an offset in azimuth becomes one in cross-elevation.
+    elevation: of the source, with which an offset in azimuth becomes one in cross-elevation.
     """
     try:
         table = csv_table.Table(path, csv_table.text(path))
@@ -64,7 +59,7 @@ def read(path, elevation=None) -> Levels:
         rows = [(table.number(across, row[across.name], *OFFSET_RANGE_DEG),
                  table.number(up, row[up.name], *OFFSET_RANGE_DEG),
                  table.number(level, row[level.name], *LEVEL_RANGE_DB)) for row in table]
-    except csv_table.csv.Error as error:
+    except csv.Error as error:
         raise csv_table.TableError(f'{path}: not a CSV text file: {error}') from None
     if not rows:
         raise LevelError('0 levels, must be at least 1')
@@ -79,8 +74,8 @@ def read(path, elevation=None) -> Levels:
                   math.nan, str(path))
 
 
-def of_recording(bag, source) -> Levels:
-    """Return the Levels of a bag.Bag of one beam; source: its name. Raises LevelError."""
+def of_recording(bag: Recording, source: str) -> Levels:
+    """Return the levels of a recording of one beam; source: its name. Raises LevelError."""
     if 'ship/imu/data' in bag.topics:
         raise LevelError('the recording is of a ship; its offsets contain the attitude of the deck')
     missing = [name for name in ('joint_states', 'tracking_receiver/angle_error', 'acu/reference')

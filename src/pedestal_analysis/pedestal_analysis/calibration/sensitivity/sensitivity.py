@@ -1,4 +1,5 @@
 """`pedestal calibrate sensitivity`: beamwidth and squint, and with the flux of the source G/T."""
+import argparse
 import dataclasses
 import math
 
@@ -7,6 +8,7 @@ import numpy as np
 from pedestal_analysis.calibration import output_files
 from pedestal_analysis.calibration.sensitivity import beam, levels, sensitivity_page
 from pedestal_analysis.results.intervals import estimated, row
+from pedestal_common.quantities import Degrees, Json, Pair, Row
 from pedestal_recording import bag as bags
 
 CASE_NAME = 'sensitivity'  # case of the rows
@@ -18,26 +20,18 @@ OPTION_RANGES = {'flux': (1.0, 1e6, 'sfu'), 'frequency': (0.1, 300.0, 'GHz'), 'd
 
 @dataclasses.dataclass(frozen=True)
 class Sensitivity:
-    """Result of a beam cut.
-
-    levels     levels.Levels
-    beam       beam.Beam
-    diameter   of the source [deg]
-    null       (2,) offset at which the errors of the receiver are 0 [deg], or None
-    ratio      (Y - 1) L [-], NaN if unknown
-    g_over_t   G/T [dB/K], NaN without a flux
-    """
+    """Result of a beam cut."""
     levels: levels.Levels
     beam: beam.Beam
-    diameter: float
-    null: np.ndarray | None
-    ratio: float
-    g_over_t: float
+    diameter: Degrees   # of the source
+    null: Pair | None   # offset at which the errors of the receiver are 0 [deg]
+    ratio: float        # (Y - 1) L [-], NaN if unknown
+    g_over_t: float     # G/T [dB/K], NaN without a flux
 
 
-def diameter_of_source(measured, options):
-    """Return the diameter [deg] of the source of levels.Levels: that of the options, of the sun with a flux, or that
-    which the recording states. Raises ValueError without any of them."""
+def diameter_of_source(measured: levels.Levels, options: argparse.Namespace) -> Degrees:
+    """Return the diameter of the source of levels: that of the options, of the sun with a flux, or that which the
+    recording states. Raises ValueError without any of them."""
     if options.diameter is not None:
         return options.diameter
     if options.flux:
@@ -48,8 +42,8 @@ def diameter_of_source(measured, options):
     return measured.diameter
 
 
-def calibrate(measured, options) -> Sensitivity:
-    """Return the Sensitivity of levels.Levels for the options of the verb. Raises LevelError and ValueError."""
+def calibrate(measured: levels.Levels, options: argparse.Namespace) -> Sensitivity:
+    """Return the result of levels for the options of the verb. Raises LevelError and ValueError."""
     diameter = diameter_of_source(measured, options)
     found = beam.fit(measured, diameter)
     scale = found.floor
@@ -63,11 +57,11 @@ def calibrate(measured, options) -> Sensitivity:
     return Sensitivity(measured, found, diameter, beam.null(measured, found.place, found.width), ratio, g_over_t)
 
 
-def rows(found):
-    """Return the rows of a Sensitivity for --json."""
+def rows(found: Sensitivity) -> list[Row]:
+    """Return the rows for --json."""
     fitted, count = found.beam, int(found.beam.used.sum())
 
-    def with_interval(name, value, half, unit):
+    def with_interval(name: str, value: float, half: float, unit: str) -> Row:
         return estimated(CASE_NAME, name, (value, value - half, value + half), unit, count)
 
     # The relative interval of the amplitude as one in dB.
@@ -88,8 +82,8 @@ def rows(found):
             row(CASE_NAME, 'levels', count)]
 
 
-def lines(found):
-    """Return the printed lines of a Sensitivity."""
+def lines(found: Sensitivity) -> list[str]:
+    """Return the printed lines."""
     fitted, (b_x, b_y), (x, y) = found.beam, found.beam.width, found.beam.place
     half = fitted.half
     said = [f'{len(found.levels.power)} levels of {found.levels.source}, {fitted.used.sum()} fitted, source of '
@@ -113,8 +107,8 @@ def lines(found):
     return said
 
 
-def parameters(found):
-    """Return {node: {parameter: value}} for a Sensitivity: the beamwidth, for control unit and simulated receiver.
+def parameters(found: Sensitivity) -> dict[str, dict[str, float]]:
+    """Return {node: {parameter: value}}: the beamwidth, for control unit and simulated receiver.
 
     The peak off the source is an error of the pointing, which the pointing model corrects.
     """
@@ -122,7 +116,7 @@ def parameters(found):
     return {'acu': {'tracker.receiver.beamwidth': width}, 'tracking_receiver': {'antenna.beamwidth': width}}
 
 
-def check_options(options):
+def check_options(options: argparse.Namespace) -> None:
     """Raise ValueError for an option out of its range, for a flux without a frequency, and for an option without
     effect."""
     for name, (low, high, unit) in OPTION_RANGES.items():
@@ -136,7 +130,7 @@ def check_options(options):
             raise ValueError(f'--{name}: has no effect without --{other}')
 
 
-def main(options):
+def main(options: argparse.Namespace) -> tuple[list[str], dict[str, Json]]:
     """Calibrate for the options of the verb, write its files, and return (lines, content). Raises ValueError."""
     check_options(options)
     source = options.levels or options.bag

@@ -1,14 +1,20 @@
 """HTML page of `pedestal calibrate sensitivity`: levels and fit over both axes."""
 import html
+import typing
+from collections.abc import Iterable
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.calibration.sensitivity import beam
 from pedestal_analysis.report import elements
 from pedestal_analysis.report.figures import FILTERED_COLOUR, RAW_COLOUR, Spec, new_panels
 
+if typing.TYPE_CHECKING:
+    from pedestal_analysis.calibration.sensitivity.sensitivity import Sensitivity
 
-def cuts(found):
+
+def cuts(found: 'Sensitivity') -> Figure:
     """Return the figure with the levels over both offsets from the peak, and the fitted cuts."""
     figure, panels = new_panels(1, 2, height=3.0, x=('cross-elevation from the peak [deg]',
                                                     'elevation from the peak [deg]'), y='level over the peak [dB]')
@@ -33,8 +39,8 @@ FIGURES = (Spec('cuts', 'Cuts through the beam', 'Points: levels within a quarte
 """Figures of the page."""
 
 
-def page(found, printed, command):
-    """Return the HTML page of a sensitivity.Sensitivity; printed: its lines; command: the command line."""
+def page(found: 'Sensitivity', printed: Iterable[str], command: str) -> str:
+    """Return the HTML page of a beam cut; printed: its lines; command: the command line."""
     return elements.page('Sensitivity', [
         f'<h1>Sensitivity: {html.escape(found.levels.source)}</h1>', f'<p class="soft">{html.escape(command)}</p>',
         f'<pre class="wide">{html.escape(chr(10).join(printed))}</pre>',
