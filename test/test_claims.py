@@ -78,7 +78,7 @@ def test_without_noise_an_alignment_reaches_the_limits_of_the_paper(monkeypatch)
     found = {}
     for method in ('classical', 'adrc'):
         constants = navigator.constants(alignment.INS_PARAMETERS, method, 'none', LATITUDE)
-        estimates = np.zeros(len(angle) // every, alignment.ALIGNMENT_ESTIMATE)
+        estimates = np.zeros(len(angle) // every, alignment.AlignmentEstimate.dtype)
         alignment.align(navigator.initial_state(constants, start), constants, angle, force, alignment.IMU_PERIOD_S,
                         every, estimates)
         errors = alignment.errors(estimates['quaternion'], attitude[every - 1::every])[550:] / alignment.ARCMIN_RAD
@@ -103,7 +103,7 @@ def test_constant_rate_and_acceleration_leave_no_error(rate, acceleration, late,
     v, a = np.radians((rate, acceleration))
     target = np.column_stack([v * t + 0.5 * a * t * t, v + a * t, np.full(len(t), a)])
     known = np.column_stack([v + a * (t + 0.5 * T - late), np.full(len(t), a)])
-    out = np.zeros((1, len(t)), loop.STEP_RECORD)
+    out = np.zeros((1, len(t)), loop.Step.dtype)
     loop._follow(target, known, axis_filter.Filter.zeros(), axis_filter.constants(FilterParameters()), 0.0,
                  loop.rate_loop_step(*loop.RATE_LOOP_CONSTANTS), np.zeros((1, len(t))), out)
     miss = math.degrees(out['miss'][0, -1])

@@ -17,6 +17,7 @@ from rclpy.node import Node
 
 from pedestal_common.graph import layouts, nodes, topics
 from pedestal_common.node import middleware, shell
+from pedestal_common.quantities import Message
 
 RING_NODES = ('tracking_receiver', 'acu', 'adu', 'recorder')  # names of the nodes of the ring
 TRIGGER_TOPICS = {'tracking_receiver': 'adu/truth', 'acu': 'tracking_receiver/angle_error', 'adu': 'acu/rate_command'}
@@ -25,7 +26,7 @@ WARM_UP_LAPS = 300  # number of laps before the measurement of the time starts
 RING_STEPS = 3000  # measured laps of a run, as many as steps of 5 ms in a run of `pedestal bench graph`
 
 
-def _filled(topic):
+def _filled(topic: topics.Topic) -> Message:
     """Return an rclpy message with as many values as the message of the graph."""
     type_name = topic.type
     message = middleware.message_class(type_name)()
@@ -47,7 +48,7 @@ class Ring(Node):
     awaits = 'its trigger'
     spin = shell.Shell.spin
 
-    def __init__(self, role, steps):
+    def __init__(self, role: str, steps: int) -> None:
         super().__init__(role)
         self.steps, self.lap, self.begun, self.finished, self.failure = steps, 0, 0.0, False, None
         step_topics = [link for link in nodes.recorded(RING_NODES) if link.rate == 'step']
@@ -66,24 +67,24 @@ class Ring(Node):
         if role == 'adu':
             self.start_timer = self.create_timer(0.01, self.start)
 
-    def start(self):
+    def start(self) -> None:
         """Start the first lap as soon as every publisher has found its subscribers."""
         if all(publisher.get_subscription_count() >= readers for publisher, _, readers in self.writers):
             self.start_timer.cancel()
             time.sleep(1.0)     # The other nodes may not have found all publishers yet.
             self.send()
 
-    def ignore(self, _message):
+    def ignore(self, _message: Message) -> None:
         """Drop a message."""
 
-    def draining(self):
+    def draining(self) -> bool:
         """Return False: the node waits for nothing at the end."""
         return False
 
-    def close(self):
+    def close(self) -> None:
         """Do nothing at the end."""
 
-    def pass_on(self, _message):
+    def pass_on(self, _message: Message) -> None:
         """Publish the messages of a lap; after the last lap the drive prints the mean time of a lap [us]."""
         self.lap += 1
         if self.lap == WARM_UP_LAPS:
@@ -94,13 +95,13 @@ class Ring(Node):
             return
         self.send()
 
-    def send(self):
+    def send(self) -> None:
         """Publish every message of this node once."""
         for publisher, message, _ in self.writers:
             publisher.publish(message)
 
 
-def lap(steps=RING_STEPS):
+def lap(steps: int = RING_STEPS) -> float:
     """Return the lap time [us] of the ring: as many processes as the graph and the same messages, without any work."""
     processes = {role: subprocess.Popen([sys.executable, __file__, role, str(steps)], stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE, text=True) for role in RING_NODES}
@@ -117,7 +118,7 @@ def lap(steps=RING_STEPS):
     return json.loads(output.splitlines()[-1])['lap_us']
 
 
-def compare():
+def compare() -> None:
     """Print the lap times of the graph and of the bare ring, and their ratio: medians of runs that alternate.
 
     Other load of the machine affects runs that alternate alike.
@@ -132,7 +133,7 @@ def compare():
     print('a lap of the graph {:.0f} us, of the bare ring {:.0f} us: ratio {:.2f}'.format(*times, times[0] / times[1]))
 
 
-def main(args) -> int:
+def main(args: list[str]) -> int:
     """Run a role for as many laps as the command line gives, or compare; return the exit code."""
     if args:
         role, steps = args

@@ -5,6 +5,7 @@ rows of the studies. A verdict states in words whether the claim holds. tools/re
 verdicts side by side into docs/papers.md.
 """
 import typing
+from collections.abc import Sequence
 
 from pedestal_studies.p000_ma.filter_families import FILTER_MEANINGS
 
@@ -24,7 +25,7 @@ class Claim(typing.NamedTuple):
     verdict: str = ''
 
 
-def _of(study, *claims):
+def _of(study: str, *claims: Sequence[str]) -> tuple[Claim, ...]:
     """Return the Claims that one study measures; claims: tuples (claim, reading, case, metric, verdict if any)."""
     return tuple(Claim(claim, reading, study, *where) for claim, reading, *where in claims)
 

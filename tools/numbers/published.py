@@ -11,6 +11,8 @@ import json
 import math
 import pathlib
 import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
 
 from tools.numbers import claims
 
@@ -18,6 +20,7 @@ import pedestal_studies
 from pedestal_analysis import console
 from pedestal_analysis.results.intervals import missed
 from pedestal_analysis.trials import monte_carlo
+from pedestal_common.quantities import Row
 from pedestal_studies.p000_ma import filter_families
 from pedestal_studies.p001_zhou_yang_qin import alignment, alignment_speed
 from pedestal_studies.p002_jia import phased_array
@@ -26,6 +29,10 @@ from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import REVERSAL_S_BY_AXIS
 from pedestal_studies.p004_li_chen_wang import rate_measurement, telemetry_flight
 from pedestal_studies.profiles import PROFILES
 from pedestal_studies.system import acquisition, budget, filters
+
+Key: TypeAlias = tuple[str, str, str]   # of a row: study, case, metric
+Content: TypeAlias = tuple[Sequence[str], Sequence[Sequence[str]]]  # of a table: heads of the columns, lines of cells
+Maker: TypeAlias = Callable[['Rows'], Content]   # of a table
 
 ROWS_FILE = 'docs/rows.json'  # file of the rows in a checkout
 
@@ -70,29 +77,29 @@ HEADLINE_RESULTS = (
 """(text, case, metric) of the results of the study scenarios in README.md."""
 
 
-class Rows(dict):
-    """Mapping {(study, case, metric): row}. `used` holds the rows that were read, which are the rows of the tables."""
+class Rows(dict[Key, Row]):
+    """The published rows. `used` holds the rows that were read, which are the rows of the tables."""
 
-    def __init__(self, rows):
+    def __init__(self, rows: Mapping[Key, Row]) -> None:
         super().__init__(rows)
-        self.used = {}
+        self.used: dict[Key, Row] = {}
 
-    def __getitem__(self, key):
+    def __getitem__(self, key: Key) -> Row:
         self.used[key] = super().__getitem__(key)
         return self.used[key]
 
 
-def rows_by_key(rows_of):
-    """Return the Rows of {study: its rows}."""
+def rows_by_key(rows_of: Mapping[str, list[Row]]) -> Rows:
+    """Return the rows of {study: its rows}."""
     return Rows({(study, row['case'], row['metric']): row for study, rows in rows_of.items() for row in rows})
 
 
-def read(root='.'):
-    """Return the Rows in ROWS_FILE of a checkout."""
+def read(root: str | pathlib.Path = '.') -> Rows:
+    """Return the rows in ROWS_FILE of a checkout."""
     return rows_by_key(json.loads(pathlib.Path(root, ROWS_FILE).read_text()))
 
 
-def write(rows, root='.'):
+def write(rows: Rows, root: str | pathlib.Path = '.') -> None:
     """Write the rows that the tables use into ROWS_FILE."""
     # The tables are made only to note the rows that they read in rows.used.
     for table in TABLES.values():
@@ -104,20 +111,20 @@ def write(rows, root='.'):
     pathlib.Path(root, ROWS_FILE).write_text('{\n' + content + '\n}\n')
 
 
-def _cells(row):
+def _cells(row: Row) -> tuple[str, str, str]:
     """Return the texts of a row: value with unit, interval, number of runs."""
     value = f'{console.number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
     return value, console.interval(row), str(row.get('runs', ''))
 
 
-def _target_text(row):
+def _target_text(row: Row) -> str:
     """Return the target of a row with its unit, marked MISSED if the row misses it."""
     if row['target'] is None:
         return ''
     return ' '.join(filter(None, (row['target'], row['unit'].removeprefix('-'), 'MISSED' if missed(row) else '')))
 
 
-def _spread(row):
+def _spread(row: Row) -> str:
     """Return the mean of a row and half its interval to two digits, 'a +- b'.
 
     Return the mean alone if all runs give the same value.
@@ -129,18 +136,18 @@ def _spread(row):
     return f'{row["value"]:.{decimals}f} +- {half:.{decimals}f}'
 
 
-def results_table(results):
-    """Return the function(Rows) that makes the table of results, which are given as SCENARIO_RESULTS is."""
-    def table(rows):
+def results_table(results: Sequence[tuple[str, str, str]]) -> Maker:
+    """Return the function that makes the table of results, which are given as SCENARIO_RESULTS is."""
+    def table(rows: Rows) -> Content:
         of_results = [rows['scenarios', case, metric] for _, case, metric in results]
         return ('result', 'mean', '95 % interval', 'seeds', 'target'), [
             (text, *_cells(row), _target_text(row)) for (text, *_), row in zip(results, of_results)]
     return table
 
 
-def claim_table(paper):
-    """Return the function(Rows) that makes the table of the claims of a paper; paper: its number, such as '000'."""
-    def table(rows):
+def claim_table(paper: str) -> Maker:
+    """Return the function that makes the table of the claims of a paper; paper: its number, such as '000'."""
+    def table(rows: Rows) -> Content:
         lines = []
         for claim in claims.CLAIMS_BY_PAPER[paper]:
             place, target, cells = '', '', ('', '', '')
@@ -158,7 +165,7 @@ FILTER_METRICS = ('angle_rms_deg', 'reduction', 'rate_rms_deg_s', 'nis_mean', 'r
 """Metrics of the study filters in its table."""
 
 
-def filter_numbers(rows):
+def filter_numbers(rows: Rows) -> Content:
     """Return the table of angle rms, reduction, rate rms and consistency of every filter on every motion."""
     lines = []
     for name in filters.SHOWN_FILTERS:
@@ -170,7 +177,7 @@ def filter_numbers(rows):
             'rate error divided by own sigma', 'reduction, noise within 5 Hz'), lines
 
 
-def manoeuvre_numbers(rows):
+def manoeuvre_numbers(rows: Rows) -> Content:
     """Return the table of the errors of rate and acceleration inside every reversal."""
     lines = [(name, f'{reversal:g} s', *(_spread(rows['manoeuvre', f'reversal-{reversal:g}s/{name}', metric])
                                          for metric in ('rate_rms_deg_s', 'acceleration_rms_deg_s2')))
@@ -178,7 +185,7 @@ def manoeuvre_numbers(rows):
     return ('filter', 'reversal', 'rate deg/s', 'acceleration deg/s2'), lines
 
 
-def feedforward_numbers(rows):
+def feedforward_numbers(rows: Rows) -> Content:
     """Return the table of paper 003's feed-forward: miss and rate noise for each source of rate and acceleration.
 
     The miss is the pointing error, a term of the paper.
@@ -198,7 +205,7 @@ def feedforward_numbers(rows):
         (case, imm_feedforward.SOURCE_MEANINGS[case.partition('/')[2]], *numbers) for case, *numbers in lines]
 
 
-def family_numbers(rows):
+def family_numbers(rows: Rows) -> Content:
     """Return the table of the filters that paper 000 compares: geometric means of the errors over all motions."""
     lines = []
     for name, meaning in filter_families.FILTER_MEANINGS.items():
@@ -210,7 +217,7 @@ def family_numbers(rows):
                                    for what in ('angle rms deg', 'rate rms deg/s'))), lines
 
 
-def speed_numbers(rows):
+def speed_numbers(rows: Rows) -> Content:
     """Return the table of paper 003's feed-forward with differences, and with targets of 30 and 50 m/s."""
     lines = [(case, *(_spread(rows['feedforward-speed', case, metric]) for metric in (
         'miss_rms_deg', 'rate_noise_deg_s', 'rate_rms_deg_s', 'acceleration_rms_deg_s2')))
@@ -221,7 +228,7 @@ def speed_numbers(rows):
     return ('case', 'miss rms deg', 'rate noise deg/s', 'rate error deg/s', 'acceleration error deg/s2'), lines
 
 
-def alignment_speed_numbers(rows):
+def alignment_speed_numbers(rows: Rows) -> Content:
     """Return the table of the ADRC alignment with all its times divided by a factor."""
     lines = [(f'{speed:g}', f'{alignment_speed.faster(speed).adrc.observer:g}',
               *(_spread(rows['alignment-speed', f'adrc/{speed:g}', metric]) for metric in alignment_speed.METRICS))
@@ -231,7 +238,7 @@ def alignment_speed_numbers(rows):
             'level, arcmin', 'azimuth at 600 s, arcmin'), lines
 
 
-def matrix_table(rows):
+def matrix_table(rows: Rows) -> Content:
     """Return the table of the matrices of paper 004's proof of stability, in seconds, with rank and condition."""
     lines = [(name, '; '.join(' '.join(f'{value:.4g}' for value in line) for line in matrix),
               *(console.number(rows['telemetry-flight', name, metric]['value'])
@@ -241,7 +248,7 @@ def matrix_table(rows):
             'condition, time in seconds'), lines
 
 
-def pareto_numbers(rows):
+def pareto_numbers(rows: Rows) -> Content:
     """Return the table of the least miss of each filter over its tunings, and the miss at the IMM's rate noise."""
     lines = [(name, pareto.FILTER_MEANINGS[name], *(_spread(rows['pareto', name, metric]) for metric in (
         'least_miss_deg', 'rate_noise_at_least_miss_deg_s')),
@@ -251,7 +258,7 @@ def pareto_numbers(rows):
             'miss at the rate noise of imm-predicted, divided by the miss of imm-predicted'), lines
 
 
-def flyby_numbers(rows):
+def flyby_numbers(rows: Rows) -> Content:
     """Return the table of the errors on the 60 m flyby with a measured rate and with a differenced rate."""
     lines = [(name, rate_measurement.RATE_SOURCE_MEANINGS[name],
               *(_spread(rows['rate-measurement', f'{rate_measurement.FLYBY_PROFILE}/{name}', metric])
@@ -259,7 +266,7 @@ def flyby_numbers(rows):
     return ('case', 'source of the rate', 'angle rms deg', 'rate rms deg/s'), lines
 
 
-def alignment_numbers(rows):
+def alignment_numbers(rows: Rows) -> Content:
     """Return the table of the methods of alignment beside the information limit."""
     metrics = ('time_to_12arcmin_rms_s', *(f'azimuth_rms_arcmin_{t}s' for t in (100, 250, 300, 600)),
                'level_rms_arcmin')
@@ -273,7 +280,7 @@ def alignment_numbers(rows):
                  *(_spread(rows['alignment', 'limit', metric]) for metric in metrics), '', '')]
 
 
-def acquisition_numbers(rows):
+def acquisition_numbers(rows: Rows) -> Content:
     """Return the table of the time that acquisition takes, and of the share of runs in which it succeeds."""
     lines = []
     for case in acquisition.CASE_NAMES:
@@ -301,7 +308,7 @@ CALIBRATION_RESULTS = (
 """(text, case, metric) of the results of the study calibration in docs/measured.md."""
 
 
-def calibration_numbers(rows):
+def calibration_numbers(rows: Rows) -> Content:
     """Return the table of the calibration of a new station."""
     of_results = [rows['calibration', case, metric] for _, case, metric in CALIBRATION_RESULTS]
     return ('result', 'mean', '95 % interval', 'runs', 'target'), [
@@ -312,7 +319,7 @@ ARRAY_LOOPS = ('paper', 'paper-delta', 'type-2', 'type-2-delta', 'tracked-10ms',
 """Loops of the study phased-array in the table of its loops."""
 
 
-def array_numbers(rows):
+def array_numbers(rows: Rows) -> Content:
     """Return the table of the loops of paper 002's plant: true errors without noise, and jitter due to noise."""
     lines = []
     for case in (*(f'{loop}/{target}' for loop in ARRAY_LOOPS for target in ('ramp', 'sine', 'sway')
@@ -328,18 +335,18 @@ def array_numbers(rows):
 MDEG_PER_DEG = 1e3
 
 
-def _milli(row):
+def _milli(row: Row) -> str:
     """Return a row in degrees as text in millidegrees, mean and half its interval."""
     return _spread({key: value * MDEG_PER_DEG if key in ('value', 'ci_low', 'ci_high') else value
                     for key, value in row.items()})
 
 
-def budget_table(mode):
-    """Return the function(Rows) that makes the table of the error budget of a mode: each term alone, then the sums."""
+def budget_table(mode: str) -> Maker:
+    """Return the function that makes the table of the error budget of a mode: each term alone, then the sums."""
     sums = {'systematic': ('', 'sum of the systematic terms, added as signed vectors'),
             'whole': ('', 'runs with every term on')}
 
-    def table(rows):
+    def table(rows: Rows) -> Content:
         kinds = {**{name: ('systematic', doc) for name, doc in budget.documented(mode, random=False).items()},
                  **{name: ('random', doc) for name, doc in budget.documented(mode, random=True).items()}, **sums}
         lines = [(name, kind, doc, *(_milli(rows['budget', f'{mode}/{name}', metric]) for metric in (
@@ -353,9 +360,9 @@ def budget_table(mode):
     return table
 
 
-def direction_table(mode):
-    """Return the function(Rows) that makes the table of the signed systematic errors of a mode along the pass."""
-    def table(rows):
+def direction_table(mode: str) -> Maker:
+    """Return the function that makes the table of the signed systematic errors of a mode along the pass."""
+    def table(rows: Rows) -> Content:
         cases = [f'{mode}/{time}s' for time in budget.TABLE_TIMES_S]
         head = [f'az {rows["budget", case, "azimuth_deg"]["value"]:.0f}, '
                 f'el {rows["budget", case, "elevation_deg"]["value"]:.0f} deg' for case in cases]
@@ -375,7 +382,7 @@ TABLES = {'results over seeds': results_table(SCENARIO_RESULTS), 'headline resul
           'filters of paper 000': family_numbers, 'feed forward by speed': speed_numbers,
           'speed of alignment': alignment_speed_numbers, 'acquisition': acquisition_numbers,
           'array loops': array_numbers, 'calibration': calibration_numbers, 'matrices': matrix_table}
-"""{name of a table: function(Rows) that returns (heads of the columns, lines)}."""
+"""{name of a table: function that makes it}."""
 
 PUBLISHED_STUDIES = tuple(dict.fromkeys((
     *(claim.study for of_paper in claims.CLAIMS_BY_PAPER.values() for claim in of_paper if claim.study),
@@ -383,7 +390,7 @@ PUBLISHED_STUDIES = tuple(dict.fromkeys((
 """Names of the studies whose rows are in the tables."""
 
 
-def main(names=(), root='.') -> int:
+def main(names: Sequence[str] = (), root: str | pathlib.Path = '.') -> int:
     """Run PUBLISHED_STUDIES with their default number of runs and write ROWS_FILE. Return exit code 0.
 
     names: studies to run, () for all; the rows of the other studies stay. root: folder of the checkout.

@@ -1,12 +1,19 @@
 """Figures of the studies: sheets of panels in one style, saved as PNG and, on request, as a vector file."""
+import pathlib
+from collections.abc import Callable
+
 import matplotlib
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from pedestal_analysis.report import figures
+from pedestal_bringup.loop.closed_loop import Run
 
 
-def legend(figure):
+def legend(figure: Figure) -> Figure:
     """Return the figure with one legend below all panels, where it covers no curve; every label occurs once."""
-    handles = {}
+    handles: dict[str, Artist] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels()):
             handles.setdefault(label, handle)
@@ -16,13 +23,13 @@ def legend(figure):
     return figure
 
 
-def draw_torques(axes, record):
-    """Draw the torque [Nm] of both azimuth motors of a closed_loop.Run over time."""
+def draw_torques(axes: Axes, record: Run) -> None:
+    """Draw the torque [Nm] of both azimuth motors of a run over time."""
     for i, (colour, style) in enumerate(((figures.MOTOR_1_COLOUR, '-'), (figures.MOTOR_2_COLOUR, '--'))):
         axes.plot(record.t, record['adu/motor_states']['effort'][:, i], style, color=colour, label=f'motor {i + 1}')
 
 
-def save(draw, *paths):
+def save(draw: Callable[[], Figure], *paths: pathlib.Path) -> None:
     """Draw a figure once into files, with the same bytes every time."""
     with matplotlib.rc_context({**figures.MATPLOTLIB_STYLE, 'svg.hashsalt': paths[0].stem}):
         figure = draw()

@@ -10,13 +10,15 @@ import math
 
 import numpy as np
 
+from pedestal_common.quantities import Bools, Floats, RadiansPerSecond, Seconds, Times, Vector3
 
-def overshoot_percent(y, size):
+
+def overshoot_percent(y: Floats, size: float) -> float:
     """Return the overshoot [%] of a step response y (n,) from 0 to size."""
     return 100.0 * max(float(np.max(y / size)) - 1.0, 0.0)
 
 
-def settling_time(t, y, size, band=0.02):
+def settling_time(t: Times, y: Floats, size: float, band: float = 0.02) -> Seconds:
     """Return the time [s] from which y stays within size +-band * size, or NaN if it does not settle.
 
     The time is interpolated linearly between two samples.
@@ -31,13 +33,13 @@ def settling_time(t, y, size, band=0.02):
     return float(t[last] + (t[last + 1] - t[last]) * excess[last] / (excess[last] - excess[last + 1]))
 
 
-def crossings(y, size, band=0.005):
+def crossings(y: Floats, size: float, band: float = 0.005) -> int:
     """Return the number of crossings of y through its final value `size`; motion within +-band * size is ignored."""
     side = np.sign(y - size)[np.abs(y - size) > band * abs(size)]
     return int(np.sum(side[1:] != side[:-1]))
 
 
-def whole_periods(t, period, skip):
+def whole_periods(t: Times, period: Seconds, skip: Seconds) -> Bools:
     """Return the mask (n,) of the times in whole periods of `period` [s], counted from `skip` [s] after the start.
 
     Raises ValueError for a record without a whole period.
@@ -50,14 +52,14 @@ def whole_periods(t, period, skip):
     return (t >= skip - 1e-9) & (t < skip + whole * period - 1e-9)
 
 
-def harmonic_fit(t, y, w):
+def harmonic_fit(t: Times, y: Floats, w: RadiansPerSecond) -> Vector3:
     """Return (offset, a, b) of the least-squares fit y = offset + a sin(w t) + b cos(w t)."""
     basis = np.column_stack((np.ones_like(t), np.sin(w * t), np.cos(w * t)))
     coefficients, *_ = np.linalg.lstsq(basis, y, rcond=None)
     return coefficients
 
 
-def amplitude_and_period(t, y, period):
+def amplitude_and_period(t: Times, y: Floats, period: Seconds) -> tuple[float, Seconds]:
     """Return amplitude and period of a sine fitted to y by least squares (Gauss-Newton); period: first guess [s]."""
     w = 2.0 * math.pi / period
     # If t is 0 in the middle, an error of w hardly changes the fitted phase. The search then converges from a poor
@@ -77,13 +79,13 @@ def amplitude_and_period(t, y, period):
     return math.hypot(a, b), 2.0 * math.pi / w
 
 
-def residual(t, y, period):
+def residual(t: Times, y: Floats, period: Seconds) -> Floats:
     """Return y (n,) without its mean and without its part at the frequency 1 / period, by a least-squares fit."""
     w = 2.0 * math.pi / period
     offset, a, b = harmonic_fit(t, y, w)
     return y - offset - a * np.sin(w * t) - b * np.cos(w * t)
 
 
-def peak(y):
+def peak(y: Floats) -> float:
     """Return the largest absolute value of an array of any shape."""
     return float(np.max(np.abs(y)))

@@ -5,8 +5,11 @@
 paper 003's S motion of 20 deg at 3.5 deg/s.
 """
 import math
+from typing import NamedTuple
 
 import numpy as np
+
+from pedestal_common.quantities import Floats, Radians, RadiansPerSecond, Seconds, Times
 
 PROFILES = ('flyby-500m', 'flyby-60m', 's-turn-500m', 's-20deg')  # names of the motions
 RECORD_DURATION_S = 60.0  # duration of a record [s]
@@ -27,57 +30,63 @@ S_MOTION_STROKE_RAD, S_MOTION_RATE_RAD_S, S_MOTION_REVERSAL_S = math.radians(20.
 which is ours [s]."""
 
 
-def truth(name, t):
-    """Return (angle, rate, acceleration), each (n,), of a profile at t (n,) [s]; KeyError for an unknown name."""
+class Motion(NamedTuple):
+    """Motion of a target in one angle."""
+    angle: Floats           # [rad]
+    rate: Floats            # [rad/s]
+    acceleration: Floats    # [rad/s2]
+
+
+def truth(name: str, t: Times) -> Motion:
+    """Return the motion of a profile; KeyError for an unknown name."""
     if name in MIN_FLYBY_DISTANCES_M:
         return flyby(t - 0.5 * RECORD_DURATION_S, FLYBY_SPEED_M_S / MIN_FLYBY_DISTANCES_M[name])
-    return {'s-turn-500m': s_turn, 's-20deg': lambda t: s_motion(t, S_MOTION_STROKE_RAD, S_MOTION_RATE_RAD_S,
-                                                                 S_MOTION_REVERSAL_S)}[name](t)
+    if name == 's-20deg':
+        return s_motion(t, S_MOTION_STROKE_RAD, S_MOTION_RATE_RAD_S, S_MOTION_REVERSAL_S)
+    return {'s-turn-500m': s_turn}[name](t)
 
 
-def distance(name, t):
-    """Return the distance [m] of a flyby from the antenna at t (n,) [s]; KeyError for another profile."""
+def distance(name: str, t: Times) -> Floats:
+    """Return the distance [m] of a flyby from the antenna; KeyError for another profile."""
     return np.hypot(MIN_FLYBY_DISTANCES_M[name], FLYBY_SPEED_M_S * (t - 0.5 * RECORD_DURATION_S))
 
 
-def flyby(t, w):
-    """Return (angle, rate, acceleration) (n,) of a target on a straight line, nearest at t = 0.
-
-    t: (n,) [s]. w: speed over least distance [rad/s].
-    """
+def flyby(t: Times, w: RadiansPerSecond) -> Motion:
+    """Return the motion of a target on a straight line, nearest at t = 0; w: speed over least distance."""
     u = w * t
-    return np.arctan(u), w / (1.0 + u * u), -2.0 * u * w * w / (1.0 + u * u) ** 2
+    return Motion(np.arctan(u), w / (1.0 + u * u), -2.0 * u * w * w / (1.0 + u * u) ** 2)
 
 
-def s_turn(t):
-    """Return (angle, rate, acceleration) (n,) of an S-turn at t (n,) [s].
+def s_turn(t: Times) -> Motion:
+    """Return the motion of an S-turn.
 
     The target turns to one side, twice as long to the other side, and a third time back to the old course. Before
     and after these turns the target flies straight.
     """
-    motion, before = [0.0, 0.0, 0.0], 0.0
+    motion, before = Motion(*3 * (np.zeros(t.shape),)), 0.0
     for at, side in TURN_SCHEDULE.items():
         jump = (side - before) * TURN_ACCELERATION_M_S2 / TURN_DISTANCE_M
-        motion = [x + jump * more for x, more in zip(motion, _step(t - at, ROLL_DURATION_S))]
+        motion = Motion(*(x + jump * more for x, more in zip(motion, _step(t - at, ROLL_DURATION_S))))
         before = side
-    return tuple(motion)
+    return motion
 
 
-def _step(t, width):
-    """Return (second integral over time, integral over time, s), each (n,), of a step s from 0 to 1 at t = 0.
+def _step(t: Times, width: Seconds) -> Motion:
+    """Return the motion whose acceleration is a step from 0 to 1 at t = 0.
 
-    The step rises as half a cosine over `width` [s].
+    The step rises as half a cosine over `width`.
     """
     x = np.clip(t / width + 0.5, 0.0, 1.0)
     after = np.maximum(t - 0.5 * width, 0.0)
-    return (0.5 * width * width * (0.5 * x * x + (np.cos(np.pi * x) - 1.0) / np.pi**2) + 0.5 * after * (width + after),
-            0.5 * width * (x - np.sin(np.pi * x) / np.pi) + after, 0.5 * (1.0 - np.cos(np.pi * x)))
+    return Motion(
+        0.5 * width * width * (0.5 * x * x + (np.cos(np.pi * x) - 1.0) / np.pi**2) + 0.5 * after * (width + after),
+        0.5 * width * (x - np.sin(np.pi * x) / np.pi) + after, 0.5 * (1.0 - np.cos(np.pi * x)))
 
 
-def s_motion(t, stroke, rate, reversal):
-    """Return (angle, rate, acceleration) (n,) of a motion to and fro over `stroke` [rad] at +-rate [rad/s].
+def s_motion(t: Times, stroke: Radians, rate: RadiansPerSecond, reversal: Seconds) -> Motion:
+    """Return a motion to and fro over `stroke` at +-rate.
 
-    Each reversal [s] is half a cosine in rate. At t = 0 the target is in the middle and moves forward. The largest
+    Each reversal is half a cosine in rate. At t = 0 the target is in the middle and moves forward. The largest
     acceleration is pi rate / reversal. Raises ValueError if the reversals alone are longer than the stroke.
     """
     uniform = stroke / rate - 2.0 * reversal / math.pi
@@ -89,4 +98,4 @@ def s_motion(t, stroke, rate, reversal):
     stay = np.minimum(r, uniform) - 0.5 * uniform
     x = np.pi * np.maximum(r - uniform, 0.0) / reversal
     T = reversal / math.pi
-    return sign * (stay + T * np.sin(x)), sign * np.cos(x), -sign * np.sin(x) / T
+    return Motion(sign * (stay + T * np.sin(x)), sign * np.cos(x), -sign * np.sin(x) / T)

@@ -46,7 +46,7 @@ def steady_miss(angle, late):
     t = T * np.arange(800)
     target = np.column_stack([angle.deriv(i)(t) if i else angle(t) for i in range(3)])
     known = np.column_stack([angle.deriv(i)(t + 0.5 * T - late) for i in (1, 2)])
-    out = np.zeros((1, len(t)), loop.STEP_RECORD)
+    out = np.zeros((1, len(t)), loop.Step.dtype)
     loop._follow(target, known, axis_filter.Filter.zeros(), axis_filter.constants(FilterParameters()), 0.0,
                   loop.rate_loop_step(W, ZETA), np.zeros((1, len(t))), out)
     return out['miss'][0, -1]

@@ -12,8 +12,10 @@ import numpy as np
 
 from pedestal_analysis.results.results import row
 from pedestal_bringup.graph import graph
+from pedestal_bringup.graph.start import Outcome
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
+from pedestal_common.quantities import Floats, Row, Seconds
 from pedestal_recording import bag
 from pedestal_studies.bench.table import show
 
@@ -22,21 +24,21 @@ RUN_DURATION_S, LATENCY_DURATION_S = 15.0, 10.0
 """Simulated durations of a run of the graph in lockstep and in realtime [s]."""
 
 
-def graph_run(folder, number, pacing, seconds):
-    """Return (start.Outcome, bag folder) of a run of the demo scenario."""
+def graph_run(folder: str, number: int | str, pacing: str, seconds: Seconds) -> tuple[Outcome, pathlib.Path]:
+    """Return (outcome, bag folder) of a run of the demo scenario."""
     path = pathlib.Path(folder) / f'run-{number}'
     chosen = scenario.load('leo_pass', pacing=pacing, duration=seconds)
     return graph.run(Plan(chosen), path, contextlib.nullcontext(lambda seconds: None)), path
 
 
-def lap(folder, number):
+def lap(folder: str, number: int) -> tuple[float, float]:
     """Return the lap time [us] and the real-time factor of a run of the graph in lockstep."""
     drive = graph_run(folder, number, 'lockstep', RUN_DURATION_S)[0].drive
     return drive['wall_s'] / drive['steps'] * 1e6, drive['realtime_factor']
 
 
-def latencies(path):
-    """Return the latencies (n,) [s] of the graph in a bag, by the wall clock.
+def latencies(path: pathlib.Path) -> Floats:
+    """Return the latencies [s] of the graph in a bag, by the wall clock.
 
     A latency is the time from the publication of joint_states to the publication of the acu/rate_command with the same
     stamp.
@@ -47,7 +49,7 @@ def latencies(path):
                      for stamp, published in sent['acu/rate_command'].items() if stamp in sent['joint_states']])
 
 
-def run():
+def run() -> list[Row]:
     """Print the table and return its rows."""
     with tempfile.TemporaryDirectory() as folder:
         laps, factors = zip(*(lap(folder, number) for number in range(ROUND_COUNT)))

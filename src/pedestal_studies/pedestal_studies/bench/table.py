@@ -1,11 +1,14 @@
 """Functions that print the rows of a benchmark and time a function."""
 import time
+from collections.abc import Callable, Iterable
 
 from rich.console import Console
 from rich.table import Table
 
+from pedestal_common.quantities import Row, Seconds
 
-def show(title, rows):
+
+def show(title: str, rows: Iterable[Row]) -> None:
     """Print rows of results.row as a table."""
     table = Table(title=title, title_justify='left')
     for column in ('case', 'metric', 'value', 'unit', 'target'):
@@ -15,8 +18,8 @@ def show(title, rows):
     Console().print(table)
 
 
-def best_of(function, repeats=5):
-    """Return the shortest wall time [s] of several calls."""
+def best_of(function: Callable[[], object], repeats: int = 5) -> Seconds:
+    """Return the shortest wall time of several calls."""
     times = []
     for _ in range(repeats):
         begun = time.perf_counter()

@@ -18,15 +18,20 @@ The metrics fight_torque_... are the opposing torque of the motors beyond the co
 import math
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import cases
 from pedestal_analysis.trials.cases import Case
+from pedestal_analysis.trials.monte_carlo import Progress
+from pedestal_bringup.loop.closed_loop import Run
+from pedestal_common.quantities import Floats, Json, NewtonMeters, Radians, RadiansPerSecond, Row, Seconds, Times
 from pedestal_studies import drawing, metrics
 from pedestal_studies.p000_ma import servo
-from pedestal_studies.result import Result
+from pedestal_studies.p000_ma.servo import Runs
+from pedestal_studies.result import Drawings, Metrics, Result
 
 STANDSTILL_START_S = 2.0  # time after a step from which the standstill is evaluated [s]
 REVERSAL_AMPLITUDE_RAD = 0.05  # amplitude of the sine of the reversals [rad]
@@ -38,8 +43,9 @@ The slow sine shows the lash alone. The fast sine has a peak rate of 0.2 rad/s, 
 """
 
 
-def bias(schedule, torque=12.0, hold=14.0, out=45.0):
-    """Return the parameters of a schedule of the bias torque; torques of one motor [Nm].
+def bias(schedule: str, torque: NewtonMeters = 12.0, hold: NewtonMeters = 14.0,
+         out: NewtonMeters = 45.0) -> dict[str, Json]:
+    """Return the parameters of a schedule of the bias torque; torques of one motor.
 
     torque: full bias torque; hold: demand up to which it is full; out: demand at which it is 0.
     """
@@ -72,7 +78,7 @@ METRIC_TARGETS = {
 """{(case, metric): target}."""
 
 
-def reversal_case(kind, name):
+def reversal_case(kind: str, name: str) -> Case:
     """Return the Case of three periods of a sine.
 
     kind: key of REVERSAL_FREQUENCIES_RAD_S; name: key of PAPER_CASES.
@@ -88,16 +94,16 @@ FAST_STEP_PARAMETERS = {**servo.FULL_TORQUE_PARAMETERS, 'acu.azimuth.shaper.acce
 MOVE_DURATION_S = 0.5  # time at which the step of the cases SPEED_LOOP_STRUCTURES is over [s]
 
 
-def standstill(record):
-    """Return (times [s], load angle [rad]) from STANDSTILL_START_S on; record: a closed_loop.Run, here and below."""
+def standstill(record: Run) -> tuple[Times, Floats]:
+    """Return (times, load angle [rad]) from STANDSTILL_START_S on."""
     late = record.t >= STANDSTILL_START_S
     return record.t[late], record['adu/truth']['position'][late, 0]
 
 
-def steady_residual(record, amplitude, w):
-    """Return (times [s], error [rad] without its part at the frequency of the sine), each (n,), of a sine run.
+def steady_residual(record: Run, amplitude: Radians, w: RadiansPerSecond) -> tuple[Times, Floats]:
+    """Return (times, error [rad] without its part at the frequency of the sine) of a sine run.
 
-    amplitude [rad], w [rad/s]: of the sine. Only whole periods after the first are evaluated.
+    amplitude, w: of the sine. Only whole periods after the first are evaluated.
     """
     t, period = record.t, 2.0 * math.pi / w
     error = amplitude * np.sin(w * t) - record['adu/truth']['position'][:, 0]
@@ -105,13 +111,13 @@ def steady_residual(record, amplitude, w):
     return t[steady], metrics.residual(t[steady], error[steady], period)
 
 
-def opposing_torque(record):
+def opposing_torque(record: Run) -> Floats:
     """Return the torque (n,) [Nm] with which the motors oppose each other beyond the commanded bias."""
     motors = record['adu/motor_states']['effort'][:, :2]
     return 0.5 * (motors[:, 0] - motors[:, 1]) - record.truth['bias'][:, 0]
 
 
-def synchronism_error(record):
+def synchronism_error(record: Run) -> Floats:
     """Return the measured speed of motor 1 minus that of motor 2 (n,) [rad/s]."""
     return record['adu/motor_states']['velocity'][:, 0] - record['adu/motor_states']['velocity'][:, 1]
 
@@ -132,8 +138,8 @@ and a step with each of SPEED_LOOP_STRUCTURES.
 """
 
 
-def measured(kind, name, record):
-    """Return {metric: (value, unit)} of one record (closed_loop.Run) of CASES; kind, name: its key there."""
+def measured(kind: str, name: str, record: Run) -> Metrics:
+    """Return the metrics of the run of one of CASES; kind, name: its key there."""
     if kind == 'standstill':
         _, angle = standstill(record)
         return {'standstill_peak_to_peak_rad': (np.ptp(angle), 'rad')}
@@ -153,8 +159,8 @@ def measured(kind, name, record):
             'move_synchronism_error_rms_rad_s': (tracking.rms(synchronism_error(record)[moving]), 'rad/s')}
 
 
-def rows(done):
-    """Return the rows of the records {(kind, case): closed_loop.Run} of some or all CASES."""
+def rows(done: Runs) -> list[Row]:
+    """Return the rows of the runs of some or all CASES."""
     table = []
     for (kind, name), record in done.items():
         values = measured(kind, name, record)
@@ -168,7 +174,7 @@ def rows(done):
     return table
 
 
-def run(progress) -> Result:
+def run(progress: Progress) -> Result:
     """Run all CASES."""
     done = {}
     for i, (key, case) in enumerate(CASES.items()):
@@ -177,8 +183,8 @@ def run(progress) -> Result:
     return Result(rows(done), figures(done), remarks(rows(done)))
 
 
-def remarks(table):
-    """Return the sentences that explain the rows; table: those rows."""
+def remarks(table: list[Row]) -> list[str]:
+    """Return the sentences that explain the rows."""
     values = {(row['case'], row['metric']): row['value'] for row in table}
     slow, fast = REVERSAL_FREQUENCIES_RAD_S.values()
     return [
@@ -195,14 +201,14 @@ def remarks(table):
     ]
 
 
-def figures(done):
-    """Return {name: function that draws it} of the records of all cases."""
+def figures(done: Runs) -> Drawings:
+    """Return the figures of the runs of all cases."""
     return {'standstill': lambda: standstill_figure(done), 'reversal': lambda: reversal_figure(done),
             'torques': lambda: torques_figure(done), 'schedules': lambda: schedules_figure(done),
             'structures': lambda: structures_figure(done)}
 
 
-def standstill_figure(done):
+def standstill_figure(done: Runs) -> Figure:
     """Draw the limit cycle of the load at rest and the torque of both motors, without and with bias."""
     figure, axes = new_panels(2, 2, height=4.6, y=('azimuth [\N{MICRO SIGN}rad]', 'torque [Nm]'), sharex=True,
                               sharey='row')
@@ -217,7 +223,7 @@ def standstill_figure(done):
     return drawing.legend(figure)
 
 
-def reversal_figure(done):
+def reversal_figure(done: Runs) -> Figure:
     """Draw the effect of lash on a slow sine: reference, then the error without its part at the sine frequency."""
     error = 'error [\N{MICRO SIGN}rad]'
     figure, axes = new_panels(3, height=5.6, y=('reference [rad]', error, error), sharex=True,
@@ -233,14 +239,14 @@ def reversal_figure(done):
     return figure
 
 
-def reversal_window():
-    """Return (begin, end) [s] of the 3 s about the first reversal in the second period of the slow sine."""
+def reversal_window() -> tuple[Seconds, Seconds]:
+    """Return (begin, end) of the 3 s about the first reversal in the second period of the slow sine."""
     # The reversal is the first crest of this period.
     at = 1.25 * 2.0 * math.pi / REVERSAL_FREQUENCIES_RAD_S['reversal']
     return at - 1.0, at + 2.0
 
 
-def torques_figure(done):
+def torques_figure(done: Runs) -> Figure:
     """Draw the torque of both motors over the reversal, a panel for each of PAPER_CASES."""
     figure, axes = new_panels(len(PAPER_CASES), height=5.6, y='torque [Nm]', sharex=True, sharey=True)
     for panel, name in zip(axes[:, 0], PAPER_CASES):
@@ -251,7 +257,7 @@ def torques_figure(done):
     return drawing.legend(figure)
 
 
-def schedules_figure(done):
+def schedules_figure(done: Runs) -> Figure:
     """Draw for every schedule the residual of the sine and the overshoot of the fast step."""
     names = list(BIAS_SCHEDULES)
     sine = [1e6 * measured('sine', name, done['sine', name])['sine_residual_rad'][0] for name in names]
@@ -272,7 +278,7 @@ def schedules_figure(done):
     return figure
 
 
-def structures_figure(done):
+def structures_figure(done: Runs) -> Figure:
     """Draw one speed loop on the mean speed beside a speed loop for each motor, over the step of the paper."""
     figure, axes = new_panels(2, 2, height=4.6, y=('torque [Nm]', 'opposing torque [Nm]'), sharex=True, sharey='row')
     for column, name in enumerate(SPEED_LOOP_STRUCTURES):

@@ -12,8 +12,11 @@ elasticity cause the difference between the design and the measurement. The open
 import dataclasses
 import functools
 import math
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from acu_tracker.params import AcuParameters
 from adu_drive.params import AduParameters
@@ -27,14 +30,20 @@ from pedestal_analysis.report.figures import (
     new_panels,
 )
 from pedestal_analysis.results.intervals import row
+from pedestal_analysis.trials.cases import Case
+from pedestal_analysis.trials.monte_carlo import Progress
 from pedestal_analysis.tuning import frequency_response as frequency
+from pedestal_analysis.tuning.frequency_response import Response
 from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Complexes, Floats, Row
 from pedestal_studies import drawing
 from pedestal_studies.p000_ma import servo
-from pedestal_studies.result import Result
+from pedestal_studies.result import Drawings, Result
+
+Design: TypeAlias = Callable[[Complexes], Complexes]    # function of s that returns the open loop of the design
 
 
-def controller(name):
+def controller(name: str) -> Case:
     """Return the Case of scenario leo_pass in which both axes have the position controller of this name."""
     return frequency.case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
 
@@ -70,28 +79,28 @@ MAX_DRAWN_DEVIATION = 0.2
 """Relative standard deviation of a measured response above which a frequency is not drawn [-]."""
 
 
-def nonlinearity(measured, smaller):
+def nonlinearity(measured: Response, smaller: Response) -> float:
     """Return the largest relative change of L between two excitations, within MARGIN_BAND_FACTOR.
 
-    measured, smaller: Responses to the larger and to the smaller excitation.
+    measured, smaller: responses to the larger and to the smaller excitation.
     """
     change = np.abs(smaller.open_loop / measured.open_loop - 1.0)
     return float(change[np.abs(np.log(np.abs(measured.open_loop))) < math.log(MARGIN_BAND_FACTOR)].max())
 
 
-def rows(responses):
-    """Return the rows of the margins; responses: {name of a loop: Response}."""
+def rows(responses: Mapping[str, Response]) -> list[Row]:
+    """Return the rows of the margins of {name of a loop: response}."""
     return [row(name, metric, value, unit) for name, measured in responses.items()
             for metric, (value, unit) in frequency.margins(measured).items()]
 
 
-def without_gain_margin(responses):
-    """Return a line on the loops of {name: Response} that have no gain margin in the measured band."""
+def without_gain_margin(responses: Mapping[str, Response]) -> list[str]:
+    """Return a line on the loops of {name: response} that have no gain margin in the measured band."""
     return frequency.without_gain_margin([name for name, measured in responses.items()
                                           if math.isnan(frequency.margins(measured)['gain_margin_db'][0])])
 
 
-def run(progress) -> Result:
+def run(progress: Progress) -> Result:
     """Measure all loops, each with full and with half excitation to test that it is linear."""
     drive = AduParameters()
     parts = {'current loops': (functools.partial(frequency.current, drive), frequency.CURRENT_SWEEP),
@@ -112,14 +121,15 @@ def run(progress) -> Result:
     return Result(rows(responses), drawings(responses, drive), remarks)
 
 
-def drawings(responses, drive):
-    """Return {name: function that draws a Figure}; responses as of `rows`; drive: AduParameters."""
+def drawings(responses: Mapping[str, Response], drive: AduParameters) -> Drawings:
+    """Return the figures; responses as of `rows`."""
     p, c = drive.azimuth, AcuParameters().azimuth.feedforward
     w_c = 2.0 * math.pi * p.current_loop.bandwidth
     # At its shaft, each of the two motors moves its own inertia and half of the load.
     J = p.motor_1.inertia + 0.5 * p.load.inertia / p.gear_train.ratio ** 2
 
-    def chosen(title, curves, design=None):
+    def chosen(title: str, curves: Mapping[str, tuple[str, str]],
+               design: Design | None = None) -> Callable[[], Figure]:
         measured = {label: (responses[name], colour) for label, (name, colour) in curves.items()}
         return lambda: bode_figure(title, measured, design)
 
@@ -146,21 +156,21 @@ def drawings(responses, drive):
                          'best': ('position/azimuth/best', FILTERED_COLOUR)})}
 
 
-def decibel(x):
-    """Return the magnitude [dB] of x (n,) complex."""
+def decibel(x: Complexes) -> Floats:
+    """Return the magnitude [dB] of x."""
     return 20.0 * np.log10(np.abs(x))
 
 
-def degrees(x):
-    """Return the phase (n,) [deg] without jumps, the first in (-360, 0]."""
+def degrees(x: Complexes) -> Floats:
+    """Return the phase [deg] without jumps, the first in (-360, 0]."""
     phase = np.degrees(np.unwrap(np.angle(x)))
     return phase - 360.0 * math.ceil(phase[0] / 360.0)
 
 
-def bode_figure(title, curves, design):
+def bode_figure(title: str, curves: Mapping[str, tuple[Response, str]], design: Design | None) -> Figure:
     """Draw Bode diagrams of the open and the closed loop.
 
-    curves: {label: (Response, colour)}. design: function of s that returns the open loop of the design, or None.
+    curves: {label: (response, colour)}.
     Crosses mark the crossover in gain and phase, and the legend gives the margins. The first of two or more curves is
     drawn wide, so that it remains visible behind a curve that coincides with it.
     """
@@ -170,7 +180,7 @@ def bode_figure(title, curves, design):
         gain, phase = axes[:, column]
         if design:
             f = next(iter(curves.values()))[0].frequency
-            L = design(2j * math.pi * f)
+            L = design(2j * math.pi * f.astype(complex))
             x = L / (1.0 + L) if column else L
             gain.semilogx(f, decibel(x), color=INK_COLOUR, lw=0.8, ls='--', label='as designed')
             phase.semilogx(f, degrees(x), color=INK_COLOUR, lw=0.8, ls='--')
@@ -197,8 +207,8 @@ def bode_figure(title, curves, design):
     return drawing.legend(figure)
 
 
-def margin_text(measured):
-    """Return the gain and phase margin of a Response in words, for a legend."""
+def margin_text(measured: Response) -> str:
+    """Return the gain and phase margin of a response in words, for a legend."""
     gain, phase = (frequency.margins(measured)[name][0] for name in ('gain_margin_db', 'phase_margin_deg'))
     parts = [f'{value:.0f} {unit}' for value, unit in ((gain, 'dB'), (phase, 'deg')) if math.isfinite(value)]
     return f'margins {", ".join(parts)}' if parts else 'no margin in the band'

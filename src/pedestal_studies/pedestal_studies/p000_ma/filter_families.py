@@ -16,19 +16,27 @@ imm                default filter of the product, without tuning
 angle_ratio_to_kalman, rate_ratio_to_kalman   rms error divided by that of kalman, in the run of equal noise
 """
 import math
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.monte_carlo import Pool, Progress
 from pedestal_analysis.tuning import parameter_search
+from pedestal_common.quantities import Pairs, Row
 from pedestal_studies import ensemble, profiles
 from pedestal_studies.p000_ma import window_filter
 from pedestal_studies.result import Result
 from pedestal_studies.system import filters
+
+Window: TypeAlias = tuple[int, int]     # parameters of least squares: number of measurements, degree
+Tuned: TypeAlias = tuple[str, FilterParameters | Window]    # a filter and its parameters
 
 DEFAULT_RUNS, BATCH_RUNS = 100, 25  # runs of each case; runs that one worker makes at a time
 NOISE = filters.NOISE_CASES[filters.SHOWN_NOISE]  # noise of the measured angle
@@ -55,16 +63,13 @@ MEAN_MOTION = 'all'  # MOTION of the geometric mean over all motions
 UNITS = {'angle': 'deg', 'rate': 'deg/s'}
 
 
-def errors(tuned, motion, seed, first, count):
-    """Return the rms errors of angle [rad] and rate [rad/s] of every run, an array (count, 2), after the window.
-
-    tuned: (filter, parameters), where the parameters are FilterParameters, or (window, degree) for least_squares.
-    """
+def errors(tuned: Tuned, motion: str, seed: int, first: int, count: int) -> Pairs:
+    """Return the rms errors of angle [rad] and rate [rad/s] of every run, after the window."""
     name, params = tuned
     t = filters.times()
     truth = profiles.truth(motion, t)
     measured = ensemble.records(truth, NOISE, seed, first, count)
-    if name == 'least_squares':
+    if isinstance(params, tuple):
         estimated = window_filter.estimates(window_filter.least_squares(*params), measured[0])
     elif name == 'wiener':
         estimated = window_filter.estimates(window_filter.wiener(WINDOW_STEPS, params.singer.alpha,
@@ -75,14 +80,14 @@ def errors(tuned, motion, seed, first, count):
     return np.column_stack([tracking.rms((estimated[i] - truth[i])[:, WINDOW_STEPS:], axis=1) for i in range(2)])
 
 
-def tune(item):
-    """Return (filter, parameters) of an item (filter, motions), tuned on the records of filters.TUNING_SEED.
+def tune(item: tuple[str, tuple[str, ...]]) -> Tuned:
+    """Return the tuned filter of an item (filter, motions), tuned on the records of filters.TUNING_SEED.
 
     The criterion is the geometric mean over the motions of the rms error of the angle.
     """
     name, motions = item
 
-    def criterion(params):
+    def criterion(params: FilterParameters | Window) -> float:
         return math.exp(np.mean([math.log(tracking.rms(errors(
             (name, params), motion, filters.TUNING_SEED, 0, filters.TUNING_RUNS)[:, 0])) for motion in motions]))
 
@@ -91,13 +96,14 @@ def tune(item):
     return name, parameter_search.tuned(FilterParameters(kind=KALMAN_KINDS[name]), criterion)[0]
 
 
-def batch(item):
-    """Return the errors [deg, deg/s] of every run (count, 2) of an item ((motion, tuned), first run, runs)."""
+def batch(item: tuple[tuple[str, Tuned], int, int]) -> Pairs:
+    """Return the errors [deg, deg/s] of every run of an item ((motion, tuned), first run, runs)."""
     (motion, tuned), first, count = item
     return np.degrees(errors(tuned, motion, filters.NOISE_SEED, first, count))
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None, motions=profiles.PROFILES) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
+        motions: Sequence[str] = profiles.PROFILES) -> Result:
     """Tune all filters and run them `runs` times; pool: monte_carlo.Pool, None for this process.
 
     motions: names of profiles.
@@ -121,8 +127,8 @@ def run(progress, runs=DEFAULT_RUNS, pool=None, motions=profiles.PROFILES) -> Re
                   [r for r in table if r['case'].startswith(f'{MEAN_MOTION}/')])
 
 
-def rows(values):
-    """Return the rows of {(motion, filter, tuning): errors [deg, deg/s] of every run (runs, 2)}."""
+def rows(values: Mapping[tuple[str, str, str], Pairs]) -> list[Row]:
+    """Return the rows of {(motion, filter, tuning): errors [deg, deg/s] of every run}."""
     table = []
     for (motion, name, tuning), of_case in values.items():
         case, kalman = f'{motion}/{name}/{tuning}', values[motion, 'kalman', tuning]
@@ -133,10 +139,10 @@ def rows(values):
     return table
 
 
-def remarks(found, runs):
-    """Return the sentences that explain the rows; found: {(filter, motions): (filter, parameters)}."""
-    tuned = ', '.join(f'{motions[0]} {n} measurements, degree {degree}' for (name, motions), (_, params)
-                      in found.items() if name == 'least_squares' and len(motions) == 1
+def remarks(found: Mapping[tuple[str, tuple[str, ...]], Tuned], runs: int) -> list[str]:
+    """Return the sentences that explain the rows; found: {(filter, motions): tuned filter}."""
+    tuned = ', '.join(f'{motions[0]} {n} measurements, degree {degree}' for (_, motions), (_, params)
+                      in found.items() if isinstance(params, tuple) and len(motions) == 1
                       for n, degree in [params])
     return [
         f'{runs} runs of each case, evaluated from {WINDOW_STEPS * ensemble.MEASUREMENT_PERIOD_S:g} s on, when every '
@@ -148,7 +154,7 @@ def remarks(found, runs):
         'clearly smaller error.']
 
 
-def ratio_figure(table, motions):
+def ratio_figure(table: list[Row], motions: Sequence[str]) -> Figure:
     """Draw the error of every filter over that of kalman, a panel for each tuning; motions: names of profiles."""
     value = {(r['case'], r['metric']): r['value'] for r in table}
     figure, axes = new_panels(1, 2, x='rms error of the angle over that of kalman', height=3.8, sharey=True)

@@ -15,9 +15,13 @@ adrc                 active disturbance rejection control (ADRC)
 """
 import functools
 import math
+from collections.abc import Callable, Iterable
+from typing import TypeAlias
 
 import numpy as np
+from matplotlib.figure import Figure
 
+from adu_drive.params import AduParameters
 from pedestal_analysis.report.figures import (
     FILTERED_COLOUR,
     INK_COLOUR,
@@ -31,8 +35,13 @@ from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import cases
 from pedestal_analysis.trials.cases import Case
+from pedestal_analysis.trials.monte_carlo import Progress
+from pedestal_bringup.loop.closed_loop import Run
+from pedestal_common.quantities import Floats, Json, Radians, RadiansPerSecond, Row, Seconds
 from pedestal_studies import drawing, metrics
-from pedestal_studies.result import Result
+from pedestal_studies.result import Drawings, Result
+
+Runs: TypeAlias = dict[tuple[str, str], Run]    # {(case, kind of run): its run}
 
 STEP_SIZE_RAD = 0.174  # step of figure 5 [rad]
 SINE_AMPLITUDE_RAD = 0.87  # amplitude of figure 6 [rad]
@@ -89,7 +98,7 @@ ADRC_PARAMETERS = {**DRIVE_PARAMETERS, **SHAPER_PARAMETERS, 'adu.azimuth.speed_l
                    'adu.azimuth.speed_loop.integral': 200.0, 'acu.azimuth.controller': 'adrc'}
 """ADRC, and the speed loop for which it was designed. The observer of the ADRC replaces the observer of the drive."""
 
-CASE_PARAMETERS = {
+CASE_PARAMETERS: dict[str, dict[str, Json]] = {
     'paper-r1': PAPER_R1_PARAMETERS, 'paper-r2': PAPER_R2_PARAMETERS, 'paper-all': PAPER_ALL_PARAMETERS,
     'best': BEST_PARAMETERS,
     'best-inertia-plus': {**BEST_PARAMETERS, 'adu.azimuth.load.inertia': 252.0},
@@ -119,39 +128,39 @@ PAPER_VALUES = {'step_overshoot_percent': 12.0, 'step_settling_2percent_s': 0.2,
 SUFFIX_UNITS = {'percent': '%', 's': 's', 'rad': 'rad', 'crossings': ''}  # {last word of a metric: unit}
 
 
-def step_case(name):
+def step_case(name: str) -> Case:
     """Return the Case of the step of figure 5 with the parameters of CASE_PARAMETERS[name]."""
     return Case(name, 'servo_step', CASE_PARAMETERS[name])
 
 
-def sine_case(name, reading):
+def sine_case(name: str, reading: str) -> Case:
     """Return the Case of SINE_PERIODS periods of the paper's sine; reading: key of SINE_READINGS."""
     return cases.sine_case(Case(name, 'servo_sine', CASE_PARAMETERS[name]), SINE_FREQUENCIES_RAD_S[reading],
                            SINE_PERIODS)
 
 
-def gust_case(name, **more):
+def gust_case(name: str, **more: Json) -> Case:
     """Return the Case of an axis at rest with a step of wind torque; more: further parameters."""
     return Case(name, 'servo_step', {**CASE_PARAMETERS[name], 'acu.azimuth.preset': 0.0, 'adu.wind.gust.kind': 'step',
                                      'adu.wind.gust.azimuth': GUST_TORQUE_NM, 'adu.wind.gust.start': GUST_START_S,
                                      **more})
 
 
-def step_metrics(record):
-    """Return {metric: value} of a closed_loop.Run of a step."""
+def step_metrics(record: Run) -> dict[str, float]:
+    """Return {metric: value} of the run of a step."""
     t, y = record.t, record['adu/truth']['position'][:, 0]
     return {'step_overshoot_percent': metrics.overshoot_percent(y, STEP_SIZE_RAD),
             'step_settling_2percent_s': metrics.settling_time(t, y, STEP_SIZE_RAD, SETTLING_BAND),
             'step_crossings': metrics.crossings(y, STEP_SIZE_RAD)}
 
 
-def sine_error(record, w):
-    """Return the sine of figure 6 at w [rad/s] minus the true load angle (n,) [rad]."""
+def sine_error(record: Run, w: RadiansPerSecond) -> Floats:
+    """Return the sine of figure 6 at w minus the true load angle (n,) [rad]."""
     return SINE_AMPLITUDE_RAD * np.sin(w * record.t) - record['adu/truth']['position'][:, 0]
 
 
-def sine_metrics(record, reading):
-    """Return {metric: value} of a closed_loop.Run of one of SINE_READINGS of the sine."""
+def sine_metrics(record: Run, reading: str) -> dict[str, float]:
+    """Return {metric: value} of a run of one of SINE_READINGS of the sine."""
     w = SINE_FREQUENCIES_RAD_S[reading]
     t, error, period = record.t, sine_error(record, w), 2.0 * math.pi / w
     steady = metrics.whole_periods(t, period, period)
@@ -165,8 +174,8 @@ def sine_metrics(record, reading):
             f'sine_{reading}_start_error_rad': metrics.peak(error[t < period])}
 
 
-def gust_metrics(record):
-    """Return {metric: value} of a closed_loop.Run of a gust."""
+def gust_metrics(record: Run) -> dict[str, float]:
+    """Return {metric: value} of the run of a gust."""
     t, y = record.t, record['adu/truth']['position'][:, 0]
     return {'gust_1000nm_peak_rad': metrics.peak(y[t >= GUST_START_S] - y[t < GUST_START_S][-1])}
 
@@ -181,8 +190,8 @@ CASE_RUNS = {
 """{case: kinds of its runs}: step, sine of one reading, gust."""
 
 
-def records(cases, progress):
-    """Return {(case, kind of run): closed_loop.Run} of the named cases."""
+def records(cases: Iterable[str], progress: Progress) -> Runs:
+    """Run the named cases."""
     wanted = [(name, kind) for name in cases for kind in CASE_RUNS[name]]
     done = {}
     for i, (name, kind) in enumerate(wanted):
@@ -192,23 +201,24 @@ def records(cases, progress):
     return done
 
 
-RUN_METRICS = {'step': step_metrics, 'gust': gust_metrics,
-               **{reading: functools.partial(sine_metrics, reading=reading) for reading in SINE_FREQUENCIES_RAD_S}}
-"""{kind of run: function that returns {metric: value} of its closed_loop.Run}."""
+RUN_METRICS: dict[str, Callable[[Run], dict[str, float]]] = {
+    'step': step_metrics, 'gust': gust_metrics,
+    **{reading: functools.partial(sine_metrics, reading=reading) for reading in SINE_FREQUENCIES_RAD_S}}
+"""{kind of run: function that returns {metric: value} of its run}."""
 
 
-def rows(done):
-    """Return the rows of the study; done: as `records` returns."""
+def rows(done: Runs) -> list[Row]:
+    """Return the rows of the study."""
     return [row(name, metric, value, SUFFIX_UNITS[metric.rpartition('_')[2]],
                 PAPER_VALUES.get(metric.removeprefix(f'sine_{kind}_')),
                 METRIC_TARGETS.get(name, {}).get(metric))
             for (name, kind), record in done.items() for metric, value in RUN_METRICS[kind](record).items()]
 
 
-def bang_bang(step, adu):
-    """Return (time of the whole move, time to its 2 % band) [s] of the fastest rest-to-rest move of the azimuth axis.
+def bang_bang(step: Radians, adu: AduParameters) -> tuple[Seconds, Seconds]:
+    """Return (time of the whole move, time to its 2 % band) of the fastest rest-to-rest move of the azimuth axis.
 
-    step: size of the move [rad]. adu: AduParameters. The motors have full torque forwards, then backwards. Coulomb
+    step: size of the move. The motors have full torque forwards, then backwards. Coulomb
     friction opposes the acceleration and supports the deceleration.
     """
     p = adu.azimuth
@@ -221,7 +231,7 @@ def bang_bang(step, adu):
     return whole, whole - math.sqrt(2.0 * SETTLING_BAND * step / down)
 
 
-def remarks(done):
+def remarks(done: Runs) -> list[str]:
     """Return the sentences that explain the rows, with the limits of the plant."""
     slow = step_metrics(done['paper-r2', 'step'])['step_settling_2percent_s']
     adu = step_case('best').loaded().node_parameters('adu')
@@ -254,13 +264,13 @@ CASE_COLOURS = {'paper-r1': TRUTH_COLOUR, 'paper-r2': RAW_COLOUR, 'best': FILTER
                 'best-inertia-plus': TRUTH_COLOUR, 'best-inertia-minus': MOTOR_1_COLOUR}
 
 
-def figures(done):
-    """Return {name: function that draws it} of the records of all cases."""
+def figures(done: Runs) -> Drawings:
+    """Return the figures of the runs of all cases."""
     return {'step': lambda: step_figure(done), 'sine': lambda: sine_figure(done), 'gust': lambda: gust_figure(done),
             'inertia': lambda: inertia_figure(done)}
 
 
-def step_figure(done):
+def step_figure(done: Runs) -> Figure:
     """Draw figure 5: the load's angle, and the torque of both motors below."""
     names = ('paper-r1', 'paper-r2', 'best')
     figure, axes = new_panels(4, height=8.0, y=('azimuth [rad]', *3 * ['torque [Nm]']), sharex=True,
@@ -279,7 +289,7 @@ def step_figure(done):
     return drawing.legend(figure)
 
 
-def sine_figure(done):
+def sine_figure(done: Runs) -> Figure:
     """Draw figure 6: reference and load, errors of the paper's controllers, and the error of best on its own scale."""
     figure, axes = new_panels(3, height=7.0, x='time [periods of the sine]', sharex=True, height_ratios=(1.4, 1.2, 1),
                               y=('azimuth [rad]', 'error [mrad]', 'error [\N{MICRO SIGN}rad]'))
@@ -303,7 +313,7 @@ def sine_figure(done):
     return drawing.legend(figure)
 
 
-def gust_figure(done):
+def gust_figure(done: Runs) -> Figure:
     """Draw the deflection of the load by the gust."""
     figure, axes = new_panels(1, height=3.4, y='deflection of the azimuth [\N{MICRO SIGN}rad]')
     axes = axes[0, 0]
@@ -320,7 +330,7 @@ def gust_figure(done):
     return drawing.legend(figure)
 
 
-def inertia_figure(done):
+def inertia_figure(done: Runs) -> Figure:
     """Draw the end of the step of best with 20 % more and 20 % less load inertia, and the torque of the motors."""
     figure, axes = new_panels(2, height=5.2, y=('azimuth - 0.174 rad [mrad]', 'torque [Nm]'), sharex=True)
     for name, label in (('best-inertia-minus', 'load 20 % lighter'), ('best', 'load as assumed'),
@@ -339,7 +349,7 @@ def inertia_figure(done):
     return drawing.legend(figure)
 
 
-def run(progress) -> Result:
+def run(progress: Progress) -> Result:
     """Run all CASE_PARAMETERS."""
     done = records(CASE_PARAMETERS, progress)
     return Result(rows(done), figures(done), remarks(done))

@@ -17,22 +17,23 @@ import numpy as np
 from scipy.linalg import solve, toeplitz
 from scipy.signal import fftconvolve
 
+from pedestal_common.quantities import Floats, Radians, RadiansPerSecond2
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
 
 
-def polynomial(n, degree):
+def polynomial(n: int, degree: int) -> Floats:
     """Return the columns (n, degree + 1) by which angle, rate and acceleration enter the measurements y_i."""
-    tau = T * np.arange(n)
+    tau = T * np.arange(n, dtype=float)
     return np.column_stack([np.ones(n), -tau, 0.5 * tau * tau][:degree + 1])
 
 
-def least_squares(n, degree):
+def least_squares(n: int, degree: int) -> Floats:
     """Return the weights (2, n) of angle and rate [1/s], newest first, of a polynomial over n measurements."""
-    return np.linalg.pinv(polynomial(n, degree))[:2]
+    return np.asarray(np.linalg.pinv(polynomial(n, degree))[:2], float)
 
 
-def displacement(n, alpha):
-    """Return the covariance (n, n) [s4] of d at the lags i T for sigma = 1; alpha [1/s]."""
+def displacement(n: int, alpha: float) -> Floats:
+    """Return the covariance (n, n) [s4] of d at the lags i T for sigma = 1."""
     covariance = toeplitz(np.exp(-alpha * T * np.arange(n)))     # of the accelerations in the middles of the intervals
     for _ in range(2):
         rate = T * np.cumsum(covariance, axis=0)
@@ -42,23 +43,23 @@ def displacement(n, alpha):
 
 
 @functools.lru_cache(maxsize=8)
-def wiener(n, alpha, sigma, noise):
+def wiener(n: int, alpha: float, sigma: RadiansPerSecond2, noise: Radians) -> Floats:
     """Return the weights (2, n) of angle and rate [1/s], newest first, of the Wiener filter over n measurements.
 
-    alpha [1/s], sigma [rad/s2]: of the acceleration. noise: standard deviation of a measurement [rad].
+    alpha [1/s], sigma: of the acceleration. noise: standard deviation of a measurement.
     """
     B = polynomial(n, degree=1)
     scaled = solve(sigma**2 * displacement(n, alpha) + noise**2 * np.eye(n), B, assume_a='pos')
     return np.linalg.solve(B.T @ scaled, scaled.T)
 
 
-def estimates(of, y):
-    """Return angle and rate (2, runs, m) of filtered measurements y (runs, m); of: weights (2, n).
+def estimates(weights: Floats, y: Floats) -> Floats:
+    """Return angle and rate (2, runs, m) of filtered measurements y (runs, m), with weights (2, n).
 
     The first n - 1 estimates lack measurements and are NaN.
     """
-    n = of.shape[1]
+    n = weights.shape[1]
     out = np.full((2, *y.shape), np.nan)
-    for i, line in enumerate(of):
+    for i, line in enumerate(weights):
         out[i, :, n - 1:] = fftconvolve(y, line[None], mode='valid', axes=1)
     return out

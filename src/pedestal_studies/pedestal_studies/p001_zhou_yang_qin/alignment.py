@@ -17,10 +17,12 @@ import dataclasses
 import functools
 import math
 import time
-import typing
-from collections import namedtuple
+from collections.abc import Callable, Mapping
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from pedestal_analysis.report.figures import (
     FILTERED_COLOUR,
@@ -34,11 +36,26 @@ from pedestal_analysis.report.figures import (
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import pseudo_values, row
 from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.monte_carlo import Pool, Progress
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import to_deck
 from pedestal_common.geometry.quaternion import product
+from pedestal_common.quantities import (
+    Degrees,
+    Floats,
+    Quaternion,
+    Quaternions,
+    Radians,
+    Records,
+    Row,
+    Seconds,
+    Vector3,
+    Vectors3,
+    Xyz,
+)
+from pedestal_common.record import Record
 from pedestal_studies import drawing
-from pedestal_studies.result import Result
+from pedestal_studies.result import Drawings, Result
 from ship_motion_sim import imu
 from ship_motion_sim.navigation import navigator
 from ship_motion_sim.params import (
@@ -104,54 +121,61 @@ SETTLED_AZIMUTH_ARCMIN = 12.0  # rms over the runs below which the azimuth count
 EVALUATION_TIMES_S = (100, 250, 300, 600)  # instants of the rows of the azimuth's rms [s]
 SWELL_EVALUATION_TIME_S = 200  # instant of the rows of the azimuth on swell [s]
 
-ALIGNMENT_ESTIMATE = np.dtype([('quaternion', 'f8', (4,)), ('azimuth_sigma', 'f8'), ('level_sigma', 'f8')])
-"""Attitude deck -> earth (x, y, z, w) of a navigator, and the 1 sigmas of azimuth and level that it states [rad]."""
+Method: TypeAlias = tuple[str, AlignmentParameters]     # method of alignment, and the parameters of the INS
 
-Sensors = namedtuple('Sensors', 'state constants ship inputs truth outputs')
-"""Records (1,) of an IMU on its ship.
 
-`state`, `constants`, `inputs`, `outputs`: of the module imu. `ship`, `truth`: constants and outputs of the module
-motion.
-"""
+class AlignmentEstimate(Record):
+    """Estimate of a navigator."""
+    quaternion: Quaternion      # attitude deck -> earth
+    azimuth_sigma: Radians      # 1 sigma of the azimuth that it states
+    level_sigma: Radians        # 1 sigma of the level that it states
 
-Increments = namedtuple('Increments', 'angle force attitude')
-"""Samples of an IMU in FLU, each over IMU_PERIOD_S: rotation `angle` (n, 3) [rad] and integral `force` (n, 3) of the
-specific force [m/s]. `attitude` (n, 4): true attitude at the end of each sample."""
+
+class Sensors(NamedTuple):
+    """Records (1,) of an IMU on its ship."""
+    state: Records      # imu.State
+    constants: Records  # imu.Constants
+    ship: Records       # motion.Constants
+    inputs: Records     # imu.Inputs
+    truth: Records      # motion.Truth
+    outputs: Records    # imu.Outputs
+
+
+class Increments(NamedTuple):
+    """Samples of an IMU in FLU, each over IMU_PERIOD_S."""
+    angle: Vectors3         # rotation [rad]
+    force: Vectors3         # integral of the specific force [m/s]
+    attitude: Quaternions   # true attitude at the end of each sample
 
 
 AZIMUTH_COLUMN, EAST_TILT_COLUMN, LEVEL_COLUMNS = 2, 0, slice(0, 2)
 """Columns of an error about east, north, up: the error of azimuth, the tilt about east, both level errors."""
 
 
-class Conditions(typing.NamedTuple):
-    """Conditions of a run: heading of the ship [deg]; misalignment a_x, a_y, a_z [rad]; biases of three gyros and
-    three accelerometers, as multiples of GYRO_BIAS_RAD_S and ACCELEROMETER_BIAS_M_S2."""
-    heading_deg: float
-    misalignment: np.ndarray
-    biases: np.ndarray
+class Conditions(NamedTuple):
+    """Conditions of a run."""
+    heading_deg: Degrees    # of the ship
+    misalignment: Vector3   # a_x, a_y, a_z [rad]
+    biases: Annotated[Floats, (6,)]     # of three gyros and three accelerometers, as multiples of GYRO_BIAS_RAD_S and
+    #                                     ACCELEROMETER_BIAS_M_S2
 
 
-class InformationLimit(typing.NamedTuple):
-    """1 sigma of azimuth and of level (n,) [rad] at the instants of the evaluation."""
-    azimuth: np.ndarray
-    level: np.ndarray
+class InformationLimit(NamedTuple):
+    """1 sigmas at the instants of the evaluation."""
+    azimuth: Floats     # [rad]
+    level: Floats       # [rad]
 
 
-class Sums(typing.NamedTuple):
-    """Sums over runs.
+class Sums(NamedTuple):
+    """Sums over runs."""
+    squares: Vectors3 | float = 0.0     # squared errors about east, north, up [rad2]
+    ratios: Floats | float = 0.0        # squared ratio of the error in azimuth to its 1 sigma
+    first: Vectors3 | None = None       # errors of the first run [rad], None if it is not among the runs
+    wall_time: Seconds = 0.0            # of the steps of the alignment law
+    steps: float = 0.0                  # number of these steps
+    runs: int = 0                       # number of runs
 
-    `squares` (n, 3): squared errors about east, north, up [rad2]. `ratios` (n,): squared ratio of the error in azimuth
-    to its 1 sigma. `first` (n, 3): errors of the first run [rad], None if it is not among the runs. `wall_time`,
-    `steps`: wall time [s] and number of the steps of the alignment law. `runs`: number of runs.
-    """
-    squares: np.ndarray | float = 0.0
-    ratios: np.ndarray | float = 0.0
-    first: np.ndarray | None = None
-    wall_time: float = 0.0
-    steps: float = 0.0
-    runs: int = 0
-
-    def plus(self, more):
+    def plus(self, more: 'Sums') -> 'Sums':
         """Return the sum of these and more Sums."""
         return Sums(self.squares + more.squares, self.ratios + more.ratios,
                     more.first if self.first is None else self.first, self.wall_time + more.wall_time,
@@ -165,60 +189,66 @@ intervals of statistics over all runs."""
 
 @dataclasses.dataclass(frozen=True)
 class Accuracy:
-    """Accuracy of a method; parts: list of Sums, one for each part of its runs."""
-    parts: list
+    """Accuracy of a method."""
+    parts: list[Sums]   # one for each part of its runs
 
     @functools.cached_property
-    def whole(self):
+    def whole(self) -> Sums:
         """Sums of all runs."""
         return functools.reduce(Sums.plus, self.parts)
 
     @property
-    def rms(self):
-        """Rms of the errors over the runs (n, 3) [arcmin]."""
+    def rms(self) -> Vectors3:
+        """Rms of the errors over the runs [arcmin]."""
         return np.sqrt(self.whole.squares / self.whole.runs) / ARCMIN_RAD
 
     @property
-    def azimuth(self):
+    def azimuth(self) -> Floats:
         """Rms of the error in azimuth over the runs (n,) [arcmin]."""
         return self.rms[:, AZIMUTH_COLUMN]
 
     @property
-    def level(self):
+    def level(self) -> float:
         """Rms of the level errors over the runs and the time from SHORT_RUN_DURATION_S on [arcmin]."""
         return tracking.rms(self.rms[round(SHORT_RUN_DURATION_S / EVALUATION_PERIOD_S):, LEVEL_COLUMNS])
 
     @property
-    def ratio(self):
+    def first(self) -> Vectors3:
+        """Errors of the first run [rad]."""
+        assert self.whole.first is not None
+        return self.whole.first
+
+    @property
+    def ratio(self) -> Floats:
         """Rms over the runs of the ratio (n,) of the azimuth error to the 1 sigma that the navigator states."""
         return np.sqrt(self.whole.ratios / self.whole.runs)
 
     @property
-    def step_us(self):
+    def step_us(self) -> float:
         """Wall time of a step of the alignment law [us]."""
         return 1e6 * self.whole.wall_time / self.whole.steps
 
-    def over_parts(self, statistic):
-        """Return intervals.pseudo_values of a statistic, a function Accuracy -> number."""
+    def over_parts(self, statistic: Callable[['Accuracy'], float]) -> Floats:
+        """Return intervals.pseudo_values of a statistic."""
         return pseudo_values(self.parts, lambda parts: statistic(Accuracy(parts)))
 
 
 @dataclasses.dataclass(frozen=True)
 class Batch:
-    """Runs first ... first + count - 1 of a kind: '', 'swell' or 'quadrant-1' ... 'quadrant-4'."""
-    kind: str
+    """Runs first ... first + count - 1 of a kind."""
+    kind: str   # '', 'swell' or 'quadrant-1' ... 'quadrant-4'
     first: int
     count: int
 
     @property
-    def duration(self):
-        """Duration of its runs [s]."""
+    def duration(self) -> Seconds:
+        """Duration of its runs."""
         return SHORT_RUN_DURATION_S if self.kind else RUN_DURATION_S
 
 
 @compiled
-def simulate(sensors, normals, velocity, out):
-    """Simulate an IMU (Sensors) on its ship and fill the Increments `out`.
+def simulate(sensors: Sensors, normals: Floats, velocity: Vectors3, out: Increments) -> None:
+    """Simulate an IMU on its ship and fill `out`.
 
     normals: standard normal noise (n, IMU_NORMALS_PER_STEP). velocity (n + 1, 3): added to the velocity of the ship,
     ENU [m/s].
@@ -240,10 +270,11 @@ def simulate(sensors, normals, velocity, out):
 
 
 @compiled
-def align(state, constants, angle, force, dt, every, estimates):
-    """Run a navigator over increments angle, force (n, 3), each over dt [s].
+def align(state: Records, constants: Records, angle: Vectors3, force: Vectors3, dt: Seconds, every: int,
+          estimates: Records) -> None:
+    """Run a navigator over increments angle, force, each over dt.
 
-    After each block of `every` increments, its ALIGNMENT_ESTIMATE is written to the next record of `estimates`.
+    After each block of `every` increments, its AlignmentEstimate is written to the next record of `estimates`.
     """
     aid = np.zeros(3)
     for k in range(len(angle)):
@@ -255,14 +286,14 @@ def align(state, constants, angle, force, dt, every, estimates):
             out.azimuth_sigma, out.level_sigma = s.azimuth_sigma, s.level_sigma
 
 
-def quaternion(axis, angle):
-    """Return the quaternion (x, y, z, w) of a rotation by an angle [rad] about an axis of ENU (0, 1, 2)."""
+def quaternion(axis: int, angle: Radians) -> Quaternion:
+    """Return the quaternion (x, y, z, w) of a rotation by an angle about an axis of ENU (0, 1, 2)."""
     q = np.zeros(4)
     q[axis], q[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
     return q
 
 
-def misaligned(attitude, angles):
+def misaligned(attitude: Quaternion, angles: Vector3) -> Quaternion:
     """Return the attitude deck -> n' for a given attitude deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T.
 
     n: the ENU frame; n': the misaligned frame that the INS takes for ENU. angles: a_x, a_y, a_z [rad].
@@ -272,8 +303,8 @@ def misaligned(attitude, angles):
     return attitude
 
 
-def draw_conditions(batch, random):
-    """Return the Conditions of one run of a Batch; random: numpy Generator, here and below."""
+def draw_conditions(batch: Batch, random: np.random.Generator) -> Conditions:
+    """Return the conditions of one run of a batch."""
     if not batch.kind.startswith('quadrant'):
         # The paper's axes point to starboard and to the bow; our x points to the bow, our y to port. Therefore the
         # biases along our y are negative.
@@ -283,7 +314,7 @@ def draw_conditions(batch, random):
     return Conditions(random.uniform(0.0, 360.0), misalignment, random.standard_normal(6))
 
 
-def disturbance(batch, random, n):
+def disturbance(batch: Batch, random: np.random.Generator, n: int) -> Vectors3:
     """Return the velocity (n + 1, 3) of the white noise and the swell at the samples of the IMU, ENU [m/s]."""
     held = round(LAW_STEP_S / IMU_PERIOD_S)     # samples of the IMU for which a value of the white noise holds
     velocity = np.repeat(VELOCITY_NOISE_M_S * random.standard_normal((n // held + 1, 3)), held, axis=0)[:n + 1]
@@ -293,16 +324,18 @@ def disturbance(batch, random, n):
     return velocity
 
 
-def simulated_run(batch, run):
-    """Return (Increments, misaligned attitude (x, y, z, w) at 0 s) of one run of a batch."""
+def simulated_run(batch: Batch, run: int) -> tuple[Increments, Quaternion]:
+    """Return (samples, misaligned attitude at 0 s) of one run of a batch."""
     seed = {'': BASE_SEED, 'swell': SWELL_SEED}.get(batch.kind, QUADRANT_SEED)
     # The last character of the kind, its number, gives each quadrant a noise of its own; the kind '' has none.
     random = np.random.default_rng((seed, *batch.kind.encode()[-1:], run))
     conditions = draw_conditions(batch, random)
     biases = conditions.biases * np.repeat((GYRO_BIAS_RAD_S, ACCELEROMETER_BIAS_M_S2), 3)
+    gyro: Xyz = biases[0], biases[1], biases[2]
+    accelerometer: Xyz = biases[3], biases[4], biases[5]
     params = ShipMotionParameters(
         dataclasses.replace(SHIP_PARAMETERS, heading_deg=conditions.heading_deg),
-        ImuParameters(*biases[:3], GYRO_NOISE_DENSITY, *biases[3:], ACCELEROMETER_NOISE_DENSITY, gyro_scale=90e-6,
+        ImuParameters(*gyro, GYRO_NOISE_DENSITY, *accelerometer, ACCELEROMETER_NOISE_DENSITY, gyro_scale=90e-6,
                       accelerometer_scale=70e-6, output='increment'))
     ship, n = motion.constants(params.ship), round(batch.duration / IMU_PERIOD_S)
     ship['phase'][0, :4] = random.uniform(0.0, 2.0 * math.pi, 4)
@@ -316,8 +349,8 @@ def simulated_run(batch, run):
     return increments, start
 
 
-def errors(estimated, attitude):
-    """Return the errors (n, 3) about east, north, up [rad] of an estimated attitude (n, 4) against the true one.
+def errors(estimated: Quaternions, attitude: Quaternions) -> Vectors3:
+    """Return the errors about east, north, up [rad] of an estimated attitude against the true one.
 
     The errors are the rotation vector of the product: estimated attitude times inverse of the true attitude. A
     quaternion describes two rotations; the sign of w selects the shorter one.
@@ -328,19 +361,17 @@ def errors(estimated, attitude):
     return np.stack((x, y, z), axis=1) * (angle / np.where(size > 0.0, size, 1.0))[:, None]
 
 
-def align_batch(item):
-    """Return {case: Sums} of an item (Batch, cases), in which every case gets the same IMU samples.
-
-    cases: {case: (method, AlignmentParameters)}.
-    """
+def align_batch(item: tuple[Batch, Mapping[str, Method]]) -> dict[str, Sums]:
+    """Return {case: sums} of an item (batch, {case: method}), in which every case gets the same IMU samples."""
     batch, cases = item
     every, latitude = round(EVALUATION_PERIOD_S / IMU_PERIOD_S), math.radians(SHIP_PARAMETERS.latitude_deg)
-    n, sums = round(batch.duration / EVALUATION_PERIOD_S), {}
+    n = round(batch.duration / EVALUATION_PERIOD_S)
+    sums: dict[str, Sums] = {}
     for i in range(batch.count):
         (angle, force, attitude), start = simulated_run(batch, batch.first + i)
         for case, (method, params) in cases.items():
             constants = navigator.constants(params, method, 'none', latitude)
-            state, estimates = navigator.initial_state(constants, start), np.zeros(n, ALIGNMENT_ESTIMATE)
+            state, estimates = navigator.initial_state(constants, start), AlignmentEstimate.zeros(n)
             # This call compiles the law before the call that is timed.
             align(state.copy(), constants, angle[:2], force[:2], IMU_PERIOD_S, every, estimates)
             begun = time.perf_counter()
@@ -354,15 +385,15 @@ def align_batch(item):
     return sums
 
 
-def limit():
-    """Return the InformationLimit: the 1 sigmas that the method riccati_eso states for a motionless IMU without noise.
+def limit() -> InformationLimit:
+    """Return the 1 sigmas that the method riccati_eso states for a motionless IMU without noise.
 
     The covariance of riccati_eso depends on the assumed noises, not on the measurements. Noise and sway could only
     enlarge the 1 sigmas, because innovations larger than expected increase them.
     """
     constants = navigator.constants(INS_PARAMETERS, 'riccati_eso', 'none', math.radians(SHIP_PARAMETERS.latitude_deg))
     state, n = navigator.initial_state(constants, (0.0, 0.0, 0.0, 1.0)), round(RUN_DURATION_S / IMU_PERIOD_S)
-    estimates, still = np.zeros(round(RUN_DURATION_S / EVALUATION_PERIOD_S), ALIGNMENT_ESTIMATE), np.zeros((n, 3))
+    estimates, still = AlignmentEstimate.zeros(round(RUN_DURATION_S / EVALUATION_PERIOD_S)), np.zeros((n, 3))
     # A deck at rest turns with the earth, and its accelerometers measure the reaction to gravity.
     k = constants[0]['conditions']
     still_force = np.tile((0.0, 0.0, float(k['gravity']) * IMU_PERIOD_S), (n, 1))
@@ -371,17 +402,22 @@ def limit():
     return InformationLimit(estimates['azimuth_sigma'], estimates['level_sigma'])
 
 
-def settling_time(rms):
-    """Return the last time [s] at which an rms (n,) [arcmin] is above SETTLED_AZIMUTH_ARCMIN; NaN if it ends above."""
+def settling_time(rms: Floats) -> Seconds:
+    """Return the last time at which an rms (n,) [arcmin] is above SETTLED_AZIMUTH_ARCMIN; NaN if it ends above."""
     above = np.flatnonzero(rms > SETTLED_AZIMUTH_ARCMIN)
     if len(above) and above[-1] == len(rms) - 1:
         return math.nan
     return EVALUATION_PERIOD_S * (above[-1] + 1) if len(above) else 0.0
 
 
-def value_at(values, t):
-    """Return the value at t [s] of a series (n,) with a value every EVALUATION_PERIOD_S."""
+def value_at(values: Floats, t: Seconds) -> float:
+    """Return the value at t of a series (n,) with a value every EVALUATION_PERIOD_S."""
     return values[round(t / EVALUATION_PERIOD_S) - 1]
+
+
+def azimuth_at(t: Seconds, accuracy: Accuracy) -> float:
+    """Return the rms of the error in azimuth at t [arcmin]."""
+    return value_at(accuracy.azimuth, t)
 
 
 METRIC_TARGETS = {
@@ -397,9 +433,9 @@ PAPER_VALUES = {('classical', 'time_to_12arcmin_rms_s'): 420, ('adrc', 'time_to_
 """{(case, metric): number that the paper prints}."""
 
 
-KIND_METRICS: dict[str, dict[str, tuple]] = {
+KIND_METRICS: dict[str, dict[str, tuple[str, Callable[[Accuracy], float]]]] = {
     '': {'time_to_12arcmin_rms_s': ('s', lambda a: settling_time(a.azimuth)),
-         **{f'azimuth_rms_arcmin_{t}s': ('arcmin', lambda a, t=t: value_at(a.azimuth, t)) for t in EVALUATION_TIMES_S},
+         **{f'azimuth_rms_arcmin_{t}s': ('arcmin', functools.partial(azimuth_at, t)) for t in EVALUATION_TIMES_S},
          'level_rms_arcmin': ('arcmin', lambda a: a.level),
          'azimuth_error_over_sigma_300s': ('-', lambda a: value_at(a.ratio, 300))},
     'swell': {f'azimuth_rms_arcmin_{SWELL_EVALUATION_TIME_S}s': (
@@ -407,11 +443,11 @@ KIND_METRICS: dict[str, dict[str, tuple]] = {
               f'azimuth_error_over_sigma_{SWELL_EVALUATION_TIME_S}s': (
                   '-', lambda a: value_at(a.ratio, SWELL_EVALUATION_TIME_S))},
     'quadrant': {'azimuth_rms_arcmin_300s': ('arcmin', lambda a: value_at(a.azimuth, 300))}}
-"""{kind of runs: {metric: (unit, function Accuracy -> value)}}."""
+"""{kind of runs: {metric: (unit, function of an Accuracy)}}."""
 
 
-def rows(accuracy, bound):
-    """Return the rows of the study; accuracy: {kind of runs: {case: Accuracy}}; bound: InformationLimit."""
+def rows(accuracy: Mapping[str, Mapping[str, Accuracy]], bound: InformationLimit) -> list[Row]:
+    """Return the rows of the study; accuracy: {kind of runs: {case: accuracy}}."""
     table = []
     for kind, cases in accuracy.items():
         for method, a in cases.items():
@@ -427,7 +463,7 @@ def rows(accuracy, bound):
     return table + [row(case, 'step_us', a.step_us, 'us') for case, a in accuracy[''].items()]
 
 
-def remarks(runs):
+def remarks(runs: int) -> list[str]:
     """Return the sentences that explain the rows, after this number of runs."""
     return [
         f'{runs} runs. Every number is a statistic over all runs, such as an rms. Its interval comes from the '
@@ -440,7 +476,7 @@ def remarks(runs):
         'strapdown.']
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Align by every method, `runs` times; pool: monte_carlo.Pool, None for this process."""
     quarter = -(-runs // 4)     # a quarter of the runs, rounded up
     kinds = {'': runs, 'swell': runs, **{f'quadrant-{n}': quarter for n in range(1, 5)}}
@@ -450,11 +486,9 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     return Result(rows(accuracy, bound), figures(accuracy, bound), remarks(runs))
 
 
-def accuracies(kinds, cases, pool, progress):
-    """Return {kind of runs: {case: Accuracy}}.
-
-    kinds: {kind of runs: number of runs}; cases: {case: (method, AlignmentParameters)}; pool: monte_carlo.Pool.
-    """
+def accuracies(kinds: Mapping[str, int], cases: Mapping[str, Method], pool: Pool,
+               progress: Progress) -> dict[str, dict[str, Accuracy]]:
+    """Return {kind of runs: {case: accuracy}}; kinds: {kind of runs: number of runs}."""
     batches = [Batch(kind, *part) for kind, count in kinds.items() for part in monte_carlo.batches(count, BATCH_RUNS)]
     parts = {(kind, case): [Sums()] * min(JACKKNIFE_PARTS, -(-count // BATCH_RUNS))
              for kind, count in kinds.items() for case in cases}
@@ -466,8 +500,8 @@ def accuracies(kinds, cases, pool, progress):
     return {kind: {case: Accuracy(parts[kind, case]) for case in cases} for kind in kinds}
 
 
-def figures(accuracy, bound):
-    """Return {name: function that draws it}; arguments as of `rows`."""
+def figures(accuracy: Mapping[str, Mapping[str, Accuracy]], bound: InformationLimit) -> Drawings:
+    """Return the figures; arguments as of `rows`."""
     return {'azimuth': lambda: azimuth_figure(accuracy[''], bound), 'level': lambda: level_figure(accuracy[''], bound),
             'swell': lambda: swell_figure(accuracy['swell'], bound)}
 
@@ -475,13 +509,13 @@ def figures(accuracy, bound):
 RMS_LABEL = 'rms of the error [arcmin]'
 
 
-def azimuth_figure(accuracy, bound):
-    """Draw figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs, {case: Accuracy}."""
+def azimuth_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) -> Figure:
+    """Draw figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs."""
     figure, axes = new_panels(3, height=9.0, y=('azimuth error [deg]', 'azimuth error [arcmin]', RMS_LABEL))
     t = EVALUATION_PERIOD_S * np.arange(1, len(bound.azimuth) + 1)
     for case, a in accuracy.items():
-        axes[0, 0].plot(t, np.degrees(a.whole.first[:, AZIMUTH_COLUMN]), color=CASE_COLOURS[case], label=case)
-        axes[1, 0].plot(t, a.whole.first[:, AZIMUTH_COLUMN] / ARCMIN_RAD, color=CASE_COLOURS[case])
+        axes[0, 0].plot(t, np.degrees(a.first[:, AZIMUTH_COLUMN]), color=CASE_COLOURS[case], label=case)
+        axes[1, 0].plot(t, a.first[:, AZIMUTH_COLUMN] / ARCMIN_RAD, color=CASE_COLOURS[case])
         axes[2, 0].plot(t, a.azimuth, color=CASE_COLOURS[case], label=case)
     axes[0, 0].set_title('azimuth error of one run (figure 3 of the paper)')
     axes[1, 0].set_title('the same after 100 s (figure 4)')
@@ -491,7 +525,7 @@ def azimuth_figure(accuracy, bound):
     return drawing.legend(figure)
 
 
-def finish_panel(axes, bound, title):
+def finish_panel(axes: Axes, bound: Floats, title: str) -> None:
     """Add the limit, a logarithmic scale and a title to a panel of rms over time."""
     t = EVALUATION_PERIOD_S * np.arange(1, len(bound) + 1)
     axes.plot(t, bound / ARCMIN_RAD, color=INK_COLOUR, linestyle='--', linewidth=1.0, label='information limit')
@@ -499,12 +533,12 @@ def finish_panel(axes, bound, title):
     axes.set_title(title)
 
 
-def level_figure(accuracy, bound):
+def level_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) -> Figure:
     """Draw figure 4 of the paper for level: one run after 100 s; then the rms over all runs."""
     figure, axes = new_panels(2, height=6.4, y=('level error [arcmin]', RMS_LABEL))
     t = EVALUATION_PERIOD_S * np.arange(1, len(bound.level) + 1)
     for case, a in accuracy.items():
-        axes[0, 0].plot(t, a.whole.first[:, EAST_TILT_COLUMN] / ARCMIN_RAD, color=CASE_COLOURS[case], linewidth=0.8,
+        axes[0, 0].plot(t, a.first[:, EAST_TILT_COLUMN] / ARCMIN_RAD, color=CASE_COLOURS[case], linewidth=0.8,
                         label=case)
         axes[1, 0].plot(t, tracking.rms(a.rms[:, LEVEL_COLUMNS], axis=1), color=CASE_COLOURS[case], label=case)
     axes[0, 0].set_title('level error about east of one run (figure 4 of the paper)')
@@ -514,8 +548,8 @@ def level_figure(accuracy, bound):
     return drawing.legend(figure)
 
 
-def swell_figure(accuracy, bound):
-    """Draw the rms of the azimuth on swell, {case: Accuracy}, beside the limit."""
+def swell_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) -> Figure:
+    """Draw the rms of the azimuth on swell beside the limit."""
     figure, axes = new_panels(1, height=3.8, y=RMS_LABEL)
     for case, a in accuracy.items():
         axes[0, 0].plot(EVALUATION_PERIOD_S * np.arange(1, len(a.rms) + 1), a.azimuth, color=CASE_COLOURS[case],

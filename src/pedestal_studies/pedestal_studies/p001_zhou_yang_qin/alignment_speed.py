@@ -13,17 +13,27 @@ level_rms_arcmin         rms of the level from 300 s on
 azimuth_rms_arcmin_Ts    rms of the azimuth after T s
 """
 import dataclasses
+from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.monte_carlo import Pool, Progress
+from pedestal_common.quantities import Floats, Seconds
 from pedestal_studies import drawing, metrics
 from pedestal_studies.p001_zhou_yang_qin import alignment
-from pedestal_studies.p001_zhou_yang_qin.alignment import EVALUATION_PERIOD_S, INS_PARAMETERS, LEVEL_COLUMNS
+from pedestal_studies.p001_zhou_yang_qin.alignment import (
+    EVALUATION_PERIOD_S,
+    INS_PARAMETERS,
+    LEVEL_COLUMNS,
+    Accuracy,
+)
 from pedestal_studies.result import Result
+from ship_motion_sim.params import AlignmentParameters
 
 DEFAULT_RUNS = 100  # runs of each case
 SPEEDS = (0.5, 1.0, 2.0, 4.0)  # factors K by which the times of the method are divided [-]; 1: the default parameters
@@ -32,25 +42,25 @@ SETTLED_LEVEL_ARCMIN = 30.0
 """Rms over the runs below which the level counts as settled [arcmin], a sixth of the initial tilt of 3 deg."""
 
 
-def faster(speed):
-    """Return the AlignmentParameters whose method adrc has all its times divided by `speed` [-]."""
+def faster(speed: float) -> AlignmentParameters:
+    """Return the parameters whose method adrc has all its times divided by `speed` [-]."""
     adrc = INS_PARAMETERS.adrc
     return dataclasses.replace(INS_PARAMETERS, adrc=dataclasses.replace(
         adrc, observer=speed * adrc.observer, control=speed * adrc.control, start=adrc.start / speed))
 
 
-CASES = {f'adrc/{speed:g}': ('adrc', faster(speed)) for speed in SPEEDS}  # {case: (method, AlignmentParameters)}
+CASES = {f'adrc/{speed:g}': ('adrc', faster(speed)) for speed in SPEEDS}  # {case: method}
 
 
-def level_over_runs(accuracy):
-    """Return the rms of both level errors over the runs (n,) [arcmin] of an alignment.Accuracy."""
+def level_over_runs(accuracy: Accuracy) -> Floats:
+    """Return the rms of both level errors over the runs (n,) [arcmin]."""
     return tracking.rms(accuracy.rms[:, LEVEL_COLUMNS], axis=1)
 
 
-def level_settling(accuracy):
-    """Return the interpolated time [s] from which `level_over_runs` stays below SETTLED_LEVEL_ARCMIN, or NaN."""
+def level_settling(accuracy: Accuracy) -> Seconds:
+    """Return the interpolated time from which `level_over_runs` stays below SETTLED_LEVEL_ARCMIN, or NaN."""
     level = level_over_runs(accuracy)
-    return metrics.settling_time(EVALUATION_PERIOD_S * np.arange(1, len(level) + 1), 1.0 + level, 1.0,
+    return metrics.settling_time(EVALUATION_PERIOD_S * np.arange(1, len(level) + 1, dtype=float), 1.0 + level, 1.0,
                                  SETTLED_LEVEL_ARCMIN)
 
 
@@ -59,10 +69,10 @@ METRICS = {
     **{name: alignment.KIND_METRICS[''][name] for name in (
         'time_to_12arcmin_rms_s', 'azimuth_rms_arcmin_100s', 'azimuth_rms_arcmin_250s', 'level_rms_arcmin',
         'azimuth_rms_arcmin_600s')}}
-"""{metric: (unit, function Accuracy -> value)}."""
+"""{metric: (unit, function of an Accuracy)}."""
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Align with every case, `runs` times; pool: monte_carlo.Pool, None for this process."""
     accuracy = alignment.accuracies({'': runs}, CASES, pool or monte_carlo.Pool(1), progress)['']
     rows = [row(case, metric, a.over_parts(value), unit, runs=a.whole.runs)
@@ -74,8 +84,8 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
         'never settles, and the row has no value.'])
 
 
-def speed_figure(accuracy):
-    """Draw the rms of level and azimuth over the runs, {case: alignment.Accuracy}."""
+def speed_figure(accuracy: Mapping[str, Accuracy]) -> Figure:
+    """Draw the rms of level and azimuth over the runs."""
     figure, axes = new_panels(2, height=6.4, y=('level [arcmin]', 'azimuth [arcmin]'), sharex=True)
     for (case, a), shade in zip(accuracy.items(), np.linspace(0.3, 1.0, len(accuracy))):
         t = EVALUATION_PERIOD_S * np.arange(1, len(a.rms) + 1)

@@ -17,7 +17,7 @@ command with the stamp i h is in force from the interval that begins at i h + de
 """
 import dataclasses
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,8 @@ from acu_tracker.geometry import attitude as attitudes
 from acu_tracker.servo import beam_loop
 from adu_drive.array import electronic_beam
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Radians, Radians2, Records, Seconds
+from pedestal_common.record import Record
 from tracking_receiver_sim import monopulse, smoothing
 from tracking_receiver_sim.params import AntennaParameters, ReceiverParameters
 
@@ -44,67 +46,71 @@ SMOOTHING_SAMPLES = 20  # number n of samples in the smoothing S1 and S2, as in 
 FULL_SCALE_BEAMWIDTHS, K_M = ReceiverParameters().full_scale, AntennaParameters().slope
 """Full scale of the receiver [beamwidths], and slope of the difference pattern of its antenna [1/beamwidth]."""
 
-SMOOTHER_RECORD = np.dtype([('error', smoothing.Smoother.dtype)], align=True)
 
-Target = namedtuple('Target', 'angle attitude rate noise')
-"""Target and carrier, such as a ship, on the grid, each (n,).
+class Smoothers(Record):
+    """Smoother of the receiver."""
+    error: smoothing.Smoother
 
-`angle`: true angle of the target [rad]. `attitude`: part of the angle that the attitude of the carrier causes [rad],
-`rate`: rate of this part [rad/s]; both as the loop receives them. `noise`: noise of the samples [rad].
-"""
 
-Beam = namedtuple('Beam', 'state constants inputs outputs')
-"""Records (1,) of an electronic beam (adu_drive.array.electronic_beam), of which only the azimuth is used."""
+class Target(NamedTuple):
+    """Target and carrier, such as a ship, on the grid."""
+    angle: Floats       # true angle of the target [rad]
+    attitude: Floats    # part of it that the attitude of the carrier causes, as the loop receives it [rad]
+    rate: Floats        # rate of this part, as the loop receives it [rad/s]
+    noise: Floats       # of the samples [rad]
 
-Receiver = namedtuple('Receiver', 'slope beamwidth lost_power_ratio')
-"""Constants of a receiver.
 
-`slope`: true slope divided by assumed slope [-]. `beamwidth`: [rad], 0 for a linear receiver. `lost_power_ratio`: the
-signal is lost if its power, divided by the power on the axis of the beam, is below this number [-].
-"""
+class Beam(NamedTuple):
+    """Records (1,) of adu_drive.array.electronic_beam, of which only the azimuth is used."""
+    state: Records
+    constants: Records
+    inputs: Records
+    outputs: Records
 
-PaperLoopConstants = namedtuple('PaperLoopConstants', 'form alpha period delta smoothing')
-"""Constants of a PaperLoop.
 
-`form`: code of beam_loop.LOOP_FORMS. `alpha`: gain [-]. `period`: time between two updates, in samples. `delta`: share
-of the carrier's rate that is compensated [-]. `smoothing`: code of SMOOTHING_CODES.
-"""
+class Receiver(NamedTuple):
+    """Constants of a receiver."""
+    slope: float        # true slope divided by assumed slope [-]
+    beamwidth: Radians  # 0 for a linear receiver
+    lost_power_ratio: float     # least power of a received signal over the power on the axis of the beam [-]
 
-FilterLoopConstants = namedtuple('FilterLoopConstants', 'filter variance period hold delay tau')
-"""Constants of a FilterLoop.
 
-`filter`: constants (1,) of its filter. `variance`: of a measurement [rad2]. `period`, `hold`: as in FilterLoop, in
-samples. `delay`: assumed delay of the beam [s]. `tau`: time constant of the low-pass for the acceleration [s].
-"""
+class PaperLoopConstants(NamedTuple):
+    """Constants of a PaperLoop."""
+    form: int           # code of beam_loop.LOOP_FORMS
+    alpha: float        # gain [-]
+    period: int         # time between two updates, in samples
+    delta: float        # share of the carrier's rate that is compensated [-]
+    smoothing: int      # code of SMOOTHING_CODES
+
+
+class FilterLoopConstants(NamedTuple):
+    """Constants of a FilterLoop."""
+    filter: Records     # axis_filter.Constants (1,)
+    variance: Radians2  # of a measurement
+    period: int         # as in FilterLoop, in samples
+    hold: int           # as in FilterLoop, in samples
+    delay: Seconds      # assumed delay of the beam
+    tau: Seconds        # time constant of the low-pass for the acceleration
 
 
 @dataclasses.dataclass(frozen=True)
 class PaperLoop:
-    """Loop of paper 002.
-
-    alpha       gain from the error to the angle [-]
-    period      time between two updates of the loop, in samples of the grid
-    delay       time from a command to its effect, in samples
-    smoothing   key of SMOOTHING_CODES
-    form        one of beam_loop.LOOP_FORMS
-    delta       share of the carrier's rate that is compensated [-]
-    slope, beamwidth, lost_power_ratio  as in Receiver
-    """
-    alpha: float = 0.1
-    period: int = 10
-    delay: int = 0
-    smoothing: str = 'S1'
-    form: str = 'type_1'
-    delta: float = 0.0
-    slope: float = 1.0
-    beamwidth: float = 0.0
+    """Loop of paper 002."""
+    alpha: float = 0.1      # gain from the error to the angle [-]
+    period: int = 10        # time between two updates of the loop, in samples of the grid
+    delay: int = 0          # time from a command to its effect, in samples
+    smoothing: str = 'S1'   # key of SMOOTHING_CODES
+    form: str = 'type_1'    # one of beam_loop.LOOP_FORMS
+    delta: float = 0.0      # share of the carrier's rate that is compensated [-]
+    slope: float = 1.0      # as in Receiver, here and below
+    beamwidth: Radians = 0.0
     lost_power_ratio: float = 0.0
 
-    def run(self, target, rate=None, noise=None):
-        """Return (beam, smoothed error in the loop), each (n,) [rad], of a target (n,) [rad].
+    def run(self, target: Floats, rate: Floats | None = None, noise: Floats | None = None) -> tuple[Floats, Floats]:
+        """Return (beam, smoothed error in the loop) [rad] of a target [rad].
 
-        rate (n,) [rad/s]: rate of the target due to the carrier. noise (n,) [rad]: noise of the samples. None for
-        zeros.
+        rate: rate of the target due to the carrier [rad/s]. noise: noise of the samples [rad]. None for zeros.
         """
         zeros, beam, errors = np.zeros(len(target)), np.zeros(len(target)), np.zeros(len(target))
         constants = PaperLoopConstants(beam_loop.LOOP_FORMS.index(self.form), self.alpha, self.period, self.delta,
@@ -112,7 +118,7 @@ class PaperLoop:
         _paper_loop(constants, Receiver(self.slope, self.beamwidth, self.lost_power_ratio),
                     Target(np.asarray(target), zeros, zeros if rate is None else rate,
                            zeros if noise is None else noise),
-                    np.zeros(1, SMOOTHER_RECORD), _beam(self.delay, self.period), beam, errors)
+                    Smoothers.zeros(), _beam(self.delay, self.period), beam, errors)
         return beam, errors
 
 
@@ -122,49 +128,44 @@ class FilterLoop:
 
     The input of the filter is the angle of the target: beam in force + error of the receiver. The command is the
     prediction of the filter for the middle of the interval in which the command will be in force.
-
-    jerk            noise of the constant-acceleration filter [rad/s3/sqrt(Hz)]
-    sigma           noise of one sample [rad]
-    period          number of samples that are averaged to one measurement
-    hold            time between two commands, in samples
-    delay           true time from a command to its effect, in samples
-    assumed_delay   delay that the loop assumes, in samples; None: the true delay
-    use_ins         True if the filter works in the earth frame, with the attitude of the INS
-    stamp_error     error of the stamps of the INS, in samples
-    tau             time constant of the low-pass for the acceleration from the INS [s]; 0: acceleration not used
     """
-    jerk: float
-    sigma: float
-    period: int = 10
-    hold: int = 1
-    delay: int = 20
-    assumed_delay: int | None = None
-    use_ins: bool = False
-    stamp_error: int = 0
-    tau: float = 0.05
+    jerk: float         # noise of the constant-acceleration filter [rad/s3/sqrt(Hz)]
+    sigma: Radians      # noise of one sample
+    period: int = 10    # number of samples that are averaged to one measurement
+    hold: int = 1       # time between two commands, in samples
+    delay: int = 20     # true time from a command to its effect, in samples
+    assumed_delay: int | None = None    # delay that the loop assumes, in samples; None: the true delay
+    use_ins: bool = False   # True if the filter works in the earth frame, with the attitude of the INS
+    stamp_error: int = 0    # error of the stamps of the INS, in samples
+    tau: Seconds = 0.05     # time constant of the low-pass for the acceleration from the INS; 0: acceleration not used
 
-    def run(self, target, noise=None, attitude=None, rate=None):
-        """Return (beam, innovation of the filter), each (n,) [rad], of a target (n,) [rad].
+    def run(self, target: Floats, noise: Floats | None = None, attitude: Floats | None = None,
+            rate: Floats | None = None) -> tuple[Floats, Floats]:
+        """Return (beam, innovation of the filter) [rad] of a target [rad].
 
-        noise (n,) [rad]: noise of the samples. attitude, rate (n,) [rad, rad/s]: rotation of the target by the
-        carrier, as the INS measures it.
+        noise: noise of the samples [rad]. attitude, rate [rad, rad/s]: rotation of the target by the carrier, as the
+        INS measures it; needed with use_ins.
         """
         n = len(target)
         zeros, beam, errors = np.zeros(n), np.zeros(n), np.zeros(n)
         measured = np.maximum(np.arange(n) - self.stamp_error, 0)
         c = axis_filter.constants(FilterParameters(kind='ca', ca=CaParameters(noise=self.jerk)))
+        if self.use_ins:
+            assert attitude is not None and rate is not None
+            attitude, rate = attitude[measured], rate[measured]
+        else:
+            attitude = rate = zeros
         delay = self.delay if self.assumed_delay is None else self.assumed_delay
         constants = FilterLoopConstants(c, self.sigma**2 / self.period, self.period, self.hold, GRID_STEP_S * delay,
                                         self.tau)
-        _filter_loop(constants, Target(np.asarray(target), attitude[measured] if self.use_ins else zeros,
-                                       rate[measured] if self.use_ins else zeros, zeros if noise is None else noise),
-                     np.zeros(1, SMOOTHER_RECORD), axis_filter.Filter.zeros(), _beam(self.delay, self.hold),
+        _filter_loop(constants, Target(np.asarray(target), attitude, rate, zeros if noise is None else noise),
+                     Smoothers.zeros(), axis_filter.Filter.zeros(), _beam(self.delay, self.hold),
                      beam, errors)
         return beam, errors
 
 
-def _beam(delay, hold):
-    """Return a Beam at rest at 0; delay, hold: in samples of the grid."""
+def _beam(delay: int, hold: int) -> Beam:
+    """Return a beam at rest at 0; delay, hold: in samples of the grid."""
     return Beam(electronic_beam.initial_state(0.0, 0.0),
                 electronic_beam.constants(GRID_STEP_S, transport_delay=delay * GRID_STEP_S,
                                           timeout=2 * hold * GRID_STEP_S),
@@ -173,8 +174,8 @@ def _beam(delay, hold):
 
 
 @compiled
-def receiver_reading(offset, receiver):
-    """Return the error [rad] that a Receiver measures for an offset [rad] of the target from the beam.
+def receiver_reading(offset: Radians, receiver: Receiver) -> Radians:
+    """Return the error that a receiver measures for an offset of the target from the beam.
 
     With the beamwidth 0 the error is linear. With any other beamwidth the error follows the monopulse pattern within
     full scale, and it is NaN if the signal is lost.
@@ -190,19 +191,20 @@ def receiver_reading(offset, receiver):
 
 
 @compiled
-def command(u, stamp, due, beam):
-    """Put a command into the inputs u of the electronic beam.
+def command(inputs: electronic_beam.Inputs, stamp: int, due: bool, beam: Radians) -> None:
+    """Put a command into the inputs of the electronic beam.
 
-    stamp: its sample on the grid. due: True for a new command. beam: commanded angle [rad].
+    stamp: its sample on the grid. due: True for a new command. beam: commanded angle.
     """
-    u.stamp_ns = u.command_stamp_ns = stamp * GRID_STEP_NS
-    u.due = 1 if due else 0
-    u.position[0] = beam
+    inputs.stamp_ns = inputs.command_stamp_ns = stamp * GRID_STEP_NS
+    inputs.due = 1 if due else 0
+    inputs.position[0] = beam
 
 
 @compiled
-def _paper_loop(constants, receiver, target, smoothers, plant, beam, errors):
-    """Run paper 002's loop over a Target into beam and errors (n,) [rad]; plant: the Beam."""
+def _paper_loop(constants: PaperLoopConstants, receiver: Receiver, target: Target, smoothers: Records, plant: Beam,
+                beam: Floats, errors: Floats) -> None:
+    """Run paper 002's loop over a target into beam and errors [rad]."""
     form, alpha, period, delta, kind = constants
     s, beta, T = smoothers[0].error, constant_gain.benedict_bordner(alpha), period * GRID_STEP_S
     R = v = error = 0.0
@@ -221,8 +223,9 @@ def _paper_loop(constants, receiver, target, smoothers, plant, beam, errors):
 
 
 @compiled
-def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
-    """Run the loop with a target filter over a Target into beam and innovations (n,) [rad]; plant: the Beam."""
+def _filter_loop(constants: FilterLoopConstants, target: Target, smoothers: Records, filters: Records, plant: Beam,
+                 beam: Floats, errors: Floats) -> None:
+    """Run the loop with a target filter over a target into beam and innovations [rad]."""
     s, f, c = smoothers[0].error, filters[0], constants.filter[0]
     period, hold, rate = constants.period, constants.hold, target.rate
     # beam_command [rad]: newest command; last_sample: last sample of the newest measurement.
@@ -257,8 +260,8 @@ def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
         electronic_beam.step(plant.state[0], plant.constants[0], plant.inputs[0], plant.outputs[0])
 
 
-def is_stable(loop, size=1e-9, seconds=20.0):
-    """Return True if the error of a PaperLoop falls for `seconds` [s] after a step of `size` [rad].
+def is_stable(loop: PaperLoop, size: Radians = 1e-9, seconds: Seconds = 20.0) -> bool:
+    """Return True if the error of a loop falls for `seconds` after a step of `size`.
 
     The largest errors in the second and in the last third of this time are compared.
     """
@@ -268,8 +271,8 @@ def is_stable(loop, size=1e-9, seconds=20.0):
     return last <= middle < 1e3 * size
 
 
-def delay_limit(loop, highest=400):
-    """Return the largest delay at which a PaperLoop is stable, in samples up to `highest`, by bisection."""
+def delay_limit(loop: PaperLoop, highest: int = 400) -> int:
+    """Return the largest delay at which a loop is stable, in samples up to `highest`, by bisection."""
     low, high = 0, highest
     while high - low > 1:
         middle = (low + high) // 2
@@ -280,8 +283,8 @@ def delay_limit(loop, highest=400):
     return low
 
 
-def spectral_radius(loop):
-    """Return the largest modulus of the eigenvalues of a PaperLoop over one period; below 1 the loop is stable.
+def spectral_radius(loop: PaperLoop) -> float:
+    """Return the largest modulus of the eigenvalues of a loop over one period; below 1 the loop is stable.
 
     The receiver is linear. The state is V = v T, the smoothed error E, and the commands C_k, C_k-1, ... that are in
     force in the samples of the next period (and of the moving average before it). In sample j = 1 ... period after

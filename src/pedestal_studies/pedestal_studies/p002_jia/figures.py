@@ -2,7 +2,11 @@
 
 S0, S1 and S2 are the kinds of smoothing in the receiver, see SMOOTHING_TITLES.
 """
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.report.figures import (
     FILTERED_COLOUR,
@@ -11,16 +15,20 @@ from pedestal_analysis.report.figures import (
     MOTOR_2_COLOUR,
     RAW_COLOUR,
     TRUTH_COLOUR,
+    Panels,
     new_panels,
 )
+from pedestal_common.quantities import Floats, Seconds
 from pedestal_studies import drawing
-from pedestal_studies.p002_jia.angle_loop import GRID_STEP_S
+from pedestal_studies.p002_jia.angle_loop import GRID_STEP_S, PaperLoop
+
+Readings: TypeAlias = dict[str, tuple[Floats, Floats]]   # {smoothing: (error that the receiver measures, true error)}
 
 LINE_COLOURS = (FILTERED_COLOUR, TRUTH_COLOUR, MOTOR_2_COLOUR, MOTOR_1_COLOUR, INK_COLOUR)
 SMOOTHING_TITLES = {'S0': 'S0, no smoothing', 'S1': 'S1, recursion', 'S2': 'S2, moving average'}
 
 
-def side_by_side(rows, **options):
+def side_by_side(rows: int, **options: Any) -> tuple[Figure, Panels]:    # of new_panels, which has many
     """Return (figure, axes (rows, 3)) with a column for each smoothing."""
     figure, axes = new_panels(rows, 3, height=1.2 + 2.4 * rows, width=9.6, sharey='row', sharex=True, **options)
     for column, title in zip(axes.T, SMOOTHING_TITLES.values()):
@@ -28,10 +36,10 @@ def side_by_side(rows, **options):
     return figure, axes
 
 
-def steps(done, label, title, seconds):
+def steps(done: Mapping[PaperLoop, Floats], label: Callable[[PaperLoop], str], title: str, seconds: Seconds) -> Figure:
     """Draw step responses {PaperLoop: beam over step (n,)} with a column for each smoothing.
 
-    label: function that returns the name of a loop in the legend. seconds: end of the time axis [s].
+    label: function that returns the name of a loop in the legend. seconds: end of the time axis.
     """
     figure, axes = side_by_side(1, y='beam over step')
     for panel, S in zip(axes[0], SMOOTHING_TITLES):
@@ -46,10 +54,10 @@ def steps(done, label, title, seconds):
     return drawing.legend(figure)
 
 
-def lags(done, title, seconds):
-    """Draw errors {label: {S: (measured error, true error), each (n,) [rad]}}, measured errors above true errors.
+def lags(done: Mapping[str, Readings], title: str, seconds: tuple[Seconds, Seconds]) -> Figure:
+    """Draw errors {label: readings [rad]}, measured errors above true errors.
 
-    seconds: (begin, end) of the drawn time [s], here and below.
+    seconds: (begin, end) of the drawn time, here and below.
     """
     figure, axes = side_by_side(2, y=('measured error [deg]', 'true error [deg]'))
     for (label, by_smoothing), colour in zip(done.items(), LINE_COLOURS):
@@ -62,7 +70,7 @@ def lags(done, title, seconds):
     return drawing.legend(figure)
 
 
-def stability(limits):
+def stability(limits: Mapping[PaperLoop, tuple[int, int]]) -> Figure:
     """Draw the largest stable delays {PaperLoop: (by bisection, by eigenvalues) [ms]} over alpha and over slope."""
     figure, axes = new_panels(1, 3, height=3.6, width=9.6, x=('alpha', 'alpha', 'true slope over assumed'),
                               y='largest stable delay [ms]')
@@ -85,7 +93,7 @@ def stability(limits):
     return drawing.legend(figure)
 
 
-def filter_loop_errors(errors, seconds):
+def filter_loop_errors(errors: Mapping[str, Floats], seconds: tuple[Seconds, Seconds]) -> Figure:
     """Draw true errors {case: (n,) [rad]} without noise, of the paper's loop and of loops with a filter."""
     figure, axes = new_panels(3, height=7.6, y='largest error [deg]', sharex=True)
     lines = {'paper': RAW_COLOUR, 'paper-delta': INK_COLOUR, 'type-2': MOTOR_2_COLOUR, 'tracked-10ms': MOTOR_1_COLOUR,
@@ -106,12 +114,12 @@ def filter_loop_errors(errors, seconds):
     return drawing.legend(figure)
 
 
-def envelope(x, width=10):
+def envelope(x: Floats, width: int = 10) -> Floats:
     """Return x (n,) with each block of `width` samples replaced by its largest sample; n: a multiple of `width`."""
     return np.repeat(np.maximum(x.reshape(-1, width).max(axis=1), 1e-9), width)
 
 
-def loss(records, seconds):
+def loss(records: Mapping[str, Floats], seconds: tuple[Seconds, Seconds]) -> Figure:
     """Draw true errors {label: (n,) in beamwidths} of a loop that keeps the target and of a loop that loses it."""
     figure, axes = new_panels(1, height=3.6, y='true error [beamwidths]')
     panel, window = axes[0, 0], slice(*(round(t / GRID_STEP_S) for t in seconds))

@@ -16,6 +16,8 @@ crossings        crossings of the target by the response to a step
 import dataclasses
 import functools
 import math
+from collections.abc import Mapping
+from typing import TypeAlias
 
 import numpy as np
 
@@ -23,8 +25,20 @@ from pedestal_analysis.results.intervals import row
 from pedestal_analysis.results.tracking import interval_start_error, rms
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.cases import Case
+from pedestal_analysis.trials.monte_carlo import Pool, Progress
+from pedestal_common.quantities import (
+    Decibels,
+    Degrees,
+    Floats,
+    Json,
+    Pairs,
+    Radians,
+    RadiansPerSecond,
+    Seconds,
+    Times,
+)
 from pedestal_studies.metrics import crossings, overshoot_percent, peak
-from pedestal_studies.p002_jia import figures as figures
+from pedestal_studies.p002_jia import figures
 from pedestal_studies.p002_jia.angle_loop import (
     GRID_STEP_S,
     SMOOTHING_CODES,
@@ -34,9 +48,12 @@ from pedestal_studies.p002_jia.angle_loop import (
     delay_limit,
     spectral_radius,
 )
-from pedestal_studies.result import Result
+from pedestal_studies.p002_jia.figures import Readings
+from pedestal_studies.result import Drawings, Result
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.params import ReceiverParameters
+
+Line: TypeAlias = tuple[str, str, float | list[Degrees], str]   # case, metric, value or the values of all runs, unit
 
 DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case with noise; seed of the first run
 
@@ -66,12 +83,12 @@ RECORD_DURATION_S, EVALUATION_START_S = 60.0, 30.0
 BEAMWIDTH_RAD = math.radians(1.0)  # beamwidth of the array in the cases loss/... [rad].
 
 
-def jerk(q):
+def jerk(q: float) -> float:
     """Return the process noise of the filter [rad/s3/sqrt(Hz)]; q: spectral density of the jerk [deg2/s5]."""
     return math.radians(math.sqrt(q))
 
 
-COMPARED_LOOPS = {
+COMPARED_LOOPS: dict[str, PaperLoop | FilterLoop] = {
     # The loop of the paper, with and without compensation of 0.85 of the ship's rate.
     'paper': PaperLoop(delay=LOOP_DELAY_MS), 'paper-delta': PaperLoop(delay=LOOP_DELAY_MS, delta=0.85),
     # The loop of the paper in a form that points the beam at R(k+1/k), the angle predicted for the next update.
@@ -137,51 +154,51 @@ STUDY_REMARKS = [
 """Sentences that explain the rows."""
 
 
-def instants(seconds):
-    """Return the middles of the milliseconds of a record (n,) [s]."""
-    return (np.arange(round(seconds / GRID_STEP_S)) - 0.5) * GRID_STEP_S
+def instants(seconds: Seconds) -> Times:
+    """Return the middles of the milliseconds of a record."""
+    return (np.arange(round(seconds / GRID_STEP_S), dtype=float) - 0.5) * GRID_STEP_S
 
 
-def sine(t, amplitude, w):
-    """Return (angle, rate), each (n,), of a sine at times t (n,) [s]; amplitude [rad], angular frequency w [rad/s]."""
+def sine(t: Times, amplitude: Radians, w: RadiansPerSecond) -> tuple[Floats, Floats]:
+    """Return angle [rad] and rate [rad/s] of a sine at times t."""
     return amplitude * np.sin(w * t), amplitude * w * np.cos(w * t)
 
 
-def ramp_target(rate):
-    """Return the angle (n,) [rad] of figure 6's ramp; rate [deg/s]."""
+def ramp_target(rate: float) -> Floats:
+    """Return the angle [rad] of figure 6's ramp; rate [deg/s]."""
     return math.radians(rate) * instants(RECORD_DURATION_S)
 
 
-def sine_target(rate=SINE_RATE_DEG_S):
-    """Return the angle (n,) [rad] of a sine of the frequency of figure 7; rate: its largest rate [deg/s]."""
+def sine_target(rate: float = SINE_RATE_DEG_S) -> Floats:
+    """Return the angle [rad] of a sine of the frequency of figure 7; rate: its largest rate [deg/s]."""
     w = SINE_ACCELERATION_DEG_S2 / SINE_RATE_DEG_S
     return sine(instants(RECORD_DURATION_S), math.radians(rate) / w, w)[0]
 
 
-def sway_target():
-    """Return (angle [rad], rate [rad/s]), each (n,), of a fixed target, seen from the swaying deck."""
+def sway_target() -> tuple[Floats, Floats]:
+    """Return angle [rad] and rate [rad/s] of a fixed target, seen from the swaying deck."""
     return sine(instants(RECORD_DURATION_S), SWAY_AMPLITUDE_RAD, 2.0 * math.pi / SWAY_PERIOD_S)
 
 
-def settled(x):
+def settled(x: Floats) -> Floats:
     """Return the evaluated part of a record (n,)."""
     return x[round(EVALUATION_START_S / GRID_STEP_S):]
 
 
-def isolation(error):
-    """Return the isolation [dB]: amplitude of the ship's sway over a remaining error [rad]."""
+def isolation(error: Radians) -> Decibels:
+    """Return the isolation: amplitude of the ship's sway over a remaining error."""
     return -20.0 * math.log10(error / SWAY_AMPLITUDE_RAD)
 
 
-def name(loop):
+def name(loop: PaperLoop) -> str:
     """Return the part of a case name that describes a PaperLoop."""
     parts = [f'alpha={loop.alpha:g}', f'T={loop.period}ms', loop.smoothing]
     parts += [f'slope={loop.slope:g}'] * (loop.slope != 1.0) + [f'delay={loop.delay}ms'] * (loop.delay > 0)
     return '/'.join(parts)
 
 
-def steps():
-    """Return {PaperLoop: step response}: beam (n,) over the size of the step, which comes at sample 0."""
+def steps() -> dict[PaperLoop, Floats]:
+    """Return {loop: step response}: beam over the size of the step, which comes at sample 0."""
     loops = [PaperLoop(alpha=alpha, period=T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
              for S in SMOOTHING_CODES]
     loops += [PaperLoop(delay=delay, smoothing=S) for delay in LOOP_DELAYS_MS[1:] for S in SMOOTHING_CODES]
@@ -192,9 +209,9 @@ def steps():
     return {loop: loop.run(target)[0][SMOOTHING_SAMPLES:] / STEP_SIZE_RAD for loop in loops}
 
 
-def step_rows(done):
-    """Return the rows (case, metric, value, unit) of step responses {PaperLoop: (n,)}."""
-    rows = []
+def step_rows(done: Mapping[PaperLoop, Floats]) -> list[Line]:
+    """Return the rows of step responses."""
+    rows: list[Line] = []
     for loop, y in done.items():
         case = f'step/{name(loop)}'
         outside = np.flatnonzero(np.abs(y - 1.0) > 0.05)[-1] + 1
@@ -205,12 +222,12 @@ def step_rows(done):
     return rows
 
 
-def eigenvalue_limit(loop, near):
-    """Return the largest delay [ms] at which all eigenvalues of a PaperLoop are inside the unit circle.
+def eigenvalue_limit(loop: PaperLoop, near: int) -> int:
+    """Return the largest delay [ms] at which all eigenvalues of a loop are inside the unit circle.
 
     near: delay at which the search starts [ms].
     """
-    def inside(delay):
+    def inside(delay: int) -> bool:
         return spectral_radius(dataclasses.replace(loop, delay=delay)) < 1.0
 
     while inside(near + 1):
@@ -220,8 +237,8 @@ def eigenvalue_limit(loop, near):
     return near
 
 
-def limits():
-    """Return {PaperLoop: (largest stable delay by bisection, by eigenvalues) [ms]}."""
+def limits() -> dict[PaperLoop, tuple[int, int]]:
+    """Return {loop: (largest stable delay by bisection, by eigenvalues) [ms]}."""
     loops = [PaperLoop(alpha=alpha, period=T, smoothing=S) for alpha in ALPHA_GAINS for T in LOOP_PERIODS_MS
              for S in SMOOTHING_CODES]
     loops += [PaperLoop(slope=slope) for slope in SLOPE_RATIOS if slope != 1.0] + [PaperLoop(form='type_2')]
@@ -232,17 +249,18 @@ def limits():
     return delays
 
 
-def limit_rows(delays):
-    """Return the rows (case, metric, value, unit) of the delays that `limits` returns."""
-    rows = []
+def limit_rows(delays: Mapping[PaperLoop, tuple[int, int]]) -> list[Line]:
+    """Return the rows of the delays that `limits` returns."""
+    rows: list[Line] = []
     for loop, (bisected, by_eigenvalues) in delays.items():
         case = f'delay-limit/{name(loop)}' + ('/type-2' if loop.form == 'type_2' else '')
         rows += [(case, 'delay_ms', bisected, 'ms'), (case, 'eigenvalue_delay_ms', by_eigenvalues, 'ms')]
     return rows
 
 
-def lag_rows(case, loop, target, rate=None):
-    """Return the rows (case, metric, value, unit) of lag_deg of a PaperLoop, and of true_lag_deg with each smoothing.
+def lag_rows(case: str, loop: PaperLoop, target: Floats,
+             rate: Floats | None = None) -> list[tuple[str, str, float, str]]:
+    """Return the rows of lag_deg of a loop, and of true_lag_deg with each smoothing.
 
     target, rate: as of PaperLoop.run.
     """
@@ -253,12 +271,12 @@ def lag_rows(case, loop, target, rate=None):
     return rows
 
 
-def moving_rows():
-    """Return the rows (case, metric, value, unit) of figures 6, 7 and 9."""
-    rows = []
+def moving_rows() -> list[Line]:
+    """Return the rows of figures 6, 7 and 9."""
+    rows: list[Line] = []
     for T, rates in zip(LOOP_PERIODS_MS, (RAMP_RATES_DEG_S, (30,))):
-        for rate in rates:
-            rows += lag_rows(f'ramp/{rate}deg_s/T={T}ms', PaperLoop(period=T), ramp_target(rate))
+        for deg_s in rates:
+            rows += lag_rows(f'ramp/{deg_s}deg_s/T={T}ms', PaperLoop(period=T), ramp_target(deg_s))
     rows += lag_rows('sine', PaperLoop(delay=LOOP_DELAY_MS), sine_target())
     steep = f'slope={STEEP_SLOPE_RATIO:g}'
     rows += lag_rows(f'ramp/30deg_s/T=10ms/{steep}', PaperLoop(slope=STEEP_SLOPE_RATIO), ramp_target(30.0))
@@ -272,22 +290,22 @@ def moving_rows():
     return rows
 
 
-def noises(run):
-    """Return the noise of receiver [rad], INS attitude [rad] and INS rate [rad/s], each (n,), of one run."""
+def noises(run: int) -> list[Floats]:
+    """Return the noise of receiver [rad], INS attitude [rad] and INS rate [rad/s] of one run."""
     rng = np.random.default_rng(FIRST_SEED + run)
     return [sigma * rng.standard_normal(round(RECORD_DURATION_S / GRID_STEP_S))
             for sigma in (RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S)]
 
 
-def compared_targets():
-    """Return {name: angle (n,) [rad]} of the targets of COMPARED_LOOPS."""
+def compared_targets() -> dict[str, Floats]:
+    """Return {name: angle [rad]} of the targets of COMPARED_LOOPS."""
     return {'ramp': ramp_target(30.0), 'sine': sine_target(), 'sway': sway_target()[0]}
 
 
-def max_error_at_ends(error, target):
-    """Return the largest error [rad] at the ends of the milliseconds, from the error (n,) in their middles.
+def max_error_at_ends(error: Floats, target: Floats) -> Radians:
+    """Return the largest error at the ends of the milliseconds, from the error [rad] in their middles.
 
-    At the ends the target (n,) [rad] is half-way between its neighbours, and the beam is that of the middle.
+    At the ends the target [rad] is half-way between its neighbours, and the beam is that of the middle.
     """
     half = 0.5 * np.diff(target)
     return max(peak(settled(error[:-1] + half)), peak(settled(error[1:] - half)))
@@ -300,8 +318,8 @@ ALPHA_LOOPS = {f'noise/alpha={alpha:g}': PaperLoop(alpha=alpha) for alpha in ALP
 """{case: loop} of the paper's loop with each gain, whose jitter is measured on a target at rest."""
 
 
-def beam(case, run=None):
-    """Return the beam (n,) [rad] of one of COMPARED_CASES; run: number of the run, None for a run without noise."""
+def beam(case: str, run: int | None = None) -> Floats:
+    """Return the beam [rad] of one of COMPARED_CASES; run: number of the run, None for a run without noise."""
     sway, rate = sway_target()
     noise, ins_angle, ins_rate = 3 * (np.zeros(len(sway)),) if run is None else noises(run)
     if case in INS_LOOPS:
@@ -314,8 +332,8 @@ def beam(case, run=None):
     return beam_angles
 
 
-def jitter(item):
-    """Return the rms [deg] of the beam's motion due to noise, for every run of an item.
+def jitter(item: tuple[str, int]) -> list[Degrees]:
+    """Return the rms of the beam's motion due to noise, for every run of an item.
 
     An item is (one of COMPARED_CASES, ALPHA_LOOPS or GRAPH_CASES, number of runs).
     """
@@ -331,20 +349,21 @@ def jitter(item):
     return [math.degrees(rms(settled(beam(case, i) - clean))) for i in range(runs)]
 
 
-def compared_errors():
-    """Return {case: true error without noise (n,) [rad]} of COMPARED_CASES."""
+def compared_errors() -> dict[str, Floats]:
+    """Return {case: true error without noise [rad]} of COMPARED_CASES."""
     targets = compared_targets()
     return {case: targets[target_of(case)] - beam(case) for case in COMPARED_CASES}
 
 
-def target_of(case):
+def target_of(case: str) -> str:
     """Return the name of the target of one of COMPARED_CASES."""
     return case.split('/')[1].removesuffix('-ins')
 
 
-def compared_rows(done, jitters):
-    """Return the rows (case, metric, value, unit) of `compared_errors`; jitters {case: rms of every run [deg]}."""
-    rows, targets = [], compared_targets()
+def compared_rows(done: Mapping[str, Floats], jitters: Mapping[str, list[Degrees]]) -> list[Line]:
+    """Return the rows of `compared_errors`; jitters {case: rms of every run}."""
+    rows: list[Line] = []
+    targets = compared_targets()
     for case, error in done.items():
         worst, at_the_ends = peak(settled(error)), max_error_at_ends(error, targets[target_of(case)])
         rows += [(case, 'max_error_deg', math.degrees(worst), 'deg'),
@@ -365,26 +384,26 @@ half-beamwidth: half of the power, at half a beamwidth. pattern: the level at wh
 """
 
 
-def signal_loss_loop(kind, form):
-    """Return the PaperLoop with a receiver that loses the signal; kind: of RECEIVER_LOSS_POWERS; form: of the loop."""
+def signal_loss_loop(kind: str, form: str) -> PaperLoop:
+    """Return the loop with a receiver that loses the signal; kind: of RECEIVER_LOSS_POWERS; form: of the loop."""
     return PaperLoop(delay=LOOP_DELAY_MS, form=form, beamwidth=BEAMWIDTH_RAD,
                      lost_power_ratio=RECEIVER_LOSS_POWERS[kind])
 
 
-def sine_from_rest(rate):
-    """Return the angle (n,) [rad] of a sine that starts at rest at one of its ends; rate: its largest rate [deg/s]."""
+def sine_from_rest(rate: float) -> Floats:
+    """Return the angle [rad] of a sine that starts at rest at one of its ends; rate: its largest rate [deg/s]."""
     w = SINE_ACCELERATION_DEG_S2 / SINE_RATE_DEG_S
     return math.radians(rate) / w * (1.0 - np.cos(w * np.maximum(instants(RECORD_DURATION_S), 0.0)))
 
 
-def kept(loop, rate):
-    """Return True if a PaperLoop keeps the sine of this largest rate [deg/s] in its beam to the end."""
+def kept(loop: PaperLoop, rate: float) -> bool:
+    """Return True if a loop keeps the sine of this largest rate [deg/s] in its beam to the end."""
     target = sine_from_rest(rate)
     return peak(settled(target - loop.run(target)[0])) < BEAMWIDTH_RAD
 
 
-def max_kept_rate(loop):
-    """Return the largest rate [deg/s] of the sine that a PaperLoop keeps, by bisection."""
+def max_kept_rate(loop: PaperLoop) -> float:
+    """Return the largest rate [deg/s] of the sine that a loop keeps, by bisection."""
     low, high = 1.0, 400.0
     while high - low > 0.05:
         middle = 0.5 * (low + high)
@@ -392,13 +411,13 @@ def max_kept_rate(loop):
     return low
 
 
-def loss_rows():
-    """Return the rows (case, metric, value, unit) of loops with a receiver that loses the signal.
+def loss_rows() -> list[Line]:
+    """Return the rows of loops with a receiver that loses the signal.
 
     The metrics are the largest rate of the sine at which the loop keeps the target, and the error at this rate with a
     linear receiver, which loses no signal.
     """
-    rows = []
+    rows: list[Line] = []
     for form in ('type_1', 'type_2'):
         for kind in RECEIVER_LOSS_POWERS:
             rate = max_kept_rate(signal_loss_loop(kind, form))
@@ -414,7 +433,7 @@ PAPER_LOOP_PARAMETERS = {f'acu.{axis}.beam.{key}': value for axis in ('azimuth',
                          for key, value in (('form', 'type_1'), ('rate_compensation', 0.85))}
 """Parameters of the control unit with the paper's loop."""
 
-GRAPH_CASES = {'graph/T=10ms': {}, 'graph/T=1ms': {'adu.period': 0.001},
+GRAPH_CASES: dict[str, dict[str, Json]] = {'graph/T=10ms': {}, 'graph/T=1ms': {'adu.period': 0.001},
                'graph/T=10ms/paper-delta': PAPER_LOOP_PARAMETERS}
 """{case: parameters of the scenario phased_array_sway}: unchanged, steered every 1 ms, and with the paper's loop."""
 
@@ -423,8 +442,8 @@ NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 110.0, 'ins.tilt_
 """Parameters of an INS without noise, and of a signal so strong that the noise of the receiver has no effect."""
 
 
-def graph_case(case, quiet=False):
-    """Return the Case of one of GRAPH_CASES.
+def graph_case(case: str, quiet: bool = False) -> Case:
+    """Return the case of one of GRAPH_CASES.
 
     quiet: True for a case without noise in receiver and INS, with the gains of the noisy case.
     """
@@ -442,8 +461,8 @@ ELEVATION_COLUMN = 1  # column of the elevation in an error of GRAPH_CASES; colu
 GRAPH_EVALUATION_START_S = 10.0  # start of the evaluation of the runs of GRAPH_CASES [s]
 
 
-def graph_error(case, quiet=False, seed=None):
-    """Return the true error (n, 2) [rad] of one of GRAPH_CASES at the ends of the evaluated intervals.
+def graph_error(case: str, quiet: bool = False, seed: int | None = None) -> Pairs:
+    """Return the true error [rad] of one of GRAPH_CASES at the ends of the evaluated intervals.
 
     Arguments as of `graph_case`.
     """
@@ -451,12 +470,12 @@ def graph_error(case, quiet=False, seed=None):
     return run.truth['error'][run.t >= GRAPH_EVALUATION_START_S]
 
 
-def graph_rows(jitters):
+def graph_rows(jitters: Mapping[str, list[Degrees]]) -> list[Line]:
     """Return the rows of GRAPH_CASES: cross-elevation and elevation together, at both ends of the intervals.
 
-    jitters: {case: rms of every run [deg]}, in elevation.
+    jitters: {case: rms of every run}, in elevation.
     """
-    rows = []
+    rows: list[Line] = []
     for case in GRAPH_CASES:
         quiet = graph_case(case, quiet=True).run()
         kept = quiet.t >= GRAPH_EVALUATION_START_S
@@ -467,12 +486,9 @@ def graph_rows(jitters):
     return rows
 
 
-def readings(loops, target, rate=None):
-    """Return {label: {smoothing: (error that the receiver measures, true error), each (n,) [rad]}}.
-
-    loops: {label: PaperLoop}; target, rate: as of PaperLoop.run.
-    """
-    errors = {}
+def readings(loops: Mapping[str, PaperLoop], target: Floats, rate: Floats | None = None) -> dict[str, Readings]:
+    """Return {label: readings [rad]} of loops; target, rate: as of PaperLoop.run."""
+    errors: dict[str, Readings] = {}
     for label, loop in loops.items():
         errors[label] = {}
         for S in SMOOTHING_CODES:
@@ -481,9 +497,10 @@ def readings(loops, target, rate=None):
     return errors
 
 
-def drawings(done, limit, errors):
-    """Return {file name: function that draws it}; arguments as of `steps`, `limits` and `compared_errors`."""
-    def of(**fixed):
+def drawings(done: Mapping[PaperLoop, Floats], limit: Mapping[PaperLoop, tuple[int, int]],
+             errors: Mapping[str, Floats]) -> Drawings:
+    """Return the figures; arguments as of `steps`, `limits` and `compared_errors`."""
+    def of(**fixed: float) -> dict[PaperLoop, Floats]:
         return {loop: y for loop, y in done.items() if loop.slope == 1.0
                 and all(getattr(loop, field) == value for field, value in fixed.items())}
 
@@ -514,7 +531,7 @@ def drawings(done, limit, errors):
         'loss': draw(figures.loss, lost, (0.0, 20.0))}
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run all loops on all targets, those with noise `runs` times; pool: monte_carlo.Pool, None for this process."""
     progress(0.0, 'steps')
     done = steps()

@@ -18,6 +18,8 @@ k_v + k_a s are the first two terms of the series of 1 / W(s). Therefore a const
 """
 import dataclasses
 import math
+from collections.abc import Mapping
+from typing import Annotated, TypeVar
 
 import numpy as np
 from scipy.linalg import expm
@@ -28,7 +30,20 @@ from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.servo import feedforward
 from pedestal_analysis.results import tracking
 from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.monte_carlo import Pool, Progress
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import (
+    Floats,
+    Json,
+    Pairs,
+    Radians,
+    RadiansPerSecond,
+    Records,
+    Seconds,
+    Times,
+    Vectors3,
+)
+from pedestal_common.record import Record
 from pedestal_studies import ensemble, metrics, profiles
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.profiles import S_MOTION_RATE_RAD_S, S_MOTION_STROKE_RAD
@@ -46,7 +61,7 @@ UNIFORM_RATE_DELAY_S = 2.0  # time after a reversal from which the rate of the t
 BATCH_RUNS, NOISE_SEED = 25, 1  # runs of one batch; seed of their noise
 
 
-def feedforward_gains(w, zeta):
+def feedforward_gains(w: RadiansPerSecond, zeta: float) -> tuple[float, Seconds]:
     """Return (k_v [-], k_a [s]) of 1 / W(s) = 1 + 2 zeta s / w + s^2 / w^2.
 
     The paper calls these gains c_1 and c_2. Its formulas are corrected here (acu_tracker/servo/feedforward.py).
@@ -54,7 +69,7 @@ def feedforward_gains(w, zeta):
     return 1.0, 2.0 * zeta / w
 
 
-def rate_loop_step(w, zeta):
+def rate_loop_step(w: RadiansPerSecond, zeta: float) -> Floats:
     """Return the matrix M (3, 4) of a step of the antenna over T: x(t + T) = M (x(t), u), exact for a constant u.
 
     x = (theta, omega, omega'): angle [rad], rate [rad/s] and acceleration [rad/s2] of the antenna; u: rate command.
@@ -67,20 +82,23 @@ def rate_loop_step(w, zeta):
 
 K_V, K_A = feedforward_gains(*RATE_LOOP_CONSTANTS)  # gains k_v [-] and k_a [s] of the feed-forward
 
-STEP_RECORD = np.dtype([('miss', 'f8'), ('rate', 'f8'), ('acceleration', 'f8'), ('mu', 'f8', axis_filter.BANK_SIZE)],
-                       align=True)
-"""Record of a step: true miss [rad]; rate [rad/s] and acceleration [rad/s2] fed forward; probability of each motion
-model."""
+
+class Step(Record):
+    """Step of the loop."""
+    miss: Radians           # true miss
+    rate: float             # rate that is fed forward [rad/s]
+    acceleration: float     # acceleration that is fed forward [rad/s2]
+    mu: Annotated[Floats, (axis_filter.BANK_SIZE,)]     # probability of each motion model
 
 
 @compiled
-def _follow(target, known, f, c, lead, M, normals, out):
-    """Run the loop once for each row of `normals` (runs, n) and write its steps to `out` (runs, n) of STEP_RECORD.
+def _follow(target: Vectors3, known: Pairs, filters: Records, constants: Records, lead: Seconds, M: Floats,
+            normals: Floats, out: Records) -> None:
+    """Run the loop once for each row of `normals` (runs, n) and write its Steps to `out` (runs, n).
 
-    target (n, 3)   true angle, rate and acceleration of the target
-    known (n, 2)    rate and acceleration to feed forward; if it is (0, 2), the filter estimates them
-    f, c            state and constants (1,) of the filter
-    lead            time from the instant of the miss to the instant for which the filter predicts [s]
+    target          true angle, rate and acceleration of the target
+    known           rate and acceleration to feed forward; if it is (0, 2), the filter estimates them
+    lead            time from the instant of the miss to the instant for which the filter predicts
     M               as of `rate_loop_step`
     normals         standard normal noise of the miss
 
@@ -98,17 +116,17 @@ def _follow(target, known, f, c, lead, M, normals, out):
                 e = target[j, 0] + MISS_SIGMA_RAD * normals[i, j] - encoder[j]
                 y = encoder[j] + e
                 if j == 0:
-                    axis_filter.start(f[0], c[0], y, R, S_MOTION_RATE_RAD_S)
+                    axis_filter.start(filters[0], constants[0], y, R, S_MOTION_RATE_RAD_S)
                 else:
-                    axis_filter.predict(f[0], c[0], T)
-                    axis_filter.correct(f[0], c[0], AxisMeasurement(y, R, math.nan, math.nan))
-                _, v, a = axis_filter.outlook(f[0], c[0], lead)
+                    axis_filter.predict(filters[0], constants[0], T)
+                    axis_filter.correct(filters[0], constants[0], AxisMeasurement(y, R, math.nan, math.nan))
+                _, v, a = axis_filter.outlook(filters[0], constants[0], lead)
             if len(known) > 0:
                 v, a = known[k]
             u = feedforward.rate(e, 0.0, feedforward.fed(v, a, K_V, K_A), K_P)
             step = out[i, k]
             step.miss, step.rate, step.acceleration = target[k, 0] - theta, v, a
-            axis_filter.probabilities(f[0], c[0], step.mu)
+            axis_filter.probabilities(filters[0], constants[0], step.mu)
             theta, omega, omega_dot = (
                 theta + M[0, 1] * omega + M[0, 2] * omega_dot + M[0, 3] * u,
                 M[1, 1] * omega + M[1, 2] * omega_dot + M[1, 3] * u,
@@ -117,35 +135,36 @@ def _follow(target, known, f, c, lead, M, normals, out):
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """Source of rate and acceleration: a filter, the differences of the measured angle, or the truth.
+    """Source of rate and acceleration: a filter, the differences of the measured angle, or the truth."""
+    filter: FilterParameters | None     # None for differences and for the truth
+    predicted: bool = False     # True for values at the instant of the command, False for values at that of the miss
+    difference_steps: int = 0   # distance of the differenced angles, in T; 0 for a filter and for the truth
 
-    `filter`: None for differences and for the truth. `predicted`: True for values predicted to the instant of the
-    command, False for values at the time of the miss. `difference_steps`: distance of the differenced angles, in T; 0
-    for a filter and for the truth.
-    """
-    filter: FilterParameters | None
-    predicted: bool = False
-    difference_steps: int = 0
+    @property
+    def own_filter(self) -> FilterParameters:
+        """The filter of a source that has one."""
+        assert self.filter is not None
+        return self.filter
 
 
-def filter_of(kind, **groups):
-    """Return the FilterParameters of a kind with parameters changed by group, for example cv={'noise': 0.01}."""
+def filter_of(kind: str, **groups: Mapping[str, Json]) -> FilterParameters:
+    """Return the filter of a kind with parameters changed by group, for example cv={'noise': 0.01}."""
     return FilterParameters(kind=kind, **{name: dataclasses.replace(getattr(FilterParameters(), name), **values)
                                           for name, values in groups.items()})
 
 
-def cv(q):
-    """Return the Source of a constant-rate filter; q: process noise [deg/s2/sqrt(Hz)]."""
+def cv(q: float) -> Source:
+    """Return the source of a constant-rate filter; q: process noise [deg/s2/sqrt(Hz)]."""
     return Source(filter_of('cv', cv={'noise': math.radians(q)}))
 
 
-def ca(q):
-    """Return the Source of a constant-acceleration filter; q: process noise [deg/s3/sqrt(Hz)]."""
+def ca(q: float) -> Source:
+    """Return the source of a constant-acceleration filter; q: process noise [deg/s3/sqrt(Hz)]."""
     return Source(filter_of('ca', ca={'noise': math.radians(q)}))
 
 
-def imm(q_ca, predicted):
-    """Return the Source of an IMM of the models cv, ca and current_statistical.
+def imm(q_ca: float, predicted: bool) -> Source:
+    """Return the source of an IMM of the models cv, ca and current_statistical.
 
     A model holds for a mean dwell of 5 s. cv has a low process noise, and ca has q_ca [deg/s3/sqrt(Hz)]. For fast
     manoeuvres current_statistical has a largest acceleration of 40 deg/s2. predicted: as in Source.
@@ -160,20 +179,20 @@ def imm(q_ca, predicted):
     return Source(filter_of('imm', imm=bank), predicted)
 
 
-def motion(axis, rate=S_MOTION_RATE_RAD_S):
-    """Return (times t (n,) [s], target (n, 3), period [s]) of the motion on an axis; rate: between reversals [rad/s].
+def motion(axis: str, rate: RadiansPerSecond = S_MOTION_RATE_RAD_S) -> tuple[Times, Vectors3, Seconds]:
+    """Return (times, target, period) of the motion on an axis; rate: between reversals.
 
     target: angle [rad], rate [rad/s] and acceleration [rad/s2]. The times are half a period to settle and
     EVALUATED_PERIODS.
     """
     reversal = REVERSAL_S_BY_AXIS[axis]
     period = 2.0 * (S_MOTION_STROKE_RAD / rate + reversal * (1.0 - 2.0 / math.pi))
-    t = T * np.arange(round((0.5 + EVALUATED_PERIODS) * period / T))
+    t = T * np.arange(round((0.5 + EVALUATED_PERIODS) * period / T), dtype=float)
     return t, np.column_stack(profiles.s_motion(t, S_MOTION_STROKE_RAD, rate, reversal)), period
 
 
-def differenced(y, steps):
-    """Return rate [rad/s] and acceleration [rad/s2] (n, 2) by the differences of measured angles y (n,) [rad].
+def differenced(y: Floats, steps: int) -> Pairs:
+    """Return rate [rad/s] and acceleration [rad/s2] by the differences of measured angles y [rad].
 
     steps: distance of the differenced angles, in T. The values are 0 until there are enough angles. The angle of step
     k arrives MISS_DELAY_STEPS later, in the row k + MISS_DELAY_STEPS.
@@ -186,8 +205,9 @@ def differenced(y, steps):
     return known
 
 
-def steps_of(axis, source, first, count, rate=S_MOTION_RATE_RAD_S):
-    """Return STEP_RECORD records (count, n) of runs first ... first + count - 1 of a Source on an axis.
+def steps_of(axis: str, source: Source, first: int, count: int,
+             rate: RadiansPerSecond = S_MOTION_RATE_RAD_S) -> Records:
+    """Return the Steps (count, n) of runs first ... first + count - 1 of a source on an axis.
 
     The noise of run i depends only on i. rate: as in `motion`.
     """
@@ -198,7 +218,7 @@ def steps_of(axis, source, first, count, rate=S_MOTION_RATE_RAD_S):
         at = t + 0.5 * T if source.predicted else t - MISS_DELAY_STEPS * T
         known = np.column_stack(profiles.s_motion(at, S_MOTION_STROKE_RAD, rate, REVERSAL_S_BY_AXIS[axis])[1:])
     [normals] = ensemble.normal_draws(NOISE_SEED, first, count, len(t), 1)
-    out = np.zeros((count, len(t)), STEP_RECORD)
+    out = np.zeros((count, len(t)), Step.dtype)
     c = axis_filter.constants(source.filter or FilterParameters())
     f, M = axis_filter.Filter.zeros(), rate_loop_step(*RATE_LOOP_CONSTANTS)
     if not source.difference_steps:
@@ -216,8 +236,8 @@ METRIC_UNITS = {'miss_rms_deg': 'deg', 'miss_worst_second_deg': 'deg', 'miss_pea
 forward while the rate of the target is uniform."""
 
 
-def measures(axis, steps, rate=S_MOTION_RATE_RAD_S):
-    """Return the metrics of METRIC_UNITS of every run, an array (runs, 4); steps: (runs, n) of STEP_RECORD.
+def measures(axis: str, steps: Records, rate: RadiansPerSecond = S_MOTION_RATE_RAD_S) -> Floats:
+    """Return the metrics of METRIC_UNITS of every run, an array (runs, 4); steps: Steps (runs, n).
 
     rate: as in `motion`.
     """
@@ -233,8 +253,8 @@ def measures(axis, steps, rate=S_MOTION_RATE_RAD_S):
     return np.degrees(values)
 
 
-def batch(item):
-    """Return (miss (n,) [rad], summed over the runs; metrics of METRIC_UNITS of every run (count, 4)) of an item.
+def batch(item: tuple[str, Source, int, int]) -> tuple[Floats, Floats]:
+    """Return (miss (n,) [rad] summed over the runs; metrics of METRIC_UNITS of every run (count, 4)) of an item.
 
     An item is (axis, source, first run, number of runs).
     """
@@ -245,31 +265,32 @@ def batch(item):
 
 @dataclasses.dataclass(frozen=True)
 class MissStatistics:
-    """Statistics of the runs of a Source on an axis.
-
-    `miss_mean` (n,) [rad]: mean over the runs at each step. `values` (runs, 4): metrics of METRIC_UNITS of every run.
-    """
+    """Statistics of the runs of a source on an axis."""
     axis: str
-    miss_mean: np.ndarray
-    values: np.ndarray
+    miss_mean: Floats   # mean over the runs at each step [rad]
+    values: Annotated[Floats, '(runs, 4)']  # metrics of METRIC_UNITS of every run
 
-    def of(self, metric):
+    def of(self, metric: str) -> Floats:
         """Return the values (runs,) of one of METRIC_UNITS."""
         return self.values[:, list(METRIC_UNITS).index(metric)]
 
-    def mean(self, metric):
+    def mean(self, metric: str) -> float:
         """Return the mean over the runs of one of METRIC_UNITS."""
         return float(self.of(metric).mean())
 
 
-def statistics(cases, count, pool, progress=lambda share, text: None):
-    """Return {name: MissStatistics} of `count` runs of each of {name: (axis, Source)}; pool: monte_carlo.Pool."""
+_Name = TypeVar('_Name')    # of a case
+
+
+def statistics(cases: Mapping[_Name, tuple[str, Source]], count: int, pool: Pool,
+               progress: Progress = lambda share, text: None) -> dict[_Name, MissStatistics]:
+    """Return {name: statistics} of `count` runs of each of {name: (axis, source)}."""
     pieces = monte_carlo.batches(count, BATCH_RUNS)
     items = [(axis, source, *piece) for axis, source in cases.values() for piece in pieces]
     done = pool.map(batch, items, progress)
     result = {}
     for name, (axis, _) in cases.items():
-        miss, values = 0.0, []
+        miss, values = np.zeros(()), []
         for _ in pieces:
             more, of_runs = next(done)
             miss += more

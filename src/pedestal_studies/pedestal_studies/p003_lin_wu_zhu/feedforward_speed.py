@@ -17,12 +17,17 @@ miss_ratio_to_kalman_cv                   miss of kalman-cv divided by this miss
 autotrack_percent                         share of the runs that stay in autotrack; the cases drive-... have their
                                           other rows only if all runs stay
 """
+from collections.abc import Mapping
+
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.report.figures import FILTERED_COLOUR, MOTOR_1_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.monte_carlo import Pool, Progress
+from pedestal_common.quantities import Floats, Pairs, RadiansPerSecond, Records, Row
 from pedestal_studies import drawing
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop, imm_feedforward
 from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
@@ -32,7 +37,7 @@ from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     Source,
 )
 from pedestal_studies.profiles import S_MOTION_RATE_RAD_S
-from pedestal_studies.result import Result
+from pedestal_studies.result import Item, Result
 
 DEFAULT_RUNS, BATCH_RUNS = 50, 10  # runs of each case, with independent noise; runs that one worker makes at a time
 
@@ -45,8 +50,8 @@ DIFFERENCE_STEPS = (1, 15)
 """Distances of the differenced angles [steps of 10 ms]: one step, and the distance of the least rate error."""
 
 
-def sources(axis):
-    """Return {name: Source} of an axis."""
+def sources(axis: str) -> dict[str, Source]:
+    """Return the sources of an axis."""
     return {'kalman-cv': feedforward_loop.cv(imm_feedforward.PAPER_CV_NOISES[axis]),
             'imm': imm_feedforward.FEEDFORWARD_SOURCES['imm'],
             **{f'difference-{n}': Source(filter=None, difference_steps=n) for n in DIFFERENCE_STEPS}}
@@ -57,7 +62,7 @@ CASES = {f'{axis}/{speed}/{name}': (axis, source, rate) for axis in REVERSAL_S_B
 """{case: (axis, Source, rate of the target [rad/s])}."""
 
 DRIVE_CASES = {f'{axis}/{DRIVE_SPEED}/drive-{name}': imm_feedforward.drive_case(
-    axis, sources(axis)[name].filter, RATES_RAD_S[DRIVE_SPEED])
+    axis, sources(axis)[name].own_filter, RATES_RAD_S[DRIVE_SPEED])
     for axis in REVERSAL_S_BY_AXIS for name in ('kalman-cv', 'imm')}
 """{case: Case} of the whole chain."""
 
@@ -69,8 +74,8 @@ COMPARED_METRICS = ('miss_rms_deg', 'rate_rms_deg_s', 'acceleration_rms_deg_s2')
 IMM_RATIO_TARGET = '>= 3'  # required ratio: miss of kalman-cv divided by miss of imm [-]
 
 
-def estimate_errors(axis, steps, rate):
-    """Return the rms errors of rate [deg/s] and acceleration [deg/s2] of every run, an array (runs, 2).
+def estimate_errors(axis: str, steps: Records, rate: RadiansPerSecond) -> Pairs:
+    """Return the rms errors of rate [deg/s] and acceleration [deg/s2] of every run.
 
     The errors are against the truth at the instant of the measured miss. Arguments as of feedforward_loop.measures.
     """
@@ -82,7 +87,7 @@ def estimate_errors(axis, steps, rate):
         for field, column in (('rate', 1), ('acceleration', 2))]))
 
 
-def batch(item):
+def batch(item: Item) -> Floats:
     """Return the metrics of UNITS of every run (count, 6) of an item (case, first run, number of runs)."""
     case, first, count = item
     axis, source, rate = CASES[case]
@@ -90,7 +95,7 @@ def batch(item):
     return np.hstack([feedforward_loop.measures(axis, steps, rate), estimate_errors(axis, steps, rate)])
 
 
-def drive_batch(item):
+def drive_batch(item: Item) -> Floats:
     """Return the rms miss [deg] of every run (count, 1) of an item.
 
     An item is (name of DRIVE_CASES, first run, number of runs).
@@ -100,7 +105,7 @@ def drive_batch(item):
     return np.array([imm_feedforward.drive_misses((DRIVE_CASES[name], seed))[:1] for seed in seeds])
 
 
-def rows(values, of_drive):
+def rows(values: Mapping[str, Floats], of_drive: Mapping[str, Floats]) -> list[Row]:
     """Return the rows of {case: metrics of every run (runs, 6)} and of {drive case: misses (runs, 1)}."""
     table = []
     for case, of_case in values.items():
@@ -125,7 +130,7 @@ def rows(values, of_drive):
     return table
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run CASES and DRIVE_CASES `runs` times; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     values = pool.of_cases(batch, CASES, runs, BATCH_RUNS, lambda share, text: progress(0.2 * share, text))
@@ -136,7 +141,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
                   [r for r in table if r['metric'] not in ('miss_worst_second_deg', 'miss_peak_deg')])
 
 
-def remarks(table):
+def remarks(table: list[Row]) -> list[str]:
     """Return the sentences that explain the rows."""
     value = {(r['case'], r['metric']): r['value'] for r in table}
     return [
@@ -148,7 +153,7 @@ def remarks(table):
         'difference-15 has the least rate error of all distances. Its values are half of this distance late.']
 
 
-def rate_figure(speed):
+def rate_figure(speed: str) -> Figure:
     """Draw the rate that is fed forward in one reversal of one run in azimuth, a panel for each source."""
     axis, rate = 'azimuth', RATES_RAD_S[speed]
     t, target, period = feedforward_loop.motion(axis, rate)

@@ -20,8 +20,11 @@ sine.
 """
 import dataclasses
 import math
+from collections.abc import Mapping
+from typing import TypeAlias
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
 from acu_tracker.estimation.params import FilterParameters
@@ -37,24 +40,30 @@ from pedestal_analysis.report.figures import (
 )
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
-from pedestal_analysis.trials import cases, monte_carlo
+from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.cases import Case
+from pedestal_analysis.trials.monte_carlo import Pool, Progress
 from pedestal_common.parameters import as_dict
+from pedestal_common.quantities import Bools, Degrees, Floats, Pairs, RadiansPerSecond, Row, Times, Vectors3
 from pedestal_studies import drawing, metrics, profiles
+from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
 from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     METRIC_UNITS,
     MISS_SIGMA_RAD,
     NOISE_SEED,
     REVERSAL_S_BY_AXIS,
+    MissStatistics,
     Source,
-    T,
     ca,
     cv,
     filter_of,
     imm,
     statistics,
 )
-from pedestal_studies.result import Result
+from pedestal_studies.result import Drawings, Result
+
+Misses: TypeAlias = dict[str, MissStatistics]   # {case: its statistics}
 
 DEFAULT_RUNS = 50  # runs of each case, with independent noise
 
@@ -86,7 +95,7 @@ SOURCE_MEANINGS = {
 """{name of a case without its axis: description}, for the table of the documentation."""
 
 
-def cv_name(axis, q):
+def cv_name(axis: str, q: float) -> str:
     """Return the name of the case of a conventional filter; q: its process noise [deg/s2/sqrt(Hz)]."""
     return f'{axis}/kalman-cv' if q == PAPER_CV_NOISES[axis] else f'{axis}/kalman-cv-{q:g}'
 
@@ -99,16 +108,16 @@ CASES = {
 """{case: (axis, Source)}."""
 
 
-def drive_case(axis, tuned, rate=profiles.S_MOTION_RATE_RAD_S):
-    """Return the Case of the whole chain, in which the target follows a sine on an axis.
+def drive_case(axis: str, tuned: FilterParameters, rate: RadiansPerSecond = profiles.S_MOTION_RATE_RAD_S) -> Case:
+    """Return the case of the whole chain, in which the target follows a sine on an axis.
 
-    tuned: FilterParameters of this axis. rate: largest rate of the target [rad/s]. The target's range of 510 m is the
+    tuned: filter of this axis. rate: largest rate of the target. The target's range of 510 m is the
     reference_range of the scenario uav_flyby, at which the receiver has its nominal C/N0.
     """
     w = math.pi / REVERSAL_S_BY_AXIS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
                   rate / w if name == axis else 0.0 for name in REVERSAL_S_BY_AXIS}
-    return cases.Case(axis, 'uav_flyby', {
+    return Case(axis, 'uav_flyby', {
         'tracking_receiver.target.kind': 'sine', 'tracking_receiver.target.angle.frequency': 0.5 * w / math.pi,
         'tracking_receiver.target.angle.range': 510.0, 'tracking_receiver.target.angle.elevation': DRIVE_ELEVATION_RAD,
         **amplitudes, 'tracking_receiver.receiver.latency': feedforward_loop.MISS_DELAY_STEPS * T,
@@ -120,13 +129,13 @@ def drive_case(axis, tuned, rate=profiles.S_MOTION_RATE_RAD_S):
 
 DRIVE_CASES = {
     f'{axis}/drive-{name}': drive_case(axis, tuned) for axis in REVERSAL_S_BY_AXIS for name, tuned in {
-        'kalman-cv': cv(PAPER_CV_NOISES[axis]).filter, 'imm': FEEDFORWARD_SOURCES['imm'].filter,
+        'kalman-cv': cv(PAPER_CV_NOISES[axis]).own_filter, 'imm': FEEDFORWARD_SOURCES['imm'].own_filter,
         'imm-default': filter_of('imm')}.items()}
 """{case: Case} of the whole chain."""
 
 
-def drive_error(case, seed):
-    """Return (times [s], true pointing error of the axis [rad]), each (n,), from DRIVE_EVALUATION_START_S on.
+def drive_error(case: Case, seed: int) -> tuple[Times, Floats]:
+    """Return (times, true pointing error of the axis [rad]) from DRIVE_EVALUATION_START_S on.
 
     case: as `drive_case` returns. The errors are NaN if the run left autotrack.
     """
@@ -136,8 +145,8 @@ def drive_error(case, seed):
     return record.t, error if np.all(record['acu/mode'] == Mode.AUTOTRACK) else np.full_like(error, math.nan)
 
 
-def drive_misses(item):
-    """Return (rms, largest) miss [deg] of an item (case as `drive_case` returns, seed)."""
+def drive_misses(item: tuple[Case, int]) -> tuple[Degrees, Degrees]:
+    """Return (rms, largest) miss of an item (case as `drive_case` returns, seed)."""
     _, error = drive_error(*item)
     return math.degrees(tracking.rms(error)), math.degrees(metrics.peak(error))
 
@@ -160,16 +169,13 @@ MISS_RATIO_TARGETS = {'azimuth/imm': ('>= 4', None), 'azimuth/imm-predicted': ('
 the paper prints 4 to 5."""
 
 
-def conventional_curve(misses, axis):
-    """Return (rate noise [deg/s], miss [deg]) of the conventional filters of CV_NOISES, an array (2, n, runs).
-
-    misses: {case: MissStatistics}, here and below.
-    """
+def conventional_curve(misses: Misses, axis: str) -> Floats:
+    """Return (rate noise [deg/s], miss [deg]) of the conventional filters of CV_NOISES, an array (2, n, runs)."""
     return np.array([[misses[cv_name(axis, q)].of(metric) for q in CV_NOISES]
                      for metric in ('rate_noise_deg_s', 'miss_rms_deg')])
 
 
-def at_rate_noise(misses, axis, rate_noise):
+def at_rate_noise(misses: Misses, axis: str, rate_noise: Floats) -> Floats:
     """Return the miss (runs,) [deg] of a conventional filter tuned to a rate noise (runs,) [deg/s] in each run.
 
     The miss is interpolated between the filters of CV_NOISES on logarithmic scales. If even the quietest of these
@@ -179,8 +185,8 @@ def at_rate_noise(misses, axis, rate_noise):
     return np.exp([np.interp(*run) for run in zip(np.log(rate_noise), noises.T, curve.T)])
 
 
-def rows(misses):
-    """Return the rows of {case: MissStatistics} of all cases.
+def rows(misses: Misses) -> list[Row]:
+    """Return the rows of all cases.
 
     A ratio divides the misses of two filters in runs with the same noise.
     """
@@ -200,8 +206,8 @@ def rows(misses):
     return table
 
 
-def drive_rows(of_drive):
-    """Return the rows of {name of DRIVE_CASES: (rms, largest) miss [deg] of every run, an array (runs, 2)}."""
+def drive_rows(of_drive: Mapping[str, Pairs]) -> list[Row]:
+    """Return the rows of {name of DRIVE_CASES: (rms, largest) miss [deg] of every run}."""
     table = []
     for name, values in of_drive.items():
         table += [row(name, 'miss_rms_deg', values[:, 0], 'deg'), row(name, 'miss_peak_deg', values[:, 1], 'deg')]
@@ -212,8 +218,8 @@ def drive_rows(of_drive):
     return table
 
 
-def remarks(misses):
-    """Return the sentences that explain the rows; misses: as of `rows`."""
+def remarks(misses: Misses) -> list[str]:
+    """Return the sentences that explain the rows."""
     value = {(name, metric): case.mean(metric) for name, case in misses.items() for metric in METRIC_UNITS}
     late = (feedforward_loop.MISS_DELAY_STEPS + 0.5) * T
     steepest = math.pi * math.degrees(profiles.S_MOTION_RATE_RAD_S) / REVERSAL_S_BY_AXIS['azimuth']
@@ -249,22 +255,22 @@ SOURCE_COLOURS = {'kalman-cv': TRUTH_COLOUR, 'imm': MOTOR_1_COLOUR, 'imm-predict
                   'perfect-state': INK_COLOUR}
 
 
-def figures(misses):
-    """Return {name: function that draws it} of {case: MissStatistics}."""
+def figures(misses: Misses) -> Drawings:
+    """Return the figures."""
     return {'azimuth': lambda: miss_figure('azimuth', 'figures 8 and 9', misses),
             'elevation': lambda: miss_figure('elevation', 'figures 10 and 11', misses),
             'feedforward': feedforward_figure, 'probabilities': probability_figure,
             'tunings': lambda: tuning_figure(misses), 'drive': drive_figure}
 
 
-def from_first_reversal(axis):
-    """Return (times (m,) [s] since the first evaluated step, mask (n,) of the evaluated steps, the target (n, 3))."""
+def from_first_reversal(axis: str) -> tuple[Times, Bools, Vectors3]:
+    """Return (times since the first evaluated step, mask of the evaluated steps, the target at all steps)."""
     t, target, period = feedforward_loop.motion(axis)
     counts = t >= 0.5 * period
     return t[counts] - 0.5 * period, counts, target
 
 
-def miss_figure(axis, figures_of_paper, misses):
+def miss_figure(axis: str, figures_of_paper: str, misses: Misses) -> Figure:
     """Draw the miss: one run of each case and the mean over the runs."""
     names = ('kalman-cv', 'imm', 'imm-predicted')
     figure, axes = new_panels(len(names), height=6.4, y='miss [deg]', sharex=True, sharey=True)
@@ -280,7 +286,7 @@ def miss_figure(axis, figures_of_paper, misses):
     return drawing.legend(figure)
 
 
-def feedforward_figure():
+def feedforward_figure() -> Figure:
     """Draw the rate and acceleration that are fed forward in one reversal of one run, beside the truth."""
     figure, axes = new_panels(2, height=5.4, y=('rate [deg/s]', 'acceleration [deg/s2]'), sharex=True)
     t, counts, target = from_first_reversal('azimuth')
@@ -295,7 +301,7 @@ def feedforward_figure():
     return drawing.legend(figure)
 
 
-def probability_figure():
+def probability_figure() -> Figure:
     """Draw the model probabilities of the IMM through reversals, mean over BATCH_RUNS runs."""
     figure, axes = new_panels(2, height=4.6, y=('acceleration\n[deg/s2]', 'probability'), sharex=True,
                               height_ratios=(1, 1.6))
@@ -310,7 +316,7 @@ def probability_figure():
     return drawing.legend(figure)
 
 
-def tuning_figure(misses):
+def tuning_figure(misses: Misses) -> Figure:
     """Draw the miss of every filter over the noise of the rate that it feeds forward."""
     figure, axes = new_panels(1, 2, height=3.8, x='noise of the rate fed forward [deg/s]', y='miss rms [deg]',
                               sharex=True, sharey=True)
@@ -328,7 +334,7 @@ def tuning_figure(misses):
     return drawing.legend(figure)
 
 
-def drive_figure():
+def drive_figure() -> Figure:
     """Draw the miss of the whole chain over time, one run of each filter."""
     figure, axes = new_panels(2, height=4.8, y='miss [deg]', sharex=True)
     for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[:, 0]):
@@ -340,7 +346,7 @@ def drive_figure():
     return drawing.legend(figure)
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run CASES and DRIVE_CASES `runs` times; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     misses = statistics(CASES, runs, pool, lambda share, text: progress(0.5 * share, text))

@@ -7,8 +7,11 @@ reversal-<seconds>/<filter>; their metrics are the rms errors of rate and accele
 model has a process noise of 40 and of 5 deg/s3/sqrt(Hz), as in `imm` and `imm-b` of the study imm-feedforward.
 """
 import math
+from collections.abc import Mapping
+from typing import TypeAlias
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.report.figures import (
     FILTERED_COLOUR,
@@ -20,9 +23,15 @@ from pedestal_analysis.report.figures import (
 )
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.monte_carlo import Pool, Progress
+from pedestal_common.quantities import Bools, Floats, Records, Row, Seconds, Times
 from pedestal_studies import drawing, ensemble, profiles
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
-from pedestal_studies.result import Result
+from pedestal_studies.profiles import Motion
+from pedestal_studies.result import Item, Result
+
+Errors: TypeAlias = dict[tuple[Seconds, str], Floats]
+"""{(reversal, filter): rms (2, runs) of rate [deg/s] and acceleration [deg/s2]}."""
 
 DEFAULT_RUNS = 200  # runs of the motion; the paper has 50
 BATCH_RUNS, NOISE_SEED = 25, 1  # runs of one batch; seed of their noise
@@ -36,10 +45,10 @@ then."""
 
 MEASUREMENT_NOISE = ensemble.Noise(feedforward_loop.MISS_SIGMA_RAD)  # noise of the measured angle
 
-FILTERS = {'cv': feedforward_loop.cv(0.1).filter, 'ca': feedforward_loop.ca(10.0).filter,
-           'imm-a': feedforward_loop.imm(q_ca=40.0, predicted=False).filter,
-           'imm-b': feedforward_loop.imm(q_ca=5.0, predicted=False).filter}
-"""{filter: FilterParameters}. The numbers are the process noise of the filter: cv in deg/s2/sqrt(Hz), ca and imm in
+FILTERS = {'cv': feedforward_loop.cv(0.1).own_filter, 'ca': feedforward_loop.ca(10.0).own_filter,
+           'imm-a': feedforward_loop.imm(q_ca=40.0, predicted=False).own_filter,
+           'imm-b': feedforward_loop.imm(q_ca=5.0, predicted=False).own_filter}
+"""{filter: its parameters}. The numbers are the process noise of the filter: cv in deg/s2/sqrt(Hz), ca and imm in
 deg/s3/sqrt(Hz)."""
 
 FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'imm-a': MOTOR_1_COLOUR, 'imm-b': FILTERED_COLOUR}
@@ -48,8 +57,8 @@ ACCELERATION_ROW = 1  # row of the acceleration in the rms of `measured`; row 0 
 RATE_RATIO_TARGET = '>= 3'  # required ratio: rate error of cv divided by rate error of imm-b [-]
 
 
-def motion():
-    """Return (times (n,) [s], truth (angle, rate, acceleration) (n,), {reversal: mask (n,)}) of all reversals."""
+def motion() -> tuple[Times, Motion, dict[Seconds, Bools]]:
+    """Return (times, truth, {reversal: mask of its times}) of all reversals."""
     # begin: time at which the target is in the middle of its stroke before the next reversal; legs: these times of all
     # reversals; starts: {reversal: time at which it starts}.
     stroke, rate = profiles.S_MOTION_STROKE_RAD, profiles.S_MOTION_RATE_RAD_S
@@ -59,16 +68,17 @@ def motion():
         legs.append(begin)
         starts[reversal] = begin + 0.5 * uniform
         begin += uniform + reversal
-    t = ensemble.MEASUREMENT_PERIOD_S * np.arange(round(begin / ensemble.MEASUREMENT_PERIOD_S))
+    t = ensemble.MEASUREMENT_PERIOD_S * np.arange(round(begin / ensemble.MEASUREMENT_PERIOD_S), dtype=float)
     truth = np.array([rate * (t - LEAD_TIME_S), np.full(len(t), rate), np.zeros(len(t))])
     for i, (reversal, leg) in enumerate(zip(REVERSAL_DURATIONS_S, legs)):
         later = t >= leg
         truth[:, later] = (-1.0) ** i * np.array(profiles.s_motion(t[later] - leg, stroke, rate, reversal))
-    return t, tuple(truth), {reversal: (t >= start) & (t <= start + reversal) for reversal, start in starts.items()}
+    return t, profiles.Motion(*truth), {reversal: (t >= start) & (t <= start + reversal)
+                                        for reversal, start in starts.items()}
 
 
-def batch(item):
-    """Return (MOMENTS (n,) over the runs, rms (count, len(REVERSAL_DURATIONS_S), 2)) of an item.
+def batch(item: Item) -> tuple[Records, Floats]:
+    """Return (Moments (n,) over the runs, rms (count, len(REVERSAL_DURATIONS_S), 2)) of an item.
 
     An item is (filter, first run, number of runs). The rms are those of rate [deg/s] and acceleration [deg/s2] of
     every run inside the reversals.
@@ -82,12 +92,12 @@ def batch(item):
     return ensemble.over_runs(sums), rms.transpose(2, 0, 1)
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Filter `runs` noisy records with each of FILTERS; pool: monte_carlo.Pool, None for this process."""
     pool = pool or monte_carlo.Pool(1)
     items = [(name, first, count) for name in FILTERS for first, count in monte_carlo.batches(runs, BATCH_RUNS)]
-    sums_of: dict[str, np.ndarray] = {}
-    errors: dict[str, list] = {}
+    sums_of: dict[str, Records] = {}
+    errors: dict[str, list[Floats]] = {}
     for (name, *_), (sums, rms) in zip(items, pool.map(batch, items, progress)):
         sums_of[name] = ensemble.sum_of_moments(sums_of[name], sums) if name in sums_of else sums
         errors.setdefault(name, []).append(rms)
@@ -98,17 +108,14 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     return Result(rows(values), figures, remarks(values))
 
 
-def measured(errors):
-    """Return {(reversal, filter): rms (2, runs) of rate [deg/s] and acceleration [deg/s2]}.
-
-    errors: {filter: (runs, len(REVERSAL_DURATIONS_S), 2)}.
-    """
+def measured(errors: Mapping[str, Floats]) -> Errors:
+    """Return the errors by reversal and filter; errors: {filter: (runs, len(REVERSAL_DURATIONS_S), 2)}."""
     return {(reversal, name): rms[:, i].T for i, reversal in enumerate(REVERSAL_DURATIONS_S)
             for name, rms in errors.items()}
 
 
-def rows(values):
-    """Return the rows of the study; values: as `measured` returns."""
+def rows(values: Errors) -> list[Row]:
+    """Return the rows of the study."""
     table = []
     for (reversal, name), (rate, acceleration) in values.items():
         case = f'reversal-{reversal:g}s/{name}'
@@ -122,13 +129,13 @@ def rows(values):
     return table
 
 
-def peak_acceleration(reversal):
-    """Return the peak acceleration [deg/s2] of a reversal of this duration [s]."""
+def peak_acceleration(reversal: Seconds) -> float:
+    """Return the peak acceleration [deg/s2] of a reversal of this duration."""
     return math.pi * math.degrees(profiles.S_MOTION_RATE_RAD_S) / reversal
 
 
-def remarks(values):
-    """Return the sentences that explain the rows; values as of `measured`."""
+def remarks(values: Errors) -> list[str]:
+    """Return the sentences that explain the rows."""
     worse = [f'{peak_acceleration(reversal):.1f}' for reversal in REVERSAL_DURATIONS_S
              if values[reversal, 'imm-a'][ACCELERATION_ROW].mean() > values[reversal, 'cv'][ACCELERATION_ROW].mean()]
     lines = ['_ratio_of_cv is the error of cv over the error of the filter. cv estimates no acceleration, so its '
@@ -139,10 +146,10 @@ def remarks(values):
     return lines
 
 
-def moments_figure(sums_of, what, label):
+def moments_figure(sums_of: Mapping[str, Records], what: str, label: str) -> Figure:
     """Draw truth and mean estimates above, mean errors +-1 sigma below (paper 003, figures 3 and 4).
 
-    sums_of: {filter: MOMENTS (n,) of the errors, estimate minus truth}; what: 'rate' or 'acceleration'.
+    sums_of: {filter: Moments (n,) of the errors, estimate minus truth}; what: 'rate' or 'acceleration'.
     """
     t, truth, _ = motion()
     figure, axes = new_panels(2, height=5.4, y=(label, f'error of the {label}'), sharex=True)
@@ -160,7 +167,7 @@ def moments_figure(sums_of, what, label):
     return drawing.legend(figure)
 
 
-def sharpness_figure(values):
+def sharpness_figure(values: Errors) -> Figure:
     """Draw the errors of rate and acceleration over the peak acceleration of the reversal."""
     figure, axes = new_panels(1, 2, height=3.6, x='peak acceleration of the reversal [deg/s2]', sharex=True)
     x = [peak_acceleration(reversal) for reversal in REVERSAL_DURATIONS_S]

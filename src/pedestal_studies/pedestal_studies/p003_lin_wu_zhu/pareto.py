@@ -11,8 +11,11 @@ noise at the miss of imm-predicted, and the least miss. The case `imm` is the cu
 """
 import dataclasses
 import math
+from collections.abc import Mapping
+from typing import TypeAlias
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_analysis.report.figures import (
     FILTERED_COLOUR,
@@ -25,10 +28,15 @@ from pedestal_analysis.report.figures import (
 )
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.monte_carlo import Pool, Progress
+from pedestal_common.quantities import Degrees, Floats, Row
 from pedestal_studies import drawing
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
-from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import Source
+from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import MissStatistics, Source
 from pedestal_studies.result import Result
+
+Tuning: TypeAlias = tuple[str, float]   # filter, value of its tuned parameter
+Points: TypeAlias = Mapping[Tuning, tuple[float, Degrees] | Floats]     # {tuning: (rate noise [deg/s], miss)}
 
 DEFAULT_RUNS = 50  # runs of each tuning, as many as in the paper
 LOOP_AXIS = 'azimuth'  # axis of all runs
@@ -39,13 +47,13 @@ REFERENCE_SOURCE = feedforward_loop.imm(q_ca=40.0, predicted=True)
 REFERENCE_POINT = ('reference', 0.0)  # key of REFERENCE_SOURCE beside the keys (filter, value) of the tunings
 
 
-def _current_statistical(a_max):
-    """Return the Source of a 'current' statistical filter; a_max: largest acceleration of its model [deg/s2]."""
+def _current_statistical(a_max: float) -> Source:
+    """Return the source of a 'current' statistical filter; a_max: largest acceleration of its model [deg/s2]."""
     return Source(feedforward_loop.filter_of('current_statistical', current_statistical={
         'alpha': 0.5, 'a_max': math.radians(a_max)}))
 
 
-def _logarithmic(low, high, points):
+def _logarithmic(low: float, high: float, points: int) -> list[float]:
     """Return `points` values from low to high at equal ratios, rounded to three digits."""
     return [float(f'{value:.3g}') for value in np.geomspace(low, high, points)]
 
@@ -69,14 +77,14 @@ MISS_RATIO_TARGET = '>= 5'
 """Target of the miss of cv at the rate noise of imm-predicted, divided by the miss of imm-predicted."""
 
 
-def cases():
-    """Return {(filter, value): (axis, Source)} of all tunings and of the reference."""
+def cases() -> dict[Tuning, tuple[str, Source]]:
+    """Return {tuning: (axis, source)} of all tunings and of the reference."""
     tunings = {(name, value): (LOOP_AXIS, dataclasses.replace(source(value), predicted=True))
              for name, (_, values, source) in FILTER_TUNINGS.items() for value in values}
     return tunings | {REFERENCE_POINT: (LOOP_AXIS, REFERENCE_SOURCE)}
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run every tuning `runs` times; pool: monte_carlo.Pool, None for this process."""
     misses = feedforward_loop.statistics(cases(), runs, pool or monte_carlo.Pool(1), progress)
     points = {case: measured(misses[case]) for case in misses}
@@ -84,44 +92,41 @@ def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
     return Result(rows(points), {'miss': lambda: miss_figure(mean)}, remarks(mean))
 
 
-def measured(statistics):
-    """Return (rate noise [deg/s], miss rms [deg]) of every run of MissStatistics, an array (2, runs)."""
+def measured(statistics: MissStatistics) -> Floats:
+    """Return (rate noise [deg/s], miss rms [deg]) of every run, an array (2, runs)."""
     return np.array([statistics.of(metric) for metric in ('rate_noise_deg_s', 'miss_rms_deg')])
 
 
-def curve(points, name):
-    """Return (rate noise [deg/s], miss [deg]) of a filter over its tunings, an array (2, n).
-
-    points: as of `remarks`.
-    """
+def curve(points: Points, name: str) -> Floats:
+    """Return (rate noise [deg/s], miss [deg]) of a filter over its tunings, an array (2, n)."""
     return np.array([points[name, value] for value in FILTER_TUNINGS[name][1]]).T
 
 
-def frontier(points, name):
+def frontier(points: Points, name: str) -> Floats:
     """Return the Pareto frontier of the curve of a filter, an array (2, n) of (rate noise, miss) by rising rate noise.
 
     It holds the tunings for which no other tuning has both less rate noise and less miss.
     """
-    kept = []
+    kept: list[tuple[float, float]] = []
     for noise, miss in sorted(map(tuple, curve(points, name).T)):
         if not kept or miss < kept[-1][1]:
             kept.append((noise, miss))
     return np.array(kept).T
 
 
-def miss_at(front, noise):
-    """Return the miss [deg] on a frontier at a rate noise [deg/s] within its range, log-log between its points."""
+def miss_at(front: Floats, noise: float) -> Degrees:
+    """Return the miss on a frontier at a rate noise [deg/s] within its range, log-log between its points."""
     return math.exp(np.interp(math.log(noise), *np.log(front)))
 
 
-def noise_at(front, miss):
-    """Return the rate noise [deg/s] on a frontier at a miss [deg] within its range, log-log between its points."""
+def noise_at(front: Floats, miss: Degrees) -> float:
+    """Return the rate noise [deg/s] on a frontier at a miss within its range, log-log between its points."""
     noises, misses = np.log(front)
     return math.exp(np.interp(math.log(miss), misses[::-1], noises[::-1]))
 
 
-def rows(points):
-    """Return the rows of points {(filter, value): (rate noise [deg/s], miss [deg]) of every run, an array (2, runs)}.
+def rows(points: Mapping[Tuning, Floats]) -> list[Row]:
+    """Return the rows of {tuning: (rate noise [deg/s], miss [deg]) of every run, an array (2, runs)}.
 
     The curves are read run by run, because all filters have the same noise in a run. A number that is not on the curve
     of every run has no row.
@@ -145,11 +150,8 @@ def rows(points):
     return table
 
 
-def remarks(points):
-    """Return the sentences that explain the rows.
-
-    points: {(filter, value): (rate noise [deg/s], miss [deg])}, means of the runs.
-    """
+def remarks(points: Points) -> list[str]:
+    """Return the sentences that explain the rows; points: means of the runs."""
     tuned = '; '.join(f'{name}: {what} {values[0]:g} to {values[-1]:g}'
                       for name, (what, values, _) in FILTER_TUNINGS.items())
     noise, miss = points[REFERENCE_POINT]
@@ -165,8 +167,8 @@ def remarks(points):
     return lines
 
 
-def miss_figure(points):
-    """Draw miss over rate noise, a curve for every filter; points as of `remarks`."""
+def miss_figure(points: Points) -> Figure:
+    """Draw miss over rate noise, a curve for every filter."""
     figure, axes = new_panels(1, height=4.8, x='noise of the rate fed forward, at constant rate [deg/s]',
                               y='miss rms [deg]')
     panel = axes[0, 0]

@@ -19,8 +19,10 @@ weight, |G_1| never falls below -3 dB, because the two measurements make a compl
 import dataclasses
 import math
 import typing
+from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.filters.measurement import AxisMeasurement
@@ -36,10 +38,25 @@ from pedestal_analysis.report.figures import (
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.monte_carlo import Pool, Progress
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import (
+    Complexes,
+    Floats,
+    Hertz,
+    Pairs,
+    Radians,
+    RadiansPerSecond,
+    RadiansPerSecond2,
+    Records,
+    Row,
+    Times,
+    Vector3,
+    Vectors3,
+)
 from pedestal_studies import drawing, ensemble, profiles
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
-from pedestal_studies.result import Result
+from pedestal_studies.result import Drawings, Item, Metrics, Result
 
 DEFAULT_RUNS = 40  # number of flybys
 ANGLE_SIGMA_RAD = math.radians(0.03)  # noise of a measured angle [rad]
@@ -74,44 +91,46 @@ RATE_SOURCE_MEANINGS = {
 
 
 class FlybyRecord(typing.NamedTuple):
-    """Measured angle [rad], measured rate [rad/s] and axis_filter.Estimate of a flyby, each (n,)."""
-    angle: np.ndarray
-    rate: np.ndarray
-    estimate: np.ndarray
+    """Record of a flyby."""
+    angle: Floats       # measured [rad]
+    rate: Floats        # measured [rad/s]
+    estimate: Records   # axis_filter.Estimate (n,)
 
 
 BATCH_RUNS, NOISE_SEED = 25, 1  # flybys of one batch; seed of their noise
 
 
-def filter_of(a_max, floor):
-    """Return a 'current' statistical filter (FilterParameters) that uses the measured rate.
+def filter_of(a_max: RadiansPerSecond2, floor: float) -> FilterParameters:
+    """Return a 'current' statistical filter that uses the measured rate.
 
-    a_max: largest acceleration of its model [rad/s2]; floor: least sigma_a over a_max [-].
+    a_max: largest acceleration of its model; floor: least sigma_a over a_max [-].
     """
     model = dataclasses.replace(FilterParameters().current_statistical, alpha=ALPHA, a_max=a_max, floor=floor)
     return FilterParameters(kind='current_statistical', rate_measurement=True, current_statistical=model)
 
 
 @compiled
-def _settle(f, c, rate, R_rate, steps):
+def _settle(filters: Records, constants: Records, rate: RadiansPerSecond, R_rate: float, steps: int) -> None:
     """Run the filter for `steps` on a target at rest.
 
     rate: measured rate, 0, or NaN without a measured rate. R_rate: its variance [rad2/s2].
     """
-    axis_filter.start(f[0], c[0], 0.0, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, 1.0)
+    axis_filter.start(filters[0], constants[0], 0.0, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, 1.0)
     for _ in range(steps):
-        axis_filter.predict(f[0], c[0], T)
-        axis_filter.correct(f[0], c[0], AxisMeasurement(0.0, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, rate, R_rate))
+        axis_filter.predict(filters[0], constants[0], T)
+        axis_filter.correct(filters[0], constants[0],
+                            AxisMeasurement(0.0, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, rate, R_rate))
 
 
 @compiled
-def _step(f, c, y, y_rate, R_rate):
-    """Run one step of the filter with a measured angle y [rad] and a rate y_rate [rad/s] of variance R_rate."""
-    axis_filter.predict(f[0], c[0], T)
-    axis_filter.correct(f[0], c[0], AxisMeasurement(y, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, y_rate, R_rate))
+def _step(filters: Records, constants: Records, y: Radians, y_rate: RadiansPerSecond, R_rate: float) -> None:
+    """Run one step of the filter with a measured angle y and a rate y_rate of variance R_rate [rad2/s2]."""
+    axis_filter.predict(filters[0], constants[0], T)
+    axis_filter.correct(filters[0], constants[0],
+                        AxisMeasurement(y, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, y_rate, R_rate))
 
 
-def steady_state_matrices(sigma_a, rate_sigma):
+def steady_state_matrices(sigma_a: float, rate_sigma: float) -> tuple[Floats, Floats]:
     """Return (A (3, 3), B (3, 2)) of X+ = A X + B (y, y') with constant gains.
 
     sigma_a [deg/s2]; rate_sigma: noise of the measured rate [deg/s], NaN without a measured rate. B then has a column
@@ -123,8 +142,8 @@ def steady_state_matrices(sigma_a, rate_sigma):
     f = axis_filter.Filter.zeros()
     _settle(f, c, zero_rate, R_rate, SETTLING_STEPS)
 
-    def after(x, y, y_rate):
-        """Return the state (3,) one step after the state x, with the measurements y and y_rate."""
+    def after(x: Vector3 | float, y: Radians, y_rate: RadiansPerSecond) -> Vector3:
+        """Return the state one step after the state x, with the measurements y and y_rate."""
         one = f.copy()
         one['x'][0, 0] = x
         _step(one, c, y, y_rate, R_rate)
@@ -135,15 +154,15 @@ def steady_state_matrices(sigma_a, rate_sigma):
     return A, B
 
 
-def responses(A, B, frequency):
-    """Return (G_1, G_2 / jw), each (n,), at frequencies (n,) [Hz]: estimated over true angle, and over true rate."""
+def responses(A: Floats, B: Floats, frequency: Floats) -> tuple[Complexes, Complexes]:
+    """Return (G_1, G_2 / jw) at frequencies [Hz]: estimated over true angle, and over true rate."""
     jw = 2j * math.pi * frequency
     X = np.linalg.solve(np.eye(3) - A * np.exp(-jw * T)[:, None, None], (B[:, 0] + jw[:, None] * B[:, 1])[..., None])
     return X[:, 0, 0], X[:, 1, 0] / jw
 
 
-def bandwidth(G):
-    """Return the frequency [Hz] at which |G| (n,) over RESPONSE_FREQUENCIES_HZ first falls below -3 dB, or NaN."""
+def bandwidth(G: Complexes) -> Hertz:
+    """Return the frequency at which |G| over RESPONSE_FREQUENCIES_HZ first falls below -3 dB, or NaN."""
     gain = np.log(np.abs(G)) - 0.5 * math.log(0.5)
     below = np.flatnonzero(gain < 0.0)
     if below.size == 0:
@@ -153,8 +172,8 @@ def bandwidth(G):
     return float(f[i - 1] * (f[i] / f[i - 1]) ** (gain[i - 1] / (gain[i - 1] - gain[i])))
 
 
-def measures(sigma_a, rate_sigma):
-    """Return {metric: (value, unit)} of the filter with constant gains; arguments as of `steady_state_matrices`."""
+def measures(sigma_a: float, rate_sigma: float) -> Metrics:
+    """Return the metrics of the filter with constant gains; arguments as of `steady_state_matrices`."""
     A, B = steady_state_matrices(sigma_a, rate_sigma)
     angle, rate = responses(A, B, RESPONSE_FREQUENCIES_HZ)
     (angle_at_frequency,), _ = responses(A, B, np.array([DYNAMIC_ERROR_FREQUENCY_HZ]))
@@ -169,8 +188,8 @@ CASES = {name if sigma_a == MAIN_SIGMA_DEG_S2 else f'{name}/sigma_a-{sigma_a:g}'
 """{case: (sigma_a [deg/s2], noise of the rate [deg/s])}."""
 
 
-def differenced_rate(y, steps):
-    """Return (rate (n,) [rad/s], its variance) from differences of angles y (n,) [rad] over `steps` T.
+def differenced_rate(y: Floats, steps: int) -> tuple[Floats, float]:
+    """Return (rate [rad/s], its variance) from differences of angles y [rad] over `steps` T.
 
     The first `steps` rates are NaN.
     """
@@ -179,10 +198,10 @@ def differenced_rate(y, steps):
     return rate, 2.0 * (ANGLE_SIGMA_RAD / (steps * T)) ** 2
 
 
-def filtered(t, target, y, y_rate, R_rate):
-    """Return the estimates (n,), Estimate, of the filter from measured angles y and rates y_rate (n,).
+def filtered(t: Times, target: Vectors3, y: Floats, y_rate: Floats, R_rate: float) -> Records:
+    """Return the axis_filter.Estimate (n,) of the filter from measured angles y [rad] and rates y_rate [rad/s].
 
-    t: times (n,) [s]. target (n, 3): true angle, rate and acceleration. R_rate: variance of y_rate [rad2/s2].
+    target: true angle, rate and acceleration. R_rate: variance of y_rate [rad2/s2].
     """
     c = axis_filter.constants(filter_of(MAX_ACCELERATION_RATIO * np.abs(target[:, 2]).max(), MIN_SIGMA_RATIO))
     out = np.zeros(len(t), axis_filter.Estimate.dtype)
@@ -191,14 +210,14 @@ def filtered(t, target, y, y_rate, R_rate):
     return out
 
 
-def flyby():
-    """Return (times (n,) [s], angle, rate and acceleration (n, 3)) of FLYBY_PROFILE."""
-    t = T * np.arange(round(profiles.RECORD_DURATION_S / T))
+def flyby() -> tuple[Times, Vectors3]:
+    """Return (times, angle, rate and acceleration) of FLYBY_PROFILE."""
+    t = T * np.arange(round(profiles.RECORD_DURATION_S / T), dtype=float)
     return t, np.column_stack(profiles.truth(FLYBY_PROFILE, t))
 
 
-def flyby_record(name, run):
-    """Return the FlybyRecord of one flyby.
+def flyby_record(name: str, run: int) -> FlybyRecord:
+    """Return the record of one flyby.
 
     name: one of FLYBY_CASES. The noise depends only on `run`.
     """
@@ -213,8 +232,8 @@ def flyby_record(name, run):
     return FlybyRecord(y, y_rate, filtered(t, target, y, y_rate, R_rate))
 
 
-def batch(item):
-    """Return the rms errors (count, 2) of the angle [deg] and of the rate [deg/s] of every run of an item.
+def batch(item: Item) -> Pairs:
+    """Return the rms errors of the angle [deg] and of the rate [deg/s] of every run of an item.
 
     An item is (name, first run, number of runs).
     """
@@ -232,8 +251,8 @@ METRIC_TARGETS = {('position-rate', 'rate_bandwidth_ratio'): '>= 1.5',
                   ('position-rate', 'dynamic_error_ratio'): '>= 9'}
 
 
-def rows(measured, errors):
-    """Return the rows of measured {case: as of `measures`} and errors {name of FLYBY_CASES: rms (runs, 2)}.
+def rows(measured: Mapping[str, Metrics], errors: Mapping[str, Pairs]) -> list[Row]:
+    """Return the rows of measured {case: as of `measures`} and errors {name of FLYBY_CASES: rms of every run}.
 
     The rms are in [deg, deg/s].
     """
@@ -256,7 +275,7 @@ def rows(measured, errors):
     return table
 
 
-def remarks(measured, errors):
+def remarks(measured: Mapping[str, Metrics], errors: Mapping[str, Pairs]) -> list[str]:
     """Return the sentences that explain the rows; arguments as of `rows`."""
     one, twenty, without = (errors[name][:, 0].mean() for name in (*DIFFERENCED_RATES, 'position'))
     largest, slowest = max((measured[name]['largest_eigenvalue'][0], name) for name in measured)
@@ -279,12 +298,12 @@ def remarks(measured, errors):
 CASE_COLOURS = {'position': TRUTH_COLOUR, 'position-rate': FILTERED_COLOUR, 'position-rate-0.02': MOTOR_2_COLOUR}
 
 
-def figures():
-    """Return {name: function that draws it}."""
+def figures() -> Drawings:
+    """Return the figures."""
     return {'bode': bode_figure, 'sigma_a': sigma_a_figure, 'flyby': flyby_figure}
 
 
-def bode_figure():
+def bode_figure() -> Figure:
     """Draw the responses of angle and rate with and without a measured rate, and their dynamic errors."""
     figure, axes = new_panels(2, 2, height=5.6, x='frequency [Hz]', y=('gain [dB]', 'dynamic error |1 - G|'),
                               sharex=True)
@@ -303,7 +322,7 @@ def bode_figure():
     return drawing.legend(figure)
 
 
-def sigma_a_figure():
+def sigma_a_figure() -> Figure:
     """Draw bandwidth of the rate and dynamic error of the angle over sigma_a, with and without a measured rate."""
     figure, axes = new_panels(1, 2, height=3.4, x='sigma_a [deg/s2]', y='bandwidth of the rate [Hz]', sharex=True)
     sigma_a = np.geomspace(ACCELERATION_SIGMAS_DEG_S2[0], ACCELERATION_SIGMAS_DEG_S2[-1], 13)
@@ -315,7 +334,7 @@ def sigma_a_figure():
     return drawing.legend(figure)
 
 
-def flyby_figure():
+def flyby_figure() -> Figure:
     """Draw the quantities of the paper's figures 1 to 8 on the flyby: rate, error of angle and rate, acceleration."""
     labels = ('rate [deg/s]', 'error of the angle [deg]', 'error of the rate [deg/s]', 'acceleration [deg/s2]')
     figure, axes = new_panels(4, height=8.6, y=labels, sharex=True)
@@ -338,7 +357,7 @@ def flyby_figure():
     return drawing.legend(figure)
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Identify the filters of CASES and run `runs` flybys; pool: monte_carlo.Pool, None for this process."""
     errors = (pool or monte_carlo.Pool(1)).of_cases(batch, FLYBY_CASES, runs, BATCH_RUNS, progress)
     measured = {name: measures(*case) for name, case in CASES.items()}

@@ -22,19 +22,23 @@ place of the second as the unit of time, so that the entries are of one size. In
 1 / T^2, and `condition_in_seconds` shows only this difference.
 """
 import math
+from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from acu_tracker.estimation.filters import motion_models
 from pedestal_analysis.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
+from pedestal_analysis.trials.monte_carlo import Pool, Progress
 from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Floats, Matrix3, Row, Seconds, Times, Vector3, Vectors3
 from pedestal_studies import drawing, ensemble
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S
 from pedestal_studies.p004_li_chen_wang.rate_measurement import ALPHA, ANGLE_SIGMA_RAD, differenced_rate, filtered
-from pedestal_studies.result import Result
+from pedestal_studies.result import Drawings, Item, Result
 
 DEFAULT_RUNS, NOISE_SEED = 40, 1  # number of flights; seed of their noise
 BATCH_RUNS = 5  # flights that one worker makes at a time
@@ -54,8 +58,8 @@ DIFFERENCE_STEPS = 20  # steps over which the measured rate is differenced
 QUANTITY_UNITS = {'angle': 'deg', 'rate': 'deg/s', 'acceleration': 'deg/s2'}
 
 
-def flight():
-    """Return (times (n,) [s], {axis: angle, rate, acceleration (n, 3) [rad, rad/s, rad/s2]}) of the target.
+def flight() -> tuple[Times, dict[str, Vectors3]]:
+    """Return (times, {axis: angle, rate, acceleration [rad, rad/s, rad/s2]}) of the target.
 
     A, E: azimuth, from the direction of the nearest point, and elevation. v: speed; t_0: time at the nearest point; d:
     distance over ground at t_0; h: height. With x = v (t - t_0), rho^2 = x^2 + d^2 and r^2 = rho^2 + h^2,
@@ -65,7 +69,7 @@ def flight():
         E'' = -v^2 h (1 / (rho r^2) - x^2 (3 rho^2 + h^2) / (rho^3 r^4)).
     """
     n = round((FLIGHT_END_S - FLIGHT_START_S) / MEASUREMENT_PERIOD_S) + 1
-    t = FLIGHT_START_S + MEASUREMENT_PERIOD_S * np.arange(n)
+    t = FLIGHT_START_S + MEASUREMENT_PERIOD_S * np.arange(n, dtype=float)
     v, d, h, x = TARGET_SPEED_M_S, MIN_GROUND_DISTANCE_M, TARGET_HEIGHT_M, TARGET_SPEED_M_S * (t - CULMINATION_TIME_S)
     rho2 = x * x + d * d
     rho, r2 = np.sqrt(rho2), rho2 + h * h
@@ -75,8 +79,8 @@ def flight():
     return t, {'azimuth': np.column_stack(azimuth), 'elevation': np.column_stack(elevation)}
 
 
-def flight_record(axis, run):
-    """Return (measured, filtered) angle, rate and acceleration, each (n, 3), of one flight.
+def flight_record(axis: str, run: int) -> tuple[Vectors3, Vectors3]:
+    """Return (measured, filtered) angle, rate and acceleration of one flight.
 
     The noise depends only on the axis and the run.
     """
@@ -89,7 +93,7 @@ def flight_record(axis, run):
     return np.column_stack((y, y_rate, difference)), np.column_stack([out[name] for name in QUANTITY_UNITS])
 
 
-def batch(item):
+def batch(item: Item) -> Floats:
     """Return the rms errors (count, 2, 3) [deg, deg/s, deg/s2], measured and filtered, of an item.
 
     An item is (axis, first run, number of runs).
@@ -101,8 +105,8 @@ def batch(item):
                         for values in flight_record(axis, run)] for run in range(first, first + count)])
 
 
-def model(T):
-    """Return (Phi (3, 3), U (3,)) of the 'current' statistical model over T [s] (paper 004, equations 5 and 6)."""
+def model(T: Seconds) -> tuple[Matrix3, Vector3]:
+    """Return (Phi, U) of the 'current' statistical model over T (paper 004, equations 5 and 6)."""
     angle, rate, kept = motion_models.fading(ALPHA, T)
     return (np.array([[1.0, T, angle], [0.0, 1.0, rate], [0.0, 0.0, kept]]),
             np.array([0.5 * T * T - angle, T - rate, 1.0 - kept]))
@@ -112,17 +116,17 @@ MEASUREMENT_MATRICES = {'angle': np.eye(3)[:1], 'angle-rate': np.eye(3)[:2]}
 """{case: H}: only the angle is measured, or angle and rate."""
 
 
-def controllability(Phi, U):
-    """Return the controllability matrix (3, 3) of the model: (U, Phi U, Phi^2 U)."""
+def controllability(Phi: Matrix3, U: Vector3) -> Matrix3:
+    """Return the controllability matrix of the model: (U, Phi U, Phi^2 U)."""
     return np.column_stack([np.linalg.matrix_power(Phi, i) @ U for i in range(3)])
 
 
-def observability(Phi, H):
+def observability(Phi: Matrix3, H: Floats) -> Floats:
     """Return the observability matrix of the model: H, H Phi, H Phi^2 stacked vertically; (3, 3) or (6, 3)."""
     return np.vstack([H @ np.linalg.matrix_power(Phi, i) for i in range(3)])
 
 
-def matrices():
+def matrices() -> dict[str, tuple[Floats, Floats]]:
     """Return {case: (matrix in seconds, matrix with T as the unit of time)}."""
     T = MEASUREMENT_PERIOD_S
     Phi, U = model(T)
@@ -133,7 +137,7 @@ def matrices():
                for name, H in MEASUREMENT_MATRICES.items()}}
 
 
-def rows(errors):
+def rows(errors: Mapping[str, Floats]) -> list[Row]:
     """Return the rows of the study; errors: {axis: rms errors (runs, 2, 3) as `batch` returns}."""
     table = []
     for axis, of_runs in errors.items():
@@ -149,7 +153,7 @@ def rows(errors):
     return table
 
 
-def remarks():
+def remarks() -> list[str]:
     """Return the sentences that explain the rows, with the matrices in seconds."""
     lines = ['Without the filter the acceleration is the difference of the measured rate over '
              f'{DIFFERENCE_STEPS * MEASUREMENT_PERIOD_S:g} s. The paper prints no error; it claims "smooth" and "does '
@@ -159,13 +163,13 @@ def remarks():
     return lines
 
 
-def figures():
-    """Return {name: function that draws it}: the paper's figures 1 to 4 and 5 to 8."""
+def figures() -> Drawings:
+    """Return the figures: the paper's figures 1 to 4 and 5 to 8."""
     return {'figures-1-to-4': lambda: axis_figure('azimuth', first_number=1),
             'figures-5-to-8': lambda: axis_figure('elevation', first_number=5)}
 
 
-def axis_figure(axis, first_number):
+def axis_figure(axis: str, first_number: int) -> Figure:
     """Draw angle, a part of it, rate and acceleration of one flight, measured, filtered and true.
 
     first_number: number of the first of the paper's four figures.
@@ -189,7 +193,7 @@ def axis_figure(axis, first_number):
     return drawing.legend(figure)
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Fly `runs` flights; pool: monte_carlo.Pool, None for this process."""
     errors = (pool or monte_carlo.Pool(1)).of_cases(batch, AXES, runs, BATCH_RUNS, progress)
     return Result(rows(errors), figures(), remarks())
