@@ -26,7 +26,7 @@ WARM_UP_LAPS = 300  # number of laps before the measurement of the time starts
 RING_STEPS = 3000  # measured laps of a run, as many as steps of 5 ms in a run of `pedestal bench graph`
 
 
-def _filled(topic: topics.Topic) -> Message:
+def _filled(topic: nodes.Link) -> Message:
     """Return an rclpy message with as many values as the message of the graph."""
     type_name = topic.type
     message = middleware.message_class(type_name)()

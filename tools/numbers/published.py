@@ -104,7 +104,7 @@ def write(rows: Rows, root: str | pathlib.Path = '.') -> None:
     # The tables are made only to note the rows that they read in rows.used.
     for table in TABLES.values():
         table(rows)
-    lines = {}
+    lines: dict[str, list[str]] = {}
     for (study, *_), row in sorted(rows.used.items()):
         lines.setdefault(study, []).append('  ' + json.dumps(row))
     content = ',\n'.join(f' "{study}": [\n' + ',\n'.join(of) + ']' for study, of in lines.items())

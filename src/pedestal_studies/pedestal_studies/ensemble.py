@@ -36,6 +36,10 @@ INITIAL_RATE_SIGMA_RAD_S = TrackerParameters().initial_rate
 """Standard deviation of the rate that a filter assumes at its start [rad/s]."""
 
 
+ESTIMATE_TYPE, UNSCENTED_TYPE = axis_filter.Estimate.dtype, unscented.State.dtype
+"""Types of records that a compiled law makes; it cannot take them from their class."""
+
+
 class Moments(Record):
     """Sums over runs at one time."""
     runs: float             # number of runs
@@ -178,10 +182,10 @@ def _add_unscented_runs(constants: Records, T: Seconds, truth: profiles.Motion, 
     rate_variance: at the start [rad2/s2].
     """
     R, R_range = measured.R, measured.R_range
-    out = axis_filter.Estimate.zeros()
+    out = np.zeros(1, ESTIMATE_TYPE)
     o = out[0]
     for run in range(len(measured.azimuth)):
-        state = unscented.State.zeros()
+        state = np.zeros(1, UNSCENTED_TYPE)
         s = state[0]
         for k in range(len(truth.angle)):
             A, E, r = measured.azimuth[run, k], measured.elevation[run, k], measured.ranges[run, k]

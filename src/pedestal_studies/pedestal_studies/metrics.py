@@ -14,12 +14,12 @@ from pedestal_common.quantities import Bools, Floats, RadiansPerSecond, Seconds,
 
 
 def overshoot_percent(y: Floats, size: float) -> float:
-    """Return the overshoot [%] of a step response y (n,) from 0 to size."""
+    """Return the overshoot [%] of a step response y from 0 to size."""
     return 100.0 * max(float(np.max(y / size)) - 1.0, 0.0)
 
 
 def settling_time(t: Times, y: Floats, size: float, band: float = 0.02) -> Seconds:
-    """Return the time [s] from which y stays within size +-band * size, or NaN if it does not settle.
+    """Return the time from which y stays within size +-band * size, or NaN if it does not settle.
 
     The time is interpolated linearly between two samples.
     """
@@ -40,7 +40,7 @@ def crossings(y: Floats, size: float, band: float = 0.005) -> int:
 
 
 def whole_periods(t: Times, period: Seconds, skip: Seconds) -> Bools:
-    """Return the mask (n,) of the times in whole periods of `period` [s], counted from `skip` [s] after the start.
+    """Return the mask of the times in whole periods of `period`, counted from `skip` after the start.
 
     Raises ValueError for a record without a whole period.
     """
@@ -60,7 +60,7 @@ def harmonic_fit(t: Times, y: Floats, w: RadiansPerSecond) -> Vector3:
 
 
 def amplitude_and_period(t: Times, y: Floats, period: Seconds) -> tuple[float, Seconds]:
-    """Return amplitude and period of a sine fitted to y by least squares (Gauss-Newton); period: first guess [s]."""
+    """Return amplitude and period of a sine fitted to y by least squares (Gauss-Newton); period: first guess."""
     w = 2.0 * math.pi / period
     # If t is 0 in the middle, an error of w hardly changes the fitted phase. The search then converges from a poor
     # first guess too.
@@ -80,7 +80,7 @@ def amplitude_and_period(t: Times, y: Floats, period: Seconds) -> tuple[float, S
 
 
 def residual(t: Times, y: Floats, period: Seconds) -> Floats:
-    """Return y (n,) without its mean and without its part at the frequency 1 / period, by a least-squares fit."""
+    """Return y without its mean and without its part at the frequency 1 / period, by a least-squares fit."""
     w = 2.0 * math.pi / period
     offset, a, b = harmonic_fit(t, y, w)
     return y - offset - a * np.sin(w * t) - b * np.cos(w * t)

@@ -157,12 +157,12 @@ def _bias_figure(kind: str, motion_of: Callable[[Run, int], tuple[Times, Floats]
 
 
 def _angle(run: Run, i: int) -> Floats:
-    """Return the true angle (n,) [rad] of an axis from its initial angle."""
+    """Return the true angle [rad] of an axis from its initial angle."""
     return run['adu/truth']['position'][:, i] - START_ANGLES_RAD[i]
 
 
 def _sine_error(run: Run, i: int) -> Floats:
-    """Return the sine minus the true angle (n,) [rad] of an axis."""
+    """Return the sine minus the true angle [rad] of an axis."""
     return SINE_AMPLITUDE_RAD * np.sin(2.0 * math.pi * SINE_FREQUENCY_HZ * run.t) - _angle(run, i)
 
 

@@ -25,7 +25,7 @@ from pedestal_bringup.scenario import scenario
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import build
 from pedestal_common.quantities import AnyRecord, Floats, Json, Records, Row, Times, Vectors3
-from pedestal_studies.bench.table import best_of, show
+from pedestal_studies.bench import best_of, show
 
 CORE_DURATION_S, TRIAL_DURATION_S = 20.0, 10.0  # simulated durations of the closed loop and of a trial [s]
 SHORT_RUN_STEPS, SHORT_RUN_COUNT = 40, 100

@@ -17,7 +17,7 @@ from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.quantities import Floats, Row, Seconds
 from pedestal_recording import bag
-from pedestal_studies.bench.table import show
+from pedestal_studies.bench import show
 
 ROUND_COUNT = 3  # number of runs in lockstep, of which the median counts
 RUN_DURATION_S, LATENCY_DURATION_S = 15.0, 10.0

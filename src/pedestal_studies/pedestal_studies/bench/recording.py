@@ -17,8 +17,8 @@ from pedestal_common.quantities import Row, Seconds
 from pedestal_common.wire import messages
 from pedestal_recording import bag
 from pedestal_recording.verify import verify
+from pedestal_studies.bench import best_of, show
 from pedestal_studies.bench.lockstep import graph_run
-from pedestal_studies.bench.table import best_of, show
 
 ROUND_COUNT = 3  # number of measurements of recompute, of which the median counts
 BAG_DURATION_S = 30.0  # simulated duration of the run whose bag is used [s]

@@ -112,13 +112,13 @@ def steady_residual(record: Run, amplitude: Radians, w: RadiansPerSecond) -> tup
 
 
 def opposing_torque(record: Run) -> Floats:
-    """Return the torque (n,) [Nm] with which the motors oppose each other beyond the commanded bias."""
+    """Return the torque [Nm] with which the motors oppose each other beyond the commanded bias."""
     motors = record['adu/motor_states']['effort'][:, :2]
     return 0.5 * (motors[:, 0] - motors[:, 1]) - record.truth['bias'][:, 0]
 
 
 def synchronism_error(record: Run) -> Floats:
-    """Return the measured speed of motor 1 minus that of motor 2 (n,) [rad/s]."""
+    """Return the measured speed of motor 1 minus that of motor 2 [rad/s]."""
     return record['adu/motor_states']['velocity'][:, 0] - record['adu/motor_states']['velocity'][:, 1]
 
 

@@ -104,7 +104,7 @@ def batch(item: tuple[tuple[str, Tuned], int, int]) -> Pairs:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
         motions: Sequence[str] = profiles.PROFILES) -> Result:
-    """Tune all filters and run them `runs` times; pool: monte_carlo.Pool, None for this process.
+    """Tune all filters and run them `runs` times.
 
     motions: names of profiles.
     """

@@ -155,7 +155,7 @@ def step_metrics(record: Run) -> dict[str, float]:
 
 
 def sine_error(record: Run, w: RadiansPerSecond) -> Floats:
-    """Return the sine of figure 6 at w minus the true load angle (n,) [rad]."""
+    """Return the sine of figure 6 at w minus the true load angle [rad]."""
     return SINE_AMPLITUDE_RAD * np.sin(w * record.t) - record['adu/truth']['position'][:, 0]
 
 

@@ -204,7 +204,7 @@ class Accuracy:
 
     @property
     def azimuth(self) -> Floats:
-        """Rms of the error in azimuth over the runs (n,) [arcmin]."""
+        """Rms of the error in azimuth over the runs [arcmin]."""
         return self.rms[:, AZIMUTH_COLUMN]
 
     @property
@@ -220,7 +220,7 @@ class Accuracy:
 
     @property
     def ratio(self) -> Floats:
-        """Rms over the runs of the ratio (n,) of the azimuth error to the 1 sigma that the navigator states."""
+        """Rms over the runs of the ratio of the azimuth error to the 1 sigma that the navigator states."""
         return np.sqrt(self.whole.ratios / self.whole.runs)
 
     @property
@@ -403,7 +403,7 @@ def limit() -> InformationLimit:
 
 
 def settling_time(rms: Floats) -> Seconds:
-    """Return the last time at which an rms (n,) [arcmin] is above SETTLED_AZIMUTH_ARCMIN; NaN if it ends above."""
+    """Return the last time at which an rms [arcmin] is above SETTLED_AZIMUTH_ARCMIN; NaN if it ends above."""
     above = np.flatnonzero(rms > SETTLED_AZIMUTH_ARCMIN)
     if len(above) and above[-1] == len(rms) - 1:
         return math.nan
@@ -411,7 +411,7 @@ def settling_time(rms: Floats) -> Seconds:
 
 
 def value_at(values: Floats, t: Seconds) -> float:
-    """Return the value at t of a series (n,) with a value every EVALUATION_PERIOD_S."""
+    """Return the value at t of a series with a value every EVALUATION_PERIOD_S."""
     return values[round(t / EVALUATION_PERIOD_S) - 1]
 
 
@@ -477,7 +477,7 @@ def remarks(runs: int) -> list[str]:
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Align by every method, `runs` times; pool: monte_carlo.Pool, None for this process."""
+    """Align by every method, `runs` times."""
     quarter = -(-runs // 4)     # a quarter of the runs, rounded up
     kinds = {'': runs, 'swell': runs, **{f'quadrant-{n}': quarter for n in range(1, 5)}}
     accuracy = accuracies(kinds, {case: (method, INS_PARAMETERS) for case, method in CASE_METHODS.items()},

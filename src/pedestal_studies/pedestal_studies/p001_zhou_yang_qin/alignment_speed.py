@@ -53,7 +53,7 @@ CASES = {f'adrc/{speed:g}': ('adrc', faster(speed)) for speed in SPEEDS}  # {cas
 
 
 def level_over_runs(accuracy: Accuracy) -> Floats:
-    """Return the rms of both level errors over the runs (n,) [arcmin]."""
+    """Return the rms of both level errors over the runs [arcmin]."""
     return tracking.rms(accuracy.rms[:, LEVEL_COLUMNS], axis=1)
 
 
@@ -73,7 +73,7 @@ METRICS = {
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Align with every case, `runs` times; pool: monte_carlo.Pool, None for this process."""
+    """Align with every case, `runs` times."""
     accuracy = alignment.accuracies({'': runs}, CASES, pool or monte_carlo.Pool(1), progress)['']
     rows = [row(case, metric, a.over_parts(value), unit, runs=a.whole.runs)
             for case, a in accuracy.items() for metric, (unit, value) in METRICS.items()]

@@ -37,7 +37,7 @@ def side_by_side(rows: int, **options: Any) -> tuple[Figure, Panels]:    # of ne
 
 
 def steps(done: Mapping[PaperLoop, Floats], label: Callable[[PaperLoop], str], title: str, seconds: Seconds) -> Figure:
-    """Draw step responses {PaperLoop: beam over step (n,)} with a column for each smoothing.
+    """Draw step responses {PaperLoop: beam over step} with a column for each smoothing.
 
     label: function that returns the name of a loop in the legend. seconds: end of the time axis.
     """
@@ -94,7 +94,7 @@ def stability(limits: Mapping[PaperLoop, tuple[int, int]]) -> Figure:
 
 
 def filter_loop_errors(errors: Mapping[str, Floats], seconds: tuple[Seconds, Seconds]) -> Figure:
-    """Draw true errors {case: (n,) [rad]} without noise, of the paper's loop and of loops with a filter."""
+    """Draw true errors {case: error [rad]} without noise, of the paper's loop and of loops with a filter."""
     figure, axes = new_panels(3, height=7.6, y='largest error [deg]', sharex=True)
     lines = {'paper': RAW_COLOUR, 'paper-delta': INK_COLOUR, 'type-2': MOTOR_2_COLOUR, 'tracked-10ms': MOTOR_1_COLOUR,
              'best': FILTERED_COLOUR}
@@ -115,12 +115,12 @@ def filter_loop_errors(errors: Mapping[str, Floats], seconds: tuple[Seconds, Sec
 
 
 def envelope(x: Floats, width: int = 10) -> Floats:
-    """Return x (n,) with each block of `width` samples replaced by its largest sample; n: a multiple of `width`."""
+    """Return x with each block of `width` samples replaced by its largest sample; n: a multiple of `width`."""
     return np.repeat(np.maximum(x.reshape(-1, width).max(axis=1), 1e-9), width)
 
 
 def loss(records: Mapping[str, Floats], seconds: tuple[Seconds, Seconds]) -> Figure:
-    """Draw true errors {label: (n,) in beamwidths} of a loop that keeps the target and of a loop that loses it."""
+    """Draw true errors {label: error [beamwidths]} of a loop that keeps the target and of a loop that loses it."""
     figure, axes = new_panels(1, height=3.6, y='true error [beamwidths]')
     panel, window = axes[0, 0], slice(*(round(t / GRID_STEP_S) for t in seconds))
     for (label, error), colour in zip(records.items(), LINE_COLOURS):

@@ -181,7 +181,7 @@ def sway_target() -> tuple[Floats, Floats]:
 
 
 def settled(x: Floats) -> Floats:
-    """Return the evaluated part of a record (n,)."""
+    """Return the evaluated part of a record."""
     return x[round(EVALUATION_START_S / GRID_STEP_S):]
 
 
@@ -532,7 +532,7 @@ def drawings(done: Mapping[PaperLoop, Floats], limit: Mapping[PaperLoop, tuple[i
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Run all loops on all targets, those with noise `runs` times; pool: monte_carlo.Pool, None for this process."""
+    """Run all loops on all targets, those with noise `runs` times."""
     progress(0.0, 'steps')
     done = steps()
     table = step_rows(done)

@@ -271,7 +271,7 @@ class MissStatistics:
     values: Annotated[Floats, '(runs, 4)']  # metrics of METRIC_UNITS of every run
 
     def of(self, metric: str) -> Floats:
-        """Return the values (runs,) of one of METRIC_UNITS."""
+        """Return the values of one of METRIC_UNITS."""
         return self.values[:, list(METRIC_UNITS).index(metric)]
 
     def mean(self, metric: str) -> float:

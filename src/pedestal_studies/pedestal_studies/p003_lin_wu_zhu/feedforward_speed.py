@@ -131,7 +131,7 @@ def rows(values: Mapping[str, Floats], of_drive: Mapping[str, Floats]) -> list[R
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Run CASES and DRIVE_CASES `runs` times; pool: monte_carlo.Pool, None for this process."""
+    """Run CASES and DRIVE_CASES `runs` times."""
     pool = pool or monte_carlo.Pool(1)
     values = pool.of_cases(batch, CASES, runs, BATCH_RUNS, lambda share, text: progress(0.2 * share, text))
     of_drive = pool.of_cases(drive_batch, DRIVE_CASES, runs, 1, lambda share, text: progress(

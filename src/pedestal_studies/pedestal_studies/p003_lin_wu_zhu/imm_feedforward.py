@@ -176,7 +176,7 @@ def conventional_curve(misses: Misses, axis: str) -> Floats:
 
 
 def at_rate_noise(misses: Misses, axis: str, rate_noise: Floats) -> Floats:
-    """Return the miss (runs,) [deg] of a conventional filter tuned to a rate noise (runs,) [deg/s] in each run.
+    """Return the miss [deg] of a conventional filter tuned to a rate noise [deg/s] in each run.
 
     The miss is interpolated between the filters of CV_NOISES on logarithmic scales. If even the quietest of these
     filters is noisier, the miss of this filter is returned, which is too small.
@@ -347,7 +347,7 @@ def drive_figure() -> Figure:
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Run CASES and DRIVE_CASES `runs` times; pool: monte_carlo.Pool, None for this process."""
+    """Run CASES and DRIVE_CASES `runs` times."""
     pool = pool or monte_carlo.Pool(1)
     misses = statistics(CASES, runs, pool, lambda share, text: progress(0.5 * share, text))
     items = [(case, NOISE_SEED + i) for case in DRIVE_CASES.values() for i in range(runs)]

@@ -93,7 +93,7 @@ def batch(item: Item) -> tuple[Records, Floats]:
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Filter `runs` noisy records with each of FILTERS; pool: monte_carlo.Pool, None for this process."""
+    """Filter `runs` noisy records with each of FILTERS."""
     pool = pool or monte_carlo.Pool(1)
     items = [(name, first, count) for name in FILTERS for first, count in monte_carlo.batches(runs, BATCH_RUNS)]
     sums_of: dict[str, Records] = {}

@@ -85,7 +85,7 @@ def cases() -> dict[Tuning, tuple[str, Source]]:
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Run every tuning `runs` times; pool: monte_carlo.Pool, None for this process."""
+    """Run every tuning `runs` times."""
     misses = feedforward_loop.statistics(cases(), runs, pool or monte_carlo.Pool(1), progress)
     points = {case: measured(misses[case]) for case in misses}
     mean = {case: tuple(values.mean(axis=1)) for case, values in points.items()}

@@ -358,7 +358,7 @@ def flyby_figure() -> Figure:
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Identify the filters of CASES and run `runs` flybys; pool: monte_carlo.Pool, None for this process."""
+    """Identify the filters of CASES and run `runs` flybys."""
     errors = (pool or monte_carlo.Pool(1)).of_cases(batch, FLYBY_CASES, runs, BATCH_RUNS, progress)
     measured = {name: measures(*case) for name, case in CASES.items()}
     return Result(rows(measured, errors), figures(), remarks(measured, errors))

@@ -194,6 +194,6 @@ def axis_figure(axis: str, first_number: int) -> Figure:
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Fly `runs` flights; pool: monte_carlo.Pool, None for this process."""
+    """Fly `runs` flights."""
     errors = (pool or monte_carlo.Pool(1)).of_cases(batch, AXES, runs, BATCH_RUNS, progress)
     return Result(rows(errors), figures(), remarks())

@@ -108,7 +108,7 @@ def tracked_after(run: Run, from_loss: bool) -> Seconds:
 
 
 def off_axis(run: Run) -> Floats:
-    """Return the true pointing error (n,) [beamwidths] of a run; NaN where it is not known."""
+    """Return the true pointing error [beamwidths] of a run; NaN where it is not known."""
     return np.hypot(*run.truth['error'].T) / run.units['tracking_receiver'].parameters.antenna.beamwidth
 
 
@@ -158,7 +158,7 @@ def rows(values: Mapping[str, Pairs]) -> list[Row]:
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
+    """Run every case `runs` times."""
     values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASE_NAMES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'time': lambda: time_figure(values)},
                   [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. tracked_after_s is over the runs that found their '

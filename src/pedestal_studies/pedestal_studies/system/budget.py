@@ -264,7 +264,7 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
         duration: Seconds | None = None) -> Result:
     """Measure the budget of every mode.
 
-    pool: monte_carlo.Pool, None for this process. duration: length of the pass, None for the length of the
+    duration: length of the pass, None for the length of the
     scenario.
     """
     if runs < 3:

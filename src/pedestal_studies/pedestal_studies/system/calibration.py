@@ -180,7 +180,7 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
         duration: Seconds | None = None) -> Result:
     """Measure the calibration over seeds.
 
-    pool: monte_carlo.Pool, None for this process. duration: length of a pass, None for that of the scenario.
+    duration: length of a pass, None for that of the scenario.
     """
     pool = pool or monte_carlo.Pool(1)
     numbers = pool.of_cases(functools.partial(batch, duration=duration), [None], runs, 1, progress)[None]

@@ -63,7 +63,7 @@ def rows(values: Mapping[str, Floats]) -> list[Row]:
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
+    """Run every case `runs` times."""
     values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'nees': functools.partial(figure, values)},
                   [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. A filter is too sure above {MAX_NEES:g}.'])

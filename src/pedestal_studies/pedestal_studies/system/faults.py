@@ -342,7 +342,7 @@ def run_of(mode: str, inject: str = '') -> tuple[Run, list[Report]]:
 
 
 def errors(run: Run, mode: str) -> Floats:
-    """Return the error (n,) [deg] of every step from the onset until the mode is left; NaN before and after.
+    """Return the error [deg] of every step from the onset until the mode is left; NaN before and after.
 
     A change within ON_TARGET_MODES or TOWARDS_TARGET_MODES does not leave the mode.
     """
@@ -361,14 +361,14 @@ def errors(run: Run, mode: str) -> Floats:
 
 
 def direction_error(run: Run, directions: Vectors3) -> Floats:
-    """Return the angle (n,) [rad] from the true beam to directions, ENU unit vectors of every step or of all."""
+    """Return the angle [rad] from the true beam to directions, ENU unit vectors of every step or of all."""
     beam = Rotation.from_quat(run['ship/truth']['orientation']).apply(pointing(*run['adu/truth']['position'].T))
     cosine = beam @ directions[0] if len(directions) == 1 else (beam * directions).sum(axis=1)
     return np.arccos(np.clip(cosine, -1.0, 1.0))
 
 
 def deck_error(run: Run, onset: int, azimuth_rate: RadiansPerSecond) -> Floats:
-    """Return the angle (n,) [rad] on the deck between the axes and their expected place.
+    """Return the angle [rad] on the deck between the axes and their expected place.
 
     The expected place is that before step `onset`, and moves on from there with azimuth_rate.
     """
@@ -468,7 +468,7 @@ DRAWN_FAULTS = ('adu.gust', 'adu.motor_loss', 'adu.drop', 'tracking_receiver.fad
 def figure(of_cases: Mapping[str, Floats]) -> Figure:
     """Draw the error of DRAWN_FAULTS in autotrack over time, with a line at half a beamwidth.
 
-    of_cases: {case: error (n,) [deg]}.
+    of_cases: {case: error [deg]}.
     """
     made, axes = new_panels(len(DRAWN_FAULTS), height=9.0, x='time from the onset [s]', y='[deg]', sharex=True)
     for panel, fault in zip(axes[:, 0], DRAWN_FAULTS):

@@ -168,7 +168,7 @@ def batch(item: tuple[str, str, dict[str, FilterParameters], int, int]) -> dict[
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None, on: Sequence[str] = profiles.PROFILES,
         noises: Sequence[str] = tuple(NOISE_CASES)) -> Result:
-    """Compare all filters in `runs` runs of each case; pool: monte_carlo.Pool, None for this process.
+    """Compare all filters in `runs` runs of each case.
 
     on: names of profiles; noises: names of NOISE_CASES.
     """
@@ -319,7 +319,7 @@ def errors_figure(over_time: Mapping[CaseName, Records], on: Sequence[str], what
 
 
 def profile_panels(on: Sequence[str]) -> tuple[Figure, Panels]:
-    """Return (figure, panels (n,)) with a panel for each profile, two in a row, and room for a line of each filter."""
+    """Return (figure, panels) with a panel for each profile, two in a row, and room for a line of each filter."""
     rows = (len(on) + 1) // 2
     figure, axes = new_panels(rows, 2, x='', height=0.8 + rows * (0.5 + 0.2 * len(SHOWN_FILTERS)), sharey=True)
     for panel in axes.flat[len(on):]:
@@ -329,7 +329,7 @@ def profile_panels(on: Sequence[str]) -> tuple[Figure, Panels]:
 
 def bars(values: Means, on: Sequence[str], metric: Callable[[str, Mapping[str, float]], float], label: str,
          colour: Callable[[str], str], text: Callable[[str, Mapping[str, float]], str]) -> tuple[Figure, Panels]:
-    """Return (figure, panels (n,)) with a panel of bars for each profile.
+    """Return (figure, panels) with a panel of bars for each profile.
 
     metric, text: functions (filter, its metrics) that return the length of a bar and the text at its end. label: of
     the x axis. colour: function that returns the colour of a filter.

@@ -221,7 +221,7 @@ def batch(item: Item) -> Floats:
 
 
 def rows(values: Mapping[str, Floats]) -> list[Row]:
-    """Return the rows of the study; values: {case: pointing error (runs,) [deg]}."""
+    """Return the rows of the study; values: {case: pointing error [deg]}."""
     table = []
     for name, of_runs in values.items():
         target, _, filter_name = name.partition('/')
@@ -233,7 +233,7 @@ def rows(values: Mapping[str, Floats]) -> list[Row]:
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
-    """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
+    """Run every case `runs` times."""
     values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'pointing': lambda: figure(values)},
                   [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}.'])
