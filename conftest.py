@@ -1,6 +1,7 @@
 """What holds for every test: it ends processes by signals, none of its phases lasts for ever, and its session leaves
 no process behind."""
 import faulthandler
+import itertools
 import os
 import signal
 
@@ -56,8 +57,26 @@ def pytest_unconfigure(config):
         config.stash[GUARD].end()
 
 
+SWEEP_CASES = 4
+"""Number of cases from which a parametrised test is a sweep."""
+
+
+def _mark_inside_of_sweeps(items):
+    """The first and the last case of a sweep are its corners; the others are thorough.
+
+    A test whose cases are different things, such as nodes or files, has the marker `every_case`.
+    """
+    for _, cases in itertools.groupby(items, lambda item: (item.parent, getattr(item, 'originalname', item.name))):
+        cases = list(cases)
+        if len(cases) >= SWEEP_CASES and not cases[0].get_closest_marker('every_case'):
+            for item in cases[1:-1]:
+                item.add_marker(pytest.mark.thorough)
+
+
+@pytest.hookimpl(tryfirst=True)     # before the tests are chosen by their markers
 def pytest_collection_modifyitems(items):
     """The files of STATION come first, in their order."""
+    _mark_inside_of_sweeps(items)
     ranks = {file: rank - len(STATION) for rank, file in enumerate(STATION)}
     items.sort(key=lambda item: ranks.get(item.nodeid.partition('::')[0], 0))
 

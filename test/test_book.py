@@ -12,6 +12,8 @@ from pedestal_bringup.scenario import scenario
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
 
+pytestmark = pytest.mark.every_case
+
 ROOT = pathlib.Path(__file__).parents[1]
 
 

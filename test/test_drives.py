@@ -254,6 +254,7 @@ def test_the_control_unit_knows_the_delay_of_the_bus():
     assert scenario.load('leo_pass', changes, pacing='realtime').given('acu')['command_delay'] == 0.02
 
 
+@pytest.mark.thorough
 def test_lockstep_has_no_drives():
     done = subprocess.run([*PEDESTAL, 'run', 'leo_pass', '--drives', 'simulated', '--pacing', 'lockstep'],
                           capture_output=True, text=True, timeout=60.0)

@@ -99,6 +99,7 @@ def test_a_session_that_is_ended_leaves_no_process(begin, tmp_path, number, opti
     assert _until(lambda: _gone(left))
 
 
+@pytest.mark.thorough
 def test_a_killed_session_leaves_no_node(begin, tmp_path):
     ending = "while not list(tmp_path.glob('bag/*.mcap')): time.sleep(0.1)\n    " + WAITS
     session = begin(RUNS.format(ending=ending))

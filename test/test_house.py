@@ -6,6 +6,8 @@ import pathlib
 
 import pytest
 
+pytestmark = pytest.mark.every_case
+
 SOURCES = pathlib.Path(__file__).parents[1] / 'src'
 MAX_MODULES = 14
 MAX_SHARE = 0.25

@@ -9,6 +9,8 @@ from importlib import metadata
 
 import pytest
 
+pytestmark = pytest.mark.every_case
+
 ROOT = pathlib.Path(__file__).parents[1]
 EXECUTABLES = {
     'pedestal_common': {},

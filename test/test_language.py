@@ -6,6 +6,8 @@ from tools import language
 
 from pedestal import cli
 
+pytestmark = pytest.mark.every_case
+
 
 def fault(tmp_path, name, text):
     """Return the rules that a text breaks, as a file of a name."""

@@ -208,6 +208,7 @@ def test_a_program_track_is_taken_once_whether_its_writer_latches_or_not(graph):
         assert refusals(run) == count
 
 
+@pytest.mark.thorough
 def test_a_viewer_of_its_own_ends_when_told_to(graph, start_process):
     run, _, port = graph
     live = [*PEDESTAL, 'live', '--port']

@@ -14,6 +14,8 @@ import pytest
 
 from pedestal_common.text_files import parameter_file
 
+pytestmark = pytest.mark.every_case
+
 NODES = ('ship_motion', 'ins', 'tracking_receiver', 'acu', 'adu', 'recorder')
 NOT_IN_THE_SCENARIO = {'recorder': (), 'beam_steering': (), 'iq': (), 'level_receiver': (),
                        'ins_input': ('-p', 'source:=nmea')}

@@ -62,6 +62,7 @@ def test_passes(live):
 """
 
 
+@pytest.mark.thorough
 def test_only_a_failure_with_lost_steps_is_not_judged(tmp_path):
     shutil.copy(HOME / 'conftest.py', tmp_path)
     (tmp_path / 'test').mkdir()

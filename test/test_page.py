@@ -179,6 +179,7 @@ def _resident(pid):
     return int(re.search(r'VmRSS:\s+(\d+)', pathlib.Path(f'/proc/{pid}/status').read_text())[1]) * 1024
 
 
+@pytest.mark.thorough
 def test_a_busy_port_is_said_in_one_line(lone, run_process, one_line):
     _, site = lone
     done = run_process([sys.executable, '-m', 'pedestal_operator.page_node', '--ros-args', '-p', f'port:={site.port}'],

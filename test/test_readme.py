@@ -17,6 +17,8 @@ from pedestal_analysis.console import EXIT_DISTURBED
 from pedestal_analysis.trials import plan as trial_plans
 from pedestal_bringup.scenario import scenario
 
+pytestmark = pytest.mark.every_case
+
 ROOT = pathlib.Path(__file__).parents[1]
 
 NOT_RUN = {

@@ -50,6 +50,7 @@ def test_a_run_without_failure_is_not_repeated(run):
     assert done.returncode == 0 and done.stdout.count('2 passed') == 1 and 'alone' not in done.stdout, done.stdout
 
 
+@pytest.mark.thorough
 def test_an_unsteady_test_is_named_with_both_outputs_and_one_that_fails_twice_fails(run):
     done = run({'test_a.py': FAILS + UNSTEADY, 'test_b.py': PASSES})
     assert done.returncode == 1 and 'unsteady: test_a.py::test_fails' not in done.stdout, done.stdout

@@ -7,6 +7,8 @@ from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 
+pytestmark = pytest.mark.every_case
+
 DURATION = 6.0
 
 

@@ -18,6 +18,7 @@ def default_domain_taken():
         yield
 
 
+@pytest.mark.thorough
 def test_two_runs_get_two_domains_and_commands_reach_both(default_domain_taken, start_process, run_process, tmp_path,
                                                           domain_id, one_line):
     runs = {}

@@ -231,6 +231,7 @@ def test_an_ins_that_aligns_refuses_the_stabilised_modes(Rig):
     assert ashore.ask(Mode.PROGRAM)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('ranged', [True, False])
 def test_the_lever_arm_moves_a_near_target(Rig, ranged):
     """A buoy 400 m away seen from a mast of 30 m that rolls: with a range the estimate does not see the mast swing."""

@@ -141,6 +141,7 @@ def test_loops_are_tuned_over_the_whole_range(pedestal, tmp_path, arguments):
     assert (code, errors) == (0, '') and 'elevation position, worst' in output
 
 
+@pytest.mark.thorough
 def test_the_next_command_is_quoted(pedestal, tmp_path):
     _, output, _ = pedestal('new', 'my antenna.yaml')
     assert output.endswith("written: my antenna.yaml  (pedestal tune 'my antenna.yaml' --loops)\n")

@@ -4,26 +4,32 @@ The arithmetic is strict IEEE 754 (no fastmath): a law gives the same bits where
 a recomputed bag therefore agree exactly, and NaN keeps its meaning on the topics.
 """
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Protocol, TypeVar, cast
 
 import numba
 
 from pedestal_common.law import Law
 from pedestal_common.quantities import Pairs
 
-_config: Any = numba.config     # its variables are made when it is imported
-
 _F = TypeVar('_F', bound=Callable[..., object])
 
 
-def is_compiled(unit: Any) -> bool:
+class Prepared(Protocol):
+    """What has laws to prepare: a unit."""
+
+    @property
+    def last_prepared(self) -> tuple[Callable[..., object], tuple[object, ...]]:
+        """Law that is compiled last, and its arguments."""
+
+
+def is_compiled(unit: Prepared) -> bool:
     """Return True if the laws of a unit are in the law cache."""
     law, arguments = unit.last_prepared
-    return _config.DISABLE_JIT or law.is_cached(*arguments)
+    return numba.config.DISABLE_JIT or cast(Law, law).is_cached(*arguments)
 
 
 def _law(law: _F, separate: bool = False, **options: bool) -> _F:
-    if _config.DISABLE_JIT:     # for a debugger: the laws run as plain Python
+    if numba.config.DISABLE_JIT:     # for a debugger: the laws run as plain Python
         return law
     made = Law(law, targetoptions={'nopython': True, 'error_model': 'numpy', **options}, separate=separate)
     return cast(_F, made)       # a Law is called as the function is

@@ -2,13 +2,14 @@
 import math
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Seconds
 
 
 @compiled
-def fhan(x1, x2, r, h0):
+def fhan(x1: float, x2: float, r: float, h0: Seconds) -> float:
     """Return the acceleration u, between -r and r, that brings x1'' = u to rest at x1 = 0 in the shortest time.
 
-    x1: error, in any unit; x2: its rate [unit/s]; r: largest acceleration [unit/s2]; h0: time [s] that sets the size
+    x1: error, in any unit; x2: its rate [unit/s]; r: largest acceleration [unit/s2]; h0: time that sets the size
     of a linear zone. In this zone, which u = r crosses within h0, u is a linear function of x1 and x2. This avoids
     chattering. The formula, with the names d, a0, y and a, is that of Han (2009).
     """

@@ -18,16 +18,18 @@ import inspect
 import pathlib
 import sys
 import weakref
-from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple, TypeAlias
 
 import llvmlite.binding
+import llvmlite.ir
 from numba.core import compiler, sigutils, types, typing
-from numba.core.codegen import JITCodeLibrary
+from numba.core.base import BaseContext
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.datamodel.models import OpaqueModel
 from numba.core.environment import Environment
-from numba.core.funcdesc import default_mangler
+from numba.core.funcdesc import PythonFunctionDescriptor, default_mangler
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
@@ -36,14 +38,15 @@ from numba.extending import lower_builtin, register_model, type_callable
 from pedestal_common import law_cache, law_key
 
 Linkage = llvmlite.binding.Linkage
-NumbaDispatcher: Any = CPUDispatcher     # numba's declared types do not cover what is used here
+Types: TypeAlias = tuple[types.Type, ...]       # of the arguments of a law
 
 
 class _Translation(JITCodeLibrary):
     """Translation: LLVM code of one Law for arguments of the types `args`, not yet linked with the laws that it calls.
     """
+    _shared_module: llvmlite.binding.ModuleRef | None       # with the laws that it calls
 
-    def __init__(self, codegen: Any, law: 'Law', args: tuple) -> None:
+    def __init__(self, codegen: JITCPUCodegen, law: 'Law', args: Types) -> None:
         super().__init__(codegen, law.py_func.__qualname__)
         self.law, self.args = law, args
 
@@ -65,11 +68,11 @@ class _Translation(JITCodeLibrary):
         return inside, separate
 
     @property
-    def code(self) -> Any:
+    def code(self) -> llvmlite.binding.ModuleRef:
         """LLVM module of this law, without the laws that it calls."""
         return self._final_module
 
-    def add_llvm_module(self, ll_module: Any) -> None:
+    def add_llvm_module(self, ll_module: llvmlite.binding.ModuleRef) -> None:
         """Add an LLVM module. Numba would also optimise each function here. This is left out, because the whole
         executable is optimised later."""
         self._final_module.link_in(ll_module)
@@ -92,7 +95,7 @@ class _Translation(JITCodeLibrary):
         self._finalize_dynamic_globals()
         self._finalized = True
 
-    def _get_module_for_linking(self) -> Any:
+    def _get_module_for_linking(self) -> llvmlite.binding.ModuleRef:
         """Return one LLVM module of this law with all the laws that it calls, except separate laws."""
         if self._shared_module is None:
             modules = [part.code.clone() for part in self.parts[0]]
@@ -109,7 +112,7 @@ class _Translation(JITCodeLibrary):
         return self._shared_module
 
 
-def _relink(module: Any, before: llvmlite.binding.Linkage, after: str) -> None:
+def _relink(module: llvmlite.binding.ModuleRef, before: llvmlite.binding.Linkage, after: str) -> None:
     """Give the linkage `after` to the functions of an LLVM module that have the linkage `before`.
 
     With weak_odr the linker keeps one of several equal functions. With linkonce_odr it also drops a function that has
@@ -120,7 +123,7 @@ def _relink(module: Any, before: llvmlite.binding.Linkage, after: str) -> None:
             function.linkage = after
 
 
-class _Arguments(tuple):
+class _Arguments(tuple[types.Type, ...]):
     """Types of arguments with a short text: numba makes a text of them in each of its passes, and that of a record
     with hundreds of fields takes longer than the rest."""
 
@@ -135,11 +138,11 @@ class _Compiler(compiler.Compiler):
     and the types of records in the order of their use, which differs from process to process.
     """
 
-    def __init__(self, *arguments: Any) -> None:
+    def __init__(self, *arguments: object) -> None:
         super().__init__(*arguments)
         self.state.targetctx = self.state.targetctx.subtarget(mangler=_symbol)
 
-    def _compile_bytecode(self) -> Any:
+    def _compile_bytecode(self) -> compiler.CompileResult:
         identity, library = self.state.func_id, self.state.library
         identity.unique_id = int(library.law.symbol(library.args)[:12], 16)
         identity.unique_name = f'{identity.func_qualname}${identity.unique_id}'
@@ -147,12 +150,12 @@ class _Compiler(compiler.Compiler):
         return super()._compile_bytecode()
 
 
-def _symbol(name: str, types: tuple, *, abi_tags: tuple = (), uid: int | None = None) -> str:
+def _symbol(name: str, types: Types, *, abi_tags: tuple[str, ...] = (), uid: int | None = None) -> str:
     """Return the symbol of a law. uid: number that stands for its key and for the types of its arguments."""
     return default_mangler(name, (), uid=uid)
 
 
-def _named(module: str, name: str) -> Any:
+def _named(module: str, name: str) -> object:
     """Return what has a qualified name in a module; None if there is none."""
     try:
         return functools.reduce(getattr, name.split('.'), importlib.import_module(module))
@@ -160,13 +163,13 @@ def _named(module: str, name: str) -> Any:
         return None
 
 
-def _has_names(kind: Any) -> bool:
+def _has_names(kind: types.Type) -> bool:
     """Return True if another process finds the classes of a numba type by their names.
 
     The class of a named tuple that has no name in its module would be another one after it is loaded.
     """
     of = getattr(kind, 'instance_class', None)
-    members: Any = kind if isinstance(kind, types.BaseTuple) else ()
+    members: Iterable[types.Type] = kind if isinstance(kind, types.BaseTuple) else ()
     return (of is None or _named(of.__module__, of.__qualname__) is of) and all(map(_has_names, members))
 
 
@@ -175,7 +178,7 @@ class _Call(NamedTuple):
     module: str
     name: str
     key: str          # '' for a separate law, which may change
-    args: tuple       # numba's types of the arguments
+    args: Types
     returns: types.Type
 
     @property
@@ -196,7 +199,7 @@ def _calls(translations: list[_Translation]) -> list[_Call] | None:
                         for call, part in zip(calls, translations)) else None
 
 
-def _can_be_kept(law: 'Law', made: Any) -> bool:
+def _can_be_kept(law: 'Law', made: compiler.CompileResult) -> bool:
     """Return True if another process can use a CompileResult of a law, whose values are still those of its key."""
     signature = made.signature
     return (not made.library.has_dynamic_globals and all(map(_has_names, (*signature.args, signature.return_type)))
@@ -207,15 +210,15 @@ class _KeptTranslation(NamedTuple):
     """Cached form of a translation. fndesc, environment, signature: fields of numba's CompileResult."""
     code: bytes       # LLVM module as bitcode
     calls: list[_Call]
-    fndesc: Any
+    fndesc: PythonFunctionDescriptor
     environment: Environment
-    signature: Any
+    signature: typing.Signature
 
 
 class _KeptExecutable(NamedTuple):
     """Cached form of an executable."""
     separate: list[_Call]       # separate laws whose machine code it calls
-    compiled: tuple             # numba's own form of a CompileResult
+    compiled: tuple[object, ...]    # numba's own form of a CompileResult
 
 
 class _LawType(types.Dispatcher):
@@ -227,7 +230,8 @@ register_model(_LawType)(OpaqueModel)
 
 
 @lower_constant(_LawType)
-def _law_constant(context, builder, law_type, law):
+def _law_constant(context: BaseContext, builder: llvmlite.ir.IRBuilder, law_type: _LawType,
+                  law: 'Law') -> llvmlite.ir.Value:
     return context.get_dummy_value()
 
 
@@ -235,20 +239,20 @@ _SEPARATE: dict[str, 'Law'] = {}
 """Separate laws of this process by their names, which stand in the machine code of their callers."""
 
 
-class Law(NumbaDispatcher):
+class Law(CPUDispatcher):
     """Compiled law: a numba dispatcher, which translates the law once for each set of argument types (overload).
 
     An overload becomes an executable only when Python calls it, or when the law is separate. Translations and
     executables are cached. separate: True if the law is not contained in the machine code of its callers.
     """
 
-    def __init__(self, *arguments: Any, separate: bool = False, **keywords: Any) -> None:
+    def __init__(self, *arguments: object, separate: bool = False, **keywords: object) -> None:
         super().__init__(*arguments, **keywords)
         self.separate = separate
         self._type = _LawType(self)
         self.typingctx._globals.pop(weakref.ref(self))     # remove the type that numba gave to the law
         self.typingctx.insert_global(self, self._type)
-        self._translated: dict[tuple, Any] = {}
+        self._translated: dict[Types, compiler.CompileResult] = {}
         # Of two laws of one name, as after a reload of a module, only the first one goes by the name.
         self.goes_by_name = separate and '<' not in self._name and _SEPARATE.setdefault(self._name, self) is self
 
@@ -265,7 +269,7 @@ class Law(NumbaDispatcher):
         """Key of the law (law_key)."""
         return law_key.of_law(self)
 
-    def symbol(self, args: tuple) -> str:
+    def symbol(self, args: Types) -> str:
         """Return a digest that becomes part of the symbol of this law for arguments of these types.
 
         The symbol of a separate law outlives a change of the law, because the machine code of its callers contains it.
@@ -273,21 +277,22 @@ class Law(NumbaDispatcher):
         stands_for = self._name if self.goes_by_name else self.key
         return law_key.digest((stands_for, law_key.of_types(args)))
 
-    def is_cached(self, *values: Any) -> bool:
+    def is_cached(self, *values: object) -> bool:
         """Return True if the executable for arguments of the types of these values is in the law cache, with those of
         the separate laws that it calls."""
         return self._is_cached(tuple(map(self.typeof_pyval, values)))
 
-    def _is_cached(self, args: tuple) -> bool:
+    def _is_cached(self, args: Types) -> bool:
         kept = law_cache.load(self._file('executable', args))
         return isinstance(kept, _KeptExecutable) and all(
             (law := call.law) is not None and law._is_cached(call.args) for call in kept.separate)
 
-    def _file(self, form: str, args: tuple) -> pathlib.Path:
+    def _file(self, form: str, args: Types) -> pathlib.Path:
         """Return the path of the file of a translation or an executable in the law cache."""
         return law_cache.file(self._name, _COMPILER, form, self.key, law_key.of_types(args))
 
-    def get_call_template(self, args: tuple, kws: dict) -> tuple:
+    def get_call_template(self, args: Types,
+                          kws: dict[str, types.Type]) -> tuple[type, typing.Signature, Types, dict[str, types.Type]]:
         """Return numba's template of a call from another law. Such a call needs the translation only."""
         signature, args = self._compiler.fold_argument_types(args, kws)
         self.translation(tuple(args))
@@ -295,17 +300,17 @@ class Law(NumbaDispatcher):
         template = typing.make_concrete_template(name, name, [made.signature for made in self._translated.values()])
         return template, signature, args, {}
 
-    def get_overload(self, sig: Any) -> _Translation:
+    def get_overload(self, sig: object) -> _Translation:
         """Return the translation for a signature, by which numba finds the implementation of a call from a law."""
         args, _ = sigutils.normalize_signature(sig)
         return self._translated[tuple(args)].library
 
-    def compile(self, sig: Any) -> Any:
+    def compile(self, sig: object) -> Callable[..., object]:
         """Return the entry point of the executable for a signature, for a call from Python."""
         args, _ = sigutils.normalize_signature(sig)
         return self.executable(tuple(args)).entry_point
 
-    def executable(self, args: tuple) -> Any:
+    def executable(self, args: Types) -> compiler.CompileResult:
         """Return the CompileResult of the executable for arguments of these types.
 
         If several processes need an executable that is not cached, one compiles it and the others wait.
@@ -325,7 +330,7 @@ class Law(NumbaDispatcher):
                 self.add_overload(made)
             return self.overloads[args]
 
-    def translation(self, args: tuple) -> Any:
+    def translation(self, args: Types) -> compiler.CompileResult:
         """Return the CompileResult of the translation for arguments of these types, for calls from other laws."""
         if args not in self._translated:
             path = self._file('translation', args)
@@ -341,9 +346,9 @@ class Law(NumbaDispatcher):
             self._translated[args] = made
         return self._translated[args]
 
-    def _translate(self, args: tuple) -> Any:
+    def _translate(self, args: Types) -> compiler.CompileResult:
         """Return the CompileResult of a new translation for arguments of these types."""
-        flags: Any = compiler.Flags()
+        flags = compiler.Flags()
         self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
         flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
         library = _Translation(self.targetctx.codegen(), self, args)
@@ -352,7 +357,7 @@ class Law(NumbaDispatcher):
         library.finalize()
         return made
 
-    def _load_translation(self, path: pathlib.Path, args: tuple) -> Any:
+    def _load_translation(self, path: pathlib.Path, args: Types) -> compiler.CompileResult | None:
         """Return the CompileResult of a cached translation; None where there is none that fits."""
         kept = law_cache.load(path)
         if not isinstance(kept, _KeptTranslation):
@@ -372,7 +377,7 @@ class Law(NumbaDispatcher):
             type_annotation='', library=library, call_helper=None, signature=kept.signature, objectmode=False,
             lifted=(), fndesc=kept.fndesc, environment=kept.environment, metadata=None, reload_init=())
 
-    def _make_executable(self, args: tuple, path: pathlib.Path) -> Any:
+    def _make_executable(self, args: Types, path: pathlib.Path) -> compiler.CompileResult:
         """Return the CompileResult of a new executable, and save it in the file of the law cache."""
         law = self.translation(args)
         separate = law.library.parts[1]
@@ -400,7 +405,7 @@ class Law(NumbaDispatcher):
             law_cache.save(path, _KeptExecutable(calls, made._reduce()))
         return made
 
-    def _load_executable(self, path: pathlib.Path) -> Any:
+    def _load_executable(self, path: pathlib.Path) -> compiler.CompileResult | None:
         """Return the CompileResult of a cached executable; None where there is none that fits."""
         kept = law_cache.load(path)
         if not isinstance(kept, _KeptExecutable):
@@ -414,7 +419,7 @@ class Law(NumbaDispatcher):
                 return None
         return compiler.CompileResult._rebuild(self.targetctx, *kept.compiled)
 
-    def _link(self, args: tuple) -> types.Type:
+    def _link(self, args: Types) -> types.Type:
         """Make the machine code of a separate law known to the executables that call it; return the type of its
         result."""
         made = self.executable(args)
@@ -436,7 +441,7 @@ def _garbage_kept() -> Iterator[None]:
             gc.enable()
 
 
-def by_type(function: Callable, law_of: Callable) -> None:
+def by_type(function: Callable[..., object], law_of: Callable[[types.Type], Law | None]) -> None:
     """Let compiled code call `function`, which stands for a Law that depends on the type of its first argument.
 
     law_of(type of the first argument) returns the Law, or None if the call does nothing. Numba's own function
@@ -445,15 +450,16 @@ def by_type(function: Callable, law_of: Callable) -> None:
     law_key.template(function, law_of)
 
     @type_callable(function)
-    def type_call(context):
-        def returned(*args):
+    def type_call(context: BaseContext) -> Callable[..., types.Type]:
+        def returned(*args: types.Type) -> types.Type:
             law = law_of(args[0])
             return types.none if law is None else context.resolve_function_type(law._type, args, {}).return_type
-        returned.__signature__ = inspect.signature(function)
+        vars(returned)['__signature__'] = inspect.signature(function)
         return returned
 
     @lower_builtin(function, types.VarArg(types.Any))
-    def call(context, builder, signature, args):
+    def call(context: BaseContext, builder: llvmlite.ir.IRBuilder, signature: typing.Signature,
+             args: Sequence[llvmlite.ir.Value]) -> llvmlite.ir.Value:
         law = law_of(signature.args[0])
         if law is None:
             return context.get_dummy_value()

@@ -16,7 +16,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from typing import Any
 
 import llvmlite
 import numba
@@ -59,7 +58,7 @@ def _seal(path: pathlib.Path, content: bytes) -> bytes:
     return hashlib.sha256(path.name.encode() + content).digest()
 
 
-def load(path: pathlib.Path) -> Any:
+def load(path: pathlib.Path) -> object:
     """Return the content of a file; None if there is no such file, or if it is damaged."""
     with contextlib.suppress(OSError):
         data = path.read_bytes()
@@ -73,7 +72,7 @@ def load(path: pathlib.Path) -> Any:
     return None
 
 
-def save(path: pathlib.Path, content: Any) -> None:
+def save(path: pathlib.Path, content: object) -> None:
     """Write a file at once, so that no process reads a part of it. If that fails, write one line to stderr."""
     data = dumps(content)
     try:

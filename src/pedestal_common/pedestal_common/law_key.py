@@ -13,10 +13,10 @@ import hashlib
 import sys
 import types
 from collections.abc import Callable, Iterable
-from typing import Any
 
 import numpy as np
 from numba.core import types as numba_types
+from numba.core.registry import CPUDispatcher
 
 FOREIGN_PACKAGES = frozenset({*sys.stdlib_module_names, 'numpy', 'numba', 'llvmlite', 'scipy'}) - {'builtins'}
 """Packages whose code does not change between two releases of Python and of the libraries; the cache knows these. A
@@ -35,7 +35,7 @@ def digest(parts: Iterable[str]) -> str:
     return sha.hexdigest()[:32]
 
 
-def of_law(law: Any, whole: bool = False) -> str:
+def of_law(law: CPUDispatcher, whole: bool = False) -> str:
     """Return the key of a law (law.Law), which includes the laws that it calls and their values.
 
     Of a separate law that it calls, only the name is part of the key: the law cache checks the type of its result.
@@ -51,23 +51,23 @@ def of_law(law: Any, whole: bool = False) -> str:
     return digest(sorted(found.values()))
 
 
-def of_types(args: tuple) -> str:
+def of_types(args: tuple[numba_types.Type, ...]) -> str:
     """Return a text that identifies numba's types of arguments, with the field names of named tuples."""
     return f'({",".join(map(_of_type, args))})'
 
 
-def template(function: Callable, *values: Any) -> None:
+def template(function: Callable[..., object], *values: object) -> None:
     """Mark a function that numba's `overload` or `type_callable` in its module lets laws call.
 
     values: what chooses or makes the compiled code, in addition to the module of the function.
     """
-    function.template_values = values       # type: ignore[attr-defined]
+    vars(function)['template_values'] = values
 
 
-def _of_type(kind: Any) -> str:
+def _of_type(kind: numba_types.Type) -> str:
     parts = [f'{type(kind).__name__} {kind}']
     if isinstance(kind, numba_types.BaseTuple):
-        members: Any = kind
+        members: Iterable[numba_types.Type] = kind
         parts += [_of_type(member) for member in members]
     parts += [_of_type(part) for name in ('dtype', 'type', 'key_type', 'value_type')
               if isinstance(part := getattr(kind, name, None), numba_types.Type) and part is not kind]
@@ -84,7 +84,7 @@ def _is_foreign(module: str) -> bool:
     return module.partition('.')[0] in FOREIGN_PACKAGES
 
 
-def _name(thing: Any) -> str:
+def _name(thing: Callable[..., object]) -> str:
     return f'{thing.__module__}.{thing.__qualname__}'
 
 
@@ -105,9 +105,9 @@ def _of_code(code: types.CodeType, docstring: str | None = None) -> str:
     return f'{code.co_code.hex()} {arguments} {code.co_varnames} {code.co_names} {code.co_freevars} {constants}'
 
 
-def _of_function(function: types.FunctionType) -> tuple[str, set]:
+def _of_function(function: types.FunctionType) -> tuple[str, set[CPUDispatcher]]:
     """Return (text of a function and of the values that it names, laws that it names)."""
-    laws: set = set()
+    laws: set[CPUDispatcher] = set()
     return digest([_Values(set(), laws).of_code(function)]), laws
 
 
@@ -115,7 +115,7 @@ def of_module(module: types.ModuleType) -> str:
     """Return the text of a module: the code of all its functions and methods, and its plain values; no laws."""
     found: list[str] = []
 
-    def add(things: Iterable) -> None:
+    def add(things: Iterable[object]) -> None:
         for thing in things:
             thing = getattr(thing, 'fget', getattr(thing, 'func', thing))       # of a property
             thing = thing if hasattr(thing, 'py_func') else getattr(thing, '__wrapped__', thing)
@@ -140,11 +140,11 @@ def _of_class(kind: type) -> str:
 class _Values:
     """Texts of values that a function names. names: its names; laws: filled with the laws among the values."""
 
-    def __init__(self, names: set[str], laws: set) -> None:
+    def __init__(self, names: set[str], laws: set[CPUDispatcher]) -> None:
         self._names, self._laws = names, laws
         self._open: set[int] = set()      # ids of what is being described: a module may name itself
 
-    def text(self, value: Any) -> str:
+    def text(self, value: object) -> str:
         """Return the text of a value."""
         if id(value) in self._open:
             return 'itself'
@@ -154,7 +154,7 @@ class _Values:
         finally:
             self._open.remove(id(value))
 
-    def _text(self, value: Any) -> str:
+    def _text(self, value: object) -> str:
         kind = type(value).__name__
         if hasattr(value, 'separate') and hasattr(value, 'py_func'):
             self._laws.add(value)
@@ -180,7 +180,7 @@ class _Values:
             return f'{value.dtype!r} {value.tobytes().hex()}'
         if isinstance(value, _PLAIN):
             return f'{kind} {value!r}'
-        if hasattr(value, 'template_values'):
+        if isinstance(value, types.FunctionType) and hasattr(value, 'template_values'):
             return ' '.join((of_module(sys.modules[value.__module__]), self.of_code(value), *(
                 self.of_code(part) if isinstance(part, types.FunctionType) else self.text(part)
                 for part in value.template_values)))

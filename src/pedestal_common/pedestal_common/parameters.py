@@ -12,13 +12,18 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import numpy as np
 
+from pedestal_common.quantities import DType, Records, Value
+
+Field: typing.TypeAlias = 'dataclasses.Field[Value]'     # one parameter of a dataclass
+_N = typing.TypeVar('_N', bound=float)
+
 
 class ParameterError(ValueError):
     """Unknown parameter, or value outside its range; the message gives its name, its value and the allowed range."""
 
 
-def parameter(default: float, low: float, high: float, unit: str, doc: str,
-              grid: tuple[float, float, int] | None = None) -> typing.Any:
+def parameter(default: _N, low: float, high: float, unit: str, doc: str,
+              grid: tuple[float, float, int] | None = None) -> _N:
     """Declare a number (float or int, as annotated) between low and high inclusive.
 
     grid: (lowest value, highest value, number of values) of the values at which `pedestal tune` begins its search for
@@ -28,22 +33,22 @@ def parameter(default: float, low: float, high: float, unit: str, doc: str,
                                                         'grid': grid})
 
 
-def choice(default: str, options: Iterable[str], doc: str) -> typing.Any:
+def choice(default: str, options: Iterable[str], doc: str) -> str:
     """Declare a string that must be one of the options."""
     return dataclasses.field(default=default, metadata={'options': tuple(options), 'doc': doc})
 
 
-def flag(default: bool, doc: str) -> typing.Any:
+def flag(default: bool, doc: str) -> bool:
     """Declare a bool."""
     return dataclasses.field(default=default, metadata={'doc': doc})
 
 
-def text(default: str, doc: str) -> typing.Any:
+def text(default: str, doc: str) -> str:
     """Declare a string that only the code that uses it can check (a file, a TLE line)."""
     return dataclasses.field(default=default, metadata={'doc': doc})
 
 
-def group(cls: 'type[Parameters]', **changes: typing.Any) -> typing.Any:
+def group(cls: 'type[_P]', **changes: Value) -> '_P':
     """Declare a nested dataclass, with some of its defaults changed."""
     return dataclasses.field(default_factory=lambda: cls(**changes), metadata={'group': True})
 
@@ -71,8 +76,9 @@ class Parameters:
         """
 
 
+AnyParameters: typing.TypeAlias = typing.Any    # instance of a parameter class that the node determines
 _P = typing.TypeVar('_P', bound=Parameters)
-_F = typing.TypeVar('_F', bound=Callable)
+_F = typing.TypeVar('_F', bound=Callable[..., object])
 
 
 def _cached(function: _F) -> _F:
@@ -91,7 +97,7 @@ class RosParameters(Parameters):
 _ROS_PREFIX = 'qos_overrides.'  # beginning of the names of further parameters that rclpy gives every node
 
 
-def without_ros(values: Mapping[str, typing.Any]) -> dict[str, typing.Any]:
+def without_ros(values: Mapping[str, Value]) -> dict[str, Value]:
     """Return {dotted name: value} without the parameters of every ROS 2 node. Raises ParameterError for a value that
     rclpy would refuse."""
     own = {name: value for name, value in values.items() if name in RosParameters.__dataclass_fields__}
@@ -105,7 +111,7 @@ def number_text(value: float) -> str:
     return str(value) if isinstance(value, int) else f'{value:g}'
 
 
-def _check_field(field: dataclasses.Field, name: str, value: typing.Any) -> None:
+def _check_field(field: Field, name: str, value: object) -> None:
     meta = field.metadata
     if 'low' in meta:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -125,13 +131,13 @@ def _check_field(field: dataclasses.Field, name: str, value: typing.Any) -> None
 
 
 @_cached
-def _group_type(field: dataclasses.Field) -> type[Parameters]:
+def _group_type(field: Field) -> type[Parameters]:
     """Return the dataclass of a group."""
     assert field.default_factory is not dataclasses.MISSING
     return type(field.default_factory())
 
 
-def flatten(cls: type[Parameters], prefix: str = '') -> Iterator[tuple[str, dataclasses.Field]]:
+def flatten(cls: type[Parameters], prefix: str = '') -> Iterator[tuple[str, Field]]:
     """Yield (dotted name, field) of every parameter of a dataclass, including those in its groups."""
     for field in dataclasses.fields(cls):
         name = prefix + field.name
@@ -147,18 +153,18 @@ def _default(cls: type[_P]) -> _P:
     return cls()
 
 
-def defaults(cls: type[Parameters]) -> dict[str, typing.Any]:
+def defaults(cls: type[Parameters]) -> dict[str, Value]:
     """Return {dotted name: default} of a parameter dataclass, with the changed defaults of its groups."""
     return as_dict(_default(cls))
 
 
 @_cached
-def _readers(cls: type[Parameters]) -> list[tuple[str, Callable[[Parameters], typing.Any]]]:
+def _readers(cls: type[Parameters]) -> list[tuple[str, Callable[[Parameters], Value]]]:
     """Return [(dotted name, function that reads the value from an instance)] of every parameter of a dataclass."""
     return [(name, operator.attrgetter(name)) for name, _ in flatten(cls)]
 
 
-def as_dict(instance: Parameters, prefix: str = '') -> dict[str, typing.Any]:
+def as_dict(instance: Parameters, prefix: str = '') -> dict[str, Value]:
     """Return {dotted name: value} of an instance."""
     return {prefix + name: read(instance) for name, read in _readers(type(instance))}
 
@@ -169,7 +175,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f' did you mean {near[0]!r}?' if near else ''
 
 
-def build(cls: type[_P], values: Mapping[str, typing.Any], prefix: str = '') -> _P:
+def build(cls: type[_P], values: Mapping[str, Value], prefix: str = '') -> _P:
     """Return an instance with values {dotted name: value}. Every name begins with `prefix`. Other fields keep their
     default.
 
@@ -179,7 +185,7 @@ def build(cls: type[_P], values: Mapping[str, typing.Any], prefix: str = '') -> 
     return _replace(_default(cls), values, prefix)
 
 
-def check_each(cls: type[Parameters], values: Mapping[str, typing.Any]) -> None:
+def check_each(cls: type[Parameters], values: Mapping[str, Value]) -> None:
     """Raise ParameterError for the first of {dotted name: value} that `build` would refuse whatever the others are.
 
     Each value is checked alone. `Parameters.check`, which compares fields with each other, is not called.
@@ -190,19 +196,19 @@ def check_each(cls: type[Parameters], values: Mapping[str, typing.Any]) -> None:
         _check_field(known[name], name, typed(known[name], value))
 
 
-def _check_names(known: Mapping[str, dataclasses.Field], values: Iterable[str]) -> None:
+def _check_names(known: Mapping[str, Field], values: Iterable[str]) -> None:
     for name in values:
         if name not in known:
             hint = did_you_mean(name, known)
             raise ParameterError(f'unknown parameter {name!r}' + (f';{hint}' if hint else ''))
 
 
-def typed(field: dataclasses.Field, value: typing.Any) -> typing.Any:
+def typed(field: Field, value: Value) -> Value:
     """Return the value of a field; a whole number for a field of type float is returned as a float."""
     return float(value) if field.type is float and type(value) is int else value
 
 
-def _replace(instance: _P, values: Mapping[str, typing.Any], prefix: str) -> _P:
+def _replace(instance: _P, values: Mapping[str, Value], prefix: str) -> _P:
     changes = {}
     for field in dataclasses.fields(instance):
         name = prefix + field.name
@@ -217,13 +223,13 @@ def _replace(instance: _P, values: Mapping[str, typing.Any], prefix: str) -> _P:
 
 
 @_cached
-def record_type(cls: type[Parameters]) -> np.dtype:
+def record_type(cls: type[Parameters]) -> DType:
     """Return the type of the numpy record of a parameter dataclass.
 
     A float becomes f8, an int or a bool i8, a choice i8 (its index among the options), and a group a nested record.
     Other texts are left out.
     """
-    fields: list[tuple[str, str | np.dtype]] = []
+    fields: list[tuple[str, str | DType]] = []
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
         if field.metadata.get('group'):
@@ -235,8 +241,8 @@ def record_type(cls: type[Parameters]) -> np.dtype:
     return np.dtype(fields, align=True)
 
 
-def _record_values(instance: Parameters, cls: type[Parameters]) -> tuple:
-    values: list[typing.Any] = []
+def _record_values(instance: Parameters, cls: type[Parameters]) -> tuple[object, ...]:
+    values: list[object] = []
     for field in dataclasses.fields(cls):
         value = getattr(instance, field.name)
         if field.metadata.get('group'):
@@ -248,7 +254,7 @@ def _record_values(instance: Parameters, cls: type[Parameters]) -> tuple:
     return tuple(values)
 
 
-def record(instance: Parameters, cls: type[Parameters] | None = None) -> np.ndarray:
+def record(instance: Parameters, cls: type[Parameters] | None = None) -> Records:
     """Return an instance as a record array of shape (1,), the form in which compiled laws read parameters.
 
     cls: base class of the instance, whose fields alone are in the record; None: all fields of the instance.

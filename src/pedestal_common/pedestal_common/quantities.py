@@ -22,6 +22,7 @@ DType: TypeAlias = np.dtype[np.void]                # of a record
 Radians: TypeAlias = Annotated[float, 'rad']
 RadiansPerSecond: TypeAlias = Annotated[float, 'rad/s']
 RadiansPerSecond2: TypeAlias = Annotated[float, 'rad/s2']
+RadiansPerSecond3: TypeAlias = Annotated[float, 'rad/s3']     # a jerk
 Radians2: TypeAlias = Annotated[float, 'rad2']      # a variance
 Degrees: TypeAlias = Annotated[float, 'deg']
 Seconds: TypeAlias = Annotated[float, 's']
@@ -37,6 +38,7 @@ Amperes: TypeAlias = Annotated[float, 'A']
 Volts: TypeAlias = Annotated[float, 'V']
 Decibels: TypeAlias = Annotated[float, 'dB']
 DecibelHertz: TypeAlias = Annotated[float, 'dB-Hz']  # C/N0
+Days: TypeAlias = Annotated[float, 'd']
 Bit: TypeAlias = int                                # 0 or 1; a record has no bool
 
 Pair: TypeAlias = Annotated[Floats, (2,)]           # azimuth and elevation, or cross-elevation and elevation
@@ -48,8 +50,10 @@ Xyzw: TypeAlias = tuple[float, float, float, float]     # a quaternion in a law,
 Pairs: TypeAlias = Annotated[Floats, '(n, 2)']
 Vectors3: TypeAlias = Annotated[Floats, '(n, 3)']
 Quaternions: TypeAlias = Annotated[Floats, '(n, 4)']
+Rotations: TypeAlias = Annotated[Floats, '(n, 3, 3)']
 Times: TypeAlias = Annotated[Floats, '(n,) s']
 Stamps: TypeAlias = Annotated[Ints, '(n,) ns']
+Direction: TypeAlias = tuple[Radians, Radians]     # azimuth and elevation, of a law
 
 Estimate: TypeAlias = tuple[float, float, float]    # a value, and the low and the high end of its confidence interval
 

@@ -11,21 +11,23 @@ import math
 
 import numpy as np
 
+from pedestal_common.quantities import Complexes, Floats, Matrix3, Vectors3
+
 sin, cos, exp, arccos, arctan2, power = (np.vectorize(function, otypes=[float]) for function in (
     math.sin, math.cos, math.exp, math.acos, math.atan2, math.pow))
 
 
-def turned(rotation, vectors):
+def turned(rotation: Matrix3, vectors: Vectors3) -> Vectors3:
     """Return vectors (n, 3), each turned by a rotation (3, 3)."""
     return np.einsum('ij,nj->ni', rotation, vectors)
 
 
-def geomspace(first, last, n):
+def geomspace(first: float, last: float, n: int) -> Floats:
     """Return n numbers from the first to the last in equal ratios."""
     return first * power(last / first, np.arange(n) / (n - 1))
 
 
-def solution(A, b) -> list:
+def solution(A: Floats | Complexes, b: Floats | Complexes) -> list[complex]:
     """Return the solution x of A x = b, by Gauss's elimination with the largest pivot of each column.
 
     A: (n, n), real or complex; b: (n,).

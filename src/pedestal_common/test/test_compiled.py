@@ -36,8 +36,11 @@ TYPES = ('f8', 'f4')
 
 
 def environment(folder, cache):
-    """Of a process that has the law cache in the folder `cache`."""
-    return {**os.environ, 'NUMBA_CACHE_DIR': str(cache),
+    """Of a process that has the law cache in the folder `cache`, and that reads each module from its source.
+
+    A .pyc file is valid for a source of the same length and the same second; an edit by a test may change neither.
+    """
+    return {**os.environ, 'NUMBA_CACHE_DIR': str(cache), 'PYTHONDONTWRITEBYTECODE': '1',
             'PYTHONPATH': os.pathsep.join([str(folder), *filter(None, sys.path)])}
 
 
@@ -57,10 +60,12 @@ def folder(tmp_path):
     return tmp_path
 
 
+@pytest.mark.thorough
 def test_one_of_many_compiles(folder):
     assert sorted(compilations(folder, folder / 'cache', [()] * 3)) == [0, 0, 1]
 
 
+@pytest.mark.thorough
 def test_what_is_in_the_cache_is_loaded_without_what_compiles(tmp_path):
     """To import which takes longer than everything else; it is there for what is compiled afterwards."""
     code = ('import sys, numba, numpy; from pedestal_common.compiled import assign; x = numpy.zeros((2, 2)); '
@@ -258,6 +263,7 @@ def same(of, x):
 """
 
 
+@pytest.mark.thorough
 def test_a_named_tuple_without_a_name_in_its_module_is_no_other_in_the_next_process(tmp_path):
     """Pickle would make another class of it."""
     (tmp_path / 'nameless.py').write_text(NAMELESS)

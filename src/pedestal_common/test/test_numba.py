@@ -13,6 +13,8 @@ from numba.core.registry import cpu_target
 
 from pedestal_common.compiled import compiled
 
+pytestmark = pytest.mark.every_case
+
 SIGNATURES = (
     ('base.BaseContext.insert_user_function', '(self, func, fndesc, libs=())'),
     ('base.BaseContext.push_code_library', '(self, lib)'),

@@ -294,3 +294,8 @@ def test_a_burst_after_a_pause_of_which_most_is_lost_is_the_same_writer(held):
     began, missed = 400 * T + held, held // T
     assert take(401, began) and all(take(401 + missed - left, began + 3 * MS) for left in range(7, -1, -1))
     assert all(take(401 + missed + i, began + i * T) for i in range(1, 400)) and not gate.dropped
+
+
+def test_a_shared_topic_without_a_steady_rate_has_every_publisher():
+    gate = PublisherGate(lambda data: (None, data), 0, None, paced=False)
+    assert [gate.take(data, 1, 0, 0, 0) for data in (b'a', b'b')] == [b'a', b'b']

@@ -1,7 +1,7 @@
 """Bus of the drives: the five calls that the node needs of it. Nothing above this interface knows which bus it is."""
 import typing
 
-import numpy as np
+from pedestal_common.quantities import Bools, Records
 
 
 class BusError(OSError):
@@ -24,11 +24,11 @@ class Bus(typing.Protocol):
         torque_mode: True if its command holds the target torque in place of the torque offset.
         """
 
-    def exchange(self, commands: np.ndarray, reports: np.ndarray) -> np.ndarray:
+    def exchange(self, commands: Records, reports: Records) -> Bools:
         """Send a command to each drive, let all drives act on it at the same time, and receive their reports.
 
         commands: (4,) of pdo.COMMAND_DTYPE; reports: (4,) of pdo.REPORT_DTYPE, changed for drives that have reported.
-        Return an array (4,) of bool: the drives that have reported completely. Called once a period.
+        Return for each drive whether it has reported completely. Called once a period.
         """
 
     def read(self, drive: int, index: int, subindex: int, kind: str) -> int:

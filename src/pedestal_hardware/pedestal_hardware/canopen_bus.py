@@ -10,14 +10,17 @@ import logging
 import struct
 import threading
 import time
+from collections.abc import Callable, Iterator, Sequence
 
 import can
 import canopen
 import numpy as np
 
+from pedestal_common.quantities import Bools, Records, Seconds
 from pedestal_hardware import pdo
 from pedestal_hardware.bus import BusError
-from pedestal_hardware.can_line import PythonCanLine, SocketcandLine
+from pedestal_hardware.can_line import Frame, Line, PythonCanLine, SocketcandLine
+from pedestal_hardware.params import BusParameters
 
 CIA402_PROFILE = 402  # profile of a drive in the low half of its device type (1000)
 
@@ -42,26 +45,27 @@ for _name in ('canopen', 'can'):
 
 
 class _Sender:
-    """Bus of a canopen.Network, which only sends by it. send: function of a list of frames."""
+    """Bus of a canopen.Network, which only sends by it."""
 
-    def __init__(self, send):
+    def __init__(self, send: Callable[[list[Frame]], None]) -> None:
         self._send = send
 
-    def send(self, message):
+    def send(self, message: can.Message) -> None:
         """Send a can.Message."""
         self._send([(message.arbitration_id, bytes(message.data))])
 
 
 class CanopenBus:
-    """CANopen bus with four drives.
+    """CANopen bus with four drives. nodes: their CANopen nodes; labels: their names for texts."""
 
-    parameters: params.BusParameters; nodes: CANopen nodes of the drives; labels: their names for texts; period: [s].
-    """
-
-    def __init__(self, parameters, nodes, labels, period):
-        self.notes = []
+    def __init__(self, parameters: BusParameters, nodes: Sequence[int], labels: Sequence[str],
+                 period: Seconds) -> None:
+        self.notes: list[str] = []
         self._p, self._nodes, self._labels, self._period = parameters, nodes, labels, period
-        self._network, self._line, self._drives, self._closed = None, None, [], False
+        self._network: canopen.Network | None = None
+        self._line: Line | None = None
+        self._drives: list[canopen.RemoteNode] = []
+        self._closed = False
         self._opening, self._reading, self._sending = threading.Lock(), threading.Lock(), threading.Lock()
         size = pdo.REPORT_DTYPE.itemsize
         self._places = {cob + node: (i, i * size + pdo.REPORT_PARTS[k][0], pdo.REPORT_PARTS[k][1])
@@ -70,10 +74,11 @@ class CanopenBus:
         self._started = [False] * len(nodes)
         self._buffer = bytearray(len(nodes) * size)
         self._received = np.frombuffer(self._buffer, pdo.REPORT_DTYPE)
-        self._awaited, self._refused = set(), set()     # _refused: (COB-ID, length) of the frames that were noted
+        self._awaited: set[int] = set()                 # COB-IDs of the reports of this period
+        self._refused: set[tuple[int, int]] = set()     # (COB-ID, length) of the frames that were noted
         self._last_heartbeat = self._exchanged = -np.inf
 
-    def start(self, drive, torque_mode=False):
+    def start(self, drive: int, torque_mode: bool = False) -> None:
         """Identify a drive, map its data, and let it begin to exchange them; see bus.Bus. Raises BusError."""
         with self._opening:
             if self._closed:
@@ -101,7 +106,7 @@ class CanopenBus:
         self._send(0, bytes((NMT_START, node)))
         self._started[drive] = True
 
-    def exchange(self, commands, reports):
+    def exchange(self, commands: Records, reports: Records) -> Bools:
         """Exchange commands for reports; see bus.Bus."""
         reported = np.zeros(len(self._nodes), bool)
         if self._line is None:
@@ -132,7 +137,7 @@ class CanopenBus:
         reports[reported] = self._received[reported]
         return reported
 
-    def read(self, drive, index, subindex, kind):
+    def read(self, drive: int, index: int, subindex: int, kind: str) -> int:
         """Return the value of an object; see bus.Bus. Raises BusError."""
         with self._errors_named(index, subindex):
             data = self._drives[drive].sdo.upload(index, subindex)
@@ -141,12 +146,12 @@ class CanopenBus:
             raise BusError(f'object {index:04X}:{subindex}: {len(data)} bytes: must be {size}')
         return struct.unpack(f'<{kind}', data[:size])[0]
 
-    def write(self, drive, index, subindex, kind, value):
+    def write(self, drive: int, index: int, subindex: int, kind: str, value: int) -> None:
         """Write an object; see bus.Bus. Raises BusError."""
         with self._errors_named(index, subindex):
             self._drives[drive].sdo.download(index, subindex, struct.pack(f'<{kind}', value))
 
-    def stop(self):
+    def stop(self) -> None:
         """Stop the exchange of all drives, and leave the bus. No drive can be started afterwards."""
         self._closed = True
         with self._opening:
@@ -158,10 +163,11 @@ class CanopenBus:
                     self._send(0, bytes((NMT_PRE_OPERATIONAL, node)))
             self._close()
 
-    def _open(self):
+    def _open(self) -> None:
         """Connect to the CAN bus and subscribe to the frames of the drives. Raises BusError."""
         self._close()
         p = self._p
+        line: Line
         try:
             if p.interface == 'socketcand':
                 line = SocketcandLine(p.host, p.port, p.channel, p.sdo_time)
@@ -171,7 +177,7 @@ class CanopenBus:
         except (OSError, can.CanError, ValueError) as error:
             where = f' at {p.host}:{p.port}' if p.interface == 'socketcand' else ''
             raise BusError(f'no {p.interface} bus {p.channel}{where}: {error}') from None
-        network = canopen.Network(_Sender(self._send_all))
+        network = canopen.Network(_Sender(self._send_all))  # type: ignore[arg-type]  # it only sends by its bus
         self._drives = [network.add_node(canopen.RemoteNode(node, canopen.ObjectDictionary()))
                         for node in self._nodes]
         for drive in self._drives:
@@ -179,7 +185,7 @@ class CanopenBus:
         self._started, self._network, self._line = [False] * len(self._nodes), network, line
         threading.Thread(target=self._receive_between_exchanges, args=(line,), daemon=True).start()
 
-    def _receive_between_exchanges(self, line):
+    def _receive_between_exchanges(self, line: Line) -> None:
         """Receive the frames of a line while no exchange receives them, until the line is closed."""
         while self._line is line:
             if time.monotonic() - self._exchanged < IDLE_TIME_S:
@@ -188,14 +194,14 @@ class CanopenBus:
             with self._reading, contextlib.suppress(BusError):
                 self._receive(IDLE_POLL_S)
 
-    def _close(self):
+    def _close(self) -> None:
         line, self._line, self._network = self._line, None, None
         if line is not None:
             with contextlib.suppress(can.CanError, OSError):
                 line.close()
 
-    def _receive(self, timeout):
-        """Take the frames that arrive within a time [s], as the holder of `_reading`. An error closes the line. Raises
+    def _receive(self, timeout: Seconds) -> None:
+        """Take the frames that arrive within a time, as the holder of `_reading`. An error closes the line. Raises
         BusError."""
         line = self._line
         if line is None:
@@ -211,7 +217,7 @@ class CanopenBus:
             else:
                 self._notify(cob, data)
 
-    def _notify(self, cob, data):
+    def _notify(self, cob: int, data: bytes) -> None:
         """Give a frame that is no report to the package canopen. A frame that canopen cannot read is noted once."""
         network = self._network
         if network is None:
@@ -227,7 +233,7 @@ class CanopenBus:
             for drive in self._drives:
                 drive.emcy.reset()
 
-    def _send_all(self, frames):
+    def _send_all(self, frames: list[Frame]) -> None:
         """Send frames together. Raises BusError."""
         line = self._line
         if line is None:
@@ -238,14 +244,14 @@ class CanopenBus:
         except OSError as error:
             raise BusError(f'frame 0x{frames[0][0]:03X} not sent: {error}') from None
 
-    def _reset_communication(self, drive):
+    def _reset_communication(self, drive: int) -> None:
         """Reset the communication of a drive. It clears the errors of the bus, and lets the drive answer in a known
         state."""
         booted, cob, network = threading.Event(), HEARTBEAT_COB_ID + self._nodes[drive], self._network
         if network is None:
             raise BusError('the bus is closed')
 
-        def note(_cob, data, _time):
+        def note(_cob: int, data: bytearray, _time: float) -> None:
             if data and data[0] == 0:
                 booted.set()
         network.subscribe(cob, note)
@@ -253,7 +259,7 @@ class CanopenBus:
         booted.wait(BOOT_TIME_S)
         network.unsubscribe(cob, note)
 
-    def _map(self, drive, communication, mapping, cob, objects):
+    def _map(self, drive: int, communication: int, mapping: int, cob: int, objects: pdo.Mapping) -> None:
         """Map objects to a PDO in the order that CiA 301 prescribes, and read the mapping back. Raises BusError."""
         self.write(drive, communication, 1, 'I', cob | INVALID_COB_ID)
         self.write(drive, mapping, 0, 'B', 0)
@@ -266,17 +272,17 @@ class CanopenBus:
                 self.write(drive, communication, 3, 'H', 0)
         self._write_verified(drive, communication, 1, 'I', cob)
 
-    def _write_verified(self, drive, index, subindex, kind, value):
+    def _write_verified(self, drive: int, index: int, subindex: int, kind: str, value: int) -> None:
         self.write(drive, index, subindex, kind, value)
         found = self.read(drive, index, subindex, kind)
         if found != value:
             raise BusError(f'object {index:04X}:{subindex} is 0x{found:X} after writing 0x{value:X}')
 
-    def _send(self, cob, data):
+    def _send(self, cob: int, data: bytes) -> None:
         self._send_all([(cob, data)])
 
     @contextlib.contextmanager
-    def _errors_named(self, index, subindex):
+    def _errors_named(self, index: int, subindex: int) -> Iterator[None]:
         """Turn the errors of an access to an object into a BusError that names the object."""
         where = f'object {index:04X}:{subindex}'
         try:
@@ -288,7 +294,7 @@ class CanopenBus:
         except (OSError, can.CanError, RuntimeError, IndexError, struct.error) as error:
             raise BusError(f'{where}: {error}') from None
 
-    def _take(self, cob, data):
+    def _take(self, cob: int, data: bytes) -> None:
         """Take a report of a drive."""
         i, first, size = self._places[cob]
         if len(data) != size:
@@ -297,6 +303,6 @@ class CanopenBus:
         self._buffer[first:first + size] = data
         self._awaited.discard(cob)
 
-    def _note(self, text):
+    def _note(self, text: str) -> None:
         if len(self.notes) < MAX_NOTES:
             self.notes.append(text)

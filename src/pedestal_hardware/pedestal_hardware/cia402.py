@@ -36,7 +36,7 @@ GOAL_OFF, GOAL_SWITCHED_ON, GOAL_ENABLED, GOAL_QUICK_STOP = range(len(GOALS))
 
 
 @compiled
-def state(status):
+def state(status: int) -> int:
     """Return the code of the state in a statusword, UNKNOWN_STATE for a pattern that no state has."""
     for code, (mask, value) in enumerate(_PATTERNS):
         if status & mask == value:
@@ -45,7 +45,7 @@ def state(status):
 
 
 @compiled
-def controlword(now, goal):
+def controlword(now: int, goal: int) -> int:
     """Return the controlword that leads a drive one transition nearer to a goal. now: code of its state.
 
     No controlword of this function resets a fault.
@@ -69,7 +69,7 @@ def controlword(now, goal):
 
 
 @compiled
-def successor(now, control, before):
+def successor(now: int, control: int, before: int) -> int:
     """Return the state of a drive after a controlword, by transitions 2 to 12, 15 and 16. before: previous one."""
     if now == State.FAULT:
         rising = control & CONTROL_RESET and not before & CONTROL_RESET

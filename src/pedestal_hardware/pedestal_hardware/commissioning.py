@@ -4,7 +4,9 @@ import math
 import typing
 
 from pedestal_common.graph import topics
-from pedestal_hardware.bus import BusError
+from pedestal_common.quantities import NewtonMeters, Radians, RadiansPerSecond
+from pedestal_hardware.bus import Bus, BusError
+from pedestal_hardware.params import ServoDriveParameters
 from pedestal_hardware.servo_drives import MODE_CYCLIC_TORQUE, MODE_CYCLIC_VELOCITY
 
 MODE_NAMES = {MODE_CYCLIC_VELOCITY: 'cyclic synchronous velocity', MODE_CYCLIC_TORQUE: 'cyclic synchronous torque'}
@@ -23,27 +25,25 @@ MAX_RATED_TORQUE_FACTOR = 3.0
 
 
 class Scale(typing.NamedTuple):
-    """Units of a drive on the motor shaft: of one step of position [rad], velocity [rad/s] and torque [Nm]."""
-    position: float
-    velocity: float
-    torque: float
+    """Units of a drive: one step of its objects, on the motor shaft."""
+    position: Radians
+    velocity: RadiansPerSecond
+    torque: NewtonMeters
 
 
 class Setting(typing.NamedTuple):
-    """Value of an object of a drive.
-
-    number: index of the object; kind: its type as in struct; optional: True if a drive may lack it.
-    """
-    number: int
+    """Value of an object of a drive."""
+    number: int                 # index of the object
     subindex: int
-    kind: str
+    kind: str                   # its type as in struct
     value: int
     meaning: str
-    optional: bool = False
+    optional: bool = False      # True if a drive may lack it
 
 
-def settings(parameters, drive, velocity, rated):
-    """Return the Settings of a drive. velocity: rad/s of one step of its velocity; rated: its rated torque [Nm]."""
+def settings(parameters: ServoDriveParameters, drive: int, velocity: RadiansPerSecond,
+             rated: NewtonMeters) -> list[Setting]:
+    """Return the settings of a drive. velocity: of one step of its velocity; rated: its rated torque."""
     axis = getattr(parameters, topics.AXES[drive // 2])
     motor = (axis.motor_1, axis.motor_2)[drive % 2]
     deceleration = axis.limits.deceleration * axis.gear_train.ratio / velocity
@@ -72,12 +72,12 @@ def settings(parameters, drive, velocity, rated):
     return rows
 
 
-def mode_of(torque_mode):
-    """Return the mode of operation of a drive. torque_mode: True for a drive in the mode of torque."""
+def mode_of(torque_mode: bool) -> int:
+    """Return the mode of operation of a drive."""
     return MODE_CYCLIC_TORQUE if torque_mode else MODE_CYCLIC_VELOCITY
 
 
-def commission(bus, drive, parameters):
+def commission(bus: Bus, drive: int, parameters: ServoDriveParameters) -> Scale:
     """Write and verify the settings of a drive, and return its Scale. Raises BusError."""
     mode = mode_of(parameters.torque_mode(drive))
     if not bus.read(drive, 0x6502, 0, 'I') & 1 << mode - 1:
@@ -96,16 +96,16 @@ def commission(bus, drive, parameters):
     return Scale(2.0 * math.pi * turns / increments, velocity, PERMILLE * rated)
 
 
-def velocity_unit(code):
-    """Return the velocity unit [rad/s] that object 60A9 states: rpm with a power of ten. Raises BusError."""
+def velocity_unit(code: int) -> RadiansPerSecond:
+    """Return the velocity unit that object 60A9 states: rpm with a power of ten. Raises BusError."""
     if code & 0xFFFFFF != UNIT_RPM:
         raise BusError(f'object 60A9: velocity unit 0x{code:08X}: must be 0x..B44700 (rpm with a prefix)')
     prefix = code >> 24
     return RAD_S_PER_RPM * 10.0 ** (prefix - 256 if prefix > 127 else prefix)
 
 
-def _finest_velocity_unit(bus, drive):
-    """Set the finest velocity unit that the drive accepts, and return it [rad/s]."""
+def _finest_velocity_unit(bus: Bus, drive: int) -> RadiansPerSecond:
+    """Set the finest velocity unit that the drive accepts, and return it."""
     try:
         bus.write(drive, 0x60A9, 0, 'I', MILLI_PREFIX << 24 | UNIT_RPM)
     except BusError:
@@ -113,8 +113,8 @@ def _finest_velocity_unit(bus, drive):
     return velocity_unit(bus.read(drive, 0x60A9, 0, 'I'))
 
 
-def _rated_torque(bus, drive, parameters):
-    """Return the rated torque of a drive [Nm], near the parameter of the motor."""
+def _rated_torque(bus: Bus, drive: int, parameters: ServoDriveParameters) -> NewtonMeters:
+    """Return the rated torque of a drive, near the parameter of the motor."""
     raw = bus.read(drive, 0x6076, 0, 'I')
     expected = getattr(parameters, topics.AXES[drive // 2]).thermal.rated_torque
     for unit in TORQUE_UNITS_NM:
@@ -124,7 +124,7 @@ def _rated_torque(bus, drive, parameters):
                    'uNm')
 
 
-def _set(bus, drive, setting):
+def _set(bus: Bus, drive: int, setting: Setting) -> None:
     """Write a Setting and read it back."""
     try:
         bus.write(drive, setting.number, setting.subindex, setting.kind, setting.value)

@@ -10,13 +10,20 @@ import pedestal_common.entry  # noqa: F401
 import sys
 import threading
 import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from adu_drive.adu_node import AduNode
 from pedestal_common.node import shell
+from pedestal_common.node.unit import Diagnosis
+from pedestal_common.quantities import Message, Nanoseconds
 from pedestal_hardware import commissioning, errors
 from pedestal_hardware.bus import BusError
-from pedestal_hardware.params import START_KEY, time_0_after
-from pedestal_hardware.unit import DRIVE_LABELS
+from pedestal_hardware.params import START_KEY, ServoDriveParameters, time_0_after
+from pedestal_hardware.unit import DRIVE_LABELS, ServoDrives
+
+if TYPE_CHECKING:
+    from pedestal_hardware.canopen_bus import CanopenBus
 
 RETRY_PERIOD_S = 0.5  # time between two tries to commission drives that report nothing [s]
 
@@ -27,15 +34,21 @@ ANSWER_POLL_S = 0.02  # time between two checks whether all drives answer [s]
 
 
 class DriveNode(AduNode):
-    """Node of four servo drives. recommission: drives that the thread commissions again, because of a reset."""
+    """Node of four servo drives."""
+    parameters: ServoDriveParameters
+    unit: ServoDrives
 
-    def __init__(self):
-        self.recommission, self.changed, self.ending = set(), threading.Event(), False
-        self.bus = self.commissioning = self.start_time = None
-        self.shown_errors, self.shown_problems = [], []
+    def __init__(self) -> None:
+        self.recommission: set[int] = set()     # drives that the thread commissions again, because of a reset
+        self.changed, self.ending = threading.Event(), False
+        self.bus: CanopenBus | None = None
+        self.commissioning: threading.Thread | None = None
+        self.start_time: Nanoseconds | None = None
+        self.shown_errors: list[int] = []
+        self.shown_problems: list[str] = []
         super().__init__('pedestal_hardware.drive_node')
 
-    def begin(self):
+    def begin(self) -> None:
         """Prepare the bus and the steps. The first step waits until all drives answer."""
         # The bus is imported here, because python-can is an extra of this package.
         try:
@@ -47,21 +60,17 @@ class DriveNode(AduNode):
         self.answer_limit = time.monotonic() + p.bus.connect_time
         self.commissioning = threading.Thread(target=self.commission_lost_drives, daemon=True)
         self.commissioning.start()
+        self.FIRST_STEP = -round(ENABLE_LEAD_S / p.period)      # the drives are enabled before time 0
         super().begin()
 
     @property
-    def FIRST_STEP(self):  # noqa: N802  a constant of the base class
-        """Number of the first step: the drives are enabled before time 0."""
-        return -round(ENABLE_LEAD_S / self.parameters.period)
-
-    @property
-    def awaits(self):
+    def awaits(self) -> str:
         """Condition for the first step: the drives answer, then the start time."""
         drives = self.parameters.drives
         answer = f'the drives {", ".join(map(str, drives.nodes))}'
         return answer if drives.start_after else f'{answer}, then {super().awaits}'
 
-    def make_due_step(self):
+    def make_due_step(self) -> None:
         """Make the due step as soon as all drives have answered. Raises BusError if a drive does not answer in time.
         """
         unit = self.unit
@@ -76,9 +85,10 @@ class DriveNode(AduNode):
             self._use_bus()
         super().make_due_step()
 
-    def _use_bus(self):
+    def _use_bus(self) -> None:
         """Begin to exchange data with the drives, which all answer."""
         drives = range(len(DRIVE_LABELS))
+        assert self.bus is not None
         found = [self.bus.read(drive, 0x603F, 0, 'H') for drive in drives]
         # The drives have an error of the bus because this node or the bus was absent. This start clears it.
         if any(found) and all(errors.is_of_the_bus(code) for code in found if code):
@@ -87,7 +97,7 @@ class DriveNode(AduNode):
         self._choose_start()
         self.get_logger().info(f'drives {", ".join(map(str, self.parameters.drives.nodes))} answer')
 
-    def _choose_start(self):
+    def _choose_start(self) -> None:
         """Let time 0 follow the answer of the drives, by whole seconds from graph.start, and publish it."""
         lead = self.parameters.drives.start_after
         if lead:
@@ -95,19 +105,20 @@ class DriveNode(AduNode):
             self.start_time = self._epoch = time_0_after(self.epoch(utc), utc, lead)
             self.diagnose_now()
 
-    def diagnosed(self):
+    def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of the drives, with time 0 if it follows their answer."""
         diagnosis = super().diagnosed()
         if self.start_time is None:
             return diagnosis
         return diagnosis._replace(values=[*diagnosis.values, (START_KEY, str(self.start_time))])
 
-    def label(self, drive):
+    def label(self, drive: int) -> str:
         """Return the name of a drive for texts, with its node."""
         return f'{DRIVE_LABELS[drive]} (node {self.parameters.drives.nodes[drive]})'
 
-    def commission(self, drive):
+    def commission(self, drive: int) -> bool:
         """Start a drive and verify its settings. Return True if it can be used; otherwise keep the reason."""
+        assert self.bus is not None
         try:
             self.bus.start(drive, self.parameters.torque_mode(drive))
             self.unit.use_drive(drive, commissioning.commission(self.bus, drive, self.parameters))
@@ -116,7 +127,7 @@ class DriveNode(AduNode):
             return False
         return True
 
-    def commission_lost_drives(self):
+    def commission_lost_drives(self) -> None:
         """Commission drives that have returned to the bus or whose faults are reset, until the node ends."""
         while not self.ending:
             again = self.recommission.copy()
@@ -128,12 +139,12 @@ class DriveNode(AduNode):
             self.changed.wait(RETRY_PERIOD_S)
             self.changed.clear()
 
-    def _service(self, name):
+    def _service(self, name: str) -> Callable[[Message, Message], Message]:
         """Return the callback of a service. A reset also commissions the faulty drives again, because some drives
         accept the reset only then."""
         serve = super()._service(name)
 
-        def call(request, response):
+        def call(request: Message, response: Message) -> Message:
             faulty = self.unit.faulty
             answer = serve(request, response)
             if name == 'adu/reset_faults' and answer.success and faulty:
@@ -142,7 +153,7 @@ class DriveNode(AduNode):
             return answer
         return call
 
-    def after_step(self):
+    def after_step(self) -> None:
         """Log new errors of the drives, and what the bus has rejected."""
         super().after_step()
         shown = self.unit.parts['drives']['error'].tolist()
@@ -156,10 +167,11 @@ class DriveNode(AduNode):
                 if problem and problem not in self.shown_problems:
                     self.get_logger().warning(f'{self.label(drive)}: {problem}')
             self.shown_problems = list(self.unit.problems)
+        assert self.bus is not None
         while self.bus.notes:
             self.get_logger().warning(self.bus.notes.pop(0))
 
-    def close(self):
+    def close(self) -> None:
         """Leave the bus and end."""
         self.ending = True
         self.changed.set()
@@ -170,7 +182,7 @@ class DriveNode(AduNode):
         super().close()
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node to its end. Return the exit code."""
     return shell.main(DriveNode, args)
 

@@ -27,7 +27,7 @@ CLASS_NAMES = ('', 'generic error', 'current', 'voltage', 'temperature', 'hardwa
 MAKER_CODE_MIN = 0xFF00  # smallest of the codes that each maker defines
 
 
-def name(code):
+def name(code: int) -> str:
     """Return the text of an error code, such as `0x8130 heartbeat lost`; '' for code 0."""
     if not code:
         return ''
@@ -41,13 +41,13 @@ def name(code):
 
 
 @compiled
-def is_of_the_bus(code):
+def is_of_the_bus(code: int) -> bool:
     """Return True if a drive has such an error because the bus or its master was absent. A start clears it."""
     return code & 0xFF00 == 0x8100 or code == 0x8250
 
 
 @compiled
-def fault_of(code, motor):
+def fault_of(code: int, motor: int) -> int:
     """Return the fault word of an axis for the error code of its drive `motor` (0 or 1) in the state `fault`."""
     if code == 0x2350 or code & 0xF000 == 0x4000:
         return faults.Bit.OVERTEMPERATURE

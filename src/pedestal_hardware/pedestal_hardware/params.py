@@ -1,9 +1,10 @@
 """Parameters of `drive_node` and of the simulated drives: those of the drive unit, the bus, and the drives on it."""
 import dataclasses
 
-from adu_drive.params import AduNodeParameters
+from adu_drive.params import AduNodeParameters, SpeedLoopParameters
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
+from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_hardware import pdo
 
 CONTROLS = ('velocity', 'drive', 'torque')  # divisions of the control between drive_node and the drives
@@ -21,18 +22,18 @@ FRAME_BITS, STUFFED_BITS, BITS_PER_STUFF_BIT = 47, 33, 4
 """Bits of a standard CAN frame without its data, those that may be stuffed, and the bits for each stuff bit."""
 
 
-def time_0_after(start, utc, lead):
-    """Return time 0 [ns]: `start` [ns], moved by whole seconds to at least a lead time [s] after a UTC [ns]."""
+def time_0_after(start: Nanoseconds, utc: Nanoseconds, lead: Seconds) -> Nanoseconds:
+    """Return time 0: `start`, moved by whole seconds to at least a lead time after a UTC."""
     early = (start - utc - round(lead * NS_PER_SECOND)) // NS_PER_SECOND
     return start - early * NS_PER_SECOND
 
 
-def frame_bits(data_bytes):
+def frame_bits(data_bytes: int) -> int:
     """Return the largest number of bits of a CAN frame with this number of data bytes."""
     return FRAME_BITS + 8 * data_bytes + (STUFFED_BITS + 8 * data_bytes) // BITS_PER_STUFF_BIT
 
 
-def period_bits():
+def period_bits() -> int:
     """Return the largest number of bits on a CAN bus in one period: synchronisation, commands and reports."""
     commands = pdo.DRIVE_COUNT * frame_bits(pdo.COMMAND_DTYPE.itemsize)
     reports = sum(frame_bits(pdo.REPORT_PARTS[k][1]) for drive in range(pdo.DRIVE_COUNT)
@@ -88,7 +89,7 @@ class DrivesParameters(Parameters):
                                    'graph.start; 0: time 0 is graph.start')
     profile: int = parameter(402, 0, 65535, '', 'simulated drives: profile of their device type')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for two drives with one node."""
         numbers = self.nodes
         if len(set(numbers)) < len(numbers):
@@ -96,7 +97,7 @@ class DrivesParameters(Parameters):
                                  ': must be four different nodes')
 
     @property
-    def nodes(self):
+    def nodes(self) -> tuple[int, ...]:
         """CANopen nodes of the four drives."""
         return tuple(getattr(axis, f'node_{motor}') for axis in (self.azimuth, self.elevation) for motor in (1, 2))
 
@@ -111,7 +112,7 @@ class ServoDriveParameters(AduNodeParameters):
     bus: BusParameters = group(BusParameters)
     drives: DrivesParameters = group(DrivesParameters)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for stow pins, and for a period that the bus or the control does not allow."""
         super().check()
         if self.stow_pins:
@@ -129,7 +130,7 @@ class ServoDriveParameters(AduNodeParameters):
             raise ParameterError(f'period = {self.period:g} s: must be at least {shortest:.4f} s, the time of the '
                                  f'frames of a period at bus.bitrate = {self.bus.bitrate}')
 
-    def _check_speed_loop(self, axis, loop):
+    def _check_speed_loop(self, axis: str, loop: SpeedLoopParameters) -> None:
         """Raise ParameterError for a speed loop of an axis that its drives cannot have."""
         if loop.structure != 'mean':
             raise ParameterError(f'{axis}.speed_loop.structure = {loop.structure}: must be mean for servo drives')
@@ -143,11 +144,11 @@ class ServoDriveParameters(AduNodeParameters):
                 raise ParameterError(f'{axis}.speed_loop.{name} = {gain:g}: must be at most {largest:g} with '
                                      f'drives.{step} = {getattr(self.drives, step):g}')
 
-    def torque_mode(self, drive):
+    def torque_mode(self, drive: int) -> bool:
         """Return True if a drive is in the mode of torque. drive: 0 to 3."""
         return self.control == 'torque' or self.control == 'drive' and drive % 2 == 1
 
-    def check_graph(self, beams, lockstep):
+    def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError for lockstep, which real drives cannot follow."""
         super().check_graph(beams, lockstep)
         if lockstep:

@@ -3,20 +3,33 @@
 The records are packed and little-endian, so a PDO is a part of the bytes of a record. The mapping of a drive is the
 list of its objects, (index, subindex, bits), in the order of the record.
 """
+from typing import TypeAlias
+
 import numpy as np
+
+Mapping: TypeAlias = tuple[tuple[int, int, int], ...]    # (index, subindex, bits) of each object in a PDO
 
 DRIVE_COUNT = 4  # number of drives of an antenna: two on each of two axes
 
-COMMAND_DTYPE = np.dtype([('controlword', '<u2'), ('velocity', '<i4'), ('torque', '<i2')])
-"""Command to a drive: controlword, target velocity, and torque offset in units of the drive; in the mode of torque the
-target torque in place of the torque offset."""
+# Records declare numbers of eight bytes; the sizes of these are those of the objects of a drive.
+COMMAND_DTYPE = np.dtype([
+    ('controlword', '<u2'),
+    ('velocity', '<i4'),        # target velocity, in units of the drive
+    ('torque', '<i2')])         # torque offset, in the mode of torque the target torque, in units of the drive
+"""Command to a drive."""
 
-_REPORT = (('status', '<u2'), ('velocity', '<i4'), ('torque', '<i2'), ('position', '<i4'), ('error', '<u2'),
-           ('mode', '<i1'), ('load', '<i4'), ('inputs', '<u4'))
+_REPORT = (
+    ('status', '<u2'),          # statusword
+    ('velocity', '<i4'),        # actual velocity
+    ('torque', '<i2'),          # actual torque
+    ('position', '<i4'),        # of the motor
+    ('error', '<u2'),           # error code
+    ('mode', '<i1'),            # mode of operation
+    ('load', '<i4'),            # position of the load encoder
+    ('inputs', '<u4'))          # digital inputs
 REPORT_FIELDS = tuple(name for name, _ in _REPORT)
 REPORT_DTYPE = np.dtype(list(_REPORT))
-"""Report of a drive: statusword, actual velocity and torque, position of the motor, error code, mode of operation,
-position of the load encoder, digital inputs."""
+"""Report of a drive."""
 REPORT_OFFSETS = {name: sum(np.dtype(kind).itemsize for _, kind in _REPORT[:k])
                   for k, (name, _) in enumerate(_REPORT)}
 """{field: its first byte in the record of a report}."""
@@ -34,7 +47,7 @@ REPORT_MAPPING = (((0x6041, 0, 16), (0x606C, 0, 32), (0x6077, 0, 16)),
 BITS_PER_BYTE = 8
 
 
-def pdo_bytes(mapping):
+def pdo_bytes(mapping: Mapping) -> int:
     """Return the number of bytes of a PDO with a mapping."""
     return sum(bits for _, _, bits in mapping) // BITS_PER_BYTE
 
@@ -44,6 +57,6 @@ REPORT_PARTS = tuple((sum(map(pdo_bytes, REPORT_MAPPING[:k])), pdo_bytes(REPORT_
 """(first byte, number of bytes) of each PDO in the record of a report."""
 
 
-def reports_of(drive):
+def reports_of(drive: int) -> range:
     """Return the numbers of the PDOs that a drive sends."""
     return range(len(REPORT_MAPPING) if drive % 2 == 0 else len(REPORT_MAPPING) - 1)

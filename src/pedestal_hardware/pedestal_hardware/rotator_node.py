@@ -9,47 +9,55 @@ import pedestal_common.entry  # noqa: F401
 # isort: split
 import sys
 import time
+from collections.abc import Mapping, Sequence
 
-from adu_drive.timekeeper_node import Timekeeper
+from adu_drive.timekeeper_node import Received, Timekeeper
 from pedestal_common.node import shell
+from pedestal_common.quantities import Nanoseconds
 from pedestal_hardware.rotator.line import Line
 from pedestal_hardware.rotator.protocols import PROTOCOLS
+from pedestal_hardware.rotator.unit import Rotator
+from pedestal_hardware.rotator_params import RotatorParameters
 
 
 class RotatorNode(Timekeeper):
     """A drive whose steps exchange angles with the Line of a rotator."""
 
-    def __init__(self):
-        self.line = None
+    parameters: RotatorParameters
+    unit: Rotator
+
+    def __init__(self) -> None:
+        self.line: Line | None = None
         super().__init__('pedestal_hardware.rotator_node')
 
-    def begin(self):
+    def begin(self) -> None:
         """Connect to the device and begin the steps."""
         p = self.parameters
         self.line = Line(p.url, PROTOCOLS[p.protocol], p.period, p.answer_timeout, p.baud_rate)
         self.line.start()
         super().begin()
 
-    def _make(self, stamp, values):
+    def _make(self, stamp: Nanoseconds, values: Mapping[str, Received]) -> None:
         """Make a step with the newest measurement, and send its set-point."""
-        unit = self.unit
-        unit.measure(self.line.newest, time.monotonic())
-        unit.counts, unit.fault = dict(self.line.counts), self.line.fault
+        unit, line = self.unit, self.line
+        assert line is not None
+        unit.measure(line.newest, time.monotonic())
+        unit.counts, unit.fault = dict(line.counts), line.fault
         super()._make(stamp, values)
         decision = unit.decision
-        if decision == 'stop':
-            self.line.send_stop()
+        if isinstance(decision, str):
+            line.send_stop()
         elif decision is not None:
-            self.line.send_set_point(*decision)
+            line.send_set_point(*decision)
 
-    def close(self):
+    def close(self) -> None:
         """Stop the device and end."""
         if self.line is not None:
             self.line.close()
         super().close()
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node to its end. Return the exit code."""
     return shell.main(RotatorNode, args)
 

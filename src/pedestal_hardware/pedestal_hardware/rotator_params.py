@@ -4,6 +4,7 @@ import math
 
 from adu_drive.params import RunParameters
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
+from pedestal_common.quantities import Degrees, Nanoseconds, Radians
 from pedestal_hardware.lines import sources
 from pedestal_hardware.rotator.protocols import PROTOCOLS
 
@@ -14,7 +15,7 @@ class TravelParameters(Parameters):
     low: float = parameter(0.0, -720.0, 720.0, 'deg', 'lowest set-point that the device takes')
     high: float = parameter(360.0, -720.0, 720.0, 'deg', 'highest set-point that the device takes')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for an empty range."""
         if not self.low < self.high:
             raise ParameterError(f'high = {self.high:g} deg: must be above low = {self.low:g} deg')
@@ -37,16 +38,16 @@ class RotatorParameters(RunParameters):
     elevation: TravelParameters = group(TravelParameters, high=180.0)
 
     @property
-    def step_deg(self):
-        """Smallest step of a set-point [deg]."""
+    def step_deg(self) -> Degrees:
+        """Smallest step of a set-point."""
         return self.resolution or PROTOCOLS[self.protocol].RESOLUTION
 
     @property
-    def accuracy_deg(self):
-        """Largest distance of the rotator from a target that stands still [deg]: dead band and half a step."""
+    def accuracy_deg(self) -> Degrees:
+        """Largest distance of the rotator from a target that stands still: dead band and half a step."""
         return self.dead_band + 0.5 * self.step_deg
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for a resolution that the protocol cannot send, or a silence before its time-out."""
         super().check()
         if sources.place(self.url)[0] == 'udp':
@@ -64,7 +65,7 @@ class RotatorParameters(RunParameters):
         if self.protocol == 'gs232' and min(self.azimuth.low, self.elevation.low) < 0.0:
             raise ParameterError('azimuth.low, elevation.low: must be at least 0 deg, the range of gs232')
 
-    def check_graph(self, beams, lockstep):
+    def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError for a graph in lockstep, or for a graph of a drive with motors."""
         if lockstep:
             raise ParameterError('graph.pacing = lockstep: must be realtime, because the rotator has its own time')
@@ -73,11 +74,11 @@ class RotatorParameters(RunParameters):
                                  'does')
 
     @property
-    def timeout_ns(self):
-        """Age from which a reference is stale [ns]."""
+    def timeout_ns(self) -> Nanoseconds:
+        """Age from which a reference is stale."""
         return round(self.command_timeout * self.period * 1e9)
 
     @property
-    def travel_rad(self):
-        """(lowest, highest) set-points of azimuth and elevation [rad]."""
+    def travel_rad(self) -> tuple[tuple[Radians, Radians], ...]:
+        """(lowest, highest) set-points of azimuth and elevation."""
         return tuple((math.radians(axis.low), math.radians(axis.high)) for axis in (self.azimuth, self.elevation))

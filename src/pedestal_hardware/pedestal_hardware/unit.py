@@ -3,51 +3,56 @@ messages of the graph."""
 import dataclasses
 import math
 import typing
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from adu_drive import drive_state, drive_unit
 from adu_drive import unit as adu_unit
+from adu_drive.state_file import PlantState
 from pedestal_common.graph import nodes, topics
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN, Unit, joined
-from pedestal_common.wire.commands import Reply
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN, Diagnosis, Unit, joined
+from pedestal_common.quantities import Nanoseconds, Records, Stamps
+from pedestal_common.wire.commands import Command, Reply
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware import cia402, errors, pdo, servo_drives
-from pedestal_hardware.params import CONTROLS
+from pedestal_hardware.bus import Bus
+from pedestal_hardware.commissioning import Scale
+from pedestal_hardware.params import CONTROLS, ServoDriveParameters
 
 DRIVE_LABELS = tuple(f'{axis} motor {i}' for axis in topics.AXES for i in (1, 2))  # names of the four drives in texts
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the node; record: (1,) of servo_drives.Record."""
-    record: np.ndarray
+    """Memory of the node."""
+    record: Records         # servo_drives.ServoRecord (1,)
 
 
-def _scales(p):
-    """Return the record (1,) of servo_drives.SCALES_DTYPE, in which the units of the drives are still 1."""
-    scales = np.ones(1, servo_drives.SCALES_DTYPE)
+def _scales(params: ServoDriveParameters) -> Records:
+    """Return the Scales (1,), in which the units of the drives are still 1."""
+    scales = np.ones(1, servo_drives.Scales.dtype)
     k = scales[0]
     for i, name in enumerate(topics.AXES):
-        axis, drives = getattr(p, name), getattr(p.drives, name)
+        axis, drives = getattr(params, name), getattr(params.drives, name)
         k['load'][i] = 2.0 * math.pi / 2.0 ** axis.encoder.load_bits * (-1.0 if drives.load_reversed else 1.0)
         k['load_zero'][i] = drives.load_zero
-    k['per_period'], k['control'] = 1.0 / p.period, CONTROLS.index(p.control)
-    k['follow_gain'] = 1.0 - math.exp(-p.period / p.drives.follow_time)
-    for name, time in (('lost', p.bus.report_timeout), ('enable', p.drives.enable_time),
-                       ('reset', p.drives.reset_time), ('leave', servo_drives.MAX_LEAVE_S),
+    k['per_period'], k['control'] = 1.0 / params.period, CONTROLS.index(params.control)
+    k['follow_gain'] = 1.0 - math.exp(-params.period / params.drives.follow_time)
+    for name, time in (('lost', params.bus.report_timeout), ('enable', params.drives.enable_time),
+                       ('reset', params.drives.reset_time), ('leave', servo_drives.MAX_LEAVE_S),
                        ('blind', servo_drives.MAX_BLIND_S)):
-        k[f'{name}_periods'] = math.ceil(time / p.period - 1e-6)
+        k[f'{name}_periods'] = math.ceil(time / params.period - 1e-6)
     return scales
 
 
-def _constants(p):
+def _constants(params: ServoDriveParameters) -> Records:
     """Return the constants for the laws of the drive unit, at the period of the node. The sensors of these laws are
     exact, because the drives themselves measure."""
-    constants = drive_unit.constants(p, speed_period=p.period)
+    constants = drive_unit.constants(params, speed_period=params.period)
     for axis in topics.AXES:
         c = constants[0][axis]
         c['encoder']['exact'], c['encoder']['zero'] = 1, 0.0
-        if p.control == 'drive':
+        if params.control == 'drive':
             # The drives contain the gains.
             c['K_p'] = c['K_iT'] = c['K_d'] = 0.0
         for motor in ('motor_1', 'motor_2'):
@@ -56,26 +61,27 @@ def _constants(p):
 
 
 class ServoDrives(adu_unit.Adu):
-    """Unit of four servo drives, from ServoDriveParameters.
-
-    bus: bus.Bus, None before the node has connected it; the drives then report nothing.
-    """
+    """Unit of four servo drives."""
+    parameters: ServoDriveParameters
+    memory: Memory  # type: ignore[assignment]  # not the memory of the drive unit with its mechanics
+    bus: Bus | None         # None before the node has connected it; the drives then report nothing
+    problems: list[str]     # reason why each drive cannot be used, or ''
     NODE, COMMAND, LAWS, VERBS = nodes.SERVO_DRIVE, adu_unit.RATE_COMMAND_TOPIC, {}, ()
 
-    def __init__(self, parameters, reads):
+    def __init__(self, parameters: ServoDriveParameters, reads: Iterable[str]) -> None:
         Unit.__init__(self, parameters, reads)
         self.bus = None
         self.problems = [''] * pdo.DRIVE_COUNT
         self._commands = np.zeros(pdo.DRIVE_COUNT, pdo.COMMAND_DTYPE)
         self._reports = np.zeros(pdo.DRIVE_COUNT, pdo.REPORT_DTYPE)
-        link, drives = adu_unit.Link.zeros(), np.zeros(1, servo_drives.DRIVES_DTYPE)
+        link, drives = adu_unit.Link.zeros(), servo_drives.Drives.zeros()
         drives['age'] = 1     # nothing was reported yet
         link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NO_STAMP
         link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
         link['period'] = round(parameters.period * 1e9)
         at_rest = dataclasses.replace(parameters, initially_enabled=False)
         self.memory = Memory(joined(
-            servo_drives.Record, state=drive_unit.initial_state(at_rest), constants=_constants(parameters),
+            servo_drives.ServoRecord.dtype, state=drive_unit.initial_state(at_rest), constants=_constants(parameters),
             link=link, drives=drives, scales=_scales(parameters)))
         for i, axis in enumerate(topics.AXES):
             for gain in ('K_p', 'K_iT'):
@@ -92,19 +98,19 @@ class ServoDrives(adu_unit.Adu):
             self.parts['state'][axis]['d_hat'] = 0.0
         drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
 
-    def schedule(self):
+    def schedule(self) -> list[tuple[Nanoseconds, Command]]:
         """Return []: real drives have no injected faults. The simulated drives take those of the parameter
         `inject`."""
         return []
 
-    def step(self, stamps, inputs, outputs):
-        """Make the steps of stamps (n,) [ns]: commands, exchange, messages."""
+    def step(self, stamps: Stamps, inputs: Records, outputs: Records) -> None:
+        """Make the steps of these stamps: commands, exchange, messages."""
         for k, stamp in enumerate(stamps):
             servo_drives.control(self.memory.record, stamp, inputs[k])
             self._exchange()
             servo_drives.measure(self.memory.record, stamp, outputs[k])
 
-    def _exchange(self):
+    def _exchange(self) -> None:
         """Exchange the commands for the reports of the drives."""
         d = self.parts['drives']
         d['reported'] = 0
@@ -116,8 +122,8 @@ class ServoDrives(adu_unit.Adu):
         for value, report in self._report_values:
             value[...] = report
 
-    def use_drive(self, drive, scale):
-        """Begin to use a drive whose settings are verified. scale: commissioning.Scale, the units of the drive."""
+    def use_drive(self, drive: int, scale: Scale) -> None:
+        """Begin to use a drive whose settings are verified. scale: the units of the drive."""
         d, k = self.parts['drives'], self.parts['scales']
         axis = getattr(self.parameters.drives, topics.AXES[drive // 2])
         sign = -1.0 if getattr(axis, f'reversed_{drive % 2 + 1}') else 1.0
@@ -127,12 +133,12 @@ class ServoDrives(adu_unit.Adu):
         d['known'][drive] = d['been_up'][drive] = d['away'][drive] = 0
         d['ready'][drive], self.problems[drive] = 1, ''
 
-    def reset_drives(self, drives):
+    def reset_drives(self, drives: Sequence[int]) -> None:
         """Let these drives reset their faults in the next periods."""
         self.parts['drives']['reset_left'][drives] = self.parts['scales']['reset_periods']
 
     @property
-    def rests(self):
+    def rests(self) -> bool:
         """True if the axes are disabled and all drives that report have removed the torque. A drive that does not
         remove it counts as off after `drives.enable_time`."""
         d, k = self.parts['drives'], self.parts['scales']
@@ -140,18 +146,18 @@ class ServoDrives(adu_unit.Adu):
         return super().rests and bool(off.all() or self.parts['state']['age'] > k['enable_periods'])
 
     @property
-    def lost(self):
+    def lost(self) -> list[int]:
         """Numbers of the drives that report nothing."""
         d = self.parts['drives']
         return [i for i in range(pdo.DRIVE_COUNT) if d['age'][i] > self.parts['scales']['lost_periods']
                 or not d['ready'][i]]
 
     @property
-    def faulty(self):
+    def faulty(self) -> list[int]:
         """Numbers of the drives in the state `fault`."""
         return [int(i) for i in np.flatnonzero(self.parts['drives']['state'] == cia402.State.FAULT)]
 
-    def request(self, name):
+    def request(self, name: str) -> Reply:
         """Execute one of REQUESTS and return the Reply. A reset also resets the faults of the drives."""
         d = self.parts['drives']
         if name == 'adu/reset_faults' and d['interlock']:
@@ -167,17 +173,17 @@ class ServoDrives(adu_unit.Adu):
                 state['applied'], state['brake_age'] = 1, 0
         return reply
 
-    def resume(self, state):
+    def resume(self, state: PlantState) -> None:
         """Restore the state before a restart: enabled if it was enabled. The drives know their angles."""
         self.parts['state']['wanted'] = state.enabled
 
-    def plant_state(self):
+    def plant_state(self) -> PlantState:
         """Return the state_file.PlantState for `resume`; an unknown angle is 0."""
         state = super().plant_state()
         return state._replace(azimuth=float(np.nan_to_num(state.azimuth)),
                               elevation=float(np.nan_to_num(state.elevation)))
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the Diagnosis of the drive unit, with state and error of each drive."""
         diagnosis, d = super().diagnose(), self.parts['drives']
         values = list(diagnosis.values)
@@ -193,16 +199,16 @@ class ServoDrives(adu_unit.Adu):
         return diagnosis._replace(values=values)
 
     @property
-    def urgent(self):
+    def urgent(self) -> tuple[object, ...]:
         """Values whose change is published at once: those of the drive unit, and the errors of the drives."""
         return (*super().urgent, *self.parts['drives']['error'].tolist(), *self.problems)
 
-    def prepare_requests(self):
+    def prepare_requests(self) -> None:
         """Compile the functions behind the requests, and the law that commands the drives."""
         super().request(self.REQUESTS[0])
         servo_drives.control(self.memory.record, np.int64(0), self.inputs[0])
 
     @property
-    def last_prepared(self):
+    def last_prepared(self) -> tuple[Callable[..., object], tuple[object, ...]]:
         """(law that reads the drives, its arguments): `prepare` calls it last."""
         return servo_drives.measure, (self.memory.record, np.int64(0), self.outputs[0])

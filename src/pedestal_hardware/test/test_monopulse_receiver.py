@@ -251,6 +251,7 @@ SCANNED_FEEDS = ['one_channel', 'conical_scan']
 """Feeds with one output."""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('kind', SCANNED_FEEDS)
 @pytest.mark.parametrize('cn0_dbhz, rate', [(38.0, 50.0), (50.0, 240.0), *(
     pytest.param(*case, marks=pytest.mark.thorough)

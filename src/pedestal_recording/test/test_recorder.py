@@ -198,6 +198,7 @@ def test_lockstep_ends_by_itself_after_the_duration(tmp_path, graph, rows):
     assert verify(bag.load(tmp_path / 'b')).complete
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_realtime_records_in_order_of_arrival_at_the_wall_time_of_the_writer(tmp_path, graph, rows, number):
     recorder = Recorder(tmp_path / 'b', 'realtime')

@@ -119,6 +119,7 @@ def test_a_ship_as_fast_as_the_wave_meets_it_with_frequency_zero():
     assert np.all(np.isfinite(rao))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize('angle', [45.0, 90.0, 180.0])
 def test_variance_of_many_seeds_is_the_integral_of_rao_squared_times_spectrum(angle):
     params = [ShipParameters(wave_angle_deg=angle, seed=seed) for seed in range(300)]

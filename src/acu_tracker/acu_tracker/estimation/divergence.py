@@ -10,17 +10,19 @@ An error signal with the wrong sign, with rotated axes or with a gain three time
 its target. Then m becomes large before the beam leaves the target, and it is still large when the signal is lost. In
 this case autotrack must not coast on the wrong estimate.
 
-The detected divergence is latched: it stays until a reset. s: record of Divergence.
+The detected divergence is latched: it stays until a reset.
 """
 
+from acu_tracker.estimation.filters.measurement import Innovation
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Bit
 from pedestal_common.record import Record
 
 
 class Divergence(Record):
-    """m: the mean [-]; diverged: 1 from the detection of a divergence until its reset."""
-    m: float
-    diverged: int
+    """State of the detection."""
+    m: float        # the mean [-]
+    diverged: Bit   # 1 from the detection of a divergence until its reset
 
 
 DIVERGENCE_ERROR_COUNT = 100
@@ -43,36 +45,36 @@ COASTING_DIVERGENCE_LIMIT = 2.0
 
 
 @compiled
-def restart(s):
+def restart(state: Divergence) -> None:
     """Set m to 1 when a mode begins."""
-    s.m = 1.0
+    state.m = 1.0
 
 
 @compiled
-def take(s, innovation):
-    """Add the Innovation of an error to the mean m; an Innovation of NaN (nothing was predicted) is ignored."""
+def take(state: Divergence, innovation: Innovation) -> None:
+    """Add the innovation of an error to the mean m; one of NaN (nothing was predicted) is ignored."""
     # The comparison of x with itself is False for NaN.
     x = 0.5 * (innovation.axis[0].chi_square + innovation.axis[1].chi_square)
     if x == x:
-        s.m += (min(x, MAX_COUNTED_ERROR) - s.m) / DIVERGENCE_ERROR_COUNT
+        state.m += (min(x, MAX_COUNTED_ERROR) - state.m) / DIVERGENCE_ERROR_COUNT
 
 
 @compiled
-def diverges(s, without_signal):
+def diverges(state: Divergence, without_signal: Bit) -> bool:
     """Return True if the filter has diverged.
 
     without_signal: True if the filter coasts, and no known cause explains the loss of the signal.
     """
-    return s.m > (COASTING_DIVERGENCE_LIMIT if without_signal else DIVERGENCE_LIMIT)
+    return state.m > (COASTING_DIVERGENCE_LIMIT if without_signal else DIVERGENCE_LIMIT)
 
 
 @compiled
-def latch(s):
+def latch(state: Divergence) -> None:
     """Latch the divergence until `release`."""
-    s.diverged = 1
+    state.diverged = 1
 
 
 @compiled
-def release(s):
+def release(state: Divergence) -> None:
     """Reset the latched divergence."""
-    s.diverged = 0
+    state.diverged = 0

@@ -74,7 +74,7 @@ class ImmParameters(Parameters):
     current_statistical: CurrentStatisticalParameters = group(CurrentStatisticalParameters, alpha=2.0,
                                                               a_max=0.6 * _DEG)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError unless `models` names two or more models, each once, and the last rung is in the range
         of a white jerk."""
         named_models(self.models)
@@ -144,7 +144,7 @@ class ErrorMatrixParameters(Parameters):
     ex: float = parameter(0.0, -10.0, 10.0, '', 'corrected elevation error per measured cross-elevation error')
     ee: float = parameter(1.0, -10.0, 10.0, '', 'corrected elevation error per measured elevation error')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if the matrix is nearly singular, so that one direction on the sky is lost."""
         determinant = self.xx * self.ee - self.xe * self.ex
         if abs(determinant) < MIN_DETERMINANT:
@@ -185,7 +185,7 @@ class TrackerParameters(Parameters):
     attitude: AttitudeModelParameters = group(AttitudeModelParameters)
     ukf: UkfParameters = group(UkfParameters)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if autotrack would end before it coasts."""
         if self.coast_time < self.coast_after:
             raise ParameterError(f'coast_time = {self.coast_time:g} s: must be at least coast_after = '

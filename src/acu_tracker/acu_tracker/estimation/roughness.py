@@ -14,15 +14,16 @@ Mathematical Statistics 12 (1941) 367.
 """
 import numpy as np
 
+from acu_tracker.estimation.filters.measurement import Innovation, Measurement
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Pair
 from pedestal_common.record import Record
 
 
 class Roughness(Record):
-    """nu: innovations of the previous error, of azimuth and elevation [rad], NaN without one; q: the mean [-]."""
-    nu: Pair
-    q: float
+    """State of the detection."""
+    nu: Pair    # innovations of the previous error [rad]; NaN without one
+    q: float    # the mean [-]
 
 
 ROUGHNESS_ERROR_COUNT = 10  # number of errors in the mean q
@@ -36,21 +37,21 @@ gate alone decides on it.
 
 
 @compiled
-def restart(s):
+def restart(state: Roughness) -> None:
     """Set q to 1 when the filter starts."""
-    s.nu[0] = s.nu[1] = np.nan
-    s.q = 1.0
+    state.nu[0] = state.nu[1] = np.nan
+    state.q = 1.0
 
 
 @compiled
-def take(s, innovation, m):
-    """Add an Innovation to the mean and return q; m: the Measurement of the innovation, which holds R."""
+def take(state: Roughness, innovation: Innovation, measurement: Measurement) -> float:
+    """Add an innovation to the mean and return q; the measurement of the innovation holds R."""
     x = 0.0
     for i in range(2):
         nu = innovation.axis[i].nu
-        d = nu - s.nu[i]
-        x += 0.25 * d * d / m.axis[i].variance      # d^2 / 2R, half for each axis
-        s.nu[i] = nu
+        d = nu - state.nu[i]
+        x += 0.25 * d * d / measurement.axis[i].variance      # d^2 / 2R, half for each axis
+        state.nu[i] = nu
     if x == x:  # not NaN
-        s.q += (min(x, MAX_COUNTED_DIFFERENCE) - s.q) / ROUGHNESS_ERROR_COUNT
-    return s.q
+        state.q += (min(x, MAX_COUNTED_DIFFERENCE) - state.q) / ROUGHNESS_ERROR_COUNT
+    return state.q

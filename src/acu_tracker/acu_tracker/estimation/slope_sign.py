@@ -25,26 +25,24 @@ as fast as the beam.
 The comparison is a likelihood ratio of two hypotheses (Willsky, A survey of design methods for failure detection in
 dynamic systems, Automatica 12 (1976) 601). Each axis of the receiver is tested by itself. The directions are those in
 the earth frame, because the motion of the deck has no effect there.
-
-s: record of SlopeSign.
 """
 import math
-from collections import namedtuple
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
-from acu_tracker.geometry.vector import Vector, dot, rotated
+from acu_tracker.geometry.vector import Rotation, Vector, dot, rotated
+from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Floats
+from pedestal_common.quantities import Floats, Pair, Radians, Radians2, Seconds
 from pedestal_common.record import Record
 
 
 class SlopeSign(Record):
     """State of the test."""
-    stamp: float  # time of the last error [s]; -inf: no error yet
-    n: int  # number of errors in the lines
+    stamp: Seconds      # time of the last error; -inf: no error yet
+    n: int              # number of errors in the lines
     # value and rate of the five lines: three components of the beam's unit vector (ENU), then both errors [rad]
     line: Annotated[Floats, (5, 2)]
-    J: Annotated[Floats, (2, 2)]  # J+ and J- of cross-elevation, then of elevation [-]
+    J: Annotated[Floats, (2, 2)]    # J+ and J- of cross-elevation, then of elevation [-]
 
 
 LINE_ERROR_COUNT = 200
@@ -77,88 +75,89 @@ of the other axis. Without noise this part is 0.0015, for a beam of 1 deg that s
 deck.
 """
 
-Beam = namedtuple('Beam', 'u across up')
-"""Unit Vectors (ENU) of a beam. u: along the beam; across, up: in the directions of growing cross-elevation and
-elevation."""
+
+class Beam(NamedTuple):
+    """Unit vectors (ENU) of a beam."""
+    u: Vector       # along the beam
+    across: Vector  # in the direction of growing cross-elevation
+    up: Vector      # in the direction of growing elevation
 
 
 @compiled
-def beam(mat_ed, A, E):
-    """Return the Beam at deck angles A, E [rad]; mat_ed: Rotation deck -> earth."""
+def beam(mat_ed: Rotation, A: Radians, E: Radians) -> Beam:
+    """Return the Beam at deck angles A, E; mat_ed: deck -> earth."""
     sA, cA, sE, cE = math.sin(A), math.cos(A), math.sin(E), math.cos(E)
     return Beam(rotated(mat_ed, Vector(cE * cA, -cE * sA, sE)), rotated(mat_ed, Vector(-sA, -cA, 0.0)),
                 rotated(mat_ed, Vector(-sE * cA, sE * sA, cE)))
 
 
 @compiled
-def near(u, beamwidth):
-    """Return True if an error of the receiver is on the straight part of the error curve.
-
-    u: record of signals.Inputs.dtype; beamwidth [rad].
-    """
-    return math.hypot(u.cross_elevation, u.elevation) < MAX_ERROR_BEAMWIDTHS * beamwidth
+def near(inputs: Inputs, beamwidth: Radians) -> bool:
+    """Return True if an error of the receiver is on the straight part of the error curve."""
+    return math.hypot(inputs.cross_elevation, inputs.elevation) < MAX_ERROR_BEAMWIDTHS * beamwidth
 
 
 @compiled
-def restart(s):
+def restart(state: SlopeSign) -> None:
     """Clear the memory when a mode begins."""
-    s.stamp = -math.inf
+    state.stamp = -math.inf
 
 
 @compiled
-def _innovation(s, i, y, T, alpha, beta):
+def _innovation(state: SlopeSign, i: int, y: float, T: Seconds, alpha: float, beta: float) -> float:
     """Update line i with a value y; return the innovation of y.
 
-    T: time since the previous value [s]; alpha, beta: gains of the line on value and rate [-].
+    T: time since the previous value; alpha, beta: gains of the line on value and rate [-].
     """
-    expected = s.line[i, 0] + T * s.line[i, 1]
+    expected = state.line[i, 0] + T * state.line[i, 1]
     nu = y - expected
-    s.line[i, 0] = expected + alpha * nu
-    s.line[i, 1] += beta / T * nu
+    state.line[i, 0] = expected + alpha * nu
+    state.line[i, 1] += beta / T * nu
     return nu
 
 
 @compiled
-def _begin(s, u, error):
-    """Begin the lines at the first error; u: unit Vector along the beam."""
-    s.n = 1
-    s.J[0, 0] = s.J[0, 1] = s.J[1, 0] = s.J[1, 1] = 0.0
+def _begin(state: SlopeSign, u: Vector, error: tuple[Radians, Radians]) -> None:
+    """Begin the lines at the first error; u: unit vector along the beam."""
+    state.n = 1
+    state.J[0, 0] = state.J[0, 1] = state.J[1, 0] = state.J[1, 1] = 0.0
     for i, y in enumerate((u.x, u.y, u.z, error[0], error[1])):
-        s.line[i, 0], s.line[i, 1] = y, 0.0
+        state.line[i, 0], state.line[i, 1] = y, 0.0
 
 
 @compiled
-def _reversed(J, other):
+def _reversed(J: Pair, other: Pair) -> bool:
     """Return True if an axis has a reversed slope. J: (J+, J-) of the axis; other: (J+, J-) of the other axis."""
     least = J[1] + REVERSED_SLOPE_MARGIN + CROSS_AXIS_LEAKAGE * (other[0] + other[1])
     return J[0] > REVERSED_SLOPE_RATIO * J[1] and J[0] > least
 
 
 @compiled
-def take(s, t, beam, error, variance, gap):
+def take(state: SlopeSign, t: Seconds, beam: Beam, error: tuple[Radians, Radians], variance: Radians2,
+         gap: Seconds) -> bool:
     """Take an error of the receiver; return True if the slope of an axis is reversed.
 
-    t         time at which the error was measured [s]
-    beam      Beam at t
-    error     (cross-elevation, elevation) [rad]
-    variance  R [rad2]
-    gap       time without errors after which the lines restart [s]
+    t         time at which the error was measured
+    beam      direction of the beam at t
+    error     (cross-elevation, elevation)
+    variance  R
+    gap       time without errors after which the lines restart
     """
-    T = t - s.stamp
+    T = t - state.stamp
     if T <= 0.0:
         return False
-    s.stamp = t
+    state.stamp = t
     if T > gap:
-        _begin(s, beam.u, error)
+        _begin(state, beam.u, error)
         return False
-    n = s.n = min(s.n + 1, LINE_ERROR_COUNT)
+    n = state.n = min(state.n + 1, LINE_ERROR_COUNT)
     # alpha, beta: gains of a least-squares fit to n points; from LINE_ERROR_COUNT points on, old points fade.
     alpha, beta = 2.0 * (2 * n - 1) / (n * (n + 1)), 6.0 / (n * (n + 1))
-    nu = Vector(_innovation(s, 0, beam.u.x, T, alpha, beta), _innovation(s, 1, beam.u.y, T, alpha, beta),
-                _innovation(s, 2, beam.u.z, T, alpha, beta))
+    nu = Vector(_innovation(state, 0, beam.u.x, T, alpha, beta), _innovation(state, 1, beam.u.y, T, alpha, beta),
+                _innovation(state, 2, beam.u.z, T, alpha, beta))
     for i, along in enumerate((beam.across, beam.up)):
-        b, e = dot(nu, along), _innovation(s, 3 + i, error[i], T, alpha, beta)
+        b, e = dot(nu, along), _innovation(state, 3 + i, error[i], T, alpha, beta)
         if n > 2:
-            s.J[i, 0] += ((b + e) * (b + e) / variance - s.J[i, 0]) / SLOPE_ERROR_COUNT
-            s.J[i, 1] += ((b - e) * (b - e) / variance - s.J[i, 1]) / SLOPE_ERROR_COUNT
-    return n >= MIN_ERROR_COUNT and (_reversed(s.J[0], s.J[1]) or _reversed(s.J[1], s.J[0]))
+            state.J[i, 0] += ((b + e) * (b + e) / variance - state.J[i, 0]) / SLOPE_ERROR_COUNT
+            state.J[i, 1] += ((b - e) * (b - e) / variance - state.J[i, 1]) / SLOPE_ERROR_COUNT
+    return n >= MIN_ERROR_COUNT and (_reversed(state.J[0], state.J[1]) or _reversed(state.J[1], state.J[0]))

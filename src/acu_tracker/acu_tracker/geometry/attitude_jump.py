@@ -13,18 +13,17 @@ JUMP_DECAY_RATE_RAD_S. Neither a jump of any size nor this decay disturbs tracki
 by the attitude follows the decay so slowly that the operator can check the new attitude.
 """
 import math
-from typing import Annotated
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.quaternion import product
-from pedestal_common.quantities import Floats
+from pedestal_common.quantities import Bit, Quaternion, Radians, Seconds, Xyzw
 from pedestal_common.record import Record
 
 
 class AttitudeJump(Record):
-    """c: correcting quaternion (x, y, z, w) earth -> earth; apart: 1 while c is in use, after a jump."""
-    c: Annotated[Floats, (4,)]
-    apart: int
+    """Correction of the attitude after a jump."""
+    c: Quaternion   # correcting quaternion earth -> earth
+    apart: Bit      # 1 while c is in use, after a jump
 
 
 MAX_UNEXPLAINED_ANGLE_RAD = 3e-3
@@ -38,48 +37,48 @@ JUMP_DECAY_RATE_RAD_S = 1e-3
 
 
 @compiled
-def conjugate(q):
+def conjugate(q: Xyzw) -> Xyzw:
     """Return the inverse of a unit quaternion."""
     return -q[0], -q[1], -q[2], q[3]
 
 
 @compiled
-def _half_angle(q):
-    """Return half of the angle [rad] of a unit quaternion, 0 to pi / 2."""
+def _half_angle(q: Xyzw | Quaternion) -> Radians:
+    """Return half of the angle of a unit quaternion, 0 to pi / 2."""
     return math.atan2(math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]), abs(q[3]))
 
 
 @compiled
-def clear(s):
+def clear(jump: AttitudeJump) -> None:
     """Discard c: the measured attitude is used without a correction."""
-    s.apart = 0
+    jump.apart = 0
 
 
 @compiled
-def _decay(s, T):
-    """Reduce the angle of c by JUMP_DECAY_RATE_RAD_S for T [s]."""
-    half = _half_angle(s.c)
+def _decay(jump: AttitudeJump, T: Seconds) -> None:
+    """Reduce the angle of c by JUMP_DECAY_RATE_RAD_S for T."""
+    half = _half_angle(jump.c)
     left = half - 0.5 * JUMP_DECAY_RATE_RAD_S * T
     if left <= 0.0:
-        s.apart = 0
+        jump.apart = 0
         return
-    k = math.sin(left) / math.sin(half) * math.copysign(1.0, s.c[3])
-    s.c[0], s.c[1], s.c[2], s.c[3] = k * s.c[0], k * s.c[1], k * s.c[2], math.cos(left)
+    k = math.sin(left) / math.sin(half) * math.copysign(1.0, jump.c[3])
+    jump.c[0], jump.c[1], jump.c[2], jump.c[3] = k * jump.c[0], k * jump.c[1], k * jump.c[2], math.cos(left)
 
 
 @compiled
-def jump_corrected(s, predicted, measured, T):
+def jump_corrected(jump: AttitudeJump, predicted: Xyzw, measured: Xyzw, T: Seconds) -> Xyzw:
     """Return the corrected quaternion b_k of a measured quaternion q_k.
 
-    predicted: p_k; measured: q_k; T: time since the sample before [s].
+    predicted: p_k; measured: q_k; T: time since the sample before.
     """
     q = measured
-    if s.apart:
-        _decay(s, T)
-        if s.apart:
-            q = product(s.c, measured)
+    if jump.apart:
+        _decay(jump, T)
+        if jump.apart:
+            q = product(jump.c, measured)
     if 2.0 * _half_angle(product(conjugate(predicted), q)) <= MAX_UNEXPLAINED_ANGLE_RAD:
         return q
-    s.c[0], s.c[1], s.c[2], s.c[3] = product(predicted, conjugate(measured))
-    s.apart = 1
+    jump.c[0], jump.c[1], jump.c[2], jump.c[3] = product(predicted, conjugate(measured))
+    jump.apart = 1
     return predicted

@@ -3,21 +3,25 @@
 The choice matters for an axis with more than one revolution of travel.
 """
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.quantities import Radians
 
-Travel = namedtuple('Travel', 'below above')
-"""Future travel of a target's azimuth below (<= 0) and above (>= 0) its present value [rad]."""
+
+class Travel(NamedTuple):
+    """Future travel of a target's azimuth from its present value."""
+    below: Radians      # at most 0
+    above: Radians      # at least 0
 
 
 @compiled
-def nearest(azimuth, near, low, high, travel):
-    """Return the wrap of an azimuth [rad] that suits the limits low to high [rad] best.
+def nearest(azimuth: Radians, near: Radians, low: Radians, high: Radians, travel: Travel) -> Radians:
+    """Return the wrap of an azimuth that suits the limits low to high best.
 
-    The first choice is the wrap nearest to `near` [rad] from which the Travel stays inside the limits. The second
-    choice is the nearest wrap that is inside the limits itself. The last choice is the nearest wrap.
+    The first choice is the wrap nearest to `near` from which the Travel stays inside the limits. The second choice is
+    the nearest wrap that is inside the limits itself. The last choice is the nearest wrap.
     """
     # Two penalties, far above every distance, rank the wraps: 2e6 for a wrap outside the limits, 1e6 for a wrap whose
     # travel leaves the limits.

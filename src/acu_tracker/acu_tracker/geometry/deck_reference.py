@@ -12,26 +12,26 @@ The conversion is exact: it differentiates the unit vector u to the target twice
     w, dw        angular rate and angular acceleration of the deck, FLU                         [rad/s, rad/s2]
     [w x]        matrix of the cross product with w
 """
-from collections import namedtuple
+from typing import NamedTuple
 
 from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles, turned
-from acu_tracker.geometry.vector import Vector, cross, minus, rotated, times, transposed
+from acu_tracker.geometry.vector import Rotation, Vector, cross, minus, rotated, times, transposed
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.quantities import Radians, RadiansPerSecond
 
 ZERO_VECTOR = Vector(0.0, 0.0, 0.0)
 
-Attitude = namedtuple('Attitude', 'mat w dw')
-"""Attitude of the deck and its motion.
 
-mat  M, the rotation from the deck to the frame in which the target is given
-w    Vector of the angular rate of the deck, FLU [rad/s]
-dw   Vector of its angular acceleration, FLU [rad/s2]
-"""
+class Attitude(NamedTuple):
+    """Attitude of the deck and its motion."""
+    mat: Rotation   # M, from the deck to the frame in which the target is given
+    w: Vector       # angular rate of the deck, FLU [rad/s]
+    dw: Vector      # its angular acceleration, FLU [rad/s2]
 
 
 @compiled
-def on_deck(attitude, sight):
+def on_deck(attitude: Attitude, sight: LineOfSight) -> LineOfSight:
     """Return a LineOfSight on the deck (FLU); sight: the LineOfSight in the frame to which attitude.mat rotates."""
     u, du, ddu = turned(transposed(attitude.mat), sight)
     wu, dwu = cross(attitude.w, u), cross(attitude.dw, u)
@@ -39,10 +39,10 @@ def on_deck(attitude, sight):
 
 
 @compiled
-def fixed_rates(w, A, E):
-    """Return the rates (dA, dE) [rad/s] of the deck angles of an earth-fixed direction.
+def fixed_rates(w: Vector, A: Radians, E: Radians) -> tuple[RadiansPerSecond, RadiansPerSecond]:
+    """Return the rates (dA, dE) of the deck angles of an earth-fixed direction.
 
-    A, E: its deck angles now [rad]; w: Vector of the rate of the deck [rad/s], FLU.
+    A, E: its deck angles now; w: rate of the deck [rad/s], FLU.
     """
     u = Vector(*line_of_sight.direction(A, E))
     motion = angles(LineOfSight(u, times(-1.0, cross(w, u)), ZERO_VECTOR))
@@ -50,8 +50,8 @@ def fixed_rates(w, A, E):
 
 
 @compiled
-def earth_rates(attitude, u, du):
-    """Return the rates (dA, dE) [rad/s] of the earth angles of a direction that is measured on the deck.
+def earth_rates(attitude: Attitude, u: Vector, du: Vector) -> tuple[RadiansPerSecond, RadiansPerSecond]:
+    """Return the rates (dA, dE) of the earth angles of a direction that is measured on the deck.
 
     u, du: unit vector (FLU) of the direction and its rate on the deck [1/s]. The rate of the unit vector in the earth
     frame is M (du + w x u). Where attitude.mat rotates to the frame of the filter, the rates are those in that frame.

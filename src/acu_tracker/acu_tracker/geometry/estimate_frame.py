@@ -6,17 +6,15 @@ process noise, and no direction is singular.
 
 The frame is laid when the filter starts, and again when the target is more than MAX_FRAME_ELEVATION_RAD off the
 equator. Between these instants the frame is fixed to the earth.
-
-f: record of Frame.
 """
 import math
 
 from acu_tracker.geometry.deck_reference import Attitude
-from acu_tracker.geometry.motion import earth_angles, line_of_sight, turned
+from acu_tracker.geometry.motion import LineOfSight, Motion, earth_angles, line_of_sight, turned
 from acu_tracker.geometry.vector import Rotation, Vector, cross, dot, rotated, rotated_back, rotation, transposed
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_direction
-from pedestal_common.quantities import Matrix3
+from pedestal_common.quantities import Matrix3, Radians
 from pedestal_common.record import Record
 
 MAX_FRAME_ELEVATION_RAD = math.radians(20.0)
@@ -25,12 +23,12 @@ the squared rate. A smaller limit lays the frame more often on the way of a targ
 
 
 class Frame(Record):
-    """mat: rotation matrix frame -> earth"""
-    mat: Matrix3
+    """Frame of the filter."""
+    mat: Matrix3    # rotation frame -> earth
 
 
 @compiled
-def lay(f, u, du):
+def lay(frame: Frame, u: Vector, du: Vector) -> None:
     """Lay the frame: azimuth and elevation 0 are at the target, and the equator leads along its motion.
 
     u, du: ENU unit vector towards the target and its rate [1/s]. At a target at rest the equator is horizontal.
@@ -43,60 +41,59 @@ def lay(f, u, du):
     else:
         along = Vector(1.0, 0.0, 0.0)
     up = cross(along, u)
-    f.mat[0, 0], f.mat[1, 0], f.mat[2, 0] = along
-    f.mat[0, 1], f.mat[1, 1], f.mat[2, 1] = u
-    f.mat[0, 2], f.mat[1, 2], f.mat[2, 2] = up
+    frame.mat[0, 0], frame.mat[1, 0], frame.mat[2, 0] = along
+    frame.mat[0, 1], frame.mat[1, 1], frame.mat[2, 1] = u
+    frame.mat[0, 2], frame.mat[1, 2], frame.mat[2, 2] = up
 
 
 @compiled
-def to_earth(f, motion):
+def to_earth(frame: Frame, motion: Motion) -> LineOfSight:
     """Return the LineOfSight in ENU; motion: the Motion in the frame."""
-    return turned(rotation(f.mat), line_of_sight(motion))
+    return turned(rotation(frame.mat), line_of_sight(motion))
 
 
 @compiled
-def to_frame(f, sight):
+def to_frame(frame: Frame, sight: LineOfSight) -> Motion:
     """Return the Motion in the frame; sight: the LineOfSight in ENU. The function is the inverse of to_earth."""
-    return earth_angles(turned(transposed(rotation(f.mat)), sight))
+    return earth_angles(turned(transposed(rotation(frame.mat)), sight))
 
 
 @compiled
-def direction_to_frame(f, azimuth, elevation):
-    """Return (azimuth, elevation) [rad] of a direction in the frame; azimuth, elevation: its earth angles [rad]."""
+def direction_to_frame(frame: Frame, azimuth: Radians, elevation: Radians) -> tuple[Radians, Radians]:
+    """Return (azimuth, elevation) of a direction in the frame; azimuth, elevation: its earth angles."""
     e, n, u = earth_direction(azimuth, elevation)
-    v = rotated_back(rotation(f.mat), Vector(e, n, u))
+    v = rotated_back(rotation(frame.mat), Vector(e, n, u))
     return math.atan2(v.x, v.y), math.atan2(v.z, math.hypot(v.x, v.y))
 
 
 @compiled
-def verticals(f, azimuth, elevation):
+def verticals(frame: Frame, azimuth: Radians, elevation: Radians) -> tuple[float, float]:
     """Return (across, along), the vertical components of two unit vectors at a right angle to a direction.
 
     The first vector points to growing azimuth, the second to growing elevation. In the frame of the earth their
     components along the earth's vertical are 0 and cos(elevation). `measurement.attitude_variances` needs these
-    components to separate the errors of heading and tilt. azimuth, elevation: angles of the direction in the frame
-    [rad].
+    components to separate the errors of heading and tilt. azimuth, elevation: angles of the direction in the frame.
     """
     # z: the earth's vertical, as components in the frame.
-    s, c, z = math.sin(azimuth), math.cos(azimuth), f.mat[2]
+    s, c, z = math.sin(azimuth), math.cos(azimuth), frame.mat[2]
     return z[0] * c - z[1] * s, z[2] * math.cos(elevation) - (z[0] * s + z[1] * c) * math.sin(elevation)
 
 
 @compiled
-def from_earth(f, mat):
+def from_earth(frame: Frame, mat: Rotation) -> Rotation:
     """Return the Rotation into the frame of a Rotation into the earth's frame."""
-    turn, (x, y, z) = rotation(f.mat), transposed(mat)
+    turn, (x, y, z) = rotation(frame.mat), transposed(mat)
     return transposed(Rotation(rotated_back(turn, x), rotated_back(turn, y), rotated_back(turn, z)))
 
 
 @compiled
-def of_deck(f, attitude):
+def of_deck(frame: Frame, attitude: Attitude) -> Attitude:
     """Return the Attitude deck -> frame; attitude: the Attitude deck -> earth."""
-    return Attitude(from_earth(f, attitude.mat), attitude.w, attitude.dw)
+    return Attitude(from_earth(frame, attitude.mat), attitude.w, attitude.dw)
 
 
 @compiled
-def earth_variances(f, framed, earth, p_A, p_E):
+def earth_variances(frame: Frame, framed: Motion, earth: Motion, p_A: float, p_E: float) -> tuple[float, float]:
     """Return the variances of azimuth and elevation in the earth frame, in the unit of p_A and p_E.
 
     p_A, p_E       variances of azimuth and elevation in the frame of the filter, of angles [rad2] or of rates; or the
@@ -108,7 +105,7 @@ def earth_variances(f, framed, earth, p_A, p_E):
     A, E = framed.azimuth.angle, framed.elevation.angle
     azimuth, elevation = earth.azimuth.angle, earth.elevation.angle
     # Unit vectors of both frames in the direction of growing azimuth, and the cosine c of the angle between them.
-    across = rotated(rotation(f.mat), Vector(math.cos(A), -math.sin(A), 0.0))
+    across = rotated(rotation(frame.mat), Vector(math.cos(A), -math.sin(A), 0.0))
     c = across.x * math.cos(azimuth) - across.y * math.sin(azimuth)
     p_across = p_A * math.cos(E)**2
     cos_el = max(math.cos(elevation), 0.01)

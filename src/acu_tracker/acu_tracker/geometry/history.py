@@ -2,7 +2,7 @@
 from typing import Annotated
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Floats
+from pedestal_common.quantities import Floats, Seconds
 from pedestal_common.record import Record
 
 HISTORY_LENGTH = 64  # number of samples in a history
@@ -21,8 +21,8 @@ class History(Record, open=True):
 
 
 @compiled
-def push(history, stamp):
-    """Append a stamp [s] newer than all others; return the row of its sample, which the caller fills."""
+def push(history: History, stamp: Seconds) -> int:
+    """Append a stamp newer than all others; return the row of its sample, which the caller fills."""
     history.newest = (history.newest + 1) % HISTORY_LENGTH
     history.stamp[history.newest] = stamp
     history.count = min(history.count + 1, HISTORY_LENGTH)
@@ -30,8 +30,8 @@ def push(history, stamp):
 
 
 @compiled
-def bracket(history, t):
-    """Return (older row, newer row, fraction) of the samples around the instant t [s].
+def bracket(history: History, t: Seconds) -> tuple[int, int, float]:
+    """Return (older row, newer row, fraction) of the samples around the instant t.
 
     The fraction runs from 0 at the older row to 1 at the newer row. Both rows are -1 if t is outside the history.
     """
@@ -49,7 +49,7 @@ def bracket(history, t):
 
 
 @compiled
-def interpolated(history, rows, column):
+def interpolated(history: History, rows: tuple[int, int, float], column: int) -> float:
     """Return the number in a column, interpolated linearly; rows: a result of `bracket` with valid rows."""
     i, j, f = rows
     a, b = history.sample[i, column], history.sample[j, column]

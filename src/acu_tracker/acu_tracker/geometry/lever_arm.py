@@ -8,77 +8,76 @@ from the INS.
 
     R, rho   range of the target from the INS and from the antenna   [m]
     u        unit vector from the antenna to the target, FLU         [-]
-
-s: record of LeverArm.
 """
 import math
 
-from acu_tracker.geometry.motion import AxisMotion, Motion, normalised
-from acu_tracker.geometry.vector import Vector, minus, rotated, vector
+from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, normalised
+from acu_tracker.geometry.vector import Rotation, Vector, minus, rotated, vector
 from pedestal_common.compiled import compiled
+from pedestal_common.geometry.lever_arm import LeverArm as LeverArmParameters
 from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction, wrap
-from pedestal_common.quantities import Vector3
+from pedestal_common.quantities import Bit, Meters, Vector3
 from pedestal_common.record import Record
 
 
 class LeverArm(Record):
-    """arm: r / R, FLU [-], zero without a range; range: smoothed R [m], 0 if the filter started without a range."""
-    arm: Vector3
-    range: float
+    """State of the conversion."""
+    arm: Vector3    # r / R, FLU [-]; zero without a range
+    range: Meters   # smoothed R; 0 if the filter started without a range
 
 
 RANGE_SMOOTHING_SHARE = 0.05  # share of each new measurement in the smoothed range [-]
 
 
 @compiled
-def from_ins(s, r, measured, running, v):
-    """Return the direction of the target from the INS, a Vector (FLU) of length about 1.
+def from_ins(state: LeverArm, arm: LeverArmParameters, measured: Meters, running: Bit, v: Vector) -> Vector:
+    """Return the direction of the target from the INS, a vector (FLU) of length about 1.
 
     v         unit vector (FLU) from the antenna to the target
-    r         lever arm, record x, y, z [m]
-    measured  range of the target from the antenna [m]; NaN: no range
+    arm       lever arm
+    measured  range of the target from the antenna; NaN: no range
     running   True if the filter of the target runs
 
     For a filter that started with a range the function smooths R and adds the lever arm to rho v. For another filter
     the function returns v. This avoids an estimate that mixes the lines of sight from the INS and from the antenna.
     """
-    along, r2 = v.x * r.x + v.y * r.y + v.z * r.z, r.x * r.x + r.y * r.y + r.z * r.z
+    along, r2 = v.x * arm.x + v.y * arm.y + v.z * arm.z, arm.x * arm.x + arm.y * arm.y + arm.z * arm.z
     known = measured > 0.0
     R = math.sqrt(measured * measured + 2.0 * measured * along + r2) if known else 0.0
     if not running:
-        s.range = R
-    elif s.range > 0.0 and known:
-        s.range += RANGE_SMOOTHING_SHARE * (R - s.range)
-    if not s.range > math.sqrt(r2):
-        s.arm[:] = 0.0
+        state.range = R
+    elif state.range > 0.0 and known:
+        state.range += RANGE_SMOOTHING_SHARE * (R - state.range)
+    if not state.range > math.sqrt(r2):
+        state.arm[:] = 0.0
         return v
-    k = 1.0 / s.range
-    s.arm[0], s.arm[1], s.arm[2] = k * r.x, k * r.y, k * r.z
-    rho = k * (math.sqrt(along * along + s.range * s.range - r2) - along)
-    return Vector(rho * v.x + s.arm[0], rho * v.y + s.arm[1], rho * v.z + s.arm[2])
+    k = 1.0 / state.range
+    state.arm[0], state.arm[1], state.arm[2] = k * arm.x, k * arm.y, k * arm.z
+    rho = k * (math.sqrt(along * along + state.range * state.range - r2) - along)
+    return Vector(rho * v.x + state.arm[0], rho * v.y + state.arm[1], rho * v.z + state.arm[2])
 
 
 @compiled
-def to_antenna(s, sight):
+def to_antenna(state: LeverArm, sight: LineOfSight) -> LineOfSight:
     """Return the LineOfSight from the antenna; sight: the LineOfSight from the INS, both FLU.
 
     The vector r / R is subtracted, with R taken as constant.
     """
-    return normalised(minus(sight.u, vector(s.arm)), sight.du, sight.ddu)
+    return normalised(minus(sight.u, vector(state.arm)), sight.du, sight.ddu)
 
 
 @compiled
-def to_ins(s, u, du):
+def to_ins(state: LeverArm, u: Vector, du: Vector) -> tuple[Vector, Vector]:
     """Return (unit vector from the INS to the target, its rate [1/s]), both FLU.
 
     u, du: unit vector from the antenna to the target and its rate [1/s], FLU.
     """
-    sight = normalised(Vector(u.x + s.arm[0], u.y + s.arm[1], u.z + s.arm[2]), du, Vector(0.0, 0.0, 0.0))
+    sight = normalised(Vector(u.x + state.arm[0], u.y + state.arm[1], u.z + state.arm[2]), du, Vector(0.0, 0.0, 0.0))
     return sight.u, sight.du
 
 
 @compiled
-def earth_angles_to_antenna(s, mat_ed, motion):
+def earth_angles_to_antenna(state: LeverArm, mat_ed: Rotation, motion: Motion) -> Motion:
     """Return the Motion of the target in earth angles, as seen from the antenna.
 
     mat_ed: Rotation deck -> earth; motion: the Motion as seen from the INS. Only the angles differ; the rates and the
@@ -86,7 +85,7 @@ def earth_angles_to_antenna(s, mat_ed, motion):
     """
     A, E = motion.azimuth.angle, motion.elevation.angle
     e, n, u = earth_direction(A, E)
-    r = rotated(mat_ed, vector(s.arm))
+    r = rotated(mat_ed, vector(state.arm))
     azimuth, elevation = earth_angles(e - r.x, n - r.y, u - r.z)
     return Motion(AxisMotion(A + wrap(azimuth - A), motion.azimuth.rate, motion.azimuth.acceleration),
                   AxisMotion(elevation, motion.elevation.rate, motion.elevation.acceleration))

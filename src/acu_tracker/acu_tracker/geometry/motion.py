@@ -5,28 +5,41 @@ and up of the earth therefore have the same formulas. Because earth vectors are 
 `north_west_up` converts them.
 """
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
-from acu_tracker.geometry.vector import Vector, dot, minus, rotated, times
+from acu_tracker.geometry.vector import Rotation, Vector, dot, minus, rotated, times
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Radians, RadiansPerSecond, RadiansPerSecond2
 
-AxisMotion = namedtuple('AxisMotion', 'angle rate acceleration')
-"""Angle [rad], rate [rad/s] and acceleration [rad/s2] of one axis."""
 
-Motion = namedtuple('Motion', 'azimuth elevation')  # motion of both axes; motion[0] is azimuth, motion[1] elevation
+class AxisMotion(NamedTuple):
+    """Motion of one axis."""
+    angle: Radians
+    rate: RadiansPerSecond
+    acceleration: RadiansPerSecond2
 
-LineOfSight = namedtuple('LineOfSight', 'u du ddu')
-"""Unit vector u [-] towards the target, its first [1/s] and second [1/s2] derivative."""
+
+class Motion(NamedTuple):
+    """Motion of both axes; motion[0] is azimuth, motion[1] elevation."""
+    azimuth: AxisMotion
+    elevation: AxisMotion
+
+
+class LineOfSight(NamedTuple):
+    """Direction towards the target."""
+    u: Vector       # unit vector [-]
+    du: Vector      # its first time derivative [1/s]
+    ddu: Vector     # its second time derivative [1/s2]
 
 
 @compiled
-def turned(mat, sight):
+def turned(mat: Rotation, sight: LineOfSight) -> LineOfSight:
     """Return a LineOfSight after the rotation by a Rotation."""
     return LineOfSight(rotated(mat, sight.u), rotated(mat, sight.du), rotated(mat, sight.ddu))
 
 
 @compiled
-def line_of_sight(motion):
+def line_of_sight(motion: Motion) -> LineOfSight:
     """Return the LineOfSight in ENU of a Motion in earth angles."""
     A, dA, ddA = motion.azimuth
     E, dE, ddE = motion.elevation
@@ -42,7 +55,7 @@ def line_of_sight(motion):
 
 
 @compiled
-def north_west_up(v):
+def north_west_up(v: Vector) -> Vector:
     """Return the north-west-up components of an ENU vector.
 
     A vector that line_of_sight made of deck angles becomes one in FLU.
@@ -51,7 +64,7 @@ def north_west_up(v):
 
 
 @compiled
-def angles(sight):
+def angles(sight: LineOfSight) -> Motion:
     """Return the Motion of a LineOfSight in FLU or north-west-up.
 
     The azimuth is singular at the zenith. Within 1e-6 rad of the zenith the rates are therefore those at 1e-6 rad.
@@ -67,13 +80,13 @@ def angles(sight):
 
 
 @compiled
-def earth_angles(sight):
+def earth_angles(sight: LineOfSight) -> Motion:
     """Return the Motion of a LineOfSight in ENU."""
     return angles(LineOfSight(north_west_up(sight.u), north_west_up(sight.du), north_west_up(sight.ddu)))
 
 
 @compiled
-def normalised(v, dv, ddv):
+def normalised(v: Vector, dv: Vector, ddv: Vector) -> LineOfSight:
     """Return the LineOfSight along a vector v of any length; dv, ddv: its time derivatives, in the unit of v.
 
     n = v / |v|, n' = (v' - n (n.v')) / |v|; n: unit vector, ': time derivative, a point: scalar product.
@@ -88,7 +101,7 @@ def normalised(v, dv, ddv):
 
 
 @compiled
-def motion_of_position(p, v, a):
+def motion_of_position(p: Vector, v: Vector, a: Vector) -> Motion:
     """Return the Motion in earth angles of a point as seen from the origin.
 
     p, v, a: position [m], velocity [m/s] and acceleration [m/s2] of the point, ENU.

@@ -1,10 +1,12 @@
 """Parameters of the pointing model: its terms, and the facts by which an operator recognises it."""
 import dataclasses
+from datetime import datetime
 
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.pointing_model import TERMS
 from pedestal_common.geometry.pointing_report import Report, in_degrees, in_radians, residual_rows
 from pedestal_common.parameters import ParameterError, Parameters, parameter, text
+from pedestal_common.quantities import Floats, Seconds
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,7 +42,7 @@ class PointingParameters(Parameters):
     residuals: str = text('', "residuals of the fit for the page: 'azimuth elevation [deg] cross-elevation elevation "
                           "[mdeg]; ...'")
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for a date or residuals that are none."""
         _ = self.made
         try:
@@ -49,46 +51,46 @@ class PointingParameters(Parameters):
             raise ParameterError(f'residuals: {error}') from None
 
     @property
-    def made(self):
-        """The datetime (UTC) of the model; None: not stated. Raise ParameterError for a wrong date."""
+    def made(self) -> datetime | None:
+        """The time (UTC) of the model; None: not stated. Raise ParameterError for a wrong date."""
         try:
             return orbit.instant('date', self.date) if self.date else None
         except orbit.TargetError as error:
             raise ParameterError(str(error)) from None
 
     @property
-    def terms(self):
+    def terms(self) -> Floats:
         """The values of pointing_model.TERMS (20,) [rad, -]."""
         return in_radians({name: getattr(self, name) for name in TERMS})
 
     @property
-    def named(self):
+    def named(self) -> bool:
         """True if the model has an antenna, a file or a date."""
         return bool(self.antenna or self.file or self.date)
 
-    def report(self, before=None, begins_s=0.0, ends_s=0.0):
-        """Return the pointing_report.Report of the model.
+    def report(self, before: Floats | None = None, begins_s: Seconds = 0.0, ends_s: Seconds = 0.0) -> Report:
+        """Return the report of the model.
 
         before: terms (20,) [rad, -] from which a change begins; None: without a change.
         """
         return Report(self.antenna, self.file, self.date, self.rms, in_degrees(self.terms),
                       {} if before is None else in_degrees(before), begins_s, ends_s, self.residuals)
 
-    def check_antenna(self, antenna):
+    def check_antenna(self, antenna: str) -> None:
         """Raise ParameterError for a model of another antenna; antenna: name of this antenna, '' if it has none."""
         if self.antenna and antenna and self.antenna != antenna:
             raise ParameterError(f'pointing.antenna = {self.antenna!r}: must be the parameter antenna, {antenna!r}: '
                                  'the model belongs to another antenna')
 
-    def unchecked(self, antenna):
+    def unchecked(self, antenna: str) -> str:
         """Return a text that the antenna of the model has not been checked, because this antenna has no name; ''
         otherwise. antenna: name of this antenna."""
         if not self.antenna or antenna:
             return ''
         return f'antenna {self.antenna!r} of the pointing model is not checked, because the parameter antenna is empty'
 
-    def check_date(self, now):
-        """Raise ParameterError for a model of a later date than `now`, a datetime (UTC); None: unknown."""
+    def check_date(self, now: datetime | None) -> None:
+        """Raise ParameterError for a model of a later date than `now` (UTC); None: unknown."""
         if now is not None and self.made is not None and self.made > now:
             raise ParameterError(f'pointing.date = {self.date!r}: must not be later than now, '
                                  f'{now.isoformat(" ", "seconds")} UTC')

@@ -18,32 +18,37 @@ three thresholds above m:
 
 The threshold loss is at least m + 2 sqrt(V). With a lower threshold the noise alone would count as a target after the
 target is lost.
-
-s, p: records of Level and of AcquisitionParameters.
 """
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
+from acu_tracker.search.params import AcquisitionParameters
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Bit, DecibelHertz, Seconds
 from pedestal_common.record import Record
 
 
 class Level(Record):
     """State of the detection."""
-    mean: float  # mean, variance: m [dB-Hz] and V [dB2]
-    variance: float
-    samples: int  # samples, learnt: number n of the samples of noise, and their total duration [s]
-    learnt: float
-    z: float  # z, stamp: last level [dB-Hz] and its stamp [s]
-    stamp: float
-    # above_detect, above_track, below_loss: time for which the level has been above or below the threshold [s]
-    above_detect: float
-    above_track: float
-    below_loss: float
-    present: int  # 1 if there is a target
+    mean: DecibelHertz      # m
+    variance: float         # V [dB2]
+    samples: int            # number n of the samples of noise
+    learnt: Seconds         # their total duration
+    z: DecibelHertz         # last level
+    stamp: Seconds          # its stamp
+    above_detect: Seconds   # time for which the level has been above the threshold detect
+    above_track: Seconds    # time for which it has been above the threshold track
+    below_loss: Seconds     # time for which it has been below the threshold loss
+    present: Bit            # 1 if there is a target
 
 
-Thresholds = namedtuple('Thresholds', 'detect track loss')  # thresholds of the level [dB-Hz]
+class Thresholds(NamedTuple):
+    """Thresholds of the level."""
+    detect: DecibelHertz
+    track: DecibelHertz
+    loss: DecibelHertz
+
+
 DETECTION_SIGMAS = 4.0  # height of the detection threshold above the mean noise, in standard deviations of the noise
 MIN_LOSS_SIGMAS = 2.0  # least height of the loss threshold above the mean noise, in standard deviations of the noise
 
@@ -52,75 +57,76 @@ TRACK_MARGIN_DB, LOSS_MARGIN_DB = 1.0, -2.0
 
 
 @compiled
-def known(s, p):
+def known(state: Level, params: AcquisitionParameters) -> bool:
     """Return True if the noise is known: learnt for at least learn_time."""
-    return s.learnt >= p.learn_time
+    return state.learnt >= params.learn_time
 
 
 @compiled
-def thresholds(s):
+def thresholds(state: Level) -> Thresholds:
     """Return the Thresholds above the learnt noise."""
-    sigma = math.sqrt(s.variance)
-    detect = s.mean + DETECTION_SIGMAS * sigma
-    return Thresholds(detect, detect + TRACK_MARGIN_DB, max(detect + LOSS_MARGIN_DB, s.mean + MIN_LOSS_SIGMAS * sigma))
+    sigma = math.sqrt(state.variance)
+    detect = state.mean + DETECTION_SIGMAS * sigma
+    return Thresholds(detect, detect + TRACK_MARGIN_DB,
+                      max(detect + LOSS_MARGIN_DB, state.mean + MIN_LOSS_SIGMAS * sigma))
 
 
 @compiled
-def learn(s, p, z, T):
-    """Take a level z [dB-Hz] that was measured off the target, T [s] after the last one.
+def learn(state: Level, params: AcquisitionParameters, z: DecibelHertz, T: Seconds) -> None:
+    """Take a level z that was measured off the target, T after the last one.
 
     A level above the known noise is ignored.
     """
-    if known(s, p) and z > thresholds(s).detect:
+    if known(state, params) and z > thresholds(state).detect:
         return
-    s.samples += 1
-    s.learnt += T
-    w = max(1.0 / s.samples, T / p.learn_time)
-    d = z - s.mean
-    s.mean += w * d
-    s.variance = (1.0 - w) * (s.variance + w * d * d)
+    state.samples += 1
+    state.learnt += T
+    w = max(1.0 / state.samples, T / params.learn_time)
+    d = z - state.mean
+    state.mean += w * d
+    state.variance = (1.0 - w) * (state.variance + w * d * d)
 
 
 @compiled
-def take(s, p, z, stamp, locked):
-    """Take the level z [dB-Hz] of a stamp [s]; an older stamp has no effect, an equal stamp adds no time.
+def take(state: Level, params: AcquisitionParameters, z: DecibelHertz, stamp: Seconds, locked: bool) -> None:
+    """Take the level z of a stamp; an older stamp has no effect, an equal stamp adds no time.
 
     locked: True if the receiver measures angle errors. Until the noise is known, only the lock shows a target.
     """
-    T = stamp - s.stamp if math.isfinite(s.stamp) else 0.0
+    T = stamp - state.stamp if math.isfinite(state.stamp) else 0.0
     if not T >= 0.0 or not math.isfinite(z):
         return
-    s.z, s.stamp = z, stamp
+    state.z, state.stamp = z, stamp
     # After a gap a level represents no more than the time over which it was smoothed.
-    T = min(T, p.time_constant)
-    at = thresholds(s)
-    if not known(s, p):
+    T = min(T, params.time_constant)
+    at = thresholds(state)
+    if not known(state, params):
         at = Thresholds(-math.inf, -math.inf, -math.inf) if locked else Thresholds(math.inf, math.inf, math.inf)
-    s.above_detect = s.above_detect + T if z > at.detect else 0.0
-    s.above_track = s.above_track + T if z > at.track else 0.0
-    s.below_loss = s.below_loss + T if z < at.loss else 0.0
+    state.above_detect = state.above_detect + T if z > at.detect else 0.0
+    state.above_track = state.above_track + T if z > at.track else 0.0
+    state.below_loss = state.below_loss + T if z < at.loss else 0.0
     # With an acquire_time or a loss_time of 0, only a time above 0 shows that the level was beyond its threshold.
-    if s.present == 0:
-        s.present = s.above_track >= p.acquire_time and s.above_track > 0.0
-    elif s.below_loss >= p.loss_time and s.below_loss > 0.0:
-        s.present = 0
+    if state.present == 0:
+        state.present = state.above_track >= params.acquire_time and state.above_track > 0.0
+    elif state.below_loss >= params.loss_time and state.below_loss > 0.0:
+        state.present = 0
 
 
 @compiled
-def detected(s, p):
+def detected(state: Level, params: AcquisitionParameters) -> bool:
     """Return True if the level has been above the threshold detect for acquire_time, so that acquire begins."""
-    return s.above_detect >= p.acquire_time and s.above_detect > 0.0
+    return state.above_detect >= params.acquire_time and state.above_detect > 0.0
 
 
 @compiled
-def restart_noise(s, p):
+def restart_noise(state: Level, params: AcquisitionParameters) -> None:
     """Discard the samples of noise if the noise is not known yet: they may contain a signal."""
-    if not known(s, p):
-        s.samples, s.learnt, s.mean, s.variance = 0, 0.0, 0.0, 0.0
+    if not known(state, params):
+        state.samples, state.learnt, state.mean, state.variance = 0, 0.0, 0.0, 0.0
 
 
 @compiled
-def restart_times(s):
+def restart_times(state: Level) -> None:
     """Set the times above and below the thresholds to 0, because the beam has moved to another place."""
-    s.above_detect = s.above_track = s.below_loss = 0.0
-    s.present = 0
+    state.above_detect = state.above_track = state.below_loss = 0.0
+    state.present = 0

@@ -35,7 +35,7 @@ class SearchParameters(Parameters):
     speed: float = parameter(1.0, 0.01, 1.0, '', 'speed of the beam, in beamwidths per 4 time constants of the level')
     rounds: int = parameter(3, 1, 1000, '', 'number of rounds of both areas before the fallback mode')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if the small area is larger than the full one."""
         if self.small > self.full:
             raise ParameterError(f'small = {self.small:g} beamwidths: must be at most full = {self.full:g}')

@@ -16,9 +16,10 @@ The beam reaches its speed in SPEED_RISE_TIME_S, and is at rest for an instant i
 rate have no jump. The exception is the end of the spiral, where the rate jumps from full speed to zero.
 """
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Radians, RadiansPerSecond, Seconds
 
 SEARCH_PATTERNS = ('spiral', 'raster', 'square', 'sector')
 PATTERN_SPIRAL, PATTERN_RASTER, PATTERN_SQUARE, PATTERN_SECTOR = range(len(SEARCH_PATTERNS))
@@ -33,42 +34,47 @@ PATTERN_SPIRAL, PATTERN_RASTER, PATTERN_SQUARE, PATTERN_SECTOR = range(len(SEARC
 
 SPEED_RISE_TIME_S = 0.2  # time in which the beam reaches its speed, and in which it stops [s]
 
-Area = namedtuple('Area', 'pattern radius across pitch speed')
-"""Area and pattern of a search.
 
-pattern  code of the shape
-radius   half length of the area along the track of the target [rad]
-across   half width of the area, of raster and sector only [rad]; the others use the radius in both directions
-pitch    distance between neighbouring lines [rad]
-speed    speed of the beam along its path [rad/s]
-"""
+class Area(NamedTuple):
+    """Area and pattern of a search."""
+    pattern: int                # index into SEARCH_PATTERNS
+    radius: Radians             # half length of the area along the track of the target
+    across: Radians             # half width of a raster or a sector; the others use the radius in both directions
+    pitch: Radians              # distance between neighbouring lines
+    speed: RadiansPerSecond     # of the beam along its path
 
-Point = namedtuple('Point', 'x y dx dy')
-"""Offset of the beam from the expected place in two directions [rad], and its rates [rad/s].
 
-The directions are along and across the track of the target, or cross-elevation and elevation.
-"""
+class Point(NamedTuple):
+    """Offset of the beam from the expected place in two directions, and its rates.
+
+    The directions are along and across the track of the target, or cross-elevation and elevation.
+    """
+    x: Radians
+    y: Radians
+    dx: RadiansPerSecond
+    dy: RadiansPerSecond
 
 
 @compiled
-def highest_speed(beamwidth, time_constant, share):
-    """Return the speed of the beam [rad/s]: a share (at most 1) of the highest speed b / (4 tau)."""
+def highest_speed(beamwidth: Radians, time_constant: Seconds, share: float) -> RadiansPerSecond:
+    """Return the speed of the beam: a share (at most 1) of the highest speed b / (4 tau)."""
     return share * beamwidth / (4.0 * time_constant)
 
 
 @compiled
-def rotated(p, angle):
-    """Return a Point p turned by an angle [rad]: from along and across the track to cross-elevation and elevation.
+def rotated(point: Point, angle: Radians) -> Point:
+    """Return a point turned by an angle: from along and across the track to cross-elevation and elevation.
 
     angle: place.track of the target.
     """
     s, c = math.sin(angle), math.cos(angle)
-    return Point(c * p.x - s * p.y, s * p.x + c * p.y, c * p.dx - s * p.dy, s * p.dx + c * p.dy)
+    return Point(c * point.x - s * point.y, s * point.x + c * point.y,
+                 c * point.dx - s * point.dy, s * point.dx + c * point.dy)
 
 
 @compiled
-def circle(radius, period, t):
-    """Return the Point at t [s] of a circle; its radius grows from 0 to `radius` [rad] during the first period [s].
+def circle(radius: Radians, period: Seconds, t: Seconds) -> Point:
+    """Return the Point at t of a circle; its radius grows from 0 to `radius` during the first period.
 
     The circle is no search pattern. `acquisition` uses it to check the slopes of the receiver errors.
     """
@@ -79,8 +85,8 @@ def circle(radius, period, t):
 
 
 @compiled
-def duration(area):
-    """Return the duration of a pattern [s]."""
+def duration(area: Area) -> Seconds:
+    """Return the duration of a pattern."""
     if area.pattern == PATTERN_SPIRAL:
         return spiral_length(_turn_of(area), area.pitch) / area.speed + 0.5 * SPEED_RISE_TIME_S
     T, n = 0.0, vertices(area)
@@ -90,8 +96,8 @@ def duration(area):
 
 
 @compiled
-def point(area, t):
-    """Return the Point of a pattern at t [s] after its begin; after its `duration` it stays at its end."""
+def point(area: Area, t: Seconds) -> Point:
+    """Return the Point of a pattern at t after its begin; after its `duration` it stays at its end."""
     if area.pattern == PATTERN_SPIRAL:
         return _on_spiral(area, t)
     n = vertices(area)
@@ -105,14 +111,14 @@ def point(area, t):
 
 
 @compiled
-def _turn_of(area):
-    """Return the angle [rad] at which the spiral ends: half a pitch beyond the radius, to cover all of the edge."""
+def _turn_of(area: Area) -> Radians:
+    """Return the angle at which the spiral ends: half a pitch beyond the radius, to cover all of the edge."""
     return 2.0 * math.pi * (area.radius / area.pitch + 0.5)
 
 
 @compiled
-def spiral_length(theta, pitch):
-    """Return the length [rad] of the spiral r = k theta, k = pitch / (2 pi), from its centre to the angle theta [rad].
+def spiral_length(theta: Radians, pitch: Radians) -> Radians:
+    """Return the length of the spiral r = k theta, k = pitch / (2 pi), from its centre to the angle theta.
 
     The length is k/2 (theta sqrt(1 + theta^2) + asinh theta).
     """
@@ -120,8 +126,8 @@ def spiral_length(theta, pitch):
 
 
 @compiled
-def _on_spiral(area, t):
-    """Return the Point of the spiral at t [s].
+def _on_spiral(area: Area, t: Seconds) -> Point:
+    """Return the Point of the spiral at t.
 
     The length of the path grows with the speed v. Newton's method finds the angle theta that belongs to the length.
     """
@@ -141,7 +147,7 @@ def _on_spiral(area, t):
 
 
 @compiled
-def lines_aside(area):
+def lines_aside(area: Area) -> int:
     """Return the number of lines of a raster or a sector on one side of the middle line, at least 0.
 
     The outermost line is at most half a pitch inside the edge of the area, so that the beam passes over the edge.
@@ -150,7 +156,7 @@ def lines_aside(area):
 
 
 @compiled
-def vertices(area):
+def vertices(area: Area) -> int:
     """Return the number of corners of a pattern of straight legs; begin and end of the pattern count as corners.
 
     A raster or a sector has the centre and the two ends of each of its 2 lines_aside + 1 lines. A square has the
@@ -162,8 +168,8 @@ def vertices(area):
 
 
 @compiled
-def vertex(area, i):
-    """Return (x, y) [rad] of corner i; corner 0 is the centre."""
+def vertex(area: Area, i: int) -> tuple[Radians, Radians]:
+    """Return (x, y) of corner i; corner 0 is the centre."""
     if i == 0:
         return 0.0, 0.0
     if area.pattern == PATTERN_SQUARE:
@@ -176,22 +182,22 @@ def vertex(area, i):
 
 
 @compiled
-def _alternating(n):
+def _alternating(n: int) -> int:
     """Return 0, 1, -1, 2, -2 ... for n = 0, 1, 2, 3, 4 ..."""
     return (n + 1) // 2 if n % 2 == 1 else -(n // 2)
 
 
 @compiled
-def _leg_length(area, i):
-    """Return the distance [rad] from corner i - 1 to corner i."""
+def _leg_length(area: Area, i: int) -> Radians:
+    """Return the distance from corner i - 1 to corner i."""
     x0, y0 = vertex(area, i - 1)
     x1, y1 = vertex(area, i)
     return math.hypot(x1 - x0, y1 - y0)
 
 
 @compiled
-def _leg_time(area, i):
-    """Return the time [s] from corner i - 1 to corner i, from rest to rest.
+def _leg_time(area: Area, i: int) -> Seconds:
+    """Return the time from corner i - 1 to corner i, from rest to rest.
 
     The acceleration is v / SPEED_RISE_TIME_S; v: speed of the beam along its path.
     """
@@ -200,8 +206,8 @@ def _leg_time(area, i):
 
 
 @compiled
-def _on_leg(area, i, t):
-    """Return the Point of the leg to corner i, t [s] after its begin."""
+def _on_leg(area: Area, i: int, t: Seconds) -> Point:
+    """Return the Point of the leg to corner i, t after its begin."""
     x0, y0 = vertex(area, i - 1)
     x1, y1 = vertex(area, i)
     L, T, a = _leg_length(area, i), _leg_time(area, i), area.speed / SPEED_RISE_TIME_S

@@ -14,17 +14,18 @@ import math
 from acu_tracker.geometry.great_circle import turned
 from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, angles, earth_angles
 from acu_tracker.geometry.vector import Vector, dot, times, vector
+from acu_tracker.search.pattern import Point
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
-from pedestal_common.quantities import Vector3
+from pedestal_common.quantities import Radians, Seconds, Vector3
 from pedestal_common.record import Record
 
 
 class Place(Record):
-    """Last known place: ENU unit vector u [-] towards the target at the stamp [s], and its rate du [1/s]."""
-    u: Vector3
-    du: Vector3
-    stamp: float
+    """Last known place of the target."""
+    u: Vector3      # ENU unit vector towards the target [-]
+    du: Vector3     # its rate [1/s]
+    stamp: Seconds
 
 
 ZERO_VECTOR = Vector(0.0, 0.0, 0.0)  # vector of length 0
@@ -32,18 +33,18 @@ RATE_FADE_TIME_S = 10.0  # time constant with which the expected rate fades [s]
 
 
 @compiled
-def remember(s, t, u, du):
-    """Keep the last known place: ENU unit Vector u and its rate du [1/s] at t [s]."""
-    s.u[0], s.u[1], s.u[2] = u
-    s.du[0], s.du[1], s.du[2] = du
-    s.stamp = t
+def remember(place: Place, t: Seconds, u: Vector, du: Vector) -> None:
+    """Keep the last known place: ENU unit vector u and its rate du [1/s] at t."""
+    place.u[0], place.u[1], place.u[2] = u
+    place.du[0], place.du[1], place.du[2] = du
+    place.stamp = t
 
 
 @compiled
-def motion_at(s, t):
-    """Return the Motion of the expected place in earth angles at t [s], a time after the last known place."""
-    u, du = vector(s.u), vector(s.du)
-    W, left = math.sqrt(dot(du, du)), math.exp((s.stamp - t) / RATE_FADE_TIME_S)
+def motion_at(place: Place, t: Seconds) -> Motion:
+    """Return the Motion of the expected place in earth angles at t, a time after the last known place."""
+    u, du = vector(place.u), vector(place.du)
+    W, left = math.sqrt(dot(du, du)), math.exp((place.stamp - t) / RATE_FADE_TIME_S)
     angle = W * RATE_FADE_TIME_S * (1.0 - left)
     ahead = turned(u, du, W, angle)
     # ahead = u cos(angle) + du/W sin(angle), and the angle grows with the rate W left. The second derivative has two
@@ -54,8 +55,8 @@ def motion_at(s, t):
 
 
 @compiled
-def track(motion):
-    """Return the direction [rad] in which a target with this Motion moves.
+def track(motion: Motion) -> Radians:
+    """Return the direction in which a target with this Motion moves.
 
     The direction is an angle from cross-elevation towards elevation; it is 0 for a target at rest.
     """
@@ -63,14 +64,14 @@ def track(motion):
 
 
 @compiled
-def displaced(motion, p):
+def displaced(motion: Motion, offset: Point) -> Motion:
     """Return the Motion of a beam that is at an offset from a direction.
 
-    motion: Motion of the direction; p: pattern.Point of the offset in cross-elevation and elevation. The accelerations
-    of the pattern are neglected.
+    motion: Motion of the direction; offset: in cross-elevation and elevation. The accelerations of the pattern are
+    neglected.
     """
     n = line_of_sight.displaced_motion(motion.azimuth.angle, motion.elevation.angle, motion.azimuth.rate,
-                                       motion.elevation.rate, p.x, p.y, p.dx, p.dy)
+                                       motion.elevation.rate, offset.x, offset.y, offset.dx, offset.dy)
     beam = angles(LineOfSight(Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]), ZERO_VECTOR))
     return Motion(AxisMotion(beam.azimuth.angle, beam.azimuth.rate, motion.azimuth.acceleration),
                   AxisMotion(beam.elevation.angle, beam.elevation.rate, motion.elevation.acceleration))

@@ -10,6 +10,7 @@ one of these places is within the main lobe.
 import math
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import DecibelHertz, Floats, Meters, Radians
 
 SIDE_LOBE_MARGIN_DB = 10.0  # distance below the expected level at which a signal counts as one in a side lobe [dB]
 LOOK_AROUND_PLACES = 6  # number of places of a look-around
@@ -18,11 +19,11 @@ MIN_IMPROVEMENT_DB = 2.0  # least increase of the level for which the beam moves
 
 
 @compiled
-def expected(cn0_dbhz, reference_range, exponent, distance):
-    """Return the level [dB-Hz] that is expected on the axis of the beam.
+def expected(cn0_dbhz: DecibelHertz, reference_range: Meters, exponent: float, distance: Meters) -> DecibelHertz:
+    """Return the level that is expected on the axis of the beam.
 
-    cn0_dbhz   level at the reference range [dB-Hz]
-    reference_range, distance  ranges of the target [m]; distance NaN: unknown, the result is cn0_dbhz
+    cn0_dbhz   level at the reference range
+    reference_range, distance  ranges of the target; distance NaN: unknown, the result is cn0_dbhz
     exponent   power of the range with which the level falls [-]
     """
     if math.isnan(distance) or distance <= 0.0:
@@ -31,14 +32,14 @@ def expected(cn0_dbhz, reference_range, exponent, distance):
 
 
 @compiled
-def suspected(z, level):
-    """Return True if a level z is more than SIDE_LOBE_MARGIN_DB below the expected level [dB-Hz]."""
+def suspected(z: DecibelHertz, level: DecibelHertz) -> bool:
+    """Return True if a level z is more than SIDE_LOBE_MARGIN_DB below the expected level."""
     return z < level - SIDE_LOBE_MARGIN_DB
 
 
 @compiled
-def place(i, beamwidth):
-    """Return the offset (cross-elevation, elevation) [rad] of place i of a look-around.
+def place(i: int, beamwidth: Radians) -> tuple[Radians, Radians]:
+    """Return the offset (cross-elevation, elevation) of place i of a look-around.
 
     Place 0 is the centre; the places 1 to LOOK_AROUND_PLACES are around it.
     """
@@ -49,7 +50,7 @@ def place(i, beamwidth):
 
 
 @compiled
-def best(levels):
+def best(levels: Floats) -> int:
     """Return the number of the place with the highest level; levels: of all 1 + LOOK_AROUND_PLACES places [dB-Hz].
 
     Return 0 if no place is better than the centre by more than MIN_IMPROVEMENT_DB.

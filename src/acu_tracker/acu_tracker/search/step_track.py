@@ -16,20 +16,21 @@ large as the step.
 """
 import math
 
+from acu_tracker.search.params import StepTrackParameters
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Pair
+from pedestal_common.quantities import Bit, DecibelHertz, Pair, Radians, Seconds
 from pedestal_common.record import Record
 
 
 class StepTrack(Record):
     """State of step track."""
-    place: Pair  # offset of the beam between its steps: cross-elevation, elevation [rad]
-    began: float  # begin of the cycle [s]
-    phase: int  # phase, since: index in STEP_PHASES, and begin of this phase [s]
-    since: float
-    sum: float  # sum, samples: sum [dB-Hz] and number of the levels in this phase
-    samples: int
-    plus: float  # mean level on the plus side [dB-Hz]
+    place: Pair     # offset of the beam between its steps: cross-elevation, elevation [rad]
+    began: Seconds  # begin of the cycle
+    phase: int      # index into STEP_PHASES
+    since: Seconds  # begin of this phase
+    sum: float      # of the levels in this phase [dB-Hz]
+    samples: int    # number of these levels
+    plus: DecibelHertz  # mean level on the plus side
 
 
 STEP_PHASES = ('cross-elevation plus', 'cross-elevation minus', 'elevation plus', 'elevation minus', 'rest')
@@ -40,57 +41,56 @@ STEP_SETTLING_LAGS = 5.0  # number of time constants of the level after which it
 
 
 @compiled
-def start(s, t, x, e):
-    """Start at t [s] at an offset x, e (cross-elevation, elevation) [rad]; a cycle begins at once."""
-    s.place[0], s.place[1] = x, e
-    s.began = t
-    _enter(s, 0, t)
+def start(state: StepTrack, t: Seconds, x: Radians, e: Radians) -> None:
+    """Start at t at an offset x, e (cross-elevation, elevation); a cycle begins at once."""
+    state.place[0], state.place[1] = x, e
+    state.began = t
+    _enter(state, 0, t)
 
 
 @compiled
-def _enter(s, phase, t):
-    """Begin a phase at t [s]."""
-    s.phase, s.since, s.sum, s.samples = phase, t, 0.0, 0
+def _enter(state: StepTrack, phase: int, t: Seconds) -> None:
+    state.phase, state.since, state.sum, state.samples = phase, t, 0.0, 0
 
 
 @compiled
-def peak(z_plus, z_minus, step, beamwidth):
-    """Return theta0 [rad], the distance of the peak; z_plus, z_minus: levels one step [rad] to either side [dB-Hz]."""
+def peak(z_plus: DecibelHertz, z_minus: DecibelHertz, step: Radians, beamwidth: Radians) -> Radians:
+    """Return theta0, the distance of the peak; z_plus, z_minus: levels one step to either side."""
     return (z_plus - z_minus) * beamwidth * beamwidth / (48.0 * step)
 
 
 @compiled
-def step(s, p, beamwidth, tau, t, z, present):
-    """Advance to t [s] and return the offset (cross-elevation, elevation) of the beam [rad].
+def step(state: StepTrack, params: StepTrackParameters, beamwidth: Radians, tau: Seconds, t: Seconds, z: DecibelHertz,
+         present: Bit) -> tuple[Radians, Radians]:
+    """Advance to t and return the offset (cross-elevation, elevation) of the beam.
 
-    p        record of StepTrackParameters
-    tau      time constant of the level [s]
-    z        level that was measured since the last step [dB-Hz]; NaN: none
+    tau      time constant of the level
+    z        level that was measured since the last step; NaN: none
     present  True if there is a signal
     """
-    d = p.step * beamwidth
-    if not present or (s.phase == REST_PHASE and t - s.began < p.cycle):
+    d = params.step * beamwidth
+    if not present or (state.phase == REST_PHASE and t - state.began < params.cycle):
         if not present:
-            _enter(s, REST_PHASE, t)
-        return s.place[0], s.place[1]
-    if s.phase == REST_PHASE:
-        s.began = t
-        _enter(s, 0, t)
+            _enter(state, REST_PHASE, t)
+        return state.place[0], state.place[1]
+    if state.phase == REST_PHASE:
+        state.began = t
+        _enter(state, 0, t)
     settled = STEP_SETTLING_LAGS * tau
-    if not math.isnan(z) and t - s.since > settled:
-        s.sum += z
-        s.samples += 1
-    if t - s.since >= settled + p.dwell and s.samples > 0:
-        mean, axis = s.sum / s.samples, s.phase // 2
-        if s.phase % 2 == 0:
-            s.plus = mean
+    if not math.isnan(z) and t - state.since > settled:
+        state.sum += z
+        state.samples += 1
+    if t - state.since >= settled + params.dwell and state.samples > 0:
+        mean, axis = state.sum / state.samples, state.phase // 2
+        if state.phase % 2 == 0:
+            state.plus = mean
         else:
-            move = peak(s.plus, mean, d, beamwidth)
-            if abs(move) > p.deadband * beamwidth:
-                s.place[axis] += min(max(move, -d), d)
-        _enter(s, s.phase + 1, t)
-    x, e = s.place[0], s.place[1]
-    if s.phase == REST_PHASE:
+            move = peak(state.plus, mean, d, beamwidth)
+            if abs(move) > params.deadband * beamwidth:
+                state.place[axis] += min(max(move, -d), d)
+        _enter(state, state.phase + 1, t)
+    x, e = state.place[0], state.place[1]
+    if state.phase == REST_PHASE:
         return x, e
-    aside = d if s.phase % 2 == 0 else -d
-    return (x + aside, e) if s.phase < 2 else (x, e + aside)
+    aside = d if state.phase % 2 == 0 else -d
+    return (x + aside, e) if state.phase < 2 else (x, e + aside)

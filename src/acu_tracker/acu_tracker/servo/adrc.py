@@ -31,13 +31,14 @@ NLC (11)    u0 = v3 + w_c^2 (v1 - z1) + 2 w_c (v2 - z2). This is fhan with h1 = 
 import math
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Radians, RadiansPerSecond, RadiansPerSecond2, Seconds, Vector3, Xyz
 
 
 @compiled
-def observer_gains(w_o, w_s, h):
+def observer_gains(w_o: RadiansPerSecond, w_s: RadiansPerSecond, h: Seconds) -> Xyz:
     """Return (l1 [-], l2 [1/s], l3 [1/s2]) that put the three poles of the observer at p = exp(-w_o h).
 
-    w_o, w_s: poles of the observer and of the drive's rate loop [rad/s]; h: step of the observer [s].
+    w_o, w_s: poles of the observer and of the drive's rate loop; h: step of the observer.
 
     For w_s -> 0 the gains are 1 - p^3, 1.5 (1 - p)^2 (1 + p) / h, (1 - p)^3 / h^2.
     """
@@ -53,11 +54,12 @@ def observer_gains(w_o, w_s, h):
 
 
 @compiled
-def observed(z, y, u, v3, w_o, w_s, h):
-    """Return the new state (z1, z2, z3) of the observer [rad, rad/s, rad/s2], h [s] after its last state z (3,).
+def observed(z: Vector3, y: Radians, u: RadiansPerSecond, v3: RadiansPerSecond2, w_o: RadiansPerSecond,
+             w_s: RadiansPerSecond, h: Seconds) -> tuple[Radians, RadiansPerSecond, RadiansPerSecond2]:
+    """Return the new state (z1, z2, z3) of the observer, h after its last state z.
 
-    y      encoder angle now [rad]
-    u, v3  rate command [rad/s] and acceleration of the reference [rad/s2] that were in force during h
+    y      encoder angle now
+    u, v3  rate command and acceleration of the reference that were in force during h
     """
     z1, z2, z3 = z[0], z[1], z[2]
     # settled: rate that the drive would reach at constant u, v3 and z3.
@@ -71,12 +73,13 @@ def observed(z, y, u, v3, w_o, w_s, h):
 
 
 @compiled
-def rate(z, v1, v2, v2_m, w_c, w_s):
-    """Return the rate command [rad/s].
+def rate(z: Vector3, v1: Radians, v2: RadiansPerSecond, v2_m: RadiansPerSecond, w_c: RadiansPerSecond,
+         w_s: RadiansPerSecond) -> RadiansPerSecond:
+    """Return the rate command.
 
-    z       state (3,) of the observer at t_k, the stamp of the step
-    v1, v2  angle [rad] and rate [rad/s] of the reference at t_k
-    v2_m    rate of the reference at t_m, the middle of the interval in which the command is in force [rad/s]
+    z       state of the observer at t_k, the stamp of the step
+    v1, v2  angle and rate of the reference at t_k
+    v2_m    rate of the reference at t_m, the middle of the interval in which the command is in force
     """
     # u0 - v3 = feedback, so v3 cancels: u = (feedback + w_s z2 - z3) / w_s = z2 + (feedback - z3) / w_s. The command
     # acts at t_m. Therefore z2 is predicted to t_m: the rate of the reference there, plus the error z2 - v2 of t_k.

@@ -34,6 +34,7 @@ beam will be in force.
 import math
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Radians, RadiansPerSecond, Seconds
 
 LOOP_FORMS = ('tracked', 'type_1', 'type_2')
 """Names of the forms of the loop; the docstring of the module explains them."""
@@ -41,34 +42,38 @@ FORM_TRACKED, FORM_TYPE_1, FORM_TYPE_2 = range(len(LOOP_FORMS))
 
 
 @compiled
-def type_1(R, v, error, alpha, beta, T, compensation):
-    """Return (angle R(k/k) of the beam [rad], its rate v [rad/s]).
+def type_1(R: Radians, v: RadiansPerSecond, error: Radians, alpha: float, beta: float, T: Seconds,
+           compensation: RadiansPerSecond) -> tuple[Radians, RadiansPerSecond]:
+    """Return (angle R(k/k) of the beam, its rate v).
 
-    R, v          angle [rad] and rate [rad/s] of the beam in the step before, T [s] ago
-    error         error of the receiver [rad]
+    R, v          angle and rate of the beam in the step before, T ago
+    error         error of the receiver
     alpha, beta   gains on the angle and on the rate [-]
-    compensation  delta V [rad/s]
+    compensation  delta V
     """
     nu = error - v * T
     return R + v * T + alpha * nu + compensation * T, v + beta / T * nu
 
 
 @compiled
-def type_2(R, v, error, alpha, beta, T, compensation):
-    """Return (angle R(k+1/k) of the beam [rad], its rate v [rad/s]); the arguments are those of type_1."""
+def type_2(R: Radians, v: RadiansPerSecond, error: Radians, alpha: float, beta: float, T: Seconds,
+           compensation: RadiansPerSecond) -> tuple[Radians, RadiansPerSecond]:
+    """Return (angle R(k+1/k) of the beam, its rate v); the arguments are those of type_1."""
     v += beta / T * error
     return R + alpha * error + v * T + compensation * T, v
 
 
 @compiled
-def coasted(R, v, T, compensation):
-    """Return (angle of the beam [rad], its rate [rad/s]) in a step without an error; the arguments as in type_1."""
+def coasted(R: Radians, v: RadiansPerSecond, T: Seconds,
+            compensation: RadiansPerSecond) -> tuple[Radians, RadiansPerSecond]:
+    """Return (angle of the beam, its rate) in a step without an error; the arguments as in type_1."""
     return R + v * T + compensation * T, v
 
 
 @compiled
-def step(form, R, v, error, alpha, beta, T, compensation):
-    """Return (angle of the beam [rad], its rate [rad/s]) after a step.
+def step(form: int, R: Radians, v: RadiansPerSecond, error: Radians, alpha: float, beta: float, T: Seconds,
+         compensation: RadiansPerSecond) -> tuple[Radians, RadiansPerSecond]:
+    """Return (angle of the beam, its rate) after a step.
 
     form: FORM_TYPE_1 or FORM_TYPE_2; error: NaN without an error of the receiver; the other arguments as in type_1.
     """

@@ -10,23 +10,27 @@
 The slope dv/dd is at most 1 / t. Therefore a command that is late by t / e (e: Euler's number) causes no overshoot.
 """
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Radians, RadiansPerSecond, RadiansPerSecond2, Seconds
 
-Ends = namedtuple('Ends', 'low high')
-"""Least and largest angle that an axis may have at present [rad]: its limits, or the floor."""
+
+class Ends(NamedTuple):
+    """Angles between which an axis may be at present: its limits, or the floor."""
+    low: Radians
+    high: Radians
 
 
 @compiled
-def braking_distance(v, a, t):
-    """Return the distance [rad] in which an axis at a rate v >= 0 stops."""
+def braking_distance(v: RadiansPerSecond, a: RadiansPerSecond2, t: Seconds) -> Radians:
+    """Return the distance in which an axis at a rate v >= 0 stops."""
     return v * v / (2.0 * a) + v * t
 
 
 @compiled
-def stopping_rate(d, a, t):
-    """Return the largest rate [rad/s] towards an end d [rad] ahead from which an axis stops before the end.
+def stopping_rate(d: Radians, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSecond:
+    """Return the largest rate towards an end d ahead from which an axis stops before the end.
 
     The rate is 0 if the axis is beyond the end (d <= 0).
     """
@@ -36,8 +40,8 @@ def stopping_rate(d, a, t):
 
 
 @compiled
-def inside(u, y, ends, a, t):
-    """Return a rate command u [rad/s] limited so that an axis at y [rad] stops between its Ends.
+def inside(u: RadiansPerSecond, y: Radians, ends: Ends, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSecond:
+    """Return a rate command u limited so that an axis at y stops between its Ends.
 
     Beyond an end only motion back inside is left.
     """
@@ -45,8 +49,8 @@ def inside(u, y, ends, a, t):
 
 
 @compiled
-def time_to(y, dy, ends):
-    """Return the time [s] until an axis at y [rad] reaches an end if it keeps its rate dy [rad/s].
+def time_to(y: Radians, dy: RadiansPerSecond, ends: Ends) -> Seconds:
+    """Return the time until an axis at y reaches an end if it keeps its rate dy.
 
     The time is 0 beyond an end, and inf if the axis is at rest.
     """

@@ -26,32 +26,30 @@ swapped.
 """
 import math
 
+from acu_tracker.servo.params import FeedforwardParameters
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import NewtonMeters, Radians, RadiansPerSecond, RadiansPerSecond2, Seconds
 
 
 @compiled
-def fed(v, a, k_v, k_a):
-    """Return the part of the rate command that is fed forward [rad/s].
+def fed(v: RadiansPerSecond, a: RadiansPerSecond2, k_v: float, k_a: Seconds) -> RadiansPerSecond:
+    """Return the part of the rate command that is fed forward.
 
-    v, a: rate [rad/s] and acceleration [rad/s2] of the reference; k_v, k_a: shares of them [-], [s].
+    v, a: rate and acceleration of the reference; k_v, k_a: shares of them.
     """
     return k_v * v + k_a * a
 
 
 @compiled
-def rate(e, integral, fed_forward, K_p):
-    """Return the rate command [rad/s].
+def rate(e: Radians, integral: RadiansPerSecond, fed_forward: RadiansPerSecond, K_p: float) -> RadiansPerSecond:
+    """Return the rate command.
 
-    e: error [rad]; integral: I [rad/s]; fed_forward: result of `fed` [rad/s]; K_p: gain of the position loop [1/s].
+    e: error; integral: I; fed_forward: result of `fed`; K_p: gain of the position loop [1/s].
     """
     return fed_forward + K_p * e + integral
 
 
 @compiled
-def torque(v, a, c):
-    """Return the load torque [Nm] = J a + Tc tanh(v / v_s) for a reference with rate v [rad/s] and acceleration a
-    [rad/s2].
-
-    c: record of FeedforwardParameters.
-    """
-    return c.inertia * a + c.friction * math.tanh(v / c.friction_rate)
+def torque(v: RadiansPerSecond, a: RadiansPerSecond2, params: FeedforwardParameters) -> NewtonMeters:
+    """Return the load torque J a + Tc tanh(v / v_s) for a reference with rate v and acceleration a."""
+    return params.inertia * a + params.friction * math.tanh(v / params.friction_rate)

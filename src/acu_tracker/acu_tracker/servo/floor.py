@@ -3,19 +3,23 @@
 The floor keeps the dish clear of structures around the antenna. A table of points, joined by straight lines, defines
 the floor. Where the floor rises, the azimuth waits until the elevation is above the floor ahead.
 
-c, u: records of control_unit.Constants and of signals.Inputs.dtype; floor: record of Floor; limits: record
-of the LimitsParameters of an axis; A, E: azimuth and elevation in encoder angles [rad].
+A, E: azimuth and elevation in encoder angles.
 """
 import math
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from acu_tracker.servo.ends import Ends, braking_distance
+from acu_tracker.servo.params import LimitsParameters
+from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
-from pedestal_common.quantities import Floats
+from pedestal_common.quantities import Bit, Floats, Radians, Records
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.control_unit import Constants
 
 MAX_FLOOR_POINTS = 64  # largest number of points of a floor
 FLOOR_DOC = ("floor of the elevation over the azimuth, at most 64 points: 'azimuth elevation; ...' [rad] on the deck, "
@@ -26,12 +30,9 @@ CELL_WIDTH_RAD = 2.0 * math.pi / CELL_COUNT  # width of a cell [rad]
 
 
 class Floor(Record):
-    """given: 1 if there is a floor; highest: highest value of the floor in each cell [rad].
-
-    Cell 0 is from azimuth 0 to CELL_WIDTH_RAD.
-    """
-    given: int
-    highest: Annotated[Floats, (CELL_COUNT,)]
+    """Table of the floor. Cell 0 is from azimuth 0 to CELL_WIDTH_RAD."""
+    given: Bit      # 1 if there is a floor
+    highest: Annotated[Floats, (CELL_COUNT,)]   # highest value of the floor in each cell [rad]
 
 
 MAX_AZIMUTH_RAD = 1e3
@@ -48,8 +49,8 @@ of the encoder.
 """
 
 
-def points(text):
-    """Return (azimuths, elevations) (n,) [rad] of the points in a text as in FLOOR_DOC; ((), ()) for an empty text.
+def points(text: str) -> tuple[tuple[Radians, ...], tuple[Radians, ...]]:
+    """Return (azimuths, elevations) of the points in a text as in FLOOR_DOC; ((), ()) for an empty text.
 
     Raise ParameterError for a wrong text.
     """
@@ -69,13 +70,13 @@ def points(text):
     return A, f
 
 
-def at(text, A):
-    """Return the floor [rad] at an azimuth A, of a text as in FLOOR_DOC; -inf if there is no floor."""
+def at(text: str, A: Radians) -> Radians:
+    """Return the floor at an azimuth A, of a text as in FLOOR_DOC; -inf if there is no floor."""
     azimuths, elevations = points(text)
     return np.interp(A, azimuths, elevations, period=2.0 * math.pi) if azimuths else -math.inf
 
 
-def table(text) -> np.ndarray:
+def table(text: str) -> Records:
     """Return the Floor (1,) of a text as in FLOOR_DOC.
 
     The value of a cell is the highest value of the floor at its two ends and at the points of the table inside it.
@@ -91,14 +92,14 @@ def table(text) -> np.ndarray:
 
 
 @compiled
-def _cell(A):
+def _cell(A: Radians) -> int:
     """Return the number of the cell of an azimuth, which still counts turns; modulo CELL_COUNT it is an index."""
     return math.floor(min(max(A, -MAX_AZIMUTH_RAD), MAX_AZIMUTH_RAD) / CELL_WIDTH_RAD)
 
 
 @compiled
-def highest(floor, A, B):
-    """Return the highest value of the floor [rad] between the azimuths A and B [rad]."""
+def highest(floor: Floor, A: Radians, B: Radians) -> Radians:
+    """Return the highest value of the floor between the azimuths A and B."""
     first, last = _cell(min(A, B)), _cell(max(A, B))
     top = -math.inf
     for i in range(first, min(last, first + CELL_COUNT - 1) + 1):
@@ -107,13 +108,13 @@ def highest(floor, A, B):
 
 
 @compiled
-def above(floor, A, E):
+def above(floor: Floor, A: Radians, E: Radians) -> bool:
     """Return True if the floor at the azimuth A is above the elevation E."""
     return floor.given != 0 and floor.highest[_cell(A) % CELL_COUNT] > E
 
 
 @compiled
-def of_azimuth(floor, limits, A, E):
+def of_azimuth(floor: Floor, limits: LimitsParameters, A: Radians, E: Radians) -> Ends:
     """Return the Ends of the azimuth, now at A: its limits, or the places where the floor rises above the elevation E.
 
     If the floor at A is above E already, the azimuth may leave: its Ends are then the limits.
@@ -134,10 +135,10 @@ def of_azimuth(floor, limits, A, E):
 
 
 @compiled
-def of_elevation(floor, limits, A, ahead, target):
+def of_elevation(floor: Floor, limits: LimitsParameters, A: Radians, ahead: Radians, target: Radians) -> Ends:
     """Return the Ends of the elevation: above the floor on the whole way of the azimuth.
 
-    A: azimuth now; ahead: azimuth at which the axis can stop; target: azimuth to which the axis goes; all in rad.
+    A: azimuth now; ahead: azimuth at which the axis can stop; target: azimuth to which the axis goes.
     """
     if not floor.given:
         return Ends(limits.low, limits.high)
@@ -146,19 +147,20 @@ def of_elevation(floor, limits, A, ahead, target):
 
 
 @compiled
-def ends(c, u, azimuth):
-    """Return (Ends of the azimuth, Ends of the elevation) at present; azimuth: angle to which this axis goes [rad]."""
-    a, e, A, dA = c.axis[0].p.limits, c.axis[1].p.limits, u.position[0], u.velocity[0]
-    ahead = A + math.copysign(braking_distance(abs(dA), c.axis[0].braking, c.axis[0].reaction), dA)
-    return of_azimuth(c.floor, a, A, u.position[1]), of_elevation(c.floor, e, A, ahead, azimuth)
+def ends(constants: 'Constants', inputs: Inputs, azimuth: Radians) -> tuple[Ends, Ends]:
+    """Return (Ends of the azimuth, Ends of the elevation) at present; azimuth: angle to which this axis goes."""
+    a, e, A, dA = constants.axis[0].p.limits, constants.axis[1].p.limits, inputs.position[0], inputs.velocity[0]
+    ahead = A + math.copysign(braking_distance(abs(dA), constants.axis[0].braking, constants.axis[0].reaction), dA)
+    return of_azimuth(constants.floor, a, A, inputs.position[1]), of_elevation(constants.floor, e, A, ahead, azimuth)
 
 
 @compiled
-def by_hand(c, u, azimuth):
+def by_hand(constants: 'Constants', inputs: Inputs, azimuth: Radians) -> tuple[Ends, Ends]:
     """Return (Ends of the azimuth, Ends of the elevation) of a point that an operator moves by hand.
 
-    azimuth: azimuth of the point [rad]. The result differs from `ends` in one respect: the azimuth of the point goes
-    on wherever the elevation can rise above the floor.
+    azimuth: azimuth of the point. The result differs from `ends` in one respect: the azimuth of the point goes on
+    wherever the elevation can rise above the floor.
     """
-    _, of_elevation_now = ends(c, u, azimuth)
-    return of_azimuth(c.floor, c.axis[0].p.limits, u.position[0], c.axis[1].p.limits.high), of_elevation_now
+    _, of_elevation_now = ends(constants, inputs, azimuth)
+    azimuth_limits, highest_elevation = constants.axis[0].p.limits, constants.axis[1].p.limits.high
+    return of_azimuth(constants.floor, azimuth_limits, inputs.position[0], highest_elevation), of_elevation_now

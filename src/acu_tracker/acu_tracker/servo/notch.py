@@ -11,12 +11,14 @@ The discrete filter follows by the bilinear transformation, prewarped so that it
 import math
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Hertz, Seconds
 
 
-def coefficients(frequency, width, depth, period):
-    """Return the coefficients (b0, b1, b2, a1, a2) of the discrete filter, for steps of period [s].
+def coefficients(frequency: Hertz, width: float, depth: float,
+                 period: Seconds) -> tuple[float, float, float, float, float]:
+    """Return the coefficients (b0, b1, b2, a1, a2) of the discrete filter, for steps of a period.
 
-    y_k = b0 x_k + b1 x_k-1 + b2 x_k-2 - a1 y_k-1 - a2 y_k-2. frequency: centre [Hz], below 0.5 / period; 0: no notch.
+    y_k = b0 x_k + b1 x_k-1 + b2 x_k-2 - a1 y_k-1 - a2 y_k-2. frequency: centre, below 0.5 / period; 0: no notch.
     """
     if frequency == 0.0:
         return 1.0, 0.0, 0.0, 0.0, 0.0
@@ -29,11 +31,12 @@ def coefficients(frequency, width, depth, period):
 
 
 @compiled
-def removed(x, memory, c):
+def removed(x: float, memory: Floats, coefficients: Floats) -> float:
     """Return the part that the notch removes from x: x minus the output y of the filter, in the unit of x.
 
-    memory: (x_k-1, x_k-2, y_k-1, y_k-2); c: result of `coefficients`.
+    memory: (x_k-1, x_k-2, y_k-1, y_k-2).
     """
-    y = c[0] * x + c[1] * memory[0] + c[2] * memory[1] - c[3] * memory[2] - c[4] * memory[3]
+    b0, b1, b2, a1, a2 = coefficients[0], coefficients[1], coefficients[2], coefficients[3], coefficients[4]
+    y = b0 * x + b1 * memory[0] + b2 * memory[1] - a1 * memory[2] - a2 * memory[3]
     memory[0], memory[1], memory[2], memory[3] = x, memory[0], y, memory[2]
     return x - y

@@ -4,6 +4,7 @@ import math
 
 from acu_tracker.servo.beam_loop import LOOP_FORMS
 from pedestal_common.parameters import ParameterError, Parameters, choice, parameter
+from pedestal_common.quantities import RadiansPerSecond2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +70,7 @@ class ShaperParameters(Parameters):
     jerk: float = parameter(4000.0, 1e-3, 1e6, 'rad/s3', 'largest jerk')
     h0: float = parameter(0.02, 1e-4, 10.0, 's', "filter step of Han's fhan; a longer step is smoother, with more lag")
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if h0 is too short for the jerk, because the end of a move would ring.
 
         fhan removes the acceleration within about h0 [s]. The jerk limit needs the time acceleration / jerk to do so.
@@ -91,11 +92,11 @@ class LimitsParameters(Parameters):
                                'wind; 0: half of `acceleration`')
 
     @property
-    def deceleration(self):
-        """Deceleration with which the axis stops before low and high [rad/s2]."""
+    def deceleration(self) -> RadiansPerSecond2:
+        """Deceleration with which the axis stops before low and high."""
         return self.braking or 0.5 * self.acceleration
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError if low is not below high."""
         if self.low >= self.high:
             raise ParameterError(f'low = {self.low:g} rad: must be below high = {self.high:g} rad')

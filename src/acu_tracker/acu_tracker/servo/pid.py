@@ -9,21 +9,23 @@
 
 The controller `feedforward` uses the integral as well.
 """
+from acu_tracker.servo.params import FeedforwardParameters, PidParameters
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Radians, RadiansPerSecond, Seconds
 
 
 @compiled
-def gains(c):
-    """Return (K_p [1/s], K_i [1/s2]); c: record of PidParameters or FeedforwardParameters.
+def gains(params: PidParameters | FeedforwardParameters) -> tuple[float, float]:
+    """Return (K_p [1/s], K_i [1/s2]).
 
     Because K_i = integral K_p^2, the parameter `integral` alone sets the damping.
     """
-    return c.bandwidth, c.integral * (c.bandwidth * c.bandwidth)
+    return params.bandwidth, params.integral * (params.bandwidth * params.bandwidth)
 
 
 @compiled
-def integrated(integral, e, dt, K_p, K_i):
-    """Return the integral I [rad/s] after dt [s] with the error e [rad].
+def integrated(integral: RadiansPerSecond, e: Radians, dt: Seconds, K_p: float, K_i: float) -> RadiansPerSecond:
+    """Return the integral I after dt with the error e.
 
     If K_i is 0, the value of I that a change of the controller left decays with the bandwidth K_p.
     """
@@ -31,15 +33,16 @@ def integrated(integral, e, dt, K_p, K_i):
 
 
 @compiled
-def derivative(D, e, e_before, dt, derivative_time):
-    """Return the new D [rad/s]: the rate of the error through a lag of derivative_time [s], by backward Euler.
+def derivative(D: RadiansPerSecond, e: Radians, e_before: Radians, dt: Seconds,
+               derivative_time: Seconds) -> RadiansPerSecond:
+    """Return the new D: the rate of the error through a lag of derivative_time, by backward Euler.
 
-    D: its value of the step before; e, e_before: errors now and dt [s] ago [rad].
+    D: its value of the step before; e, e_before: errors now and dt ago.
     """
     return (derivative_time * D + e - e_before) / (derivative_time + dt)
 
 
 @compiled
-def rate(e, integral, D, K_p, K_d):
-    """Return the rate command u [rad/s]; e: error [rad]; integral: I [rad/s]; D, K_p, K_d: as in the module."""
+def rate(e: Radians, integral: RadiansPerSecond, D: RadiansPerSecond, K_p: float, K_d: float) -> RadiansPerSecond:
+    """Return the rate command u; e: error; integral: I; D, K_p, K_d: as in the module."""
     return K_p * e + integral + K_d * D

@@ -10,21 +10,28 @@ beam         steers an electronic beam, which has no dynamics. Its command is th
              the forms type_1 and type_2 it is the beam of `beam_loop`, which acts on the receiver's error
 
 t_k: stamp of the step [s]; t_m: middle of the interval in which the command of the step is in force [s].
-
-axis  record of AxisLoop
-c     record of the constants of the axis, control_unit.AxisConstants
-p     record of AxisParameters
 """
 import dataclasses
-from collections import namedtuple
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from acu_tracker.estimation.filters import constant_gain
 from acu_tracker.geometry.motion import AxisMotion
 from acu_tracker.servo import adrc, beam_loop, ends, feedforward, notch, pid, reference
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Floats, Vector3
+from pedestal_common.quantities import (
+    Floats,
+    NewtonMeters,
+    Radians,
+    RadiansPerSecond,
+    RadiansPerSecond2,
+    Seconds,
+    Vector3,
+)
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.control_unit import AxisConstants
+    from acu_tracker.params import AxisParameters
 
 CONTROLLERS = ('pid', 'feedforward', 'adrc', 'beam')
 CONTROLLER_PID, CONTROLLER_FEEDFORWARD, CONTROLLER_ADRC, CONTROLLER_BEAM = range(len(CONTROLLERS))
@@ -32,50 +39,50 @@ CONTROLLER_PID, CONTROLLER_FEEDFORWARD, CONTROLLER_ADRC, CONTROLLER_BEAM = range
 
 class AxisLoop(Record):
     """State of the position loop of one axis."""
-    controller: int
-    command: float  # of the last step; [rad/s]
+    controller: int                 # index into CONTROLLERS
+    command: RadiansPerSecond       # of the last step
     reference: reference.Reference
-    integral: float
-    error: float
-    derivative: float  # I [rad/s], e [rad], D [rad/s] of pid
-    z: Vector3
-    observed: float  # adrc: z1 z2 z3, and their instant [s]
+    integral: RadiansPerSecond      # I
+    error: Radians                  # e of pid
+    derivative: RadiansPerSecond    # D of pid
+    z: Vector3                      # of adrc: z1, z2, z3
+    observed: Seconds               # of adrc: instant of z
     notch: Annotated[Floats, (4,)]  # memory of notch.removed
 
 
-Instants = namedtuple('Instants', 't_k t_m dt')
-"""Times of a step [s].
+class Instants(NamedTuple):
+    """Times of a step."""
+    t_k: Seconds    # stamp of the step
+    t_m: Seconds    # middle of the interval in which the command of the step is in force
+    dt: Seconds     # time since the step before
 
-t_k  stamp of the step
-t_m  middle of the interval in which the command of the step is in force
-dt   time since the step before
-"""
 
-Feedback = namedtuple('Feedback', 'y dy error V closed ends')
-"""Feedback of one axis at t_k.
+class Feedback(NamedTuple):
+    """Feedback of one axis at t_k."""
+    y: Radians              # angle of the encoder
+    dy: RadiansPerSecond    # rate of the encoder
+    error: Radians          # receiver error of this axis, as a deck angle; NaN: no error in this step
+    V: RadiansPerSecond     # rate at which the motion of the deck moves the deck angle of a fixed target
+    closed: bool            # True if a beam closes its own loop on the receiver error
+    ends: ends.Ends         # present ends of the travel
 
-y, dy   angle [rad] and rate [rad/s] of the encoder
-error   receiver error of this axis, as a deck angle [rad]; NaN: no error in this step
-V       rate at which the motion of the deck moves the deck angle of a fixed target [rad/s]
-closed  True if a beam closes its own loop on the receiver error
-ends    present Ends of the travel
-"""
 
-Command = namedtuple('Command', 'rate torque reference angle_limited rate_limited acceleration_limited')
-"""Command of one axis.
+class Command(NamedTuple):
+    """Command of one axis."""
+    rate: RadiansPerSecond
+    torque: NewtonMeters    # load torque that is fed forward
+    reference: AxisMotion   # is compared with the encoder at t_k; for a beam the commanded angle
+    angle_limited: bool
+    rate_limited: bool
+    acceleration_limited: bool
 
-rate       rate command [rad/s]
-torque     load torque that is fed forward [Nm]
-reference  AxisMotion that is compared with the encoder at t_k; for a beam the commanded angle
-angle_limited, rate_limited, acceleration_limited  True if the angle, the rate or the acceleration was limited
-"""
 
 MAX_DELAY_PHASE_RAD = 0.5
 """Largest product of bandwidth and delay of the command [rad]: the loss of phase margin by the delay."""
 
 
-def slowed(params, delay):
-    """Return AxisParameters whose loops are stable with a delay of the command [s].
+def slowed(params: 'AxisParameters', delay: Seconds) -> 'AxisParameters':
+    """Return AxisParameters whose loops are stable with a delay of the command.
 
     The bandwidth of each controller is reduced to MAX_DELAY_PHASE_RAD / delay, if it is higher.
     """
@@ -88,13 +95,14 @@ def slowed(params, delay):
 
 
 @compiled
-def limited(wanted, before, dt, rate, acceleration):
-    """Return (rate command [rad/s], True if the rate was limited, True if the acceleration was limited).
+def limited(wanted: RadiansPerSecond, before: RadiansPerSecond, dt: Seconds, rate: RadiansPerSecond,
+            acceleration: RadiansPerSecond2) -> tuple[RadiansPerSecond, bool, bool]:
+    """Return (rate command, True if the rate was limited, True if the acceleration was limited).
 
-    wanted        rate command before the limits [rad/s]
-    before        rate command of the step before, dt [s] ago [rad/s]
-    rate          largest absolute value of the command [rad/s]
-    acceleration  largest change of the command over time [rad/s2]
+    wanted        rate command before the limits
+    before        rate command of the step before, dt ago
+    rate          largest absolute value of the command
+    acceleration  largest change of the command over time
     """
     u = min(max(wanted, -rate), rate)
     rate_limited = u != wanted
@@ -104,8 +112,8 @@ def limited(wanted, before, dt, rate, acceleration):
 
 
 @compiled
-def realised(command, dy):
-    """Return the part of a rate command [rad/s] that an axis realises while it moves at the rate dy [rad/s].
+def realised(command: RadiansPerSecond, dy: RadiansPerSecond) -> RadiansPerSecond:
+    """Return the part of a rate command that an axis realises while it moves at the rate dy.
 
     The part is 0 if the axis moves against the command, the command if the axis is faster, and else dy.
     """
@@ -113,20 +121,20 @@ def realised(command, dy):
 
 
 @compiled
-def replace_command(axis, rate):
-    """Replace the rate command of the last step by another one [rad/s], with which the next step begins."""
+def replace_command(axis: AxisLoop, rate: RadiansPerSecond) -> None:
+    """Replace the rate command of the last step by another one, with which the next step begins."""
     axis.command = rate
 
 
 @compiled
-def initialise(axis, p, t_k, y, dy):
-    """Start the controller from the angle y [rad] and the rate dy [rad/s] of the encoder at t_k [s].
+def initialise(axis: AxisLoop, params: 'AxisParameters', t_k: Seconds, y: Radians, dy: RadiansPerSecond) -> None:
+    """Start the controller from the angle y and the rate dy of the encoder at t_k.
 
     A beam keeps its last command. Because the measured beam lags the command by the delay, each start from the
     measured beam would move the command back by this lag.
     """
-    axis.controller = p.controller
-    if p.controller == CONTROLLER_BEAM and axis.reference.planned.count > 0:
+    axis.controller = int(params.controller)
+    if axis.controller == CONTROLLER_BEAM and axis.reference.planned.count > 0:
         axis.reference.rate = 0.0
         return
     reference.initialise(axis.reference, t_k, y, dy, axis.command)
@@ -136,55 +144,58 @@ def initialise(axis, p, t_k, y, dy):
 
 
 @compiled
-def _initialise_feedback(axis, t_k, y, dy):
-    """Reset the integral and the observer: they start without a disturbance, at y [rad] and dy [rad/s]."""
+def _initialise_feedback(axis: AxisLoop, t_k: Seconds, y: Radians, dy: RadiansPerSecond) -> None:
+    """Reset the integral and the observer: they start without a disturbance, at y and dy."""
     axis.integral = 0.0
     axis.z[0], axis.z[1], axis.z[2] = y, dy, 0.0
     axis.observed = t_k
 
 
 @compiled
-def stop(axis, p, dt):
+def stop(axis: AxisLoop, params: 'AxisParameters', dt: Seconds) -> Command:
     """Return the Command that brings the rate to zero within the acceleration limit; reset the integral.
 
-    dt: time since the last command [s].
+    dt: time since the last command.
     """
-    axis.command, _, acceleration_limited = limited(0.0, axis.command, dt, p.limits.rate, p.limits.acceleration)
+    axis.command, _, acceleration_limited = limited(0.0, axis.command, dt, params.limits.rate,
+                                                    params.limits.acceleration)
     axis.integral = 0.0
     return Command(axis.command, 0.0, AxisMotion(axis.reference.angle, 0.0, 0.0), False, False, acceleration_limited)
 
 
 @compiled
-def instant(p, t_k, t_m):
-    """Return the instant [s] for which the controller needs the raw target: t_k for pid, t_m for the others."""
-    return t_k if p.controller == CONTROLLER_PID else t_m
+def instant(params: 'AxisParameters', t_k: Seconds, t_m: Seconds) -> Seconds:
+    """Return the instant for which the controller needs the raw target: t_k for pid, t_m for the others."""
+    return t_k if int(params.controller) == CONTROLLER_PID else t_m
 
 
 @compiled
-def follow(axis, c, target, feedback, now):
+def follow(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedback: Feedback,
+           now: Instants) -> Command:
     """Return the Command of one step.
 
-    target: AxisMotion of the raw target at `instant`; feedback: the Feedback; now: the Instants.
+    target: the raw target at `instant`.
     """
-    if c.p.controller == CONTROLLER_BEAM:
-        return _steer(axis, c.p, target, feedback, now.dt)
-    return _step(axis, c, target, feedback, now)
+    if int(constants.p.controller) == CONTROLLER_BEAM:
+        return _steer(axis, constants.p, target, feedback, now.dt)
+    return _step(axis, constants, target, feedback, now)
 
 
 @compiled
-def _steer(axis, p, target, feedback, T):
+def _steer(axis: AxisLoop, params: 'AxisParameters', target: AxisMotion, feedback: Feedback, T: Seconds) -> Command:
     """Return the Command of an electronic beam: the raw target at t_m, or the beam that `beam_loop` computes.
 
-    T: time since the step before [s].
+    T: time since the step before.
     """
-    b, r = p.beam, axis.reference
+    b, r = params.beam, axis.reference
     beta, compensation = constant_gain.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
     axis.controller = CONTROLLER_BEAM
     r.acceleration = 0.0
-    if not feedback.closed or b.form == beam_loop.FORM_TRACKED:
+    if not feedback.closed or int(b.form) == beam_loop.FORM_TRACKED:
         reference.put(r, target)
     else:
-        r.angle, r.rate = beam_loop.step(b.form, r.angle, r.rate, feedback.error, b.alpha, beta, T, compensation)
+        r.angle, r.rate = beam_loop.step(int(b.form), r.angle, r.rate, feedback.error, b.alpha, beta, T,
+                                         compensation)
     low, high = feedback.ends
     angle_limited = not low <= r.angle <= high
     if angle_limited:
@@ -194,18 +205,20 @@ def _steer(axis, p, target, feedback, T):
 
 
 @compiled
-def _step(axis, c, target, feedback, now):
+def _step(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedback: Feedback,
+          now: Instants) -> Command:
     """Return the Command of one step of an axis with motors.
 
     Anti-windup: if the limits change the command in the direction opposite to the error, the integral keeps its value.
     The observer of adrc receives the limited command.
     """
-    p, r, y, dy = c.p, axis.reference, feedback.y, feedback.dy
-    handover = axis.controller != p.controller
-    if p.controller == CONTROLLER_PID or (handover and axis.controller == CONTROLLER_PID):
+    p, r, y, dy = constants.p, axis.reference, feedback.y, feedback.dy
+    controller = int(p.controller)
+    handover = axis.controller != controller
+    if controller == CONTROLLER_PID or (handover and axis.controller == CONTROLLER_PID):
         reference.initialise(r, now.t_k, y, dy, axis.command)
     torque, rate_limited, acceleration_limited = 0.0, False, False
-    if p.controller == CONTROLLER_PID:
+    if controller == CONTROLLER_PID:
         v, angle_limited = _held_inside(target, feedback.ends.low, feedback.ends.high)
     else:
         angle_limited, rate_limited, acceleration_limited = reference.follow(r, p, target, now.t_m, axis.command,
@@ -220,8 +233,8 @@ def _step(axis, c, target, feedback, now):
     else:
         _update(axis, p, e, y, now)
     u, fed = _control_law(axis, p, e, v)
-    u -= notch.removed(u - fed, axis.notch, c.notch)
-    kept = ends.inside(u, y, feedback.ends, c.braking, c.reaction)
+    u -= notch.removed(u - fed, axis.notch, constants.notch)
+    kept = ends.inside(u, y, feedback.ends, constants.braking, constants.reaction)
     axis.command, rate_cut, acceleration_cut = limited(kept, axis.command, now.dt, p.limits.rate,
                                                        p.limits.acceleration)
     reference.commanded(r, axis.command)
@@ -235,10 +248,10 @@ def _step(axis, c, target, feedback, now):
 
 
 @compiled
-def _held_inside(target, low, high):
+def _held_inside(target: AxisMotion, low: Radians, high: Radians) -> tuple[AxisMotion, bool]:
     """Return (AxisMotion of the raw target, put on the end of travel if it is beyond; True if it was put there).
 
-    low, high: ends of travel [rad].
+    low, high: ends of travel.
     """
     held = not low <= target.angle <= high
     if held:
@@ -247,57 +260,61 @@ def _held_inside(target, low, high):
 
 
 @compiled
-def _control_law(axis, p, e, v):
-    """Return (rate command before notch and limits, the part of it that is fed forward) [rad/s].
+def _control_law(axis: AxisLoop, params: 'AxisParameters', e: Radians,
+                 v: AxisMotion) -> tuple[RadiansPerSecond, RadiansPerSecond]:
+    """Return (rate command before notch and limits, the part of it that is fed forward).
 
-    v: AxisMotion of the reference at t_k; e: v.angle minus the encoder angle [rad].
+    v: reference at t_k; e: v.angle minus the encoder angle.
     """
-    if p.controller == CONTROLLER_PID:
-        return pid.rate(e, axis.integral, axis.derivative, p.pid.bandwidth, p.pid.derivative), 0.0
+    controller = int(params.controller)
+    if controller == CONTROLLER_PID:
+        return pid.rate(e, axis.integral, axis.derivative, params.pid.bandwidth, params.pid.derivative), 0.0
     r = axis.reference
-    if p.controller == CONTROLLER_FEEDFORWARD:
-        k = p.feedforward
+    if controller == CONTROLLER_FEEDFORWARD:
+        k = params.feedforward
         fed = feedforward.fed(r.rate, r.acceleration, k.rate_feedforward, k.acceleration_feedforward)
         return feedforward.rate(e, axis.integral, fed, k.bandwidth), fed
-    k = p.adrc
-    return adrc.rate(axis.z, v.angle, v.rate, r.rate, k.bandwidth, k.rate_bandwidth), r.rate
+    loop = params.adrc
+    return adrc.rate(axis.z, v.angle, v.rate, r.rate, loop.bandwidth, loop.rate_bandwidth), r.rate
 
 
 @compiled
-def _transfer(axis, p, e, v, feedback, t_k):
+def _transfer(axis: AxisLoop, params: 'AxisParameters', e: Radians, v: AxisMotion, feedback: Feedback,
+              t_k: Seconds) -> None:
     """Start another controller so that its first command equals the last command of the controller before.
 
     The integral takes up the difference of both commands, or the disturbance z3 of adrc. The notch starts in its
-    steady state. The arguments are those of _control_law; t_k: stamp of the step [s].
+    steady state. The arguments are those of _control_law; t_k: stamp of the step.
     """
-    axis.controller = p.controller
+    axis.controller = int(params.controller)
     axis.error, axis.derivative = e, v.rate - feedback.dy
     _initialise_feedback(axis, t_k, feedback.y, feedback.dy)
-    u, fed = _control_law(axis, p, e, v)
-    if p.controller == CONTROLLER_ADRC:
-        axis.z[2] = p.adrc.rate_bandwidth * (u - axis.command)
+    u, fed = _control_law(axis, params, e, v)
+    if axis.controller == CONTROLLER_ADRC:
+        axis.z[2] = params.adrc.rate_bandwidth * (u - axis.command)
     else:
         axis.integral = axis.command - u
     axis.notch[:] = axis.command - fed
 
 
 @compiled
-def _update(axis, p, e, y, now):
+def _update(axis: AxisLoop, params: 'AxisParameters', e: Radians, y: Radians, now: Instants) -> None:
     """Advance the observer, or the integral and the derivative, of the running controller to t_k.
 
-    e: error [rad]; y: encoder angle [rad]; now: the Instants.
+    e: error; y: encoder angle.
     """
-    if p.controller == CONTROLLER_ADRC:
+    controller = int(params.controller)
+    if controller == CONTROLLER_ADRC:
         h = now.t_k - axis.observed
         if h > 0.0:
             # u, v3: command and acceleration that were in force since the last instant of the observer.
             u, v3 = reference.in_force(axis.reference, now.t_k - 0.5 * h)
-            axis.z[0], axis.z[1], axis.z[2] = adrc.observed(axis.z, y, u, v3, p.adrc.observer_bandwidth,
-                                                            p.adrc.rate_bandwidth, h)
+            axis.z[0], axis.z[1], axis.z[2] = adrc.observed(axis.z, y, u, v3, params.adrc.observer_bandwidth,
+                                                            params.adrc.rate_bandwidth, h)
             axis.observed = now.t_k
     else:
-        if p.controller == CONTROLLER_PID:
-            axis.derivative = pid.derivative(axis.derivative, e, axis.error, now.dt, p.pid.derivative_time)
+        if controller == CONTROLLER_PID:
+            axis.derivative = pid.derivative(axis.derivative, e, axis.error, now.dt, params.pid.derivative_time)
             axis.error = e
-        K_p, K_i = pid.gains(p.pid) if p.controller == CONTROLLER_PID else pid.gains(p.feedforward)
+        K_p, K_i = pid.gains(params.pid) if controller == CONTROLLER_PID else pid.gains(params.feedforward)
         axis.integral = pid.integrated(axis.integral, e, now.dt, K_p, K_i)

@@ -5,17 +5,19 @@ history keeps the reference until the encoder reports this instant, so that both
 
 The controller pid uses no shaped reference. The reference is then kept at the angle and rate of the axis, so that
 another controller can begin there.
-
-r: record of Reference.
 """
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, interpolated, push
 from acu_tracker.geometry.motion import AxisMotion
 from acu_tracker.servo import shaper
+from acu_tracker.servo.ends import Ends
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Floats, Radians, RadiansPerSecond, RadiansPerSecond2
+from pedestal_common.quantities import Floats, Radians, RadiansPerSecond, RadiansPerSecond2, Seconds
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.params import AxisParameters
 
 
 class Planned(History):
@@ -36,68 +38,69 @@ ANGLE_COLUMN, RATE_COLUMN, ACCELERATION_COLUMN, COMMAND_COLUMN = range(4)
 
 
 @compiled
-def now(r):
-    """Return the newest reference, an AxisMotion."""
-    return AxisMotion(r.angle, r.rate, r.acceleration)
+def now(reference: Reference) -> AxisMotion:
+    """Return the newest reference."""
+    return AxisMotion(reference.angle, reference.rate, reference.acceleration)
 
 
 @compiled
-def put(r, motion):
-    """Set the reference to an AxisMotion."""
-    r.angle, r.rate, r.acceleration = motion
+def put(reference: Reference, motion: AxisMotion) -> None:
+    """Set the reference."""
+    reference.angle, reference.rate, reference.acceleration = motion
 
 
 @compiled
-def _plan(r, stamp, command):
+def _plan(reference: Reference, stamp: Seconds, command: RadiansPerSecond) -> None:
     """Put the reference into the history.
 
-    stamp: instant for which the reference is planned [s]; command: rate command [rad/s].
+    stamp: instant for which the reference is planned; command: rate command.
     """
-    row = r.planned.sample[push(r.planned, stamp)]
-    row[ANGLE_COLUMN], row[RATE_COLUMN], row[ACCELERATION_COLUMN] = r.angle, r.rate, r.acceleration
-    row[COMMAND_COLUMN] = command
+    row = reference.planned.sample[push(reference.planned, stamp)]
+    row[ANGLE_COLUMN], row[RATE_COLUMN] = reference.angle, reference.rate
+    row[ACCELERATION_COLUMN], row[COMMAND_COLUMN] = reference.acceleration, command
 
 
 @compiled
-def initialise(r, stamp, y, dy, command):
-    """Restart the reference at an angle y [rad] and a rate dy [rad/s] at a stamp [s]; clear the history.
+def initialise(reference: Reference, stamp: Seconds, y: Radians, dy: RadiansPerSecond,
+               command: RadiansPerSecond) -> None:
+    """Restart the reference at an angle y and a rate dy at a stamp; clear the history.
 
-    command: rate command in force [rad/s].
+    command: rate command in force.
     """
-    r.planned.count = 0
-    put(r, AxisMotion(y, dy, 0.0))
-    _plan(r, stamp, command)
+    reference.planned.count = 0
+    put(reference, AxisMotion(y, dy, 0.0))
+    _plan(reference, stamp, command)
 
 
 @compiled
-def follow(r, p, target, stamp, command, ends):
+def follow(reference: Reference, params: 'AxisParameters', target: AxisMotion, stamp: Seconds,
+           command: RadiansPerSecond, ends: Ends) -> tuple[bool, bool, bool]:
     """Advance the shaped reference towards a target. Return (angle limited, rate limited, acceleration limited).
 
-    p        record of AxisParameters
-    target   AxisMotion of the raw target at the stamp
-    stamp    instant for which the reference is planned [s]
-    command  rate command of the step before [rad/s]; `commanded` replaces it in the history
-    ends     present Ends of the axis
+    target   raw target at the stamp
+    stamp    instant for which the reference is planned
+    command  rate command of the step before; `commanded` replaces it in the history
+    ends     present ends of the axis
     """
-    k = p.shaper
-    dt = stamp - r.planned.stamp[r.planned.newest]
+    k = params.shaper
+    dt = stamp - reference.planned.stamp[reference.planned.newest]
     target, angle_limited = shaper.held_inside(target, ends.low, ends.high, k.acceleration,
                                                k.h0 + k.acceleration / k.jerk)
-    shaped, rate_limited, acceleration_limited = shaper.shape(now(r), target, dt, k)
-    put(r, shaped)
-    _plan(r, stamp, command)
+    shaped, rate_limited, acceleration_limited = shaper.shape(now(reference), target, dt, k)
+    put(reference, shaped)
+    _plan(reference, stamp, command)
     return angle_limited, rate_limited, acceleration_limited
 
 
 @compiled
-def commanded(r, command):
-    """Put the rate command [rad/s] of this step into the newest row of the history."""
-    r.planned.sample[r.planned.newest, COMMAND_COLUMN] = command
+def commanded(reference: Reference, command: RadiansPerSecond) -> None:
+    """Put the rate command of this step into the newest row of the history."""
+    reference.planned.sample[reference.planned.newest, COMMAND_COLUMN] = command
 
 
 @compiled
-def _around(history, t):
-    """Return the result of `bracket` at t [s]; if t is outside the history, use its oldest row for both rows."""
+def _around(history: History, t: Seconds) -> tuple[int, int, float]:
+    """Return the result of `bracket` at t; if t is outside the history, use its oldest row for both rows."""
     i, j, f = bracket(history, t)
     if i < 0:
         i = j = (history.newest + 1 - history.count) % HISTORY_LENGTH
@@ -105,22 +108,24 @@ def _around(history, t):
 
 
 @compiled
-def planned(r, t):
-    """Return the AxisMotion that was planned for t [s].
+def planned(reference: Reference, t: Seconds) -> AxisMotion:
+    """Return the AxisMotion that was planned for t.
 
     The angle is interpolated by a cubic Hermite polynomial, rate and acceleration linearly.
     """
-    i, j, f = rows = _around(r.planned, t)
-    a, b = r.planned.sample[i], r.planned.sample[j]
-    T = r.planned.stamp[j] - r.planned.stamp[i]
+    i, j, f = rows = _around(reference.planned, t)
+    a, b = reference.planned.sample[i], reference.planned.sample[j]
+    T = reference.planned.stamp[j] - reference.planned.stamp[i]
     # T: time between the rows; d: change of the angle; m0, m1: slopes at the ends, times T.
     d, m0, m1 = b[ANGLE_COLUMN] - a[ANGLE_COLUMN], T * a[RATE_COLUMN], T * b[RATE_COLUMN]
     return AxisMotion(a[ANGLE_COLUMN] + f * (m0 + f * (3.0 * d - 2.0 * m0 - m1 + f * (m0 + m1 - 2.0 * d))),
-                      interpolated(r.planned, rows, RATE_COLUMN), interpolated(r.planned, rows, ACCELERATION_COLUMN))
+                      interpolated(reference.planned, rows, RATE_COLUMN),
+                      interpolated(reference.planned, rows, ACCELERATION_COLUMN))
 
 
 @compiled
-def in_force(r, t):
-    """Return (rate command [rad/s], acceleration of the reference [rad/s2]) that were in force at t [s]."""
-    rows = _around(r.planned, t)
-    return interpolated(r.planned, rows, COMMAND_COLUMN), interpolated(r.planned, rows, ACCELERATION_COLUMN)
+def in_force(reference: Reference, t: Seconds) -> tuple[RadiansPerSecond, RadiansPerSecond2]:
+    """Return (rate command, acceleration of the reference) that were in force at t."""
+    history = reference.planned
+    rows = _around(history, t)
+    return interpolated(history, rows, COMMAND_COLUMN), interpolated(history, rows, ACCELERATION_COLUMN)

@@ -8,18 +8,20 @@ raw target within the limits without lag. After a jump it reaches the raw target
 import math
 
 from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.servo.params import ShaperParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan
+from pedestal_common.quantities import Radians, RadiansPerSecond, RadiansPerSecond2, RadiansPerSecond3, Seconds
 
 SUB_STEP_COUNT = 4  # number of sub-steps in which the shaper computes a step of the drive
 
 
 @compiled
-def toward_rate_limit(gap, h, jerk):
-    """Return the largest acceleration a [rad/s2] with which the rate still stays inside its limit.
+def toward_rate_limit(gap: RadiansPerSecond, h: Seconds, jerk: RadiansPerSecond3) -> RadiansPerSecond2:
+    """Return the largest acceleration a with which the rate still stays inside its limit.
 
-    gap: distance of the rate from its limit [rad/s]; h: sub-step [s]; jerk: largest jerk j [rad/s3]. The jerk must
-    reduce a to 0 before the rate has grown by gap:
+    gap: distance of the rate from its limit; h: sub-step; jerk: largest jerk j. The jerk must reduce a to 0 before the
+    rate has grown by gap:
 
         a^2/(2 j) + a h/2 + j h^2/8 = gap
 
@@ -33,14 +35,15 @@ def toward_rate_limit(gap, h, jerk):
 
 
 @compiled
-def held_inside(raw, low, high, braking, lag):
+def held_inside(raw: AxisMotion, low: Radians, high: Radians, braking: RadiansPerSecond2,
+                lag: Seconds) -> tuple[AxisMotion, bool]:
     """Return (AxisMotion of the raw target, put on a limit if necessary; True if it was put there).
 
     A raw target is put on a limit if it is beyond the limit, or if it could not stop before the limit.
 
-    low, high  limits [rad]
-    braking    deceleration [rad/s2]
-    lag        time until the braking begins [s]
+    low, high  limits
+    braking    deceleration
+    lag        time until the braking begins
     """
     stop = raw.angle + raw.rate * (abs(raw.rate) / (2.0 * braking) + lag)
     if raw.angle > high or (raw.rate > 0.0 and stop > high):
@@ -51,12 +54,11 @@ def held_inside(raw, low, high, braking, lag):
 
 
 @compiled
-def shape(before, raw, dt, limits):
-    """Return (AxisMotion of the shaped reference, True if its rate was limited, True if its acceleration was limited).
+def shape(before: AxisMotion, raw: AxisMotion, dt: Seconds, limits: ShaperParameters) -> tuple[AxisMotion, bool, bool]:
+    """Return (shaped reference, True if its rate was limited, True if its acceleration was limited).
 
-    before  AxisMotion of the shaped reference dt [s] ago
-    raw     AxisMotion of the raw target now, at the end of dt
-    limits  record of ShaperParameters
+    before  shaped reference dt ago
+    raw     raw target now, at the end of dt
     """
     p, v, a = before
     h = dt / SUB_STEP_COUNT

@@ -10,28 +10,25 @@ a is dt / ENVELOPE_TIME_CONSTANT_S, but 0 as long as the command that made the e
 
 An axis may lag behind its commands and overshoot them. Therefore every rate between 0 and the envelope is allowed. The
 rate may also exceed this range by a threshold and a share of the width of the envelope.
-
-s: record of Envelope.
 """
 import math
 from typing import Annotated
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Floats, Pair
+from pedestal_common.quantities import Bit, Floats, Pair, RadiansPerSecond, Records, Seconds
 from pedestal_common.record import Record
 
 
 class Envelope(Record):
     """State of the detection."""
-    high: Pair
-    low: Pair  # h, l of both axes [rad/s]
-    high_at: Pair
-    low_at: Pair  # last command that made them [s]
-    since: float  # stamp from which the axes are watched [s]
-    beyond: float  # last stamp at which no rate was outside its allowed range [s]
-    moves: int  # 1 after a rate was outside for MIN_EXCESS_TIME_S, until a reset
-    # of each axis, at the detection: rate, lowest and highest allowed rate [rad/s]
-    measured: Annotated[Floats, (2, 3)]
+    high: Pair      # h of both axes [rad/s]
+    low: Pair       # l of both axes [rad/s]
+    high_at: Pair   # time of the last command that made h [s]
+    low_at: Pair    # time of the last command that made l [s]
+    since: Seconds  # stamp from which the axes are watched
+    beyond: Seconds     # last stamp at which no rate was outside its allowed range
+    moves: Bit      # 1 after a rate was outside for MIN_EXCESS_TIME_S, until a reset
+    measured: Annotated[Floats, (2, 3)]     # of each axis, at the detection: rate, lowest and highest allowed [rad/s]
 
 
 ENVELOPE_TIME_CONSTANT_S = 0.2
@@ -50,70 +47,70 @@ A gust of 4000 Nm on both axes causes a shorter excess.
 """
 
 
-def initialise(s):
-    """Start before the first step; s: view of Envelope."""
-    s['since'] = -math.inf
+def initialise(record: Records) -> None:
+    """Start before the first step."""
+    record['since'] = -math.inf
 
 
 @compiled
-def _restart(s, t):
-    """Restart the detection at t [s], with no command in force."""
-    s.since, s.beyond = t, t
-    s.high[:] = 0.0
-    s.low[:] = 0.0
+def _restart(envelope: Envelope, t: Seconds) -> None:
+    """Restart the detection at t, with no command in force."""
+    envelope.since, envelope.beyond = t, t
+    envelope.high[:] = 0.0
+    envelope.low[:] = 0.0
 
 
 @compiled
-def release(s):
+def release(envelope: Envelope) -> None:
     """Reset the detected uncommanded motion."""
-    s.moves = 0
+    envelope.moves = 0
 
 
 @compiled
-def watch(s, t, velocity, threshold, restart):
+def watch(envelope: Envelope, t: Seconds, velocity: Pair, threshold: RadiansPerSecond, restart: bool) -> bool:
     """Take the measured rates of a step; return True if uncommanded motion is detected.
 
-    t          stamp of the step [s]
-    velocity   measured rates (2,), which follow the commands of earlier steps [rad/s]
-    threshold  part of the allowed excess that does not depend on the envelope [rad/s]
+    t          stamp of the step
+    velocity   measured rates, which follow the commands of earlier steps [rad/s]
+    threshold  part of the allowed excess that does not depend on the envelope
     restart    True if no earlier command is in force
     """
-    if restart or not math.isfinite(s.since):
-        _restart(s, t)
+    if restart or not math.isfinite(envelope.since):
+        _restart(envelope, t)
     outside = False
     for i in range(2):
-        allowed = threshold + ENVELOPE_OVERSHOOT_SHARE * (s.high[i] - s.low[i])
-        low, high = min(s.low[i], 0.0) - allowed, max(s.high[i], 0.0) + allowed
+        allowed = threshold + ENVELOPE_OVERSHOOT_SHARE * (envelope.high[i] - envelope.low[i])
+        low, high = min(envelope.low[i], 0.0) - allowed, max(envelope.high[i], 0.0) + allowed
         outside |= velocity[i] > high or velocity[i] < low
-        if s.moves == 0:
-            s.measured[i, 0], s.measured[i, 1], s.measured[i, 2] = velocity[i], low, high
-    if not outside or t - s.since < RESTART_SETTLING_TIME_S:
-        s.beyond = t
-    elif t - s.beyond >= MIN_EXCESS_TIME_S:
-        s.moves = 1
-    return s.moves != 0
+        if envelope.moves == 0:
+            envelope.measured[i, 0], envelope.measured[i, 1], envelope.measured[i, 2] = velocity[i], low, high
+    if not outside or t - envelope.since < RESTART_SETTLING_TIME_S:
+        envelope.beyond = t
+    elif t - envelope.beyond >= MIN_EXCESS_TIME_S:
+        envelope.moves = 1
+    return envelope.moves != 0
 
 
 @compiled
-def beyond(s, t):
-    """Return True if a rate was outside its allowed range in the step at t [s]."""
-    return s.beyond < t
+def beyond(envelope: Envelope, t: Seconds) -> bool:
+    """Return True if a rate was outside its allowed range in the step at t."""
+    return envelope.beyond < t
 
 
 @compiled
-def command(s, i, rate, t, dt, hold):
-    """Take the rate command [rad/s] of axis i at t [s] into the envelope.
+def command(envelope: Envelope, i: int, rate: RadiansPerSecond, t: Seconds, dt: Seconds, hold: Seconds) -> None:
+    """Take the rate command of axis i at t into the envelope.
 
-    dt    time by which the envelope shrinks [s]; at most a period, because a control unit that was late does not make
+    dt    time by which the envelope shrinks; at most a period, because a control unit that was late does not make
           up the missed steps
-    hold  longest time for which a command stays in force [s]
+    hold  longest time for which a command stays in force
     """
     a = min(dt / ENVELOPE_TIME_CONSTANT_S, 1.0)
-    if rate >= s.high[i]:
-        s.high[i], s.high_at[i] = rate, t
-    elif t - s.high_at[i] > hold:
-        s.high[i] = max(rate, s.high[i] + a * (rate - s.high[i]))
-    if rate <= s.low[i]:
-        s.low[i], s.low_at[i] = rate, t
-    elif t - s.low_at[i] > hold:
-        s.low[i] = min(rate, s.low[i] + a * (rate - s.low[i]))
+    if rate >= envelope.high[i]:
+        envelope.high[i], envelope.high_at[i] = rate, t
+    elif t - envelope.high_at[i] > hold:
+        envelope.high[i] = max(rate, envelope.high[i] + a * (rate - envelope.high[i]))
+    if rate <= envelope.low[i]:
+        envelope.low[i], envelope.low_at[i] = rate, t
+    elif t - envelope.low_at[i] > hold:
+        envelope.low[i] = min(rate, envelope.low[i] + a * (rate - envelope.low[i]))

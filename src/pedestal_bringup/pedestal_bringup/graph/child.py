@@ -26,6 +26,10 @@ import sys
 import threading
 import time
 import traceback
+from collections.abc import Callable, Iterable
+from typing import NoReturn
+
+from pedestal_common.quantities import Seconds
 
 PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_MM, PR_SET_MM_MAP = 1, 15, 35, 14  # operations of prctl(2)
 
@@ -53,16 +57,16 @@ class Child:
     """Child process that is held until `begin` and then runs a module like `python -m`. Its methods are like those of
     subprocess.Popen. It heads a session of its own, and the kernel sends it SIGTERM when its parent ends.
 
-    command   [interpreter, '-m', module, arguments ...]
+    command   interpreter, '-m', module, arguments ...
     output    file descriptor of its log
     rehearse  function that a copy calls while it is held, to load the laws of the node. Errors of this function are
               ignored, because the node meets the same error later and reports it.
     """
 
-    def __init__(self, command, output, rehearse):
+    def __init__(self, command: list[str], output: int, rehearse: Callable[[], object]) -> None:
         copy = 'rclpy' not in sys.modules and threading.active_count() == 1
         gate, self._begin = os.pipe()
-        self.returncode = None
+        self.returncode: int | None = None
         parent = os.getpid()
         if copy:
             # This avoids that a garbage collection in the child writes to memory pages that it shares with its parent,
@@ -72,7 +76,7 @@ class Child:
         try:
             self.pid = os.fork()
             if not self.pid:
-                def run():
+                def run() -> int:
                     held = _settle(parent, output, gate, mask)
                     # A copy that cannot show its own command line would look like a second `pedestal run`, and a
                     # user who kills that name would kill the node too. A new interpreter has its own command line.
@@ -86,13 +90,13 @@ class Child:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
             os.close(gate)
 
-    def begin(self):
+    def begin(self) -> None:
         """Release the held process, so that it runs its module."""
         with contextlib.suppress(BrokenPipeError):
             os.write(self._begin, b'.')
         os.close(self._begin)
 
-    def poll(self):
+    def poll(self) -> int | None:
         """Return the exit code of the process, -N after an end by signal N; None while the process runs."""
         if self.returncode is None:
             pid, status = os.waitpid(self.pid, os.WNOHANG)
@@ -100,30 +104,31 @@ class Child:
                 self.returncode = os.waitstatus_to_exitcode(status)
         return self.returncode
 
-    def wait(self, timeout=None):
-        """Wait for the end of the process and return its exit code. timeout: longest wait [s], None without limit.
+    def wait(self, timeout: Seconds | None = None) -> int:
+        """Wait for the end of the process and return its exit code. timeout: longest wait, None without limit.
         Raises subprocess.TimeoutExpired."""
         end = math.inf if timeout is None else time.monotonic() + timeout
         while self.poll() is None:
-            if time.monotonic() > end:
+            if timeout is not None and time.monotonic() > end:
                 raise subprocess.TimeoutExpired(str(self.pid), timeout)
             time.sleep(0.005)
+        assert self.returncode is not None
         return self.returncode
 
-    def send_signal(self, number):
+    def send_signal(self, number: int) -> None:
         """Send a signal, unless the process has ended."""
         if self.poll() is None:
             os.kill(self.pid, number)
 
-    def kill(self):
+    def kill(self) -> None:
         """Send SIGKILL."""
         self.send_signal(signal.SIGKILL)
 
 
-def _run_child(run):
+def _run_child(run: Callable[[], int]) -> NoReturn:
     """Call run(), and end the child with the exit code that run() returns. An error in run() ends the child with code
     1, because the child must never return into the code of its parent."""
-    code = 1
+    code: str | int = 1     # a text ends a program with exit code 1
     try:
         code = run() or 0
     except SystemExit as end:
@@ -137,7 +142,7 @@ def _run_child(run):
             os._exit(code if isinstance(code, int) else 1)
 
 
-def _settle(parent, output, gate, mask):
+def _settle(parent: int, output: int, gate: int, mask: Iterable[int]) -> int:
     """Detach the child from the resources of its parent, and return the new descriptor of the gate.
 
     parent: its process number; output: descriptor of the log; gate: pipe on which the parent releases the child; mask:
@@ -164,25 +169,27 @@ def _settle(parent, output, gate, mask):
     return gate
 
 
-def _wait(gate):
+def _wait(gate: int) -> None:
     """Wait at the gate until the parent releases this process; end this process if the parent has ended."""
     if not os.read(gate, 1):
         os._exit(0)
     os.close(gate)
 
 
-def _as_interpreter(command, gate, _):
+def _as_interpreter(command: list[str], gate: int, _: object) -> NoReturn:
     """Wait for the release, then replace this process by a new interpreter that runs the command."""
     _wait(gate)
     os.execv(command[0], command)
 
 
-def _as_copy(command, gate, rehearse):
+def _as_copy(command: list[str], gate: int, rehearse: Callable[[], object]) -> int:
     """Import the module of the command and rehearse, wait for the release, then run main() of the module."""
     sys.stdout, sys.stderr = (open(descriptor, 'w', buffering, errors='backslashreplace', closefd=False)
                               for descriptor, buffering in ((1, -1), (2, 1)))
     module = command[2]
-    sys.argv = [importlib.util.find_spec(module).origin, *command[3:]]
+    found = importlib.util.find_spec(module)
+    assert found is not None and found.origin is not None
+    sys.argv = [found.origin, *command[3:]]
     # The module of the node first imports pedestal_common.entry, which sets the signal handlers if sys.argv[0] is a
     # node. The parent may have imported `entry` with another sys.argv[0]. Because an import executes a module only
     # once, `entry` is removed here, so that the next import executes it again.
@@ -194,7 +201,7 @@ def _as_copy(command, gate, rehearse):
     return main()
 
 
-def _set_command_line(command):
+def _set_command_line(command: list[str]) -> bool:
     """Give this process its own command line, as ps, pgrep and killall show it. Return True if the kernel has done
     so."""
     with contextlib.suppress(OSError, ValueError, struct.error):
@@ -202,7 +209,7 @@ def _set_command_line(command):
     return False
 
 
-def _try_to_set_command_line(command):
+def _try_to_set_command_line(command: list[str]) -> bool:
     """Copy the command line into new memory, and tell the kernel its addresses; see _set_command_line."""
     _libc.prctl(PR_SET_NAME, os.path.basename(command[0]).encode())
     line = b''.join(os.fsencode(argument) + b'\0' for argument in command)
@@ -211,7 +218,7 @@ def _try_to_set_command_line(command):
     with open('/proc/self/stat') as stream:
         # proc(5) counts its fields from 1. The fields are counted from the last bracket on, because field 2, a name in
         # brackets, may contain any character. Three zeros stand for the fields 0, 1 and 2.
-        fields = [0, 0, 0, *stream.read().rpartition(')')[2].split()]
+        fields = ['0', '0', '0', *stream.read().rpartition(')')[2].split()]
     code, stack, data_and_heap, environment = (map(int, fields[first:end]) for first, end in (
         CODE_FIELDS, STACK_FIELDS, DATA_AND_HEAP_FIELDS, ENVIRONMENT_FIELDS))
     memory = PRCTL_MM_MAP.pack(*code, *data_and_heap, _libc.sbrk(0), *stack, begin, begin + len(line), *environment,

@@ -4,13 +4,20 @@ The class processes.Graph makes a process for each node and holds it. The module
 begin, and watches them.
 """
 import pathlib
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING
 
-from pedestal_bringup.graph.processes import Graph
-from pedestal_bringup.graph.start import START_LEAD_TIME_S
+from pedestal_bringup.graph.processes import Graph, ServerProcess
+from pedestal_bringup.graph.start import START_LEAD_TIME_S, Outcome
 from pedestal_common.graph import domain
+from pedestal_common.quantities import Message, Seconds
+
+if TYPE_CHECKING:
+    from pedestal_bringup.scenario.program import Plan
 
 
-def _free_bag(scenario):
+def _free_bag(scenario: str) -> pathlib.Path:
     """Return the path bags/runs/SCENARIO-N with the smallest N for which nothing exists there.
 
     scenario: name of the scenario.
@@ -23,7 +30,7 @@ def _free_bag(scenario):
         number += 1
 
 
-def new_bag(given, scenario):
+def new_bag(given: str, scenario: str) -> pathlib.Path:
     """Return the folder for the recording: `given`, or bags/runs/SCENARIO-N if `given` is empty. scenario: name of the
     scenario. Raises ValueError if the folder exists already."""
     bag = pathlib.Path(given) if given else _free_bag(scenario)
@@ -32,8 +39,8 @@ def new_bag(given, scenario):
     return bag
 
 
-def read_files(plan):
-    """Read the files of ship and target of a program.Plan before any node is started.
+def read_files(plan: 'Plan') -> tuple[list[str], dict[str, Message]]:
+    """Read the files of ship and target of a plan before any node is started.
 
     Return (lines of text that announce the run to the user, {topic: program track}). Raises ValueError, OSError for an
     invalid file.
@@ -41,13 +48,13 @@ def read_files(plan):
     return plan.announced(), plan.tracks
 
 
-def run(plan, bag, progress, servers=None):
-    """Run the scenario of a program.Plan to its end, or until Ctrl-C, and return its Outcome.
+def run(plan: 'Plan', bag: pathlib.Path, progress: AbstractContextManager[Callable[[Seconds], object]],
+        servers: Mapping[str, ServerProcess] | None = None) -> Outcome:
+    """Run the scenario of a plan to its end, or until Ctrl-C, and return its Outcome.
 
-    bag: folder for the recording. progress: context manager that gives a function; this function is called during
-    the run with the time of the run [s]. servers: {name: processes.ServerProcess} beside the nodes. Raises RunError if
-    the run cannot continue. The recording up to that moment stays readable. Raises GraphError if the domain of the
-    user has another graph, see domain.of_run.
+    bag: folder for the recording. progress: its function is called during the run with the time of the run. servers:
+    {name: process} beside the nodes. Raises RunError if the run cannot continue. The recording up to that moment stays
+    readable. Raises GraphError if the domain of the user has another graph, see domain.of_run.
     """
     _, tracks = read_files(plan)
     with domain.of_run(), Graph(plan.scenario, bag, servers) as graph:

@@ -1,6 +1,8 @@
 """Arguments of the launch file pedestal.launch.py, and the functions that turn them into a scenario. This module does
 not import the ROS 2 package `launch`, because only a machine with ROS 2 has it."""
-import typing
+import pathlib
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple, TypeVar
 
 from pedestal_bringup.graph import graph, operator_servers, supervisor
 from pedestal_bringup.graph.processes import Graph
@@ -10,13 +12,15 @@ from pedestal_bringup.scenario.program import Plan
 from pedestal_common import parameters
 
 
-class Argument(typing.NamedTuple):
-    """Argument of the launch file: name, text for --show-args, default, allowed values (() for any)."""
+class Argument(NamedTuple):
+    """Argument of the launch file."""
     name: str
-    doc: str
+    doc: str                            # for --show-args
     default: str = ''
-    choices: tuple = ()
+    choices: tuple[str, ...] = ()       # allowed values, () for any
 
+
+_N = TypeVar('_N', int, float)
 
 SERVER_OFF, SERVER_ON = 'false', 'true'
 
@@ -35,7 +39,7 @@ ARGUMENTS = (
       for name, server in operator_servers.SERVERS.items()))
 
 
-def misspelt_arguments(names):
+def misspelt_arguments(names: Iterable[str]) -> list[str]:
     """Return a line on each of the given names that looks like a misspelt argument. Because launch accepts any name,
     it reports no error itself."""
     known = [argument.name for argument in ARGUMENTS]
@@ -43,10 +47,10 @@ def misspelt_arguments(names):
             if name not in known and (meant := parameters.did_you_mean(name, known))]
 
 
-def _number(given, name, number_type, description):
+def _number(given: Mapping[str, str], name: str, number_type: Callable[[str], _N], description: str) -> _N | None:
     """Return the number of the argument `name`; None if its text is empty.
 
-    given: {argument: text}; number_type: int or float; description: of an allowed value, for the error. Raises
+    given: {argument: text}; description: of an allowed value, for the error. Raises
     ValueError.
     """
     try:
@@ -55,7 +59,7 @@ def _number(given, name, number_type, description):
         raise ValueError(f'{name}:={given[name]}: must be {description}') from None
 
 
-def load_scenario(given):
+def load_scenario(given: Mapping[str, str]) -> scenario.Scenario:
     """Return the Scenario that the arguments select and change. given: {argument: text}. Raises ValueError."""
     from pedestal_common.node import middleware  # loads rclpy, which --show-args does not need
     namespace = middleware.namespace('namespace:=', given['namespace'])
@@ -65,8 +69,9 @@ def load_scenario(given):
                          _number(given, 'duration', float, 'a number of seconds'), given['pacing'] or None)
 
 
-def servers(given, chosen):
-    """Return [(Server, its parameters)] of the requested servers. given: {argument: text}; chosen: Scenario. Raises
+def servers(given: Mapping[str, str],
+            chosen: scenario.Scenario) -> list[tuple[operator_servers.Server, dict[str, int]]]:
+    """Return [(server, its parameters)] of the requested servers. given: {argument: text}. Raises
     ValueError, see operator_servers.check."""
     ports = {name: _port(name, given[name]) for name in operator_servers.SERVERS if given[name].lower() != SERVER_OFF}
     operator_servers.check(ports, chosen.header, '{}:=')
@@ -74,7 +79,7 @@ def servers(given, chosen):
                                               **({'port': port} if port else {})}) for name, port in ports.items()]
 
 
-def _port(name, text):
+def _port(name: str, text: str) -> int:
     """Return the port of a server, 0 for a server without one. Raises ValueError."""
     default = operator_servers.SERVERS[name].port
     try:
@@ -83,8 +88,8 @@ def _port(name, text):
         raise ValueError(f'{name}:={text}: must be {SERVER_OFF}, {SERVER_ON} or a port, 1 to 65535') from None
 
 
-def prepare(given, chosen):
-    """Prepare the run of a Scenario `chosen`: in realtime compile its laws, then write its files to the folder of the
+def prepare(given: Mapping[str, str], chosen: scenario.Scenario) -> tuple[list[str], pathlib.Path, pathlib.Path]:
+    """Prepare the run of a scenario: in realtime compile its laws, then write its files to the folder of the
     logs. given: {argument: text}.
 
     Return (lines on the run, path of the ROS 2 parameter file of all nodes, path of the scenario file). Raises

@@ -1,11 +1,14 @@
 """Watch of a lockstep run by `pedestal run`. In lockstep every node is needed for the next step, so a node that dies
 or is silent ends the run. The error names this node."""
 import time
+from collections.abc import Callable, Mapping, Sequence
 
 from rclpy.executors import SingleThreadedExecutor
 
-from pedestal_bringup.graph.processes import RunError, exit_description
+from pedestal_bringup.graph.operator_node import Operator
+from pedestal_bringup.graph.processes import Graph, RunError, exit_description
 from pedestal_common.graph import nodes
+from pedestal_common.quantities import Message, Seconds
 
 ACCUSATION_TIME_S = 0.5
 """Time between a failure and the error message [s]. In this time the other nodes end, and name (accuse) the node for
@@ -14,18 +17,19 @@ which they waited."""
 SELF_ENDING_NODES = (nodes.DRIVE_NODE, 'recorder')  # nodes that end by themselves at the end of the run
 
 
-def watch(graph, operator, tracks, progress):
+def watch(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
+          progress: Callable[[Seconds], object]) -> None:
     """Watch the nodes from their start to their end.
 
-    graph: processes.Graph; operator: operator_node.Operator; tracks: {topic: program track}, sent once all nodes that
-    read them are present; progress: function of the drive's time [s]. Raises RunError.
+    tracks: {topic: program track}, sent once all nodes that read them are present; progress: function of the drive's
+    time. Raises RunError.
     """
     header = graph.scenario.header
     sent = False
     executor = SingleThreadedExecutor()
     executor.add_node(operator)
 
-    def stuck_nodes(names):
+    def stuck_nodes(names: Sequence[str]) -> list[str]:
         return operator.stuck(names, executor)
 
     while graph.ended().get(nodes.DRIVE_NODE) != 0:
@@ -44,7 +48,8 @@ def watch(graph, operator, tracks, progress):
         raise failure(graph, stuck_nodes)
 
 
-def failure(graph, stuck_nodes, without_diagnostics=None):
+def failure(graph: Graph, stuck_nodes: Callable[[list[str]], list[str]],
+            without_diagnostics: str | None = None) -> RunError:
     """Return the RunError of a run in which a node has ended too early, or is without diagnostics for too long.
 
     stuck_nodes: function that returns which of the named nodes do not answer a request. without_diagnostics: node

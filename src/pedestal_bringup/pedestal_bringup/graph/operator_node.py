@@ -1,13 +1,17 @@
 """Node `operator` inside the processes `pedestal run` and `pedestal program`: it sends the program tracks to the
 control units, and receives the diagnostics of the other nodes."""
 import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from rcl_interfaces.srv import GetParameters
+from rclpy.executors import Executor
+from rclpy.task import Future
 
 from pedestal_bringup.graph.processes import RunError
 from pedestal_common import parameters
 from pedestal_common.graph import domain, nodes
 from pedestal_common.node.shell import Shell
+from pedestal_common.quantities import Message, Nanoseconds, Seconds
 from pedestal_common.wire import messages
 
 DISCOVERY_TIME_S = 0.5  # time for which a run looks for another graph on its domain before it starts its own [s]
@@ -17,30 +21,31 @@ SERVICE_TIMEOUT_S = 2.0  # time in which a node must answer a parameter service,
 class Operator(Shell):
     """Node that sends the program tracks to a graph and receives the diagnostics of the graph.
 
-    beams           number of beams of an array, 0 for a drive with motors (as of nodes.links)
-    names           nodes whose diagnostics are used; others are ignored
-    on_diagnostics  function (DiagnosticStatus, monotonic time [s]), called for each status of these nodes
-    time            time of the graph, by the newest diagnostics [s]
-    latest          {node: monotonic time at which its newest diagnostics arrived [s]}
+    beams   number of beams of an array, 0 for a drive with motors (as of nodes.links)
+    names   nodes whose diagnostics are used; others are ignored
     """
+    on_diagnostics: Callable[[Message, Seconds], None]  # called with each DiagnosticStatus of these nodes and the
+                                                        # monotonic time at which it arrived
+    time: Seconds               # of the graph, by the newest diagnostics
+    latest: dict[str, Seconds]  # {node: monotonic time at which its newest diagnostics arrived}
 
-    def __init__(self, beams=0, names=()):
+    def __init__(self, beams: int = 0, names: Iterable[str] = ()) -> None:
         super().__init__('operator', parameters.Parameters)
         self.links = nodes.links(beams)
         self._names = frozenset(names)
         self.time = 0.0
         self.latest = {}
         self.on_diagnostics = lambda status, now: None
-        self._publish_by_topic = {}     # {topic: function that publishes bytes}
+        self._publish_by_topic: dict[str, Callable[[bytes], None]] = {}
         self.message_reader('diagnostics', self._note_diagnostics)
 
-    def send(self, tracks):
+    def send(self, tracks: Mapping[str, Message]) -> None:
         """Publish the program tracks {topic: message} on latched topics, which also deliver them to late joiners."""
         self._open_publishers(tracks)
         for topic, message in tracks.items():
             self._publish_by_topic[topic](messages.serialize(message))
 
-    def send_to(self, names, tracks):
+    def send_to(self, names: Sequence[str], tracks: Mapping[str, Message]) -> bool:
         """Publish the program tracks {topic: message} if all their subscribers are present. Return True if the tracks
         are published.
 
@@ -54,13 +59,13 @@ class Operator(Shell):
         self.send(tracks)
         return True
 
-    def _open_publishers(self, names):
+    def _open_publishers(self, names: Iterable[str]) -> None:
         """Open a publisher for each of these topics, unless it is open."""
         for name in names:
             if name not in self._publish_by_topic:
                 self._publish_by_topic[name] = self.writer(name)
 
-    def check_domain_free(self):
+    def check_domain_free(self) -> None:
         """Raise GraphError if nodes of another graph are on this ROS domain, because those nodes would receive the
         messages of this graph."""
         deadline = time.monotonic() + DISCOVERY_TIME_S
@@ -70,7 +75,7 @@ class Operator(Shell):
                 raise domain.another_graph(self.context.get_domain_id())
             time.sleep(0.02)
 
-    def _note_diagnostics(self, array):
+    def _note_diagnostics(self, array: Message) -> None:
         """Take a DiagnosticArray: keep its time, and call on_diagnostics for each status of the watched nodes."""
         for status in array.status:
             if status.name in self._names:
@@ -78,23 +83,23 @@ class Operator(Shell):
                 self.latest[status.name] = time.monotonic()
                 self.on_diagnostics(status, self.latest[status.name])
 
-    def silent(self, limit):
-        """Return the node with the oldest diagnostics if these are older than limit [s], otherwise None."""
-        last = min(self.latest, key=self.latest.get, default=None)
+    def silent(self, limit: Seconds) -> str | None:
+        """Return the node with the oldest diagnostics if these are older than a limit, otherwise None."""
+        last = min(self.latest, key=self.latest.__getitem__, default=None)
         return last if last is not None and time.monotonic() - self.latest[last] > limit else None
 
-    def stuck(self, names, executor):
+    def stuck(self, names: Sequence[str], executor: Executor) -> list[str]:
         """Return those of the named nodes that do not answer a request for parameters.
 
         rclpy answers this request in the thread that also runs the steps of the node. A node without an answer is
-        therefore stuck in its code. executor: rclpy executor of this node.
+        therefore stuck in its code. executor: of this node.
         """
         answers = self._get_parameters(names, GetParameters.Request(), executor)
         return [node for node in names if node not in answers]
 
-    def graph_start(self, node, executor):
-        """Return graph.start of a running node: the UTC at which its time is 0 [ns]. executor: rclpy executor of this
-        node. Raises RunError if the node does not answer."""
+    def graph_start(self, node: str, executor: Executor) -> Nanoseconds:
+        """Return graph.start of a running node: the UTC at which its time is 0. executor: of this node. Raises
+        RunError if the node does not answer."""
         answers = self._get_parameters([node], GetParameters.Request(names=['graph.start']), executor)
         if node not in answers or not answers[node].values:
             domain_id = self.context.get_domain_id()
@@ -102,10 +107,10 @@ class Operator(Shell):
                            f'its time: {domain.hint(domain_id)}')
         return answers[node].values[0].integer_value
 
-    def _get_parameters(self, names, request, executor):
+    def _get_parameters(self, names: Sequence[str], request: Message, executor: Executor) -> dict[str, Message]:
         """Return {node: its answer to a GetParameters request} of the named nodes that answer in time."""
         clients = {node: self.create_client(GetParameters, f'{node}/get_parameters') for node in names}
-        calls = {}
+        calls: dict[str, Future] = {}
         deadline = time.monotonic() + SERVICE_TIMEOUT_S
         while time.monotonic() < deadline and not (len(calls) == len(clients) and all(
                 call.done() for call in calls.values())):

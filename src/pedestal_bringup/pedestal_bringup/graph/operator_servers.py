@@ -3,12 +3,15 @@
 `pedestal run` starts the requested servers beside a realtime run. Each server is a node of its own that uses only the
 topics of the graph.
 """
+import argparse
 import contextlib
 import importlib.util
 import sys
 import typing
+from collections.abc import Mapping
 
 from pedestal_bringup.graph.processes import ServerProcess
+from pedestal_bringup.scenario.scenario import ScenarioParameters
 from pedestal_operator import tcp_port
 from pedestal_operator.page.page_security import PAGE_ROLES
 
@@ -17,26 +20,18 @@ SERVER_ADDRESS = '127.0.0.1'
 
 
 class Server(typing.NamedTuple):
-    """Server, a row of SERVERS.
-
-    module       Python module of the node
-    executable   name of the node's executable in ROS 2
-    port         default TCP port; 0: the server has none
-    does         task of the server, for the help texts
-    first_lines  number of lines that the server prints for the user when it begins to serve; each begins with its name
-    library      Python package that the server needs, beyond those of every node; '': none
-    extra        name of the pip requirement that installs the library
-    """
-    module: str
-    executable: str
-    port: int
-    does: str
-    first_lines: int = 1
-    library: str = ''
-    extra: str = ''
+    """Server, a row of SERVERS."""
+    module: str             # Python module of the node
+    executable: str         # name of the node's executable in ROS 2
+    port: int               # default TCP port; 0: the server has none
+    does: str               # task of the server, for the help texts
+    first_lines: int = 1    # number of lines that it prints for the user when it begins to serve; each begins with
+                            # its name
+    library: str = ''       # Python package that it needs, beyond those of every node; '': none
+    extra: str = ''         # name of the pip requirement that installs the library
 
     @property
-    def package(self):
+    def package(self) -> str:
         """Name of the ROS package that contains the node."""
         return self.module.partition('.')[0]
 
@@ -53,8 +48,8 @@ SERVERS = {'rotctld': Server('pedestal_operator.rotctld_node', 'rotctld_node', 4
                             'publish robot_description and tf, for RViz')}
 
 
-def add_arguments(parser):
-    """Add an option for each server to an argparse parser, such as --rotctld [PORT]."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add an option for each server to a parser, such as --rotctld [PORT]."""
     for name, server in SERVERS.items():
         if server.port:
             parser.add_argument(f'--{name}', nargs='?', type=port, const=server.port, metavar='PORT',
@@ -63,7 +58,7 @@ def add_arguments(parser):
             parser.add_argument(f'--{name}', action='store_const', const=0, help=f'in realtime: {server.does}')
 
 
-def port(text):
+def port(text: str) -> int:
     """Return the TCP port that the text of an option states. Raises ValueError outside 1 to 65535."""
     port = int(text)
     if not 1 <= port <= 65535:
@@ -71,10 +66,10 @@ def port(text):
     return port
 
 
-def check(ports, header, option='--{} '):
+def check(ports: Mapping[str, int], header: ScenarioParameters, option: str = '--{} ') -> None:
     """Raise ValueError if servers are requested in lockstep, if a library is missing, or if a port is in use.
 
-    ports: {name of the server: its port, 0 without one}; header: ScenarioParameters; option: format of an option in
+    ports: {name of the server: its port, 0 without one}; option: format of an option in
     the error, '--{} ' for the command line or '{}:=' for a launch file.
     """
     with contextlib.ExitStack() as probes:
@@ -92,9 +87,8 @@ def check(ports, header, option='--{} '):
                 raise ValueError(f'{requested}: {error}: {option.format(name)}PORT selects another port') from None
 
 
-def selected(options, header) -> dict:
-    """Return {name: ServerProcess} of the servers that the options request. options: as argparse returns them; header:
-    ScenarioParameters. Raises ValueError, see `check`."""
+def selected(options: argparse.Namespace, header: ScenarioParameters) -> dict[str, ServerProcess]:
+    """Return {name: process} of the servers that the options request. Raises ValueError, see `check`."""
     ports = {name: getattr(options, name) for name in SERVERS if getattr(options, name) is not None}
     check(ports, header)
     return {name: ServerProcess(

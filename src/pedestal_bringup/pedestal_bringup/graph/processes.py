@@ -10,10 +10,15 @@ import signal
 import subprocess
 import sys
 import time
-import typing
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 from pedestal_bringup.graph.child import Child
 from pedestal_common.graph import nodes
+from pedestal_common.quantities import Json
+
+if TYPE_CHECKING:
+    from pedestal_bringup.scenario.scenario import Scenario
 
 SHOWN_LOG_LINES = 8  # largest number of log lines in an error
 NODE_STOP_TIMEOUT_S = 20.0  # grace period of a node from SIGTERM to SIGKILL [s]
@@ -39,17 +44,13 @@ class RunError(RuntimeError):
     """Error of a run that ended too early; the message holds the node, the reason and its last log lines."""
 
 
-class ServerProcess(typing.NamedTuple):
-    """Process of a server beside the nodes (operator_servers).
-
-    command: [interpreter, '-m', module, arguments ...]; first_lines: number of lines that the server prints for the
-    user when it begins to serve.
-    """
-    command: list
-    first_lines: int
+class ServerProcess(NamedTuple):
+    """Process of a server beside the nodes (operator_servers)."""
+    command: list[str]      # interpreter, '-m', module, arguments ...
+    first_lines: int        # number of lines that the server prints for the user when it begins to serve
 
 
-def command_line(node, module, file):
+def command_line(node: str, module: str, file: pathlib.Path) -> list[str]:
     """Return the command that starts a node with a parameter file. node: its name; the node beam_2/acu starts in the
     namespace beam_2. module: its Python module; file: path of the parameter file."""
     beam = nodes.beam_of(node)
@@ -58,7 +59,7 @@ def command_line(node, module, file):
 
 
 @contextlib.contextmanager
-def uninterrupted():
+def uninterrupted() -> Iterator[None]:
     """Ignore the signals that end `pedestal` in this context, which is the clean stop of the nodes. A second Ctrl-C
     thus does not interrupt the stop."""
     before = {number: signal.signal(number, signal.SIG_IGN)
@@ -70,7 +71,7 @@ def uninterrupted():
             signal.signal(number, handler)
 
 
-def _load_laws(scenario, node):
+def _load_laws(scenario: 'Scenario', node: str) -> None:
     """Load the laws of a node from the law cache; do nothing if the cache lacks them."""
     from pedestal_common.compiled import is_compiled  # imported late, because only a run needs numba
     if scenario.row(node).unit:
@@ -90,44 +91,50 @@ class Graph:
     NODE.state with the last angles of a drive. The logs and states of an earlier run of the same name are deleted.
     Raises RunError if the folder cannot be written.
 
-    scenario: scenario.Scenario; bag: folder of the recording; servers: {name: ServerProcess}.
+    bag: folder of the recording; servers: by name.
     """
+    log: pathlib.Path
 
-    def __init__(self, scenario, bag, servers=None):
+    def __init__(self, scenario: 'Scenario', bag: str | pathlib.Path,
+                 servers: Mapping[str, ServerProcess] | None = None) -> None:
         self.scenario = scenario
-        self.servers, self._unannounced = servers or {}, set()
+        self.servers = servers or {}
+        self._unannounced: set[str] = set()
         self.bag = pathlib.Path(bag)
         self.log = log_folder(bag)
         self.file = self.log / 'parameters.yaml'
-        self.processes, self._begun = {}, set()
-        self._log_starts = {}
+        self.processes: dict[str, Child] = {}
+        self._begun: set[str] = set()
+        self._log_starts: dict[str, int] = {}
         with self._disk_errors_named():
             self.log.mkdir(parents=True, exist_ok=True)
             for old_file in (*self.log.glob('*.log'), *self.log.glob('*.state')):
                 old_file.unlink()
 
     @contextlib.contextmanager
-    def _disk_errors_named(self):
+    def _disk_errors_named(self) -> Iterator[None]:
         """Turn the OSErrors in this context into a RunError that names the bag and the file."""
         try:
             yield
         except OSError as error:
             raise RunError(f'cannot record to {self.bag}: {error.filename}: {error.strerror}') from None
 
-    def __enter__(self):
+    def __enter__(self) -> 'Graph':
         self._reaper = subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.graph.reaper'], stdin=subprocess.PIPE,
                                         start_new_session=True)
+        assert self._reaper.stdin is not None
+        self._reaper_input = self._reaper.stdin
         for node in self.scenario.nodes:
             if node != 'operator':     # the operator runs in this process (watch)
                 self._hold(node)
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.stop()
-        self._reaper.stdin.close()
+        self._reaper_input.close()
         self._reaper.wait()
 
-    def start_servers(self):
+    def start_servers(self) -> None:
         """Start the servers, and wait until each has announced itself. Raises RunError for a server that ends instead.
 
         The announcement of a server are the lines `NAME: address` or `NAME, ...` in its log.
@@ -145,7 +152,7 @@ class Graph:
                 if time.monotonic() > deadline:
                     raise RunError(f'--{name}: no announcement within {SERVER_START_TIMEOUT_S:g} s')
 
-    def announce(self):
+    def announce(self) -> None:
         """Print the announcements of the servers that have announced themselves since the last call."""
         for name in sorted(self._unannounced):
             lines = [line for line in self._lines(name) if line.startswith((f'{name}:', f'{name},'))]
@@ -153,12 +160,12 @@ class Graph:
                 self._unannounced.remove(name)
                 print(*lines, sep='\n', flush=True)
 
-    def write(self, parameters):
+    def write(self, parameters: str) -> None:
         """Write the parameter file with which every node starts. parameters: text of a ROS 2 parameter file."""
         with self._disk_errors_named():
             self.file.write_text(parameters)
 
-    def begin(self, parameters, names=None):
+    def begin(self, parameters: str, names: Collection[str] | None = None) -> None:
         """Start the held nodes. parameters: text of the ROS 2 parameter file with which they start; names: nodes to
         start, None for all that do not run yet."""
         self.write(parameters)
@@ -167,12 +174,12 @@ class Graph:
                 self._begun.add(node)
                 process.begin()
 
-    def start(self, node):
+    def start(self, node: str) -> None:
         """Start a server, or start a node again. The new process appends to the log of the earlier process."""
         self._hold(node)
         self.processes[node].begin()
 
-    def _hold(self, node):
+    def _hold(self, node: str) -> None:
         """Make the process of a node or server, which is held until its `begin`, and report its number to the
         reaper."""
         with open(self._log_of(node), 'ab') as output:
@@ -188,15 +195,15 @@ class Graph:
                 rehearse = functools.partial(_load_laws, self.scenario, node)
             self.processes[node] = Child(command, output.fileno(), rehearse)
         with contextlib.suppress(OSError):
-            self._reaper.stdin.write(b'%d\n' % self.processes[node].pid)
-            self._reaper.stdin.flush()
+            self._reaper_input.write(b'%d\n' % self.processes[node].pid)
+            self._reaper_input.flush()
 
-    def kill(self, node):
+    def kill(self, node: str) -> None:
         """Kill the process of a node and wait for its end."""
         self.processes[node].kill()
         self.processes[node].wait()
 
-    def stop(self):
+    def stop(self) -> bool:
         """Stop the processes that still run, and return True if every process has ended with exit code 0.
 
         The recorder ends last. In realtime the drive ends first, so that it stops its axes while the other nodes are
@@ -207,7 +214,7 @@ class Graph:
         with uninterrupted():
             return not any([code for group in (first, others, ['recorder']) for code in self._stop(group)])
 
-    def _stop(self, names):
+    def _stop(self, names: Iterable[str]) -> list[int]:
         """Stop the processes of these names together, and return their exit codes. A process that ignores SIGTERM is
         killed after NODE_STOP_TIMEOUT_S."""
         processes = [self.processes[node] for node in names if node in self.processes]
@@ -224,21 +231,21 @@ class Graph:
                 process.kill()
         return [process.wait() for process in processes]
 
-    def _log_of(self, node):
+    def _log_of(self, node: str) -> pathlib.Path:
         """Return the path of the log of a node or server."""
         return self.log / f'{node.replace("/", ".")}.log'
 
-    def _lines(self, node):
+    def _lines(self, node: str) -> list[str]:
         """Return the lines of the log of a node or server since its last start."""
         with open(self._log_of(node), 'rb') as log:
             log.seek(self._log_starts[node])
             return log.read().decode(errors='replace').strip().splitlines()
 
-    def last_lines(self, node):
+    def last_lines(self, node: str) -> list[str]:
         """Return the last lines of a node's log, at most SHOWN_LOG_LINES, without the JSON line of its result."""
         return [line for line in self._lines(node) if not line.startswith('{')][-SHOWN_LOG_LINES:]
 
-    def result(self, node):
+    def result(self, node: str) -> dict[str, Json]:
         """Return the last JSON object in a node's log: the result of the node or the reason of its end, as shell.main
         prints it; {} if the log has none."""
         for line in reversed(self._lines(node)):
@@ -247,35 +254,35 @@ class Graph:
                     return json.loads(line)
         return {}
 
-    def outcome(self, node):
+    def outcome(self, node: str) -> dict[str, Json]:
         """Return the result of a node that has ended without error. Raises RunError if its log has no result."""
         result = self.result(node)
         if not result:
             raise RunError(f'{node} ended without its result; its log is {self._log_of(node)}')
         return result
 
-    def ended(self):
+    def ended(self) -> dict[str, int]:
         """Return {node: exit code} of the processes that have ended."""
-        return {node: process.returncode for node, process in self.processes.items() if process.poll() is not None}
+        return {node: code for node, process in self.processes.items() if (code := process.poll()) is not None}
 
-    def exit_report(self, node, reason):
+    def exit_report(self, node: str, reason: str) -> str:
         """Return the text of an error: the node, the reason of its end, and the last lines of its log."""
         log = '\n'.join(f'  | {line}' for line in self.last_lines(node)) or '  | (it logged nothing)'
         return f'{node} {reason}; its last log lines ({self._log_of(node)}):\n{log}'
 
-    def cause(self, node, code):
+    def cause(self, node: str, code: int) -> str:
         """Return the last log line of a node, in brackets, if the node ended by itself with an error. code: its exit
         code. Return '' for a node that a signal has ended."""
         lines = self.last_lines(node)
         return f' ({lines[-1]})' if lines and code > 0 else ''
 
 
-def exit_description(code):
+def exit_description(code: int) -> str:
     """Return a text that states how a process with this exit code ended, for example `died by signal SIGKILL`."""
     return f'died by signal {signal.Signals(-code).name}' if code < 0 else f'ended with exit code {code}'
 
 
-def log_folder(bag):
+def log_folder(bag: str | pathlib.Path) -> pathlib.Path:
     """Return the folder of the logs of a run beside its bag: BAG.log, or BAG.logs where BAG.log is a file.
 
     `pedestal run --bag dish > dish.log` makes such a file.

@@ -14,11 +14,12 @@ import select
 import signal
 import sys
 import time
+from collections.abc import Iterable
 
 GRACE_PERIOD_S = 20.0  # time from the end of `pedestal run` in which the nodes must end by themselves [s]
 
 
-def main():
+def main() -> None:
     """Read the process numbers of the nodes until the input ends, wait for the grace period, and kill the nodes that
     remain."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -36,7 +37,7 @@ def main():
     _signal(nodes, signal.SIGKILL)
 
 
-def _signal(nodes, number):
+def _signal(nodes: Iterable[int], number: int) -> None:
     """Send a signal to the nodes, a list of pidfds."""
     for node in nodes:
         with contextlib.suppress(OSError):
@@ -44,4 +45,4 @@ def _signal(nodes, number):
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

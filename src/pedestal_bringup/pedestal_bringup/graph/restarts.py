@@ -6,23 +6,26 @@ The death of a node is the end of its process before the end of the run, for any
 import collections
 import math
 
+from pedestal_common.quantities import Seconds
+
 
 class Restarts:
-    """Schedule of the restarts of nodes that died. All times are those of one monotonic clock [s].
+    """Schedule of the restarts of nodes that died. All times are those of one monotonic clock.
 
     attempts  largest number of restarts of a node in the time `within`; 0: no restart
-    within    length of the window in which the deaths of a node are counted [s]
-    delay     the first restart in the window follows at once; each further restart waits longer by this time [s]
+    within    length of the window in which the deaths of a node are counted
+    delay     the first restart in the window follows at once; each further restart waits longer by this time
     """
 
-    def __init__(self, attempts, within, delay):
+    def __init__(self, attempts: int, within: Seconds, delay: Seconds) -> None:
         self.attempts, self.within, self.delay = attempts, within, delay
         self.count = 0
-        self._deaths = collections.defaultdict(collections.deque)
-        self._due = {}
+        self._deaths: collections.defaultdict[str, collections.deque[Seconds]] = collections.defaultdict(
+            collections.deque)
+        self._due: dict[str, Seconds] = {}
 
-    def note_death(self, node, now):
-        """Note the death of a node at the time now [s]. Return the number of its next restart in the window, from 1
+    def note_death(self, node: str, now: Seconds) -> int:
+        """Note the death of a node at the time now. Return the number of its next restart in the window, from 1
         on; 0 if the node has died too often."""
         deaths = self._deaths[node]
         while deaths and deaths[0] <= now - self.within:
@@ -34,8 +37,8 @@ class Restarts:
         self.count += 1
         return len(deaths)
 
-    def due(self, now):
-        """Return the nodes that are to be started at the time now [s]. Each restart is returned only once."""
+    def due(self, now: Seconds) -> list[str]:
+        """Return the nodes that are to be started at the time now. Each restart is returned only once."""
         ready = [node for node, time in self._due.items() if time <= now]
         for node in ready:
             del self._due[node]
@@ -44,22 +47,22 @@ class Restarts:
 
 class Losses:
     """Count of the steps that the drive lost outside the recovery time after a death. All times are those of one
-    monotonic clock [s]. The drive itself publishes the number of steps that it has lost since its start.
+    monotonic clock. The drive itself publishes the number of steps that it has lost since its start.
     """
     RECOVERY_TIME_S = 5.0
     """Time after a death in which lost steps count as an effect of the death [s]. A graph recovers within 2.3 s
     (docs/reliability.md)."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.count = 0
         self._last_number, self._recovered_at = 0, -math.inf
 
-    def note_death(self, now):
-        """Note the death of any node at the time now [s]."""
+    def note_death(self, now: Seconds) -> None:
+        """Note the death of any node at the time now."""
         self._recovered_at = now + self.RECOVERY_TIME_S
 
-    def note(self, number, now):
-        """Note the number of steps that the drive has published as lost, at the time now [s]. A restarted drive begins
+    def note(self, number: int, now: Seconds) -> None:
+        """Note the number of steps that the drive has published as lost, at the time now. A restarted drive begins
         at 0."""
         if now > self._recovered_at:
             restarted = number < self._last_number
@@ -69,31 +72,31 @@ class Losses:
 
 class Silence:
     """Times at which the last diagnostics of each node arrived, to find silent nodes. All times are those of one
-    monotonic clock [s].
+    monotonic clock.
 
-    A pause longer than `gap` [s] between two calls of `note_check` is a stall of `pedestal run` itself. Because
+    A pause longer than `gap` between two calls of `note_check` is a stall of `pedestal run` itself. Because
     `pedestal run` could not receive diagnostics in that time, the pause does not count as silence.
     """
 
-    def __init__(self, gap=1.0):
+    def __init__(self, gap: Seconds = 1.0) -> None:
         self._gap = gap
-        self._latest = {}
-        self._last_check = None
+        self._latest: dict[str, Seconds] = {}
+        self._last_check: Seconds | None = None
 
-    def note(self, node, now):
-        """Note that diagnostics of a node arrived at the time now [s]."""
+    def note(self, node: str, now: Seconds) -> None:
+        """Note that diagnostics of a node arrived at the time now."""
         self._latest[node] = now
 
-    def remove(self, node):
+    def remove(self, node: str) -> None:
         """Remove a node that has died. Its next diagnostics add it again."""
         self._latest.pop(node, None)
 
-    def longer_than(self, limit, now):
-        """Return the nodes whose last diagnostics are older than limit [s] at the time now [s]."""
+    def longer_than(self, limit: Seconds, now: Seconds) -> list[str]:
+        """Return the nodes whose last diagnostics are older than a limit at the time now."""
         return [node for node, time in self._latest.items() if now - time > limit]
 
-    def note_check(self, now):
-        """Note that nodes are checked at the time now [s]. Call this method before `longer_than`."""
+    def note_check(self, now: Seconds) -> None:
+        """Note that nodes are checked at the time now. Call this method before `longer_than`."""
         if self._last_check is not None and now - self._last_check > self._gap:
             stall = now - self._last_check
             self._latest = {node: time + stall for node, time in self._latest.items()}

@@ -1,11 +1,15 @@
 """Start and outcome of a run of the graph: the time at which the run begins, the parameters of its nodes, and the data
 that the run leaves."""
 import dataclasses
+import pathlib
 import time
+from collections.abc import Mapping
 
 from pedestal_bringup.graph.processes import log_folder
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Json, Nanoseconds
 from pedestal_common.text_files import parameter_file
 from pedestal_recording import configuration
 
@@ -22,23 +26,16 @@ LATEST_START_S = 600.0
 
 @dataclasses.dataclass
 class Outcome:
-    """Outcome of a run.
-
-    drive     result of the drive: the last JSON line of its log; {} without one
-    recorder  result of the recorder, likewise
-    restarts  number of restarts of nodes
-    losses    number of steps that the drive lost, without those lost because of restarts
-    stopped   True if the user stopped the run
-    """
-    drive: dict
-    recorder: dict
-    restarts: int = 0
-    losses: int = 0
-    stopped: bool = False
+    """Outcome of a run."""
+    drive: dict[str, Json]      # result of the drive: the last JSON line of its log; {} without one
+    recorder: dict[str, Json]   # result of the recorder, likewise
+    restarts: int = 0           # number of restarts of nodes
+    losses: int = 0             # number of steps that the drive lost, without those lost because of restarts
+    stopped: bool = False       # True if the user stopped the run
 
 
-def begins(scenario):
-    """Return graph.start of a run whose nodes start now: the UTC at which its time is 0 [ns]. In lockstep, where the
+def begins(scenario: Scenario) -> Nanoseconds:
+    """Return graph.start of a run whose nodes start now: the UTC at which its time is 0. In lockstep, where the
     steps alone determine the time, return 0."""
     if scenario.header.pacing != 'realtime':
         return 0
@@ -46,8 +43,9 @@ def begins(scenario):
     return time.time_ns() + round(lead * NS_PER_SECOND)
 
 
-def parameters_of_all(scenario, bag, start, changes=None):
-    """Return the text of the ROS 2 parameter file of a run: the values of a Scenario for each node, and the parameters
+def parameters_of_all(scenario: Scenario, bag: pathlib.Path, start: Nanoseconds,
+                      changes: Mapping[str, Mapping[str, object]] | None = None) -> str:
+    """Return the text of the ROS 2 parameter file of a run: the values of a scenario for each node, and the parameters
     `graph.` that all its nodes share.
 
     bag: folder of the recording; start: graph.start, see `begins`; changes: {node: {name: value}} that the scenario

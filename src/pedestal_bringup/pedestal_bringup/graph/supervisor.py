@@ -5,14 +5,18 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Mapping
 
 from rclpy.executors import SingleThreadedExecutor
 
-from pedestal_bringup.graph.processes import RunError, exit_description
+from pedestal_bringup.graph.operator_node import Operator
+from pedestal_bringup.graph.processes import Graph, RunError, exit_description
 from pedestal_bringup.graph.restarts import Losses, Restarts, Silence
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.compiled import is_compiled
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Message, Nanoseconds, Seconds
 from pedestal_recording.verify import count
 
 RESTART_CUTOFF_S = 0.5  # time before the end of a run within which a dead node is not started again [s]
@@ -22,8 +26,8 @@ MAX_SILENCE_S = 5.0
 """Time without diagnostics after which a node is reported as silent [s]. A node publishes diagnostics every second."""
 
 
-def prepare(scenario):
-    """Compile the laws of the nodes of a Scenario that are not in the law cache, so that the nodes start without
+def prepare(scenario: Scenario) -> None:
+    """Compile the laws of the nodes of a scenario that are not in the law cache, so that the nodes start without
     delay. The laws of each node are compiled in a process of their own. Raises RunError."""
     units = {nodes.plain(node): node for node in scenario.nodes
              if scenario.row(node).unit and not is_compiled(scenario.unit(node))}
@@ -32,9 +36,11 @@ def prepare(scenario):
                                         start_new_session=True) for node in units.values()}
     try:
         for process in processes.values():
+            assert process.stdin is not None
             with contextlib.suppress(BrokenPipeError), process.stdin:
                 process.stdin.write(scenario.as_yaml())
         for node, process in processes.items():
+            assert process.stderr is not None
             errors = process.stderr.read()
             if process.wait() != 0:
                 lines = errors.strip().splitlines()
@@ -45,17 +51,18 @@ def prepare(scenario):
             if process.poll() is None:
                 process.kill()
             process.wait()
-            process.stderr.close()
+            if process.stderr is not None:
+                process.stderr.close()
 
 
 class Supervisor:
     """Supervisor of the processes of a running graph.
 
-    graph: processes.Graph; operator: operator_node.Operator, which receives the diagnostics; start: UTC at which the
-    time of the graph is 0 [ns]. restarts, losses: see the module restarts.
+    operator: receives the diagnostics; start: UTC at which the time of the graph is 0. restarts, losses: see the
+    module restarts.
     """
 
-    def __init__(self, graph, operator, start):
+    def __init__(self, graph: Graph, operator: Operator, start: Nanoseconds) -> None:
         header = graph.scenario.header
         self._graph, self._operator = graph, operator
         self._start, self._end = start, start + round(header.duration * NS_PER_SECOND)
@@ -63,14 +70,14 @@ class Supervisor:
         self.restarts, self._server_restarts = (
             Restarts(self._limits.attempts, self._limits.within, self._limits.delay) for _ in range(2))
         self._silence, self.losses = Silence(), Losses()
-        self._reported_silent = set()
-        self._dead = set()      # nodes whose restart is due, and servers that stay off
+        self._reported_silent: set[str] = set()
+        self._dead: set[str] = set()    # nodes whose restart is due, and servers that stay off
         operator.on_diagnostics = self._note
 
-    def watch(self, tracks, progress):
+    def watch(self, tracks: Mapping[str, Message], progress: Callable[[Seconds], object]) -> None:
         """Watch the nodes until the end of the run. The end is a UTC, and a restart does not move it.
 
-        tracks: {topic: program track}; progress: function of the time of the run [s]. Raises RunError if a node has
+        tracks: {topic: program track}; progress: function of the time of the run. Raises RunError if a node has
         died too often.
         """
         executor = SingleThreadedExecutor()
@@ -81,7 +88,7 @@ class Supervisor:
             progress(min(max(time.time_ns() - self._start, 0), self._end - self._start) / NS_PER_SECOND)
             self.check_processes(time.monotonic())
 
-    def _is_running(self):
+    def _is_running(self) -> bool:
         """Return True while the run continues. The run is over when the drive has ended at the end of the run, at the
         latest SHUTDOWN_GRACE_S after it. A drive that is dead shortly before the end, and that is therefore not
         started again, also ends the run."""
@@ -90,13 +97,13 @@ class Supervisor:
             return drive_runs or not self._is_nearly_over()
         return drive_runs and now < self._end + SHUTDOWN_GRACE_S * NS_PER_SECOND
 
-    def _is_nearly_over(self):
+    def _is_nearly_over(self) -> bool:
         """Return True if a dead node is no longer started again, because the end of the run is near."""
         return time.time_ns() > self._end - RESTART_CUTOFF_S * NS_PER_SECOND
 
-    def check_processes(self, now):
+    def check_processes(self, now: Seconds) -> None:
         """Start dead nodes again when their restart is due, and kill nodes that were silent for too long. now:
-        monotonic time [s]."""
+        monotonic time."""
         self._silence.note_check(now)
         for node in self._silence.longer_than(min(MAX_SILENCE_S, self._limits.silence or MAX_SILENCE_S), now):
             if node not in self._reported_silent:
@@ -114,9 +121,9 @@ class Supervisor:
             self._dead.discard(node)
             self._graph.start(node)
 
-    def _handle_exit(self, node, code, now):
+    def _handle_exit(self, node: str, code: int, now: Seconds) -> None:
         """Schedule the restart of a node or server that has died. Raises RunError, which ends the run, if a node has
-        died too often. A server that has died too often stays off. code: exit code; now: monotonic time [s].
+        died too often. A server that has died too often stays off. code: exit code; now: monotonic time.
         """
         limits = self._limits
         reason = ('was silent and was killed' if node in self._reported_silent and code == -signal.SIGKILL
@@ -138,8 +145,8 @@ class Supervisor:
         report(f'{node} {reason}{self._graph.cause(node, code)}: starting it again, {number} of {limits.attempts} '
                f'within {limits.within:g} s')
 
-    def _note(self, status, now):
-        """Note a DiagnosticStatus of a node that arrived at the monotonic time now [s]."""
+    def _note(self, status: Message, now: Seconds) -> None:
+        """Note a DiagnosticStatus of a node that arrived at the monotonic time now."""
         node = status.name
         self._silence.note(node, now)
         if node == nodes.DRIVE_NODE:
@@ -151,7 +158,7 @@ class Supervisor:
             report(f'{node} publishes diagnostics again')
 
 
-def report(line):
+def report(line: str) -> None:
     """Print a line for the user on stderr. A closed terminal does not end the run."""
     with contextlib.suppress(OSError):
         print(f'pedestal: {line}', file=sys.stderr, flush=True)

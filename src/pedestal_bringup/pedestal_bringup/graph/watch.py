@@ -7,27 +7,34 @@ because time 0, a parameter of every node, follows the answer of the equipment.
 """
 import socket
 import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
 
-import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.utilities import try_shutdown
 
 from pedestal_bringup.graph import lockstep, supervisor
 from pedestal_bringup.graph.operator_node import Operator
-from pedestal_bringup.graph.processes import RunError, exit_description
+from pedestal_bringup.graph.processes import Graph, RunError, exit_description
 from pedestal_bringup.graph.start import LATEST_START_S, START_LEAD_TIME_S, Outcome, begins, parameters_of_all
+from pedestal_bringup.scenario.program import Plan
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware
+from pedestal_common.quantities import Message, Nanoseconds, Seconds
 from pedestal_common.wire import messages
 from pedestal_hardware.params import START_KEY
 
+Changes: TypeAlias = Mapping[str, Mapping[str, object]]     # {node: {parameter: value}}
 
-def run(graph, tracks, progress):
+
+def run(graph: Graph, tracks: Mapping[str, Message], progress: Callable[[Seconds], object]) -> Outcome:
     """Let the held nodes (child.Child) of a graph begin, watch the nodes to their end or until Ctrl-C, and return the
     Outcome.
 
-    graph: processes.Graph; tracks: {topic: program track}; progress: function of the time of the run [s]. Raises
-    RunError, and GraphError if another graph runs on the domain.
+    tracks: {topic: program track}; progress: function of the time of the run. Raises RunError, and GraphError if
+    another graph runs on the domain.
     """
     middleware.initialise([])
     try:
@@ -39,11 +46,12 @@ def run(graph, tracks, progress):
         finally:
             operator.destroy_node()
     finally:
-        rclpy.try_shutdown()
+        try_shutdown()
 
 
-def _in_lockstep(graph, operator, tracks, progress):
-    """Run a graph in lockstep and return its Outcome; arguments as of `run`, operator: Operator."""
+def _in_lockstep(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
+                 progress: Callable[[Seconds], object]) -> Outcome:
+    """Run a graph in lockstep and return its Outcome; arguments as of `run`."""
     graph.begin(parameters_of_all(graph.scenario, graph.bag, 0))
     try:
         lockstep.watch(graph, operator, tracks, progress)
@@ -53,8 +61,9 @@ def _in_lockstep(graph, operator, tracks, progress):
     return Outcome(graph.outcome(nodes.DRIVE_NODE), graph.outcome('recorder'))
 
 
-def _in_realtime(graph, operator, tracks, progress):
-    """Run a graph in realtime and return its Outcome; arguments as of `run`, operator: Operator."""
+def _in_realtime(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
+                 progress: Callable[[Seconds], object]) -> Outcome:
+    """Run a graph in realtime and return its Outcome; arguments as of `run`."""
     supervisor.prepare(graph.scenario)
     start, changes = begins(graph.scenario), _addresses(graph.scenario)
     if graph.scenario.header.simulated_parts:
@@ -77,21 +86,20 @@ def _in_realtime(graph, operator, tracks, progress):
                    stopped)
 
 
-def _free_port(kind):
+def _free_port(kind: int) -> int:
     """Return a port of this machine that no program uses. kind: socket.SOCK_STREAM for TCP, SOCK_DGRAM for UDP."""
     with socket.socket(socket.AF_INET, kind) as free:
         free.bind(('127.0.0.1', 0))
         return free.getsockname()[1]
 
 
-def _addresses(scenario):
-    """Return {node: {name: value}} of the free ports between simulated equipment and its nodes, where a Scenario gives
-    no port."""
-    found = {}
+def _addresses(scenario: Scenario) -> Changes:
+    """Return the free ports between simulated equipment and its nodes, where a scenario gives no port."""
+    found: dict[str, Mapping[str, object]] = {}
     for part in scenario.header.simulated_parts:
         node = nodes.SIMULATED_PARTS[part]
         if part == nodes.SIMULATED_DRIVES.name:
-            changes = {'bus.port': _free_port(socket.SOCK_STREAM)}
+            changes: dict[str, object] = {'bus.port': _free_port(socket.SOCK_STREAM)}
         elif scenario.node_parameters(node).source.kind == 'vita49':
             changes = {'source.address': f'udp://127.0.0.1:{_free_port(socket.SOCK_DGRAM)}'}
         else:
@@ -107,11 +115,11 @@ ANSWER_PARAMETERS = {
 """{simulated equipment: parameters with which its node chooses time 0 at the answer of the equipment}."""
 
 
-def _equipment_begun(graph, operator, changes):
-    """Let simulated equipment and its node begin, wait for the answer of the equipment, and return graph.start [ns],
+def _equipment_begun(graph: Graph, operator: Operator, changes: Changes) -> Nanoseconds:
+    """Let simulated equipment and its node begin, wait for the answer of the equipment, and return graph.start,
     which its node chooses then. If several are simulated, time 0 follows the answer of the drives.
 
-    graph: processes.Graph; operator: operator_node.Operator; changes: see parameters_of_all. Raises RunError.
+    changes: see parameters_of_all. Raises RunError.
     """
     part = graph.scenario.header.simulated_parts[0]
     chooser = nodes.SIMULATED_PARTS[part]
@@ -127,15 +135,17 @@ def _equipment_begun(graph, operator, changes):
     return chosen
 
 
-def chosen_start(graph, operator, spin, part, limit):
-    """Wait until the node of simulated equipment chooses time 0, and return it [ns].
+def chosen_start(graph: Graph, operator: Operator, spin: Callable[..., object], part: str,
+                 limit: Seconds) -> Nanoseconds:
+    """Wait until the node of simulated equipment chooses time 0, and return it.
 
-    graph, operator: see `run`; spin: function spin(timeout_sec) that lets the operator take diagnostics; part: name
-    of the equipment; limit: longest wait [s]. Raises RunError that names the node and what it awaits.
+    spin: function spin(timeout_sec) that lets the operator take diagnostics; part: name
+    of the equipment; limit: longest wait. Raises RunError that names the node and what it awaits.
     """
-    chooser, chosen, heard = nodes.SIMULATED_PARTS[part], [], ['no diagnostics']
+    chooser, heard = nodes.SIMULATED_PARTS[part], ['no diagnostics']
+    chosen: list[Nanoseconds] = []
 
-    def note(status, _now):
+    def note(status: Message, _now: Seconds) -> None:
         if status.name == chooser:
             heard[:] = [status.message]
             chosen.extend(int(value.value) for value in status.values if value.key == START_KEY)
@@ -151,10 +161,10 @@ def chosen_start(graph, operator, spin, part, limit):
     return chosen[0]
 
 
-def send_program(plan, start=None, ros_arguments=()) -> int:
-    """Send the program track of a program.Plan to a running ACU and keep it latched until Ctrl-C.
+def send_program(plan: Plan, start: Nanoseconds | None = None, ros_arguments: Sequence[str] = ()) -> int:
+    """Send the program track of a plan to a running ACU and keep it latched until Ctrl-C.
 
-    start: UTC at which the time of the track is 0 [ns]; None: the graph.start of the ACU, which is requested from it.
+    start: UTC at which the time of the track is 0; None: the graph.start of the ACU, which is requested from it.
     ros_arguments: arguments of ROS for the sending node, such as the namespace of the graph.
     """
     beams = plan.scenario.header.graph_beams
@@ -177,4 +187,4 @@ def send_program(plan, start=None, ros_arguments=()) -> int:
     except KeyboardInterrupt:
         return 0
     finally:
-        rclpy.try_shutdown()
+        try_shutdown()

@@ -7,49 +7,68 @@ equals a lockstep recording of the scenario to the last bit. If an array has sev
 own. These loops have equal ship, INS and time, and do not act on each other.
 """
 import dataclasses
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
 
 import numpy as np
 from numba.core import types
 from numba.extending import overload
+from numpy.typing import NDArray
 
 from acu_tracker.operating import announcement
 from adu_drive import unit as drive_unit
 from adu_drive.array import beam_unit
 from pedestal_bringup.scenario.program import Plan
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import layouts, nodes, topics
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.law import by_type
 from pedestal_common.law_key import template
 from pedestal_common.node.unit import MAX_BLOCK_STEPS, Unit, announced
-from pedestal_common.quantities import Pair
+from pedestal_common.parameters import Parameters
+from pedestal_common.quantities import (
+    AnyRecord,
+    Bools,
+    Message,
+    Nanoseconds,
+    Pair,
+    Pairs,
+    Records,
+    Stamps,
+    Times,
+)
 from pedestal_common.record import Record
 from pedestal_common.wire import records
+from pedestal_common.wire.commands import Command, Reply
+
+AnyMemory: TypeAlias = AnyRecord            # memory of a unit, whose law is chosen by its type
+Column: TypeAlias = NDArray[np.generic] | list[str]     # of a topic, with a row per message
+Forecast: TypeAlias = tuple[Nanoseconds, list[tuple[str, str]]]     # stamp, announcement.numbers
 
 COMMAND_TOPIC, REFERENCE_TOPIC = 'acu/rate_command', 'acu/reference'
 
 STEP_DTYPE = records.of(*(topic.name for topic in topics.TOPICS
                           if topic.rate == 'step' or records.is_text(topic.name)))
-"""Record of one step: every topic except the program track, commands and the diagnostics."""
+"""Type of the record of one step, which follows from the table of topics: every topic except the program track,
+commands and the diagnostics."""
 
 
 class Truth(Record, align=False):
-    """Numbers of the time t_k that no topic holds: bias torques (azimuth, elevation) [Nm], true error of the beam
-    (cross-elevation, elevation) [rad].
-    """
-    bias: Pair
-    error: Pair
+    """Numbers of the time t_k that no topic holds."""
+    bias: Pair      # bias torques, azimuth, elevation [Nm]
+    error: Pair     # true error of the beam, cross-elevation, elevation [rad]
 
 
 # Compiled code finds the law of a unit by the type of its Memory, which holds state, inputs and outputs of its step.
 _LAWS = {memory: law for node in nodes.UNIT_NODES for memory, (law, _) in node.unit_type().LAWS.items()}
 
 
-def step(memory, stamp, inputs, outputs):
+def step(memory: AnyMemory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
     """Make the step of any unit, selected by the type of its memory. memory None: no unit, so do nothing.
 
-    Only compiled code calls this function. `by_type` below gives compiled code the law of each type of memory. stamp:
-    of the step [ns]; inputs, outputs: records of STEP_DTYPE.
+    Only compiled code calls this function. `by_type` below gives compiled code the law of each type of memory. inputs,
+    outputs: records of STEP_DTYPE.
     """
     raise NotImplementedError
 
@@ -57,35 +76,42 @@ def step(memory, stamp, inputs, outputs):
 by_type(step, lambda memory: None if isinstance(memory, types.NoneType) else _LAWS[memory.instance_class])
 
 
-def true_bias(drive, truth):
-    """Write the bias torques of the drive into the record `truth` of Truth; an array has none. drive: memory of
-    its unit. Only compiled code calls this function."""
+def true_bias(drive: AnyMemory, truth: Truth) -> None:
+    """Write the bias torques of the drive into `truth`; an array has none. drive: memory of its unit.
+
+    Only compiled code calls this function.
+    """
     raise NotImplementedError
 
 
 @overload(true_bias)
-def _true_bias(drive, truth):
-    def of_axes(drive, truth):
-        y = drive.record[0].outputs
-        truth.bias[0], truth.bias[1] = y.azimuth.bias, y.elevation.bias
+def _true_bias(drive: AnyMemory, truth: Truth) -> Callable[[AnyMemory, Truth], None]:
+    # numba gives the types of the arguments, and wants equal annotations of all three functions.
+    def of_axes(drive: AnyMemory, truth: Truth) -> None:
+        outputs = drive.record[0].outputs
+        truth.bias[0], truth.bias[1] = outputs.azimuth.bias, outputs.elevation.bias
 
-    return {drive_unit.Memory: of_axes, beam_unit.Memory: lambda drive, truth: None}[drive.instance_class]
+    def of_beam(drive: AnyMemory, truth: Truth) -> None:
+        return
+
+    return {drive_unit.Memory: of_axes, beam_unit.Memory: of_beam}[drive.instance_class]
 
 
 template(true_bias)
 
 
 @compiled
-def loop(units, first, period_ns, before, injected, steps, truth):
+def loop(units: tuple[AnyMemory, ...], first: int, period_ns: Nanoseconds, before: Records, injected: Pairs,
+         steps: Records, truth: Records) -> None:
     """Make n steps, from the step number `first` on.
 
     units      memories of drive, ship, INS, receiver and control unit; ship and INS are None ashore
-    period_ns  time of one step [ns]
+    period_ns  time of one step
     before     (1,) of STEP_DTYPE: the previous step, from which the drive takes its commands; changed to the last step
-    injected   (n, 2) for azimuth and elevation: added to the commands on their way to the drive. A drive follows the
+    injected   for azimuth and elevation: added to the commands on their way to the drive. A drive follows the
                rates [rad/s], the beam of an array follows the angles [rad]; the number is added to both.
     steps      (n,) of STEP_DTYPE, filled
-    truth      (n,) of Truth, filled
+    truth      Truths (n,), filled
     """
     drive, ship, ins, receiver, acu = units
     for k in range(len(steps)):
@@ -110,47 +136,40 @@ UNIT_ORDER = ('adu', 'ship_motion', 'ins', 'tracking_receiver', 'acu')
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """Result of a run of the closed loop, kept in memory; memory_recording gives it the interface of a recording.
-
-    steps      (n,) of STEP_DTYPE, or of some of its topics
-    truth      (n,) of Truth; empty for one of several runs that the module side_by_side computes together
-    stamps     stamps of the steps (n,) [ns]
-    units      {node: Unit} after the run
-    forecasts  [(stamp [ns], announcement.numbers)] at every whole second: the keyhole forecasts of the control unit
-    replies    {topic of replies: [(stamp [ns], Command, Reply)]} to the scheduled commands
-    tracks     {topic: JointTrajectory} of the program track, which the operator sends before the first step
-    """
-    steps: np.ndarray
-    truth: np.ndarray
-    stamps: np.ndarray
-    units: dict
-    forecasts: list
-    replies: dict
-    tracks: dict
+    """Result of a run of the closed loop, kept in memory; memory_recording gives it the interface of a recording."""
+    steps: Records              # (n,) of STEP_DTYPE, or of some of its topics
+    truth: Records              # Truths (n,); none for one of several runs that side_by_side computes together
+    stamps: Stamps
+    units: dict[str, Unit]      # of the nodes, after the run
+    forecasts: list[Forecast]   # at every whole second: the keyhole forecasts of the control unit
+    replies: dict[str, list[tuple[Nanoseconds, Command, Reply]]]    # {topic of replies: replies to the scheduled
+                                                                    # commands, with the stamps}
+    tracks: dict[str, Message]  # {topic: program track}, which the operator sends before the first step
 
     @property
-    def t(self):
-        """Stamps of the steps (n,) [s]."""
-        return self.stamps * 1e-9
+    def t(self) -> Times:
+        """Stamps of the steps in seconds."""
+        return self.stamps.astype(np.float64) * 1e-9
 
-    def __getitem__(self, topic):
+    def __getitem__(self, topic: str) -> Records:
         """Return the records (n,) of a topic, one per step."""
         return self.steps[topic]
 
-    def where(self, steps):
-        """Return the Run of some of its steps, which a mask (n,) selects."""
+    def where(self, steps: Bools) -> 'Run':
+        """Return the Run of some of its steps, which a mask selects."""
         return dataclasses.replace(self, steps=self.steps[steps], truth=self.truth[steps], stamps=self.stamps[steps])
 
     @property
-    def topics(self):
+    def topics(self) -> dict[str, str]:
         """{name: type} of the topics with at least one message in this run."""
         written = [name for unit in self.units.values() for name in unit.writes]
-        kept = [topic for topic in topics.TOPICS if topic.name in written and topic.name in self.steps.dtype.names]
+        names = self.steps.dtype.names or ()
+        kept = [topic for topic in topics.TOPICS if topic.name in written and topic.name in names]
         return {topic.name: topic.type for topic in kept
                 if records.is_text(topic.name) or (self.steps[topic.name]['stamp'] != records.NO_STAMP).any()}
 
-    def table(self, topic):
-        """Return {column: array (n,)} of a topic with a row per message, like columns.table of a bag."""
+    def table(self, topic: str) -> dict[str, Column]:
+        """Return {name: column} of a topic with a row per message, like columns.table of a bag."""
         if records.is_text(topic):
             unit = next(unit for unit in self.units.values() if topic in unit.NODE.writes)
             if topics.TOPIC_BY_NAME[topic].type != 'std_msgs/msg/String':
@@ -169,31 +188,31 @@ class Run:
 class Loop:
     """Closed loop of a scenario: the units of its nodes, ready for one run.
 
-    beam: name of one beam of several, such as beam_2; '': the first beam. changed: {node: parameter dataclass} that
-    replaces the scenario's.
+    beam: name of one beam of several, such as beam_2; '': the first beam. changed: {node: parameters} that replace
+    those of the scenario.
     """
     units: dict[str, Unit]
+    steps: int                  # number of steps of the run
 
-    def __init__(self, scenario, beam='', changed=()):
+    def __init__(self, scenario: Scenario, beam: str = '', changed: Mapping[str, Parameters] | None = None) -> None:
         prefix = f'{beam}/' if beam else scenario.prefixes[0]
         self.units = {}
         for name in UNIT_ORDER:
             full = prefix + name if nodes.row(name).of_beam else name
             if full in scenario.nodes:
-                self.units[name] = scenario.unit(full, dict(changed).get(name))
+                self.units[name] = scenario.unit(full, (changed or {}).get(name))
         self.tracks = {nodes.plain(topic): message for topic, message in Plan(scenario).tracks.items()
                        if topic.startswith(prefix)}
         for topic, message in self.tracks.items():
             self.units['acu'].decode(topic, message)
-        self.replies = {}
+        self.replies: dict[str, list[tuple[Nanoseconds, Command, Reply]]] = {}
         period = self.units[nodes.DRIVE_NODE].parameters.period
         self.period_ns = round(period * NS_PER_SECOND)
-        # steps: number of steps of the run
         self.steps = round(scenario.header.duration / period) + 1
 
-    def before_step(self, first, forecasts):
+    def before_step(self, first: int, forecasts: list[Forecast]) -> None:
         """Prepare the step number `first`: execute the scheduled commands that are due, and keep their replies. If a
-        second of the run begins, append the forecast to the list `forecasts`."""
+        second of the run begins, append the forecast to `forecasts`."""
         stamp = first * self.period_ns
         if stamp // NS_PER_SECOND > (stamp - self.period_ns) // NS_PER_SECOND:
             forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['guidance']['lookahead'])))
@@ -202,24 +221,24 @@ class Loop:
             while unit.pending_replies:
                 self.replies.setdefault(unit.NODE.replies, []).append((stamp, *unit.pending_replies.popleft()))
 
-    def next_event_step(self, first):
+    def next_event_step(self, first: int) -> int:
         """Return the number of the first step after `first` that needs `before_step`, at most the number of steps."""
         due = min((first * self.period_ns // NS_PER_SECOND + 1) * NS_PER_SECOND,
                   *(unit.next_due for unit in self.units.values()))
         step_not_before_due = -(-due // self.period_ns)
         return min(step_not_before_due, self.steps)
 
-    def run(self, injected=None, watch=None) -> Run:
+    def run(self, injected: Pairs | None = None, watch: Callable[[int], int] | None = None) -> Run:
         """Make every step of the scenario and return the Run. Call this method only once.
 
-        injected: (steps, 2), see `loop`; None: zeros. watch(number of steps made): a function that is called between
+        injected: see `loop`; None: zeros. watch(number of steps made): a function that is called between
         blocks of steps and may read or command the units. It returns the largest number of steps until its next call.
         """
         if injected is None:
             injected = np.zeros((self.steps, 2))
-        steps, truth = records.empty(STEP_DTYPE, self.steps), np.zeros(self.steps, Truth.dtype)
+        steps, truth = records.empty(STEP_DTYPE, self.steps), Truth.zeros(self.steps)
         before = records.empty(STEP_DTYPE, 1)
-        forecasts: list[tuple] = []
+        forecasts: list[Forecast] = []
         first = 0
         while first < self.steps:
             self.before_step(first, forecasts)

@@ -1,15 +1,19 @@
 """Simulated I/Q samples of a scenario: the beam moves as in a run of the scenario in memory (closed_loop). The unit of
 the simulated I/Q makes the samples of all channels along this run."""
 import time
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.geometry import orbit
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_hardware.monopulse import sinks
+from pedestal_hardware.monopulse.iq_unit import SimulatedIq
 
 TRUTH_TOPICS = 'adu/truth', 'ship/truth'
 IQ_SECTIONS = tuple(f'{node}.{group}.' for node in ('tracking_receiver', 'iq')
@@ -17,10 +21,11 @@ IQ_SECTIONS = tuple(f'{node}.{group}.' for node in ('tracking_receiver', 'iq')
 """Beginnings of the parameters that only a receiver of I/Q samples has."""
 
 
-def scenarios(name, changes, own=(), duration=None):
-    """Return (loop Scenario, I/Q Scenario) for `run`, of the name or path of a scenario.
+def scenarios(name: str, changes: Iterable[str], own: Iterable[str] = (),
+              duration: Seconds | None = None) -> tuple[Scenario, Scenario]:
+    """Return (scenario of the loop, scenario of the I/Q) for `run`, of the name or path of a scenario.
 
-    changes: texts 'node.key=value'; own: further texts for the I/Q scenario; duration [s], None for that of the
+    changes: texts 'node.key=value'; own: further texts for the I/Q scenario; duration: None for that of the
     scenario. Raises ScenarioError.
     """
     of_loop = [change for change in changes if not change.startswith(IQ_SECTIONS)]
@@ -29,25 +34,26 @@ def scenarios(name, changes, own=(), duration=None):
                           pacing='realtime'))
 
 
-def start_utc(unit) -> int:
-    """Return the UTC of stamp 0 of the target of a unit [ns]; 0 for a target without a date."""
+def start_utc(unit: SimulatedIq) -> Nanoseconds:
+    """Return the UTC of stamp 0 of the target of a unit; 0 for a target without a date."""
     if not unit.target.start_time:
         return 0
     return round((orbit.instant('start_time', unit.target.start_time) - orbit.instant('start', '1970-01-01T00:00:00')
                   ).total_seconds()) * NS_PER_SECOND
 
 
-def run(loop_scenario, iq_scenario, live, progress) -> int:
+def run(loop_scenario: Scenario, iq_scenario: Scenario, live: bool, progress: Callable[[Seconds], object]) -> int:
     """Send the samples of a scenario to the source address of its receiver, and return their number.
 
-    loop_scenario   Scenario with the simulated receiver, whose beam is taken
+    loop_scenario   with the simulated receiver, whose beam is taken
     iq_scenario     the same with I/Q samples
     live            True to send each step at its time, False for a file
-    progress        function of the time of the run [s]
+    progress        function of the time of the run
 
     Raises StreamError.
     """
     unit = iq_scenario.unit(nodes.SIMULATED_IQ.name)
+    assert isinstance(unit, SimulatedIq)
     sink = sinks.opened(unit.parameters)
     try:
         made = closed_loop.Loop(loop_scenario).run()

@@ -1,12 +1,15 @@
 """Recording without a file: a run of the closed loop, kept in memory, with the methods of bag.Bag that
 pedestal_analysis uses. Trials and studies compute their results from it."""
 import functools
+from collections.abc import Iterator
 
 import numpy as np
 
 from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import as_dict
+from pedestal_common.quantities import Ints, Message, Nanoseconds
 from pedestal_common.wire import commands, messages
 from pedestal_recording import columns
 
@@ -16,20 +19,20 @@ KEYHOLE_ENTRY = 'keyhole', 'keyhole'
 """(key, value) among the diagnostics of the control unit that marks the forecast of a keyhole."""
 
 
-def record(scenario, beam=''):
-    """Run a scenario.Scenario in memory and return its MemoryRecording. beam: name of one beam of several, such as
+def record(scenario: Scenario, beam: str = '') -> 'MemoryRecording':
+    """Run a scenario in memory and return its recording. beam: name of one beam of several, such as
     beam_2; '': the first beam."""
     return MemoryRecording(scenario, closed_loop.Loop(scenario, beam).run())
 
 
 class MemoryRecording:
-    """Recording of one beam of a scenario.Scenario, made from its closed_loop.Run.
+    """Recording of one beam of a scenario, made from its run.
 
     From the diagnostics it holds only the keyhole forecasts of the control unit and the last values of each node,
     because no result uses anything else.
     """
 
-    def __init__(self, scenario, run):
+    def __init__(self, scenario: Scenario, run: closed_loop.Run) -> None:
         receiver = run.units['tracking_receiver'].parameters
         self.path, self.beams = scenario.name, int(scenario.header.beam)
         self.metadata = {'beamwidth': str(receiver.antenna.beamwidth)}
@@ -37,19 +40,19 @@ class MemoryRecording:
         self.configuration = {'parameters': {'tracking_receiver': as_dict(receiver),
                                              'acu': as_dict(run.units['acu'].parameters)}}
         self._run, self.start, self.end = run, 0, run.t[-1]      # time 0 of the scenario, time of the last step [s]
-        self._tables = {}
+        self._tables: dict[str, dict[str, closed_loop.Column]] = {}
         self._forecasts = run.forecasts if any(KEYHOLE_ENTRY in values for _, values in run.forecasts) else []
 
     @functools.cached_property
-    def topics(self):
+    def topics(self) -> dict[str, str]:
         """{name: type} of the topics in this recording."""
         of_diagnostics = {DIAGNOSTICS_TOPIC: messages.DiagnosticArray.__msgtype__} if self._forecasts else {}
         of_replies = dict.fromkeys(self._run.replies, messages.DiagnosticStatus.__msgtype__)
         of_tracks = {topic: message.__msgtype__ for topic, message in self._run.tracks.items()}
         return {**self._run.topics, **of_tracks, **of_replies, **of_diagnostics}
 
-    def table(self, topic):
-        """Return {column: array (n,)} of a topic with a row per message, like columns.table of a bag."""
+    def table(self, topic: str) -> dict[str, closed_loop.Column]:
+        """Return {name: column} of a topic with a row per message, like columns.table of a bag."""
         if topic == DIAGNOSTICS_TOPIC:
             return {'t': np.array([stamp for stamp, _ in self._forecasts]) / NS_PER_SECOND}
         if topic in self._run.replies:
@@ -59,16 +62,16 @@ class MemoryRecording:
             self._tables[topic] = self._run.table(topic)
         return self._tables[topic]
 
-    def rows(self, topic):
+    def rows(self, topic: str) -> Ints:
         """Return the indices 0 ... n - 1 of the messages of a topic."""
         return np.arange(len(self.table(topic)['t']))
 
-    def last_values(self, node):
+    def last_values(self, node: str) -> dict[str, str]:
         """Return {key: value} of the diagnostics of a node at the end of the run."""
         return dict(self._run.units[node].diagnose().values)
 
-    def messages(self, topic):
-        """Yield (topic, log time [ns], publish time [ns], message) of `diagnostics`, of a topic of replies or of the
+    def messages(self, topic: str) -> Iterator[tuple[str, Nanoseconds, Nanoseconds, Message]]:
+        """Yield (topic, log time, publish time, message) of `diagnostics`, of a topic of replies or of the
         program track."""
         if topic in self._run.tracks:
             yield topic, 0, 0, self._run.tracks[topic]

@@ -12,13 +12,16 @@ import os
 import pathlib
 import sys
 import time
+from collections.abc import Iterable
 
-from numba.core import config
+import numba
 
 from pedestal_bringup.loop import closed_loop, side_by_side
 from pedestal_bringup.scenario import scenario
 from pedestal_common import law_cache, law_key
 from pedestal_common.compiled import is_compiled
+from pedestal_common.node.unit import Unit
+from pedestal_common.quantities import Seconds
 
 SERVO_DRIVES = 'scenario.drives=simulated', 'scenario.pacing=realtime'
 """Changes of a scenario with which four servo drives take the place of the drive unit."""
@@ -36,14 +39,14 @@ with the longest compilation first."""
 COMPILE_RUN_S = 0.1  # duration of the scenario that is run to compile a closed loop [s]
 
 
-def _unit_of_scenario(name, node, *changes):
+def _unit_of_scenario(name: str, node: str, *changes: str) -> Unit:
     """Return the unit of a node of the scenario `name` with changes."""
     return scenario.load(name, changes).unit(node)
 
 
-def _compile_unit(name, node, *changes):
+def _compile_unit(name: str, node: str, *changes: str) -> tuple[str, Seconds]:
     """Compile the laws of a node of the scenario `name` with changes. Return (text that names them, time that this
-    took [s])."""
+    took)."""
     begun = time.perf_counter()
     _unit_of_scenario(name, node, *changes).prepare()
     return f'{node} of {name}{" with servo drives" * bool(changes)}', time.perf_counter() - begun
@@ -55,8 +58,8 @@ def _loop_done(name: str, count: int) -> pathlib.Path:
     return law_cache.file(f'compiled-{name}-{count}', law_key.of_law(law, whole=True))
 
 
-def _compile_loop(name, count):
-    """Compile `count` parallel closed loops of the scenario `name`. Return (text that names them, time taken [s])."""
+def _compile_loop(name: str, count: int) -> tuple[str, Seconds]:
+    """Compile `count` parallel closed loops of the scenario `name`. Return (text that names them, time taken)."""
     begun = time.perf_counter()
     loops = [closed_loop.Loop(scenario.load(name, duration=COMPILE_RUN_S)) for _ in range(count)]
     if count > 1:
@@ -67,10 +70,10 @@ def _compile_loop(name, count):
     return f'closed loop{"s" * (count > 1)} of {name}{" side by side" * (count > 1)}', time.perf_counter() - begun
 
 
-def compile_cold(units, loops):
+def compile_cold(units: Iterable[tuple[str, ...]], loops: Iterable[tuple[str, int]]) -> None:
     """Compile the laws that are not cached, and print a line for each unit and closed loop. units: rows of
     COMPILED_UNITS; loops: rows of COMPILED_LOOPS."""
-    if config.DISABLE_JIT:      # for a debugger: there is nothing to compile
+    if vars(numba.config)['DISABLE_JIT']:      # for a debugger: there is nothing to compile
         return
     units = [part for part in units if not is_compiled(_unit_of_scenario(*part))]
     loops = [part for part in loops if not _loop_done(*part).exists()]
@@ -84,7 +87,7 @@ def compile_cold(units, loops):
             print(f'  {name}: {seconds:.0f} s', flush=True)
 
 
-def main():
+def main() -> int:
     """Compile the laws that the command line names; return the exit code."""
     match sys.argv[1:]:
         case []:

@@ -6,6 +6,7 @@ Receivers and control units run one after the other, with the records and laws o
 that of closed_loop.Loop to the last bit.
 """
 import typing
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -14,8 +15,11 @@ from acu_tracker.program.program_track import ProgramTrack
 from acu_tracker.program.tables import Tables
 from adu_drive import lanes
 from adu_drive import unit as drive_unit
-from pedestal_bringup.loop.closed_loop import STEP_DTYPE, Run, Truth
+from pedestal_bringup.loop.closed_loop import STEP_DTYPE, Forecast, Loop, Run, Truth
+from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.compiled import compiled
+from pedestal_common.node.unit import Unit
+from pedestal_common.quantities import AnyRecord, Floats, Ints, Nanoseconds, Records
 from pedestal_common.wire import records
 from tracking_receiver_sim import unit as receiver_unit
 
@@ -31,35 +35,29 @@ MAX_MEMORY_BYTES = 2**30  # largest memory for the records of parallel trials [b
 
 
 @compiled
-def _receiver_law(receivers, i, stamp, step):
-    """Make the step of receiver i. receivers: as of `loops_in_lanes`; stamp: of the step [ns]; step: its record of
-    STEP_DTYPE."""
-    r = receivers
-    receiver_unit.law(receiver_unit.Memory(r.record[i:i + 1], r.breaks[i], r.coefficients[i], r.normals[i]), stamp,
-                      step, step)
+def _receiver_law(receivers: receiver_unit.Memory, i: int, stamp: Nanoseconds, step: AnyRecord) -> None:
+    """Make the step of receiver i. receivers: as of `loops_in_lanes`; step: record of STEP_DTYPE."""
+    own = receiver_unit.Memory(receivers.record[i:i + 1], receivers.breaks[i], receivers.coefficients[i],
+                               receivers.normals[i])
+    receiver_unit.law(own, stamp, step, step)
 
 
 @compiled
-def _track(rows, ends, i):
+def _track(rows: ProgramTrack, ends: Ints, i: int) -> ProgramTrack:
     """Return ProgramTrack i of those that `_joined_tracks` has joined into rows, with their ends."""
     return ProgramTrack(rows.times[ends[i]:ends[i + 1]], rows.angles[ends[i]:ends[i + 1]])
 
 
 class ControlUnits(typing.NamedTuple):
-    """Control units of n trials, which run one after the other.
-
-    record  (n,): their records
-    tables  Tables in which each track is the tracks of all units, joined by `_joined_tracks`
-    ends    (3, n + 1): for each of the three tracks, the ends of the rows of each unit
-    """
-    record: np.ndarray
-    tables: Tables
-    ends: np.ndarray
+    """Control units of n trials, which run one after the other."""
+    record: Records     # (n,)
+    tables: Tables      # in which each track is the tracks of all units, joined by `_joined_tracks`
+    ends: Ints          # (3, n + 1): for each of the three tracks, the ends of the rows of each unit
 
 
 @compiled
-def _acu_law(acus, i, stamp, step):
-    """Make the step of control unit i. acus: ControlUnits; stamp: of the step [ns]; step: its record of STEP_DTYPE."""
+def _acu_law(acus: ControlUnits, i: int, stamp: Nanoseconds, step: AnyRecord) -> None:
+    """Make the step of control unit i. step: record of STEP_DTYPE."""
     of_all, ends = acus.tables, acus.ends
     tables = Tables(_track(of_all.program, ends[0], i), _track(of_all.tle, ends[1], i), _track(of_all.sun, ends[2], i))
     acu_unit.law(acu_unit.Memory(acus.record[i:i + 1], tables), stamp, step, step)
@@ -67,28 +65,23 @@ def _acu_law(acus, i, stamp, step):
 
 class KeptSteps(typing.NamedTuple):
     """Part of each step that is kept after it, as 8-byte words, because `loops_in_lanes` would otherwise be compiled
-    again for each choice of topics.
-
-    words  (m,): indices of the kept words in a record of STEP_DTYPE
-    steps  (2, trials, words of a STEP_DTYPE): the steps of `loops_in_lanes`, as `_words` gives them
-    rows   (trials, n, m): the kept words of all n steps, filled
-    """
-    words: np.ndarray
-    steps: np.ndarray
-    rows: np.ndarray
+    again for each choice of topics."""
+    words: Ints     # (m,): indices of the kept words in a record of STEP_DTYPE
+    steps: Ints     # (2, trials, words of a STEP_DTYPE): the steps of `loops_in_lanes`, as `_words` gives them
+    rows: Ints      # (trials, n, m): the kept words of all n steps, filled
 
 
 @compiled
-def loops_in_lanes(drives, receivers, acus, first, last, period_ns, steps, kept):
+def loops_in_lanes(drives: Floats, receivers: receiver_unit.Memory, acus: ControlUnits, first: int, last: int,
+                   period_ns: Nanoseconds, steps: Records, kept: KeptSteps) -> None:
     """Make the steps first ... last - 1 of every trial.
 
     drives     flat array of the drives on lanes, as lanes.to_lanes gives it
-    receivers  receiver_unit.Memory whose arrays have the trials as their first dimension
-    acus       ControlUnits
-    period_ns  time of one step [ns]
+    receivers  their arrays have the trials as their first dimension
+    period_ns  time of one step
     steps      (2, trials) of STEP_DTYPE: the last even step and the last odd step, in turn the present and the
                previous step
-    kept       KeptSteps, which keeps a part of each step
+    kept       keeps a part of each step
     """
     moving = drive_unit.DRIVE_LANES(drives)
     for k in range(first, last):
@@ -101,13 +94,13 @@ def loops_in_lanes(drives, receivers, acus, first, last, period_ns, steps, kept)
                 kept.rows[i, k, j] = kept.steps[now, i, kept.words[j]]
 
 
-def _words(records):
+def _words(records: Records) -> Ints:
     """Return a view of records (n, m) as their 8-byte words (n, m, words)."""
     return records.view(np.int64).reshape(*records.shape, -1)
 
 
-def max_parallel_trials(scenario, names):
-    """Return the largest number of trials of a scenario.Scenario that can run side by side; 0 for a scenario with a
+def max_parallel_trials(scenario: Scenario, names: Sequence[str]) -> int:
+    """Return the largest number of trials of a scenario that can run side by side; 0 for a scenario with a
     ship or an array. names: topics that are kept, whose records determine the memory needed."""
     if scenario.header.ship or scenario.header.beam:
         return 0
@@ -115,16 +108,20 @@ def max_parallel_trials(scenario, names):
     return min(lanes.LANE_COUNT, int(MAX_MEMORY_BYTES / (steps * records.of(*names).itemsize)))
 
 
-def can_run_parallel(loops):
-    """Return True if these closed_loop.Loops can run side by side: drives with motors ashore, with equal period and
+def can_run_parallel(loops: Sequence[Loop]) -> bool:
+    """Return True if these loops can run side by side: drives with motors ashore, with equal period and
     number of steps, and memories of equal shapes."""
-    ours = all({name: type(unit) for name, unit in loop.units.items()} == LANE_UNIT_TYPES
-               and loop.units['adu'].fits_lanes
-               for loop in loops)
-    return MIN_PARALLEL_LOOPS <= len(loops) <= lanes.LANE_COUNT and ours and len(set(map(_shape, loops))) == 1
+    return (MIN_PARALLEL_LOOPS <= len(loops) <= lanes.LANE_COUNT and all(map(_fits_lanes, loops))
+            and len(set(map(_shape, loops))) == 1)
 
 
-def _shape(loop):
+def _fits_lanes(loop: Loop) -> bool:
+    drive = loop.units['adu']
+    return ({name: type(unit) for name, unit in loop.units.items()} == LANE_UNIT_TYPES
+            and isinstance(drive, drive_unit.Adu) and drive.fits_lanes)
+
+
+def _shape(loop: Loop) -> tuple[object, ...]:
     """Return the numbers that must be equal for loops that run side by side: times, counts and array shapes."""
     receiver = loop.units['tracking_receiver'].memory
     constants = loop.units['adu'].parts['constants']
@@ -132,7 +129,7 @@ def _shape(loop):
             receiver.breaks.shape, receiver.coefficients.shape, receiver.normals.shape[1])
 
 
-def _stacked(units):
+def _stacked(units: Sequence[Unit]) -> Records:
     """Join the records of units into one array (units,) and return it; each unit continues with its part of the
     array."""
     record = np.empty(len(units), units[0].memory.record.dtype)
@@ -142,7 +139,7 @@ def _stacked(units):
     return record
 
 
-def _joined_tracks(tracks):
+def _joined_tracks(tracks: Iterable[ProgramTrack]) -> tuple[ProgramTrack, Ints]:
     """Return (one ProgramTrack with the rows of n ProgramTracks, their ends); the tracks may differ in length.
 
     ends: (n + 1,), 0 first: track i has the rows ends[i] ... ends[i + 1] - 1.
@@ -150,8 +147,8 @@ def _joined_tracks(tracks):
     return ProgramTrack(*map(np.concatenate, zip(*tracks))), np.cumsum([0, *(len(track.times) for track in tracks)])
 
 
-def runs(loops, names, kept=None):
-    """Run closed_loop.Loops side by side (see can_run_parallel), and return the Run of each, without truth.
+def runs(loops: Sequence[Loop], names: Sequence[str], kept: Records | None = None) -> list[Run]:
+    """Run loops side by side (see can_run_parallel), and return the Run of each, without truth.
 
     names: topics that the Runs keep. kept: memory (trials, steps) of records.of(*names) for the Runs, which the next
     call overwrites; None: new memory.
@@ -168,7 +165,7 @@ def runs(loops, names, kept=None):
     all_words = np.arange(STEP_DTYPE.itemsize // lanes.WORD_BYTES).view(STEP_DTYPE)
     words = all_words[list(names)].astype(kept.dtype).view(np.int64)
     keeps = KeptSteps(words, _words(steps), _words(kept))
-    forecasts = [[] for _ in loops]
+    forecasts: list[list[Forecast]] = [[] for _ in loops]
     first = 0
     while first < count:
         for loop, forecast in zip(loops, forecasts):
@@ -181,6 +178,6 @@ def runs(loops, names, kept=None):
                        ControlUnits(acu_record, Tables(*tables), np.array(ends)), first, last, period_ns, steps, keeps)
         first = last
     lanes.from_lanes(moving, drive_record)
-    return [Run(steps, np.zeros(0, Truth.dtype), np.arange(count) * period_ns, loop.units, forecast, loop.replies,
+    return [Run(steps, Truth.zeros(0), np.arange(count) * period_ns, loop.units, forecast, loop.replies,
                 loop.tracks)
             for loop, steps, forecast in zip(loops, kept, forecasts)]

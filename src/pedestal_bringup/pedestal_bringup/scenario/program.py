@@ -9,33 +9,34 @@ import numpy as np
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
+from pedestal_common.quantities import Message, Nanoseconds, Pairs, Seconds, Times
 from pedestal_common.wire import messages
 from ship_motion_sim.sea import motion
 from tracking_receiver_sim import target
+from tracking_receiver_sim.params import TargetParameters
 from tracking_receiver_sim.path import arrival
 
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Scenario (scenario.Scenario) together with its targets and its program tracks, which are built once, at their
+    """Scenario together with its targets and its program tracks, which are built once, at their
     first use."""
     scenario: Scenario
 
     @functools.cached_property
-    def targets(self):
-        """{prefix of the beam ('' for a single beam): the target.Target that the simulation moves}."""
+    def targets(self) -> dict[str, target.Target]:
+        """{prefix of the beam ('' for a single beam): the target that the simulation moves}."""
         return {prefix: self._built(prefix, self._parameters(prefix)) for prefix in self.scenario.prefixes}
 
-    def _parameters(self, prefix):
-        """Return the TargetParameters of the receiver of a beam."""
+    def _parameters(self, prefix: str) -> TargetParameters:
         return self.scenario.node_parameters(prefix + 'tracking_receiver').target
 
-    def _built(self, prefix, parameters):
-        """Return the target.Target of TargetParameters for the run of this scenario."""
+    def _built(self, prefix: str, parameters: TargetParameters) -> target.Target:
+        """Return the target for the run of this scenario."""
         mask = self.scenario.node_parameters(prefix + 'tracking_receiver').receiver.horizon_mask
         return target.build(parameters, self.scenario.header.duration, mask)
 
-    def _nominal_target(self, prefix):
+    def _nominal_target(self, prefix: str) -> target.Target:
         """Return the target of a beam as the operator predicts it: with the time UT1 of the earth's rotation equal to
         UTC."""
         true = self._parameters(prefix)
@@ -43,12 +44,12 @@ class Plan:
         return self.targets[prefix] if nominal == true else self._built(prefix, nominal)
 
     @functools.cached_property
-    def tables(self):
+    def tables(self) -> dict[str, tuple[Times, Pairs]]:
         """Predicted tables {prefix of the beam: (times, angles)}.
 
-        times   (n,) s, from stamp 0 to two intervals after the run, so that the end of the run is inside; equal to the
+        times   from stamp 0 to two intervals after the run, so that the end of the run is inside; equal to the
                 last bit to the times that the ACU reads from the message
-        angles  (n, 2) rad: earth azimuth (unwrapped), elevation
+        angles  earth azimuth (unwrapped), elevation [rad]
 
         The prediction omits UT1 - UTC of the true target. It includes the travel time of the wave only if
         `program.light_time` of the header is set, and refraction only if `program.refractivity` is above 0. `program`
@@ -73,20 +74,20 @@ class Plan:
         return tables
 
     @functools.cached_property
-    def tracks(self):
+    def tracks(self) -> dict[str, Message]:
         """{topic: JointTrajectory} of the program track for every beam; {} without a program track."""
         if self.scenario.header.program.source == 'none':
             return {}
         return {f'{prefix}acu/program_track': program_message(*table) for prefix, table in self.tables.items()}
 
     @functools.cached_property
-    def ship_summary(self):
+    def ship_summary(self) -> tuple[str, ...]:
         """Lines on the file of a recorded ship motion (motion.summary); () without such a file or without a ship."""
         if 'ship_motion' not in self.scenario.nodes:
             return ()
         return motion.summary(self.scenario.node_parameters('ship_motion').ship, self.scenario.header.duration)
 
-    def announced(self):
+    def announced(self) -> list[str]:
         """Return the lines that a user reads before the run: the notes of the scenario, the file of the ship motion,
         and the targets.
 
@@ -98,8 +99,8 @@ class Plan:
             lines += [*built.summary, *_sky(built, self._parameters(prefix).kind, self.scenario.header.duration)]
         return list(dict.fromkeys(lines))
 
-    def begins(self):
-        """Return the UTC [ns] at which the time of the run is 0, by the date of the first beam's target. Raises
+    def begins(self) -> Nanoseconds:
+        """Return the UTC at which the time of the run is 0, by the date of the first beam's target. Raises
         ValueError if the target has no date."""
         start_time = self.targets[self.scenario.prefixes[0]].start_time
         if not start_time:
@@ -108,11 +109,11 @@ class Plan:
         return round(begin.timestamp() * 1e3) * 1_000_000
 
 
-def _sky(built, kind, duration):
-    """Return lines on a Target `built`: its rise and its set or end if they are within the run, and its highest place
+def _sky(built: target.Target, kind: str, duration: Seconds) -> tuple[str, ...]:
+    """Return lines on a target: its rise and its set or end if they are within the run, and its highest place
     if it has a date and no summary. (The summary of a recorded flight already states the highest place.)
 
-    kind: name of its kind, as in target.kind; duration: length of the run [s].
+    kind: name of its kind, as in target.kind; duration: length of the run.
     """
     name = 'satellite' if kind == 'leo_pass' else 'target'
     times = np.linspace(0.0, duration, 1 + int(min(1e5, 10.0 * duration)))
@@ -122,7 +123,7 @@ def _sky(built, kind, duration):
         return ()
     begin = orbit.instant('start', built.start_time) if built.start_time else None
 
-    def when(row):
+    def when(row: int) -> str:
         at = f', at {begin + datetime.timedelta(seconds=float(times[row])):%H:%M:%S} UTC' if begin else ''
         return f'after {times[row]:.1f} s{at}'
     top = int(np.nanargmax(elevation))
@@ -135,8 +136,8 @@ def _sky(built, kind, duration):
     return (*highest, *rises, *sets, *ends)
 
 
-def program_message(times, angles):
-    """Return the JointTrajectory of a table: times (n,) s, angles (n, 2) rad (earth azimuth, elevation)."""
+def program_message(times: Times, angles: Pairs) -> Message:
+    """Return the JointTrajectory of a table. angles: earth azimuth, elevation [rad]."""
     points = []
     for time, positions in zip(times, angles):
         point = messages.trajectory_point(len(positions))

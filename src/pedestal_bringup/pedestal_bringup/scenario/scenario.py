@@ -23,14 +23,18 @@ from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.graph_parameters import GraphParameters
 from pedestal_common.graph.nodes import Node
+from pedestal_common.quantities import Seconds, Value
 from pedestal_common.text_files import files, parameter_file, plain_yaml
 
 if typing.TYPE_CHECKING:
     from importlib.abc import Traversable
 
     from pedestal_common.node.unit import Unit
+    from pedestal_hardware.monopulse.params import MonopulseParameters
+    from tracking_receiver_sim.params import TargetParameters
 
-Sections = dict[str, dict[str, typing.Any]]  # values of each node and of `scenario`: {section: {dotted name: value}}
+AnyParameters: typing.TypeAlias = typing.Any        # instance of the parameter class of a node
+Sections: typing.TypeAlias = dict[str, dict[str, Value]]    # {node or `scenario`: {dotted name: value}}
 
 
 _P = typing.TypeVar('_P', bound=parameters.Parameters)
@@ -68,7 +72,7 @@ class RestartParameters(parameters.Parameters):
                                           'killed and started again; 0: never')
 
 
-def _of_graph(name: str) -> typing.Any:
+def _of_graph(name: str) -> Value:
     """Return a field of the header for the parameter graph.NAME, which the header gives to every node."""
     field = GraphParameters.__dataclass_fields__[name]
     return dataclasses.field(default=field.default, metadata=field.metadata)
@@ -205,11 +209,11 @@ class Scenario:
         """Return the nodes.Node of one of its nodes."""
         return _row(node, self.header)
 
-    def given(self, node: str) -> dict[str, typing.Any]:
+    def given(self, node: str) -> dict[str, Value]:
         """Return {dotted name: value} of the values of this scenario for a node."""
         return _values_of(self.values, node)
 
-    def node_parameters(self, node: str) -> typing.Any:
+    def node_parameters(self, node: str) -> AnyParameters:
         """Return the parameter dataclass of one node with the values of this scenario."""
         return _built(self.row(node).parameters_type(), parameters.without_ros(self.given(node)))
 
@@ -262,7 +266,7 @@ def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
     return name, entry.read_text()
 
 
-def _values_of(sections: Sections, node: str) -> dict[str, typing.Any]:
+def _values_of(sections: Sections, node: str) -> dict[str, Value]:
     """Return the values of a node such as beam_2/acu: those of the section `acu` for every beam, replaced by those of
     its own section. A simulated part of equipment has the values of its node, replaced by those of its own section."""
     general = nodes.SIMULATED_PARTS.get(node) or nodes.plain(node)
@@ -306,7 +310,7 @@ def _not_of_the_graph(section: str, namespace: str) -> str:
     return f'is no node; there are {", ".join(SECTION_NODES)}'
 
 
-def _every_node(section: str, values: Mapping[str, typing.Any]) -> tuple[str, ...]:
+def _every_node(section: str, values: Mapping[str, Value]) -> tuple[str, ...]:
     """Return the nodes of a section for every node, such as /**. Raises ScenarioError if the section has any parameter
     other than those that every ROS 2 node has."""
     for key in parameters.without_ros(values):
@@ -327,7 +331,7 @@ def parameters_of(node: str) -> type[parameters.Parameters]:
     return nodes.row(node).parameters_type()
 
 
-def parse_override(text: str) -> tuple[str, str, typing.Any]:
+def parse_override(text: str) -> tuple[str, str, Value]:
     """Return (node, key, value) of a text 'node.key=value' of the option --param; the value is read as YAML. Raises
     ScenarioError."""
     left, equals, right = text.partition('=')
@@ -342,7 +346,7 @@ def parse_override(text: str) -> tuple[str, str, typing.Any]:
         raise ScenarioError(f'--param {text!r}: {plain_yaml.problem(error)}') from None
 
 
-def override(name: str, value: typing.Any) -> str:
+def override(name: str, value: Value) -> str:
     """Return the text 'name=value', the inverse of parse_override; name: 'node.key'. A text stands without quotes if
     YAML reads the same text from it."""
     with contextlib.suppress(yaml.YAMLError):
@@ -369,7 +373,7 @@ def file_overrides(path: str | pathlib.Path, namespace: str = '') -> list[str]:
     return [override(f'{node}.{key}', value) for node, values in sections.items() for key, value in values.items()]
 
 
-def _check_each(node: str, values: Mapping[str, typing.Any]) -> None:
+def _check_each(node: str, values: Mapping[str, Value]) -> None:
     """Raise ParameterError for the first value of a node that no scenario accepts. The section `adu` accepts the
     parameters of a drive with motors and those of an array."""
     own = values if node == 'scenario' else parameters.without_ros(values)
@@ -386,7 +390,7 @@ def _check_each(node: str, values: Mapping[str, typing.Any]) -> None:
         raise
 
 
-def _check_each_of_other_drives(values: Mapping[str, typing.Any]) -> None:
+def _check_each_of_other_drives(values: Mapping[str, Value]) -> None:
     """Raise ParameterError for the first value that is neither of an array nor of servo drives."""
     with contextlib.suppress(parameters.ParameterError):
         parameters.check_each(parameters_of(nodes.SIMULATED_DRIVES.name), values)
@@ -427,7 +431,7 @@ class Draft:
         return _checked(self.name, 'scenario', ScenarioParameters, self.sections['scenario'])
 
     @property
-    def target(self) -> typing.Any:
+    def target(self) -> 'TargetParameters':
         """Target parameters of the section `tracking_receiver`."""
         return _target(self.name, self.sections.get('tracking_receiver', {}), self.sections['scenario'])
 
@@ -439,14 +443,14 @@ def draft(name_or_path: str | pathlib.Path) -> Draft:
 
 
 def load(name_or_path: str | pathlib.Path, overrides: Iterable[str] = (), seed: int | None = None,
-         duration: float | None = None, pacing: str | None = None) -> Scenario:
+         duration: Seconds | None = None, pacing: str | None = None) -> Scenario:
     """Return the Scenario of a name or of the path of a .yaml file. overrides: texts 'node.key=value'; for the other
     arguments see `checked`."""
     return checked(draft(name_or_path).changed(overrides), seed, duration, pacing)
 
 
 def parse(name: str, content: str, overrides: Iterable[str] = (), seed: int | None = None,
-          duration: float | None = None, pacing: str | None = None) -> Scenario:
+          duration: Seconds | None = None, pacing: str | None = None) -> Scenario:
     """Return the Scenario of a YAML text; parse(name, Scenario.as_yaml()) returns the same scenario.
 
     overrides: texts 'node.key=value'; for the other arguments see `checked`.
@@ -454,7 +458,7 @@ def parse(name: str, content: str, overrides: Iterable[str] = (), seed: int | No
     return checked(Draft(name, _sections(name, content)).changed(overrides), seed, duration, pacing)
 
 
-def checked(new_draft: Draft, seed: int | None = None, duration: float | None = None,
+def checked(new_draft: Draft, seed: int | None = None, duration: Seconds | None = None,
             pacing: str | None = None) -> Scenario:
     """Return the Scenario of a Draft: check each value, and add the parameters that follow from others. This call
     changes the Draft, so use the Draft only once.
@@ -518,8 +522,8 @@ def _narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
     for section in [section for section in sections if nodes.plain(section) == 'acu']:
         for axis, (end, drive_end, inward) in itertools.product(topics.AXES, LIMIT_ENDS):
             own, of_drive = f'{axis}.limits.{end}', f'{axis}.limits.{drive_end}'
-            wide = _values_of(sections, section).get(own, acu_defaults[own])
-            narrow = sections['adu'].get(of_drive, drive_defaults[of_drive])
+            wide: Value = _values_of(sections, section).get(own, acu_defaults[own])
+            narrow: Value = sections['adu'].get(of_drive, drive_defaults[of_drive])
             if inward * (narrow - wide) > 0.0:
                 sections[section][own] = narrow
                 notes.append(f'{section}.{own} = {wide:g} rad is wider than the travel of the drive: '
@@ -527,16 +531,17 @@ def _narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _target(name: str, receiver_values: Mapping[str, typing.Any],
-            header_values: Mapping[str, typing.Any]) -> typing.Any:
+def _target(name: str, receiver_values: Mapping[str, Value],
+            header_values: Mapping[str, Value]) -> 'TargetParameters':
     """Return the target parameters of the section `tracking_receiver`."""
     iq = header_values.get('receiver', 'simulated') != 'simulated'
-    return _checked(name, 'tracking_receiver', nodes.row('tracking_receiver', iq=iq).parameters_type(),
-                    receiver_values).target
+    receiver: AnyParameters = _checked(name, 'tracking_receiver',
+                                       nodes.row('tracking_receiver', iq=iq).parameters_type(), receiver_values)
+    return receiver.target
 
 
-def _derive_from_flight(name: str, receiver_values: dict[str, typing.Any],
-                        header_values: dict[str, typing.Any]) -> None:
+def _derive_from_flight(name: str, receiver_values: dict[str, Value],
+                        header_values: dict[str, Value]) -> None:
     """Set the parameters that the scenario lacks, from the file of a target's path: station, reference range,
     duration, and for the file of an orbit also the start time. Raises ScenarioError, TableError."""
     target = _target(name, receiver_values, header_values)
@@ -559,7 +564,7 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
 
     name: of the scenario; seed: as of `checked`. Raises ScenarioError if the section of a node has another value.
     """
-    def share(node: str, key: str, value: typing.Any) -> None:
+    def share(node: str, key: str, value: Value) -> None:
         sections[node].setdefault(key, value)
         for section in [section for section in sections if nodes.plain(section) == node]:
             own = sections[section].get(key, value)
@@ -579,7 +584,7 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
         if key.startswith('ship.'):
             share('ins', key, value)
 
-    def value_of(node: str, key: str, otherwise: typing.Any = None) -> typing.Any:
+    def value_of(node: str, key: str, otherwise: Value = None) -> Value:
         default = parameters.defaults(_row(node, header).parameters_type()).get(key, otherwise)
         return sections[node].get(key, default)
 
@@ -602,12 +607,12 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
                             'ins.error_told = false')
     if header.iq:
         # The error of a block of samples has the stamp of its middle, and arrives one step after its end.
-        receiver = _checked(name, 'tracking_receiver', nodes.MONOPULSE_RECEIVER.parameters_type(),
-                            _values_of(sections, 'tracking_receiver'))
-        latency = (IQ_LATENCY_STEPS + 0.5 * (receiver.steps_per_error - 1)) * receiver.period
+        of_iq: AnyParameters = _checked(name, 'tracking_receiver', nodes.MONOPULSE_RECEIVER.parameters_type(),
+                                        _values_of(sections, 'tracking_receiver'))
+        latency = (IQ_LATENCY_STEPS + 0.5 * (of_iq.steps_per_error - 1)) * of_iq.period
         sections['acu'].setdefault('receiver_latency', latency)
-        if receiver.feed.scanned:
-            _share_scan(name, receiver, latency, sections['acu'])
+        if of_iq.feed.scanned:
+            _share_scan(name, of_iq, latency, sections['acu'])
     if header.servo:
         for key, value in SIMULATED_BUS.items():
             if sections['adu'].get(key, value) != value:
@@ -623,19 +628,20 @@ def _share_parameters(name: str, sections: Sections, header: ScenarioParameters,
         from tracking_receiver_sim import receiver
         sections['tracking_receiver'].setdefault('receiver.beam', 'held')
         for prefix in nodes.prefixes(header.graph_beams):
-            tracking = _checked(name, f'{prefix}tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
-                                _values_of(sections, f'{prefix}tracking_receiver'))
+            tracking: AnyParameters = _checked(
+                name, f'{prefix}tracking_receiver', nodes.row('tracking_receiver').parameters_type(),
+                _values_of(sections, f'{prefix}tracking_receiver'))
             for key, value in (('age', receiver.age(tracking, tracking.period)),
                                ('beam_age', receiver.beam_age(tracking, tracking.period))):
                 if f'tracker.receiver.{key}' not in sections['acu']:
                     sections[f'{prefix}acu'].setdefault(f'tracker.receiver.{key}', value)
 
 
-def _share_scan(name: str, receiver: typing.Any, latency: float, values: dict[str, typing.Any]) -> None:
+def _share_scan(name: str, receiver: 'MonopulseParameters', latency: Seconds, values: dict[str, Value]) -> None:
     """Give the section `acu` the parameters that follow from a feed with one output: the noise of its errors, and the
     time between them.
 
-    receiver: MonopulseParameters; latency: of the errors [s]. Raises ScenarioError for a scan that is too slow.
+    latency: of the errors. Raises ScenarioError for a scan that is too slow.
     """
     # Imported late, because their laws take half a second to import.
     from acu_tracker.geometry.history import MAX_DELAY_STEPS
@@ -669,13 +675,13 @@ def _share_with_beam(name: str, node: str, sections: Sections, header: ScenarioP
                                 'tracking_receiver')
 
 
-def _checked(name: str, section: str, parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
+def _checked(name: str, section: str, parameters_type: type[_P], values: Mapping[str, Value]) -> _P:
     """Return the parameter dataclass of a section of the scenario `name`. Raises ScenarioError."""
     with _errors_named(f'scenario {name}, {section}'):
         return _built(parameters_type, values if section == 'scenario' else parameters.without_ros(values))
 
 
-def _built(parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
+def _built(parameters_type: type[_P], values: Mapping[str, Value]) -> _P:
     """Return parameters.build, cached for equal values, because trials of a scenario share most of their values."""
     key = tuple((name, type(value), value) for name, value in values.items())
     hashable = all(isinstance(value, int | float | str | None) for value in values.values())
@@ -685,7 +691,7 @@ def _built(parameters_type: type[_P], values: Mapping[str, typing.Any]) -> _P:
 
 
 @functools.lru_cache(256)
-def _built_once(parameters_type: type[_P], key: tuple[tuple[str, type, typing.Any], ...]) -> _P:
+def _built_once(parameters_type: type[_P], key: tuple[tuple[str, type, Value], ...]) -> _P:
     return parameters.build(parameters_type, {name: value for name, _, value in key})
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
+from pedestal_common.quantities import Floats, Radians
 
 MAX_SECTORS = 8  # largest number of hidden sectors
 
@@ -14,7 +15,7 @@ BLOCKAGE_DOC = ("sectors hidden by the superstructure, at most 8: 'azimuth_low a
 """Meaning of a parameter with hidden sectors."""
 
 
-def sectors(text) -> np.ndarray:
+def sectors(text: str) -> Floats:
     """Return the table (MAX_SECTORS, 3) [rad] that `blocked` reads, from a text as in BLOCKAGE_DOC.
 
     A row has the lowest and the highest azimuth and the highest elevation of a sector. Raises ParameterError, which
@@ -39,8 +40,8 @@ def sectors(text) -> np.ndarray:
 
 
 @compiled
-def blocked(table, azimuth, elevation):
-    """Return True if a direction, in deck angles [rad], is in a hidden sector; False if an angle is NaN. table: from
+def blocked(table: Floats, azimuth: Radians, elevation: Radians) -> bool:
+    """Return True if a direction, in deck angles, is in a hidden sector; False if an angle is NaN. table: from
     `sectors`."""
     for i in range(MAX_SECTORS):
         low, high, top = table[i, 0], table[i, 1], table[i, 2]

@@ -15,6 +15,7 @@ import pathlib
 import numpy as np
 
 from pedestal_common.parameters import ParameterError, Parameters, parameter, text
+from pedestal_common.quantities import Days, Floats, Pairs, Times, Vectors3
 from pedestal_common.text_files import files
 
 MAX_FINALS_BYTES = 16_000_000  # largest size of a file [bytes]; the file of all days since 1973 has 4 million
@@ -42,41 +43,37 @@ class EarthOrientationParameters(Parameters):
                               'diagnostics warn')
 
 
-def _date(mjd):
-    """Return an MJD as text, YYYY-MM-DD."""
+def _date(mjd: Days) -> str:
     return datetime.date.fromordinal(MJD_ZERO_ORDINAL + math.floor(mjd)).isoformat()
 
 
 class EarthOrientation:
-    """The rows of a file.
+    """The rows of a file."""
 
-    name           name of the file, without its folder
-    mjd            MJD of the rows (n,), increasing
-    measured_until MJD of the last measured row
-    """
-
-    def __init__(self, name, mjd, values, measured_until):
-        self.name, self.mjd, self.measured_until = name, mjd, measured_until
+    def __init__(self, name: str, mjd: Floats, values: Vectors3, measured_until: Days) -> None:
+        self.name = name                        # of the file, without its folder
+        self.mjd = mjd                          # of the rows, increasing
+        self.measured_until = measured_until    # MJD of the last measured row
         x, y, ut1 = values.T
         self._pole = ARCSECOND_RAD * np.column_stack((x, y))
         # A leap second raises UT1 - UTC by 1 s from one row to the next.
         self._leaps = np.append(0.0, np.cumsum(np.round(np.diff(ut1))))
         self._ut1 = ut1 - self._leaps
 
-    def at(self, mjd):
-        """Return (UT1 - UTC (n,) [s], polar motion x, y (n, 2) [rad]) at UTC as MJD (n,)."""
+    def at(self, mjd: Floats) -> tuple[Times, Pairs]:
+        """Return (UT1 - UTC, polar motion x, y [rad]) at UTC as MJD (n,)."""
         row = np.clip(np.searchsorted(self.mjd, mjd, side='right') - 1, 0, None)
         pole = np.column_stack([np.interp(mjd, self.mjd, column) for column in self._pole.T])
         return np.interp(mjd, self.mjd, self._ut1) + self._leaps[row], pole
 
-    def age(self, mjd):
-        """Return the time [d] from the last measured row to an MJD, 0 before that row."""
+    def age(self, mjd: Days) -> Days:
+        """Return the time from the last measured row to an MJD, 0 before that row."""
         return max(mjd - self.measured_until, 0.0)
 
-    def problem(self, mjd, oldest):
+    def problem(self, mjd: Days, oldest: Days) -> str:
         """Return the reason why the values at an MJD are inaccurate, with the values used instead; '' for good values.
 
-        oldest: largest age of the last measured row without a problem [d].
+        oldest: largest age of the last measured row without a problem.
         """
         first, last = self.mjd[0], self.mjd[-1]
         if mjd < first:
@@ -92,14 +89,14 @@ class EarthOrientation:
                     f'at most {oldest:g} d; its predicted rows are used')
         return ''
 
-    def description(self, mjd):
+    def description(self, mjd: Days) -> str:
         """Return a text with the name of the file, its age at an MJD, and the day of its last row."""
         return (f'{self.name}, measured until {_date(self.measured_until)}, age {self.age(mjd):.1f} d, predicted '
                 f'until {_date(self.mjd[-1])}')
 
 
-def load(parameters) -> EarthOrientation | None:
-    """Return the EarthOrientation of EarthOrientationParameters, None without a file. Raises ParameterError."""
+def load(parameters: EarthOrientationParameters) -> EarthOrientation | None:
+    """Return the EarthOrientation of the file of the parameters, None without a file. Raises ParameterError."""
     if not parameters.file:
         return None
     try:
@@ -113,12 +110,14 @@ def load(parameters) -> EarthOrientation | None:
 
 
 @functools.lru_cache(4)
-def _read(path, _modified, _size):
+def _read(path: str, _modified: int, _size: int) -> EarthOrientation:
     """Return the EarthOrientation of a file. Raises ValueError with the line, OSError, UnicodeDecodeError.
 
     The file is read again once its time of modification or its size differs.
     """
-    mjds, rows, measured = [], [], -math.inf
+    mjds: list[Days] = []
+    rows: list[list[float]] = []
+    measured = -math.inf
     for number, line in enumerate(files.read_text(path, MAX_FINALS_BYTES).splitlines(), 1):
         cells = [line[first:end].strip() for (first, end), _, _ in VALUE_COLUMNS.values()]
         mjd = _number(number, 'MJD', line[slice(*MJD_COLUMNS)], *MJD_RANGE, 'in columns 8 to 15 of finals2000A')
@@ -140,7 +139,7 @@ def _read(path, _modified, _size):
     return EarthOrientation(pathlib.Path(path).name, np.array(mjds), np.array(rows), measured)
 
 
-def _number(line, name, cell, low, high, unit):
+def _number(line: int, name: str, cell: str, low: float, high: float, unit: str) -> float:
     """Return the number in a cell of a line. Raises ValueError for any other text and outside low to high."""
     try:
         value = float(cell)

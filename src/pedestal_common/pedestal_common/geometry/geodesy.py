@@ -6,6 +6,7 @@ import math
 import numpy as np
 
 from pedestal_common.parameters import Parameters, parameter
+from pedestal_common.quantities import Degrees, Floats, Matrix3, Meters, Radians, Vector3
 from pedestal_common.reproducible import cos, sin
 
 EARTH_RADIUS_M, EARTH_FLATTENING = 6378137.0, 1.0 / 298.257223563
@@ -30,9 +31,8 @@ class StationParameters(Parameters):
     height: float = parameter(500.0, -500.0, 9000.0, 'm', 'height above the ellipsoid')
 
 
-def geocentric(latitude, longitude, height):
-    """Return earth-fixed x, y, z [m], (..., 3), of WGS84 latitude, longitude [rad] and height [m], arrays or
-    numbers."""
+def geocentric(latitude: Radians | Floats, longitude: Radians | Floats, height: Meters | Floats) -> Floats:
+    """Return earth-fixed x, y, z [m], (..., 3), of WGS84 latitude, longitude and height, arrays or numbers."""
     # e2: eccentricity squared; N: radius of curvature in the prime vertical.
     e2 = EARTH_FLATTENING * (2.0 - EARTH_FLATTENING)
     N = EARTH_RADIUS_M / np.sqrt(1.0 - e2 * sin(latitude)**2)
@@ -41,9 +41,8 @@ def geocentric(latitude, longitude, height):
                      (N * (1.0 - e2) + height) * sin(latitude)], axis=-1)
 
 
-def station_frame(station):
-    """Return the earth-fixed position (3,) [m] of a station, and the rotation (3, 3) earth-fixed -> ENU. station:
-    StationParameters."""
+def station_frame(station: StationParameters) -> tuple[Vector3, Matrix3]:
+    """Return the earth-fixed position [m] of a station, and the rotation earth-fixed -> ENU."""
     latitude, longitude = math.radians(station.latitude_deg), math.radians(station.longitude_deg)
     # sp, cp: sine and cosine of the latitude (phi); sl, cl: of the longitude (lambda).
     sp, cp, sl, cl = math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)
@@ -51,8 +50,9 @@ def station_frame(station):
     return geocentric(latitude, longitude, station.height), to_enu
 
 
-def destination(latitude_deg, longitude_deg, bearing, distance):
-    """Return (latitude, longitude) [deg] of the place at a distance [m] and a bearing [rad, clockwise from north].
+def destination(latitude_deg: Degrees, longitude_deg: Degrees, bearing: Radians,
+                distance: Meters) -> tuple[Degrees, Degrees]:
+    """Return (latitude, longitude) of the place at a distance and a bearing, which is clockwise from north.
 
     The place is on the great circle that leaves the first place with this bearing. Because the earth is taken as a
     sphere, the distance is right to 0.6 %.

@@ -1,11 +1,12 @@
 """Search in a table of increasing times for the interval that holds a time."""
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats
 
 
 @compiled
-def interval(breaks, t):
-    """Return the index i with breaks[i] <= t < breaks[i + 1]. breaks: increasing array (n,), n at least 2. Return 0
-    for a t before the first break, and n - 2 for a t after the last."""
+def interval(breaks: Floats, t: float) -> int:
+    """Return the index i with breaks[i] <= t < breaks[i + 1]. breaks: increasing, (n,), n at least 2. Return 0 for a t
+    before the first break, and n - 2 for a t after the last."""
     low, high = 0, len(breaks) - 1
     while high - low > 1:
         middle = (low + high) // 2

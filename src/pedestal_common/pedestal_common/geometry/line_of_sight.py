@@ -1,6 +1,6 @@
 """Line-of-sight geometry: directions in the frames of beam, deck and earth.
 
-All angles are in rad. The docstring of the package pedestal_common defines the frames. Symbols:
+The docstring of the package pedestal_common defines the frames. Symbols:
 
     b, c, e         components of a vector along the beam, in cross-elevation and in elevation
     db, dc, de      time derivatives of b, c, e
@@ -11,22 +11,23 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Direction, Matrix3, Radians, RadiansPerSecond, Xyz
 
 
 @compiled
-def wrap(angle):
+def wrap(angle: Radians) -> Radians:
     """Return the same angle in [-pi, pi)."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
 @compiled
-def cross(ax, ay, az, bx, by, bz):
+def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Xyz:
     """Return a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @compiled
-def direction(azimuth, elevation):
+def direction(azimuth: Radians, elevation: Radians) -> Xyz:
     """Return the unit vector of an azimuth (clockwise) and an elevation: FLU for deck angles, north-west-up for earth
     angles."""
     cos_el = math.cos(elevation)
@@ -34,35 +35,35 @@ def direction(azimuth, elevation):
 
 
 @compiled
-def angles(x, y, z):
+def angles(x: float, y: float, z: float) -> Direction:
     """Return azimuth (clockwise) and elevation of a vector of any length: deck angles if the vector is FLU, earth
     angles if it is north-west-up."""
     return math.atan2(-y, x), math.atan2(z, math.hypot(x, y))
 
 
 @compiled
-def earth_angles(east, north, up):
+def earth_angles(east: float, north: float, up: float) -> Direction:
     """Return azimuth clockwise from north and elevation of an ENU vector."""
     return angles(north, -east, up)
 
 
 @compiled
-def earth_direction(azimuth, elevation):
+def earth_direction(azimuth: Radians, elevation: Radians) -> Xyz:
     """Return the ENU unit vector of an azimuth clockwise from north and an elevation."""
     north, west, up = direction(azimuth, elevation)
     return -west, north, up
 
 
 @compiled
-def to_earth(mat_ed, x, y, z):
-    """Return a deck vector (FLU) in ENU; mat_ed (3, 3) rotates deck -> earth."""
+def to_earth(mat_ed: Matrix3, x: float, y: float, z: float) -> Xyz:
+    """Return a deck vector (FLU) in ENU; mat_ed rotates deck -> earth."""
     return (mat_ed[0, 0] * x + mat_ed[0, 1] * y + mat_ed[0, 2] * z,
             mat_ed[1, 0] * x + mat_ed[1, 1] * y + mat_ed[1, 2] * z,
             mat_ed[2, 0] * x + mat_ed[2, 1] * y + mat_ed[2, 2] * z)
 
 
 @compiled
-def to_deck(mat_ed, east, north, up):
+def to_deck(mat_ed: Matrix3, east: float, north: float, up: float) -> Xyz:
     """Return an ENU vector in the deck frame (FLU); the transpose of to_earth."""
     return (mat_ed[0, 0] * east + mat_ed[1, 0] * north + mat_ed[2, 0] * up,
             mat_ed[0, 1] * east + mat_ed[1, 1] * north + mat_ed[2, 1] * up,
@@ -70,7 +71,7 @@ def to_deck(mat_ed, east, north, up):
 
 
 @compiled
-def offsets(azimuth, elevation, x, y, z):
+def offsets(azimuth: Radians, elevation: Radians, x: float, y: float, z: float) -> tuple[Radians, Radians]:
     """Return the offset (dX, dE) of a direction from the beam.
 
     azimuth, elevation: of the beam
@@ -93,11 +94,11 @@ def offsets(azimuth, elevation, x, y, z):
 
 
 @compiled
-def offset_rates(beam, beam_rate, r, v):
-    """Return the time derivative of `offsets`, (d dX/dt, d dE/dt) [rad/s].
+def offset_rates(beam: Direction, beam_rate: tuple[RadiansPerSecond, RadiansPerSecond], r: Xyz,
+                 v: Xyz) -> tuple[RadiansPerSecond, RadiansPerSecond]:
+    """Return the time derivative of `offsets`, (d dX/dt, d dE/dt).
 
-    beam: (azimuth, elevation) [rad]
-    beam_rate: rates of these angles [rad/s]
+    beam, beam_rate: angles of the beam and their rates
     r: vector of the direction, of any length, in the frame of these angles; v: time derivative of r
     """
     azimuth, elevation = beam
@@ -123,7 +124,7 @@ def offset_rates(beam, beam_rate, r, v):
 
 
 @compiled
-def displaced(azimuth, elevation, cross_elevation, elevation_error):
+def displaced(azimuth: Radians, elevation: Radians, cross_elevation: Radians, elevation_error: Radians) -> Direction:
     """Return azimuth and elevation of the direction at an offset from the beam: the inverse of `offsets`.
 
     azimuth, elevation: of the beam; cross_elevation, elevation_error: the offset (dX, dE). The returned azimuth is
@@ -138,12 +139,14 @@ def displaced(azimuth, elevation, cross_elevation, elevation_error):
 
 
 @compiled
-def displaced_motion(azimuth, elevation, azimuth_rate, elevation_rate, cross_elevation, elevation_error,
-                     cross_elevation_rate, elevation_error_rate):
-    """Return the unit vector of the direction at an offset from the beam, and its time derivative [1/s]: six floats.
+def displaced_motion(azimuth: Radians, elevation: Radians, azimuth_rate: RadiansPerSecond,
+                     elevation_rate: RadiansPerSecond, cross_elevation: Radians, elevation_error: Radians,
+                     cross_elevation_rate: RadiansPerSecond,
+                     elevation_error_rate: RadiansPerSecond) -> tuple[float, float, float, float, float, float]:
+    """Return the unit vector of the direction at an offset from the beam, and its time derivative [1/s].
 
-    The first four arguments are the angles of the beam and their rates, the others the offset (dX, dE) and its rates
-    [rad, rad/s]. The vectors are FLU for deck angles, north-west-up for earth angles. See `offsets`, `offset_rates`.
+    The first four arguments are the angles of the beam and their rates, the others the offset (dX, dE) and its rates.
+    The vectors are FLU for deck angles, north-west-up for earth angles. See `offsets`, `offset_rates`.
     """
     theta2 = cross_elevation * cross_elevation + elevation_error * elevation_error
     theta = math.sqrt(theta2)
@@ -166,7 +169,7 @@ def displaced_motion(azimuth, elevation, azimuth_rate, elevation_rate, cross_ele
 
 
 @compiled
-def rows(qx, qy, qz, qw):
+def rows(qx: float, qy: float, qz: float, qw: float) -> tuple[Xyz, Xyz, Xyz]:
     """Return the three rows of the rotation matrix of a unit quaternion (x, y, z, w)."""
     return ((1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qz * qw), 2 * (qx * qz + qy * qw)),
             (2 * (qx * qy + qz * qw), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qx * qw)),
@@ -174,8 +177,8 @@ def rows(qx, qy, qz, qw):
 
 
 @compiled
-def rotation(qx, qy, qz, qw, mat):
-    """Fill mat (3, 3) with the rotation of a unit quaternion (x, y, z, w)."""
+def rotation(qx: float, qy: float, qz: float, qw: float, mat: Matrix3) -> None:
+    """Fill mat with the rotation of a unit quaternion (x, y, z, w)."""
     x, y, z = rows(qx, qy, qz, qw)
     mat[0, 0], mat[0, 1], mat[0, 2] = x
     mat[1, 0], mat[1, 1], mat[1, 2] = y
@@ -183,7 +186,7 @@ def rotation(qx, qy, qz, qw, mat):
 
 
 @compiled
-def quaternion(roll, pitch, yaw):
+def quaternion(roll: Radians, pitch: Radians, yaw: Radians) -> tuple[float, float, float, float]:
     """Return the unit quaternion (x, y, z, w) deck -> earth of roll, pitch and yaw about fixed axes (REP 103). At yaw
     0 the bow points east."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
@@ -197,6 +200,6 @@ ASHORE_ATTITUDE = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
 """Quaternion (x, y, z, w) deck -> earth of a pedestal ashore: the bow points north."""
 
 
-def ashore_matrix() -> np.ndarray:
-    """Return mat_ed (3, 3) of a pedestal ashore."""
+def ashore_matrix() -> Matrix3:
+    """Return mat_ed of a pedestal ashore."""
     return np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

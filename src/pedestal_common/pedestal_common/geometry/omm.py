@@ -6,9 +6,11 @@ neither the number of the element set nor the number of the revolution.
 import datetime
 import json
 import math
+from collections.abc import Mapping
 
 from sgp4 import omm
 from sgp4.alpha5 import from_alpha5
+from sgp4.api import Satrec
 
 NUMBER_LIMITS = {'MEAN_MOTION': (0.05, 18.0), 'ECCENTRICITY': (0.0, 0.9999999), 'INCLINATION': (0.0, 180.0),
                  'RA_OF_ASC_NODE': (-360.0, 360.0), 'ARG_OF_PERICENTER': (-360.0, 360.0),
@@ -33,7 +35,7 @@ KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'EPOCH', 'EPHEMERIS_TYPE', 'NORAD_CAT_ID
 """Keywords that are read."""
 
 
-def require_sgp4(ephemeris_type):
+def require_sgp4(ephemeris_type: object) -> None:
     """Raise ValueError if an ephemeris type means another theory than SGP4. '': the elements state no type."""
     kind = str(ephemeris_type).strip()
     if kind not in SGP4_TYPES:
@@ -41,7 +43,7 @@ def require_sgp4(ephemeris_type):
         raise ValueError(f'ephemeris type {kind!s:.20}: must be 0 or 2 (SGP4){theory}')
 
 
-def catalogue_number(text):
+def catalogue_number(text: str) -> str:
     """Return a catalogue number as digits, '' for an empty text. Raises ValueError.
 
     The first of five characters may be a letter (Alpha-5).
@@ -56,35 +58,35 @@ def catalogue_number(text):
     return str(number) if text else ''
 
 
-def checked(fields):
+def checked(fields: Mapping[str, object]) -> dict[str, str]:
     """Return {keyword: text} of valid elements, with every number that SGP4 needs, from the fields of an OMM.
 
     Raises ValueError, which names keyword, value and range.
     """
-    fields = {**DEFAULT_FIELDS, **{key: str(value).strip() for key, value in fields.items() if key in KEYWORDS}}
+    given = {**DEFAULT_FIELDS, **{key: str(value).strip() for key, value in fields.items() if key in KEYWORDS}}
     for keyword, allowed in ALLOWED_VALUES.items():
-        if fields.get(keyword, allowed[0]).upper() not in allowed:
-            raise ValueError(f'{keyword} = {fields[keyword]!r:.60}: must be {" or ".join(allowed)}')
-    require_sgp4(fields.get('EPHEMERIS_TYPE', ''))
+        if given.get(keyword, allowed[0]).upper() not in allowed:
+            raise ValueError(f'{keyword} = {given[keyword]!r:.60}: must be {" or ".join(allowed)}')
+    require_sgp4(given.get('EPHEMERIS_TYPE', ''))
     for keyword in OTHER_KEYWORDS:
-        if float(fields.get(keyword) or 0.0):
-            raise ValueError(f'{keyword} = {fields[keyword]!r:.60}: must be absent, because it needs SGP4-XP')
-    without_drag = not fields.get('BSTAR')
+        if float(given.get(keyword) or 0.0):
+            raise ValueError(f'{keyword} = {given[keyword]!r:.60}: must be absent, because it needs SGP4-XP')
+    without_drag = not given.get('BSTAR')
     if without_drag:
-        fields['BSTAR'] = '0'
+        given['BSTAR'] = '0'
     for keyword, (low, high) in NUMBER_LIMITS.items():
         try:
-            value = float(fields.get(keyword, '').replace('_', ' '))  # float() alone would accept _ between digits
+            value = float(given.get(keyword, '').replace('_', ' '))  # float() alone would accept _ between digits
         except ValueError:
-            raise ValueError(f'{keyword} = {fields.get(keyword)!r:.60}: must be a number') from None
+            raise ValueError(f'{keyword} = {given.get(keyword)!r:.60}: must be a number') from None
         if not low <= value <= high:
             raise ValueError(f'{keyword} = {value:g}: must be {low:g} to {high:g}')
-    if without_drag and fields.get('MEAN_ELEMENT_THEORY', '').upper() not in BSTAR_OPTIONAL_THEORIES:
+    if without_drag and given.get('MEAN_ELEMENT_THEORY', '').upper() not in BSTAR_OPTIONAL_THEORIES:
         raise ValueError('BSTAR is missing: only an OMM with MEAN_ELEMENT_THEORY = SGP4 may omit it')
-    return {**fields, 'NORAD_CAT_ID': catalogue_number(fields.get('NORAD_CAT_ID', ''))}
+    return {**given, 'NORAD_CAT_ID': catalogue_number(given.get('NORAD_CAT_ID', ''))}
 
 
-def initialize(satrec, text):
+def initialize(satrec: Satrec, text: str) -> str:
     """Fill a Satrec with the elements of an OMM in JSON. Return the catalogue number, or the name of the satellite if
     there is no number. Raises ValueError."""
     try:

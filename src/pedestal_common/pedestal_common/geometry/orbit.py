@@ -5,6 +5,7 @@ resulting error. earth_orientation reads UT1 and the polar motion from a file.
 """
 import datetime
 import re
+from typing import Protocol
 
 import numpy as np
 from sgp4.api import SGP4_ERRORS, WGS72, Satrec
@@ -12,8 +13,15 @@ from sgp4.io import compute_checksum
 from sgp4.propagation import gstime
 
 from pedestal_common.geometry import omm
-from pedestal_common.geometry.geodesy import EARTH_RATE, SIDEREAL_RATE, SPEED_OF_LIGHT_M_S, station_frame
+from pedestal_common.geometry.geodesy import (
+    EARTH_RATE,
+    SIDEREAL_RATE,
+    SPEED_OF_LIGHT_M_S,
+    StationParameters,
+    station_frame,
+)
 from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.quantities import Floats, Pairs, Rotations, Seconds, Times, Vector3, Vectors3
 from pedestal_common.reproducible import arctan2, cos, sin, turned
 
 TLE_NUMBER_COLUMNS = (
@@ -37,18 +45,30 @@ class TargetError(ValueError):
     """
 
 
+class Elements(Protocol):
+    """Elements of a satellite."""
+
+    @property
+    def omm(self) -> str:
+        """OMM in JSON; if it is empty, the lines of the TLE are used."""
+
+    @property
+    def line_1(self) -> str:
+        """First line of a TLE."""
+
+    @property
+    def line_2(self) -> str:
+        """Second line of a TLE."""
+
+
 class Satellite(Satrec):
-    """The SGP4 record of a satellite. number: its catalogue number, with any number of digits; form: of its elements,
-    TLE or OMM."""
-    number: str
-    form: str
+    """The SGP4 record of a satellite."""
+    number: str     # catalogue number, with any number of digits
+    form: str       # of its elements: TLE or OMM
 
 
-def satellite(leo_pass) -> Satellite:
-    """Return the SGP4 record of a satellite. Raises TargetError.
-
-    leo_pass: an object with the texts `omm`, and `line_1` and `line_2` of a TLE, which are used if `omm` is empty.
-    """
+def satellite(leo_pass: Elements) -> Satellite:
+    """Return the SGP4 record of a satellite. Raises TargetError."""
     if leo_pass.omm:
         satrec = Satellite()
         satrec.form = 'OMM'
@@ -85,12 +105,13 @@ def satellite(leo_pass) -> Satellite:
     return satrec
 
 
-def earth_fixed(julian, fractions, ut1_offset=0.0, pole=None):
-    """Return rotations (n, 3, 3) from TEME, the frame of SGP4 (true equator and mean equinox of date), to the
+def earth_fixed(julian: float, fractions: Floats, ut1_offset: Seconds | Times = 0.0,
+                pole: Pairs | None = None) -> Rotations:
+    """Return rotations from TEME, the frame of SGP4 (true equator and mean equinox of date), to the
     earth-fixed frame.
 
-    The times are the Julian dates julian + fractions (n,), in UTC. ut1_offset: UT1 - UTC [s], one or (n,); pole: polar
-    motion x, y (n, 2) [rad], None for the pole of TEME.
+    The times are the Julian dates julian + fractions (n,), in UTC. ut1_offset: UT1 - UTC; pole: polar motion x, y
+    [rad], None for the pole of TEME.
     """
     theta = gstime(julian) + SIDEREAL_RATE * (SECONDS_PER_DAY * fractions + ut1_offset)
     c, s = cos(theta), sin(theta)
@@ -104,19 +125,19 @@ def earth_fixed(julian, fractions, ut1_offset=0.0, pole=None):
     return to_fixed
 
 
-def apparent(fixed, origin):
-    """Return the vectors (n, 3) [m] to the places at which an observer sees targets, earth-fixed.
+def apparent(fixed: Vectors3, origin: Vector3) -> Vectors3:
+    """Return the vectors [m] to the places at which an observer sees targets, earth-fixed.
 
-    fixed: positions (n, 3) [m] of the targets when the light left them, turned with the earth to its arrival; origin:
-    position (3,) [m] of the observer. The observer moves with the earth, which adds the diurnal aberration.
+    fixed: positions [m] of the targets when the light left them, turned with the earth to its arrival; origin:
+    position [m] of the observer. The observer moves with the earth, which adds the diurnal aberration.
     """
     relative = fixed - origin
     travel = np.sqrt(np.einsum('ni,ni->n', relative, relative)) / SPEED_OF_LIGHT_M_S
     return relative + np.outer(travel, np.cross([0.0, 0.0, EARTH_RATE], origin))
 
 
-def _teme(satrec, julian, fractions):
-    """Return position and velocity (n, 3) [km, km/s] of a satellite in TEME; arguments as in `enu`. Raises
+def _teme(satrec: Satellite, julian: float, fractions: Floats) -> tuple[Vectors3, Vectors3]:
+    """Return position and velocity [km, km/s] of a satellite in TEME; arguments as in `enu`. Raises
     TargetError."""
     error, position, velocity = satrec.sgp4_array(np.full(len(fractions), julian), fractions)
     if error.any():
@@ -126,11 +147,11 @@ def _teme(satrec, julian, fractions):
     return position, velocity
 
 
-def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
-    """Return position [m] and velocity against the earth [m/s] of a satellite, each (n, 3), ENU of a station.
+def enu(satrec: Satellite, station: StationParameters, julian: float, fraction: float, times: Times,
+        ut1_offset: Seconds | Times = 0.0) -> tuple[Vectors3, Vectors3]:
+    """Return position [m] and velocity against the earth [m/s] of a satellite, ENU of a station.
 
-    satrec: from `satellite`; station: StationParameters; times: (n,) [s] after the Julian date julian + fraction, UTC;
-    ut1_offset: UT1 - UTC [s]. Raises TargetError where SGP4 fails.
+    times: after the Julian date julian + fraction, UTC; ut1_offset: UT1 - UTC. Raises TargetError where SGP4 fails.
     """
     fractions = fraction + times / SECONDS_PER_DAY
     position, velocity = _teme(satrec, julian, fractions)
@@ -141,10 +162,10 @@ def enu(satrec, station, julian, fraction, times, ut1_offset=0.0):
     return turned(to_enu, r - origin), turned(to_enu, v)
 
 
-def seen(satrec, station, julian, fractions, to_fixed, light_time):
-    """Return the vectors (n, 3) [m], ENU of a station, in which a satellite is seen without refraction.
+def seen(satrec: Satellite, station: StationParameters, julian: float, fractions: Floats, to_fixed: Rotations,
+         light_time: bool) -> Vectors3:
+    """Return the vectors [m], ENU of a station, in which a satellite is seen without refraction.
 
-    satrec, station  as in `enu`
     julian, fractions, to_fixed  the Julian dates julian + fractions (n,) in UTC, and `earth_fixed` at these times
     light_time       True to include the travel time of the wave
 
@@ -160,26 +181,26 @@ def seen(satrec, station, julian, fractions, to_fixed, light_time):
     return turned(to_enu, apparent(np.einsum('nij,nj->ni', to_fixed, 1e3 * left), origin))
 
 
-def elevations(satrec, station, julian, fraction, times):
+def elevations(satrec: Satellite, station: StationParameters, julian: float, fraction: float, times: Times) -> Floats:
     """Return the elevations [deg] (n,) of a satellite at a station; arguments as in `enu`."""
     east, north, up = enu(satrec, station, julian, fraction, times)[0].T
     return np.degrees(arctan2(up, np.hypot(east, north)))
 
 
-def calendar(julian, fraction):
+def calendar(julian: float, fraction: float) -> datetime.datetime:
     """Return the Julian date julian + fraction as a datetime, to the millisecond."""
     since_2000 = datetime.timedelta(days=julian - 2451544.5) + datetime.timedelta(days=fraction)
     return datetime.datetime(2000, 1, 1) + datetime.timedelta(milliseconds=round(since_2000.total_seconds() * 1e3))
 
 
-def julian_date(when):
+def julian_date(when: datetime.datetime) -> tuple[float, float]:
     """Return (Julian day, fraction) of a datetime in UTC."""
     # sgp4.api.jday is one day off from March 2100 on.
     second = when.second + when.microsecond * 1e-6 + when.minute * 60.0 + when.hour * 3600.0
     return when.toordinal() + ORDINAL_ZERO_JULIAN_DATE, second / SECONDS_PER_DAY
 
 
-def instant(name, text):
+def instant(name: str, text: str) -> datetime.datetime:
     """Return the time in an ISO 8601 text as a datetime in UTC without a zone.
 
     name: name of the text in the TargetError that a wrong text raises. The leap second 23:59:60 counts as the first
@@ -193,6 +214,6 @@ def instant(name, text):
     return when if when.tzinfo is None else when.astimezone(datetime.timezone.utc).replace(tzinfo=None)
 
 
-def iso(julian, fraction):
+def iso(julian: float, fraction: float) -> str:
     """Return the Julian date julian + fraction as ISO 8601 text, to the millisecond."""
     return calendar(julian, fraction).isoformat(timespec='milliseconds') + 'Z'

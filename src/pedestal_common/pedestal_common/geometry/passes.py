@@ -8,13 +8,16 @@ and to its set.
 import datetime
 import math
 import typing
+from collections.abc import Callable
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from pedestal_common.geometry import orbit
-from pedestal_common.geometry.orbit import TargetError
+from pedestal_common.geometry.geodesy import StationParameters
+from pedestal_common.geometry.orbit import Satellite, TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.quantities import Days, Degrees, Floats, Seconds, Times
 
 SEARCH_STEP_S = 20.0  # time between two elevations [s]
 MIN_CULMINATION_DEG = 10.0
@@ -27,25 +30,18 @@ MAX_RUN_S = float(SECONDS_PER_DAY)  # largest duration of a run [s]
 
 
 class Pass(typing.NamedTuple):
-    """Pass of a satellite.
-
-        rise, set                   UTC as datetime; None if it is more than MAX_PASS_DAYS outside the search
-        top                         UTC of the highest elevation, the culmination
-        rise_azimuth, set_azimuth   [deg]; NaN without rise or set
-        elevation                   highest elevation [deg]
-        begin                       UTC of the beginning of the search
-    """
-    rise: datetime.datetime | None
-    top: datetime.datetime
-    set: datetime.datetime | None
-    rise_azimuth: float
-    elevation: float
-    set_azimuth: float
-    begin: datetime.datetime
+    """Pass of a satellite; times are in UTC."""
+    rise: datetime.datetime | None      # None if it is more than MAX_PASS_DAYS outside the search
+    top: datetime.datetime              # time of the highest elevation, the culmination
+    set: datetime.datetime | None       # as `rise`
+    rise_azimuth: Degrees               # NaN without rise
+    elevation: Degrees                  # highest elevation
+    set_azimuth: Degrees                # NaN without set
+    begin: datetime.datetime            # beginning of the search
 
     @property
-    def duration(self) -> float:
-        """Time from rise to set [s], infinite without a rise or a set."""
+    def duration(self) -> Seconds:
+        """Time from rise to set, infinite without a rise or a set."""
         return (self.set - self.rise).total_seconds() if self.rise and self.set else math.inf
 
     @property
@@ -59,25 +55,26 @@ class Pass(typing.NamedTuple):
         return self.begin if self.rise is None or self.under_way and self.duration > MAX_RUN_S else self.rise
 
 
-def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
-    """Return the passes that are under way at `begin` (datetime, UTC) or rise within `days` after it.
+def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.datetime,
+                 days: Days = SEARCH_DAYS) -> list[Pass]:
+    """Return the passes that are under way at `begin` (UTC) or rise within `days` after it.
 
-    A pass below MIN_CULMINATION_DEG is left out, except one that is longer than a run. satrec: as of orbit.satellite;
-    station: StationParameters. Raises TargetError if the satellite does not rise, or if SGP4 ends.
+    A pass below MIN_CULMINATION_DEG is left out, except one that is longer than a run. Raises TargetError if the
+    satellite does not rise, or if SGP4 ends.
     """
     julian, fraction = orbit.julian_date(begin)
 
-    def elevation(t):
+    def elevation(t: Seconds | Times) -> Floats:
         return orbit.elevations(satrec, station, julian, fraction, np.atleast_1d(t))
 
-    def azimuth(t):
+    def azimuth(t: Seconds) -> Degrees:
         [[east, north, _]], _ = orbit.enu(satrec, station, julian, fraction, np.array([t]))
         return math.degrees(math.atan2(east, north)) % 360.0
 
-    def crossing(i):
+    def crossing(i: int) -> Seconds:
         return brentq(lambda t: elevation(t)[0], times[i], times[i + 1], xtol=1e-3)
 
-    def utc(t):
+    def utc(t: Seconds) -> datetime.datetime:
         return begin + datetime.timedelta(milliseconds=round(1e3 * t))
 
     times = np.arange(0.0, SECONDS_PER_DAY * days, SEARCH_STEP_S)
@@ -95,7 +92,7 @@ def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
     # +1 at the first step above the horizon, -1 at the first step below it again.
     edges = np.diff(np.concatenate(([False], heights > 0.0, [False])).astype(int))
     found = []
-    for i, j in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1):
+    for i, j in zip(np.flatnonzero(edges > 0).tolist(), (np.flatnonzero(edges < 0) - 1).tolist()):
         rise, down = crossing(i - 1) if i else None, crossing(j) if j + 1 < len(times) else None
         best = i + int(np.argmax(heights[i:j + 1]))
         top = minimize_scalar(lambda t: -elevation(t)[0], bounds=(
@@ -110,15 +107,15 @@ def passes_after(satrec, station, begin, days=SEARCH_DAYS) -> list[Pass]:
     return found
 
 
-def _until_below(elevation, start, step):
-    """Return (times [s], elevations [deg]) after `start` [s], in steps [s], up to the first below the horizon.
+def _until_below(elevation: Callable[[Times], Floats], start: Seconds, step: Seconds) -> tuple[Times, Floats]:
+    """Return (times, elevations [deg]) after `start`, in steps, up to the first below the horizon.
 
     A negative step goes back in time. The series ends at most MAX_PASS_DAYS away, or where SGP4 fails. elevation:
     function of times, which returns elevations.
     """
     times, heights = np.zeros(0), np.zeros(0)
     while len(times) * abs(step) < MAX_PASS_DAYS * SECONDS_PER_DAY:
-        chunk = start + step * np.arange(len(times) + 1, len(times) + 1 + PASS_CHUNK_STEPS)
+        chunk = start + step * np.arange(len(times) + 1, len(times) + 1 + PASS_CHUNK_STEPS, dtype=np.float64)
         try:
             above = elevation(chunk)
         except TargetError:
@@ -131,7 +128,7 @@ def _until_below(elevation, start, step):
     return times, heights
 
 
-def search_start(satrec, now):
+def search_start(satrec: Satellite, now: datetime.datetime) -> tuple[datetime.datetime, str]:
     """Return (beginning of the search, reason). These are `now` and '', or the epoch of the elements and the reason,
     if the elements are too far from `now`."""
     epoch = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF)
@@ -142,8 +139,8 @@ def search_start(satrec, now):
                    f'{"old" if age > 0.0 else "ahead"}; SGP4 holds for {orbit.MAX_TLE_AGE_DAYS:g}')
 
 
-def chosen_pass(satrec, station, which, now) -> Pass:
-    """Return the pass that `which` names. now: datetime, UTC. Raises TargetError.
+def chosen_pass(satrec: Satellite, station: StationParameters, which: str, now: datetime.datetime) -> Pass:
+    """Return the pass that `which` names. now: UTC. Raises TargetError.
 
     The values of `which` are:
 

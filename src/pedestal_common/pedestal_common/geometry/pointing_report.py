@@ -12,7 +12,8 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
-from pedestal_common.geometry.pointing_model import FACTORS, TERMS
+from pedestal_common.geometry.pointing_model import FACTORS, TERMS, PointingModel
+from pedestal_common.quantities import Degrees, Floats, Pairs, Seconds, Times
 
 MAX_RESIDUALS = 40  # largest number of residuals of a model, whose text then fits into an argument of a command
 
@@ -21,23 +22,16 @@ RESIDUAL_RANGES = (-360.0, 540.0), (-5.0, 90.0), (-5000.0, 5000.0), (-5000.0, 50
 
 
 class Report(typing.NamedTuple):
-    """Pointing model in force.
-
-    antenna, file, date, rms_deg  identification of the model
-    terms            {name: value} of the terms that are not 0
-    before           the same of the model before, from which the change begins; {} without a change
-    begins_s, ends_s  begin and end of the change of the terms, time of the graph [s]; 0 without a change
-    residuals        text of residual_rows
-    """
-    antenna: str
+    """Pointing model in force."""
+    antenna: str                    # antenna, file, date and rms_deg identify the model
     file: str
     date: str
-    rms_deg: float
-    terms: dict[str, float]
-    before: dict[str, float] = {}
-    begins_s: float = 0.0
-    ends_s: float = 0.0
-    residuals: str = ''
+    rms_deg: Degrees
+    terms: dict[str, float]         # {name: value} of the terms that are not 0
+    before: dict[str, float] = {}   # the same of the model before, from which the change begins; {} without a change
+    begins_s: Seconds = 0.0         # begin of the change of the terms, time of the graph; 0 without a change
+    ends_s: Seconds = 0.0           # its end
+    residuals: str = ''             # text of residual_rows
 
     @property
     def text(self) -> str:
@@ -92,8 +86,8 @@ def residual_rows(text: str) -> list[list[float]]:
     return found
 
 
-def residual_text(directions: np.ndarray, residuals: np.ndarray) -> str:
-    """Return the text of residual_rows for directions (n, 2) and residuals (n, 2) [deg].
+def residual_text(directions: Pairs, residuals: Pairs) -> str:
+    """Return the text of residual_rows for directions and residuals [deg].
 
     Of more than MAX_RESIDUALS rows, rows at equal distances are taken.
     """
@@ -102,31 +96,32 @@ def residual_text(directions: np.ndarray, residuals: np.ndarray) -> str:
                      for (az, el), (x, y) in zip(directions[chosen], residuals[chosen]))
 
 
-def in_degrees(terms: np.ndarray) -> dict[str, float]:
-    """Return {name: value} of the terms (20,) [rad, -] that are not 0, in the units of the parameters."""
+def in_degrees(terms: Floats) -> dict[str, float]:
+    """Return {name: value} of the terms (20,) that are not 0, in the units of the parameters."""
     return {name: float(value) if name in FACTORS else float(np.degrees(value))
             for name, value in zip(TERMS, terms.tolist()) if value != 0.0}
 
 
-def in_radians(terms: typing.Mapping[str, float]) -> np.ndarray:
-    """Return the terms (20,) [rad, -] of {name: value} in the units of the parameters."""
+def in_radians(terms: typing.Mapping[str, float]) -> Floats:
+    """Return the terms (20,) of {name: value} in the units of the parameters."""
     return np.array([terms.get(name, 0.0) if name in FACTORS else math.radians(terms.get(name, 0.0))
                      for name in TERMS])
 
 
 @compiled
-def _directions(m, before, after, begins, ends, times, angles, on_sky):
-    """Fill on_sky (n, 2) with the directions of the encoder angles (n, 2) at times (n,)."""
+def _directions(model: PointingModel, before: Floats, after: Floats, begins: Seconds, ends: Seconds, times: Times,
+                angles: Pairs, on_sky: Pairs) -> None:
+    """Fill on_sky with the directions of the encoder angles at these times."""
     for k in range(len(times)):
         if ends > begins:
-            pointing_model.put_between(m, before, after, min(max((times[k] - begins) / (ends - begins), 0.0), 1.0))
-        on_sky[k, 0], on_sky[k, 1] = pointing_model.direction_of(m, angles[k, 0], angles[k, 1])
+            pointing_model.put_between(model, before, after, min(max((times[k] - begins) / (ends - begins), 0.0), 1.0))
+        on_sky[k, 0], on_sky[k, 1] = pointing_model.direction_of(model, angles[k, 0], angles[k, 1])
 
 
-def directions(report: Report | None, times: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Return the directions (n, 2) of the beam on the sky, deck angles [rad], of encoder angles (n, 2) [rad].
+def directions(report: Report | None, times: Times, angles: Pairs) -> Pairs:
+    """Return the directions of the beam on the sky, deck angles, of encoder angles at times of the graph.
 
-    report: the Report in force; None: encoders and sky have the same angles; times (n,): times of the graph [s].
+    report: the one in force; None: encoders and sky have the same angles.
     """
     if report is None or not (report.terms or report.before):
         return angles

@@ -1,9 +1,11 @@
 """Product of quaternions in the order (x, y, z, w)."""
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Quaternion
 
 
 @compiled
-def product(a, b):
+def product(a: Quaternion | tuple[float, float, float, float],
+            b: Quaternion | tuple[float, float, float, float]) -> tuple[float, float, float, float]:
     """Return the Hamilton product of a and b, which stands for the rotation b followed by the rotation a."""
     ax, ay, az, aw = a[0], a[1], a[2], a[3]
     bx, by, bz, bw = b[0], b[1], b[2], b[3]

@@ -15,9 +15,10 @@ Between both elevations the two forms are mixed, so that value and slope are con
 refraction is constant. The apparent elevation grows with the true elevation for every weather in the allowed ranges.
 """
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Floats, Radians, Vectors3
 
 MIN_ERFA_ELEVATION_RAD, MAX_ITU_ELEVATION_RAD = math.radians(5.0), math.radians(3.0)
 """True elevation from which on the refraction is that of ERFA alone, and up to which it is that of ITU-R P.834 alone
@@ -29,15 +30,23 @@ ITU_REFRACTIVITY = 315.0  # refractivity at sea level of the atmosphere for whic
 PRESSURE_RANGE_HPA, TEMPERATURE_RANGE_CELSIUS, HUMIDITY_RANGE = (300.0, 1100.0), (-90.0, 60.0), (0.0, 1.0)
 """Lowest and highest accepted value of each number of the weather."""
 
-Weather = namedtuple('Weather', 'pressure temperature humidity')
-"""Weather at the antenna: pressure [hPa], temperature [deg C], relative humidity [0 to 1]."""
 
-Air = namedtuple('Air', 'A B N')
-"""Constants of the refraction: A, B [rad] of the formula of ERFA, and the refractivity N at the antenna."""
+class Weather(NamedTuple):
+    """Weather at the antenna."""
+    pressure: float         # [hPa]
+    temperature: float      # [deg C]
+    humidity: float         # relative, 0 to 1
+
+
+class Air(NamedTuple):
+    """Constants of the refraction."""
+    A: Radians      # of the formula of ERFA
+    B: Radians      # the same
+    N: float        # refractivity at the antenna
 
 
 @compiled
-def of_weather(pressure, temperature, humidity):
+def of_weather(pressure: float, temperature: float, humidity: float) -> Air:
     """Return the Air of a Weather, by the function refco of ERFA for a wavelength above 100 um."""
     P, t = pressure, temperature
     # es: saturation pressure of water vapour; e: its pressure [hPa].
@@ -52,8 +61,8 @@ def of_weather(pressure, temperature, humidity):
 
 
 @compiled
-def _of_erfa(air, elevation):
-    """Return the refraction [rad] at a true elevation [rad], by the function atioq of ERFA."""
+def _of_erfa(air: Air, elevation: Radians) -> Radians:
+    """Return the refraction at a true elevation, by the function atioq of ERFA."""
     z, r = math.sin(elevation), math.cos(elevation)
     tan_z = r / z
     w = air.B * tan_z * tan_z
@@ -61,15 +70,15 @@ def _of_erfa(air, elevation):
 
 
 @compiled
-def _of_itu(air, elevation):
-    """Return the refraction [rad] at a true elevation [rad], by ITU-R P.834."""
+def _of_itu(air: Air, elevation: Radians) -> Radians:
+    """Return the refraction at a true elevation, by ITU-R P.834."""
     E = math.degrees(max(elevation, MIN_ELEVATION_RAD))
     return math.radians(air.N / ITU_REFRACTIVITY / (1.728 + 0.5411 * E + 0.03723 * E * E))
 
 
 @compiled
-def refraction(air, elevation):
-    """Return apparent minus true elevation [rad] at a true elevation [rad]."""
+def refraction(air: Air, elevation: Radians) -> Radians:
+    """Return apparent minus true elevation at a true elevation."""
     if elevation >= MIN_ERFA_ELEVATION_RAD:
         return _of_erfa(air, elevation)
     low = _of_itu(air, elevation)
@@ -80,10 +89,10 @@ def refraction(air, elevation):
 
 
 @compiled
-def raise_all(weather, elevations):
-    """Add the refraction to true elevations (n,) [rad], in place.
+def raise_all(weather: Vectors3, elevations: Floats) -> None:
+    """Add the refraction to true elevations [rad], in place.
 
-    weather: (n, 3), the numbers of a Weather for each elevation.
+    weather: the numbers of a Weather for each elevation.
     """
     for k in range(len(elevations)):
         air = of_weather(weather[k, 0], weather[k, 1], weather[k, 2])

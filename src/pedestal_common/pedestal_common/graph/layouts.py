@@ -6,31 +6,23 @@ nodes, the tables of a bag, the comparison of recordings and the export all take
 import math
 import re
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
 from pedestal_common.graph import topics
+from pedestal_common.quantities import Bools, Floats, Pairs, Records
 
 
 class Field(typing.NamedTuple):
-    """Group of numbers of a message.
-
-    name        name of the field in a record
-    path        path of its numbers in the message, a pattern whose group 1 is the component
-    components  values of group 1, in the order of the record; None: the indices of Topic.names
-    column      name of a column, with {} for the component (or the name of the joint)
-    unit        unit of the numbers where the topic gives none
-    tolerance   largest accepted difference between recorded and recomputed numbers, in that unit
-    recorded    True if the field is part of the records of the graph's topics
-    """
-    name: str
-    path: str
-    components: tuple[str, ...] | None
-    column: str
-    unit: str = ''
-    tolerance: float = 1e-9
-    recorded: bool = True
+    """Group of numbers of a message."""
+    name: str                           # of the field in a record
+    path: str                           # of its numbers in the message, a pattern whose group 1 is the component
+    components: tuple[str, ...] | None  # values of group 1, in the order of the record; None: indices of Topic.names
+    column: str                         # name of a column, with {} for the component (or the name of the joint)
+    unit: str = ''                      # of the numbers where the topic gives none
+    tolerance: float = 1e-9             # largest accepted difference of recorded and recomputed numbers, in that unit
+    recorded: bool = True               # the field is part of the records of the graph's topics
 
 
 _XYZ, _XYZW = ('x', 'y', 'z'), ('x', 'y', 'z', 'w')
@@ -76,24 +68,23 @@ LAYOUTS = {
 states."""
 
 
+Absent: typing.TypeAlias = Callable[..., bool | Bools]
+"""Function of numbers of a message, scalars or arrays: True where there is no data."""
+
+
 class NoDataMark(typing.NamedTuple):
-    """The convention by which a message states that it has no data for a field.
-
-    field   name of the field
-    paths   paths of the numbers in the message that state whether there is data
-    absent  function of these numbers, scalars or arrays: True where there is no data
-    """
-    field: str
-    paths: tuple
-    absent: typing.Callable
+    """The convention by which a message states that it has no data for a field."""
+    field: str                  # its name
+    paths: tuple[str, ...]      # paths of the numbers in the message that state whether there is data
+    absent: Absent              # function of these numbers
 
 
-def _negative(variance: typing.Any) -> typing.Any:
+def _negative(variance: float | Floats) -> bool | Bools:
     """Return True where a variance is negative."""
     return variance < 0.0
 
 
-def _out_of_range(distance: typing.Any, least: typing.Any, largest: typing.Any) -> typing.Any:
+def _out_of_range(distance: float | Floats, least: float | Floats, largest: float | Floats) -> bool | Bools:
     """Return True where a range is infinite (REP 117), or outside the limits of its sensor where there are limits."""
     outside = (largest > least) & ((distance < least) | (distance > largest))
     return (np.abs(distance) == math.inf) | outside
@@ -109,7 +100,8 @@ Because no variance is negative, every negative number counts as this mark. By t
 min_range to max_range must be discarded."""
 
 
-def no_data(type_name: str, numbers: list, texts: dict) -> list:
+def no_data(type_name: str, numbers: Iterable[tuple[str, int, str]],
+            texts: Mapping[str, str]) -> list[tuple[list[str | None], list[tuple[int, str]], Absent]]:
     """Return [(names of the columns of a field, [(first byte, dtype)] of the numbers of its mark, function absent)].
 
     numbers, texts: places in a message of the type, as in cdr.Places; absent: as in NoDataMark.
@@ -121,15 +113,15 @@ def no_data(type_name: str, numbers: list, texts: dict) -> list:
              [places[path] for path in mark.paths], mark.absent) for mark in marks]
 
 
-def blank_no_data(type_name: str, table: dict) -> dict:
+def blank_no_data(type_name: str, table: dict[str, Floats]) -> dict[str, Floats]:
     """Return a table {column: array (n,)} with NaN where its messages mark the numbers of a field as no data.
 
     A mark is applied only if all its numbers are columns of the table.
     """
     for mark in NO_DATA_MARKS.get(type_name, ()):
-        numbers = [column(type_name, path, {}) for path in mark.paths]
-        if all(number in table for number in numbers):
-            absent = mark.absent(*[table[number] for number in numbers])
+        numbers = [table.get(column(type_name, path, {}) or '') for path in mark.paths]
+        if all(number is not None for number in numbers):
+            absent = mark.absent(*numbers)
             table |= {name: np.where(absent, np.nan, values) for name, values in table.items()
                       if name.partition('.')[0] == mark.field}
     return table
@@ -142,9 +134,9 @@ _JOINTS = {'sensor_msgs/msg/JointState': 'name', 'trajectory_msgs/msg/JointTraje
 class Column(typing.NamedTuple):
     """One number of a topic's messages."""
     name: str
-    field: str
+    field: str          # name of its Field
     unit: str
-    tolerance: float
+    tolerance: float    # as in Field
 
 
 def fields(topic: str) -> tuple[Field, ...]:
@@ -199,8 +191,8 @@ def unit(topic: str, type_name: str, column: str) -> str:
     return 's' if column.endswith('time_from_start') else ''
 
 
-def of_filter(steps: np.ndarray, name: str) -> np.ndarray:
-    """Return one number of the filters of both axes, (n, 2), from records (n,) with the topic acu/filter.
+def of_filter(steps: Records, name: str) -> Pairs:
+    """Return one number of the filters of both axes from records (n,) with the topic acu/filter.
 
     name: key of topics.FILTER_UNITS.
     """

@@ -6,36 +6,21 @@ import typing
 
 
 class Row(typing.NamedTuple):
-    """Row of MODE_ROWS.
-
-    doc        motion of the axes
-    entry      condition for entry
-    exit       automatic exit
-    needs      field of acu_tracker.modes.Conditions without which the mode cannot be entered; '' for none
-    ends       field of acu_tracker.modes.Conditions without which the mode ends; '' for none
-    follows    the mode follows a target through the sky, for which the attitude of the deck must be known
-    by_level   the mode uses the signal level around the expected place of the target
-    fallback   mode after the loss of the target, '' for none; `program` stands for the table that was followed last
-    handover   mode that replaces this one as soon as it can be entered, '' for none
-    table      the mode follows a table of directions
-    pinned     the stow pins may lock the axes
-    predicted  method of acu_tracker.program.prediction.Predictor that makes the table; '' for none
-    button     the page has a button for the mode
-    """
+    """Row of MODE_ROWS."""
     name: str
-    doc: str
-    entry: str
-    exit: str = ''
-    needs: str = ''
-    ends: str = ''
-    follows: bool = False
-    by_level: bool = False
-    fallback: str = ''
-    handover: str = ''
-    table: bool = False
-    pinned: bool = False
-    predicted: str = ''
-    button: bool = True
+    doc: str                    # motion of the axes
+    entry: str                  # condition for entry
+    exit: str = ''              # automatic exit
+    needs: str = ''             # field of acu_tracker.modes.Conditions without which it cannot be entered; '' for none
+    ends: str = ''              # field of acu_tracker.modes.Conditions without which the mode ends; '' for none
+    follows: bool = False       # it follows a target through the sky, for which the attitude of the deck must be known
+    by_level: bool = False      # it uses the signal level around the expected place of the target
+    fallback: str = ''          # mode after the loss of the target; `program` stands for the table followed last
+    handover: str = ''          # mode that replaces this one as soon as it can be entered, '' for none
+    table: bool = False         # it follows a table of directions
+    pinned: bool = False        # the stow pins may lock the axes
+    predicted: str = ''         # method of acu_tracker.program.prediction.Predictor that makes the table; '' for none
+    button: bool = True         # the page has a button for the mode
 
 
 MODE_ROWS = (

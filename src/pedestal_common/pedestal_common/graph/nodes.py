@@ -11,6 +11,7 @@ import typing
 from collections.abc import Collection, Iterable
 
 from pedestal_common.graph.topics import REALTIME_RATES, TOPIC_BY_NAME, TOPICS
+from pedestal_common.parameters import AnyParameters
 
 MAX_BEAMS = 16  # largest number of beams of an electronic array
 REPLAY_NODE = 'replay'  # name of the node that replays a recording to the other nodes
@@ -18,33 +19,20 @@ DRIVE_NODE = 'adu'  # name of the node that owns the time
 
 
 class Node(typing.NamedTuple):
-    """Row of the table: one node.
-
-    name          name in the graph
-    module        executable, PACKAGE.EXECUTABLE; '' for a node without a process of its own
-    parameters    module and name of its parameter class
-    unit          module and name of its unit (unit.Unit); '' for a node without a law
-    reads         topics that it subscribes to; the first topic of a unit is its trigger, which begins its steps
-    writes        topics that it publishes; other nodes wait for the first of these
-    answer        topic with which it answers every step, with the same stamp; '' for a node that answers late
-    obeys         topic of its commands, from any client; replies: topic of its replies
-    doc           its task; stands_for: the equipment that replaces it on a real antenna
-    of_beam       True if each beam of an array has a node of its own
-    optional      True if the other nodes run without it in a graph that does not name it
-    """
-    name: str
-    module: str = ''
-    parameters: str = ''
-    unit: str = ''
-    reads: tuple[str, ...] = ()
-    writes: tuple[str, ...] = ()
-    answer: str = ''
-    obeys: str = ''
-    replies: str = ''
-    doc: str = ''
-    stands_for: str = ''
-    of_beam: bool = False
-    optional: bool = False
+    """Row of the table: one node."""
+    name: str                       # in the graph
+    module: str = ''                # executable, PACKAGE.EXECUTABLE; '' for a node without a process of its own
+    parameters: str = ''            # module and name of its parameter class
+    unit: str = ''                  # module and name of its unit (unit.Unit); '' for a node without a law
+    reads: tuple[str, ...] = ()     # topics that it subscribes to; the first is the trigger, which begins its steps
+    writes: tuple[str, ...] = ()    # topics that it publishes; other nodes wait for the first of these
+    answer: str = ''                # topic with which it answers every step, with the same stamp; '': it answers late
+    obeys: str = ''                 # topic of its commands, from any client
+    replies: str = ''               # topic of its replies
+    doc: str = ''                   # its task
+    stands_for: str = ''            # the equipment that replaces it on a real antenna
+    of_beam: bool = False           # each beam of an array has a node of its own
+    optional: bool = False          # the other nodes run without it in a graph that does not name it
 
     @property
     def package(self) -> str:
@@ -56,16 +44,16 @@ class Node(typing.NamedTuple):
         """Name of its executable in that package."""
         return self.module.rpartition('.')[2]
 
-    def parameters_type(self) -> type[typing.Any]:
+    def parameters_type(self) -> type[AnyParameters]:
         """Return its parameter dataclass."""
         return _named(self.parameters)
 
-    def unit_type(self) -> type[typing.Any]:
+    def unit_type(self) -> type[typing.Any]:    # a Unit, which this package must not import
         """Return the class of its unit."""
         return _named(self.unit)
 
 
-def _named(path: str) -> typing.Any:
+def _named(path: str) -> type:
     module, _, name = path.partition(':')
     return getattr(importlib.import_module(module), name)
 
@@ -252,13 +240,13 @@ def members(names: Iterable[str], beams: int) -> tuple[str, ...]:
 
 
 class Link(typing.NamedTuple):
-    """Topic in a graph: its name there, its type, rate and flag (see Topic), its publishers and subscribers."""
-    name: str
-    type: str
+    """Topic in a graph."""
+    name: str                   # in the graph
+    type: str                   # as in topics.Topic, as are rate and flag
     rate: str
     flag: str
-    writers: tuple[str, ...]
-    readers: tuple[str, ...]
+    writers: tuple[str, ...]    # nodes that publish it
+    readers: tuple[str, ...]    # nodes that subscribe to it
 
 
 @functools.cache

@@ -10,8 +10,9 @@ a latency L contributes its message of the newest trigger stamp <= t_k - L. Exam
 The publisher of the trigger may therefore be up to two steps ahead of this follower.
 """
 import collections
-import typing
 from collections.abc import Callable, Collection, Iterable, Mapping
+
+from pedestal_common.quantities import Message, Nanoseconds
 
 NS_PER_SECOND = 1_000_000_000  # nanoseconds in a second [ns]
 SECONDS_PER_DAY = 86_400  # seconds in a day [s]
@@ -33,9 +34,9 @@ class GraphError(RuntimeError):
 class Steps:
     """Matcher of a node's inputs: the trigger stamped t_k and, of each follower, the message due at t_k.
 
-    followers  {topic: latency [ns]}; the message due has the newest trigger stamp <= t_k - latency. At the start no
+    followers  {topic: latency}; the message due has the newest trigger stamp <= t_k - latency. At the start no
                message is due
-    answer     answer(stamp_ns, trigger_message, {topic: message or None}), called once per step, in order
+    answer     answer(stamp, trigger_message, {topic: message or None}), called once per step, in order
     prompt     True if a realtime step is answered at once, without waiting for followers
     held       followers for which a realtime step does not wait, because their last message stays valid
 
@@ -43,38 +44,37 @@ class Steps:
     realtime the step t_k is answered at the latest when the trigger of the next step arrives. Its answer receives the
     newest messages, and None for a follower without a new message. Real equipment may have fewer messages than steps.
     Therefore a realtime step waits only if the next message, by the shortest of the last intervals, is due.
-
-    _ahead     triggers (stamp, message) whose step has not begun
-    _pending   trigger of the step that waits for its inputs, or None
-    _awaited   {follower: trigger stamps for which its message has not become due}
-    _due       {follower: stamp of its message due in the pending step, or None}
-    _arrived   {follower: messages (stamp, message) that no step has used}
-    _last      {topic: stamp of its newest message}
-    _intervals {follower: last intervals between its stamps [ns]}
     """
 
-    def __init__(self, trigger: str, followers: Mapping[str, int], lockstep: bool,
-                 answer: Callable[[int, typing.Any, dict[str, typing.Any]], object], prompt: bool = False,
+    def __init__(self, trigger: str, followers: Mapping[str, Nanoseconds], lockstep: bool,
+                 answer: Callable[[Nanoseconds, Message, dict[str, Message]], object], prompt: bool = False,
                  held: Collection[str] = frozenset()) -> None:
         self.trigger, self._lockstep, self._answer = trigger, lockstep, answer
         self._prompt = prompt and not lockstep
         self._held: Collection[str] = frozenset() if lockstep else held
         self._latency = dict(followers)
-        self._awaited: dict[str, collections.deque[int]] = {topic: collections.deque() for topic in followers}
-        self._due: dict[str, int | None] = dict.fromkeys(followers)
-        self._arrived: dict[str, collections.deque] = {topic: collections.deque() for topic in followers}
-        self._last: dict[str, int | None] = dict.fromkeys((trigger, *followers))
-        self._intervals: dict[str, collections.deque[int]] = {topic: collections.deque(maxlen=RECENT_INTERVALS)
-                                                              for topic in followers}
-        self._pending: tuple[int, typing.Any] | None = None
-        self._ahead: collections.deque[tuple[int, typing.Any]] = collections.deque()
-        self._period: int | None = None
-        self.refused = 0
-        self.refusal = ''
+        # {follower: trigger stamps for which its message has not become due}
+        self._awaited: dict[str, collections.deque[Nanoseconds]] = {topic: collections.deque() for topic in followers}
+        # {follower: stamp of its message due in the pending step}
+        self._due: dict[str, Nanoseconds | None] = dict.fromkeys(followers)
+        # {follower: messages that no step has used}
+        self._arrived: dict[str, collections.deque[tuple[Nanoseconds, Message]]] = {
+            topic: collections.deque() for topic in followers}
+        # {topic: stamp of its newest message}
+        self._last: dict[str, Nanoseconds | None] = dict.fromkeys((trigger, *followers))
+        # {follower: last intervals between its stamps}
+        self._intervals: dict[str, collections.deque[Nanoseconds]] = {
+            topic: collections.deque(maxlen=RECENT_INTERVALS) for topic in followers}
+        # trigger of the step that waits for its inputs
+        self._pending: tuple[Nanoseconds, Message] | None = None
+        # triggers whose step has not begun
+        self._ahead: collections.deque[tuple[Nanoseconds, Message]] = collections.deque()
+        self._period: Nanoseconds | None = None
+        self.refused = 0        # number of refused messages, in realtime
+        self.refusal = ''       # reason of the last refusal
 
-    def take(self, topic: str, stamp: int, message: typing.Any) -> None:
-        """Take a message of an input, with its stamp [ns]. Raises GraphError in lockstep if the stamp is not the next.
-        """
+    def take(self, topic: str, stamp: Nanoseconds, message: Message) -> None:
+        """Take a message of an input, with its stamp. Raises GraphError in lockstep if the stamp is not the next."""
         last = self._last[topic]
         if last is not None and stamp <= last:
             self._refuse(f'{topic} stamp went back from {last / NS_PER_SECOND:.6f} to {stamp / NS_PER_SECOND:.6f} s')
@@ -101,7 +101,7 @@ class Steps:
                 break
             self._close()
 
-    def _begin(self, stamp: int, message: typing.Any) -> None:
+    def _begin(self, stamp: Nanoseconds, message: Message) -> None:
         """Make the step of a trigger the pending step, and determine the message due of each follower."""
         self._pending = (stamp, message)
         for name, awaited in self._awaited.items():
@@ -150,7 +150,7 @@ class Steps:
                              f'({self._latency[topic] / NS_PER_SECOND:.6f} s)?')
         return bool(arrived)
 
-    def _next_stamp(self, topic: str) -> int:
+    def _next_stamp(self, topic: str) -> Nanoseconds:
         """Return the stamp that the next message of a follower has at the earliest, 0 for one without two messages."""
         last, intervals = self._last[topic], self._intervals[topic]
         return 0 if last is None or not intervals else last + min(intervals)
@@ -166,7 +166,7 @@ class Steps:
         assert self._pending is not None
         stamp, message = self._pending
         self._pending = None
-        inputs: dict[str, typing.Any] = {}
+        inputs: dict[str, Message] = {}
         for topic, arrived in self._arrived.items():
             inputs[topic] = None
             if self._lockstep:
@@ -178,7 +178,7 @@ class Steps:
         self._answer(stamp, message, inputs)
 
     @property
-    def pending_stamp(self) -> int | None:
+    def pending_stamp(self) -> Nanoseconds | None:
         """Stamp of the step that waits for its inputs [ns], or None."""
         return None if self._pending is None else self._pending[0]
 

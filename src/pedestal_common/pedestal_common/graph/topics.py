@@ -12,6 +12,7 @@ Rate
 The rate determines the quality of service: see QOS_BY_RATE.
 """
 import typing
+from collections.abc import Mapping
 
 AXES = ('azimuth', 'elevation')
 MOTOR_NAMES = tuple(f'{axis}_motor_{i}' for axis in AXES for i in (1, 2))
@@ -35,25 +36,16 @@ NO_TEXT_CODE = -1  # code, in records, of a text or a list that was never publis
 
 
 class Qos(typing.NamedTuple):
-    """Quality of service of a rate: a row of QOS_BY_RATE. Publishers are reliable, and so are subscribers in lockstep.
-
-    latched     True if a late joiner receives the last message
-    lockstep    queue depth of publishers and subscribers in lockstep; 0: all messages
-    written     queue depth of a publisher in realtime, which never waits for a subscriber
-    read        queue depth of a subscriber in realtime, a few steps. It keeps the newest messages, so a late node
-                skips stale data. It is deep enough that a second, faster publisher cannot evict the messages of the
-                first.
-    reliable    True if a subscriber in realtime is reliable: a message that it lost is sent again
-    recorded    queue depth of a recorder, some seconds, because its disk may delay it
-    unlatched   True if realtime subscribers also accept volatile publishers (`ros2 topic pub`), by a second
-                subscription
-    """
-    latched: bool
-    lockstep: int
-    written: int
+    """Quality of service of a rate: a row of QOS_BY_RATE. Publishers are reliable, and subscribers in lockstep too."""
+    latched: bool       # a late joiner receives the last message
+    lockstep: int       # queue depth of publishers and subscribers in lockstep; 0: all messages
+    written: int        # queue depth of a publisher in realtime, which never waits for a subscriber
+    # queue depth of a subscriber in realtime, a few steps. It keeps the newest messages, so a late node skips stale
+    # data. It is deep enough that a second, faster publisher cannot evict the messages of the first
     read: int
-    reliable: bool
-    recorded: int
+    reliable: bool      # a subscriber in realtime is reliable: a message that it lost is sent again
+    recorded: int       # queue depth of a recorder, some seconds, because its disk may delay it
+    # realtime subscribers also accept volatile publishers (`ros2 topic pub`), by a second subscription
     unlatched: bool = False
 
 
@@ -75,35 +67,23 @@ EVENT_RATES = 'change', 'reply'
 
 
 class Topic(typing.NamedTuple):
-    """Row of the table: one topic.
-
-    doc      content of its messages
-    names    joints of a JointState or JointTrajectory, in the order of its numbers
-    frame    header.frame_id; child: child_frame_id
-    units    {column: unit} where the type of the message does not determine the unit (see layouts)
-    texts    texts that subscribers distinguish, in the order of their codes
-    measured  name of a parameter of its publisher that is true if the topic exists; '': the topic always exists
-    flag     name of the parameter of its subscribers with the same meaning
-    holds    True if a message is valid until the next one: in realtime no step waits for it
-    only     fields of its layout that it uses; (): all
-    inputs   {field of its record: name of the control unit's input, or a name for each number}; see wire.inputs
-    latency  parameter of the control unit with the age of the data at a step; '': age 0
-    """
+    """Row of the table: one topic."""
     name: str
     type: str
     rate: str
-    doc: str
-    names: tuple[str, ...] = AXES
-    frame: str = ''
-    child: str = ''
-    units: typing.Mapping[str, str] = {}
-    texts: tuple[str, ...] = ()
-    measured: str = ''
-    flag: str = ''
-    holds: bool = False
-    only: tuple[str, ...] = ()
-    inputs: typing.Mapping[str, str | tuple[str, ...]] = {}
-    latency: str = ''
+    doc: str                            # content of its messages
+    names: tuple[str, ...] = AXES       # joints of a JointState or JointTrajectory, in the order of its numbers
+    frame: str = ''                     # header.frame_id
+    child: str = ''                     # child_frame_id
+    units: Mapping[str, str] = {}       # {column: unit} where the type of the message states none (see layouts)
+    texts: tuple[str, ...] = ()         # texts that subscribers distinguish, in the order of their codes
+    measured: str = ''                  # parameter of its publisher that is true if the topic exists; '': always
+    flag: str = ''                      # parameter of its subscribers with the same meaning
+    holds: bool = False                 # a message is valid until the next one: in realtime no step waits for it
+    only: tuple[str, ...] = ()          # fields of its layout that it uses; (): all
+    # {field of its record: name of the control unit's input, or a name for each number}; see wire.inputs
+    inputs: Mapping[str, str | tuple[str, ...]] = {}
+    latency: str = ''                   # parameter of the control unit with the age of the data at a step; '': age 0
 
 
 TOPICS = (

@@ -11,79 +11,73 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import table
-from pedestal_common.quantities import Floats
+from pedestal_common.quantities import Bit, Floats, Nanoseconds
 from pedestal_common.record import Record
 
 MAX_HELD_NUMBERS = 32  # largest number of values that a node freezes: the size of `held`
 
 
 class MessageFault(Record):
-    """Record of the message faults of a node that are in force.
-
-    drop, freeze, nan    1 while in force
-        held                 numbers of the first frozen step; holds: 1 once they are stored
-        sigma, seed          1 sigma of white noise, in the unit of the numbers, 0 for none; its seed
-    """
-    drop: int
-    freeze: int
-    nan: int
-    holds: int
-    held: Annotated[Floats, (MAX_HELD_NUMBERS,)]
-    sigma: float
-    seed: int
+    """Message faults of a node that are in force."""
+    drop: Bit       # 1 while in force
+    freeze: Bit     # the same
+    nan: Bit        # the same
+    holds: Bit      # 1 once the numbers of the first frozen step are stored
+    held: Annotated[Floats, (MAX_HELD_NUMBERS,)]    # these numbers
+    sigma: float    # 1 sigma of white noise, in the unit of the numbers, 0 for none
+    seed: int       # of the noise
 
 
 @compiled
-def clear(e):
+def clear(faults: MessageFault) -> None:
     """End every fault of the message. Afterwards `apply` sets the faults that are still in force.
 
-    e: MessageFault of the node. e.holds becomes 1 if the step before had a freeze: a freeze that continues then
-    uses the same held numbers.
+    `holds` becomes 1 if the step before had a freeze: a freeze that continues then uses the same held numbers.
     """
-    e.holds = e.freeze
-    e.drop, e.freeze, e.nan, e.sigma = 0, 0, 0, 0.0
+    faults.holds = faults.freeze
+    faults.drop, faults.freeze, faults.nan, faults.sigma = 0, 0, 0, 0.0
 
 
-def codes(node):
+def codes(node: str) -> tuple[int, ...]:
     """Return the codes of the faults that every message of a node can have: drop, freeze, nan, noise."""
     return tuple(table.code(node, name) for name in ('drop', 'freeze', 'nan', 'noise'))
 
 
 @compiled
-def apply(e, codes, fault, values):
+def apply(faults: MessageFault, codes: tuple[int, ...], fault: int, values: Floats) -> None:
     """Apply a fault if it is one of `codes`; other faults change nothing here.
 
-    e: as in `clear`; codes: result of the function `codes`; fault: code of the fault; values: its arguments.
+    codes: result of the function `codes`; fault: code of the fault; values: its arguments.
     """
     drop, freeze, nan, noise = codes
     if fault == drop:
-        e.drop = 1
+        faults.drop = 1
     elif fault == freeze:
-        e.freeze = 1
+        faults.freeze = 1
     elif fault == nan:
-        e.nan = 1
+        faults.nan = 1
     elif fault == noise:
-        e.sigma, e.seed = values[0], int(values[1])
+        faults.sigma, faults.seed = values[0], int(values[1])
 
 
 @compiled
-def numbers(e, values, first):
+def numbers(faults: MessageFault, values: Floats, first: int) -> None:
     """Freeze values (n,) or make them NaN, in place, as the faults in force require.
 
-    e.held stores the values from its element `first` on; first + n must be at most MAX_HELD_NUMBERS.
+    `held` stores the values from its element `first` on; first + n must be at most MAX_HELD_NUMBERS.
     """
     for i in range(len(values)):
-        if e.freeze != 0:
-            if e.holds != 0:
-                values[i] = e.held[first + i]
+        if faults.freeze != 0:
+            if faults.holds != 0:
+                values[i] = faults.held[first + i]
             else:
-                e.held[first + i] = values[i]
-        if e.nan != 0:
+                faults.held[first + i] = values[i]
+        if faults.nan != 0:
             values[i] = math.nan
 
 
 @compiled
-def _mixed(x):
+def _mixed(x: np.uint64) -> np.uint64:
     """Return the 64 bits that the finaliser of SplitMix64 makes of 64 bits (Steele, Lea and Flood, OOPSLA 2014)."""
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -91,7 +85,7 @@ def _mixed(x):
 
 
 @compiled
-def _uniform(seed, stamp, i):
+def _uniform(seed: int, stamp: Nanoseconds, i: int) -> float:
     """Return a random number in (0, 1) that depends only on (seed, stamp, i), not on earlier numbers.
 
     Such a generator is counter-based (Salmon et al., SC 2011).
@@ -101,8 +95,8 @@ def _uniform(seed, stamp, i):
 
 
 @compiled
-def noise(e, stamp, i):
-    """Return the white noise of number i of a message: e.sigma times a standard normal number (Box and Muller 1958).
-    stamp: of the step [ns]."""
-    u, v = _uniform(e.seed, stamp, 2 * i), _uniform(e.seed, stamp, 2 * i + 1)
-    return e.sigma * math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)
+def noise(faults: MessageFault, stamp: Nanoseconds, i: int) -> float:
+    """Return the white noise of number i of a message: sigma times a standard normal number (Box and Muller 1958).
+    stamp: of the step."""
+    u, v = _uniform(faults.seed, stamp, 2 * i), _uniform(faults.seed, stamp, 2 * i + 1)
+    return faults.sigma * math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)

@@ -1,9 +1,9 @@
 """Schedule of the injected faults of a simulated node: a record of the faults in force.
 
-The law of the node checks the record once per step. It begins with these lines, where m is the memory of the law:
+The law of the node checks the record once per step. It begins with these lines:
 
-    if schedule.pending(m.schedule, stamp):
-        injected.take(m, stamp)
+    if schedule.pending(memory.schedule, stamp):
+        injected.take(memory, stamp)
 
 A node without a fault therefore behaves as if faults did not exist. `take` clears all faults, then applies again the
 fault of every row that is in force. No state must be restored after a fault.
@@ -16,7 +16,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import table
-from pedestal_common.quantities import Floats
+from pedestal_common.quantities import Bit, Floats, Nanoseconds, Records, Seconds
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
@@ -25,43 +25,43 @@ MAX_ACTIVE_FAULTS = 16  # largest number of faults in force in a node at a time
 
 class Fault(Record):
     """Row of a fault."""
-    used: int  # 1 for a fault in force
-    fault: int  # code of the fault, see table.code
-    end: int  # stamp [ns] of the first step without the fault, NO_STAMP before its first step
-    duration: int  # time for which the fault is in force [ns]
-    values: Annotated[Floats, (table.MAX_FAULT_VALUES,)]  # its arguments; an option is stored as its index
+    used: Bit               # 1 for a fault in force
+    fault: int              # its code, see table.code
+    end: Nanoseconds        # stamp of the first step without the fault, NO_STAMP before its first step
+    duration: Nanoseconds   # time for which the fault is in force
+    values: Annotated[Floats, (table.MAX_FAULT_VALUES,)]    # its arguments; an option is stored as its index
 
 
 class Schedule(Record):
     """Faults of a node."""
-    stamp: int  # stamp of the last step [ns], NO_STAMP before the first
-    pending: int  # 1 while the law must check the rows, because a fault is in force or was in the last step
+    stamp: Nanoseconds      # of the last step, NO_STAMP before the first
+    pending: Bit            # 1 while the law must check the rows, because a fault is in force or was in the last step
     row: Annotated[Sequence[Fault], (MAX_ACTIVE_FAULTS,)]
 
 
-def empty() -> np.ndarray:
-    """Return Schedule (1,) before the first step, without a fault."""
+def empty() -> Records:
+    """Return the Schedule (1,) before the first step, without a fault."""
     made = Schedule.zeros()
     made['stamp'] = NO_STAMP
     return made
 
 
 @compiled
-def pending(schedule, stamp):
-    """Return True if the law of the step of a stamp [ns] must check the rows."""
+def pending(schedule: Schedule, stamp: Nanoseconds) -> bool:
+    """Return True if the law of the step of a stamp must check the rows."""
     schedule.stamp = stamp
     return schedule.pending != 0
 
 
 @compiled
-def begin(schedule):
+def begin(schedule: Schedule) -> None:
     """Begin a check of the rows: no fault is known to be in force."""
     schedule.pending = 0
 
 
 @compiled
-def in_force(schedule, row, stamp):
-    """Return True if a row is in force in the step of a stamp [ns]. A new row is in force from this step."""
+def in_force(schedule: Schedule, row: Fault, stamp: Nanoseconds) -> bool:
+    """Return True if a row is in force in the step of a stamp. A new row is in force from this step."""
     if row.used == 0:
         return False
     if row.end == NO_STAMP:
@@ -73,9 +73,8 @@ def in_force(schedule, row, stamp):
     return True
 
 
-def add(schedule, code, values, duration):
-    """Add a fault to a Schedule, in force from the next step for a duration [s]. Raise ValueError where no row
-    is free."""
+def add(schedule: np.void, code: int, values: Sequence[float], duration: Seconds) -> None:
+    """Add a fault to a Schedule, in force from the next step for a duration. Raise ValueError where no row is free."""
     free = np.flatnonzero(schedule['row']['used'] == 0)
     if not free.size:
         raise ValueError(f'{MAX_ACTIVE_FAULTS} faults are in force, must be at most {MAX_ACTIVE_FAULTS} at a time')
@@ -86,7 +85,7 @@ def add(schedule, code, values, duration):
     schedule['pending'] = 1
 
 
-def clear(schedule):
+def clear(schedule: np.void) -> None:
     """End all faults from the next step."""
     schedule['row']['used'] = 0
     schedule['pending'] = 1

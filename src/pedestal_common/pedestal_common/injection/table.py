@@ -6,7 +6,8 @@ example '12 encoder_jump axis=azimuth size=0.01 duration=5'.
 import typing
 
 from pedestal_common.parameters import ParameterError
-from pedestal_common.wire.commands import Argument, CommandDefinition, schedule
+from pedestal_common.quantities import Nanoseconds
+from pedestal_common.wire.commands import Argument, Command, CommandDefinition, schedule
 
 
 class Fault(typing.NamedTuple):
@@ -14,14 +15,14 @@ class Fault(typing.NamedTuple):
 
     The first three fields are those of a commands.CommandDefinition, so a Fault also defines its command.
 
-    lockstep: True if a lockstep graph can have the fault. A fault that deletes a message or changes its stamp would
-    stop a lockstep graph, because every node would wait for the message. The faults `drop` and `delay` of the drive
-    are allowed: each command arrives in its step, and the law of the drive then ignores or delays its content.
+    A fault that deletes a message or changes its stamp would stop a lockstep graph, because every node would wait for
+    the message. The faults `drop` and `delay` of the drive are allowed: each command arrives in its step, and the law
+    of the drive then ignores or delays its content.
     """
     name: str
     doc: str
-    arguments: tuple = ()
-    lockstep: bool = True
+    arguments: tuple[Argument, ...] = ()
+    lockstep: bool = True       # a lockstep graph can have the fault
 
 
 MAX_FAULT_DURATION_S = 86400.0  # longest duration of a fault [s]; it also stands for a fault without an end
@@ -30,21 +31,21 @@ _DURATION = Argument('duration', 'duration; left out: to the end of the run', 1e
                      default=MAX_FAULT_DURATION_S)
 
 
-def _fault(name, doc, *arguments, lockstep=True):
+def _fault(name: str, doc: str, *arguments: Argument, lockstep: bool = True) -> Fault:
     """Return a Fault with an argument `duration` added."""
     return Fault(name, doc, (*arguments, _DURATION), lockstep)
 
 
-def _option(name, doc, *options):
+def _option(name: str, doc: str, *options: str) -> Argument:
     return Argument(name, doc, options=options, default=options[0])
 
 
-def _number(name, doc, default, high, unit='', low=None):
+def _number(name: str, doc: str, default: float, high: float, unit: str = '', low: float | None = None) -> Argument:
     """Return an Argument between -high and high, or between low and high."""
     return Argument(name, doc, -high if low is None else low, high, unit, default=default)
 
 
-def _noise(default, high, unit):
+def _noise(default: float, high: float, unit: str) -> tuple[Argument, Argument]:
     return (_number('sigma', '1-sigma of each number', default, high, unit, low=0.0),
             _number('seed', 'seed of the noise', 1.0, 1e9, low=0.0))
 
@@ -119,7 +120,8 @@ INJECTED_FAULTS = {
 
 CLEAR_COMMAND = CommandDefinition('clear', 'end all injected faults of the node')
 
-INJECT_COMMANDS = {node: (*faults, CLEAR_COMMAND) for node, faults in INJECTED_FAULTS.items()}
+INJECT_COMMANDS: dict[str, tuple[Fault | CommandDefinition, ...]] = {
+    node: (*faults, CLEAR_COMMAND) for node, faults in INJECTED_FAULTS.items()}
 """{node: its commands on `NODE/inject`}."""
 
 MAX_FAULT_VALUES = max(len(fault.arguments) - 1 for faults in INJECTED_FAULTS.values() for fault in faults)
@@ -129,18 +131,18 @@ INJECT_DOC = "faults injected at times [s]: 'AT FAULT argument=value ... duratio
 """Meaning of the parameter `inject`."""
 
 
-def code(node, name) -> int:
+def code(node: str, name: str) -> int:
     """Return the code of a fault for compiled laws: its index among the faults of its node."""
     return [fault.name for fault in INJECTED_FAULTS[node]].index(name)
 
 
-def scheduled_commands(node, text) -> list:
-    """Return [(at [ns], Command)] of the parameter `inject` of a node, in order of time. Raise ParameterError for a
+def scheduled_commands(node: str, text: str) -> list[tuple[Nanoseconds, Command]]:
+    """Return the commands of the parameter `inject` of a node with their times, in order. Raise ParameterError for a
     text that is no schedule."""
     return schedule('inject', text, INJECT_COMMANDS[node])
 
 
-def check_pacing(node, text, lockstep):
+def check_pacing(node: str, text: str, lockstep: bool) -> None:
     """Raise ParameterError where `inject` of a node contains a fault that a lockstep graph cannot have."""
     for _, command in scheduled_commands(node, text) if lockstep else ():
         refusal = refused_in_lockstep(node, command.verb)
@@ -148,7 +150,7 @@ def check_pacing(node, text, lockstep):
             raise ParameterError(f'inject: {refusal}')
 
 
-def refused_in_lockstep(node, name) -> str:
+def refused_in_lockstep(node: str, name: str) -> str:
     """Return why a lockstep graph cannot have a fault of a node, '' for a fault that it can have."""
     fault = next((fault for fault in INJECTED_FAULTS[node] if fault.name == name), None)
     if fault is None or fault.lockstep:

@@ -4,10 +4,19 @@ The diagnostics contain the diagnosis of the node itself. In realtime they also 
 stalls, steps of the host's clock, and dropped messages.
 """
 import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeAlias
 
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis
+from pedestal_common.quantities import Message, Nanoseconds
 from pedestal_common.wire import messages
+
+if TYPE_CHECKING:
+    from pedestal_common.node.shell import Shell
+
+Diagnose: TypeAlias = Callable[[], tuple[int, str, list[tuple[str, str]]]]
+"""Function that returns a Diagnosis."""
 
 DIAGNOSTICS_PERIOD_S = 1.0  # time between two diagnostics in realtime [s]
 
@@ -23,20 +32,21 @@ CLOCK_STEP_REPORT_NS = 60 * NS_PER_SECOND  # time for which the diagnostics repo
 
 
 class Diagnostics:
-    """Publish diagnose() -> (level, message, [(key, value text)]) of a Shell; see Shell.diagnose_with."""
+    """Publish the diagnoses of a Shell; see Shell.diagnose_with."""
 
-    def __init__(self, node, diagnose):
+    def __init__(self, node: 'Shell', diagnose: Diagnose) -> None:
         self._node, self._diagnose, self._write = node, diagnose, node.writer('diagnostics')
         self._published = time.monotonic_ns()
-        self._reported_steps = 0, None
+        # number of the last reported steps of the clock, and their time
+        self._reported_steps: tuple[int, Nanoseconds | None] = 0, None
         if not node.graph.lockstep:
             node.every(DIAGNOSTICS_PERIOD_S, self._publish_now)
 
-    def publish(self, stamp):
-        """Publish the diagnostics in lockstep, with the stamp of a step [ns]."""
+    def publish(self, stamp: Nanoseconds) -> None:
+        """Publish the diagnostics in lockstep, with the stamp of a step."""
         self._send(self._diagnose(), stamp)
 
-    def publish_urgent(self):
+    def publish_urgent(self) -> bool:
         """Publish the diagnostics in realtime at once, except within MIN_URGENT_PERIOD_NS after the last diagnostics.
         Return True if they were published."""
         due = time.monotonic_ns() - self._published > MIN_URGENT_PERIOD_NS
@@ -44,25 +54,25 @@ class Diagnostics:
             self._publish_now()
         return due
 
-    def _publish_now(self):
+    def _publish_now(self) -> None:
         diagnosis = Diagnosis(*self._diagnose())
         now, stamp = self._node.clock()
         elapsed, self._published = now - self._published, now
         self._send(self._with_findings(diagnosis, now, elapsed), stamp)
 
-    def _send(self, diagnosis, stamp):
+    def _send(self, diagnosis: tuple[int, str, list[tuple[str, str]]], stamp: Nanoseconds) -> None:
         level, message, values = diagnosis
-        array = messages.DiagnosticArray(header=messages.header(''), status=[messages.DiagnosticStatus(
+        array: Message = messages.DiagnosticArray(header=messages.header(''), status=[messages.DiagnosticStatus(
             level=level, name=self._node.name, message=message, hardware_id='pedestal',
             values=[messages.KeyValue(key=key, value=value) for key, value in values])])
         messages.put_stamp(array.header.stamp, stamp)
         self._write(messages.serialize(array))
 
-    def _with_findings(self, diagnosis, now, elapsed):
+    def _with_findings(self, diagnosis: Diagnosis, now: Nanoseconds, elapsed: Nanoseconds) -> Diagnosis:
         """Return a Diagnosis with the findings of the shell of a realtime node, the worst first. elapsed: time since
-        the last diagnostics [ns]."""
+        the last diagnostics."""
         utc = self._node.utc
-        findings = [*filter(None, (listener.finding(now) for listener in self._node.listeners))]
+        findings: list[tuple[int, str]] = [*filter(None, (listener.finding(now) for listener in self._node.listeners))]
         if elapsed > STALL_LIMIT_NS:
             findings.append((LEVEL_WARN, f'stalled for {elapsed * 1e-9:.1f} s'))
         steps, since = self._reported_steps

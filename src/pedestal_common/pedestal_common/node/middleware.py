@@ -5,22 +5,26 @@ import os
 import pathlib
 import re
 import sys
+from collections.abc import Sequence
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
+from rclpy.context import Context
 from rclpy.exceptions import InvalidNamespaceException
+from rclpy.executors import Executor
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_namespace import validate_namespace
 
 from pedestal_common.graph import topics
 from pedestal_common.text_files import parameter_file
+from pedestal_common.text_files.files import FilePath
 
 DDS_PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
 """{ROS_AUTOMATIC_DISCOVERY_RANGE: the DDS profile for it}."""
 
 
-def qos(rate, role='lockstep') -> QoSProfile:
+def qos(rate: str, role: str = 'lockstep') -> QoSProfile:
     """Return the quality of service of the topics of a rate.
 
     role: `lockstep` for publishers and subscribers in lockstep; `written`, `read` or `recorded` in realtime (see
@@ -33,13 +37,13 @@ def qos(rate, role='lockstep') -> QoSProfile:
                       durability=DurabilityPolicy.TRANSIENT_LOCAL if row.latched else DurabilityPolicy.VOLATILE)
 
 
-def message_class(type_name):
+def message_class(type_name: str) -> type:
     """Return the rclpy class of 'package/msg/Name'."""
     package, _, name = type_name.split('/')
     return getattr(importlib.import_module(f'{package}.msg'), name)
 
 
-def namespace(option, name):
+def namespace(option: str, name: str) -> str:
     """Return the namespace of a name such as ship_1, with a slash before it; '' for none.
 
     option: beginning of the error, such as '--namespace '. Raises ValueError.
@@ -52,7 +56,7 @@ def namespace(option, name):
     return place
 
 
-def set_defaults():
+def set_defaults() -> None:
     """Set the DDS profile of this process and its children by ROS_AUTOMATIC_DISCOVERY_RANGE, unless the user names a
     profile.
 
@@ -68,7 +72,7 @@ def set_defaults():
             os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SYSTEM_DEFAULT'
 
 
-def initialise(args=None):
+def initialise(args: Sequence[str] | None = None) -> None:
     """Initialise rclpy in this process with arguments, by default those of the command line. DDS is set as in
     set_defaults, and signals are left to the caller. Logs go to stderr only, which needs neither a home nor a disk.
     Raises ValueError for arguments that rcl refuses."""
@@ -83,7 +87,7 @@ def initialise(args=None):
         raise ValueError(re.sub(r', at \S+:\d+', '', ' '.join(str(error).split()))) from None
 
 
-def parameter_files(arguments):
+def parameter_files(arguments: Sequence[str]) -> list[int]:
     """Return the places of the parameter files among the arguments of a process."""
     places, of_ros = [], False
     for place, argument in enumerate(arguments):
@@ -93,7 +97,7 @@ def parameter_files(arguments):
     return places
 
 
-def _as_read(path):
+def _as_read(path: FilePath) -> str:
     """Return the path of a copy of a parameter file in memory, which states the values as parameter_file reads them.
 
     Without the copy, rcl would read 010 as 8 and `on` as true. Raises ParameterFileError.
@@ -104,7 +108,7 @@ def _as_read(path):
     return f'/proc/self/fd/{copy}'
 
 
-def make_executor(context=None):
+def make_executor(context: Context | None = None) -> Executor:
     """Return the executor that every node runs in. context: an rclpy.Context, None for the default."""
     try:
         from rclpy.experimental.events_executor import EventsExecutor

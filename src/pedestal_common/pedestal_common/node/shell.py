@@ -12,6 +12,9 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import FrameType
+from typing import TYPE_CHECKING, NoReturn, Protocol, TextIO, TypeVar
 
 import rclpy
 from rcl_interfaces.msg import (
@@ -23,21 +26,27 @@ from rcl_interfaces.msg import (
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.executors import Executor
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.timer import Timer
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from pedestal_common import ignored_stop, parameters
 from pedestal_common.graph import nodes
 from pedestal_common.graph.graph_parameters import GraphParameters
 from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY, GraphError
 from pedestal_common.node import middleware
-from pedestal_common.node.diagnostics import Diagnostics
+from pedestal_common.node.diagnostics import Diagnose, Diagnostics
 from pedestal_common.node.subscriptions import (
     LockstepSubscriber,
     TopicSubscriber,
     subscribe,
     two_argument_callback,
 )
+from pedestal_common.quantities import Json, Message, Nanoseconds, Seconds, Value
 from pedestal_common.realtime import utc
 from pedestal_common.wire import messages
 
@@ -57,6 +66,16 @@ EXPECTED_ERRORS = (parameters.ParameterError, GraphError, ValueError, OSError, I
                    InvalidParameterValueException, Stopped)
 """Errors that end a node with one line; any other error is a defect and shows its traceback."""
 
+_M = TypeVar('_M')      # a decoded message
+
+
+class Unprepared(Protocol):
+    """What has laws to compile: a unit."""
+
+    def prepare(self) -> None:
+        """Compile them."""
+
+
 _stop: list[bool] = []  # not empty after SIGINT or SIGTERM
 _compiling: list[bool] = []  # not empty while the process compiles, which a signal may interrupt
 
@@ -64,22 +83,22 @@ STOP_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
 """Signals that stop a node; the last is sent only by the node itself, see ignored_stop."""
 
 
-def _on_signal(_number, frame):
+def _on_signal(_number: int, frame: FrameType | None) -> None:
     """Note the signal, so that `main` stops the node. Raise Stopped if the process compiles laws."""
     _stop.append(True)
     if _compiling:
         ignored_stop.raise_stop(Stopped, frame)
 
 
-def stop_on_signals():
+def stop_on_signals() -> None:
     """Let the STOP_SIGNALS stop the node of this process."""
     for number in STOP_SIGNALS:
         signal.signal(number, _on_signal)
     ignored_stop.retry(Stopped)
 
 
-def readings():
-    """Return a pair of readings (steady clock, system clock) [ns]. The pair is read again, at most twice, if more than
+def readings() -> tuple[Nanoseconds, Nanoseconds]:
+    """Return a pair of readings (steady clock, system clock). The pair is read again, at most twice, if more than
     0.1 ms passed between the two readings."""
     for _ in range(3):
         steady, system = time.monotonic_ns(), time.time_ns()
@@ -88,16 +107,15 @@ def readings():
     return steady, system
 
 
-def node_of(info, root='/'):
+def node_of(info: TopicEndpointInfo, root: str = '/') -> str:
     """Return the name in the graph of the node that owns a publisher or subscriber, 'beam_2/acu' for example.
 
-    info: rclpy's TopicEndpointInfo of the publisher or subscriber; root: namespace of the graph, with a '/' at its
-    end.
+    info: of the publisher or subscriber; root: namespace of the graph, with a '/' at its end.
     """
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'.removeprefix(root)
 
 
-def _descriptor(field, read_only):
+def _descriptor(field: parameters.Field, read_only: bool) -> ParameterDescriptor:
     meta = field.metadata
     unit = f' [{meta["unit"]}]' if meta.get('unit') else ''
     descriptor = ParameterDescriptor(description=meta['doc'] + unit, read_only=read_only)
@@ -118,31 +136,33 @@ class Shell(Node):
     live: prefixes of parameters that may change while the node runs; the node then implements `reconfigure()`. Raises
     parameters.ParameterError for an unknown or refused parameter.
 
-    finished    True ends the node in `main`
-    failure     error that ends the node, None without one
-    result      {name: value} that `main` prints at the end
     """
+    parameters: parameters.AnyParameters
 
-    def __init__(self, name, parameters_type, live=()):
+    def __init__(self, name: str, parameters_type: type[parameters.Parameters], live: Sequence[str] = ()) -> None:
         super().__init__(name)
         self._parameters_type = parameters_type
         self._declare(live)
         self.links = nodes.links_of(self.graph.members, self.graph.beams)
         self._root, self.beam = self._place(name)
         self.name = self.beam + name
-        self.finished = False
-        self.failure = None
-        self.result = {}
-        self.publishers_by_link = {}
+        self.finished = False       # True ends the node in `main`
+        self.failure: BaseException | None = None       # error that ends the node
+        self.result: dict[str, Json] = {}       # {name: value} that `main` prints at the end
+        self.publishers_by_link: dict[nodes.Link, Publisher] = {}
         self._next_second = 0
         self._stamp = 0
         self._started = False
-        self.diagnostics = None
+        self.diagnostics: Diagnostics | None = None
         self.utc = utc.Utc(*readings())
         self._epoch = 0 if self.graph.lockstep else self.graph.start or None
-        self.listeners = []
+        self.listeners: list[TopicSubscriber[Message]] = []
 
-    def _place(self, name):
+    if TYPE_CHECKING:
+        def get_logger(self) -> RcutilsLogger:
+            """Return the logger of the node; rclpy does not state its type."""
+
+    def _place(self, name: str) -> tuple[str, str]:
         """Return (namespace of the graph, prefix of this node's beam in the graph), each with a '/' at its end. The
         prefix is '' for a node without a beam."""
         namespace = self.get_namespace().rstrip('/') + '/'
@@ -150,7 +170,7 @@ class Shell(Node):
                        and nodes.row(name).of_beam and namespace.endswith('/' + prefix)), '')
         return namespace.removesuffix(prefix), prefix
 
-    def _declare(self, live):
+    def _declare(self, live: Sequence[str]) -> None:
         """Check the given ROS parameters, store them in `parameters` and `graph`, and declare them in ROS."""
         given = {name: given.value for name, given in self._parameter_overrides.items()}
         given = parameters.without_ros({name: list(value) if isinstance(value, array.array) else value
@@ -170,20 +190,21 @@ class Shell(Node):
             self.add_on_set_parameters_callback(self._on_set)
             self.add_post_set_parameters_callback(self._post_set)
 
-    def _declare_all(self, values, fields, live):
+    def _declare_all(self, values: Mapping[str, Value], fields: Iterable[tuple[str, parameters.Field]],
+                     live: Sequence[str]) -> None:
         """Declare a ROS parameter for each (name, field), with its value in `values`. A parameter whose name begins
         with one of `live` is writable."""
         for name, field in fields:
             self.declare_parameter(name, values[name], _descriptor(field, not name.startswith(tuple(live))),
                                    ignore_override=True)
 
-    def _typed(self, changes):
+    def _typed(self, changes: Iterable[Parameter]) -> list[Parameter]:
         """Return changed ROS parameters, in which a whole number has become a float if the parameter is a float."""
         fields = dict(parameters.flatten(self._parameters_type))
         return [Parameter(change.name, value=parameters.typed(fields[change.name], change.value))
                 if change.name in fields else change for change in changes]
 
-    def _changed(self, changes):
+    def _changed(self, changes: Iterable[Parameter]) -> parameters.Parameters:
         """Return the parameters of the node with changed ROS parameters. Raises ParameterError."""
         values = parameters.as_dict(self.parameters)
         values.update({change.name: change.value for change in changes if change.name in values})
@@ -191,7 +212,7 @@ class Shell(Node):
         changed.check_graph(self.graph.beams, self.graph.lockstep)
         return changed
 
-    def _on_set(self, changes):
+    def _on_set(self, changes: Iterable[Parameter]) -> SetParametersResult:
         """Accept or refuse changed ROS parameters, for rclpy."""
         try:
             self._changed(changes)
@@ -199,27 +220,27 @@ class Shell(Node):
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    def _post_set(self, changes):
+    def _post_set(self, changes: Iterable[Parameter]) -> None:
         """Store accepted changes, for rclpy."""
         self.parameters = self._changed(changes)
         self.reconfigure()
 
-    def reconfigure(self):
+    def reconfigure(self) -> None:
         """Take the changed `self.parameters`; overridden by a node with live parameters."""
 
-    def _link(self, name):
+    def _link(self, name: str) -> tuple[nodes.Link, str]:
         """Return (nodes.Link, ROS name) of a topic of the graph. A node of a beam names the topics of its beam without
         the prefix of the beam."""
         link = self.links.get(self.beam + name) or self.links[name]
         return link, self._root + link.name if self.beam else link.name
 
-    def clock(self):
-        """Return (time of the steady clock, UTC) now [ns]."""
+    def clock(self) -> tuple[Nanoseconds, Nanoseconds]:
+        """Return (time of the steady clock, UTC) now."""
         steady, system = readings()
         return steady, self.utc.at(steady, system)
 
-    def epoch(self, stamp):
-        """Return the stamp [ns] at which the time of the units is 0.
+    def epoch(self, stamp: Nanoseconds) -> Nanoseconds:
+        """Return the stamp at which the time of the units is 0.
 
         In lockstep this is 0. In realtime it is the parameter `graph.start`. If that is 0, it is the beginning of the
         UTC day of the first `stamp`.
@@ -228,7 +249,7 @@ class Shell(Node):
             self._epoch = stamp // (SECONDS_PER_DAY * NS_PER_SECOND) * SECONDS_PER_DAY * NS_PER_SECOND
         return self._epoch
 
-    def writer(self, name):
+    def writer(self, name: str) -> Callable[[bytes], None]:
         """Return a function that publishes the CDR bytes of a message on a topic of the graph."""
         link, ros_name = self._link(name)
         publisher = self.create_publisher(middleware.message_class(link.type), ros_name,
@@ -236,41 +257,42 @@ class Shell(Node):
         self.publishers_by_link[link] = publisher
         return publisher.publish
 
-    def reader(self, name, decode, take):
+    def reader(self, name: str, decode: Callable[[bytes], tuple[Nanoseconds | None, _M]],
+               take: Callable[[_M, bool], None]) -> None:
         """Subscribe to a topic of the graph, and call take(message, after_gap) for every message.
 
-        decode(CDR bytes) returns (stamp [ns] or None, message). It raises ValueError for bytes that are no such
+        decode(CDR bytes) returns (stamp or None, message). It raises ValueError for bytes that are no such
         message. In lockstep such bytes from a node of the graph end this node. In all other cases they are dropped, as
         are the messages that a PublisherGate refuses. after_gap: True if messages may be missing before this message.
         """
         link, ros_name = self._link(name)
 
         if self.graph.lockstep:
-            listener = LockstepSubscriber(self, link, ros_name, decode, take)
+            subscriber = LockstepSubscriber(self, link, ros_name, decode, take)
             self.create_subscription(middleware.message_class(link.type), ros_name,
-                                     two_argument_callback(self._guarded(listener.callback)),
+                                     two_argument_callback(self._guarded(subscriber.callback)),
                                      middleware.qos(link.rate), raw=True)
         else:
             listener = TopicSubscriber(self, link, ros_name, decode, take)
             self.listeners.append(listener)
             listener.open(lambda: subscribe(self, link, ros_name, self._guarded(listener.callback), 'read'))
 
-    def warn_of_foreign(self, link, data):
+    def warn_of_foreign(self, link: nodes.Link, data: bytes) -> None:
         """Log the first foreign message of a topic in lockstep. The recording has all foreign messages."""
         self.get_logger().warning(f'{link.name}: a foreign message of {len(data)} bytes dropped at '
                                   f'{self._stamp / NS_PER_SECOND:.6f} s')
 
-    def publishers_of(self, ros_name):
+    def publishers_of(self, ros_name: str) -> list[str]:
         """Return the names of the nodes that publish a topic now."""
         return [node_of(info, self._root) for info in self.get_publishers_info_by_topic(ros_name)]
 
-    def message_reader(self, name, take):
+    def message_reader(self, name: str, take: Callable[[Message], None]) -> None:
         """Subscribe to a topic of the graph, and call take(message) for every message."""
         type_name = self._link(name)[0].type
         self.reader(name, lambda data: (None, messages.deserialize(data, type_name)),
                     lambda message, after_gap: take(message))
 
-    def sample_reader(self, name, take):
+    def sample_reader(self, name: str, take: Callable[[Message], None]) -> None:
         """Subscribe to a topic of rate `sample`, and call take(message) for every message.
 
         Unlike message_reader this also drops messages whose stamp is in the future, or not newer than the last one.
@@ -279,37 +301,37 @@ class Shell(Node):
         self.reader(name, lambda data: (messages.stamp_of(data) or None, messages.deserialize(data, type_name)),
                     lambda message, after_gap: take(message))
 
-    def every(self, period, function):
-        """Return a timer that calls a function at a period of the steady wall clock [s]."""
+    def every(self, period: Seconds, function: Callable[[], object]) -> Timer:
+        """Return a timer that calls a function at a period of the steady wall clock."""
         return self.create_timer(period, self._guarded(function), clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def _guarded(self, function):
+    def _guarded(self, function: Callable[..., object]) -> Callable[..., None]:
         """Return a callback that calls `function` and stores an expected error for `main`. Without this, rclpy would
         print a traceback first."""
-        def call(*args):
+        def call(*args: object) -> None:
             try:
                 function(*args)
             except EXPECTED_ERRORS as error:
                 self.failure = self.failure or error
                 self.finished = True
-        call.__signature__ = inspect.signature(function)
+        vars(call)['__signature__'] = inspect.signature(function)
         return call
 
-    def diagnose_with(self, diagnose):
-        """Publish the diagnostics that diagnose() returns, (level, message, [(key, value text)]).
+    def diagnose_with(self, diagnose: Diagnose) -> None:
+        """Publish the diagnostics that diagnose() returns.
 
         In lockstep they are published at every whole second of the drive's time. In realtime they are published once a
         second of the wall clock, and in `diagnose_now`.
         """
         self.diagnostics = Diagnostics(self, diagnose)
 
-    def diagnose_now(self):
+    def diagnose_now(self) -> bool:
         """Publish the diagnostics at once in realtime, because of a change. Return True if they were published. They
         are not published in lockstep, or too soon after the last diagnostics."""
         return self.diagnostics is not None and not self.graph.lockstep and self.diagnostics.publish_urgent()
 
-    def begin_step(self, stamp):
-        """Note the stamp t_k [ns] of a step, before any message of the step is published. In lockstep the first call
+    def begin_step(self, stamp: Nanoseconds) -> None:
+        """Note the stamp t_k of a step, before any message of the step is published. In lockstep the first call
         waits for the graph, and diagnostics are published at every whole second. In realtime there is no wait."""
         self._stamp = stamp
         if not self._started:
@@ -320,13 +342,14 @@ class Shell(Node):
             self.get_logger().info('runs')
         if self.graph.lockstep and stamp >= self._next_second:
             self._next_second = (stamp // NS_PER_SECOND + 1) * NS_PER_SECOND
+            assert self.diagnostics
             self.diagnostics.publish(stamp)
 
-    def restart(self):
+    def restart(self) -> None:
         """Treat the next step as the first step."""
         self._started, self._stamp, self._next_second = False, 0, 0
 
-    def prepare(self, unit):
+    def prepare(self, unit: Unprepared) -> None:
         """Compile the laws of a unit, which takes half a minute and more when they are not cached. Raises Stopped
         after a signal."""
         _compiling.append(True)
@@ -337,7 +360,7 @@ class Shell(Node):
         finally:
             _compiling.clear()
 
-    def await_acknowledged(self):
+    def await_acknowledged(self) -> None:
         """Wait until every subscriber has received all messages of this node. Raises GraphError after graph.deadline.
 
         The error names the recorder as silent: in lockstep all other nodes have answered the step before.
@@ -347,7 +370,7 @@ class Shell(Node):
                 raise GraphError(f'a subscriber of {link.name} took no message in {self.graph.deadline:g} s',
                                  ('recorder',))
 
-    def announce(self, publish, message):
+    def announce(self, publish: Callable[[bytes], None], message: Message) -> None:
         """Publish a message without a stamp. In lockstep, wait before and after it until all subscribers have
         acknowledged all messages, so that the order is deterministic."""
         if self.graph.lockstep:
@@ -356,7 +379,7 @@ class Shell(Node):
         if self.graph.lockstep:
             self.await_acknowledged()
 
-    def await_graph(self):
+    def await_graph(self) -> None:
         """Wait until every topic that this node publishes has all its subscribers among the nodes of the graph.
 
         Raises GraphError after START_DEADLINE_S, or when another graph publishes the same topics.
@@ -376,7 +399,7 @@ class Shell(Node):
                 raise GraphError(f'{link.name} already has a publisher: another graph runs on ROS_DOMAIN_ID '
                                  f'{self.context.get_domain_id()}; set a free one')
 
-    def _missing(self, publisher, wanted):
+    def _missing(self, publisher: Publisher, wanted: Sequence[str]) -> list[str]:
         """Return the names of the wanted subscribers that a topic lacks. No other subscriber replaces a wanted one,
         except a replay."""
         if not wanted:
@@ -387,21 +410,21 @@ class Shell(Node):
         # The graph may list a subscriber to which the publisher is not connected yet.
         return missing or (list(wanted) if publisher.get_subscription_count() < len(subscribers) else [])
 
-    def spin(self, executor):
+    def spin(self, executor: Executor) -> None:
         """Take one turn of the executor; overridden by a node that makes steps of its own."""
         executor.spin_once(timeout_sec=0.1)
 
     @property
-    def awaits(self):
+    def awaits(self) -> str:
         """Text that names the inputs for which a ready node waits; overridden by a node with other inputs."""
         return 'messages'
 
-    def draining(self):
+    def draining(self) -> bool:
         """Return True while a node that has finished must go on receiving before `close`; overridden by the
         recorder."""
         return False
 
-    def close(self):
+    def close(self) -> None:
         """Wait a little for the acknowledgement of the last messages, which would be lost with the node. Called once
         before the node ends; overridden by a node with data to store."""
         deadline = time.monotonic() + ACKNOWLEDGE_TIMEOUT_S
@@ -409,14 +432,14 @@ class Shell(Node):
             publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
 
-def _write_line(stream, line):
+def _write_line(stream: TextIO, line: str) -> None:
     """Write a last line without Python's buffer. A full disk or a closed pipe loses the line, and must not change the
     reason of the end."""
     with contextlib.suppress(OSError):
         os.write(stream.fileno(), f'{line}\n'.encode())
 
 
-def _end_process(node, code):
+def _end_process(node: Node, code: int) -> NoReturn:
     """End the process with an exit code as soon as the publishers and subscribers of its node have left the graph.
 
     The DDS participant of the process is not destroyed. In 1 of 100 ends of a graph, Fast DDS 2.14 hangs in the
@@ -431,7 +454,7 @@ def _end_process(node, code):
     os._exit(code)
 
 
-def main(make_node, args=None):
+def main(make_node: Callable[[], Shell], args: Sequence[str] | None = None) -> int:
     """Run the node of make_node() until it is finished or a signal stops it, and end the process.
 
     The exit code is 0, or 1 after an error, which is one line on stderr. The node's `result`, if any, is printed on

@@ -4,15 +4,26 @@ LockstepSubscriber is for a lockstep graph, TopicSubscriber for a realtime graph
 """
 import collections
 import inspect
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Generic, TypeAlias, TypeVar
 
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.qos import DurabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.subscription import Subscription
 
 from pedestal_common.graph import nodes, topics
 from pedestal_common.node import middleware
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN
+from pedestal_common.quantities import Nanoseconds
 from pedestal_common.realtime import publisher_gate
 from pedestal_common.wire.commands import MAX_COMMAND_AGE_NS
+
+if TYPE_CHECKING:
+    from pedestal_common.node.shell import Shell
+
+MessageInfo: TypeAlias = Mapping[str, int]      # of rclpy: numbers and times of a message
+Take: TypeAlias = Callable[[bytes, MessageInfo], None]      # callback of a subscription, for the CDR bytes
+_M = TypeVar('_M')      # a decoded message
 
 DROP_REPORT_NS = 2_000_000_000  # time for which the diagnostics report a dropped message [ns]
 UNDISCOVERED_NODE_NAME = '_NODE_NAME_UNKNOWN_'  # name that rmw gives to a node before its discovery
@@ -28,31 +39,32 @@ MAX_RECENT_MESSAGES = 100
 """Number of messages that a topic with two subscriptions remembers, to drop the copy from its second subscription."""
 
 
-def two_argument_callback(function):
+def two_argument_callback(function: Take) -> Callable[..., None]:
     """Return function(data, info) as a callback of a subscription. EventsExecutor (rclpy 7.1.6) passes one pair to a
     callback of two arguments, SingleThreadedExecutor passes two arguments."""
-    def call(data, info=None):
+    def call(data: bytes, info: MessageInfo | None = None) -> None:
         function(*(data if info is None else (data, info)))
-    call.__signature__ = inspect.signature(lambda data, info: None)
+    vars(call)['__signature__'] = inspect.signature(lambda data, info: None)
     return call
 
 
-def subscribe(node, link, ros_name, take, role):
-    """Return the subscriptions of a node in realtime to the topic of a nodes.Link, named ros_name in ROS.
+def subscribe(node: 'Shell', link: nodes.Link, ros_name: str, take: Take, role: str) -> list[Subscription]:
+    """Return the subscriptions of a node in realtime to the topic of a link, named ros_name in ROS.
 
-    The subscriptions call take(CDR bytes, rclpy's message info) once for each message. role: `read` or `recorded`. A
+    The subscriptions call `take` once for each message. role: `read` or `recorded`. A
     latched subscriber does not match a volatile publisher. Where topics.Qos has `unlatched` there is therefore a
     second, volatile subscription. A latched publisher matches both; the second copy of its message is dropped.
     """
-    def open_with(profile, callback, **events):
+    def open_with(profile: QoSProfile, callback: Take,
+                  events: SubscriptionEventCallbacks | None = None) -> Subscription:
         return node.create_subscription(middleware.message_class(link.type), ros_name,
-                                        two_argument_callback(callback), profile, raw=True, **events)
+                                        two_argument_callback(callback), profile, event_callbacks=events, raw=True)
     latched = middleware.qos(link.rate, role)
     if not topics.QOS_BY_RATE[link.rate].unlatched:
         return [open_with(latched, take)]
-    recent = collections.deque(maxlen=MAX_RECENT_MESSAGES)
+    recent: collections.deque[tuple[Nanoseconds, int]] = collections.deque(maxlen=MAX_RECENT_MESSAGES)
 
-    def take_once(data, info):
+    def take_once(data: bytes, info: MessageInfo) -> None:
         message = info['source_timestamp'], info['publication_sequence_number']
         if message not in recent:
             recent.append(message)
@@ -61,11 +73,11 @@ def subscribe(node, link, ros_name, take, role):
     volatile.durability = DurabilityPolicy.VOLATILE
     # The default callback of rclpy is off, because it would warn of each volatile publisher.
     unmatched = SubscriptionEventCallbacks(use_default_callbacks=False)
-    return [open_with(latched, take_once, event_callbacks=unmatched), open_with(volatile, take_once)]
+    return [open_with(latched, take_once, unmatched), open_with(volatile, take_once)]
 
 
-def foreign_publishers(node, link, ros_name):
-    """Return the names of the nodes that publish a topic and are no publisher of its nodes.Link.
+def foreign_publishers(node: 'Shell', link: nodes.Link, ros_name: str) -> list[str] | None:
+    """Return the names of the nodes that publish a topic and are no publisher of its link.
 
     Return None if no node of the graph publishes the link. A node before its discovery counts, because it may be
     foreign.
@@ -78,27 +90,27 @@ def foreign_publishers(node, link, ros_name):
 class SoleNumbers:
     """Check of the sequence numbers of a topic in lockstep: those of the publisher in the graph rise by 1.
 
-    node: the shell.Shell that subscribes; link: nodes.Link of the topic, named ros_name in ROS
-    next: number of the next message, None if any number may follow
+    node: the node that subscribes; link: the topic, named ros_name in ROS; first: as `next`
     """
 
-    def __init__(self, node, link, ros_name, first=None):
-        self._node, self._link, self._ros_name, self.next = node, link, ros_name, first
+    def __init__(self, node: 'Shell', link: nodes.Link, ros_name: str, first: int | None = None) -> None:
+        self._node, self._link, self._ros_name = node, link, ros_name
+        self.next = first       # number of the next message, None if any number may follow
 
-    def is_next(self, number):
+    def is_next(self, number: int | None) -> bool:
         """Return True if a message with this number follows the last one. A middleware without numbers has None."""
         return number is None or self.next in (None, number)
 
-    def note(self, number):
+    def note(self, number: int | None) -> None:
         """Note the number of a message of the graph."""
         self.next = None if number is None else number + 1
 
-    def shows_foreign(self):
+    def shows_foreign(self) -> bool:
         """Return True if ROS lists a foreign publisher of the topic, and the topic has one publisher in the table."""
         return len(self._link.writers) == 1 and bool(foreign_publishers(self._node, self._link, self._ros_name))
 
 
-class LockstepSubscriber:
+class LockstepSubscriber(Generic[_M]):
     """Subscriber to one topic in lockstep, which passes the messages of the graph to take(message, False).
 
     False states that no gap precedes the message. A message whose number is not the next (see SoleNumbers) is foreign
@@ -107,11 +119,12 @@ class LockstepSubscriber:
     node, link, ros_name, decode: see TopicSubscriber. An unreadable message of the graph raises ValueError.
     """
 
-    def __init__(self, node, link, ros_name, decode, take):
+    def __init__(self, node: 'Shell', link: nodes.Link, ros_name: str,
+                 decode: Callable[[bytes], tuple[Nanoseconds | None, _M]], take: Callable[[_M, bool], None]) -> None:
         self._node, self._link, self._decode, self._take = node, link, decode, take
         self._numbers, self._dropped = SoleNumbers(node, link, ros_name), 0
 
-    def callback(self, data, info):
+    def callback(self, data: bytes, info: MessageInfo) -> None:
         """Take a message."""
         number = info['publication_sequence_number']
         follows = self._numbers.is_next(number)
@@ -128,21 +141,21 @@ class LockstepSubscriber:
         self._numbers.note(number)
         self._take(message, False)
 
-    def _drop(self, data):
+    def _drop(self, data: bytes) -> None:
         self._dropped += 1
         if self._dropped == 1:
             self._node.warn_of_foreign(self._link, data)
 
 
-class TopicSubscriber:
+class TopicSubscriber(Generic[_M]):
     """Subscriber to one topic, which passes the messages that its PublisherGate accepts to take(message, True after a
     gap).
 
-    node: the shell.Shell that subscribes; link: nodes.Link of the topic, named ros_name in ROS; decode: see
-    PublisherGate
+    node: the node that subscribes; link: the topic, named ros_name in ROS; decode: see PublisherGate
     """
 
-    def __init__(self, node, link, ros_name, decode, take):
+    def __init__(self, node: 'Shell', link: nodes.Link, ros_name: str,
+                 decode: Callable[[bytes], tuple[Nanoseconds | None, _M]], take: Callable[[_M, bool], None]) -> None:
         self.link, self._node, self._ros_name, self._take = link, node, ros_name, take
         is_shared = len(link.writers) > 1 or link.rate in ('once', 'command')
         self._expected = any(writer in node.graph.members for writer in link.writers)
@@ -151,22 +164,25 @@ class TopicSubscriber:
         self.gate = publisher_gate.PublisherGate(
             decode, round(node.graph.future * 1e9), unexpected, paced=not (text or sample),
             oldest=MAX_COMMAND_AGE_NS if link.rate == 'command' else None)
-        self._held, self._missed = collections.deque(maxlen=MAX_HELD_TEXTS), 0
+        # texts that are held, with their time of arrival
+        self._held: collections.deque[tuple[Nanoseconds, bytes, MessageInfo]] = collections.deque(
+            maxlen=MAX_HELD_TEXTS)
+        self._missed = 0
         self.callback = self._hold if text else self._receive
         if text:
             node.every(DISCOVERY_POLL_S, self._take_held)
 
-    def open(self, subscribe):
+    def open(self, subscribe: Callable[[], list[Subscription]]) -> None:
         """Subscribe. subscribe() makes the subscriptions with `callback`."""
         self._subscribe = subscribe
         self._subscriptions = subscribe()
 
-    def _hold(self, data, info):
+    def _hold(self, data: bytes, info: MessageInfo) -> None:
         """Hold a text until every publisher of its topic has a name."""
         self._held.append((self._node.clock()[0], data, info))
         self._take_held()
 
-    def _take_held(self):
+    def _take_held(self) -> None:
         """Take the held texts once every publisher has a name. A text that arrived while an unexpected publisher was
         present is dropped. After that publisher has left, a new subscription brings the last text again."""
         while self._held and (not self._undiscovered() or self._node.clock()[0] - self._held[0][0] > MAX_DISCOVERY_NS):
@@ -178,10 +194,10 @@ class TopicSubscriber:
                 self._node.destroy_subscription(subscription)
             self._subscriptions = self._subscribe()
 
-    def _undiscovered(self):
+    def _undiscovered(self) -> bool:
         return any(UNDISCOVERED_NODE_NAME in name for name in self._node.publishers_of(self._ros_name))
 
-    def _receive(self, data, info):
+    def _receive(self, data: bytes, info: MessageInfo) -> None:
         """Pass a message on if the PublisherGate accepts it; otherwise publish diagnostics for a serious reason."""
         gate = self.gate
         now, utc = self._node.clock()
@@ -191,23 +207,23 @@ class TopicSubscriber:
         elif gate.reason in publisher_gate.WARNING_DROP_REASONS:
             self._node.diagnose_now()
 
-    def unexpected_publishers(self):
+    def unexpected_publishers(self) -> list[str]:
         """Return the names of the publishers that the graph does not expect; [] in a graph without the expected
         nodes."""
         return foreign_publishers(self._node, self.link, self._ros_name) or []
 
-    def _unexpected_count(self):
+    def _unexpected_count(self) -> int | None:
         """Return the number of unexpected publishers for PublisherGate. A node before its discovery counts as
         unexpected."""
         return len(self.unexpected_publishers()) if self._expected else None
 
-    def _surplus_count(self):
+    def _surplus_count(self) -> int:
         """Return the number of publishers beyond one, for a topic of rate `sample`, which any one node may publish."""
         return max(len(self._node.publishers_of(self._ros_name)) - 1, 0)
 
-    def finding(self, now):
+    def finding(self, now: Nanoseconds) -> tuple[int, str] | None:
         """Return (level, text) for the diagnostics, about messages dropped within DROP_REPORT_NS; None without any.
-        now: steady clock [ns]."""
+        now: steady clock."""
         gate = self.gate
         if gate.dropped_at is None or now - gate.dropped_at > DROP_REPORT_NS:
             return None
@@ -218,7 +234,7 @@ class TopicSubscriber:
         who = ', '.join(names) or 'it has left'
         return LEVEL_ERROR, f'{self.link.name}: {count} dropped: {reason}: {who}'
 
-    def values(self):
+    def values(self) -> list[tuple[str, str]]:
         """Return [(key, text)] for the diagnostics: the number of dropped messages, the smallest time from sending to
         reception."""
         gate = self.gate

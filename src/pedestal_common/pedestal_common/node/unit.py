@@ -6,12 +6,13 @@ loop, in a recomputed recording and in many trials. The caller passes a record w
 """
 import collections
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
 from pedestal_common.graph import nodes, topics
-from pedestal_common.parameters import Parameters, as_dict
+from pedestal_common.parameters import AnyParameters, Parameters, as_dict
+from pedestal_common.quantities import DType, Message, Nanoseconds, Records, Seconds, Stamps, Value
 from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import Reply
 
@@ -23,15 +24,19 @@ MAX_BLOCK_STEPS = 2000
 """Largest number of steps in one call of a law; a unit with noise generates the noise of so many steps in advance."""
 
 
+Memory: typing.TypeAlias = typing.Any      # named tuple of arrays; each unit has a type of its own
+Law: typing.TypeAlias = Callable[..., object]       # its first argument is a Memory
+
+
 class Diagnosis(typing.NamedTuple):
-    """State of a node: level LEVEL_OK, LEVEL_WARN or LEVEL_ERROR; one line for people; values [(key, text)]."""
-    level: int
-    message: str
-    values: list[tuple[str, str]]
+    """State of a node."""
+    level: int                      # LEVEL_OK, LEVEL_WARN or LEVEL_ERROR
+    message: str                    # one line for people
+    values: list[tuple[str, str]]   # (key, text)
 
 
-def joined(record_type: np.dtype, **parts: np.ndarray) -> np.ndarray:
-    """Return a record (1,) whose fields are these parts, {name: record (1,)}."""
+def joined(record_type: DType, **parts: Records | int) -> Records:
+    """Return a record (1,) whose fields are these parts: records (1,) or numbers."""
     record = np.zeros(1, record_type)
     for name, part in parts.items():
         record[name] = part
@@ -43,52 +48,36 @@ class Unit(typing.Protocol):
 
         law(memory, stamp, inputs, outputs)
 
-    stamp is the time t_k of the step [ns]. inputs and outputs are records of topics, and may hold further topics. In
+    stamp is the time t_k of the step. inputs and outputs are records of topics, and may hold further topics. In
     the closed loop both are one record, which holds all topics of the step. The drive is the exception: its inputs are
     the record of the step before.
-
-    NODE         row of nodes.NODES or nodes.HARDWARE_ROWS of the node that runs this unit
-    LAWS         {type of its memory: (law of one step, law of many steps)}, compiled. The second law takes arrays (n,)
-                 of stamps and records
-    LIVE         prefixes of the parameters that may change while it runs
-    REQUESTS     names of its services
-    VERBS        commands.CommandDefinition of each command that it accepts on the topic NODE.obeys
-    CALLS        names of services of other nodes that it may call
-    MOMENTARY    text topics whose text `encode` can make only directly after the step that changed it; a recomputation
-                 makes many steps at once and therefore omits them
-
-    parameters   instance of the parameter class of NODE
-    reads        topics that it reads in its graph, a part of NODE.reads
-    writes       topics that it writes with these parameters, a part of NODE.writes
-    memory       named tuple of arrays with all data that a step reads or changes, except inputs and outputs. The array
-                 `record` (1,) holds the records of the law; further arrays hold noise or a track
-    inputs, outputs     records (1,) of one step in a node
-    messages     {topic: message} of its stamped output topics; in each step only the numbers of a message change
-    epoch        UTC [ns] of stamp 0, 0 where stamps are not UTC; set by its node
-    silent       True while its trigger, the topic that begins its steps, is absent; set by a realtime node
-    lockstep     True if its graph runs in lockstep; set by its node
-    pending_replies    (Command, Reply) of the last commands, the newest last; its node publishes and removes them
     """
-    NODE: nodes.Node
-    LAWS: typing.Mapping
-    LIVE: tuple[str, ...] = ()
-    REQUESTS: tuple[str, ...] = ()
-    VERBS: tuple = ()
-    CALLS: tuple[str, ...] = ()
+    NODE: nodes.Node                # row of nodes.NODES or nodes.HARDWARE_ROWS of the node that runs this unit
+    # {type of its memory: (law of one step, law of many steps)}, compiled; the second takes many stamps and records
+    LAWS: Mapping[type, tuple[Law, Law]]
+    LIVE: tuple[str, ...] = ()      # prefixes of the parameters that may change while it runs
+    REQUESTS: tuple[str, ...] = ()  # names of its services
+    VERBS: tuple[commands.Definition, ...] = ()     # each command that it accepts on the topic NODE.obeys
+    CALLS: tuple[str, ...] = ()     # names of services of other nodes that it may call
+    # text topics whose text `encode` can make only directly after the step that changed it; a recomputation makes many
+    # steps at once and therefore omits them
     MOMENTARY: tuple[str, ...] = ()
-    parameters: typing.Any
-    reads: tuple[str, ...]
-    writes: tuple[str, ...]
-    memory: typing.Any
-    inputs: np.ndarray
-    outputs: np.ndarray
-    messages: dict[str, typing.Any]
-    pending_replies: collections.deque[tuple[commands.Command, Reply]]
-    epoch: int = 0
-    silent: bool = False
-    lockstep: bool = False
-    _last: int | None = None
-    _due: collections.deque[tuple[int, commands.Command]]
+
+    parameters: AnyParameters       # of the parameter class of NODE
+    reads: tuple[str, ...]          # topics that it reads in its graph, a part of NODE.reads
+    writes: tuple[str, ...]         # topics that it writes with these parameters, a part of NODE.writes
+    # all data that a step reads or changes, except inputs and outputs. The array `record` (1,) holds the records of
+    # the law; further arrays hold noise or a track
+    memory: Memory
+    inputs: Records                 # (1,), of one step in a node
+    outputs: Records                # the same
+    messages: dict[str, Message]    # {topic: message} of its stamped output topics; only their numbers change
+    pending_replies: collections.deque[tuple[commands.Command, Reply]]  # the newest last; its node removes them
+    epoch: Nanoseconds = 0          # UTC of stamp 0, 0 where stamps are not UTC; set by its node
+    silent: bool = False            # its trigger, the topic that begins its steps, is absent; set by a realtime node
+    lockstep: bool = False          # its graph runs in lockstep; set by its node
+    _last: Nanoseconds | None = None        # stamp of the last step
+    _due: collections.deque[tuple[Nanoseconds, commands.Command]]   # scheduled commands
 
     def __init__(self, parameters: Parameters, reads: Iterable[str]) -> None:
         self.parameters, self.reads = parameters, tuple(reads)
@@ -101,13 +90,13 @@ class Unit(typing.Protocol):
         self._due = collections.deque(self.schedule())
 
     @classmethod
-    def inputs_type(cls) -> np.dtype:
+    def inputs_type(cls) -> DType:
         """Return the type of the record of its inputs, without the topics that `decode` takes."""
         return records.of(*(name for name in cls.NODE.reads
                             if topics.TOPIC_BY_NAME[name].rate not in topics.UNSTEPPED_RATES))
 
     @classmethod
-    def outputs_type(cls) -> np.dtype:
+    def outputs_type(cls) -> DType:
         """Return the type of the record of its outputs."""
         return records.of(*cls.NODE.writes)
 
@@ -117,13 +106,13 @@ class Unit(typing.Protocol):
         return self.NODE.reads[0]
 
     @property
-    def latencies(self) -> dict[str, float]:
+    def latencies(self) -> dict[str, Seconds]:
         """{topic: age of its data at the step [s]} of the topics for which a step waits in addition to its trigger."""
         return {name: self.latency(name) for name in self.reads
                 if name != self.trigger and topics.TOPIC_BY_NAME[name].rate == 'step'}
 
-    def latency(self, topic: str) -> float:
-        """Return the age of the data of a topic at the step [s], from the parameter named Topic.latency; 0 without."""
+    def latency(self, topic: str) -> Seconds:
+        """Return the age of the data of a topic at the step, from the parameter named Topic.latency; 0 without."""
         return getattr(self.parameters, topics.TOPIC_BY_NAME[topic].latency, 0.0)
 
     @property
@@ -131,13 +120,13 @@ class Unit(typing.Protocol):
         """Views of the records of its law by name, for example self.parts['outputs']['status']."""
         return self.memory.record[0]
 
-    def block(self, steps: int) -> tuple:
+    def block(self, steps: int) -> Memory:
         """Return the memory for this number of next steps, at most MAX_BLOCK_STEPS; overridden by a unit with
         noise."""
         return self.memory
 
-    def step(self, stamps: np.ndarray, inputs: np.ndarray, outputs: np.ndarray) -> None:
-        """Make the steps of stamps (n,) [ns], from inputs (n,) to outputs (n,). Scheduled commands are executed before
+    def step(self, stamps: Stamps, inputs: Records, outputs: Records) -> None:
+        """Make the steps of stamps (n,), from inputs (n,) to outputs (n,). Scheduled commands are executed before
         the step at which they are due."""
         _, law_of_many = self.LAWS[type(self.memory)]
         first = 0
@@ -148,18 +137,18 @@ class Unit(typing.Protocol):
             law_of_many(self.block(last - first), stamps[part], inputs[part], outputs[part])
             first = last
 
-    def schedule(self) -> list[tuple[int, commands.Command]]:
-        """Return [(at [ns], Command)] of its scheduled commands, in order; overridden by a unit with such
+    def schedule(self) -> list[tuple[Nanoseconds, commands.Command]]:
+        """Return its scheduled commands with their times, in order; overridden by a unit with such
         parameters."""
         return []
 
     @property
-    def next_due(self) -> int:
-        """Time of the next scheduled command [ns]."""
+    def next_due(self) -> Nanoseconds:
+        """Time of the next scheduled command."""
         return self._due[0][0] if self._due else NEVER_DUE_NS
 
-    def execute_due(self, stamp: int) -> None:
-        """Execute the scheduled commands that are due at or before the step with this stamp [ns]. A unit that starts
+    def execute_due(self, stamp: Nanoseconds) -> None:
+        """Execute the scheduled commands that are due at or before the step with this stamp. A unit that starts
         later than its schedule skips the earlier commands."""
         while self._due and self._due[0][0] <= stamp:
             at, command = self._due.popleft()
@@ -168,8 +157,8 @@ class Unit(typing.Protocol):
         self._last = stamp
 
     def command(self, command: commands.Command) -> Reply:
-        """Execute a Command between two steps and return the Reply. The Command takes effect in the next step. The
-        Reply is also added to `pending_replies`."""
+        """Execute a Command between two steps. The Command takes effect in the next step. The Reply is also added to
+        `pending_replies`."""
         try:
             self.admit(command)
             if command.verb in self.REQUESTS:
@@ -185,12 +174,12 @@ class Unit(typing.Protocol):
         """Raise ValueError where the client of a Command may not command; overridden by a unit with a client in
         control."""
 
-    def execute(self, command: commands.Command, arguments: dict[str, typing.Any]) -> Reply:
+    def execute(self, command: commands.Command, arguments: Mapping[str, Value]) -> Reply:
         """Execute a Command of VERBS with its arguments {name: number or text} and return the Reply; overridden by a
         unit with commands. Raises ValueError for a refusal."""
         raise KeyError(command.verb)
 
-    def decode(self, topic: str, message: typing.Any) -> None:
+    def decode(self, topic: str, message: Message) -> None:
         """Take a message of a topic of rate `once` or `sample`. Raises ValueError for a refused message."""
         raise ValueError(f'{topic} is not read')
 
@@ -198,7 +187,7 @@ class Unit(typing.Protocol):
         """Take the new text of a text topic."""
         self.inputs[topic] = records.code_of(topic, text)
 
-    def encode(self, topic: str, code: int) -> typing.Any:
+    def encode(self, topic: str, code: int) -> Message:
         """Return the text of a code of one of its text topics, or the message of a list of texts."""
         return topics.TOPIC_BY_NAME[topic].texts[code]
 
@@ -219,7 +208,7 @@ class Unit(typing.Protocol):
         """Return its present state, and the events since the last diagnosis."""
 
     @property
-    def urgent(self) -> tuple:
+    def urgent(self) -> tuple[object, ...]:
         """Part of its diagnosis whose change is published at once; read after every step in realtime."""
         return ()
 
@@ -229,7 +218,7 @@ class Unit(typing.Protocol):
         return ()
 
     @staticmethod
-    def idle(numbers: Mapping[str, typing.Any]) -> str:
+    def idle(numbers: Mapping[str, Message]) -> str:
         """Return the reason why this unit did nothing in a recording, such as a receiver that never locked; '' if it
         was active.
 
@@ -249,7 +238,7 @@ class Unit(typing.Protocol):
             array[...] = values
 
     @property
-    def last_prepared(self) -> tuple[typing.Any, tuple]:
+    def last_prepared(self) -> tuple[Callable[..., object], tuple[object, ...]]:
         """(law that `prepare` calls last, its arguments): the law of many steps."""
         _, law_of_many = self.LAWS[type(self.memory)]
         return law_of_many, (self.memory, np.zeros(1, np.int64), self.inputs, self.outputs)
@@ -261,11 +250,10 @@ class Unit(typing.Protocol):
             self.request(name)
 
 
-def announced(unit: Unit, topic: str, stamps: np.ndarray,
-              outputs: np.ndarray) -> tuple[np.ndarray, list[typing.Any]]:
-    """Return (stamps (m,) [ns], texts) of a text topic of a unit: a text for each change in outputs (n,).
+def announced(unit: Unit, topic: str, stamps: Stamps, outputs: Records) -> tuple[Stamps, list[Message]]:
+    """Return (stamps (m,), texts) of a text topic of a unit: a text for each change in outputs (n,).
 
-    stamps: of the steps (n,) [ns]. A text has the stamp of the first stamped message that the unit writes in the same
+    stamps: of the steps (n,). A text has the stamp of the first stamped message that the unit writes in the same
     step. If the unit answers late, this stamp is earlier than that of the step. Without such a message the text has
     the stamp of the step.
     """
@@ -273,7 +261,7 @@ def announced(unit: Unit, topic: str, stamps: np.ndarray,
     stamps = np.where(answers != records.NO_STAMP, answers, stamps)
     codes = outputs[topic]
     rows: list[int] = []
-    texts: list[typing.Any] = []
+    texts: list[Message] = []
     for row in np.flatnonzero(np.diff(codes, prepend=topics.NO_TEXT_CODE)).tolist():
         text = unit.encode(topic, int(codes[row]))
         if not texts or text != texts[-1]:

@@ -5,17 +5,19 @@ The class UnitNode runs every unit. Subclasses add tasks that are no law: the dr
 (adu_drive.timekeeper_node), and the ship publishes NMEA sentences.
 """
 import collections
-import collections.abc
 import dataclasses
 import time
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from pedestal_common.graph import nodes, topics
-from pedestal_common.graph.steps import NS_PER_SECOND, Steps
+from pedestal_common.graph.steps import NS_PER_SECOND, GraphError, Steps
 from pedestal_common.node import shell
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN, Diagnosis, Unit
+from pedestal_common.quantities import Message, Nanoseconds, Seconds
 from pedestal_common.realtime import priority
 from pedestal_common.wire import commands, messages, records
 
@@ -29,8 +31,8 @@ SETTLING_POLL_S = 0.001  # time after which the messages queued at start-up coun
 
 @dataclasses.dataclass
 class LastText:
-    """Last published text of a text topic: its code, the text, and the function that publishes the next text."""
-    publish: collections.abc.Callable
+    """Last published text of a text topic."""
+    publish: Callable[[bytes], None]    # publishes the next text
     code: int = topics.NO_TEXT_CODE
     text: object = ''
 
@@ -39,7 +41,7 @@ class Port:
     """Connection of a unit to its topics. prefix: prefix of the unit's beam in a node that serves several beams, else
     ''."""
 
-    def __init__(self, node, unit, prefix=''):
+    def __init__(self, node: shell.Shell, unit: Unit, prefix: str = '') -> None:
         self.prefix = prefix
         self.stamps = np.zeros(1, np.int64)
         written = [name for name in unit.writes if not prefix or name in nodes.BEAM_TOPICS
@@ -51,7 +53,7 @@ class Port:
         self._clock = node.clock
         self.use(unit)
 
-    def use(self, unit):
+    def use(self, unit: Unit) -> None:
         """Connect a new unit, whose first step is the next step."""
         self.unit = unit
         self.decoders = {self.named(name): records.Decoder(name, unit.inputs)
@@ -60,14 +62,15 @@ class Port:
         self._encoders = [(records.Encoder(name, message, unit.outputs), self._writers[name])
                           for name, message in unit.messages.items() if name in self._writers]
         self._texts = {name: LastText(writer) for name, writer in self._writers.items() if records.is_text(name)}
-        self._epoch, self._last = 0, None
+        self._epoch = 0
+        self._last: Nanoseconds | None = None       # stamp of the last step
 
-    def named(self, topic):
+    def named(self, topic: str) -> str:
         """Return the name in the graph of a topic of the unit, with the prefix of the beam for a topic of a beam."""
         return self.prefix + topic if topic in nodes.BEAM_TOPICS else topic
 
-    def step(self, stamp, values):
-        """Make the step of a stamp [ns]. values: {topic: (stamp [ns], numbers), or None if no message arrived}.
+    def step(self, stamp: Nanoseconds, values: Mapping[str, records.Decoded | None]) -> None:
+        """Make the step of a stamp. values: {topic: its message, or None if no message arrived}.
 
         The unit receives stamps that count from the epoch (Shell.epoch), so that times in seconds keep their
         resolution as floating-point numbers.
@@ -80,25 +83,25 @@ class Port:
         self.stamps[0] = stamp - self._epoch
         self.unit.step(self.stamps, self.unit.inputs, self.unit.outputs)
 
-    def reset_after_gap(self):
+    def reset_after_gap(self) -> None:
         """Reset the memory of the unit to its initial values. Received texts and messages of rate `once` stay."""
         self.unit.memory.record[...] = self._initial
         self.unit.configure(self.unit.parameters)
 
-    def command(self, command):
+    def command(self, command: commands.Command) -> commands.Reply:
         """Return the Reply of the unit to a Command, and publish it."""
         reply = self.unit.command(command)
         self.reply()
         return reply
 
-    def reply(self):
+    def reply(self) -> None:
         """Publish the replies to the commands."""
         while self.unit.pending_replies:
             answer = commands.reply_message(*self.unit.pending_replies.popleft())
             if self._reply:
                 self._announce(self._reply, answer)
 
-    def publish(self):
+    def publish(self) -> None:
         """Publish the replies since the last step, the changed texts, then every message that is due."""
         self.reply()
         self.announce()
@@ -106,7 +109,7 @@ class Port:
             if encoder.due:
                 publish(encoder.encoded(self._epoch))
 
-    def announce(self):
+    def announce(self) -> None:
         """Publish the texts that have changed; a list of texts has the stamp of the step."""
         outputs = self.unit.outputs[0]
         for name, last in self._texts.items():
@@ -119,7 +122,7 @@ class Port:
                     self._announce(last.publish, messages.String(data=text) if isinstance(text, str)
                                    else self._stamped(text))
 
-    def _stamped(self, message):
+    def _stamped(self, message: Message) -> Message:
         """Return a message with the stamp of the last step, before the first step with the time of now."""
         header = messages.header('')
         messages.put_stamp(header.stamp, self._clock()[1] if self._last is None else self._last)
@@ -132,30 +135,34 @@ class UnitNode(shell.Shell):
     PRECEDENCE = 0
     """Amount by which the scheduling priority of this node exceeds graph.priority."""
 
-    def __init__(self, module, serves_beams=False):
+    def __init__(self, module: str, serves_beams: bool = False) -> None:
         self.row = nodes.of_executable(module)
         unit_type = self.row.unit_type()
         super().__init__(self.row.name, self.row.parameters_type(), unit_type.LIVE)
         flags = [flag for flag in topics.TOPIC_FLAGS if getattr(self.parameters, flag, False)]
         reads = nodes.reads(self.row, self.graph.members, flags)
         prefixes = nodes.prefixes(self.graph.beams) if serves_beams else ('',)
-        self.ports = []
+        self.ports: list[Port] = []
         for prefix in prefixes:
             unit = unit_type(self.parameters, reads)
             unit.lockstep = self.graph.lockstep
             self.prepare(unit)
             self.ports.append(Port(self, unit, prefix))
         self.unit = self.ports[0].unit
-        self.steps = None
+        self.steps: Steps | None = None
         self.refused = ''
-        # _waiting_for_once: topics of rate `once` without a message; _held: the first steps, which wait for them.
-        self._waiting_for_once, self._held = set(), collections.deque()
-        self._settled, self._settling = not self.graph.lockstep, None
+        self._waiting_for_once: set[str] = set()    # topics of rate `once` without a message
+        # the first steps, which wait for these messages
+        self._held: collections.deque[tuple[Nanoseconds, dict[str, records.Decoded | None]]] = collections.deque()
+        self._settled = not self.graph.lockstep
+        self._settling: Timer | None = None
         self._urgent = [port.unit.urgent for port in self.ports]
-        self._once, self._replays, self._replay_left = frozenset(), set(), False
+        self._once: frozenset[str] = frozenset()
+        self._replays: set[bytes] = set()       # identities of the publishers of replays
+        self._replay_left = False
         self._callees = {} if self.graph.lockstep else {
             name: self.create_client(Trigger, self._root + name if self.beam else name) for name in unit_type.CALLS}
-        self._called = set()
+        self._called: set[str] = set()
         for port in self.ports:
             self._listen(port)
         self._once = frozenset(self._waiting_for_once)
@@ -169,7 +176,7 @@ class UnitNode(shell.Shell):
                 self.get_logger().info(f'runs with default scheduling: graph.priority = {self.graph.priority}: '
                                        f'{refusal}')
 
-    def _listen(self, port):
+    def _listen(self, port: Port) -> None:
         """Subscribe to the topics that do not belong to a step: texts, topics of rate `once` or `sample`, commands.
         """
         if self.row.obeys:
@@ -186,9 +193,9 @@ class UnitNode(shell.Shell):
             elif rate == 'sample' and not self.graph.lockstep:
                 self.sample_reader(port.named(name), self._sample_taker(port, name))
 
-    def _command_taker(self, port):
+    def _command_taker(self, port: Port) -> Callable[[Message], None]:
         """Return take(message), which passes a command to the unit."""
-        def take(message):
+        def take(message: Message) -> None:
             try:
                 port.command(commands.of_message(message))
             except ValueError as error:
@@ -196,16 +203,16 @@ class UnitNode(shell.Shell):
                 self.get_logger().warning(self.refused)
         return take
 
-    def _text_taker(self, port, name):
+    def _text_taker(self, port: Port, name: str) -> Callable[[Message], None]:
         """Return take(message), which passes a text to the unit."""
-        def take(message):
+        def take(message: Message) -> None:
             self._look_for_replay()
             port.unit.take_text(name, message.data)
         return take
 
-    def _once_taker(self, port, name):
+    def _once_taker(self, port: Port, name: str) -> Callable[[Message], None]:
         """Return take(message), which passes a message of rate `once` to the unit."""
-        def take(message):
+        def take(message: Message) -> None:
             self._look_for_replay()
             stamp = messages.nanoseconds(message.header.stamp)
             try:
@@ -218,42 +225,43 @@ class UnitNode(shell.Shell):
             self._release()
         return take
 
-    def _sample_taker(self, port, name):
+    def _sample_taker(self, port: Port, name: str) -> Callable[[Message], None]:
         """Return take(message), which passes a message of rate `sample` to the unit.
 
         Messages before the first step are dropped, because the first step determines the epoch.
         """
-        def take(message):
+        def take(message: Message) -> None:
             if not self._stamp:
                 return
             stamp = messages.nanoseconds(message.header.stamp)
             port.unit.decode(name, messages.since(message, self.epoch(stamp) if stamp else 0))
         return take
 
-    def _settle(self):
+    def _settle(self) -> None:
         """Note that all messages queued at start-up have been processed."""
+        assert self._settling
         self._settling.cancel()
         self._settled = True
         self._release()
 
-    def _release(self):
+    def _release(self) -> None:
         """Answer the held first steps as soon as no message of rate `once` is awaited."""
         while self._held and self._settled and not self._waiting_for_once:
             self.answer(*self._held.popleft())
 
     @property
-    def awaits(self):
+    def awaits(self) -> str:
         """Names of the awaited topics: the trigger, and the topics of rate `once` without a message."""
         return ', '.join((self.unit.trigger, *sorted(self._waiting_for_once)))
 
-    def begin(self):
+    def begin(self) -> None:
         """Start to follow the trigger of the unit; overridden by the drive, which owns the time."""
         self.follow(self.unit.trigger, self.unit.latencies)
 
-    def follow(self, trigger, latencies):
+    def follow(self, trigger: str, latencies: Mapping[str, Seconds]) -> None:
         """Subscribe to the inputs of the steps, match the messages of each step (see Steps), and `answer` each step.
 
-        trigger: topic that begins a step; latencies: {other topic: age of its data at the step [s]}. In lockstep a
+        trigger: topic that begins a step; latencies: {other topic: age of its data at the step}. In lockstep a
         step whose inputs are absent for graph.deadline ends the node with the names of the silent publishers.
         """
         self.steps = Steps(trigger, {name: round(latency * NS_PER_SECOND) for name, latency in latencies.items()},
@@ -262,7 +270,8 @@ class UnitNode(shell.Shell):
         for name in (trigger, *latencies):
             if nodes.plain(name) not in self.row.writes:
                 self.reader(name, decoding(decoders[name]), self._step_taker(name))
-        self._watched_step, self._watched_since = None, time.monotonic()
+        self._watched_step: Nanoseconds | None = None
+        self._watched_since = time.monotonic()
         self._replayed = next(name for name in (trigger, *latencies) if nodes.plain(name) not in self.row.writes)
         self.every(REPLAY_POLL_S, self._look_for_replay)
         if self.graph.lockstep:
@@ -271,7 +280,7 @@ class UnitNode(shell.Shell):
             self._answered = self._triggered = self._watched = self._begun = time.monotonic_ns()
             self.every(TRIGGER_POLL_S, self._watch_trigger)
 
-    def _look_for_replay(self):
+    def _look_for_replay(self) -> None:
         """Begin again if a new replay, which was not seen before, publishes the first input of the steps."""
         if self.steps is None:
             return
@@ -283,7 +292,7 @@ class UnitNode(shell.Shell):
         self._replays |= replays
         self._replay_left = bool(self._replays) and not replays
 
-    def _begin_again(self):
+    def _begin_again(self) -> None:
         """Discard all steps and messages, so that the node continues like a node that starts."""
         self.get_logger().info('begins again, for another replay')
         for port in self.ports:
@@ -291,6 +300,7 @@ class UnitNode(shell.Shell):
             unit.lockstep = self.graph.lockstep
             port.use(unit)
         self.unit = self.ports[0].unit
+        assert self.steps
         self.steps.reset_after_gap(self.steps.trigger)
         self.refused = self.steps.refusal = ''
         self._waiting_for_once = set(self._once)
@@ -299,12 +309,13 @@ class UnitNode(shell.Shell):
         self._urgent = [port.unit.urgent for port in self.ports]
         self.restart()
 
-    def _step_taker(self, name):
+    def _step_taker(self, name: str) -> Callable[[records.Decoded, bool], None]:
         """Return take(message, after_gap), which passes the messages of one input to the Steps. After a gap it first
         resets the state that depends on earlier messages."""
+        assert self.steps
         steps = self.steps
 
-        def take(message, after_gap):
+        def take(message: records.Decoded, after_gap: bool) -> None:
             if message[0] <= self._stamp:
                 self._look_for_replay()
             if after_gap:
@@ -317,10 +328,11 @@ class UnitNode(shell.Shell):
             steps.take(name, message[0], message)
         return take
 
-    def _answer(self, stamp, trigger, values):
+    def _answer(self, stamp: Nanoseconds, trigger: records.Decoded, values: dict[str, records.Decoded | None]) -> None:
         """Answer a complete step. In lockstep the first steps wait for the topics of rate `once`, and for the texts
         that arrived before the executor began. Because the executor takes queued messages in any order, these texts
         may come after the first step."""
+        assert self.steps
         values[self.steps.trigger] = trigger
         if self._settled and not self._waiting_for_once:
             self.answer(stamp, values)
@@ -329,8 +341,8 @@ class UnitNode(shell.Shell):
         if self._settling is None:
             self._settling = self.every(SETTLING_POLL_S, self._settle)
 
-    def answer(self, stamp, values):
-        """Answer the step of a stamp [ns]. values: {topic: (stamp, numbers) or None}."""
+    def answer(self, stamp: Nanoseconds, values: Mapping[str, records.Decoded | None]) -> None:
+        """Answer the step of a stamp. values: as in Port.step."""
         for port in self.ports:
             port.step(stamp, values)
         self.begin_step(stamp)
@@ -338,7 +350,7 @@ class UnitNode(shell.Shell):
             port.publish()
         self.after_step()
 
-    def after_step(self):
+    def after_step(self) -> None:
         """Publish urgent diagnostics after a step in realtime, and call the services that a unit needs."""
         if self.graph.lockstep:
             return
@@ -353,14 +365,15 @@ class UnitNode(shell.Shell):
                 answer.add_done_callback(lambda done, name=name: self._log_refusal(name, done.result()))
             self._called = calls
 
-    def _log_refusal(self, name, response):
+    def _log_refusal(self, name: str, response: Trigger.Response) -> None:
         """Log the refusal of a called service."""
         if not response.success:
             self.get_logger().warning(f'{name}: {response.message}')
 
-    def _watch_trigger(self):
+    def _watch_trigger(self) -> None:
         """Set `silent` of the units in realtime while the trigger is absent, except after a stall of this node and
         before graph.start."""
+        assert self.steps
         now, limit = time.monotonic_ns(), self.graph.silence * NS_PER_SECOND
         if self.clock()[1] < self.graph.start:
             self._answered = self._begun = now
@@ -380,21 +393,22 @@ class UnitNode(shell.Shell):
             if silent:
                 self.diagnose_now()
 
-    def _watch_pending_step(self):
+    def _watch_pending_step(self) -> None:
         """Raise GraphError in lockstep if one step has waited for its inputs longer than graph.deadline."""
+        assert self.steps
         pending = self.steps.pending_stamp
         if pending is None or self._watched_step != pending or self._replay_left:
             self._watched_step, self._watched_since = pending, time.monotonic()
         elif time.monotonic() - self._watched_since > self.graph.deadline:
             waiting = self.steps.waiting_for
             silent = [writer for name in waiting for writer in self._link(name)[0].writers]
-            raise shell.GraphError(f'no {", ".join(waiting)} for step {pending / NS_PER_SECOND:.6f} s after '
+            raise GraphError(f'no {", ".join(waiting)} for step {pending / NS_PER_SECOND:.6f} s after '
                                    f'{self.graph.deadline:g} s', silent)
 
-    def _service(self, name):
+    def _service(self, name: str) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
         """Return the callback of a service. The callback passes the request to every unit between two steps, and
         answers with the Reply of the units."""
-        def serve(_request, response):
+        def serve(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             # Each port receives the same commands, so all give the same reply.
             [reply] = {port.command(commands.Command(name, commands.SERVICE_CLIENT)) for port in self.ports}
             if name.endswith('/reset_faults') and reply.granted:
@@ -403,20 +417,20 @@ class UnitNode(shell.Shell):
             return response
         return serve
 
-    def reconfigure(self):
+    def reconfigure(self) -> None:
         """Pass the changed parameters to the units."""
         for port in self.ports:
             port.unit.configure(self.parameters)
 
-    def diagnosed(self):
+    def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of the unit; overridden by a node that runs several units."""
         return self.unit.diagnose()
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the Diagnosis of the node: a silent trigger comes first, with an error of the unit behind it. A
         refused input replaces the message of the unit, except an error."""
         diagnosis = self.diagnosed()
-        if self.unit.silent:
+        if self.unit.silent and self.steps:
             since = (time.monotonic_ns() - self._answered) * 1e-9
             text = (f'no {self.steps.trigger} so far' if self._answered == self._begun else
                     f'no {self.steps.trigger} for {since:.1f} s')
@@ -428,16 +442,16 @@ class UnitNode(shell.Shell):
         return diagnosis
 
 
-def decoding(decoder):
-    """Return decode(CDR bytes) -> (stamp [ns], result of the Decoder), for Shell.reader."""
+def decoding(decoder: records.Decoder) -> Callable[[bytes], tuple[Nanoseconds, records.Decoded]]:
+    """Return the function that decodes CDR bytes, for Shell.reader."""
     decoded = decoder.decoded
 
-    def decode(data):
+    def decode(data: bytes) -> tuple[Nanoseconds, records.Decoded]:
         message = decoded(data)
         return message[0], message
     return decode
 
 
-def main(module, args=None) -> int:
+def main(module: str, args: Sequence[str] | None = None) -> int:
     """Run the unit of a module and return the exit code."""
     return shell.main(lambda: UnitNode(module), args)

@@ -4,7 +4,7 @@ import contextlib
 import os
 
 
-def take(priority):
+def take(priority: int) -> str:
     """Set the scheduling policy SCHED_RR at a priority (1 to 99) for every thread of this process. Return '', or the
     reason why the system refuses.
 
@@ -15,5 +15,5 @@ def take(priority):
             with contextlib.suppress(ProcessLookupError):
                 os.sched_setscheduler(int(thread), os.SCHED_RR, os.sched_param(priority))
     except OSError as error:
-        return error.strerror
+        return error.strerror or str(error)
     return ''

@@ -16,8 +16,11 @@ motion that the topic commands stops. An unexpected publisher is a node that sho
 the table of nodes. The module uses neither ROS nor a clock.
 """
 import collections
+from collections.abc import Callable
+from typing import Generic, TypeVar
 
-from pedestal_common.realtime.streams import Streams
+from pedestal_common.quantities import Nanoseconds
+from pedestal_common.realtime.streams import Stream, Streams
 
 SILENCE_LIMIT_NS = 200_000_000
 """Silence of the active publisher after which another may become active, and time after which stamps that went back
@@ -37,12 +40,14 @@ DROP_UNDECODABLE, DROP_STALE, DROP_FUTURE, DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PU
 
 WARNING_DROP_REASONS = DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER  # reasons that need the attention of the operator
 
+_M = TypeVar('_M')      # what `decode` returns
 
-class PublisherGate:
+
+class PublisherGate(Generic[_M]):
     """Gate of one topic.
 
-    decode      decode(data) -> (stamp [ns], None of a topic without stamps; message); ValueError for invalid data
-    future      largest accepted lead of a stamp over this node's UTC [ns]
+    decode      decode(data) -> (stamp, None of a topic without stamps; message); ValueError for invalid data
+    future      largest accepted lead of a stamp over this node's UTC
     unexpected  unexpected() -> number of unexpected publishers in the graph, None where it is unknown. It is called
                 when a candidate may become active. The candidate may itself be an unexpected publisher. It becomes
                 active only if at least as many other streams overlapped as there are unexpected publishers: then the
@@ -50,59 +55,63 @@ class PublisherGate:
     paced       True if the messages come at a steady rate, by which publishers are distinguished. Otherwise every
                 message is dropped while the graph shows an unexpected publisher; the last accepted message stays
                 valid.
-    oldest      largest accepted time from sending to reception [ns]; None: any
-
-    dropped     {reason: count}
-    reason, detail, dropped_at    of the last dropped message: its reason, details as text, time of reception [ns]
-    after_gap   True if messages may be missing before the last accepted message, because the publisher changed or
-                the stamps went back
-    offset      smallest time from sending to reception since the publisher became active [ns]
+    oldest      largest accepted time from sending to reception; None: any
 
     Fields of a streams.Stream that this class uses: `overlapped`, `graph_check_time`, and growth(elapsed), the largest
-    growth of its numbers in a time [ns].
+    growth of its numbers in a time.
     """
 
-    def __init__(self, decode, future, unexpected=lambda: 0, paced=True, oldest=None):
-        self._decode, self._future, self._unexpected, self._paced = decode, future, unexpected, paced
+    def __init__(self, decode: Callable[[bytes], tuple[Nanoseconds | None, _M]], future: Nanoseconds,
+                 unexpected: Callable[[], int | None] | None = lambda: 0, paced: bool = True,
+                 oldest: Nanoseconds | None = None) -> None:
+        self._decode, self._future, self._paced = decode, future, paced
+        self._is_open = unexpected is None      # every publisher is accepted
+        self._unexpected: Callable[[], int | None] = unexpected or (lambda: 0)
         self._oldest = oldest
         self.streams = Streams()
-        self.active = None
-        self.dropped = collections.Counter()
-        self.reason = self.detail = ''
-        self.dropped_at = None
+        self.active: Stream | None = None
+        self.dropped: collections.Counter[str] = collections.Counter()      # {reason: count}
+        self.reason = self.detail = ''      # of the last dropped message
+        self.dropped_at: Nanoseconds | None = None      # its time of reception
+        # messages may be missing before the last accepted message: the publisher changed, or the stamps went back
         self.after_gap = False
-        self.offset = None
-        self._active_at = None  # time of the last message of the active publisher [ns]
-        self._stamp = None
-        self._back_since = self._back = None    # since when earlier stamps arrive [ns], and the newest of these
+        # smallest time from sending to reception since the publisher became active
+        self.offset: Nanoseconds | None = None
+        self._active_at: Nanoseconds | None = None      # time of the last message of the active publisher
+        self._stamp: Nanoseconds | None = None
+        self._back_since: Nanoseconds | None = None     # since when earlier stamps arrive
+        self._back: Nanoseconds | None = None           # the newest of these
 
-    def take(self, data, number, source, now, utc):
+    def take(self, data: bytes, number: int, source: Nanoseconds, now: Nanoseconds, utc: Nanoseconds) -> _M | None:
         """Return the decoded message, None for a dropped message.
 
-        data: CDR bytes; number: sequence number; source: time of sending [ns, UTC]; now, utc: time of reception [ns],
-        by the steady clock and in UTC.
+        data: CDR bytes; number: sequence number; source: time of sending, UTC; now, utc: time of reception, by
+        the steady clock and in UTC.
         """
         self.after_gap = False
         if not self._paced:
             if self._unexpected():
-                return self._drop(DROP_OTHER_PUBLISHER, '', now)
-        elif self._unexpected and not self._admit(self.streams.of(number, source, now), now):
+                self._drop(DROP_OTHER_PUBLISHER, '', now)
+                return None
+        elif not self._is_open and not self._admit(self.streams.of(number, source, now), now):
             return None
         if self._oldest is not None and utc - source > self._oldest:
-            return self._drop(DROP_STALE, f'{(utc - source) * 1e-9:.3f} s from sending to reception', now)
+            self._drop(DROP_STALE, f'{(utc - source) * 1e-9:.3f} s from sending to reception', now)
+            return None
         try:
             stamp, message = self._decode(data)
         except ValueError as error:
-            return self._drop(DROP_UNDECODABLE, str(error), now)
+            self._drop(DROP_UNDECODABLE, str(error), now)
+            return None
         if stamp is not None and not self._in_order(stamp, now, utc):
             return None
         self._note_offset(utc - source)
         return message
 
-    def _admit(self, stream, now):
+    def _admit(self, stream: Stream | None, now: Nanoseconds) -> bool:
         """Return True if a message is of the active publisher, else drop the message.
 
-        A publisher that may take over becomes active first. stream: Stream of the message, None if it is unclear.
+        A publisher that may take over becomes active first. stream: of the message, None if it is unclear.
         """
         if stream is not None and stream is self.active and self._may_be_another(stream, now):
             self.active = None
@@ -122,16 +131,17 @@ class PublisherGate:
             self._drop(DROP_OTHER_PUBLISHER, '', now)
         return False
 
-    def _may_be_another(self, stream, now):
+    def _may_be_another(self, stream: Stream, now: Nanoseconds) -> bool:
         """Return True if a message of the active stream may be of another publisher.
 
         The active publisher was silent, its numbers then jumped, and the graph shows an unexpected publisher that has
         no stream of its own. Because this node may have stalled, the message may be of that publisher.
         """
+        assert self._active_at is not None
         return (now - self._active_at >= SILENCE_LIMIT_NS and stream.skipped[1] == stream.last
                 and (self._unexpected() or 0) > sum(other.overlapped for other in self._other_active(stream, now)))
 
-    def _may_take_over(self, stream, now):
+    def _may_take_over(self, stream: Stream, now: Nanoseconds) -> bool:
         """Return True if an inactive publisher becomes active now."""
         active = self.active
         silent = SILENCE_LIMIT_NS if active is None else now - active.arrival
@@ -152,12 +162,12 @@ class PublisherGate:
         stream.overlapped = stream.overlapped and not free
         return free
 
-    def _other_active(self, stream, now):
-        """Return the streams except `stream` that had a message within SILENCE_LIMIT_NS before now [ns]."""
+    def _other_active(self, stream: Stream, now: Nanoseconds) -> list[Stream]:
+        """Return the streams except `stream` that had a message within SILENCE_LIMIT_NS before now."""
         return [other for other in self.streams.streams
                 if other is not stream and now - other.arrival < SILENCE_LIMIT_NS]
 
-    def _in_order(self, stamp, now, utc):
+    def _in_order(self, stamp: Nanoseconds, now: Nanoseconds, utc: Nanoseconds) -> bool:
         """Return True if a stamp is later than the last one and not ahead of the time. A stamp that goes back is
         accepted once such stamps have arrived for SILENCE_LIMIT_NS."""
         if stamp > utc + self._future:
@@ -166,7 +176,7 @@ class PublisherGate:
         if self._stamp is None or stamp > self._stamp:
             self._stamp, self._back_since = stamp, None
             return True
-        if self._back_since is None or stamp <= self._back:
+        if self._back_since is None or self._back is None or stamp <= self._back:
             self._back_since = now
         self._back = stamp
         if now - self._back_since >= SILENCE_LIMIT_NS:
@@ -175,10 +185,10 @@ class PublisherGate:
         self._drop(DROP_STALE, f'{(self._stamp - stamp) * 1e-9:.3f} s older than the last', now)
         return False
 
-    def _note_offset(self, offset):
+    def _note_offset(self, offset: Nanoseconds) -> None:
         self.offset = offset if self.offset is None else min(self.offset, offset)
 
-    def _drop(self, reason, detail, now):
-        """Count a dropped message, and note its reason and time. Return None, the result of `take`."""
+    def _drop(self, reason: str, detail: str, now: Nanoseconds) -> None:
+        """Count a dropped message, and note its reason and time."""
         self.dropped[reason] += 1
         self.reason, self.detail, self.dropped_at = reason, detail, now

@@ -6,6 +6,9 @@ streams are unclear if a message could continue both. Once their numbers have mo
 their pace, the time per number, if the paces differ. Otherwise both stay unclear until only one of them is active.
 """
 import collections
+from collections.abc import Iterable, Sequence
+
+from pedestal_common.quantities import Nanoseconds
 
 DEFAULT_INTERVAL_NS = 5_000_000  # assumed time between two messages of a stream with only one message [ns]
 NUMBER_SLACK = 4  # numbers by which a stream may grow in addition to its backlog and to twice the numbers of its pace
@@ -40,46 +43,40 @@ EXPIRY_LIMIT_NS = 30_000_000_000  # silence after which a stream is deleted [ns]
 
 
 class Stream:
-    """Messages of one publisher.
-
-    last      sequence number of the last message; source: its time of sending, arrival: its time of arrival [ns]
-    begun     time of arrival of the first message [ns]
-    interval  mean time between two messages [ns]
-    owed      backlog: messages by which the stream is behind its pace
-    lost      count of numbers without a message; skipped: numbers (before, after) the last gap
-    unclear   True if the stream cannot be distinguished from another
-
-    A PublisherGate adds:
-
-    overlapped         True if the stream was active together with the active publisher, or may be of a different node
-    graph_check_time   time of the last check of the graph for other publishers [ns]
-    """
+    """Messages of one publisher."""
     __slots__ = ('_messages', 'arrival', 'begun', 'graph_check_time', 'interval', 'last', 'lost', 'overlapped', 'owed',
                  'skipped', 'source', 'unclear')
 
-    def __init__(self, number, source, now):
+    def __init__(self, number: int, source: Nanoseconds, now: Nanoseconds) -> None:
         self._messages = collections.deque([(number, source)], PACE_WINDOW_MESSAGES)
-        self.begun = now
-        self.last, self.source, self.arrival = number, source, now
-        self.interval = self.graph_check_time = None
-        self.lost, self.owed, self.skipped = 0, 0.0, (0, 0)
-        self.overlapped = self.unclear = False
+        self.begun = now                        # time of arrival of the first message
+        self.last = number                      # sequence number of the last message
+        self.source, self.arrival = source, now     # its time of sending and of arrival
+        self.interval: float | None = None      # mean time between two messages [ns]
+        self.lost = 0                           # count of numbers without a message
+        self.owed = 0.0                         # backlog: messages by which the stream is behind its pace
+        self.skipped = (0, 0)                   # numbers before and after the last gap
+        self.unclear = False                    # the stream cannot be distinguished from another
+        # of a PublisherGate: the stream was active together with the active publisher, or may be of a different node
+        self.overlapped = False
+        # of a PublisherGate: time of the last check of the graph for other publishers
+        self.graph_check_time: Nanoseconds | None = None
 
-    def fits(self, number, source):
+    def fits(self, number: int, source: Nanoseconds) -> bool:
         """Return True if a message can be of this stream."""
         gap = number - self.last
         return gap == 1 or 0 < gap <= self.growth(source - self.source) + self.owed
 
-    def growth(self, elapsed):
-        """Return the largest growth of its numbers in a time [ns]."""
+    def growth(self, elapsed: Nanoseconds) -> float:
+        """Return the largest growth of its numbers in a time."""
         return NUMBER_SLACK + 2.0 * elapsed / (self.interval or DEFAULT_INTERVAL_NS)
 
-    def near(self, other):
+    def near(self, other: 'Stream') -> bool:
         """Return True if the next message of one of the two streams could also be of the other."""
         behind, ahead = (self, other) if self.last < other.last else (other, self)
         return ahead.last - behind.last <= CLOSE_NUMBER_GAP or behind.fits(ahead.last, ahead.source)
 
-    def follow(self, number, source, now):
+    def follow(self, number: int, source: Nanoseconds, now: Nanoseconds) -> int:
         """Add a message to this stream, and return the number of messages that are missing before it."""
         gap, elapsed = number - self.last, source - self.source
         if elapsed > 0:
@@ -97,7 +94,7 @@ class Stream:
         self.lost += gap - 1
         return gap - 1
 
-    def pace(self):
+    def pace(self) -> float | None:
         """Return the time per number [ns], None for a stream with too few messages."""
         messages = list(self._messages)
         if len(messages) < 3 * PACE_STRIDE_MESSAGES:
@@ -107,7 +104,7 @@ class Stream:
                        for (earlier, earlier_source), (number, source) in pairs)
         return paces[len(paces) // 2]
 
-    def revive(self, stream):
+    def revive(self, stream: 'Stream') -> None:
         """Take over the messages of `stream`, which turned out to be of the publisher of this stream."""
         self._messages = stream._messages
         self.last, self.source, self.arrival = stream.last, stream.source, stream.arrival
@@ -115,18 +112,18 @@ class Stream:
 
 
 class Streams:
-    """Streams of one topic. lost: count of missing messages in all streams."""
+    """Streams of one topic."""
 
-    def __init__(self):
-        self.streams = []
-        self.lost = 0
-        self._close = ()                # unclear streams; later messages belong to new, unclear streams
+    def __init__(self) -> None:
+        self.streams: list[Stream] = []
+        self.lost = 0                   # count of missing messages in all streams
+        self._close: tuple[Stream, ...] = ()    # unclear streams; later messages belong to new, unclear streams
         self._parted = 0, -EXPIRY_LIMIT_NS    # (lowest number, time [ns]) of the last unclear streams
         self._previous = -ACTIVE_LIMIT_NS
 
-    def of(self, number, source, now):
-        """Return the Stream of a message, a new one where it continues none; None where it may be of several. number:
-        its sequence number; source: time of sending, now: time of arrival [ns]."""
+    def of(self, number: int, source: Nanoseconds, now: Nanoseconds) -> Stream | None:
+        """Return the stream of a message, a new one where it continues none; None where it may be of several. number:
+        its sequence number; source: time of sending, now: time of arrival."""
         previous, self._previous = self._previous, now
         recent = [stream for stream in self.streams if previous - stream.arrival < RECENT_LIMIT_NS]
         active = [stream for stream in recent if previous - stream.arrival < ACTIVE_LIMIT_NS]
@@ -149,17 +146,17 @@ class Streams:
             self._resolve_unclear(now)
         return None if stream.unclear else stream
 
-    def several(self, now):
-        """Return True if more than one of the streams is active at the time now [ns]."""
+    def several(self, now: Nanoseconds) -> bool:
+        """Return True if more than one of the streams is active now."""
         return sum(now - stream.arrival < ACTIVE_LIMIT_NS for stream in self.streams) > 1
 
-    def _silent(self, number, source):
+    def _silent(self, number: int, source: Nanoseconds) -> list[Stream]:
         """Return [the stream with the latest message] among all streams that the message can continue; [] without
         one."""
         return sorted((stream for stream in self.streams if stream.fits(number, source)),
                       key=lambda stream: stream.arrival)[-1:]
 
-    def _begun(self, number, source, now):
+    def _begun(self, number: int, source: Nanoseconds, now: Nanoseconds) -> Stream:
         """Add a new stream and return it. It is `overlapped` if its numbers may have been those of unclear streams."""
         self.streams = [other for other in self.streams if now - other.arrival < EXPIRY_LIMIT_NS]
         stream = Stream(number, source, now)
@@ -169,14 +166,14 @@ class Streams:
         self.streams.append(stream)
         return stream
 
-    def _mark_unclear(self, latest, streams, now):
+    def _mark_unclear(self, latest: Stream, streams: Sequence[Stream], now: Nanoseconds) -> Stream:
         """Mark these streams as unclear, and begin a new stream with the last message."""
         self._close += tuple(stream for stream in streams if not stream.unclear)
         self._parted = min(stream.last for stream in streams), now
         self.streams = [stream for stream in self.streams if stream is not latest and stream not in streams]
         return self._begun(latest.last, latest.source, now)
 
-    def _resolve_unclear(self, now):
+    def _resolve_unclear(self, now: Nanoseconds) -> None:
         """Identify unclear streams, once two have moved apart and are known by their pace, or one of them has left."""
         for stream in self._close:
             stream.arrival = now
@@ -192,7 +189,7 @@ class Streams:
                     stream.revive(found)
                 self._cleared([stream for _, stream in before])
 
-    def _cleared(self, streams):
+    def _cleared(self, streams: list[Stream]) -> None:
         """Keep these streams as identified, and delete the other unclear streams."""
         self.streams = [stream for stream in self.streams if not stream.unclear] + streams
         self._close = ()
@@ -200,16 +197,16 @@ class Streams:
             stream.unclear = False
 
 
-def _by_pace(pair):
+def _by_pace(pair: Iterable[Stream]) -> list[tuple[float, Stream]]:
     """Return [(pace, stream)] of two streams, the faster first; [] where the paces do not differ."""
-    paced = [(stream.pace(), stream) for stream in pair]
-    if any(pace is None for pace, _ in paced):
+    paced = [(pace, stream) for stream in pair if (pace := stream.pace()) is not None]
+    if len(paced) < 2:
         return []
     paced.sort(key=lambda one: one[0])
     (fast, _), (slow, _) = paced
     return paced if fast < MAX_PACE_RATIO * slow else []
 
 
-def _same_pace(was, pace):
+def _same_pace(was: float, pace: float) -> bool:
     """Return True if a pace [ns] equals the earlier one within MAX_PACE_RATIO."""
     return MAX_PACE_RATIO < min(was, pace)**2 / max(was, pace)**2

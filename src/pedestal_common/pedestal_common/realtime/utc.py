@@ -10,6 +10,8 @@ A change beyond MIN_CLOCK_STEP_NS is a step of the system's clock and is reporte
 set to the system's clock. After a step back, t runs slower than the system's clock, because otherwise a stamp would
 occur twice. Meanwhile t is ahead of the time of nodes that start later, by `ahead`; a restart of this node ends this.
 """
+from pedestal_common.quantities import Nanoseconds
+
 MAX_SLEW_RATE = 500e-6  # largest rate of change of the offset, equal to that of adjtime(3) [s/s]
 
 MIN_CLOCK_STEP_NS = 10_000_000
@@ -18,19 +20,16 @@ MAX_SLEW_RATE this change takes 20 s."""
 
 
 class Utc:
-    """UTC that never goes back. steady, system: the first pair of readings of the two clocks [ns].
+    """UTC that never goes back. steady, system: the first pair of readings of the two clocks."""
 
-    steps: number of steps of the system's clock; last_step: size of the last step [ns, forward is positive]; ahead:
-    lead of this time over the system's clock [ns]
-    """
-
-    def __init__(self, steady, system):
+    def __init__(self, steady: Nanoseconds, system: Nanoseconds) -> None:
         self._offset = self._system_offset = system - steady
         self._steady = steady
-        self.steps = self.last_step = 0
+        self.steps = 0          # number of steps of the system's clock
+        self.last_step = 0      # size of the last step [ns], forward is positive
 
-    def at(self, steady, system) -> int:
-        """Return UTC [ns] at a pair of readings. If the steady clock went back, the last time is returned again."""
+    def at(self, steady: Nanoseconds, system: Nanoseconds) -> Nanoseconds:
+        """Return UTC at a pair of readings. If the steady clock went back, the last time is returned again."""
         elapsed = max(steady - self._steady, 0)
         self._steady += elapsed
         jump = system - steady - self._system_offset
@@ -45,6 +44,6 @@ class Utc:
         return self._steady + self._offset
 
     @property
-    def ahead(self):
-        """Lead of this time over the system's clock [ns]."""
+    def ahead(self) -> Nanoseconds:
+        """Lead of this time over the system's clock."""
         return self._offset - self._system_offset

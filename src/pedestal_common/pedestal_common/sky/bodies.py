@@ -2,8 +2,9 @@
 import numpy as np
 
 from pedestal_common.geometry import orbit
-from pedestal_common.geometry.geodesy import station_frame
+from pedestal_common.geometry.geodesy import StationParameters, station_frame
 from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.quantities import Floats, Rotations, Vectors3
 from pedestal_common.reproducible import turned
 from pedestal_common.sky import ecliptic, moon, sun
 
@@ -14,8 +15,8 @@ NODE_INTERVAL_S = 1800.0
 """Time between two computed positions [s]. Between them a body moves on a straight line, the sun within 1e-6 deg."""
 
 
-def seen(body, station, julian, fractions, to_fixed):
-    """Return the vectors (n, 3) [m], ENU of a station, in which a body of POSITIONS is seen without refraction.
+def seen(body: str, station: StationParameters, julian: float, fractions: Floats, to_fixed: Rotations) -> Vectors3:
+    """Return the vectors [m], ENU of a station, in which a body of POSITIONS is seen without refraction.
 
     julian, fractions, to_fixed: the Julian dates julian + fractions (n,) in UTC, and orbit.earth_fixed at these times.
     """

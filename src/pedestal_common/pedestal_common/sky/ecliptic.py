@@ -12,6 +12,7 @@ import numpy as np
 
 from pedestal_common.geometry.earth_orientation import ARCSECOND_RAD
 from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.quantities import Floats, Vectors3
 from pedestal_common.reproducible import cos, sin
 
 J2000 = 2451545.0  # julian date of the epoch J2000 [d]
@@ -29,12 +30,12 @@ NUTATION_TERMS = (
 longitude and of the cosine in obliquity [arcsec]."""
 
 
-def centuries(n):
+def centuries(n: Floats) -> Floats:
     """Return the centuries of TT since J2000 (m,) at days n (m,) of UTC since J2000."""
     return (n + TT_MINUS_UTC_S / SECONDS_PER_DAY) / 36525.0
 
 
-def _arguments(t):
+def _arguments(t: Floats) -> Floats:
     """Return the arguments of the nutation (m, 5) [rad] at centuries t (m,).
 
     The arguments are the elongation of the moon, the anomalies of sun and moon, the argument of the latitude of the
@@ -46,7 +47,7 @@ def _arguments(t):
         125.04452 - 1934.136261 * t + 0.0020708 * t * t)))
 
 
-def to_teme(t, longitude, latitude, distance):
+def to_teme(t: Floats, longitude: Floats, latitude: Floats, distance: Floats) -> Vectors3:
     """Return positions (m, 3) in TEME, in the unit of distance (m,).
 
     t: centuries (m,) of TT since J2000; longitude, latitude: of the ecliptic and the mean equinox of date (m,) [rad],

@@ -8,8 +8,11 @@ From 1995 to 2050 the direction is within 0.007 deg of the ephemeris DE421.
 
 Meeus, Astronomical Algorithms, chapter 47.
 """
+from collections.abc import Sequence
+
 import numpy as np
 
+from pedestal_common.quantities import Floats, Vectors3
 from pedestal_common.reproducible import cos, sin
 from pedestal_common.sky import ecliptic
 
@@ -55,7 +58,7 @@ LATITUDE_TERMS = (
 """Terms of the latitude: factors of D, M, M_moon, F; amplitude of the sine [1e-6 deg]."""
 
 
-def position(n):
+def position(n: Floats) -> Vectors3:
     """Return the apparent geocentric positions (m, 3) of the moon [m] at days n (m,) of UTC since J2000.
 
     The frame is TEME, that of orbit.earth_fixed: the true equator and the mean equinox of date.
@@ -65,7 +68,7 @@ def position(n):
                             for start, rate, square, cubic in MEAN_ARGUMENTS])
     *_, M_moon, F, L = arguments
     E = 1.0 - (0.002516 + 0.0000074 * t) * t
-    longitude = distance = latitude = 0.0
+    longitude = distance = latitude = np.zeros(len(t))
     for *factors, of_longitude, of_distance in LONGITUDE_DISTANCE_TERMS:
         angle, share = _angle(factors, arguments), E**abs(factors[1])
         longitude = longitude + of_longitude * share * sin(angle)
@@ -82,6 +85,6 @@ def position(n):
                             MEAN_DISTANCE_M + distance)
 
 
-def _angle(factors, arguments):
+def _angle(factors: Sequence[float], arguments: Floats) -> Floats:
     """Return the angle (m,) [rad] of a term; arguments: (5, m), of which the last is not used."""
     return np.einsum('i,im->m', np.array(factors, float), arguments[:4])

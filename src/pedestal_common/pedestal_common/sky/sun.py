@@ -8,9 +8,12 @@ to 2050 the direction is within 1e-4 deg of the ephemeris DE421.
 
 Meeus, Astronomical Algorithms, chapters 25 and 32.
 """
+from collections.abc import Sequence
+
 import numpy as np
 
 from pedestal_common.geometry.earth_orientation import ARCSECOND_RAD
+from pedestal_common.quantities import Floats, Vectors3
 from pedestal_common.reproducible import cos
 from pedestal_common.sky import ecliptic
 from pedestal_common.sky.sun_series import DISTANCE_TERMS, LATITUDE_TERMS, LONGITUDE_TERMS
@@ -23,7 +26,7 @@ FK5_LONGITUDE_RAD = -0.09033 * ARCSECOND_RAD
 ABERRATION_RAD = 20.4955 * ARCSECOND_RAD  # aberration of the sun at a distance of 1 AU [rad]
 
 
-def _sum(rows, t):
+def _sum(rows: Sequence[tuple[int, float, float, float]], t: Floats) -> Floats:
     """Return the sum (m,) of the rows of a series at centuries t (m,)."""
     millennia = 0.1 * t
     coefficients = [np.zeros(len(t)) for _ in range(1 + max(k for k, *_ in rows))]
@@ -35,7 +38,7 @@ def _sum(rows, t):
     return total
 
 
-def position(n):
+def position(n: Floats) -> Vectors3:
     """Return the apparent geocentric positions (m, 3) of the sun [m] at days n (m,) of UTC since J2000.
 
     The frame is TEME, that of orbit.earth_fixed: the true equator and the mean equinox of date.

@@ -8,6 +8,7 @@ is no candidate, the error names a column that begins with the quantity and has 
 import math
 import re
 import typing
+from collections.abc import Iterable, Mapping, Sequence
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 
@@ -16,7 +17,7 @@ METRES_PER_FOOT = 0.3048  # length of the international foot [m]
 UTC, JULIAN_DATE, MODIFIED_JULIAN_DATE = 'UTC', 'JD', 'MJD'
 """Units of a time with a date: a calendar date (or seconds since 1970), a Julian date, a modified Julian date."""
 
-_UNIT_NAMES = {
+_UNIT_NAMES: dict[str, dict[str, tuple[str, ...]]] = {
     # {unit of the reader, in lower case: {unit: its names in a file}}
     's': {'s': ('s', 'sec', 'secs', 'second', 'seconds'),
           'ms': ('ms', 'msec', 'millis', 'millisecond', 'milliseconds'),
@@ -56,37 +57,31 @@ class ColumnError(ValueError):
 
 
 class Quantity(typing.NamedTuple):
-    """A quantity of a table.
-
-        label       its name in errors
-        names       {name of the quantity in a file: unit that is assumed if the column states none}; '': the column
-                    must state its unit
-        unit        unit in which the reader takes the values
-    """
-    label: str
-    names: dict
-    unit: str
+    """A quantity of a table."""
+    label: str      # its name in errors
+    # {name of the quantity in a file: unit that is assumed if the column states none}; '': the column must state it
+    names: Mapping[str, str]
+    unit: str       # unit in which the reader takes the values
 
 
 class Column(typing.NamedTuple):
-    """A column that was found: its name in the file, and the unit of its values. size: factor from this unit to
-    the unit of the Quantity."""
-    name: str
-    unit: str
-    size: float
+    """A column that was found."""
+    name: str       # in the file
+    unit: str       # of its values
+    size: float     # factor from this unit to the unit of the Quantity
 
-    def described(self):
+    def described(self) -> str:
         """Return the name with the unit."""
         return f'{self.name[:40]} in {self.unit}'
 
 
-def quantity(name):
+def quantity(name: str) -> Quantity:
     """Return the Quantity of a name with a unit, as in time_s; a column must name its unit."""
     word, _, unit = name.partition('_')
     return Quantity(name, {word: ''}, unit)
 
 
-def find(names, wanted, required=True):
+def find(names: Iterable[str], wanted: Quantity, required: bool = True) -> Column | None:
     """Return the Column of a Quantity among the names of a table; None if no name begins with the quantity.
 
     Raises ColumnError for two candidates. Also raises ColumnError if names begin with the quantity, but none has a
@@ -97,7 +92,7 @@ def find(names, wanted, required=True):
         unit = unit_of(name, wanted)
         if unit:
             found.append(Column(name, unit, _UNIT_SIZES[unit]))
-        elif unit == '' and (required or not _known(name, wanted)[1].startswith(_DERIVED_WORDS)):
+        elif unit == '' and (required or not _rest(name, wanted).startswith(_DERIVED_WORDS)):
             others.append(name)
     if len(found) > 1:
         raise ColumnError(f'columns {found[0].name!r:.60} and {found[1].name!r:.60}: only one of them may be '
@@ -109,28 +104,28 @@ def find(names, wanted, required=True):
     return found[0] if found else None
 
 
-def is_time(unit):
+def is_time(unit: str) -> bool:
     """Return True for a unit of time, with or without a date."""
     return unit == UTC or unit in _UNIT_NAMES['s']
 
 
-def named(names, wanted):
+def named(names: Iterable[str], wanted: Quantity) -> bool:
     """Return True if one of the names of a table begins with the quantity, whatever follows."""
     return any(unit_of(name, wanted) is not None for name in names)
 
 
-def names_unit(name, wanted):
+def names_unit(name: str, wanted: Quantity) -> bool:
     """Return True if the name of a column of a Quantity states a unit."""
-    return bool(_known(name, wanted)[1])
+    return bool(_rest(name, wanted))
 
 
-def listed(names):
+def listed(names: Sequence[str]) -> str:
     """Return the names of the columns of a table as a text for an error."""
     more = f' and {len(names) - MAX_LISTED_NAMES} more' if len(names) > MAX_LISTED_NAMES else ''
     return f'columns found: {", ".join(f"{name[:40]!r}" for name in names[:MAX_LISTED_NAMES]) or "none"}{more}'
 
 
-def _known(name, wanted):
+def _known(name: str, wanted: Quantity) -> tuple[str, str] | None:
     """Return (name of the quantity, rest without blanks and brackets) of a column's name; None if the name does not
     begin with the quantity."""
     for spaced in (name, _CAMEL_CASE_PATTERN.sub(' ', name)):
@@ -141,7 +136,14 @@ def _known(name, wanted):
     return None
 
 
-def unit_of(name, wanted):
+def _rest(name: str, wanted: Quantity) -> str:
+    """Return the rest of a name that begins with the quantity, see `_known`."""
+    match = _known(name, wanted)
+    assert match
+    return match[1]
+
+
+def unit_of(name: str, wanted: Quantity) -> str | None:
     """Return the unit of a column; '' if the words behind the quantity are no known unit; None if the name does not
     begin with the quantity."""
     match = _known(name, wanted)

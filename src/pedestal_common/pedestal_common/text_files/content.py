@@ -1,5 +1,6 @@
 """Recognition of the content of a file by its first bytes: the encoding of a text, or a format that is no text."""
 import codecs
+from typing import BinaryIO
 from xml.parsers import expat
 
 ENCODINGS_BY_MARK = ((codecs.BOM_UTF8, 'utf-8-sig'), (codecs.BOM_UTF32_LE, 'utf-32'), (codecs.BOM_UTF32_BE, 'utf-32'),
@@ -25,29 +26,29 @@ PACKED_FORMATS = (
 MAX_MARK_BYTES = 6  # largest number of bytes that name a format
 
 
-def packed(beginning):
+def packed(beginning: bytes) -> str:
     """Return the name and the remedy of a packed file by its first bytes; '' for another file."""
     return next((name for mark, name in PACKED_FORMATS if beginning.startswith(mark)), '')
 
 
-def marked_encoding(beginning):
+def marked_encoding(beginning: bytes) -> str:
     """Return the encoding that the byte order mark of a file names; '' without a mark."""
     return next((encoding for mark, encoding in ENCODINGS_BY_MARK if beginning.startswith(mark)), '')
 
 
-def xml_parser(stream):
+def xml_parser(stream: BinaryIO) -> expat.XMLParserType:
     """Return an expat parser for a seekable stream, in the encoding of the byte order mark or of the declaration."""
     marked = marked_encoding(stream.read(MAX_MARK_BYTES))
     stream.seek(0)
     return expat.ParserCreate({'utf-8-sig': 'UTF-8', 'utf-16': 'UTF-16'}.get(marked))
 
 
-def beginning(content):
+def beginning(content: bytes) -> str:
     """Return the text of the first bytes of a file; bytes that are no text become replacement characters."""
     return content.decode(marked_encoding(content) or 'utf-8', 'replace')
 
 
-def decode(content):
+def decode(content: bytes) -> str:
     """Return the text of the bytes of a file. Raises UnicodeDecodeError.
 
     The encoding is that of the byte order mark. Without a mark it is UTF-8, or FALLBACK_ENCODING if the bytes are not

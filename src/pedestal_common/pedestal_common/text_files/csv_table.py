@@ -12,11 +12,15 @@ import itertools
 import pathlib
 import re
 import typing
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import BinaryIO, Literal, TextIO, overload
 
 import numpy as np
 
+from pedestal_common.quantities import Floats
 from pedestal_common.text_files import columns as _columns
 from pedestal_common.text_files import content, files
+from pedestal_common.text_files.files import FilePath
 
 MAX_CSV_BYTES = 64_000_000  # largest size of a file [bytes]
 MAX_CSV_ROWS = 1_000_000  # largest number of rows of a file
@@ -45,12 +49,13 @@ class TableError(ValueError):
 
 
 class Rows(typing.NamedTuple):
-    """Rows of a table: numbers (n, k), and a line of text that names the columns taken and the number of rows."""
-    numbers: np.ndarray
-    description: str
+    """Rows of a table."""
+    numbers: Floats     # (n, k)
+    description: str    # line of text that names the columns taken and the number of rows
 
 
-def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest step', optional=None) -> Rows:
+def read(path: FilePath, columns: Mapping[str, tuple[float, float]], least_rows: int = 2, max_step: float = np.inf,
+         step_name: str = 'its greatest step', optional: Mapping[str, tuple[float, float]] | None = None) -> Rows:
     """Return the Rows of a CSV file with a header. Raises TableError.
 
     columns, optional: {name: (low, high)}; the numbers (n, k) have the columns in this order. An optional column that
@@ -87,7 +92,7 @@ def read(path, columns, least_rows=2, max_step=np.inf, step_name='its greatest s
 
 
 @contextlib.contextmanager
-def stream(path):
+def stream(path: FilePath) -> Iterator[BinaryIO]:
     """Yield the bytes of a file of at most MAX_CSV_BYTES, as a context. Raises TableError for a file that cannot be
     read, and for a packed file."""
     try:
@@ -101,7 +106,7 @@ def stream(path):
         raise TableError(f'{path}: {error.strerror}') from None
 
 
-def text(path):
+def text(path: FilePath) -> str:
     """Return the text of a file, see `content.decode`. Raises TableError."""
     with stream(path) as file:
         read_bytes = file.read(MAX_CSV_BYTES)
@@ -118,7 +123,7 @@ READ_ERRORS = (TableError, csv.Error)  # errors that mean that a text is no tabl
 
 
 @contextlib.contextmanager
-def opened(path, bare=()):
+def opened(path: FilePath, bare: Sequence[str] = ()) -> Iterator['Table']:
     """Yield the Table of a file, as a context, see `text` and `Table`. Raises TableError."""
     try:
         yield Table(path, text(path), bare)
@@ -129,26 +134,26 @@ def opened(path, bare=()):
 class Table:
     """The rows of a CSV text as dictionaries {name of the column: cell}, without the blanks around a cell.
 
-        fieldnames      names of the columns, without the blanks around them
-        head_line       line of the names in the file
-        line_num        line of the last row
-        bare            names of the columns for a text without names: its first line is a row with as many cells
+    bare: names of the columns for a text without names: its first line is a row with as many cells.
     """
 
-    def __init__(self, path, content, bare=()):
+    def __init__(self, path: FilePath, content: str, bare: Sequence[str] = ()) -> None:
         self.path = path
         lines = io.StringIO(content, newline='')
         before, begin, separator = _beginning(lines)
-        self.line_num = self.head_line = len(before) + 1
+        self.head_line = len(before) + 1    # line of the names in the file
+        self.line_num = self.head_line      # line of the last row
         sample = ''.join([begin, *itertools.islice(lines, SNIFFED_LINES)])
         lines.seek(sum(map(len, before)))
         self.separator = separator or _separator(begin, sample)
         self._rows = csv.reader(lines, delimiter=self.separator, skipinitialspace=True)
-        # _passed: lines before the table; _decimal: {decimal sign: first cell with it}; _again: a first line that is a
-        # row and not names, which the iteration yields again.
-        self._passed, self._decimal, self._again = len(before), {}, None
+        self._passed = len(before)      # lines before the table
+        # {decimal sign: line, column and text of its first cell}
+        self._decimal: dict[str, tuple[int, str, str]] = {}
+        # a first line that is a row and not names, which the iteration yields again
+        self._again: list[str] | None = None
         first = self._cells() or []
-        self.fieldnames = tuple(first)
+        self.fieldnames = tuple(first)      # names of the columns, without the blanks around them
         if _is_row(first):
             names = _names_above(before, self.separator, bare) if before else []
             if len(names) == len(first) and not _is_row(names):
@@ -156,7 +161,7 @@ class Table:
             elif len(bare) == len(first):
                 self.fieldnames, self._again = tuple(bare), first
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[dict[str, str | None]]:
         count = len(self.fieldnames)
         while (cells := self._again or self._cells()) is not None:
             self._again = None
@@ -165,7 +170,7 @@ class Table:
                                  f'{self.head_line} (separator {self.separator!r})')
             yield dict(itertools.zip_longest(self.fieldnames, cells[:count]))
 
-    def _cells(self):
+    def _cells(self) -> list[str] | None:
         """Return the cells of the next row that is not blank, None at the end of the table."""
         for cells in self._rows:
             self.line_num = self._passed + self._rows.line_num
@@ -177,9 +182,15 @@ class Table:
                 return [cell.strip() for cell in cells]
         return None
 
-    def column(self, quantity, required=True, without=''):
-        """Return the columns.Column of a columns.Quantity. None if there is none and it is not required. Raises
-        TableError.
+    @overload
+    def column(self, quantity: _columns.Quantity, required: Literal[True] = True,
+               without: str = '') -> _columns.Column: ...
+
+    @overload
+    def column(self, quantity: _columns.Quantity, required: bool, without: str = '') -> _columns.Column | None: ...
+
+    def column(self, quantity: _columns.Quantity, required: bool = True, without: str = '') -> _columns.Column | None:
+        """Return the column of a quantity; None if there is none and it is not required. Raises TableError.
 
         without: name of a column that is not considered, '' for none.
         """
@@ -191,7 +202,7 @@ class Table:
             raise self.missing(quantity.label)
         return column
 
-    def missing(self, name):
+    def missing(self, name: str) -> TableError:
         """Return the TableError of a column that is not in the table."""
         dates = next(filter(_DATE_NAME_PATTERN.match, self.fieldnames), '') if name == 'time_s' else ''
         remedy = (f': write the seconds since the first row in it, because {dates!r:.60} may hold dates' if dates
@@ -199,11 +210,11 @@ class Table:
         return TableError(f'{self.path}: line {self.head_line}: column {name!r} is missing{remedy}; '
                           f'{self._listed()}')
 
-    def _listed(self):
+    def _listed(self) -> str:
         return f'{_columns.listed(self.fieldnames)} (separator {self.separator!r})'
 
-    def number(self, column, cell, low, high):
-        """Return the number in a cell of a columns.Column, in the unit of its quantity. Raises TableError.
+    def number(self, column: _columns.Column, cell: str | None, low: float, high: float) -> float:
+        """Return the number in a cell of a column, in the unit of its quantity. Raises TableError.
 
         cell: None if the row ends before the column; low, high: allowed range, in the unit of the quantity.
         """
@@ -216,7 +227,7 @@ class Table:
         return column.size * number(self.path, self.line_num, column.name, self.point(column.name, cell),
                                     low / column.size, high / column.size)
 
-    def point(self, name, cell):
+    def point(self, name: str, cell: str) -> str:
         """Return a cell with a decimal point instead of a decimal comma. Raises TableError if the table has both."""
         if self.separator == ',' or not cell:
             return cell
@@ -230,7 +241,7 @@ class Table:
         return cell.replace(',', '.') if _DECIMAL_COMMA_PATTERN.fullmatch(cell) else cell
 
 
-def _beginning(lines):
+def _beginning(lines: TextIO) -> tuple[list[str], str, str]:
     """Return (lines before the names of the columns, line of the names, separator that the file states or '').
 
     lines: stream of the text, which is left behind the line of the names.
@@ -256,7 +267,7 @@ def _beginning(lines):
     return before, '', separator
 
 
-def _names_above(before, separator, bare):
+def _names_above(before: Sequence[str], separator: str, bare: Iterable[str]) -> list[str]:
     """Return the cells of the last line with text before the first row, which may be names in a comment.
 
     Names that are separated by blanks count if one of them begins like one of `bare` (see Table).
@@ -267,14 +278,14 @@ def _names_above(before, separator, bare):
     return words if named and len(cells) < 2 else cells
 
 
-def _is_title(line, after):
+def _is_title(line: str, after: Iterable[str]) -> bool:
     """Return True if a line has no separator of cells and the next line with text has one."""
     following = next((text.strip() for text in after if text.strip()), '')
     separators = set(''.join(SEPARATORS))
     return separators.isdisjoint(line) and not separators.isdisjoint(following)
 
 
-def _separator(begin, sample):
+def _separator(begin: str, sample: str) -> str:
     """Return the separator of the cells by the first line of a table and a sample of its lines."""
     for separators in SEPARATORS:
         there = ''.join(separator for separator in separators if separator in begin)
@@ -284,26 +295,26 @@ def _separator(begin, sample):
     return next((separator for separator in DEFAULT_SEPARATORS if separator in begin.strip()), DEFAULT_SEPARATORS[0])
 
 
-def _is_row(cells):
+def _is_row(cells: Sequence[str]) -> bool:
     """Return True if cells are a row and no names: the first cell begins with a digit, and another is a number."""
     return bool(cells) and bool(_DIGIT_FIRST_PATTERN.match(cells[0])) and any(map(_is_number, cells[1:]))
 
 
-def _is_number(cell):
+def _is_number(cell: str) -> bool:
     with contextlib.suppress(ValueError):
         float(cell.replace(',', '.'))
         return True
     return False
 
 
-def require(table, names):
-    """Raise TableError where a Table lacks one of these columns."""
+def require(table: Table, names: Iterable[str]) -> None:
+    """Raise TableError where a table lacks one of these columns."""
     for name in names:
         if name not in table.fieldnames:
             raise table.missing(name)
 
 
-def number(path, line, name, cell, low, high):
+def number(path: FilePath, line: int, name: str, cell: object, low: float, high: float) -> float:
     """Return the number in a cell of text, between low and high. Raises TableError."""
     try:
         value = float(str(cell).replace('_', ' '))  # float() alone would accept _ between digits
@@ -314,12 +325,13 @@ def number(path, line, name, cell, low, high):
     return value
 
 
-def too_long(path, line):
+def too_long(path: FilePath, line: int) -> TableError:
     """Return the TableError of a file with more than MAX_CSV_ROWS rows."""
     return TableError(f'{path}: line {line}: must be at most {MAX_CSV_ROWS} rows')
 
 
-def bad_step(path, line, value, step, unit, max_step, step_name):
+def bad_step(path: FilePath, line: int, value: str, step: float, unit: str, max_step: float,
+             step_name: str) -> TableError:
     """Return the TableError of a row whose `value` does not grow from that of the row before by at most max_step."""
     limit = f' and at most {step_name} = {max_step:g} {unit}' if np.isfinite(max_step) else ''
     return TableError(f'{path}: line {line}: {value}: {step:g} {unit} after the row before, must be above 0{limit}')

@@ -6,13 +6,16 @@ import errno
 import hashlib
 import os
 import stat
+from typing import BinaryIO, TypeAlias
+
+FilePath: TypeAlias = str | os.PathLike[str]
 
 SPARSE_FILE_LIMITS = 16_000_000, 100
 """Limits above which a file is refused as sparse, if it exceeds both: its length [bytes], and the ratio of its length
 to the bytes that it has on the disk."""
 
 
-def open_regular(path, largest=None):
+def open_regular(path: FilePath, largest: int | None = None) -> BinaryIO:
     """Return a regular file (no device, pipe or directory) as an open binary stream.
 
     largest: largest accepted length [bytes], None for any. Raises OSError, whose strerror is the reason.
@@ -33,13 +36,13 @@ def open_regular(path, largest=None):
         raise
 
 
-def read_text(path, largest):
+def read_text(path: FilePath, largest: int) -> str:
     """Return the text of a regular UTF-8 file of at most `largest` bytes. Raises OSError, UnicodeDecodeError."""
     with open_regular(path, largest) as stream:
         return stream.read(largest + 1).decode()
 
 
-def sha256(path) -> str:
+def sha256(path: FilePath) -> str:
     """Return the SHA-256 of a file, read in pieces. Raises OSError."""
     digest = hashlib.sha256()
     with open(path, 'rb') as stream:

@@ -5,11 +5,14 @@ A section of a file is for one node. In the files of a graph the name of a secti
 the node acu in any namespace.
 """
 import re
+from collections.abc import Iterator, Mapping
 
 import yaml
 
 from pedestal_common import parameters
+from pedestal_common.quantities import Json
 from pedestal_common.text_files import files, plain_yaml
+from pedestal_common.text_files.files import FilePath
 
 ANY_NAMESPACE = '/**/'
 
@@ -20,23 +23,25 @@ class ParameterFileError(ValueError):
     """Error of a parameter file that cannot be read. Its text is one line with the file and the section."""
 
 
-def text(sections):
+def text(sections: Mapping[str, Mapping[str, Json]]) -> str:
     """Return the text of a parameter file of {node: {name: value}}; a node of a beam is named 'beam_2/acu'."""
     return dumped({ANY_NAMESPACE + node: values for node, values in sections.items()})
 
 
-def dumped(sections):
+def dumped(sections: Mapping[str, Mapping[str, Json]]) -> str:
     """Return the text of a parameter file of {section: {name: value}}."""
     return plain_yaml.dump({section: {'ros__parameters': values} for section, values in sections.items()},
                            sort_keys=False)
 
 
-def divided(section):
+def divided(section: str) -> tuple[str, str]:
     """Return (namespace, node) of the name of a section. A node of a beam is 'beam_2/acu' for example."""
-    return re.fullmatch(r'(.*?)/?((?:beam_[1-9]\d*/)?[^/]*)', section, re.DOTALL).groups()
+    match = re.fullmatch(r'(.*?)/?((?:beam_[1-9]\d*/)?[^/]*)', section, re.DOTALL)
+    assert match    # as any text does
+    return match[1], match[2]
 
 
-def node_of(section, namespace=''):
+def node_of(section: str, namespace: str = '') -> str | None:
     """Return the node for which a section is, 'acu' or 'beam_2/acu', in a graph in a namespace such as '/ship_1'.
 
     Return EVERY_NODE for each node of the namespace, None for no node of this namespace. A section without a slash,
@@ -50,7 +55,7 @@ def node_of(section, namespace=''):
     return node if section == node or re.fullmatch(pattern, namespace) else None
 
 
-def dotted(tree, prefix=''):
+def dotted(tree: Mapping[str, Json], prefix: str = '') -> dict[str, Json]:
     """Return {dotted name: value} of nested dicts. Raises ParameterFileError for a name with two values or none."""
     flat = {}
     for key, value in tree.items():
@@ -65,7 +70,7 @@ def dotted(tree, prefix=''):
     return flat
 
 
-def _found(tree, place=''):
+def _found(tree: Mapping[str, Json], place: str = '') -> Iterator[tuple[str, Json]]:
     """Yield (name of a section, its body) of a file. A namespace may contain the sections of its nodes."""
     for name, body in tree.items():
         section = f'{place.rstrip("/")}/{name.lstrip("/")}' if place else name
@@ -76,7 +81,7 @@ def _found(tree, place=''):
             yield section, body
 
 
-def parse(content):
+def parse(content: str) -> dict[str, dict[str, Json]]:
     """Return {section: {dotted name: value}} of the text of a file. Raises ParameterFileError, which does not name the
     file."""
     try:
@@ -85,7 +90,7 @@ def parse(content):
         raise ParameterFileError(plain_yaml.problem(error)) from None
     if not isinstance(tree, dict) or not tree:
         raise ParameterFileError('must hold a section for a node')
-    sections = {}
+    sections: dict[str, dict[str, Json]] = {}
     for section, body in _found(tree):
         whole = isinstance(body, dict) and list(body) == ['ros__parameters']
         values = body['ros__parameters'] or {} if whole else None
@@ -99,7 +104,7 @@ def parse(content):
     return sections
 
 
-def read(path):
+def read(path: FilePath) -> dict[str, dict[str, Json]]:
     """Return {section: {dotted name: value}} of a file. Raises ParameterFileError, which names the file."""
     try:
         return parse(files.read_text(path, plain_yaml.MAX_YAML_BYTES))

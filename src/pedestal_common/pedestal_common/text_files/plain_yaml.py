@@ -6,11 +6,18 @@ parameter file, because rcl refuses them. Where aliases are accepted, MAX_VALUES
 few lines can therefore not stand for billions of values.
 """
 import re
-import typing
+from collections.abc import Iterable
 
 import yaml
 
+from pedestal_common.quantities import Json
 from pedestal_common.text_files import files
+from pedestal_common.text_files.files import FilePath
+
+try:
+    from yaml import CSafeLoader as _Base
+except ImportError:     # PyYAML without libyaml
+    from yaml import SafeLoader as _Base
 
 MAX_YAML_BYTES = 2_000_000
 """Largest size of a file [bytes]. The largest known file, all parameters of an array of 16 beams, has a tenth of
@@ -21,17 +28,15 @@ MAX_DEPTH, MAX_VALUES = 20, 200_000
 
 _TAG = 'tag:yaml.org,2002:'
 _PLAIN = ('null', 'bool', 'int', 'float', 'str', 'seq', 'map')
-_Base: typing.Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-"""Loader of PyYAML in C, or in Python where libyaml is missing."""
 
 
 class _Loader(_Base):
     """Loader of the values of this module. Its own resolvers and constructors replace the rules of YAML 1.1."""
 
-    yaml_implicit_resolvers: dict = {}
+    yaml_implicit_resolvers: dict[str, object] = {}
     yaml_constructors = {tag: _Base.yaml_constructors[tag] for tag in (*(_TAG + name for name in _PLAIN), None)}
 
-    def construct_mapping(self, node, deep=False):
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[str, Json]:
         """Return a section {text: value}, with each of its keys once."""
         section = {}
         for key, value in node.value:
@@ -45,7 +50,7 @@ class _Loader(_Base):
             section[key.value] = self.construct_object(value, deep=deep)
         return section
 
-    def construct_integer(self, node):
+    def construct_integer(self, node: yaml.ScalarNode) -> int:
         """Return an integer of 64 bits, the range of ROS 2."""
         if len(node.value) > 20 or not -2**63 <= int(node.value, 0) < 2**63:
             raise yaml.constructor.ConstructorError(None, None, f'{node.value[:20]}... has more than 64 bits',
@@ -72,12 +77,12 @@ _Dumper.add_implicit_resolver(_TAG + 'quoted', re.compile(
     list('-+.0123456789iInNyY'))
 
 
-def dump(values, sort_keys=True) -> str:
+def dump(values: Json, sort_keys: bool = True) -> str:
     """Return the YAML text of values, which `parse` reads back."""
     return yaml.dump(values, Dumper=_Dumper, sort_keys=sort_keys)
 
 
-def parse(text, aliases=False):
+def parse(text: str, aliases: bool = False) -> Json:
     """Return the values of a YAML text. aliases: accept them. Raises yaml.YAMLError."""
     try:
         _check(yaml.parse(text, Loader=_Base), aliases)
@@ -89,9 +94,11 @@ def parse(text, aliases=False):
         raise
 
 
-def _check(events, aliases):
+def _check(events: Iterable[yaml.Event], aliases: bool) -> None:
     """Raise yaml.YAMLError where a text is too deep, has a tag or an alias, or stands for too many values."""
-    count, begun, sizes = 0, [], {}
+    count = 0
+    begun: list[tuple[str | None, int]] = []     # (anchor, count before) of the open sections and lists
+    sizes: dict[str | None, int] = {}            # {anchor: number of values}
     for event in events:
         if getattr(event, 'tag', None):
             raise yaml.composer.ComposerError(None, None, f'tag {event.tag}', event.start_mark)
@@ -114,13 +121,13 @@ def _check(events, aliases):
             raise yaml.composer.ComposerError(None, None, f'more than {most}', event.start_mark)
 
 
-def read(path):
+def read(path: FilePath) -> Json:
     """Return the values of a YAML file of at most MAX_YAML_BYTES bytes, aliases accepted. Raises OSError,
     UnicodeDecodeError, yaml.YAMLError."""
     return parse(files.read_text(path, MAX_YAML_BYTES), aliases=True)
 
 
-def problem(error) -> str:
+def problem(error: Exception) -> str:
     """Return the reason of an error of `read` or `parse`, on one line and without the path."""
     if isinstance(error, OSError):
         return error.strerror or str(error)

@@ -7,6 +7,7 @@ found.
 import struct
 
 from rosbags.interfaces import Nodetype
+from rosbags.interfaces.typing import FieldDesc
 
 from pedestal_common.wire.messages import CDR_HEADER_BYTES, ROS_TYPESTORE
 
@@ -25,34 +26,31 @@ PADDING_LIMIT_BYTES = 4  # the padding that DDS adds behind a message is always 
 
 
 class Places:
-    """Places in one message, given as CDR bytes of a type. Raises ValueError when the bytes are no such message.
+    """Places in one message, given as CDR bytes of a type. Raises ValueError when the bytes are no such message."""
 
-    numbers     [(path of the number in the message, its first byte, dtype)]
-    texts       {path: text}
-    fixed       [(start, stop)] of the bytes that must be equal in another message, so that its numbers are at these
-                places
-    stop        end of the message
-    """
-
-    def __init__(self, data, type_name):
+    def __init__(self, data: bytes, type_name: str) -> None:
         if len(data) < CDR_HEADER_BYTES:
             raise ValueError(f'{len(data)} bytes are no {type_name}')
         self.data = data
         self.order = '<' if data[1] & 1 else '>'     # the header states the order of the bytes
-        self.stop = CDR_HEADER_BYTES
-        self.numbers, self.texts, self.fixed = [], {}, [(0, CDR_HEADER_BYTES)]
+        self.stop = CDR_HEADER_BYTES        # end of the message
+        # (path of the number in the message, its first byte, dtype)
+        self.numbers: list[tuple[str, int, str]] = []
+        self.texts: dict[str, str] = {}     # {path: text}
+        # (start, stop) of the bytes that must be equal in another message, so that its numbers are at these places
+        self.fixed = [(0, CDR_HEADER_BYTES)]
         try:
             self._fields(type_name, '')
         except (struct.error, KeyError, UnicodeDecodeError) as error:
             raise ValueError(f'{len(data)} bytes are no {type_name}: {error}') from None
 
-    def _fields(self, type_name, prefix):
+    def _fields(self, type_name: str, prefix: str) -> None:
         """Find the places in the next bytes, which hold a value of this type. prefix: beginning of the paths of its
         fields."""
         for name, node in ROS_TYPESTORE.fielddefs[type_name][1]:
             self._node(node, prefix + name)
 
-    def _take(self, size, alignment, path):
+    def _take(self, size: int, alignment: int, path: str) -> int:
         """Return the start of the next `size` bytes, and move `stop` behind them. path: path of the field, for an
         error.
         """
@@ -62,27 +60,26 @@ class Places:
             raise struct.error(f'{path} is missing')
         return start
 
-    def _length(self, path):
+    def _length(self, path: str) -> int:
         """Return the length of a text or a list, which stands before its content."""
         start = self._take(4, 4, path)
         self.fixed.append((start, self.stop))
         return struct.unpack_from(self.order + 'I', self.data, start)[0]
 
-    def _node(self, node, path):
+    def _node(self, node: FieldDesc, path: str) -> None:
         """Find the places in the next bytes, which hold one field. node: type of the field, by rosbags."""
-        kind, what = node
-        if kind == Nodetype.NAME:
-            self._fields(what, path + '.')
-        elif kind == Nodetype.BASE and what[0] in ('string', 'wstring'):
+        if node[0] == Nodetype.NAME:
+            self._fields(node[1], path + '.')
+        elif node[0] == Nodetype.BASE and node[1][0] in ('string', 'wstring'):
             start = self._take(self._length(path), 1, path)
             self.fixed.append((start, self.stop))
             self.texts[path] = bytes(self.data[start:self.stop]).rstrip(b'\0').decode()
-        elif kind == Nodetype.BASE:
-            size = _SIZES[what[0]]
-            self.numbers.append((path, self._take(size, size, path), self.order + _DTYPES[what[0]]))
+        elif node[0] == Nodetype.BASE:
+            size = _SIZES[node[1][0]]
+            self.numbers.append((path, self._take(size, size, path), self.order + _DTYPES[node[1][0]]))
             if len(self.numbers) > MAX_MESSAGE_NUMBERS:
                 raise ValueError(f'message of {len(self.data)} bytes: must have at most {MAX_MESSAGE_NUMBERS} numbers')
         else:
-            count = what[1] if kind == Nodetype.ARRAY else self._length(path)
-            for i in range(count):
-                self._node(what[0], f'{path}[{i}]')
+            element, count = node[1]
+            for i in range(count if node[0] == Nodetype.ARRAY else self._length(path)):
+                self._node(element, f'{path}[{i}]')

@@ -8,8 +8,10 @@ separated by semicolons. No ROS here.
 import math
 import re
 import typing
+from collections.abc import Iterable, Mapping
 
 from pedestal_common.parameters import ParameterError, did_you_mean
+from pedestal_common.quantities import Message, Nanoseconds, Value
 from pedestal_common.wire import messages
 
 SERVICE_CLIENT, SCHEDULE_CLIENT = 'service', 'scenario'
@@ -34,38 +36,34 @@ SCHEDULE_DOC = "commands executed at times [s]: 'AT COMMAND name=value ...; AT C
 
 
 class Command(typing.NamedTuple):
-    """Request of a client. verb: name of the command or service; who: the client; number: number of the request;
-    arguments: {argument: text}."""
-    verb: str
-    who: str = ''
-    number: str = ''
-    arguments: typing.Mapping = {}
+    """Request of a client."""
+    verb: str                           # name of the command or service
+    who: str = ''                       # the client
+    number: str = ''                    # of the request
+    arguments: Mapping[str, str] = {}   # {argument: text}
 
-    def __str__(self):
+    def __str__(self) -> str:
         return ' '.join((self.verb, *(f'{name}={text}' for name, text in self.arguments.items())))
 
 
 class Reply(typing.NamedTuple):
-    """Answer to a command. granted: True if the node accepts it; text: one line for people."""
-    granted: bool
-    text: str
+    """Answer to a command."""
+    granted: bool   # True if the node accepts it
+    text: str       # one line for people
 
 
 class Argument(typing.NamedTuple):
-    """Argument of a command: a number between low and high, or one of the options; without either, any text.
-
-    default: its value where it is left out; None: it must be given.
-    """
+    """Argument of a command: a number between low and high, or one of the options; without either, any text."""
     name: str
     doc: str
     low: float = -math.inf
     high: float = math.inf
     unit: str = ''
-    options: tuple = ()
-    default: object = None
+    options: tuple[str, ...] = ()
+    default: float | str | None = None      # its value where it is left out; None: it must be given
 
     @property
-    def range(self):
+    def range(self) -> str:
         """Allowed values, in words."""
         if self.options:
             return f'one of {", ".join(self.options)}'
@@ -76,13 +74,25 @@ class CommandDefinition(typing.NamedTuple):
     """Row of a unit's table of commands."""
     name: str
     doc: str
-    arguments: tuple = ()
+    arguments: tuple[Argument, ...] = ()
 
 
-def values(definitions, command) -> dict:
+class Definition(typing.Protocol):
+    """What defines a command: a CommandDefinition, or a row with further fields."""
+
+    @property
+    def name(self) -> str:
+        """Name of the command."""
+
+    @property
+    def arguments(self) -> tuple[Argument, ...]:
+        """Its arguments."""
+
+
+def values(definitions: Iterable[Definition], command: Command) -> dict[str, Value]:
     """Return {argument: number or text} of a Command, with the defaults of left-out arguments. Raises ValueError.
 
-    definitions: CommandDefinitions of the node, one of which must have the name of the command.
+    definitions: of the node; one of them must have the name of the command.
     """
     definition = next((row for row in definitions if row.name == command.verb), None)
     if definition is None:
@@ -97,7 +107,7 @@ def values(definitions, command) -> dict:
             for argument in definition.arguments}
 
 
-def _value(definition, argument, text):
+def _value(definition: Definition, argument: Argument, text: str | None) -> float | str:
     if text is None:
         if argument.default is None:
             raise ValueError(f'{definition.name}: {argument.name} is missing; must be {argument.range} {argument.unit}'
@@ -120,7 +130,7 @@ def _value(definition, argument, text):
     return number
 
 
-def _in_degrees(number, argument):
+def _in_degrees(number: float, argument: Argument) -> str:
     """Return a refused angle or rate and its range in degrees, '' for an Argument with another unit or for NaN.
 
     `pedestal mode rate --az 500` gives degrees, and a client of the topic gives radians.
@@ -131,7 +141,7 @@ def _in_degrees(number, argument):
     return f' ({given} {argument.unit.replace("rad", "deg")}: must be {low} to {high})'
 
 
-def of_message(status) -> Command:
+def of_message(status: Message) -> Command:
     """Return the Command in a DiagnosticStatus. Raises ValueError."""
     given = [(value.key, value.value) for value in status.values]
     if len(given) > MAX_ARGUMENTS:
@@ -147,14 +157,14 @@ def of_message(status) -> Command:
     return Command(status.name, status.hardware_id, status.message, arguments)
 
 
-def message(command):
+def message(command: Command) -> Message:
     """Return the DiagnosticStatus of a Command."""
     return messages.DiagnosticStatus(level=0, name=command.verb, hardware_id=command.who, message=command.number,
                                      values=[messages.KeyValue(key=key, value=str(text))
                                              for key, text in command.arguments.items()])
 
 
-def reply_message(command, reply):
+def reply_message(command: Command, reply: Reply) -> Message:
     """Return the DiagnosticStatus of the Reply to a Command."""
     status = message(command)
     status.level = 0 if reply.granted else 1
@@ -163,8 +173,8 @@ def reply_message(command, reply):
     return status
 
 
-def of_reply(status):
-    """Return (Command, Reply) of a DiagnosticStatus on a topic of replies. Raises ValueError."""
+def of_reply(status: Message) -> tuple[Command, Reply]:
+    """Return what a DiagnosticStatus on a topic of replies holds. Raises ValueError."""
     rest = [value for value in status.values if value.key not in RESERVED_KEYS]
     result = {value.key: value.value for value in status.values if value.key in RESERVED_KEYS}
     if set(result) != set(RESERVED_KEYS):
@@ -174,7 +184,7 @@ def of_reply(status):
     return of_message(bare), Reply(result['granted'] == 'true', result['reply'])
 
 
-def parsed(text) -> Command:
+def parsed(text: str) -> Command:
     """Return the Command of a text 'COMMAND name=value ...', without a client. Raises ValueError."""
     verb, *pairs = text.split()
     arguments = {}
@@ -186,8 +196,9 @@ def parsed(text) -> Command:
     return Command(verb, arguments=arguments)
 
 
-def schedule(name, text, definitions) -> list:
-    """Return [(at [ns], Command)] of the schedule in the parameter `name`, in order of time. Raises ParameterError."""
+def schedule(name: str, text: str, definitions: Iterable[Definition]) -> list[tuple[Nanoseconds, Command]]:
+    """Return the commands of the schedule in the parameter `name` with their times, in order. Raises ParameterError.
+    """
     due = []
     for part in filter(None, (part.strip() for part in text.split(';'))):
         at, _, rest = part.partition(' ')

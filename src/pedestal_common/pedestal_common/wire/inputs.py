@@ -7,57 +7,61 @@ array. In addition to the fields of its layout, a message has the fields `stamp`
 text has the field `code` only.
 """
 import itertools
+from collections.abc import Callable, Iterable, Iterator
 
 from numba.extending import overload
 
 from pedestal_common.graph import layouts, topics
 from pedestal_common.law_key import template
+from pedestal_common.quantities import AnyRecord
 from pedestal_common.wire.records import NO_STAMP
 
 
-def _numbers(topic):
+def _numbers(topic: str) -> Iterator[tuple[str, list[str]]]:
     """Yield (name of an input, [source text that reads each of its numbers from the record of a topic])."""
     given, row = topics.TOPIC_BY_NAME[topic].inputs, topics.TOPIC_BY_NAME[topic]
     for field in layouts.fields(topic):
         if field.name in given:
             count = len(field.components or row.names)
-            named = (given[field.name],) * count if isinstance(given[field.name], str) else given[field.name]
+            names = given[field.name]
+            named = (names,) * count if isinstance(names, str) else names
             for name, places in itertools.groupby(range(count), named.__getitem__):
-                yield name, [f'm.{field.name}[{place}]' for place in places]
+                yield name, [f'message.{field.name}[{place}]' for place in places]
 
 
-def fields(names) -> list:
+def fields(names: Iterable[str]) -> list[tuple[str, str] | tuple[str, str, tuple[int, ...]]]:
     """Return the fields of a record of these topics' inputs, as numpy takes them."""
     kinds = {'came': 'i8', 'code': 'i8', 'stamp': 'f8'}
     return [field for topic in names for field in (
-        *((name, kinds[key]) for key, name in topics.TOPIC_BY_NAME[topic].inputs.items() if key in kinds),
+        *((name, kinds[key]) for key, name in topics.TOPIC_BY_NAME[topic].inputs.items()
+          if key in kinds and isinstance(name, str)),
         *((name, 'f8', (len(places),)) if len(places) > 1 else (name, 'f8') for name, places in _numbers(topic)))]
 
 
-def _lines(topic):
-    """Yield the source lines that copy the record of one topic, `m`, into the inputs `u`."""
+def _lines(topic: str) -> Iterator[str]:
+    """Yield the source lines that copy the record of one topic, the message, into the inputs."""
     given = topics.TOPIC_BY_NAME[topic].inputs
-    yield f'    m = inputs[{topic!r}]'
+    yield f'    message = records[{topic!r}]'
     if 'code' in given:
-        yield f'    u.{given["code"]} = m'
+        yield f'    inputs.{given["code"]} = message'
         return
     if 'came' in given:
-        yield f'    u.{given["came"]} = m.stamp != {NO_STAMP}'
-    yield f'    if m.stamp != {NO_STAMP}:'
+        yield f'    inputs.{given["came"]} = message.stamp != {NO_STAMP}'
+    yield f'    if message.stamp != {NO_STAMP}:'
     if 'stamp' in given:
-        yield f'        u.{given["stamp"]} = m.stamp * 1e-9'
+        yield f'        inputs.{given["stamp"]} = message.stamp * 1e-9'
     for name, places in _numbers(topic):
         for i, place in enumerate(places):
-            yield f'        u.{name}{f"[{i}]" if len(places) > 1 else ""} = {place}'
+            yield f'        inputs.{name}{f"[{i}]" if len(places) > 1 else ""} = {place}'
 
 
-def taking(names):
-    """Return the function take(u, inputs) for laws, which copies the records of these topics into the inputs u."""
-    made = {}
+def taking(names: Iterable[str]) -> Callable[[AnyRecord, AnyRecord], None]:
+    """Return the function take(inputs, records) for laws, which copies the records of these topics into the inputs."""
+    made: dict[str, Callable[[AnyRecord, AnyRecord], None]] = {}
     lines = [line for topic in names if topics.TOPIC_BY_NAME[topic].inputs for line in _lines(topic)]
     # Because numba needs the names of the fields in the source, the function is made as text.
-    exec('\n'.join(('def take(u, inputs):', *lines)), made)
-    overload(made['take'], inline='always')(lambda u, inputs: made['take'])
+    exec('\n'.join(('def take(inputs, records):', *lines)), made)
+    overload(made['take'], inline='always')(lambda inputs, records: made['take'])
     made['take'].__module__ = __name__
     template(made['take'])
     return made['take']

@@ -11,41 +11,46 @@ A Decoder reads the numbers from the CDR bytes of a message, and an Encoder writ
 the places of the numbers (cdr.Places), and neither builds a message object.
 """
 import struct
+from collections.abc import Iterable, Sequence
+from typing import TypeAlias
 
 import numpy as np
 
 from pedestal_common.graph import layouts, topics
+from pedestal_common.quantities import DType, Floats, Message, Nanoseconds, Records
 from pedestal_common.wire import cdr, messages
 
 NO_STAMP = -2**63  # stamp [ns] of a message that did not arrive
 TEXT_TYPES = ('std_msgs/msg/String', 'diagnostic_msgs/msg/DiagnosticArray')  # types of a text and of a list of texts
 
+Decoded: TypeAlias = tuple[Nanoseconds, Sequence[float]]   # stamp and numbers of a message
+
 _STAMP = struct.Struct('<iI')
 _FORMATS = {'f8': 'd', 'f4': 'f'}
 
 
-def _type(topic):
+def _type(topic: str) -> str | DType:
     row = topics.TOPIC_BY_NAME[topic]
     if is_text(topic):
         return 'i8'
     sizes = [(field.name, 'f8', (len(field.components or row.names),)) for field in layouts.fields(topic)]
-    return np.dtype([('stamp', 'i8'), *sizes])
+    return np.dtype([('stamp', 'i8'), *sizes])      # no Record, because the tables of topics and layouts determine it
 
 
-def of(*names) -> np.dtype:
+def of(*names: str) -> DType:
     """Return the type of the record of these topics."""
     return np.dtype([(name, _type(name)) for name in names])
 
 
-def is_text(topic) -> bool:
+def is_text(topic: str) -> bool:
     """Return True if a topic of the table is a text or a list of texts, held in records by its code."""
     return topics.TOPIC_BY_NAME[topic].type in TEXT_TYPES and topics.TOPIC_BY_NAME[topic].rate == 'change'
 
 
-def empty(record_type, count) -> np.ndarray:
+def empty(record_type: DType, count: int) -> Records:
     """Return records (count,) without any message or text."""
     made = np.zeros(count, record_type)
-    for name in record_type.names:
+    for name in record_type.names or ():
         if record_type[name].names is None:
             made[name] = topics.NO_TEXT_CODE
         else:
@@ -53,15 +58,16 @@ def empty(record_type, count) -> np.ndarray:
     return made
 
 
-def numbers(records, topic) -> np.ndarray:
+def numbers(records: Records, topic: str) -> Floats:
     """Return a view (n, columns) of the numbers of a stamped topic in records (n,)."""
     # Positions are in words of 8 bytes. The first word of the topic is its stamp.
-    offset = records.dtype.fields[topic][1]
-    start = offset // 8 + 1
+    fields = records.dtype.fields
+    assert fields
+    start = fields[topic][1] // 8 + 1
     return records.view('f8').reshape(len(records), -1)[:, start:start + len(layouts.columns(topic))]
 
 
-def code_of(topic, text) -> int:
+def code_of(topic: str, text: str) -> int:
     """Return the code of a text: its index in Topic.texts, or their number for any other text."""
     texts = topics.TOPIC_BY_NAME[topic].texts
     return texts.index(text) if text in texts else len(texts)
@@ -69,19 +75,16 @@ def code_of(topic, text) -> int:
 
 class _Shape:
     """Places of the columns of a topic, found in one message, and valid for messages that differ only in their
-    numbers.
+    numbers."""
 
-    fields: [(index of the column, first byte, dtype)]; reader: the Struct that reads these numbers at once. marks:
-    [(columns, [(Struct, first byte)], function absent)] of layouts.no_data.
-    """
-
-    def __init__(self, topic, data):
+    def __init__(self, topic: str, data: bytes) -> None:
         type_name = topics.TOPIC_BY_NAME[topic].type
         places = cdr.Places(data, type_name)
         index = {column.name: i for i, column in enumerate(layouts.columns(topic))}
         self.size = places.stop
         # Bytes that another message must have too, so that its numbers are at the same places.
         self.guard = [(start, stop, bytes(data[start:stop])) for start, stop in _joined(places.fixed)]
+        # (index of the column, first byte, dtype)
         self.fields = [(index[name], start, dtype) for path, start, dtype in places.numbers
                       if (name := layouts.column(type_name, path, places.texts)) in index]
         self.in_order = [column for column, _, _ in self.fields] == list(range(len(index)))
@@ -90,20 +93,21 @@ class _Shape:
         for _, start, dtype in self.fields:
             form += f'{start - at}x{_FORMATS[dtype[1:]]}'
             at = start + int(dtype[2:])
-        self.reader = struct.Struct(form)
+        self.reader = struct.Struct(form)       # reads these numbers at once
+        # (columns, [(Struct, first byte)], function absent) of layouts.no_data
         self.marks = [([index[name] for name in names if name in index],
                        [(struct.Struct(dtype[0] + _FORMATS[dtype[1:]]), start) for start, dtype in where], absent)
                       for names, where, absent in layouts.no_data(type_name, places.numbers, places.texts)]
 
-    def fits(self, data):
+    def fits(self, data: bytes) -> bool:
         """Return True if the numbers of a message are at the same places."""
         return 0 <= len(data) - self.size < cdr.PADDING_LIMIT_BYTES and all([data[start:stop] == text
                                                                              for start, stop, text in self.guard])
 
 
-def _joined(fixed):
-    """Return a list of (start, stop) in which adjacent ranges are merged."""
-    joined = []
+def _joined(fixed: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return ranges (start, stop), of which adjacent ones are merged."""
+    joined: list[tuple[int, int]] = []
     for start, stop in sorted(fixed):
         if joined and joined[-1][1] == start:
             joined[-1] = joined[-1][0], stop
@@ -112,12 +116,12 @@ def _joined(fixed):
     return joined
 
 
-def _runs(fields):
+def _runs(fields: Iterable[tuple[int, int, str]]) -> list[tuple[slice, np.dtype[np.generic], int, int]]:
     """Return [(columns as a slice, dtype, count, start)] of numbers [(column, start, dtype)], in which adjacent
     numbers are merged."""
-    runs = []
-    for column, start, dtype in fields:
-        dtype = np.dtype(dtype)
+    runs: list[tuple[int, np.dtype[np.generic], int, int]] = []
+    for column, start, name in fields:
+        dtype = np.dtype(name)
         if runs:
             first, kind, count, begin = runs[-1]
             if kind == dtype and column == first + count and start == begin + count * kind.itemsize:
@@ -128,16 +132,16 @@ def _runs(fields):
 
 
 class Decoder:
-    """Reader of the messages of one stamped topic. record: (1,), whose field of this topic `put` fills."""
+    """Reader of the messages of one stamped topic. record: (1,); `put` fills its field of this topic."""
 
-    def __init__(self, topic, record):
+    def __init__(self, topic: str, record: Records) -> None:
         self.topic = topic
         self._columns = len(layouts.columns(topic))
         self._shape = _Shape(topic, messages.serialize(messages.template(topic)))
         self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
 
-    def decoded(self, data):
-        """Return (stamp [ns], numbers (columns,)) of CDR bytes. A number is NaN if the message does not contain it, or
+    def decoded(self, data: bytes) -> Decoded:
+        """Return the stamp and the numbers of CDR bytes. A number is NaN if the message does not contain it, or
         marks it as no data (layouts.NO_DATA_MARKS). Raises ValueError for bytes that are no message of the topic's
         type, and for an invalid stamp."""
         if not self._shape.fits(data):
@@ -145,17 +149,18 @@ class Decoder:
         seconds, nanoseconds = _STAMP.unpack_from(data, messages.CDR_HEADER_BYTES)
         if seconds < 0 or nanoseconds >= 1_000_000_000:
             raise ValueError(f'{self.topic}: {seconds} s {nanoseconds} ns is no stamp')
-        values = self._shape.reader.unpack_from(data)
+        values: Sequence[float] = self._shape.reader.unpack_from(data)
         if not self._shape.in_order:
-            given, values = values, [np.nan] * self._columns
-            for (column, _, _), value in zip(self._shape.fields, given):
-                values[column] = value
+            placed = [np.nan] * self._columns
+            for (column, _, _), value in zip(self._shape.fields, values):
+                placed[column] = value
+            values = placed
         for marked, where, absent in self._shape.marks:
             if absent(*[form.unpack_from(data, start)[0] for form, start in where]):
                 values = [np.nan if column in marked else value for column, value in enumerate(values)]
         return seconds * 1_000_000_000 + nanoseconds, values
 
-    def put(self, stamp, values):
+    def put(self, stamp: Nanoseconds, values: Sequence[float] | None) -> None:
         """Put the result of `decoded` into the record; values None: no message arrived."""
         if values is None:
             self._stamp[0] = NO_STAMP
@@ -171,7 +176,7 @@ class Encoder:
     numbers; None where only `bytes_of` is used.
     """
 
-    def __init__(self, topic, template, record=None):
+    def __init__(self, topic: str, template: Message, record: Records | None = None) -> None:
         data = messages.serialize(template)
         shape = _Shape(topic, data)
         self._buffer = bytearray(data)
@@ -181,17 +186,17 @@ class Encoder:
             self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
 
     @property
-    def due(self):
+    def due(self) -> bool:
         """True if the record holds a message."""
         return self._stamp[0] != NO_STAMP
 
-    def encoded(self, epoch=0) -> bytes:
+    def encoded(self, epoch: Nanoseconds = 0) -> bytes:
         """Return the CDR bytes of the message with the numbers of the record. Its stamp is that of the record plus the
-        epoch [ns]."""
+        epoch."""
         return self.bytes_of(self._stamp.item() + epoch, self._numbers)
 
-    def bytes_of(self, stamp, values) -> bytes:
-        """Return the CDR bytes of the message with a stamp [ns] and numbers (columns,)."""
+    def bytes_of(self, stamp: Nanoseconds, values: Floats) -> bytes:
+        """Return the CDR bytes of the message with a stamp and numbers (columns,)."""
         _STAMP.pack_into(self._buffer, messages.CDR_HEADER_BYTES, *divmod(stamp, 1_000_000_000))
         for columns, view in self._views:
             view[:] = values[columns]

@@ -14,10 +14,9 @@ but not with the parameters, leaves a and r equal; the direction of the specific
 finds it.
 """
 import math
-from typing import Annotated
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Floats, Matrix3, Vector3
+from pedestal_common.quantities import Bit, Matrix3, Nanoseconds, Quaternion, Vector3
 from pedestal_common.record import Record
 from pedestal_hardware.ins.frames import rotation_vector
 
@@ -51,115 +50,113 @@ FRAME_UNKNOWN, FRAME_RIGHT, FRAME_WRONG = range(3)
 
 class Check(Record):
     """State of the check."""
-    # runs, begin, last: 1 after the first sample; stamps of the begin of the block and of the last sample [ns]
-    runs: int
-    begin: int
-    last: int
-    # q, w, integral: quaternion at the begin of the block; rate of the last sample; integral of the rate [rad]
-    q: Annotated[Floats, (4,)]
-    w: Vector3
-    integral: Vector3
-    cross: Matrix3  # faded sums r_i a_j [rad2]; attitude, rates: of a_i^2 and r_i^2; weight: of the blocks
-    attitude: Vector3
-    rates: Vector3
-    weight: float
-    force: Vector3  # force, force_weight: faded sum of the specific force [m/s2], and of the samples
-    force_weight: float
-    moved: Vector3  # time during which an axis was compared [s]
-    jumps: int  # jumps, rest: number of jumps of the attitude; blocks until the next jump may be
-    rest: int
-    verdict: int  # verdict, down: of FRAME_*; 1 if the specific force points downwards
-    down: int
+    runs: Bit               # 1 after the first sample
+    begin: Nanoseconds      # stamp of the begin of the block
+    last: Nanoseconds       # stamp of the last sample
+    q: Quaternion           # at the begin of the block
+    w: Vector3              # rate of the last sample [rad/s]
+    integral: Vector3       # of the rate since the begin of the block [rad]
+    cross: Matrix3          # faded sums r_i a_j [rad2]
+    attitude: Vector3       # faded sums a_i^2 [rad2]
+    rates: Vector3          # faded sums r_i^2 [rad2]
+    weight: float           # faded sum of the blocks
+    force: Vector3          # faded sum of the specific force [m/s2]
+    force_weight: float     # faded sum of the samples of the specific force
+    moved: Vector3          # time during which an axis was compared [s]
+    jumps: int              # number of jumps of the attitude
+    rest: int               # blocks until the next jump may be
+    verdict: int            # FRAME_UNKNOWN, FRAME_RIGHT or FRAME_WRONG
+    down: Bit               # 1 if the specific force points downwards
 
 
 @compiled
-def restart(s):
+def restart(check: Check) -> None:
     """Begin a new block; the sums stay."""
-    s.runs = 0
+    check.runs = 0
 
 
 @compiled
-def slope(s, i):
+def slope(check: Check, i: int) -> float:
     """Return the slope of an axis; infinite without rates."""
-    return s.cross[i, i] / s.rates[i]
+    return check.cross[i, i] / check.rates[i]
 
 
 @compiled
-def is_compared(s, i):
+def is_compared(check: Check, i: int) -> bool:
     """Return True if an axis moves enough to be compared."""
-    blocks = BLOCK_TIME_S**2 * s.weight
-    return s.rates[i] > MIN_RATE_RAD_S**2 * blocks or s.attitude[i] > MIN_ATTITUDE_RATE_RAD_S**2 * blocks
+    blocks = BLOCK_TIME_S**2 * check.weight
+    return check.rates[i] > MIN_RATE_RAD_S**2 * blocks or check.attitude[i] > MIN_ATTITUDE_RATE_RAD_S**2 * blocks
 
 
 @compiled
-def agrees(s, i, axes):
+def agrees(check: Check, i: int, axes: int) -> bool:
     """Return True if attitude and rates of an axis agree; axes: as of `take`."""
     if axes == ALL_AXES:
-        return SLOPE_RANGE[0] <= slope(s, i) <= SLOPE_RANGE[1]
-    return s.cross[i, i] >= MIN_TURN_CORRELATION * math.sqrt(s.attitude[i] * s.rates[i])
+        return SLOPE_RANGE[0] <= slope(check, i) <= SLOPE_RANGE[1]
+    return check.cross[i, i] >= MIN_TURN_CORRELATION * math.sqrt(check.attitude[i] * check.rates[i])
 
 
 @compiled
-def _close_block(s, q, axes):
+def _close_block(check: Check, q: Quaternion, axes: int) -> None:
     """Add a block that ends with the quaternion q to the sums, and set the verdict."""
-    a = rotation_vector(s.q, q)
+    a = rotation_vector(check.q, q)
     size_a, size_r = math.sqrt(a[0]**2 + a[1]**2 + a[2]**2), 0.0
     for i in range(3):
-        size_r += s.integral[i]**2
-    s.rest = max(s.rest - 1, 0)
-    if axes == ALL_AXES and size_a > JUMP_RAD and size_a > 5.0 * math.sqrt(size_r) and s.rest == 0:
-        s.jumps += 1
-        s.rest = JUMP_REST_BLOCKS
+        size_r += check.integral[i]**2
+    check.rest = max(check.rest - 1, 0)
+    if axes == ALL_AXES and size_a > JUMP_RAD and size_a > 5.0 * math.sqrt(size_r) and check.rest == 0:
+        check.jumps += 1
+        check.rest = JUMP_REST_BLOCKS
         return
     fade = math.exp(-BLOCK_TIME_S / MEMORY_TIME_S)
-    s.weight = fade * s.weight + 1.0
+    check.weight = fade * check.weight + 1.0
     for i in range(3):
         for j in range(3):
-            s.cross[i, j] = fade * s.cross[i, j] + s.integral[i] * a[j]
-        s.attitude[i] = fade * s.attitude[i] + a[i]**2
-        s.rates[i] = fade * s.rates[i] + s.integral[i]**2
+            check.cross[i, j] = fade * check.cross[i, j] + check.integral[i] * a[j]
+        check.attitude[i] = fade * check.attitude[i] + a[i]**2
+        check.rates[i] = fade * check.rates[i] + check.integral[i]**2
     wrong, right = False, False
     for i in range(3):
         if axes & (1 << i) == 0:
             continue
-        if is_compared(s, i):
-            s.moved[i] += BLOCK_TIME_S
-            if s.moved[i] >= MIN_CHECK_TIME_S:
-                good = agrees(s, i, axes)
+        if is_compared(check, i):
+            check.moved[i] += BLOCK_TIME_S
+            if check.moved[i] >= MIN_CHECK_TIME_S:
+                good = agrees(check, i, axes)
                 right, wrong = right or good, wrong or not good
         else:
-            s.moved[i] = 0.0
+            check.moved[i] = 0.0
     if wrong or right:
-        s.verdict = FRAME_WRONG if wrong else FRAME_RIGHT
+        check.verdict = FRAME_WRONG if wrong else FRAME_RIGHT
 
 
 @compiled
-def take(s, stamp, q, w, force, axes):
+def take(check: Check, stamp: Nanoseconds, q: Quaternion, w: Vector3, force: Vector3, axes: int) -> None:
     """Take a sample in the frames that the parameters declare.
 
-    stamp     of the sample [ns], newer than the last
-    q, w      quaternion (4,) deck -> earth, and rates (3,) [rad/s]
-    force     specific force (3,) [m/s2], NaN for none
+    stamp     of the sample, newer than the last
+    q, w      quaternion deck -> earth, and rates [rad/s]
+    force     specific force [m/s2], NaN for none
     axes      ALL_AXES of gyros, TURN_AXIS of a rate of turn
     """
     if abs(force[0]) + abs(force[1]) + abs(force[2]) < MAX_FORCE_M_S2:      # also excludes NaN
-        k = math.exp(-(stamp - s.last) * 1e-9 / MEMORY_TIME_S) if s.runs else 1.0
-        s.force_weight = k * s.force_weight + 1.0
+        k = math.exp(-(stamp - check.last) * 1e-9 / MEMORY_TIME_S) if check.runs else 1.0
+        check.force_weight = k * check.force_weight + 1.0
         for i in range(3):
-            s.force[i] = k * s.force[i] + force[i]
-        s.down = 1 if s.force[2] < -GRAVITY_M_S2 * s.force_weight else 0
-    if s.runs:
-        T = (stamp - s.last) * 1e-9
+            check.force[i] = k * check.force[i] + force[i]
+        check.down = 1 if check.force[2] < -GRAVITY_M_S2 * check.force_weight else 0
+    if check.runs:
+        T = (stamp - check.last) * 1e-9
         for i in range(3):
-            s.integral[i] += 0.5 * T * (s.w[i] + w[i])
-    if s.runs and (stamp - s.begin) * 1e-9 > 0.999 * BLOCK_TIME_S:
-        _close_block(s, q, axes)
-    if s.runs == 0 or (stamp - s.begin) * 1e-9 > 0.999 * BLOCK_TIME_S:
-        s.runs, s.begin = 1, stamp
+            check.integral[i] += 0.5 * T * (check.w[i] + w[i])
+    if check.runs and (stamp - check.begin) * 1e-9 > 0.999 * BLOCK_TIME_S:
+        _close_block(check, q, axes)
+    if check.runs == 0 or (stamp - check.begin) * 1e-9 > 0.999 * BLOCK_TIME_S:
+        check.runs, check.begin = 1, stamp
         for i in range(4):
-            s.q[i] = q[i]
+            check.q[i] = q[i]
         for i in range(3):
-            s.integral[i] = 0.0
-    s.last = stamp
+            check.integral[i] = 0.0
+    check.last = stamp
     for i in range(3):
-        s.w[i] = w[i]
+        check.w[i] = w[i]

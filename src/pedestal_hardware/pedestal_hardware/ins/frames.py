@@ -10,14 +10,17 @@ Quaternions are (x, y, z, w), body -> earth. With the matrices as quaternions, a
     H    rotation about the vertical by the heading at which the device reports 0
 """
 import math
-from typing import Annotated
+from typing import TypeAlias
 
 import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.quaternion import product
-from pedestal_common.quantities import Floats, Matrix3
+from pedestal_common.quantities import Matrix3, Quaternion, Radians, Records, Vector3
 from pedestal_common.record import Record
+
+Numbers3: TypeAlias = tuple[float, float, float]             # a vector, without an array
+Numbers4: TypeAlias = tuple[float, float, float, float]      # a quaternion, without an array
 
 BODY_MATRICES = {'flu': np.eye(3), 'frd': np.diag((1.0, -1.0, -1.0)),
                  'rfu': np.array(((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))}
@@ -29,14 +32,14 @@ EARTH_MATRICES = {'enu': np.eye(3), 'nwu': np.array(((0.0, -1.0, 0.0), (1.0, 0.0
 
 
 class Frame(Record):
-    """Constants of a conversion: quaternions H E and B^-1 M^-1, matrix M R."""
-    left: Annotated[Floats, (4,)]
-    right: Annotated[Floats, (4,)]
-    rate: Matrix3
+    """Constants of a conversion."""
+    left: Quaternion    # H E
+    right: Quaternion   # B^-1 M^-1
+    rate: Matrix3       # M R
 
 
-def quaternion_of(matrix):
-    """Return the quaternion (x, y, z, w) of a rotation matrix (3, 3)."""
+def quaternion_of(matrix: Matrix3) -> Quaternion:
+    """Return the quaternion of a rotation matrix."""
     # Of 4 w^2, 4 x^2, ... the largest is at least 1, so the division is safe.
     m = np.asarray(matrix)
     squares = np.array((1.0 + m[0, 0] - m[1, 1] - m[2, 2], 1.0 - m[0, 0] + m[1, 1] - m[2, 2],
@@ -49,8 +52,8 @@ def quaternion_of(matrix):
     return row / np.linalg.norm(row)
 
 
-def mounting_matrix(roll, pitch, yaw):
-    """Return the rotation case -> deck of a device that is mounted at angles [rad], FLU: yaw to port, then pitch with
+def mounting_matrix(roll: Radians, pitch: Radians, yaw: Radians) -> Matrix3:
+    """Return the rotation case -> deck of a device that is mounted at these angles, FLU: yaw to port, then pitch with
     the bow down, then roll with the port side up."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in (roll, pitch, yaw))
     return np.array(((cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
@@ -58,11 +61,12 @@ def mounting_matrix(roll, pitch, yaw):
                      (-sp, cp * sr, cp * cr)))
 
 
-def constants(earth, body, rate_body, mounting, heading_zero):
+def constants(earth: str, body: str, rate_body: str, mounting: tuple[Radians, Radians, Radians],
+              heading_zero: Radians) -> Records:
     """Return the Frame (1,) of a device.
 
-    earth, body, rate_body: names of frames; mounting: (roll, pitch, yaw) of its case [rad]; heading_zero: true
-    heading at which the device reports 0 [rad], clockwise.
+    earth, body, rate_body: names of frames; mounting: roll, pitch, yaw of its case; heading_zero: true heading at
+    which the device reports 0, clockwise.
     """
     case = mounting_matrix(*mounting)
     found = Frame.zeros()
@@ -74,23 +78,22 @@ def constants(earth, body, rate_body, mounting, heading_zero):
 
 
 @compiled
-def attitude(c, q):
-    """Return the quaternion deck -> earth of the quaternion q (4,) of a device; c: record of Frame."""
-    return product(product(c.left, q), c.right)
+def attitude(frame: Frame, q: Quaternion) -> Numbers4:
+    """Return the quaternion deck -> earth of the quaternion of a device."""
+    return product(product(frame.left, q), frame.right)
 
 
 @compiled
-def on_deck(c, v):
-    """Return the components on the deck of a vector v (3,) in the body frame of the rates; c: record of
-    Frame."""
-    return (c.rate[0, 0] * v[0] + c.rate[0, 1] * v[1] + c.rate[0, 2] * v[2],
-            c.rate[1, 0] * v[0] + c.rate[1, 1] * v[1] + c.rate[1, 2] * v[2],
-            c.rate[2, 0] * v[0] + c.rate[2, 1] * v[1] + c.rate[2, 2] * v[2])
+def on_deck(frame: Frame, v: Vector3) -> Numbers3:
+    """Return the components on the deck of a vector in the body frame of the rates."""
+    return (frame.rate[0, 0] * v[0] + frame.rate[0, 1] * v[1] + frame.rate[0, 2] * v[2],
+            frame.rate[1, 0] * v[0] + frame.rate[1, 1] * v[1] + frame.rate[1, 2] * v[2],
+            frame.rate[2, 0] * v[0] + frame.rate[2, 1] * v[1] + frame.rate[2, 2] * v[2])
 
 
 @compiled
-def rotation_vector(a, b):
-    """Return the rotation vector [rad] in the frame of the body by which it turned from the quaternion a to b."""
+def rotation_vector(a: Quaternion | Numbers4, b: Quaternion) -> Numbers3:
+    """Return the rotation vector in the frame of the body by which it turned from the quaternion a to b."""
     x, y, z, w = product((-a[0], -a[1], -a[2], a[3]), b)
     if w < 0.0:
         x, y, z, w = -x, -y, -z, -w
@@ -100,18 +103,18 @@ def rotation_vector(a, b):
 
 
 @compiled
-def turned(q, x, y, z):
-    """Return the quaternion of a body that had the quaternion q and turned by a rotation vector (x, y, z) [rad] in the
-    frame of the body."""
+def turned(q: Quaternion | Numbers4, x: Radians, y: Radians, z: Radians) -> Numbers4:
+    """Return the quaternion of a body that had the quaternion q and turned by a rotation vector in the frame of
+    the body."""
     angle = math.sqrt(x * x + y * y + z * z)
     k = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
     return product(q, (k * x, k * y, k * z, math.cos(0.5 * angle)))
 
 
 @compiled
-def of_angles(heading, pitch, roll):
+def of_angles(heading: Radians, pitch: Radians, roll: Radians) -> Numbers4:
     """Return the quaternion FLU -> ENU of a heading clockwise from north, a pitch with the bow up and a roll with the
-    starboard side down, all [rad]: Rz(90 deg - heading) Ry(-pitch) Rx(roll)."""
+    starboard side down: Rz(90 deg - heading) Ry(-pitch) Rx(roll)."""
     y, p, r = 0.5 * (0.5 * math.pi - heading), -0.5 * pitch, 0.5 * roll
     yaw, level = (0.0, 0.0, math.sin(y), math.cos(y)), (0.0, math.sin(p), 0.0, math.cos(p))
     return product(product(yaw, level), (math.sin(r), 0.0, 0.0, math.cos(r)))

@@ -1,53 +1,48 @@
 """Law of one sample of an INS: frames, check of the frames, rates, and the reason why a sample is not published."""
 import math
-from typing import Annotated
 
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Floats, Vector3
+from pedestal_common.quantities import Bit, Nanoseconds, Quaternion, RadiansPerSecond, Records, Vector3
 from pedestal_common.record import Record
 from pedestal_hardware.ins import frame_check, frames, rate_estimator
 
 
 class Constants(Record):
-    """frame: of the device; bandwidth: of rate_estimator [rad/s]; max_gap_ns: longest time between two samples, after
-    which the rates begin again; checked: 1 if a failed check withholds the attitude.
-    """
+    """Constants of a device."""
     frame: frames.Frame
-    bandwidth: float
-    max_gap_ns: int
-    checked: int
+    bandwidth: RadiansPerSecond     # of rate_estimator
+    max_gap_ns: Nanoseconds         # longest time between two samples, after which the rates begin again
+    checked: Bit                    # 1 if a failed check withholds the attitude
 
 
 class State(Record):
-    """runs: 1 after the first sample; last: its stamp [ns]; gaps: number of gaps."""
+    """State of the law."""
     check: frame_check.Check
     estimator: rate_estimator.Estimator
-    runs: int
-    last: int
-    gaps: int
+    runs: Bit               # 1 after the first sample
+    last: Nanoseconds       # stamp of the last sample
+    gaps: int               # number of gaps
 
 
 class Inputs(Record):
-    """Sample in the frames of the device: stamp [ns], quaternion, rates [rad/s], specific force [m/s2] or NaN; axes: bit
-    mask of the known rates, 0 for none.
-    """
-    stamp: int
-    q: Annotated[Floats, (4,)]
-    w: Vector3
-    force: Vector3
-    axes: int
+    """Sample in the frames of the device."""
+    stamp: Nanoseconds
+    q: Quaternion
+    w: Vector3              # rates [rad/s]
+    force: Vector3          # specific force [m/s2] or NaN
+    axes: int               # bit mask of the known rates, 0 for none
 
 
 class Outputs(Record):
-    """Sample in the frames of the graph: quaternion deck -> earth, deck rate [rad/s], specific force [m/s2]."""
-    q: Annotated[Floats, (4,)]
-    w: Vector3
-    force: Vector3
+    """Sample in the frames of the graph."""
+    q: Quaternion           # deck -> earth
+    w: Vector3              # deck rate [rad/s]
+    force: Vector3          # specific force [m/s2]
 
 
-class UnitRecord(Record):
-    """Record."""
+class InputRecord(Record):
+    """All data of the law."""
     constants: Constants
     state: State
     inputs: Inputs
@@ -64,48 +59,50 @@ Outcome = codes(OUTCOMES)
 
 
 @compiled
-def _is_attitude(q, w, axes):
+def _is_attitude(q: Quaternion, w: Vector3, axes: int) -> bool:
     """Return True if q has the length 1 and the known rates are finite."""
     size = math.sqrt(q[0]**2 + q[1]**2 + q[2]**2 + q[3]**2)
     return abs(size - 1.0) < MAX_NORM_ERROR and (axes == 0 or math.isfinite(w[0] + w[1] + w[2]))
 
 
 @compiled
-def step(record):
-    """Convert the sample in the inputs. Return the code of its outcome; record: (1,) of Record."""
-    m = record[0]
-    c, s, u, o = m.constants, m.state, m.inputs, m.outputs
-    if not _is_attitude(u.q, u.w, u.axes):
+def step(records: Records) -> int:
+    """Convert the sample in the inputs of InputRecords (1,). Return the code of its outcome."""
+    record = records[0]
+    constants, state, inputs, outputs = record.constants, record.state, record.inputs, record.outputs
+    if not _is_attitude(inputs.q, inputs.w, inputs.axes):
         return Outcome.NO_ATTITUDE
-    if s.runs and u.stamp <= s.last:
+    if state.runs and inputs.stamp <= state.last:
         return Outcome.NOT_NEWER
-    if u.axes == frame_check.ALL_AXES and u.w[0]**2 + u.w[1]**2 + u.w[2]**2 > MAX_RATE_RAD_S**2:
+    if inputs.axes == frame_check.ALL_AXES and inputs.w[0]**2 + inputs.w[1]**2 + inputs.w[2]**2 > MAX_RATE_RAD_S**2:
         return Outcome.TOO_FAST
-    if s.runs and u.stamp - s.last > c.max_gap_ns:
-        s.gaps += 1
-        frame_check.restart(s.check)
-        rate_estimator.restart(s.estimator)
-    s.runs, s.last = 1, u.stamp
-    q, w, force = frames.attitude(c.frame, u.q), frames.on_deck(c.frame, u.w), frames.on_deck(c.frame, u.force)
+    if state.runs and inputs.stamp - state.last > constants.max_gap_ns:
+        state.gaps += 1
+        frame_check.restart(state.check)
+        rate_estimator.restart(state.estimator)
+    state.runs, state.last = 1, inputs.stamp
+    frame = constants.frame
+    q = frames.attitude(frame, inputs.q)
+    w, force = frames.on_deck(frame, inputs.w), frames.on_deck(frame, inputs.force)
     size = math.sqrt(q[0]**2 + q[1]**2 + q[2]**2 + q[3]**2)
     for i in range(4):
-        o.q[i] = q[i] / size
+        outputs.q[i] = q[i] / size
     for i in range(3):
-        o.w[i], o.force[i] = w[i], force[i]
-    if u.axes:
-        frame_check.take(s.check, u.stamp, o.q, o.w, o.force, u.axes)
+        outputs.w[i], outputs.force[i] = w[i], force[i]
+    if inputs.axes:
+        frame_check.take(state.check, inputs.stamp, outputs.q, outputs.w, outputs.force, inputs.axes)
     # The cosine of the tilt is the third diagonal element of the matrix of q.
-    if 1.0 - 2.0 * (o.q[0]**2 + o.q[1]**2) < 0.5:
+    if 1.0 - 2.0 * (outputs.q[0]**2 + outputs.q[1]**2) < 0.5:
         return Outcome.TILTED
     settled = True
-    if u.axes != frame_check.ALL_AXES:
-        settled, w, jumped = rate_estimator.take(s.estimator, u.stamp, o.q, c.bandwidth)
+    if inputs.axes != frame_check.ALL_AXES:
+        settled, w, jumped = rate_estimator.take(state.estimator, inputs.stamp, outputs.q, constants.bandwidth)
         if jumped:
             return Outcome.TOO_FAST
         for i in range(3):
-            o.w[i] = w[i]
-    if settled and o.w[0]**2 + o.w[1]**2 + o.w[2]**2 > MAX_RATE_RAD_S**2:
+            outputs.w[i] = w[i]
+    if settled and outputs.w[0]**2 + outputs.w[1]**2 + outputs.w[2]**2 > MAX_RATE_RAD_S**2:
         return Outcome.TOO_FAST
-    if c.checked and (s.check.verdict == frame_check.FRAME_WRONG or s.check.down):
+    if constants.checked and (state.check.verdict == frame_check.FRAME_WRONG or state.check.down):
         return Outcome.WRONG_FRAME
     return Outcome.PUBLISHED if settled else Outcome.SETTLING

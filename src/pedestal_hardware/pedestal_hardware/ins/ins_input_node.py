@@ -7,14 +7,17 @@ import pedestal_common.entry  # noqa: F401
 
 # isort: split
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from pedestal_common.node import middleware, shell
+from pedestal_common.node.unit import Diagnosis
 from pedestal_common.parameters import ParameterError
 from pedestal_common.wire import messages
-from pedestal_hardware.ins.unit import InsInputUnit
+from pedestal_hardware.ins.params import InsInputParameters
+from pedestal_hardware.ins.unit import InsInputUnit, Sample
 from pedestal_hardware.lines.line_node import LineNode
 
 ATTITUDE_TOPIC, STATE_TOPIC, IMU_TYPE = 'ship/imu/data', 'ins/state', 'sensor_msgs/msg/Imu'
@@ -24,8 +27,9 @@ DRIVER_QUEUE_DEPTH = 10  # number of messages of a driver that wait while the no
 
 class InsInputNode(LineNode):
     """Node of an InsInputUnit."""
+    parameters: InsInputParameters
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('pedestal_hardware.ins.ins_input_node')
         p, self.unit = self.parameters, InsInputUnit(self.parameters)
         self.prepare(self.unit)
@@ -46,21 +50,21 @@ class InsInputNode(LineNode):
                                      profile, raw=True)
 
     @property
-    def awaits(self):
+    def awaits(self) -> str:
         """Text that names the device for which the node waits."""
         p = self.parameters
         return f'{p.nmea.sentence.upper()} from {p.nmea.url}' if p.source == 'nmea' else p.imu.topic
 
     @property
-    def quiet_reason(self):
+    def quiet_reason(self) -> str:
         """Text for a device that sends nothing that can be used."""
         return f'no {self.awaits}'
 
-    def take_line(self, line):
+    def take_line(self, line: bytes) -> None:
         """Publish the attitude of a sentence."""
         self.send(self.unit.take_line(line, self.clock()[1]))
 
-    def take_imu(self, data):
+    def take_imu(self, data: bytes) -> None:
         """Publish the attitude of a message of a driver, CDR bytes."""
         try:
             message = messages.deserialize(bytes(data), IMU_TYPE)
@@ -70,8 +74,8 @@ class InsInputNode(LineNode):
         with self.lock:
             self.send(self.unit.take_imu(message, self.clock()[1]))
 
-    def send(self, sample):
-        """Publish a Sample, or nothing without one; then ins/state after a change."""
+    def send(self, sample: Sample | None) -> None:
+        """Publish a sample, or nothing without one; then ins/state after a change."""
         if sample is not None:
             self.published(sample.stamp)
             m = self.message
@@ -85,18 +89,18 @@ class InsInputNode(LineNode):
             self.publish(messages.serialize(m))
         self.announce_state()
 
-    def announce_state(self):
+    def announce_state(self) -> None:
         """Publish ins/state after a change."""
         if self.unit.state != self.state:
             self.state = self.unit.state
             self.publish_state(messages.serialize(messages.String(data=self.state)))
 
-    def diagnosed(self):
+    def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of the unit."""
         return self.unit.diagnose(self.clock()[1])
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node to its end. Return the exit code."""
     return shell.main(InsInputNode, args)
 

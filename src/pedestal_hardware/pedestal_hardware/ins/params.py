@@ -3,6 +3,7 @@ import dataclasses
 import math
 
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
+from pedestal_common.quantities import Radians
 from pedestal_hardware.ins.frames import BODY_MATRICES, EARTH_MATRICES
 from pedestal_hardware.ins.sentences import KINDS
 from pedestal_hardware.lines import sources
@@ -43,9 +44,9 @@ class MountingParameters(Parameters):
     yaw: float = parameter(0.0, -180.0, 180.0, 'deg', 'yaw of the case, positive with its front to port')
 
     @property
-    def radians(self):
-        """(roll, pitch, yaw) [rad]."""
-        return tuple(math.radians(angle) for angle in (self.roll, self.pitch, self.yaw))
+    def radians(self) -> tuple[Radians, Radians, Radians]:
+        """Roll, pitch, yaw."""
+        return math.radians(self.roll), math.radians(self.pitch), math.radians(self.yaw)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,7 +72,7 @@ class InsInputParameters(Parameters):
     silence: float = parameter(0.5, 0.05, 60.0, 's', 'time without an attitude from which the diagnostics report an '
                                'error')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for a connection that cannot be used, or a time that the sentence does not have."""
         if self.source == 'nmea':
             sources.place(self.nmea.url, 'nmea.url')
@@ -84,7 +85,7 @@ class InsInputParameters(Parameters):
         if not self.imu.topic.strip():
             raise ParameterError("imu.topic = '': must be the name of a topic")
 
-    def check_graph(self, beams, lockstep):
+    def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError for a graph in lockstep."""
         if lockstep:
             raise ParameterError('graph.pacing = lockstep: must be realtime, because the INS has its own time')

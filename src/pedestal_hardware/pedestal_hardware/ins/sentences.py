@@ -11,8 +11,10 @@ clockwise from north.
 """
 import math
 import typing
+from collections.abc import Callable, Sequence
 
 from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY
+from pedestal_common.quantities import Degrees, Nanoseconds
 
 KINDS = ('pashr', 'prdid', 'hdt')  # sentences that give an attitude. hdt gives only the heading.
 MAX_LEVEL_DEG = 90.0  # largest roll and pitch [deg]
@@ -22,28 +24,20 @@ MAX_TURN_DEG_MIN = 3600.0  # largest rate of turn [deg/min]
 class SentenceError(ValueError):
     """Error of a sentence that is dropped; kind: bad_checksum, unreadable or out_of_range."""
 
-    def __init__(self, kind, reason):
+    def __init__(self, kind: str, reason: str) -> None:
         super().__init__(reason)
         self.kind = kind
 
 
 class Attitude(typing.NamedTuple):
-    """Angles of a sentence [deg].
-
-    kind                  of KINDS
-    heading               NaN for an empty field
-    pitch, roll           as in the sentence; 0 in a sentence without
-    time_of_day           time since midnight UTC [ns], None in a sentence without time
-    sigmas                1-sigma of roll, pitch, heading, NaN where it is not stated
-    status                INS status, None where it is not stated
-    """
-    kind: str
-    heading: float
-    pitch: float = 0.0
-    roll: float = 0.0
-    time_of_day: int | None = None
-    sigmas: tuple[float, float, float] = (math.nan,) * 3
-    status: int | None = None
+    """Angles of a sentence."""
+    kind: str                   # of KINDS
+    heading: Degrees            # NaN for an empty field
+    pitch: Degrees = 0.0        # as in the sentence; 0 in a sentence without
+    roll: Degrees = 0.0         # likewise
+    time_of_day: Nanoseconds | None = None      # since midnight UTC, None in a sentence without time
+    sigmas: tuple[Degrees, ...] = (math.nan,) * 3   # 1-sigma of roll, pitch, heading, NaN where it is not stated
+    status: int | None = None   # INS status, None where it is not stated
 
 
 class Turn(typing.NamedTuple):
@@ -51,8 +45,8 @@ class Turn(typing.NamedTuple):
     rate: float
 
 
-def parse(line):
-    """Return the Attitude or the Turn in a line, bytes; None for a sentence of another kind.
+def parse(line: bytes) -> Attitude | Turn | None:
+    """Return the Attitude or the Turn in a line; None for a sentence of another kind.
 
     Raises SentenceError, which names what is wrong.
     """
@@ -72,7 +66,7 @@ def parse(line):
         raise SentenceError(error.kind, f'{name}: {error}') from None
 
 
-def _pashr(data):
+def _pashr(data: Sequence[str]) -> Attitude | None:
     """Return the Attitude of PASHR; data: its fields, of which the first is R."""
     data = data[1:]
     if data[:1] and data[0].isalpha():
@@ -88,36 +82,37 @@ def _pashr(data):
                     _level('roll', data, 3), _time_of_day(data[0]), sigmas, status)
 
 
-def _prdid(data):
+def _prdid(data: Sequence[str]) -> Attitude:
     """Return the Attitude of PRDID; data: its fields, of which the first is D. Its heading may be empty."""
     data = data[1:]
     heading = _number('heading', data, 2, -360.0, 360.0) if len(data) > 2 and data[2] else math.nan
     return Attitude('prdid', heading, _level('pitch', data, 0), _level('roll', data, 1))
 
 
-def _hdt(data):
+def _hdt(data: Sequence[str]) -> Attitude:
     """Return the Attitude of HDT. Raises SentenceError for a magnetic heading, and for a decimal comma."""
     if len(data) < 2 or data[1] != 'T':
         raise SentenceError('unreadable', f'heading {",".join(data):.20}: must be a number and T, true')
     return Attitude('hdt', _number('heading', data, 0, -360.0, 360.0))
 
 
-def _rot(data):
+def _rot(data: Sequence[str]) -> Turn:
     """Return the Turn of ROT. Raises SentenceError for a rate that the device declares invalid."""
     if len(data) > 1 and data[1] not in ('A', ''):
         raise SentenceError('unreadable', f'status {data[1]}: must be A')
     return Turn(_number('rate of turn', data, 0, -MAX_TURN_DEG_MIN, MAX_TURN_DEG_MIN))
 
 
-_READERS = {'PASHR': _pashr, 'PRDID': _prdid, 'HDT': _hdt, 'ROT': _rot}
+_READERS: dict[str, Callable[[Sequence[str]], Attitude | Turn | None]] = {
+    'PASHR': _pashr, 'PRDID': _prdid, 'HDT': _hdt, 'ROT': _rot}
 """{sentence, or its name without the talker: function of its fields}."""
 
 
-def _level(name, data, i):
+def _level(name: str, data: Sequence[str], i: int) -> Degrees:
     return _number(name, data, i, -MAX_LEVEL_DEG, MAX_LEVEL_DEG)
 
 
-def _number(name, data, i, lowest, highest):
+def _number(name: str, data: Sequence[str], i: int, lowest: float, highest: float) -> float:
     """Return the number in a field. Raises SentenceError for a missing number, and for one out of range."""
     text = data[i] if i < len(data) else ''
     try:
@@ -129,8 +124,8 @@ def _number(name, data, i, lowest, highest):
     return number
 
 
-def _time_of_day(text):
-    """Return the time since midnight [ns] of hhmmss.sss; None for an empty field."""
+def _time_of_day(text: str) -> Nanoseconds | None:
+    """Return the time since midnight of hhmmss.sss; None for an empty field."""
     if not text:
         return None
     if not (text[:6].isdecimal() and len(text) >= 6 and text.isascii()):
@@ -141,7 +136,7 @@ def _time_of_day(text):
     return (hours * 3600 + minutes * 60) * NS_PER_SECOND + round(seconds * NS_PER_SECOND)
 
 
-def stamp_at(time_of_day, arrival):
-    """Return the stamp [ns, UTC] of a time of day [ns] that is nearest to the time of arrival [ns, UTC]."""
+def stamp_at(time_of_day: Nanoseconds, arrival: Nanoseconds) -> Nanoseconds:
+    """Return the stamp, UTC, of a time of day that is nearest to the time of arrival, UTC."""
     day = SECONDS_PER_DAY * NS_PER_SECOND
     return arrival + (time_of_day - arrival + day // 2) % day - day // 2

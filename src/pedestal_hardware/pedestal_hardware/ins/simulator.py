@@ -9,21 +9,30 @@ import pty
 import socket
 import time
 import tty
+from typing import Protocol
 
-import numpy as np
-
+from pedestal_common.quantities import AnyRecord, Hertz, Nanoseconds, RadiansPerSecond
 from ship_motion_sim import nmea
+from ship_motion_sim.params import ShipParameters
 from ship_motion_sim.sea import motion
+
+
+class Sink(Protocol):
+    """Connection to a receiver."""
+    name: str       # url or path that the receiver opens
+
+    def send(self, data: bytes) -> None:
+        """Send bytes."""
 
 
 class UdpSink:
     """Datagrams to a UDP port of a host."""
 
-    def __init__(self, host, port):
+    def __init__(self, host: str, port: int) -> None:
         self.name = f'udp://{host}:{port}'
         self._socket, self._to = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), (host, port)
 
-    def send(self, data):
+    def send(self, data: bytes) -> None:
         """Send bytes as a datagram. A port without a receiver loses it."""
         self._socket.sendto(data, self._to)
 
@@ -31,13 +40,13 @@ class UdpSink:
 class SerialSink:
     """Pseudo terminal; `name` is the path that a receiver opens."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._end, self._device = pty.openpty()
         tty.setraw(self._device)
         os.set_blocking(self._end, False)
         self.name = os.ttyname(self._device)
 
-    def send(self, data):
+    def send(self, data: bytes) -> None:
         """Send bytes; a line that no receiver reads is lost."""
         try:
             os.write(self._end, data)
@@ -45,16 +54,16 @@ class SerialSink:
             return
 
 
-def yaw_rate(truth):
-    """Return the rate of the yaw angle [rad/s] of a record of motion.Truth.dtype."""
+def yaw_rate(truth: AnyRecord) -> RadiansPerSecond:
+    """Return the rate of the yaw angle of a motion.Truth."""
     _, w_y, w_z = truth['angular_velocity']
     return float((w_y * math.sin(truth['roll']) + w_z * math.cos(truth['roll'])) / math.cos(truth['pitch']))
 
 
-def sentences(kind, truth, stamp):
+def sentences(kind: str, truth: AnyRecord, stamp: Nanoseconds) -> bytes:
     """Return the bytes of one sample: the sentence of a kind of ins.sentences.KINDS, behind HDT and ROT.
 
-    truth: record of motion.Truth.dtype; stamp: UTC [ns].
+    truth: a motion.Truth; stamp: UTC.
     """
     roll, pitch, yaw = float(truth['roll']), float(truth['pitch']), float(truth['yaw'])
     turn = nmea.turn(yaw_rate(truth))
@@ -65,13 +74,12 @@ def sentences(kind, truth, stamp):
     return turn + heading + (nmea.angles(roll, pitch, yaw) if kind == 'prdid' else b'')
 
 
-def run(ship, sink, kind, rate, start):
+def run(ship: ShipParameters, sink: Sink, kind: str, rate: Hertz, start: Nanoseconds) -> None:
     """Send samples until the process is interrupted.
 
-    ship: ShipParameters; sink: UdpSink or SerialSink; kind: of ins.sentences.KINDS; rate: samples per second; start:
-    UTC at which the time of the ship is 0 [ns].
+    kind: of ins.sentences.KINDS; rate: of the samples; start: UTC at which the time of the ship is 0.
     """
-    [constants], [truth] = motion.constants(ship), np.zeros(1, motion.Truth.dtype)
+    [constants], [truth] = motion.constants(ship), motion.Truth.zeros()
     motion.truth(constants, 0.0, truth)      # compiles the law before the first sample is due
     period = round(1e9 / rate)
     due = time.time_ns() // period * period

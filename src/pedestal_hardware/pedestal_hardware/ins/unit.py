@@ -7,9 +7,11 @@ import typing
 import numpy as np
 
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
+from pedestal_common.quantities import Degrees, Message, Nanoseconds, Quaternion, Radians, Radians2, Records, Vector3
 from pedestal_common.wire import messages
 from pedestal_hardware.ins import conventions, frame_check, frames, input_law, sentences
 from pedestal_hardware.ins.input_law import Outcome
+from pedestal_hardware.ins.params import InsInputParameters
 
 REPORT_NS = 2_000_000_000  # time for which the diagnosis reports a dropped sample [ns]
 TURN_AGE_NS = 1_000_000_000  # age from which a rate of turn is not compared any more [ns]
@@ -31,37 +33,29 @@ VERDICT_TEXTS = ('not enough motion so far', 'agrees', 'wrong')  # texts of the 
 
 
 class Sample(typing.NamedTuple):
-    """Attitude of the deck in the frames of the graph.
-
-    stamp      time of the measurement [ns, UTC]
-    q, w       quaternion deck -> earth; rate [rad/s]
-    force      specific force [m/s2], NaN for none
-    variances  of roll, pitch, heading [rad2], 0 for unknown
-    """
-    stamp: int
-    q: np.ndarray
-    w: np.ndarray
-    force: np.ndarray
-    variances: tuple[float, float, float]
+    """Attitude of the deck in the frames of the graph."""
+    stamp: Nanoseconds      # time of the measurement, UTC
+    q: Quaternion           # deck -> earth
+    w: Vector3              # rate [rad/s]
+    force: Vector3          # specific force [m/s2], NaN for none
+    variances: tuple[Radians2, ...]     # of roll, pitch, heading, 0 for unknown
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the law: a record (1,) of input_law.Record."""
-    record: np.ndarray
+    """Memory of the law."""
+    record: Records         # input_law.InputRecord (1,)
 
 
 class InsInputUnit:
-    """Attitudes of an InsInputParameters.
+    """Attitudes of a device."""
+    counts: collections.Counter[str]    # of the published samples, of the dropped ones, and of unused sentences
+    state: str                          # text of ins/state
 
-    counts    {kind: number} of the published samples, of the dropped ones, and of sentences that are not used
-    state     text of ins/state
-    """
-
-    def __init__(self, parameters):
+    def __init__(self, parameters: InsInputParameters) -> None:
         p = self.parameters = parameters
         frame = (p.imu.earth, p.imu.body, p.imu.rate_body) if p.source == 'imu' else ('enu', 'flu', 'flu')
         self._declared, self._case = frame, frames.mounting_matrix(*p.mounting.radians)
-        self.memory = Memory(input_law.UnitRecord.zeros())
+        self.memory = Memory(input_law.InputRecord.zeros())
         self.record = self.memory.record
         constants = self.record['constants'][0]
         constants['frame'] = frames.constants(*frame, p.mounting.radians, math.radians(p.heading_zero))[0]
@@ -71,7 +65,7 @@ class InsInputUnit:
         self.state, self._dropped, self._dropped_at, self._blocking = 'aligning', '', 0, ''
         self._heading, self._turn, self._age_ns = (math.nan, 0), (0.0, 0), 0
 
-    def prepare(self):
+    def prepare(self) -> None:
         """Compile the law, without a change of the unit."""
         before = self.record.copy()
         input_law.step(self.record)
@@ -79,8 +73,8 @@ class InsInputUnit:
         input_law.step(self.record)
         self.record[...] = before
 
-    def take_line(self, line, arrival):
-        """Return the Sample of a line, bytes; None without one. arrival: of the line [ns, UTC]."""
+    def take_line(self, line: bytes, arrival: Nanoseconds) -> Sample | None:
+        """Return the sample of a line; None without one. arrival: of the line, UTC."""
         p = self.parameters
         try:
             found = sentences.parse(line)
@@ -112,8 +106,8 @@ class InsInputUnit:
         variances = tuple(0.0 if math.isnan(sigma) else math.radians(sigma)**2 for sigma in found.sigmas)
         return self._sample(device, arrival, variances, aligned)
 
-    def _level_angles(self, found):
-        """Return (pitch, roll) [rad] of a sentence with the bow up and the starboard side down."""
+    def _level_angles(self, found: sentences.Attitude) -> tuple[Radians, Radians]:
+        """Return (pitch, roll) of a sentence with the bow up and the starboard side down."""
         p = self.parameters.nmea
         pitch = math.radians(found.pitch) * (1.0 if p.pitch_positive == 'bow_up' else -1.0)
         roll = math.radians(found.roll) * (1.0 if p.roll_positive == 'starboard_down' else -1.0)
@@ -121,8 +115,8 @@ class InsInputUnit:
             roll = math.asin(min(max(math.sin(roll) / max(math.cos(pitch), 1e-9), -1.0), 1.0))
         return pitch, roll
 
-    def take_imu(self, message, arrival):
-        """Return the Sample of a sensor_msgs/Imu; None without one. arrival: of the message [ns, UTC]."""
+    def take_imu(self, message: Message, arrival: Nanoseconds) -> Sample | None:
+        """Return the sample of a sensor_msgs/Imu; None without one. arrival: of the message, UTC."""
         p, u = self.parameters, self.record['inputs'][0]
         if message.orientation_covariance[0] < 0.0:
             return self._drop('no_orientation', f'{p.imu.topic}: orientation_covariance[0] < 0 declares no '
@@ -138,9 +132,9 @@ class InsInputUnit:
         aligned = not math.sqrt(variances[2]) > math.radians(p.aligned_sigma)
         return self._sample(messages.nanoseconds(message.header.stamp), arrival, variances, aligned)
 
-    def _sample(self, device, arrival, variances, aligned):
-        """Return the Sample of the inputs of the law; None for a dropped one. device: stamp of the device [ns, UTC],
-        None for none."""
+    def _sample(self, device: Nanoseconds | None, arrival: Nanoseconds, variances: tuple[Radians2, ...],
+                aligned: bool) -> Sample | None:
+        """Return the sample of the inputs of the law; None for a dropped one. device: stamp of the device, UTC."""
         p, u = self.parameters, self.record['inputs'][0]
         stamp = arrival if p.stamp == 'arrival' else device
         if stamp is None:
@@ -162,7 +156,7 @@ class InsInputUnit:
         outputs = self.record['outputs'][0]
         return Sample(int(u['stamp']), outputs['q'], outputs['w'], outputs['force'], variances)
 
-    def _wrong_frame(self, outcome):
+    def _wrong_frame(self, outcome: int) -> str:
         """Return the text of a frame that cannot be right, with the frames that would fit."""
         check, u, o = (self.record[name][0] for name in ('state', 'inputs', 'outputs'))
         check = check['check']
@@ -182,18 +176,20 @@ class InsInputUnit:
         fitting = conventions.fitting(check, self._declared, self._case, u['q'])
         return f'wrong frame: {reason}; {conventions.text(fitting)}'
 
-    def _drop(self, kind, reason, arrival):
+    def _drop(self, kind: str, reason: str, arrival: Nanoseconds) -> Sample | None:
+        """Count and note what is dropped. Return None, for the caller to return."""
         self.counts[kind] += 1
         if kind != 'settling':
             self._dropped, self._dropped_at = f'dropped a sample: {reason}', arrival
+        return None
 
     @property
-    def verdict(self):
+    def verdict(self) -> str:
         """Text of the verdict of the check of the frames."""
         return VERDICT_TEXTS[self.record['state'][0]['check']['verdict']]
 
-    def diagnose(self, now):
-        """Return the Diagnosis at a time [ns, UTC]: ERROR for a wrong frame, WARN for REPORT_NS after a dropped
+    def diagnose(self, now: Nanoseconds) -> Diagnosis:
+        """Return the Diagnosis at a UTC: ERROR for a wrong frame, WARN for REPORT_NS after a dropped
         sample."""
         state, o = self.record['state'][0], self.record['outputs'][0]
         values = [*((f'{name}_deg', f'{angle:.2f}') for name, angle in self._angles(o['q'])),
@@ -217,8 +213,8 @@ class InsInputUnit:
             return Diagnosis(LEVEL_WARN, 'the INS aligns', values)
         return Diagnosis(LEVEL_OK, 'receives attitudes', values)
 
-    def _angles(self, q):
-        """Return (name, angle [deg]) of heading, pitch (bow up) and roll (starboard down) of a quaternion."""
+    def _angles(self, q: Quaternion) -> tuple[tuple[str, Degrees], ...]:
+        """Return (name, angle) of heading, pitch (bow up) and roll (starboard down) of a quaternion."""
         x, y, z, w = q
         yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         pitch = -math.asin(min(max(2.0 * (w * y - x * z), -1.0), 1.0))

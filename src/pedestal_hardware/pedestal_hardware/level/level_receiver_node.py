@@ -8,9 +8,12 @@ import pedestal_common.entry  # noqa: F401
 # isort: split
 import math
 import sys
+from collections.abc import Sequence
 
 from pedestal_common.node import shell
+from pedestal_common.node.unit import Diagnosis
 from pedestal_common.wire import messages
+from pedestal_hardware.level.params import LevelReceiverParameters
 from pedestal_hardware.level.unit import LevelUnit
 from pedestal_hardware.lines.line_node import LineNode
 
@@ -19,8 +22,9 @@ ERROR_TOPIC = 'tracking_receiver/angle_error'
 
 class LevelReceiverNode(LineNode):
     """Node of a LevelUnit. An error of 0 would state that the target is on the axis, so the errors are NaN."""
+    parameters: LevelReceiverParameters
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('pedestal_hardware.level.level_receiver_node')
         self.unit, self.message = LevelUnit(self.parameters), messages.template(ERROR_TOPIC)
         self.message.vector.x = self.message.vector.y = math.nan
@@ -28,11 +32,11 @@ class LevelReceiverNode(LineNode):
         self.read_lines(self.parameters.url, self.parameters.baud_rate)
 
     @property
-    def awaits(self):
+    def awaits(self) -> str:
         """Text that names the device for which the node waits."""
         return f'lines from {self.parameters.url}'
 
-    def take_line(self, line):
+    def take_line(self, line: bytes) -> None:
         """Publish the level of a line."""
         level = self.unit.take(line, self.clock()[1])
         if level is None:
@@ -42,12 +46,12 @@ class LevelReceiverNode(LineNode):
         self.message.vector.z = level.level
         self.publish(messages.serialize(self.message))
 
-    def diagnosed(self):
+    def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of the unit."""
         return self.unit.diagnose(self.clock()[1])
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node to its end. Return the exit code."""
     return shell.main(LevelReceiverNode, args)
 

@@ -24,7 +24,7 @@ SEPARATORS = ',; '  # characters of which one follows {skip}. The match is there
 class LineFormat:
     """A format string. Raises ParameterError, which names the wrong field."""
 
-    def __init__(self, text):
+    def __init__(self, text: str) -> None:
         self.text, self._hexadecimal = text, False
         try:
             parts = list(string.Formatter().parse(text.strip()))
@@ -36,7 +36,7 @@ class LineFormat:
             if name is None:
                 continue
             field = f'field {{{name}' + (f'!{conversion}' if conversion else '') + (f':{form}' if form else '') + '}'
-            if (name, form) not in FIELD_PATTERNS or conversion:
+            if form is None or (name, form) not in FIELD_PATTERNS or conversion:
                 raise self._error(f'{field}: must be {FIELDS_TEXT}')
             if after and (not after[0] or name == 'skip' and after[0][0] not in SEPARATORS):
                 raise self._error(f'{field}: must be followed by a comma, a semicolon, a space or the end')
@@ -49,11 +49,11 @@ class LineFormat:
             raise self._error('field {level}: is missing')
         self._pattern = re.compile(pattern, re.ASCII | re.IGNORECASE)
 
-    def _error(self, reason):
+    def _error(self, reason: str) -> ParameterError:
         return ParameterError(f"format = '{self.text}': {reason}")
 
-    def level(self, line):
-        """Return the number in a line, bytes; it may be NaN or infinite. Raises ValueError for a line of another
+    def level(self, line: bytes) -> float:
+        """Return the number in a line; it may be NaN or infinite. Raises ValueError for a line of another
         form."""
         match = self._pattern.fullmatch(line.decode('ascii', 'replace').strip())
         if match is None:

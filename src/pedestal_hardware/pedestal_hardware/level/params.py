@@ -21,7 +21,7 @@ class LevelReceiverParameters(Parameters):
     silence: float = parameter(2.0, 0.05, 600.0, 's', 'time without a level from which the diagnostics report an '
                                'error')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for a url, a format or a range that cannot be used."""
         sources.place(self.url)
         LineFormat(self.format)
@@ -30,7 +30,7 @@ class LevelReceiverParameters(Parameters):
         if self.scale == 0.0:
             raise ParameterError('scale = 0 dB: must not be 0')
 
-    def check_graph(self, beams, lockstep):
+    def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError for a graph in lockstep."""
         if lockstep:
             raise ParameterError('graph.pacing = lockstep: must be realtime, because the receiver has its own time')

@@ -6,43 +6,51 @@ import threading
 
 from pedestal_common.graph import nodes
 from pedestal_common.node import shell
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN, Diagnosis
+from pedestal_common.quantities import Nanoseconds
 from pedestal_hardware.lines.reader import LineReader
 
 
 class LineNode(shell.Shell):
-    """Node of a device that sends lines. A subclass has `take_line(line)` and `diagnosed()`.
+    """Node of a device that sends lines. Its parameters have the field `silence`, the longest time between two
+    published messages that is no error [s]."""
 
-    silence     longest time between two published messages that is no error [s]
-    reader      the LineReader, None for a device that sends no lines
-    """
-
-    def __init__(self, module):
+    def __init__(self, module: str) -> None:
         row = nodes.of_executable(module)
         super().__init__(row.name, row.parameters_type())
-        self.lock, self.reader, self._published = threading.Lock(), None, None
+        self.lock = threading.Lock()
+        self.line_reader: LineReader | None = None      # None for a device that sends no lines
+        self._published: Nanoseconds | None = None      # time of the steady clock
         self.diagnose_with(self.diagnose)
 
-    def read_lines(self, url, baud_rate):
-        """Begin to read the lines of a device."""
-        self.reader = LineReader(url, baud_rate, self._guarded(self._locked_line))
-        self.reader.start()
+    def take_line(self, line: bytes) -> None:
+        """Publish what a line states; overridden by a node that reads lines."""
+        raise NotImplementedError
 
-    def _locked_line(self, line):
+    def diagnosed(self) -> Diagnosis:
+        """Return the Diagnosis of the unit; overridden by each node."""
+        raise NotImplementedError
+
+    def read_lines(self, url: str, baud_rate: int) -> None:
+        """Begin to read the lines of a device."""
+        self.line_reader = LineReader(url, baud_rate, self._guarded(self._locked_line))
+        self.line_reader.start()
+
+    def _locked_line(self, line: bytes) -> None:
         with self.lock:
             self.take_line(line)
 
-    def published(self, stamp):
-        """Note that a message with a stamp [ns] is about to be published."""
+    def published(self, stamp: Nanoseconds) -> None:
+        """Note that a message with a stamp is about to be published."""
         self.begin_step(stamp)
         self._published = self.clock()[0]
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the Diagnosis: ERROR while the device is silent, else that of the subclass with the counts of the
         reader."""
         with self.lock:
             diagnosis = self.diagnosed()
-        reader = self.reader
+        reader = self.line_reader
         counts = reader.counts if reader else {}
         values = [*diagnosis.values, *((name, str(count)) for name, count in counts.items())]
         since = None if self._published is None else (self.clock()[0] - self._published) * 1e-9
@@ -56,12 +64,12 @@ class LineNode(shell.Shell):
         return diagnosis._replace(values=values)
 
     @property
-    def quiet_reason(self):
+    def quiet_reason(self) -> str:
         """Text for a device that sends nothing over an open connection."""
-        return f'no line from {self.reader.url}' if self.reader else 'no message'
+        return f'no line from {self.line_reader.url}' if self.line_reader else 'no message'
 
-    def close(self):
+    def close(self) -> None:
         """End the reader and the node."""
-        if self.reader is not None:
-            self.reader.close()
+        if self.line_reader is not None:
+            self.line_reader.close()
         super().close()

@@ -7,7 +7,9 @@ Half a level or half an angle would otherwise be a wrong number.
 import re
 import threading
 import time
+from collections.abc import Callable
 
+from pedestal_common.quantities import Seconds
 from pedestal_hardware.lines import sources
 
 MAX_LINE_BYTES = 256  # largest length of a line; NMEA 0183 allows 82 bytes
@@ -24,23 +26,23 @@ ENDS_PATTERN = re.compile(rb'[\r\n\0]')
 class LineSplitter:
     """Whole lines in a stream of bytes. counts: {kind: number} of the lines and of what was discarded."""
 
-    def __init__(self, counts):
+    def __init__(self, counts: dict[str, int]) -> None:
         self.counts = counts
         self._rest, self._since, self._skips = b'', 0.0, False
 
-    def begin(self, whole):
+    def begin(self, whole: bool) -> None:
         """Begin with a new connection. whole: True if its first bytes begin a line."""
         if self._rest:
             self.counts['cut_lines'] += 1
         self._rest, self._skips = b'', not whole
 
-    def datagram(self, received):
+    def datagram(self, received: bytes) -> list[bytes]:
         """Return the lines of a datagram, of which each is whole."""
         return self._checked(ENDS_PATTERN.split(received))
 
-    def stream(self, received, now):
-        """Return the lines that are complete with bytes that were received now, a time [s]; b'' to look only for a
-        line that has stopped."""
+    def stream(self, received: bytes, now: Seconds) -> list[bytes]:
+        """Return the lines that are complete with bytes that were received now; b'' to look only for a line that has
+        stopped."""
         if self._rest and now - self._since > LINE_TIMEOUT_S:
             self.counts['cut_lines'] += 1
             self._rest, self._skips = b'', True
@@ -57,7 +59,7 @@ class LineSplitter:
         self._rest, self._since = rest, now
         return self._checked(ended)
 
-    def _checked(self, lines):
+    def _checked(self, lines: list[bytes]) -> list[bytes]:
         """Return the lines that are not empty and not too long."""
         kept = [line for line in lines if line.strip() and len(line) <= MAX_LINE_BYTES]
         self.counts['long_lines'] += sum(len(line) > MAX_LINE_BYTES for line in lines)
@@ -66,33 +68,30 @@ class LineSplitter:
 
 
 class LineReader:
-    """Reader of one device.
+    """Reader of one device. take: called in the thread of the reader for each whole line."""
+    url: str                # see sources.place
+    baud_rate: int
+    silence: str            # reason why no bytes arrive, '' while the connection is open
+    counts: dict[str, int]  # lines, cut_lines, long_lines, connections
 
-    url, baud_rate   of the device, see sources.place
-    take             take(line: bytes), called in the thread of the reader for each whole line
-
-    silence   reason why no bytes arrive, '' while the connection is open
-    counts    {kind: number}: lines, cut_lines, long_lines, connections
-    """
-
-    def __init__(self, url, baud_rate, take):
+    def __init__(self, url: str, baud_rate: int, take: Callable[[bytes], None]) -> None:
         self.url, self.baud_rate, self._take = url, baud_rate, take
         self.silence = f'{url}: not connected so far'
         self.counts = {'lines': 0, 'cut_lines': 0, 'long_lines': 0, 'connections': 0}
         self._splitter, self._ended = LineSplitter(self.counts), threading.Event()
         self._thread = threading.Thread(target=self._run, name='lines', daemon=True)
 
-    def start(self):
+    def start(self) -> None:
         """Start the thread."""
         self._thread.start()
 
-    def close(self):
+    def close(self) -> None:
         """End the thread."""
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join(sources.CONNECT_TIMEOUT_S + RETRY_PERIOD_S)
 
-    def _run(self):
+    def _run(self) -> None:
         while not self._ended.is_set():
             source = None
             try:
@@ -108,7 +107,7 @@ class LineReader:
                 if source is not None:
                     source.close()
 
-    def _serve(self, source):
+    def _serve(self, source: sources.Source) -> None:
         """Read lines until the reader ends. Raises OSError when the device vanishes."""
         heard = time.monotonic()
         while not self._ended.is_set():

@@ -1,14 +1,7 @@
-"""Sources of bytes: a UDP port of this machine, a TCP connection to a device, or a serial device.
-
-A source has three members:
-
-    read()    wait at most READ_TIMEOUT_S; return the received bytes, b'' for none. Raises OSError if the device
-              vanished
-    close()   end the connection
-    WHOLE     True if each `read` returns whole lines, as a datagram does
-"""
+"""Sources of bytes: a UDP port of this machine, a TCP connection to a device, or a serial device."""
 import socket
 import urllib.parse
+from typing import Protocol
 
 from pedestal_common.parameters import ParameterError
 
@@ -20,11 +13,23 @@ URL_FORMS_TEXT = 'udp://HOST:PORT, socket://HOST:PORT, or the path of a serial d
 """Forms of the url of a device, for texts."""
 
 
+class Source(Protocol):
+    """Source of bytes."""
+    WHOLE: bool     # True if each `read` returns whole lines, as a datagram does
+
+    def read(self) -> bytes:
+        """Wait at most READ_TIMEOUT_S, and return the received bytes, b'' for none. Raises OSError if the device has
+        vanished."""
+
+    def close(self) -> None:
+        """End the connection."""
+
+
 class UdpSource:
     """Datagrams at a UDP port of this machine. host: address of this machine to which the device sends."""
     WHOLE = True
 
-    def __init__(self, host, port):
+    def __init__(self, host: str, port: int) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self.socket.bind((host, port))
@@ -33,14 +38,14 @@ class UdpSource:
             raise
         self.socket.settimeout(READ_TIMEOUT_S)
 
-    def read(self):
+    def read(self) -> bytes:
         """Return the next datagram."""
         try:
             return self.socket.recv(MAX_READ_BYTES)
         except TimeoutError:
             return b''
 
-    def close(self):
+    def close(self) -> None:
         """Free the port."""
         self.socket.close()
 
@@ -49,11 +54,11 @@ class TcpSource:
     """TCP connection to a device that listens at host and port."""
     WHOLE = False
 
-    def __init__(self, host, port):
+    def __init__(self, host: str, port: int) -> None:
         self.socket = socket.create_connection((host, port), CONNECT_TIMEOUT_S)
         self.socket.settimeout(READ_TIMEOUT_S)
 
-    def read(self):
+    def read(self) -> bytes:
         """Return the next bytes. Raises OSError after the end of the connection."""
         try:
             received = self.socket.recv(MAX_READ_BYTES)
@@ -63,7 +68,7 @@ class TcpSource:
             raise OSError('the device has closed the connection')
         return received
 
-    def close(self):
+    def close(self) -> None:
         """End the connection."""
         self.socket.close()
 
@@ -72,7 +77,7 @@ class SerialSource:
     """Serial device of a path, at a speed [Bd]."""
     WHOLE = False
 
-    def __init__(self, path, baud_rate):
+    def __init__(self, path: str, baud_rate: int) -> None:
         # pyserial is an extra of this package.
         try:
             import serial
@@ -80,16 +85,16 @@ class SerialSource:
             raise OSError(f"{error}: pip install 'pedestal_hardware[serial]'") from None
         self.device = serial.Serial(path, baud_rate, timeout=READ_TIMEOUT_S)
 
-    def read(self):
+    def read(self) -> bytes:
         """Return the next bytes. Raises OSError, of which SerialException is a kind, when the device vanishes."""
         return self.device.read(max(1, min(self.device.in_waiting, MAX_READ_BYTES)))
 
-    def close(self):
+    def close(self) -> None:
         """Free the device."""
         self.device.close()
 
 
-def place(url, name='url'):
+def place(url: str, name: str = 'url') -> tuple[str, str, int]:
     """Return (scheme, host, port) of a url; ('', path, 0) for a serial device.
 
     Raises ParameterError, which begins with the name of the parameter and names the part that is wrong.
@@ -110,7 +115,7 @@ def place(url, name='url'):
     return parts.scheme, parts.hostname, port
 
 
-def opened(url, baud_rate):
+def opened(url: str, baud_rate: int) -> Source:
     """Return the opened source of a url. Raises OSError, or ValueError for a speed that the device refuses."""
     scheme, where, port = place(url)
     if not scheme:

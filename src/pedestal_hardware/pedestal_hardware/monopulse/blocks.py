@@ -6,11 +6,17 @@ sample counter, from one measured time. The time of arrival of a chunk alone nev
 """
 import collections
 import contextlib
-import typing
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Hertz, Nanoseconds, Seconds
+
+if TYPE_CHECKING:
+    from pedestal_hardware.monopulse import sigmf
 
 TIME_TOLERANCE_NS = 20_000
 """Largest deviation of a source's time from the sample counter before the counter is set again [ns]."""
@@ -40,22 +46,25 @@ class StreamError(ValueError):
     """Error of a stream of samples, one line that names the value and what it must be."""
 
 
-class Chunk(typing.NamedTuple):
-    """Samples (n, channels) complex64 that follow each other, the number of the first sample, and its UTC [ns]."""
-    samples: np.ndarray
-    first: int
-    utc: int
+Samples: TypeAlias = NDArray[np.complex64]   # (n, channels)
 
 
-class Block(typing.NamedTuple):
-    """Samples (n, channels) of a step, the UTC of their middle [ns], number of samples missing before them."""
-    samples: np.ndarray
-    middle: int
-    missing: int
+class Chunk(NamedTuple):
+    """Samples that follow each other."""
+    samples: Samples
+    first: int          # number of the first sample
+    utc: Nanoseconds    # of the first sample
 
 
-def saturated_share(samples, full_scale) -> float:
-    """Return the share of samples (n, channels) whose first channel is at full scale, 0 without a full scale."""
+class Block(NamedTuple):
+    """Samples of a step."""
+    samples: Samples
+    middle: Nanoseconds     # UTC of their middle
+    missing: int            # number of samples missing before them
+
+
+def saturated_share(samples: Samples, full_scale: float | None) -> float:
+    """Return the share of samples whose first channel is at full scale, 0 without a full scale."""
     if full_scale is None:
         return 0.0
     first = samples[:, 0]
@@ -63,16 +72,18 @@ def saturated_share(samples, full_scale) -> float:
 
 
 class TimeBase:
-    """Time of the samples: `index` is the number of a sample, `utc` its time [ns]."""
+    """Time of the samples: `index` is the number of a sample, `utc` its time."""
+    utc: Nanoseconds | None
 
-    def __init__(self, rate):
+    def __init__(self, rate: Hertz) -> None:
         self.rate, self.index, self.utc = rate, 0, None
 
-    def at(self, index) -> int:
-        """Return the UTC of a sample [ns]."""
+    def at(self, index: int) -> Nanoseconds:
+        """Return the UTC of a sample, after the first `note`."""
+        assert self.utc is not None
         return self.utc + round((index - self.index) * NS_PER_SECOND / self.rate)
 
-    def note(self, index, utc) -> bool:
+    def note(self, index: int, utc: Nanoseconds) -> bool:
         """Take the measured time of a sample. Return True if the times of the samples have changed."""
         if self.utc is not None and abs(utc - self.at(index)) <= TIME_TOLERANCE_NS:
             return False
@@ -81,29 +92,30 @@ class TimeBase:
 
 
 class Blocks:
-    """Blocks of a size, made of chunks.
+    """Blocks of a size, made of chunks. recorder: to which the samples are written."""
+    kept: Samples           # samples of an incomplete block
+    next: int | None        # number of the sample after the last one
+    lost: int               # number of samples that were missing
+    gaps: int               # number of gaps
+    recorder_fault: str     # text of the error that ended the recorder, '' without one
 
-    lost: number of samples that were missing; gaps: number of gaps; recorder: sigmf.Recorder to which the samples are
-    written, or None; recorder_fault: text of the error that ended the recorder, '' without one.
-    """
-
-    def __init__(self, rate, size, recorder=None):
+    def __init__(self, rate: Hertz, size: int, recorder: 'sigmf.Recorder | None' = None) -> None:
         self.size, self.base, self.recorder = size, TimeBase(rate), recorder
-        self.kept, self.begin, self.next = None, 0, None      # kept: samples of an incomplete block
+        self.kept, self.begin, self.next = np.zeros((0, 0), np.complex64), 0, None
         self.lost = self.gaps = self.missing = 0
         self.recorder_fault = ''
 
-    def put(self, chunk) -> 'list[Block]':
-        """Take a Chunk and return the complete blocks. A gap discards the samples of an incomplete block."""
-        gap = self.next is not None and chunk.first != self.next
-        if gap:
-            lost = max(chunk.first - self.next, 1)
+    def put(self, chunk: Chunk) -> list[Block]:
+        """Take a chunk and return the complete blocks. A gap discards the samples of an incomplete block."""
+        gap = False
+        if self.next is not None and chunk.first != self.next:
+            gap, lost = True, max(chunk.first - self.next, 1)
             self.lost, self.gaps, self.missing = self.lost + lost, self.gaps + 1, self.missing + lost
         if gap or self.next is None:
             self.kept, self.begin = chunk.samples[:0], chunk.first
         moved = self.base.note(chunk.first, chunk.utc)
         if self.recorder is not None:
-            self._record(chunk, moved or gap or self.next is None)
+            self._record(self.recorder, chunk, moved or gap or self.next is None)
         self.next = chunk.first + len(chunk.samples)
         self.kept = np.concatenate((self.kept, chunk.samples)) if len(self.kept) else chunk.samples
         made = []
@@ -114,12 +126,12 @@ class Blocks:
         self.kept = self.kept[len(made) * self.size:]
         return made
 
-    def _record(self, chunk, begins):
-        """Write a Chunk to the recorder. An error ends the recorder, not the blocks."""
+    def _record(self, recorder: 'sigmf.Recorder', chunk: Chunk, begins: bool) -> None:
+        """Write a chunk to the recorder. An error ends the recorder, not the blocks."""
         try:
-            self.recorder.write(chunk, begins)
+            recorder.write(chunk, begins)
         except StreamError as error:
-            recorder, self.recorder, self.recorder_fault = self.recorder, None, str(error)
+            self.recorder, self.recorder_fault = None, str(error)
             with contextlib.suppress(StreamError):      # a full disk takes the rest of the samples neither
                 recorder.close()
 
@@ -127,11 +139,12 @@ class Blocks:
 class ClockComparison:
     """Comparison of the times of the blocks with the clock. fault: text of their deviation, '' without one."""
 
-    def __init__(self):
-        self.fault, self.since, self.shown = '', None, 0
+    def __init__(self) -> None:
+        self.fault, self.shown = '', 0
+        self.since: Nanoseconds | None = None       # begin of the deviation
 
-    def note(self, middle, now):
-        """Take the middle of a block and the UTC at which it was complete [ns]."""
+    def note(self, middle: Nanoseconds, now: Nanoseconds) -> None:
+        """Take the middle of a block and the UTC at which it was complete."""
         deviation = middle - now
         if abs(deviation) <= CLOCK_TOLERANCE_S * NS_PER_SECOND:
             self.fault, self.since = '', None
@@ -154,7 +167,7 @@ class ArrivalClock:
     causes: {ratio of a wrong sample rate and the right one: text on its possible cause}.
     """
 
-    def __init__(self, rate, delay, causes=None):
+    def __init__(self, rate: Hertz, delay: Seconds, causes: Mapping[float, str] | None = None) -> None:
         self.rate, self.delay_ns, self.causes = rate, round(delay * NS_PER_SECOND), causes or {}
         self.window_ns = round(ARRIVAL_WINDOW_S * NS_PER_SECOND)
         self.interval_ns = round(LATE_INTERVAL_S * NS_PER_SECOND)
@@ -163,18 +176,22 @@ class ArrivalClock:
         self.spread_ns = round((RATE_TOLERANCE + STALL_TIME_S / RATE_WINDOW_S) * self.interval_ns)
         self.clear()
 
-    def clear(self):
+    def clear(self) -> None:
         """Begin again, after a gap."""
-        self.offset = self.present = self.until = None
-        self.arrivals = collections.deque()
-        self.began = self.earliest = self.before = None
+        self.offset: Nanoseconds = 0                # shortest delay known
+        self.present: Nanoseconds = 0               # shortest delay of this window
+        self.until: Nanoseconds | None = None       # end of this window, None before the first message
+        self.arrivals: collections.deque[tuple[int, Nanoseconds]] = collections.deque()
+        self.began: Nanoseconds | None = None       # begin of the interval
+        self.earliest: Nanoseconds = 0              # shortest delay of the interval
+        self.before: Nanoseconds | None = None      # shortest delay of the interval before
         self.count = 0
 
-    def lost(self, next_sample, arrived) -> int:
+    def lost(self, next_sample: int, arrived: Nanoseconds) -> int:
         """Return the number of samples that were lost without a sign, 0 for none: for about 0.5 s, no arrival was as
         early as the times of the samples demand. The caller adds them to the numbers of the samples.
 
-        next_sample: number of the sample after the last one; arrived: UTC [ns].
+        next_sample: number of the sample after the last one; arrived: UTC.
         """
         offset = arrived - round(next_sample * NS_PER_SECOND / self.rate)
         if self.began is None:
@@ -195,8 +212,8 @@ class ArrivalClock:
         self.count = 0
         return round(late * self.rate / NS_PER_SECOND)
 
-    def utc(self, first, count, arrived) -> int:
-        """Return the UTC [ns] of sample number `first` of `count` samples that arrived at a UTC [ns]."""
+    def utc(self, first: int, count: int, arrived: Nanoseconds) -> Nanoseconds:
+        """Return the UTC of sample number `first` of `count` samples that arrived at a UTC."""
         offset = arrived - round((first + count) * NS_PER_SECOND / self.rate)
         if self.until is None or arrived > self.until:
             # The clocks of source and machine drift, so each window begins with its own earliest arrival.
@@ -205,9 +222,9 @@ class ArrivalClock:
         self.present, self.offset = min(self.present, offset), min(self.offset, offset)
         return self.offset + round(first * NS_PER_SECOND / self.rate) - self.delay_ns
 
-    def check_rate(self, next_sample, arrived):
+    def check_rate(self, next_sample: int, arrived: Nanoseconds) -> None:
         """Raise StreamError if the samples of the last RATE_WINDOW_S arrived at a wrong rate. next_sample: number of
-        the sample after the last one; arrived: UTC [ns]."""
+        the sample after the last one; arrived: UTC."""
         window = self.arrivals
         window.append((next_sample, arrived))
         while arrived - window[1][1] > RATE_WINDOW_S * NS_PER_SECOND if len(window) > 1 else False:

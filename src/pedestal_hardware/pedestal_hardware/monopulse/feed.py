@@ -19,9 +19,9 @@ from typing import Annotated
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Complexes
+from pedestal_common.quantities import Complexes, Radians, RadiansPerSample, Records, Seconds
 from pedestal_common.record import Record
-from pedestal_hardware.monopulse.params import FEED_KINDS, ONE_CHANNEL, THREE_CHANNELS
+from pedestal_hardware.monopulse.params import FEED_KINDS, ONE_CHANNEL, THREE_CHANNELS, MonopulseParameters
 from tracking_receiver_sim import receiver
 from tracking_receiver_sim.monopulse import sum_pattern
 from tracking_receiver_sim.path.multipath import Image
@@ -37,38 +37,32 @@ SPREAD_PHASES, SPREAD_POINTS = 16, 32
 
 
 class Feed(Record):
-    """Record of the simulated feed.
-
-    kind            index into FEED_KINDS
-        of_sum          share of the sum voltage in the signal [-]
-        of_difference   shares of the differences, with their phases [-]
-        squint          angle between beam and axis of rotation [rad]
-        angle, turn     angle of the scan [rad], and its change in a sample [rad]
-    """
-    kind: int
-    of_sum: float
-    of_difference: Annotated[Complexes, (2,)]
-    squint: float
-    angle: float
-    turn: float
+    """Simulated feed."""
+    kind: int                       # index into FEED_KINDS
+    of_sum: float                   # share of the sum voltage in the signal [-]
+    of_difference: Annotated[Complexes, (2,)]   # shares of the differences, with their phases [-]
+    squint: Radians                 # angle between beam and axis of rotation
+    angle: Radians                  # of the scan
+    turn: RadiansPerSample          # change of this angle in a sample
 
 
-def record(p) -> np.ndarray:
-    """Return Feed (1,) of MonopulseParameters, at the angle 0."""
-    f, feed = Feed.zeros(), p.feed
-    f['kind'] = FEED_KINDS.index(feed.kind)
-    f['of_sum'] = math.sqrt(1.0 - feed.coupling)
-    f['of_difference'] = [cmath.rect(math.sqrt(feed.coupling), phase)
-                          for phase in (p.simulated.x_phase, p.simulated.e_phase)]
-    f['squint'], f['turn'] = feed.squint * p.antenna.beamwidth, 2.0 * math.pi * feed.scan_rate / p.source.rate
-    return f
+def record(params: MonopulseParameters) -> Records:
+    """Return the Feed (1,), at the angle 0."""
+    record, feed = Feed.zeros(), params.feed
+    record['kind'] = FEED_KINDS.index(feed.kind)
+    record['of_sum'] = math.sqrt(1.0 - feed.coupling)
+    record['of_difference'] = [cmath.rect(math.sqrt(feed.coupling), phase)
+                          for phase in (params.simulated.x_phase, params.simulated.e_phase)]
+    record['squint'] = feed.squint * params.antenna.beamwidth
+    record['turn'] = 2.0 * math.pi * feed.scan_rate / params.source.rate
+    return record
 
 
-def modulation_slope(p) -> float:
-    """Return the modulation slope g of the scanned feed of MonopulseParameters [1/beamwidth]."""
-    feed, h = p.feed, DIFFERENTIATION_STEP_BEAMWIDTHS
+def modulation_slope(params: MonopulseParameters) -> float:
+    """Return the modulation slope g of the scanned feed [1/beamwidth]."""
+    feed, h = params.feed, DIFFERENTIATION_STEP_BEAMWIDTHS
     if feed.kind == ONE_CHANNEL:
-        return 2.0 * math.sqrt(feed.coupling / (1.0 - feed.coupling)) * p.antenna.slope
+        return 2.0 * math.sqrt(feed.coupling / (1.0 - feed.coupling)) * params.antenna.slope
     # The pattern is no body of rotation, so the fundamental of the power on the circle counts.
     first = power = 0.0
     for k in range(CIRCLE_DIRECTIONS):
@@ -80,14 +74,15 @@ def modulation_slope(p) -> float:
     return first / power
 
 
-def reference_efficiency(p) -> float:
-    """Return the share of the modulation that the averaged reference of MonopulseParameters keeps [-].
+def reference_efficiency(params: MonopulseParameters) -> float:
+    """Return the share of the modulation that the averaged reference keeps [-].
 
     The average over an integral shortens the reference, and a window of no whole number of scans covers the directions
     unequally. The share is the variance of a fit with two perfect components, 2 / M, over that with this reference.
     """
-    count, kind = p.steps_per_error * p.receiver.samples_per_step, FEED_KINDS.index(p.feed.kind)
-    turns = p.feed.scan_rate * p.period / p.receiver.samples_per_step * (np.arange(count * SPREAD_POINTS) + 0.5)
+    count, kind = params.steps_per_error * params.receiver.samples_per_step, FEED_KINDS.index(params.feed.kind)
+    points = np.arange(count * SPREAD_POINTS) + 0.5
+    turns = params.feed.scan_rate * params.period / params.receiver.samples_per_step * points
     variance = 0.0
     for phase in range(SPREAD_PHASES):
         angles = 2.0 * math.pi * (turns / SPREAD_POINTS + phase / SPREAD_PHASES)
@@ -97,56 +92,55 @@ def reference_efficiency(p) -> float:
     return float(2.0 / (count * variance))
 
 
-def effective_integration(p) -> float:
-    """Return the time [s] for which a receiver of three channels must integrate to have the noise of one error of
-    MonopulseParameters, at equal C/N0 of the received carrier.
+def effective_integration(params: MonopulseParameters) -> Seconds:
+    """Return the time for which a receiver of three channels must integrate to have the noise of one error, at equal
+    C/N0 of the received carrier.
 
     A scanned feed measures the power of M integrals: var(v) = 4 / (g^2 C/N0 T) with the time T of an error, against
     1 / (2 k_m^2 C/N0 T) of three channels.
     """
-    if not p.feed.scanned:
-        return p.period
-    ratio = modulation_slope(p) / p.antenna.slope
-    return 0.125 * ratio * ratio * reference_efficiency(p) * p.steps_per_error * p.period
+    if not params.feed.scanned:
+        return params.period
+    ratio = modulation_slope(params) / params.antenna.slope
+    return 0.125 * ratio * ratio * reference_efficiency(params) * params.steps_per_error * params.period
 
 
 @compiled
-def reference(kind, angle):
-    """Return the scan reference at an angle of the scan [rad]. kind: index into FEED_KINDS."""
+def reference(kind: int, angle: Radians) -> complex:
+    """Return the scan reference at an angle of the scan. kind: index into FEED_KINDS."""
     if kind == ONE_CHANNEL_KIND:
         angle = 0.5 * math.pi * math.floor(angle / (0.5 * math.pi))
     return complex(math.cos(angle), math.sin(angle))
 
 
 @compiled
-def turn(voltages, f):
+def turn(voltages: Complexes, simulated: Feed) -> None:
     """Set the scan reference in the second channel of voltages (rows, 2), one row a sample, and turn the scan on."""
     for k in range(voltages.shape[0]):
-        voltages[k, 1] = reference(f.kind, f.angle + (k + 0.5) * f.turn)
-    f.angle = (f.angle + voltages.shape[0] * f.turn) % (2.0 * math.pi)
+        voltages[k, 1] = reference(simulated.kind, simulated.angle + (k + 0.5) * simulated.turn)
+    simulated.angle = (simulated.angle + voltages.shape[0] * simulated.turn) % (2.0 * math.pi)
 
 
 @compiled
-def fill(voltages, f, s, c, seen):
-    """Set voltages (rows, channels) of a step without noise; the second channel of a scanned feed holds its reference.
-
-    s, c: state and constants of the simulated receiver; seen: receiver.Incidence.
-    """
+def fill(voltages: Complexes, simulated: Feed, state: receiver.State, constants: receiver.Constants,
+         seen: receiver.Incidence) -> None:
+    """Set voltages (rows, channels) of a step without noise; the second channel of a scanned feed holds
+    its reference. state, constants: of the simulated receiver."""
     for k in range(voltages.shape[0]):
         part = (k + 0.5) / voltages.shape[0]
-        if f.kind == THREE_CHANNELS_KIND or f.kind == ONE_CHANNEL_KIND:
-            v = receiver.voltages_at(s, c, seen, part, seen.amplitude)
+        if simulated.kind == THREE_CHANNELS_KIND or simulated.kind == ONE_CHANNEL_KIND:
+            v = receiver.voltages_at(state, constants, seen, part, seen.amplitude)
             total, x, e = complex(v.s_real, v.s_imag), complex(v.x_real, v.x_imag), complex(v.e_real, v.e_imag)
-            if f.kind == THREE_CHANNELS_KIND:
+            if simulated.kind == THREE_CHANNELS_KIND:
                 voltages[k, 0], voltages[k, 1], voltages[k, 2] = total, x, e
             else:
                 r = voltages[k, 1]
-                voltages[k, 0] = (f.of_sum * total + r.real * f.of_difference[0] * x
-                                  + r.imag * f.of_difference[1] * e)
+                voltages[k, 0] = (simulated.of_sum * total + r.real * simulated.of_difference[0] * x
+                                  + r.imag * simulated.of_difference[1] * e)
         else:
-            X, E = receiver.error_at(s, seen, part)
-            x, e = f.squint * voltages[k, 1].real, f.squint * voltages[k, 1].imag
+            X, E = receiver.error_at(state, seen, part)
+            x, e = simulated.squint * voltages[k, 1].real, simulated.squint * voltages[k, 1].imag
             image = Image(seen.image.real, seen.image.imaginary, seen.image.dX - x, seen.image.dE - e)
-            v = receiver.voltages(c, seen.amplitude, (X - x - c.boresight[0]) / c.beamwidth,
-                                  (E - e - c.boresight[1]) / c.beamwidth, image)
+            v = receiver.voltages(constants, seen.amplitude, (X - x - constants.boresight[0]) / constants.beamwidth,
+                                  (E - e - constants.boresight[1]) / constants.beamwidth, image)
             voltages[k, 0] = complex(v.s_real, v.s_imag)

@@ -7,11 +7,16 @@ import pedestal_common.entry  # noqa: F401
 
 # isort: split
 import sys
+from collections.abc import Mapping, Sequence
 
 from pedestal_common.graph.nodes import MONOPULSE_RECEIVER
+from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import shell, unit_node
+from pedestal_common.quantities import Message, Nanoseconds
+from pedestal_common.wire import records
 from pedestal_hardware.monopulse import sinks
-from pedestal_hardware.monopulse.blocks import NS_PER_SECOND
+from pedestal_hardware.monopulse.iq_unit import SimulatedIq
+from pedestal_hardware.monopulse.params import MonopulseParameters
 from pedestal_hardware.params import START_KEY
 
 NOISE_PERIOD_S = 0.02  # time between two transmissions of noise before the first step [s]
@@ -19,13 +24,17 @@ MAX_SPAN_S = 0.2  # longest time for which samples are made at once [s]. After a
 
 
 class IqNode(unit_node.UnitNode):
-    """Node of the simulated I/Q. sent: UTC of the end of the samples that were sent [ns]; number: of the next one."""
+    """Node of the simulated I/Q."""
+    parameters: MonopulseParameters
+    unit: SimulatedIq
 
-    def __init__(self):
-        self.sink, self.sent, self.number = None, None, 0
+    def __init__(self) -> None:
+        self.sink: sinks.Sink | None = None
+        self.sent: Nanoseconds | None = None    # UTC of the end of the samples that were sent
+        self.number = 0                         # of the next sample
         super().__init__('pedestal_hardware.monopulse.iq_node')
 
-    def begin(self):
+    def begin(self) -> None:
         """Open the sink, and begin to follow the trigger."""
         self.sink = sinks.opened(self.parameters)
         self.get_logger().info(f'samples to {self.parameters.source.url} ({self.parameters.source.kind})')
@@ -34,19 +43,19 @@ class IqNode(unit_node.UnitNode):
             self.message_reader('diagnostics', self._take_start)
         super().begin()
 
-    def _take_start(self, array):
+    def _take_start(self, array: Message) -> None:
         """Take time 0 from the diagnostics of the receiver, which chooses it at the first samples."""
         for status in array.status:
             for value in status.values if status.name == MONOPULSE_RECEIVER.name else ():
                 if value.key == START_KEY:
                     self._epoch = int(value.value)
 
-    def _send_noise(self):
+    def _send_noise(self) -> None:
         """Send noise up to now."""
         self._send(self.clock()[1])
 
-    def _send(self, until):
-        """Send the samples from the last ones to a UTC [ns]."""
+    def _send(self, until: Nanoseconds) -> None:
+        """Send the samples from the last ones to a UTC."""
         rate = self.parameters.source.rate
         if self.sent is None:
             self.sent = until
@@ -56,23 +65,24 @@ class IqNode(unit_node.UnitNode):
             self.sent = round(begin)
         count = round((until - self.sent) * rate / NS_PER_SECOND)
         if count > 0:
+            assert self.sink is not None
             self.sink.send(self.unit.samples(count), self.number, self.sent)
             self.number, self.sent = self.number + count, self.sent + round(count * NS_PER_SECOND / rate)
 
-    def answer(self, stamp, values):
+    def answer(self, stamp: Nanoseconds, values: Mapping[str, records.Decoded | None]) -> None:
         """Answer a step, then send its samples."""
         self.noise.cancel()
         super().answer(stamp, values)
         self._send(stamp)
 
-    def close(self):
+    def close(self) -> None:
         """Close the sink and end."""
         if self.sink is not None:
             self.sink.close()
         super().close()
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node to its end. Return the exit code."""
     return shell.main(IqNode, args)
 

@@ -9,9 +9,14 @@ import pedestal_common.entry  # noqa: F401
 import sys
 import threading
 import time
+from collections.abc import Sequence
 
 from pedestal_common.node import shell, unit_node
+from pedestal_common.node.unit import Diagnosis
+from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_hardware.monopulse import blocks, sigmf, sources
+from pedestal_hardware.monopulse.params import MonopulseParameters
+from pedestal_hardware.monopulse.unit import MonopulseReceiver
 from pedestal_hardware.params import START_KEY, time_0_after
 
 READ_TIMEOUT_S = 0.1  # longest wait for samples before the node looks whether it ends [s]
@@ -20,15 +25,21 @@ FAULT_TIME_S = 2.0  # time for which a fault of the stream is reported after its
 
 
 class MonopulseReceiverNode(unit_node.UnitNode):
-    """Node of a receiver of I/Q samples. heard: time of the monotonic clock of the last samples [s]; fault: (time,
-    text) of the last fault."""
+    """Node of a receiver of I/Q samples."""
+    parameters: MonopulseParameters
+    unit: MonopulseReceiver
 
-    def __init__(self):
-        self.source = self.receiving = self.blocks = None
-        self.ending, self.heard, self.fault, self.start = False, None, (-FAULT_TIME_S, ''), None
+    def __init__(self) -> None:
+        self.source: sources.Source | None = None
+        self.receiving: threading.Thread | None = None
+        self.blocks: blocks.Blocks | None = None
+        self.ending = False
+        self.heard: Seconds | None = None       # time of the monotonic clock of the last samples
+        self.fault = -FAULT_TIME_S, ''          # time and text of the last fault
+        self.start: Nanoseconds | None = None   # time 0
         super().__init__('pedestal_hardware.monopulse.monopulse_receiver_node')
 
-    def begin(self):
+    def begin(self) -> None:
         """Open the source and receive."""
         p, recorder = self.parameters, None
         self.source = sources.opened(p, lambda: self.clock()[1])
@@ -45,13 +56,14 @@ class MonopulseReceiverNode(unit_node.UnitNode):
         self.receiving.start()
 
     @property
-    def awaits(self):
+    def awaits(self) -> str:
         """Text that names the inputs for which the node waits."""
         source = self.parameters.source
         return f'samples of {source.url} ({source.kind})'
 
-    def _receive(self):
+    def _receive(self) -> None:
         """Receive samples and make the steps until the node ends."""
+        assert self.source is not None and self.blocks is not None
         while not self.ending:
             try:
                 chunk = self.source.read(READ_TIMEOUT_S)
@@ -72,7 +84,7 @@ class MonopulseReceiverNode(unit_node.UnitNode):
             if chunk is None or made:
                 self._look_for_faults()
 
-    def _note_fault(self, text):
+    def _note_fault(self, text: str) -> None:
         """Note a fault of the stream, and log a new one."""
         at, last = self.fault
         now = time.monotonic()
@@ -81,8 +93,9 @@ class MonopulseReceiverNode(unit_node.UnitNode):
         self.fault = now, text
         self._look_for_faults()
 
-    def _look_for_faults(self):
+    def _look_for_faults(self) -> None:
         """Give the unit the present fault and the counts of the stream, and publish a change at once."""
+        assert self.source is not None and self.blocks is not None
         now, (at, text) = time.monotonic(), self.fault
         silent = now - (self.begun if self.heard is None else self.heard)
         if now - at > FAULT_TIME_S:
@@ -95,8 +108,9 @@ class MonopulseReceiverNode(unit_node.UnitNode):
         if [unit.urgent] != self._urgent and self.diagnose_now():
             self._urgent = [unit.urgent]
 
-    def _make(self, block):
+    def _make(self, block: blocks.Block) -> None:
         """Make the step of a block, and publish its error."""
+        assert self.source is not None
         [port] = self.ports
         if block.missing:
             self._note_fault(f'{block.missing} samples are missing')
@@ -108,20 +122,20 @@ class MonopulseReceiverNode(unit_node.UnitNode):
             self._note_fault(self.comparison.fault)
         self.unit.take(block)
         port.step(block.middle, {})
-        if self.start is None:
-            self._choose_start()
-        if block.middle - self.unit.age_ns < self.start:   # before time 0 of a run the graph publishes no measurements
+        start = self._choose_start() if self.start is None else self.start
+        if block.middle - self.unit.age_ns < start:   # before time 0 of a run the graph publishes no measurements
             return
         self.begin_step(block.middle)
         port.publish()
         self.after_step()
 
-    def _choose_start(self):
-        """Let time 0 follow the first samples, by whole seconds from graph.start, and publish it."""
+    def _choose_start(self) -> Nanoseconds:
+        """Let time 0 follow the first samples, by whole seconds from graph.start. Publish it and return it."""
         self.start = time_0_after(self.graph.start, self.clock()[1], self.parameters.source.start_after)
         self.diagnose_now()
+        return self.start
 
-    def diagnosed(self):
+    def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of the receiver, with the error that ended the recording, and with time 0 if it follows
         the first samples."""
         diagnosis, values = super().diagnosed(), []
@@ -131,7 +145,7 @@ class MonopulseReceiverNode(unit_node.UnitNode):
             values.append((START_KEY, str(self.start)))
         return diagnosis._replace(values=[*diagnosis.values, *values])
 
-    def close(self):
+    def close(self) -> None:
         """Close the source and the recording, and end."""
         self.ending = True
         if self.receiving is not None:
@@ -146,7 +160,7 @@ class MonopulseReceiverNode(unit_node.UnitNode):
         super().close()
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node to its end. Return the exit code."""
     return shell.main(MonopulseReceiverNode, args)
 

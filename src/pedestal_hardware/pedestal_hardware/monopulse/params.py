@@ -50,7 +50,7 @@ class SourceParameters(Parameters):
     record: str = text('', 'path of a new .sigmf-meta file for the received samples; NAME-1 if NAME exists; empty: '
                        'none')
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for an address that does not fit, or equal streams."""
         scheme = {'vita49': 'udp://', 'zmq_sub': 'tcp://', 'zmq_pull': 'tcp://'}.get(self.kind)
         if scheme:
@@ -69,22 +69,22 @@ class SourceParameters(Parameters):
                                  ': must be three different streams')
 
     @property
-    def url(self):
+    def url(self) -> str:
         """The address, or that of its kind."""
         return self.address or DEFAULT_ADDRESSES.get(self.kind, '')
 
     @property
-    def host(self):
+    def host(self) -> str:
         """Host of the address."""
         return self.url.partition('://')[2].rpartition(':')[0]
 
     @property
-    def port(self):
+    def port(self) -> int:
         """Port of the address."""
         return int(self.url.rpartition(':')[2])
 
     @property
-    def streams(self):
+    def streams(self) -> tuple[int, int, int]:
         """Numbers of the streams, in the order of CHANNELS."""
         return self.stream_sum, self.stream_cross_elevation, self.stream_elevation
 
@@ -106,12 +106,12 @@ class FeedParameters(Parameters):
                                        'moved towards positive cross-elevation')
 
     @property
-    def scanned(self):
+    def scanned(self) -> bool:
         """True for one output and a reference."""
         return self.kind != THREE_CHANNELS
 
     @property
-    def channels(self):
+    def channels(self) -> tuple[str, ...]:
         """Names of the channels of the samples."""
         return SCANNED_CHANNELS if self.scanned else CHANNELS
 
@@ -150,7 +150,7 @@ class CalibrationParameters(Parameters):
     e_from_e_phase: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'its phase')
 
     @property
-    def matrix(self):
+    def matrix(self) -> list[list[complex]]:
         """Complex matrix, rows and columns cross-elevation, elevation."""
         return [[cmath.rect(getattr(self, f'{row}_from_{column}_gain'), getattr(self, f'{row}_from_{column}_phase'))
                  for column in 'xe'] for row in 'xe']
@@ -178,7 +178,7 @@ class MonopulseParameters(TrackingReceiverNodeParameters):
     calibration: CalibrationParameters = group(CalibrationParameters)
     simulated: SimulatedIqParameters = group(SimulatedIqParameters)
 
-    def check(self):
+    def check(self) -> None:
         """Raise ParameterError for a step without a whole number of samples, or a measurement that I/Q does not give.
         """
         super().check()
@@ -194,7 +194,7 @@ class MonopulseParameters(TrackingReceiverNodeParameters):
             if getattr(self.receiver, name).measured:
                 raise ParameterError(f'receiver.{name}.measured = true: must be false for a receiver of I/Q samples')
 
-    def _check_scan(self):
+    def _check_scan(self) -> None:
         """Raise ParameterError for a scan that is too fast, and for parameters that a scanned feed does not have."""
         parts, rate = self.receiver.samples_per_step, self.feed.scan_rate
         most = parts / (MIN_INTEGRALS_PER_SCAN * self.period)
@@ -211,7 +211,7 @@ class MonopulseParameters(TrackingReceiverNodeParameters):
                 raise ParameterError(f'{name} = {values[name]:g} rad: must be 0 with feed.kind = {CONICAL_SCAN}, '
                                      'which has no differences; feed.reference_phase turns the axes')
 
-    def check_graph(self, beams, lockstep):
+    def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError for lockstep and for an array."""
         super().check_graph(beams, lockstep)
         if lockstep:
@@ -220,11 +220,11 @@ class MonopulseParameters(TrackingReceiverNodeParameters):
             raise ParameterError(f'graph.beams = {beams}: must be 0 for a receiver of I/Q samples')
 
     @property
-    def block(self):
+    def block(self) -> int:
         """Samples of a channel in one step."""
         return round(self.source.rate * self.period)
 
     @property
-    def steps_per_error(self):
+    def steps_per_error(self) -> int:
         """Number of steps of which one error is made: those that hold one scan."""
         return math.ceil(1.0 / (self.feed.scan_rate * self.period) - 1e-9) if self.feed.scanned else 1

@@ -10,10 +10,14 @@ import json
 import math
 import pathlib
 import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 
-from pedestal_hardware.monopulse.blocks import NS_PER_SECOND, TIME_TOLERANCE_NS, Chunk, StreamError
+from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Hertz, Json, Nanoseconds
+from pedestal_hardware.monopulse.blocks import TIME_TOLERANCE_NS, Chunk, StreamError
 from pedestal_hardware.monopulse.vita49 import INTEGER_FULL_SCALE
 
 MAX_META_BYTES = 50_000_000  # largest size of a .sigmf-meta file [bytes]
@@ -21,25 +25,27 @@ MAX_CAPTURES = 50_000  # largest number of captures of a recording, whose .sigmf
 META_PERIOD_S = 1.0  # shortest time of recorded samples between two writes of the .sigmf-meta file [s]
 CHUNK_SAMPLES = 65536  # number of samples that are read at once
 
+Capture: TypeAlias = tuple[int, int, Nanoseconds]    # first sample in the file, number of this sample, its UTC
+
 FORMATS = {'cf32_le': np.dtype('<c8'), 'ci16_le': np.dtype(('<i2', 2))}
 META_SUFFIX, DATA_SUFFIX = '.sigmf-meta', '.sigmf-data'
 _EPOCH = datetime.datetime(1970, 1, 1)
 _TIME = re.compile(r'(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)(?:\.(\d{1,12}))?Z')
 
 
-def data_path(meta) -> pathlib.Path:
+def data_path(meta: str | pathlib.Path) -> pathlib.Path:
     """Return the path of the samples of a .sigmf-meta file."""
     return pathlib.Path(str(meta).removesuffix(META_SUFFIX) + DATA_SUFFIX)
 
 
-def text_of(utc) -> str:
-    """Return a UTC [ns] as the text of core:datetime."""
+def text_of(utc: Nanoseconds) -> str:
+    """Return a UTC as the text of core:datetime."""
     seconds, rest = divmod(utc, NS_PER_SECOND)
     return f'{_EPOCH + datetime.timedelta(seconds=seconds):%Y-%m-%dT%H:%M:%S}.{rest:09d}Z'
 
 
-def utc_of(text) -> int:
-    """Return the UTC [ns] of a core:datetime. Raises ValueError."""
+def utc_of(text: str) -> Nanoseconds:
+    """Return the UTC of a core:datetime. Raises ValueError."""
     match = _TIME.fullmatch(text)
     if not match:
         raise ValueError(text)
@@ -47,7 +53,7 @@ def utc_of(text) -> int:
     return round(whole.total_seconds()) * NS_PER_SECOND + int((match[2] or '0').ljust(9, '0')[:9])
 
 
-def free_path(meta) -> str:
+def free_path(meta: str | pathlib.Path) -> str:
     """Return this path of a .sigmf-meta file, or the first of NAME-1, NAME-2, ... without a file."""
     base = str(meta).removesuffix(META_SUFFIX)
     names = itertools.chain((base,), (f'{base}-{k}' for k in itertools.count(1)))
@@ -62,10 +68,11 @@ class Recorder:
     contains a new capture after META_PERIOD_S at the latest, and all captures after `close`.
     """
 
-    def __init__(self, meta, rate, channels, origin):
+    def __init__(self, meta: str | pathlib.Path, rate: Hertz, channels: Sequence[str], origin: str) -> None:
         self.meta, self.rate, self.channels = pathlib.Path(meta), rate, channels
         self.description = f'pedestal: {origin} {", ".join(channels)}'
-        self.captures, self.count = [], 0       # captures: their JSON
+        self.captures: list[str] = []           # their JSON
+        self.count = 0                          # number of samples
         try:
             self.data = open(data_path(meta), 'xb')
             self._write_meta()
@@ -73,8 +80,8 @@ class Recorder:
         except OSError as error:
             raise StreamError(f'{meta}: {error.strerror}; a recording is never overwritten') from None
 
-    def write(self, chunk, begins):
-        """Write a Chunk. begins: True if a capture begins with it. Raises StreamError for a full disk, and for more
+    def write(self, chunk: Chunk, begins: bool) -> None:
+        """Write a chunk. begins: True if a capture begins with it. Raises StreamError for a full disk, and for more
         than MAX_CAPTURES captures."""
         if begins and len(self.captures) == MAX_CAPTURES:
             raise StreamError(f'{self.meta}: {MAX_CAPTURES} captures: a recording must have no more gaps and changes '
@@ -89,14 +96,14 @@ class Recorder:
             self.count += len(chunk.samples)
 
     @contextlib.contextmanager
-    def _errors_named(self):
+    def _errors_named(self) -> Iterator[None]:
         """Turn the OSErrors in this context into a StreamError that names the recording."""
         try:
             yield
         except OSError as error:
             raise StreamError(f'{self.meta}: {error.strerror}') from None
 
-    def _write_meta(self):
+    def _write_meta(self) -> None:
         content = {'core:datatype': 'cf32_le', 'core:sample_rate': self.rate, 'core:version': '1.0.0',
                    'core:num_channels': len(self.channels), 'core:description': self.description}
         captures = ',\n  '.join(self.captures)
@@ -107,7 +114,7 @@ class Recorder:
         # noted: number of captures in the file; next_meta: number of samples from which the file is written again
         self.noted, self.next_meta = len(self.captures), self.count + round(META_PERIOD_S * self.rate)
 
-    def close(self):
+    def close(self) -> None:
         """End the recording. Raises StreamError for a full disk."""
         with self._errors_named():
             try:
@@ -120,19 +127,20 @@ class Recorder:
 class Recording:
     """Recording that is read. Raises StreamError for a file that does not fit.
 
-    channels: names of the channels that the receiver needs; rate: sample rate that it needs [S/s], None for any; cut:
+    channels: names of the channels that the receiver needs; rate: sample rate that it needs, None for any; cut:
     text about samples that the file lacks, or ''.
     """
 
-    def __init__(self, meta, channels, rate=None):
+    def __init__(self, meta: str | pathlib.Path, channels: Sequence[str], rate: Hertz | None = None) -> None:
         self.meta, self.channels = pathlib.Path(meta), len(channels)
         head, captures = self._parsed()
-        self.type = FORMATS.get(self._value(head, 'core:datatype', str))
-        if self.type is None:
+        form = FORMATS.get(self._value(head, 'core:datatype', str))
+        if form is None:
             raise StreamError(f'{meta}: core:datatype = {head["core:datatype"]!r:.40}: must be one of '
                               f'{", ".join(FORMATS)}')
         if 'core:dataset' in head and head['core:dataset'] != data_path(meta).name:
             raise StreamError(f'{meta}: core:dataset = {head["core:dataset"]!r:.60}: must be {data_path(meta).name}')
+        self.type = form
         count = self._value(head, 'core:num_channels', int, 1)
         if count != self.channels:
             raise StreamError(f'{meta}: core:num_channels = {count}: must be {self.channels}: {", ".join(channels)}')
@@ -150,7 +158,7 @@ class Recording:
                                                 'is cut')
         self.captures = self._checked(captures)
 
-    def _parsed(self):
+    def _parsed(self) -> tuple[dict[str, Json], list[Json]]:
         try:
             if self.meta.stat().st_size > MAX_META_BYTES:
                 raise StreamError(f'{self.meta}: above {MAX_META_BYTES} bytes')
@@ -164,16 +172,17 @@ class Recording:
             raise StreamError(f'{self.meta}: must have an object `global` and a list `captures`')
         return content['global'], content['captures']
 
-    def _value(self, part, name, kind, otherwise=None):
+    def _value(self, part: Mapping[str, Json], name: str, kind: type | tuple[type, ...],
+               otherwise: object = None) -> Json:
         value = part.get(name, otherwise)
         if not isinstance(value, kind) or isinstance(value, bool):
             raise StreamError(f'{self.meta}: {name} = {value!r:.40}: must be '
                               f'{"a text" if kind is str else "a number"}')
         return value
 
-    def _checked(self, captures):
-        """Return [(first sample in the file, number of this sample, UTC [ns])] of the captures."""
-        found = []
+    def _checked(self, captures: list[Json]) -> list[Capture]:
+        """Return the captures. Raises StreamError for one that does not fit."""
+        found: list[Capture] = []
         for capture in captures:
             if not isinstance(capture, dict):
                 raise StreamError(f'{self.meta}: captures: each must be an object')
@@ -206,8 +215,8 @@ class Recording:
                               'number of samples in the file; the file is cut')
         return found
 
-    def chunks(self):
-        """Yield the Chunks of the recording."""
+    def chunks(self) -> Iterator[Chunk]:
+        """Yield the chunks of the recording."""
         data = np.memmap(data_path(self.meta), self.type, 'r', shape=(self.count, self.channels)) if self.count else ()
         ends = [start for start, *_ in self.captures[1:]] + [self.count]
         for (start, index, utc), end in zip(self.captures, ends):

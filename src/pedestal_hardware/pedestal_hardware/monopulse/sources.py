@@ -1,18 +1,17 @@
-"""Sources of samples: VITA 49 by UDP, sinks of GNU Radio by ZMQ, and recordings. Each has the call `read`.
-
-read(timeout) waits at most this time [s] and returns a Chunk, or None if none is complete. It raises StreamError for
-data that do not fit; the next call continues. `close` ends the source; `counts` are its events by name; `full_scale`
-is the largest part of a sample, None if the samples have no limit.
-"""
+"""Sources of samples: VITA 49 by UDP, sinks of GNU Radio by ZMQ, and recordings. See Source."""
 import socket
 import struct
 import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
+from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_hardware.monopulse import sigmf, vita49
-from pedestal_hardware.monopulse.blocks import NS_PER_SECOND, ArrivalClock, Chunk, StreamError
-from pedestal_hardware.monopulse.params import CHANNELS, SCANNED_CHANNELS
+from pedestal_hardware.monopulse.blocks import ArrivalClock, Chunk, StreamError
+from pedestal_hardware.monopulse.params import CHANNELS, SCANNED_CHANNELS, MonopulseParameters, SourceParameters
 from pedestal_hardware.monopulse.vita49 import INTEGER_FULL_SCALE
 
 TAG_MAGIC, TAG_VERSION = 0x5FF0, 1
@@ -25,22 +24,41 @@ FULL_SCALE = (INTEGER_FULL_SCALE - 1.0) / INTEGER_FULL_SCALE  # largest real or 
 MAX_MESSAGE_BYTES = 64_000_000  # largest ZMQ message [bytes]
 
 
-class VitaSource:
-    """Packets of VITA 49 that arrive by UDP. full_scale: largest number of a sample, None for floats."""
+Clock: TypeAlias = Callable[[], Nanoseconds]    # returns the UTC
 
-    def __init__(self, p, channels, _clock):
-        self.full_scale = FULL_SCALE if p.format == 'ci16' else None
-        self.format, self.joiner = p.format, vita49.Joiner(p.rate, p.streams[:len(channels)])
+
+class Source(Protocol):
+    """Source of samples."""
+    full_scale: float | None    # largest part of a sample, None if the samples have no limit
+
+    def read(self, timeout: Seconds) -> Chunk | None:
+        """Wait at most this time, and return the next chunk, or None if none is complete. Raises StreamError for data
+        that do not fit; the next call continues."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of its events, by name."""
+
+    def close(self) -> None:
+        """End the source."""
+
+
+class VitaSource:
+    """Packets of VITA 49 that arrive by UDP. Floats have no full scale."""
+
+    def __init__(self, params: SourceParameters, channels: Sequence[str], _clock: Clock) -> None:
+        self.full_scale = FULL_SCALE if params.format == 'ci16' else None
+        self.format, self.joiner = params.format, vita49.Joiner(params.rate, params.streams[:len(channels)])
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         try:
-            self.socket.bind((p.host, p.port))
+            self.socket.bind((params.host, params.port))
         except OSError as error:
             self.socket.close()
-            raise StreamError(f'source.address = {p.url}: {error.strerror}') from None
+            raise StreamError(f'source.address = {params.url}: {error.strerror}') from None
 
-    def read(self, timeout):
-        """Return the next Chunk, or None."""
+    def read(self, timeout: Seconds) -> Chunk | None:
+        """Return the next chunk, or None."""
         self.socket.settimeout(timeout)
         try:
             data = self.socket.recv(vita49.MAX_PACKET_BYTES)
@@ -50,48 +68,50 @@ class VitaSource:
         return None if packet is None else self.joiner.put(packet)
 
     @property
-    def counts(self):
+    def counts(self) -> dict[str, int]:
         """Numbers of its events."""
         return {'incomplete_packets': self.joiner.incomplete}
 
-    def close(self):
+    def close(self) -> None:
         """End the source."""
         self.socket.close()
 
 
 class ZmqSource:
-    """Stream of interleaved complex64 from a sink of GNU Radio. clock() returns the UTC [ns]."""
+    """Stream of interleaved complex64 from a sink of GNU Radio."""
 
-    full_scale = None
+    full_scale: float | None = None
 
-    def __init__(self, p, channels, clock):
+    def __init__(self, params: SourceParameters, channels: Sequence[str], clock: Clock) -> None:
         try:
             import zmq
         except ImportError as error:
             raise StreamError(f"{error}: pip install 'pedestal_hardware[sdr]'") from None
         self.zmq, self.channels, self.clock = zmq, channels, clock
         self.context = zmq.Context()
-        self.socket = self.context.socket(zmq.SUB if p.kind == 'zmq_sub' else zmq.PULL)
+        self.socket = self.context.socket(zmq.SUB if params.kind == 'zmq_sub' else zmq.PULL)
         self.socket.setsockopt(zmq.LINGER, 0)
         self.socket.setsockopt(zmq.RCVHWM, MAX_QUEUED_MESSAGES)
         self.socket.setsockopt(zmq.MAXMSGSIZE, MAX_MESSAGE_BYTES)
-        if p.kind == 'zmq_sub':
+        if params.kind == 'zmq_sub':
             self.socket.setsockopt(zmq.SUBSCRIBE, b'')
         try:
-            self.socket.connect(p.url)
+            self.socket.connect(params.url)
         except zmq.ZMQError as error:
             self.close()
-            raise StreamError(f'source.address = {p.url}: {error}') from None
+            raise StreamError(f'source.address = {params.url}: {error}') from None
         # A message contains no number of channels, but another number makes another rate.
         own = len(channels)
         other = len(CHANNELS) + len(SCANNED_CHANNELS) - own
-        self.times = ArrivalClock(p.rate, p.delay, {
+        self.times = ArrivalClock(params.rate, params.delay, {
             other / own: f'or the messages have {other} channels, must be {own} (feed.kind)'})
-        self.silence_ns = round(p.silence * NS_PER_SECOND)
-        self.next, self.item, self.arrived, self.refused = 0, None, None, 0
+        self.silence_ns = round(params.silence * NS_PER_SECOND)
+        self.next, self.refused = 0, 0          # next: number of the next sample
+        self.item: int | None = None            # number of the next item, as the sink counts
+        self.arrived: Nanoseconds | None = None     # UTC of the last message
 
-    def read(self, timeout):
-        """Return the next Chunk, or None."""
+    def read(self, timeout: Seconds) -> Chunk | None:
+        """Return the next chunk, or None."""
         if not self.socket.poll(round(1000 * timeout)):
             return None
         data, arrived = self.socket.recv(), self.clock()
@@ -119,7 +139,7 @@ class ZmqSource:
         self.times.check_rate(self.next, arrived)
         return Chunk(samples, number, self.times.utc(number, len(samples), arrived))
 
-    def _without_tags(self, data):
+    def _without_tags(self, data: bytes) -> tuple[bytes, int | None]:
         """Return (samples, number of the first one or None) of a message. Raises StreamError for tags, which have no
         fixed length."""
         if len(data) < TAG_HEADER.size or len(data) % 8 != TAG_HEADER.size % 8:
@@ -132,34 +152,34 @@ class ZmqSource:
         return data[TAG_HEADER.size:], first
 
     @property
-    def counts(self):
+    def counts(self) -> dict[str, int]:
         """Numbers of its events."""
         return {'refused_messages': self.refused}
 
-    def close(self):
+    def close(self) -> None:
         """End the source."""
         self.socket.close()
         self.context.term()
 
 
 class SigmfSource:
-    """Recording, played in the time of the clock: its first sample has the UTC of the first call. clock() returns the
-    UTC [ns]."""
+    """Recording, played in the time of the clock: its first sample has the UTC of the first call."""
 
-    def __init__(self, p, channels, clock):
-        self.recording = sigmf.Recording(p.url, channels, p.rate)
+    def __init__(self, params: SourceParameters, channels: Sequence[str], clock: Clock) -> None:
+        self.recording = sigmf.Recording(params.url, channels, params.rate)
         self.full_scale = None if self.recording.type.kind == 'c' else FULL_SCALE
-        self.block = max(round(p.rate * 0.005), 1)
-        self.pieces, self.clock, self.shift, self.ended = self._pieces(), clock, None, False
+        self.block = max(round(params.rate * 0.005), 1)
+        self.pieces, self.clock, self.ended = self._pieces(), clock, False
+        self.shift: Nanoseconds | None = None       # of the times of the recording
 
-    def _pieces(self):
+    def _pieces(self) -> Iterator[Chunk]:
         for chunk in self.recording.chunks():
             for k in range(0, len(chunk.samples), self.block):
                 yield Chunk(chunk.samples[k:k + self.block], chunk.first + k,
                             chunk.utc + round(k * NS_PER_SECOND / self.recording.rate))
 
-    def read(self, timeout):
-        """Return the next Chunk when its time has come. Raises StreamError once, for a file that is cut."""
+    def read(self, timeout: Seconds) -> Chunk | None:
+        """Return the next chunk when its time has come. Raises StreamError once, for a file that is cut."""
         chunk = next(self.pieces, None)
         if chunk is None:
             if self.recording.cut and not self.ended:
@@ -174,17 +194,18 @@ class SigmfSource:
         return chunk._replace(utc=chunk.utc + self.shift)
 
     @property
-    def counts(self):
+    def counts(self) -> dict[str, int]:
         """Numbers of its events."""
         return {}
 
-    def close(self):
+    def close(self) -> None:
         """End the source."""
 
 
-SOURCES = {'vita49': VitaSource, 'zmq_sub': ZmqSource, 'zmq_pull': ZmqSource, 'sigmf': SigmfSource}
+SOURCES: dict[str, Callable[[SourceParameters, Sequence[str], Clock], Source]] = {
+    'vita49': VitaSource, 'zmq_sub': ZmqSource, 'zmq_pull': ZmqSource, 'sigmf': SigmfSource}
 
 
-def opened(p, clock):
-    """Return the source of MonopulseParameters. clock() returns the UTC [ns]. Raises StreamError."""
-    return SOURCES[p.source.kind](p.source, p.feed.channels, clock)
+def opened(params: MonopulseParameters, clock: Clock) -> Source:
+    """Return the source of a receiver. Raises StreamError."""
+    return SOURCES[params.source.kind](params.source, params.feed.channels, clock)

@@ -2,14 +2,19 @@
 import cmath
 import math
 import typing
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, Unit, joined
+from pedestal_common.quantities import AnyRecord, Complexes, Floats, Hertz, Nanoseconds, Records, Seconds, Stamps
+from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware.monopulse import feed, front_end, scan
+from pedestal_hardware.monopulse.blocks import Block, Samples
+from pedestal_hardware.monopulse.params import MonopulseParameters
 from tracking_receiver_sim import receiver
 
 ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
@@ -19,100 +24,106 @@ AXIS_NAMES = 'cross_elevation', 'elevation'
 MAX_PASSED_GAP_S = 0.2
 """Longest gap after which the loop continues at its frequency [s]. At 3 kHz/s the carrier moves by 600 Hz in it."""
 
-_FIELDS = [('state', front_end.State), ('constants', front_end.Constants),
-           ('outputs', front_end.Outputs.dtype)]
-Record = np.dtype(_FIELDS, align=True)
-SCANNED_RECORD_DTYPE = np.dtype([*_FIELDS, ('window', scan.Window.dtype)], align=True)
+
+class ReceiverRecord(Record):
+    """Records of a receiver of three channels."""
+    state: front_end.State
+    constants: front_end.Constants
+    outputs: front_end.Outputs
+
+
+class ScannedRecord(ReceiverRecord):
+    """Records of a receiver of a scanned feed."""
+    window: scan.Window
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the unit for three channels. record: (1,) of Record; samples: (n, 3) of a block; dumps: (parts,
-    3) integrals."""
-    record: np.ndarray
-    samples: np.ndarray
-    dumps: np.ndarray
+    """Memory of the unit for three channels."""
+    record: Records         # ReceiverRecord (1,)
+    samples: Samples        # (n, 3) of a block
+    dumps: Complexes        # (parts, 3) integrals
 
 
 class ScannedMemory(typing.NamedTuple):
-    """Memory of the unit for a scanned feed. record: (1,) of SCANNED_RECORD_DTYPE; samples: (n, 2) of a block; dumps:
-    (parts, 2) integrals and means."""
-    record: np.ndarray
-    samples: np.ndarray
-    dumps: np.ndarray
+    """Memory of the unit for a scanned feed."""
+    record: Records         # ScannedRecord (1,)
+    samples: Samples        # (n, 2) of a block
+    dumps: Complexes        # (parts, 2) integrals and means
 
 
 @compiled
-def publish(error, stamp, o):
-    """Write the outputs of the receiver to the message of a stamp [ns]."""
+def publish(error: AnyRecord, stamp: Nanoseconds, outputs: front_end.Outputs) -> None:
+    """Write the outputs of the receiver to the message of a stamp."""
     error.stamp = stamp
-    error.vector[0], error.vector[1], error.vector[2] = o.cross_elevation, o.elevation, o.cn0_dbhz
+    error.vector[0], error.vector[1], error.vector[2] = outputs.cross_elevation, outputs.elevation, outputs.cn0_dbhz
 
 
 @compiled
-def law(memory, stamp, inputs, outputs):
-    """Execute the step of a block. stamp: middle of the block [ns]."""
-    m = memory.record[0]
-    front_end.step(m.state, m.constants, memory.samples, memory.dumps, m.outputs)
-    publish(outputs[ANGLE_ERROR_TOPIC], stamp, m.outputs)
+def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
+    """Execute the step of a block. stamp: middle of the block."""
+    record = memory.record[0]
+    front_end.step(record.state, record.constants, memory.samples, memory.dumps, record.outputs)
+    publish(outputs[ANGLE_ERROR_TOPIC], stamp, record.outputs)
 
 
 @compiled
-def laws(memory, stamps, inputs, outputs):
+def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> None:
     """Execute `law` for each element of arrays."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
 @compiled
-def scanned_law(memory, stamp, inputs, outputs):
-    """Execute the step of a block of a scanned feed. stamp: middle of the block [ns]. The stamp of an error is the
+def scanned_law(memory: ScannedMemory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
+    """Execute the step of a block of a scanned feed. stamp: middle of the block. The stamp of an error is the
     middle of its window."""
-    m = memory.record[0]
-    if scan.step(m.state, m.constants, m.window, memory.samples, memory.dumps, m.outputs):
-        publish(outputs[ANGLE_ERROR_TOPIC], stamp - m.window.age_ns, m.outputs)
+    record = memory.record[0]
+    if scan.step(record.state, record.constants, record.window, memory.samples, memory.dumps, record.outputs):
+        publish(outputs[ANGLE_ERROR_TOPIC], stamp - record.window.age_ns, record.outputs)
     else:
         outputs[ANGLE_ERROR_TOPIC].stamp = NO_STAMP
 
 
 @compiled
-def scanned_laws(memory, stamps, inputs, outputs):
+def scanned_laws(memory: ScannedMemory, stamps: Stamps, inputs: Records, outputs: Records) -> None:
     """Execute `scanned_law` for each element of arrays."""
     for k in range(len(stamps)):
         scanned_law(memory, stamps[k], inputs[k], outputs[k])
 
 
 class MonopulseReceiver(Unit):
-    """A receiver of the samples of three channels or of a scanned feed, of MonopulseParameters.
+    """A receiver of the samples of three channels or of a scanned feed.
 
     Before each step `take` takes the block of the step.
-
-    integration     effective time of an error [s], see feed.effective_integration
-    age_ns          time from the stamp of an error to the middle of the block that completes it [ns]
-    source_fault    fault of the stream of samples, '' without one
-    counts          {name: number} of the events of the stream
     """
+    parameters: MonopulseParameters
+    memory: Memory | ScannedMemory
+    integration: Seconds        # effective time of an error, see feed.effective_integration
+    age_ns: Nanoseconds         # time from the stamp of an error to the middle of the block that completes it
+    source_fault: str           # fault of the stream of samples, '' without one
+    counts: dict[str, int]      # of the events of the stream, by name
     NODE, LAWS = nodes.MONOPULSE_RECEIVER, {Memory: (law, laws), ScannedMemory: (scanned_law, scanned_laws)}
 
-    def __init__(self, parameters, reads):
+    def __init__(self, parameters: MonopulseParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
         p = parameters
         parts, channels = p.receiver.samples_per_step, len(p.feed.channels)
         if p.feed.scanned:
-            memory, record = ScannedMemory, joined(SCANNED_RECORD_DTYPE, state=front_end.initial_state(p),
-                                                   constants=scan.constants(p), window=scan.initial_window(p))
+            record = joined(ScannedRecord.dtype, state=front_end.initial_state(p), constants=scan.constants(p),
+                            window=scan.initial_window(p))
         else:
-            memory, record = Memory, joined(Record, state=front_end.initial_state(p),
-                                            constants=front_end.constants(p))
+            record = joined(ReceiverRecord.dtype, state=front_end.initial_state(p),
+                            constants=front_end.constants(p))
         record['outputs']['status'] = front_end.Status.WAIT
-        self.memory = memory(record, np.zeros((p.block, channels), np.complex64),
-                             np.zeros((parts, channels), np.complex128))
+        self.memory = (ScannedMemory if p.feed.scanned else Memory)(
+            record, np.zeros((p.block, channels), np.complex64), np.zeros((parts, channels), np.complex128))
         self.integration = feed.effective_integration(p)
         self.age_ns = int(self.parts['window']['age_ns']) if p.feed.scanned else 0
         self.search = front_end.Search(p)
         self.source_fault, self.counts = '', {}
 
-    def take(self, block):
-        """Take a blocks.Block for the next step. After a long gap the carrier is searched again."""
+    def take(self, block: Block) -> None:
+        """Take a block for the next step. After a long gap the carrier is searched again."""
         self.memory.samples[...] = block.samples
         state = self.parts['state']
         if block.missing:
@@ -127,7 +138,7 @@ class MonopulseReceiver(Unit):
         else:
             self.search.clear()
 
-    def prepare_requests(self):
+    def prepare_requests(self) -> None:
         """Compile the functions that the node calls between two steps."""
         super().prepare_requests()
         front_end.use_carrier(self.parts['state'], 0.0)
@@ -136,11 +147,11 @@ class MonopulseReceiver(Unit):
             scan.begin_again(self.parts['window'])
 
     @property
-    def urgent(self):
+    def urgent(self) -> tuple[object, ...]:
         """Values whose change is published at once: lock and fault of the stream."""
         return int(self.parts['outputs']['locked']), bool(self.source_fault)
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the Diagnosis: carrier, C/N0, the ratios of difference and sum or the scan, events of the stream.
 
         The level is ERROR for a fault of the stream or of its samples, or of the scan, WARN without lock.
@@ -167,7 +178,7 @@ class MonopulseReceiver(Unit):
             return Diagnosis(LEVEL_ERROR, text, values)
         return Diagnosis(LEVEL_OK if status == front_end.Status.LOCKED else LEVEL_WARN, text, values)
 
-    def _of_ratios(self):
+    def _of_ratios(self) -> list[tuple[str, str]]:
         """Return the values of the Diagnosis on the differences of three channels."""
         state, values = self.parts['state'], []
         for name, real, imag, skew in zip(AXIS_NAMES, state['ratio_real'], state['ratio_imag'], state['skew']):
@@ -177,7 +188,7 @@ class MonopulseReceiver(Unit):
                        (f'{name}_skew', f'{skew:.5f}')]
         return values
 
-    def _of_scan(self):
+    def _of_scan(self) -> list[tuple[str, str]]:
         """Return the values of the Diagnosis on a scanned feed: its rate and its modulation."""
         window = self.parts['window']
         return [('scan_hz', f'{self._scan_hz:.2f}'), ('scan_mean', f'{abs(window["mean"]):.3f}'),
@@ -185,13 +196,13 @@ class MonopulseReceiver(Unit):
                 *((f'{name}_modulation', f'{value:.5f}') for name, value in zip(AXIS_NAMES, window['slope']))]
 
     @property
-    def _scan_hz(self):
-        """Measured rate of the scan [Hz], negative for the wrong direction."""
+    def _scan_hz(self) -> Hertz:
+        """Measured rate of the scan, negative for the wrong direction."""
         p = self.parameters
         return float(self.parts['window']['advance']) / (2.0 * math.pi) * p.receiver.samples_per_step / p.period
 
     @property
-    def _wrong_scan(self):
+    def _wrong_scan(self) -> str:
         """Text that names the value of a wrong scan reference, and what it must be."""
         window, rate = self.parts['window'], self.parameters.feed.scan_rate
         if window['reversals'] > scan.MAX_REVERSALS:
@@ -201,6 +212,6 @@ class MonopulseReceiver(Unit):
         return f': its mean is {abs(window["mean"]):.2f} of its amplitude, must be 0'
 
     @staticmethod
-    def idle(numbers):
+    def idle(numbers: Mapping[str, Floats]) -> str:
         """Return a reason if no error is finite: such a recording does not exercise the receiver."""
         return '' if np.isfinite(numbers[ANGLE_ERROR_TOPIC][:, 0]).any() else 'the receiver never locked'

@@ -9,10 +9,13 @@ import collections
 import math
 import struct
 import typing
+from collections.abc import Sequence
 
 import numpy as np
 
-from pedestal_hardware.monopulse.blocks import NS_PER_SECOND, RATE_TOLERANCE, Chunk, StreamError
+from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.quantities import Hertz, Nanoseconds
+from pedestal_hardware.monopulse.blocks import RATE_TOLERANCE, Chunk, Samples, StreamError
 
 DATA_TYPE, TSI_UTC, TSF_PICOSECONDS = 1, 1, 2
 OTHER_TYPES = frozenset((4, 5, 6, 7))  # types of packets that describe a stream or command it. They are ignored.
@@ -26,15 +29,15 @@ PACKET_COUNTS = 16  # number of values of the packet counter
 
 
 class Packet(typing.NamedTuple):
-    """Packet of a stream: its counter, UTC of the first sample [ns], samples (n,) complex64."""
+    """Packet of a stream."""
     stream: int
     counter: int
-    utc: int
-    samples: np.ndarray
+    utc: Nanoseconds    # of the first sample
+    samples: Samples    # (n,)
 
 
-def encode(packet, kind, full_scale=1.0) -> bytes:
-    """Return the bytes of a Packet. kind: ci16 or cf32; full_scale: amplitude of the largest integer."""
+def encode(packet: Packet, kind: str, full_scale: float = 1.0) -> bytes:
+    """Return the bytes of a packet. kind: ci16 or cf32; full_scale: amplitude of the largest integer."""
     if kind == 'ci16':
         scaled = packet.samples.view(np.float32) * np.float32(INTEGER_FULL_SCALE / full_scale)
         payload = np.clip(np.rint(scaled), -INTEGER_FULL_SCALE, INTEGER_FULL_SCALE - 1.0).astype('>i2').tobytes()
@@ -46,7 +49,7 @@ def encode(packet, kind, full_scale=1.0) -> bytes:
     return struct.pack('>IIIQ', header, packet.stream, seconds, rest * PICOSECONDS_PER_NS) + payload
 
 
-def decode(data, kind) -> 'Packet | None':
+def decode(data: bytes, kind: str) -> Packet | None:
     """Return the Packet of a datagram; None for a packet without samples. Raises StreamError."""
     if len(data) < WORD_BYTES:
         raise StreamError(f'VITA 49 packet of {len(data)} bytes: must have a header of 4 bytes')
@@ -79,20 +82,20 @@ def decode(data, kind) -> 'Packet | None':
 
 
 class Joiner:
-    """Chunks of all channels, made of the packets of their streams by time.
+    """Chunks of all channels, made of the packets of their streams by time."""
+    incomplete: int         # number of times at which the packet of a channel was missing
+    suspected: Hertz        # wrong sample rate that the times of the last two packets show, NaN without
+    last: tuple[int, Nanoseconds, int, int] | None      # counter, UTC, samples and number of the sample after the
+                                                        # last one, of the last chunk
 
-    incomplete: number of times at which the packet of a channel was missing; suspected: wrong sample rate that the
-    times of the last two packets show [S/s], NaN without.
-    """
-
-    def __init__(self, rate, streams):
+    def __init__(self, rate: Hertz, streams: Sequence[int]) -> None:
         self.rate, self.streams, self.incomplete = rate, streams, 0
-        self.open = collections.OrderedDict()
+        self.open: collections.OrderedDict[Nanoseconds, dict[int, Packet]] = collections.OrderedDict()
         self.suspected = math.nan
-        self.last = None      # (count, utc, samples, number of the sample after the last one) of the last chunk
+        self.last = None
 
-    def put(self, packet) -> 'Chunk | None':
-        """Take a Packet and return the Chunk that it completes, or None. Raises StreamError for an unknown stream, a
+    def put(self, packet: Packet) -> Chunk | None:
+        """Take a packet and return the chunk that it completes, or None. Raises StreamError for an unknown stream, a
         time that goes back, channels of different lengths, or a wrong sample rate."""
         if packet.stream not in self.streams:
             raise StreamError(f'VITA 49 stream {packet.stream}: must be one of {", ".join(map(str, self.streams))} '
@@ -119,7 +122,7 @@ class Joiner:
                               'equal lengths')
         return Chunk(np.stack(columns, axis=1), self._number(parts[self.streams[0]]), packet.utc)
 
-    def _number(self, packet):
+    def _number(self, packet: Packet) -> int:
         """Return the number of the first sample of a chunk whose sum channel is `packet`."""
         count = len(packet.samples)
         if self.last is None:

@@ -10,7 +10,8 @@ import typing
 
 import serial
 
-from pedestal_hardware.rotator.protocols import Accepted, Position, Refusal
+from pedestal_common.quantities import Degrees, Seconds
+from pedestal_hardware.rotator.protocols import Accepted, Answer, Position, Refusal, RotatorProtocol
 
 RETRY_PERIOD_S = 1.0  # time between two attempts to open the connection [s]
 READ_TIMEOUT_S = 0.02  # longest wait for the next byte [s]
@@ -18,27 +19,26 @@ MAX_READ_BYTES = 4096  # number of bytes that are read at once
 
 
 class Measurement(typing.NamedTuple):
-    """Angles of the device [deg], and the time of the monotonic clock at which they arrived [s]."""
-    azimuth: float
-    elevation: float
-    at: float
+    """Angles of the device."""
+    azimuth: Degrees
+    elevation: Degrees
+    at: Seconds     # time of the monotonic clock at which they arrived
 
 
 class Line:
     """Connection to one rotator.
 
     url         `socket://host:port` for TCP, or the path of a serial device, as pyserial takes it
-    protocol    class of rotators' protocols
+    timeout     longest wait for an answer
     baud_rate   of a serial device; 0: that of the protocol
-    timeout     longest wait for an answer [s]
-
-    newest      the newest Measurement, None before the first
-    silence     reason why no position arrives, '' while positions arrive
-    refusal     reason of the device for the refusal of the last set-point or stop, '' after an accepted one
-    counts      numbers of positions, set-points, refusals and missing answers
     """
+    newest: Measurement | None  # None before the first
+    silence: str                # reason why no position arrives, '' while positions arrive
+    refusal: str                # of the device for the last set-point or stop, '' after an accepted one
+    counts: dict[str, int]      # positions, set-points, refusals and missing answers
 
-    def __init__(self, url, protocol, poll_period, timeout, baud_rate=0):
+    def __init__(self, url: str, protocol: type[RotatorProtocol], poll_period: Seconds, timeout: Seconds,
+                 baud_rate: int = 0) -> None:
         self.url, self.protocol, self.poll_period, self.timeout = url, protocol, poll_period, timeout
         self.baud_rate = baud_rate or protocol.BAUD_RATE
         self.newest, self.silence, self.refusal = None, f'{url}: not connected so far', ''
@@ -51,27 +51,27 @@ class Line:
         self._reader = protocol()
 
     @property
-    def fault(self):
+    def fault(self) -> str:
         """Reason why the device does not follow, '' if it does."""
         return self.silence or self.refusal
 
-    def start(self):
+    def start(self) -> None:
         """Start the thread."""
         self._thread.start()
 
-    def send_set_point(self, azimuth, elevation):
-        """Send a set-point [deg] at the next opportunity, in place of an earlier one that was not sent."""
+    def send_set_point(self, azimuth: Degrees, elevation: Degrees) -> None:
+        """Send a set-point at the next opportunity, in place of an earlier one that was not sent."""
         with self._lock:
             self._request = self._reader.set_point(azimuth, elevation)
         self._wake.set()
 
-    def send_stop(self):
+    def send_stop(self) -> None:
         """Send a stop at the next opportunity, in place of a set-point that was not sent."""
         with self._lock:
             self._request = self.protocol.STOP
         self._wake.set()
 
-    def close(self):
+    def close(self) -> None:
         """Stop the device and end the thread."""
         self.send_stop()
         self._ended.set()
@@ -79,7 +79,7 @@ class Line:
         if self._thread.is_alive():
             self._thread.join(2.0 * self.timeout + RETRY_PERIOD_S)
 
-    def _run(self):
+    def _run(self) -> None:
         while not self._ended.is_set():
             try:
                 with serial.serial_for_url(self.url, baudrate=self.baud_rate, timeout=READ_TIMEOUT_S,
@@ -89,7 +89,7 @@ class Line:
                 self.silence = f'{self.url}: {error}'
                 self._ended.wait(RETRY_PERIOD_S)
 
-    def _serve(self, device):
+    def _serve(self, device: serial.Serial) -> None:
         """Exchange requests and answers until the thread ends; raises OSError when the device vanishes."""
         self._reader = self.protocol()
         while True:
@@ -102,7 +102,7 @@ class Line:
             self._await(device, Position)
             self._wake.wait(max(self.poll_period - (time.monotonic() - begun), 0.0))
 
-    def _send_request(self, device):
+    def _send_request(self, device: serial.Serial) -> None:
         """Send the newest set-point or stop, if there is one, and await its answer where the protocol has one."""
         request = self._request
         if not request:
@@ -118,7 +118,7 @@ class Line:
             if self._request is request and not (self.refusal and request == self.protocol.STOP):
                 self._request = b''
 
-    def _refused(self, reason, awaited):
+    def _refused(self, reason: str, awaited: type[Answer]) -> None:
         """Keep the reason of a refusal: of a request until the next request is sent or accepted, of other bytes until
         the next position."""
         if awaited is Accepted or self._unanswered:
@@ -126,7 +126,7 @@ class Line:
         else:
             self.silence = f'{self.url}: {reason}'
 
-    def _await(self, device, awaited):
+    def _await(self, device: serial.Serial, awaited: type[Answer]) -> None:
         """Read until an answer of the awaited type arrives, or a refusal of a set-point.
 
         Raise OSError after a time-out. The connection is then opened again, because a late answer would be taken for

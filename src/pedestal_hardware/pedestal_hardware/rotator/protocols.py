@@ -5,51 +5,50 @@ manual of the SPID Rot2Prog. All angles are in degrees. A protocol object keeps 
 answer, so each connection needs its own object.
 """
 import re
-import typing
+from collections.abc import Iterator
+from typing import ClassVar, NamedTuple, TypeAlias
+
+from pedestal_common.quantities import Degrees
 
 MAX_ANSWER_BYTES = 512  # number of bytes without a complete answer after which the bytes are refused
 MAX_ANGLE_DEG = 1000.0  # largest angle that a device may report [deg]
 
 
-class Position(typing.NamedTuple):
-    """Answer of a device: azimuth and elevation [deg]."""
-    azimuth: float
-    elevation: float
+class Position(NamedTuple):
+    """Answer of a device."""
+    azimuth: Degrees
+    elevation: Degrees
 
 
-class Refusal(typing.NamedTuple):
-    """Answer of a device that refuses a request, or bytes that are no answer; reason: one line."""
-    reason: str
+class Refusal(NamedTuple):
+    """Answer of a device that refuses a request, or bytes that are no answer."""
+    reason: str     # one line
 
 
-class Accepted(typing.NamedTuple):
+class Accepted(NamedTuple):
     """Answer of a device that accepts a set-point or a stop."""
 
 
+Answer: TypeAlias = Position | Refusal | Accepted
+
+
 class RotatorProtocol:
-    """Base of the protocols.
+    """Base of the protocols."""
+    ASK: ClassVar[bytes] = b''              # request of the position
+    STOP: ClassVar[bytes] = b''             # request to stop both axes
+    ANSWERS_SETS: ClassVar[bool] = False    # True if the device answers a set-point
+    BAUD_RATE: ClassVar[int] = 9600         # usual speed of the serial line
+    RESOLUTION: ClassVar[Degrees] = 0.01    # smallest step of a set-point
 
-    ASK           request of the position
-    STOP          request to stop both axes
-    ANSWERS_SETS  True if the device answers a set-point
-    BAUD_RATE     usual speed of the serial line
-    RESOLUTION    smallest step of a set-point [deg]
-    """
-    ASK = b''
-    STOP = b''
-    ANSWERS_SETS = False
-    BAUD_RATE = 9600
-    RESOLUTION = 0.01
-
-    def __init__(self):
+    def __init__(self) -> None:
         self.buffer = b''
 
-    def set_point(self, azimuth, elevation) -> bytes:
-        """Return the request to move to angles [deg]."""
+    def set_point(self, azimuth: Degrees, elevation: Degrees) -> bytes:
+        """Return the request to move to these angles."""
         raise NotImplementedError
 
-    def answers(self, received: bytes) -> list:
-        """Return the complete answers in the received bytes: Position, Accepted or Refusal."""
+    def answers(self, received: bytes) -> list[Answer]:
+        """Return the complete answers in the received bytes."""
         self.buffer += received
         found = list(self._complete())
         if len(self.buffer) > MAX_ANSWER_BYTES:
@@ -57,7 +56,7 @@ class RotatorProtocol:
             self.buffer = b''
         return found
 
-    def _complete(self):
+    def _complete(self) -> Iterator[Answer]:
         """Yield the complete answers, and remove their bytes from the buffer."""
         raise NotImplementedError
 
@@ -65,23 +64,29 @@ class RotatorProtocol:
 class LineProtocol(RotatorProtocol):
     """Base of the protocols of text lines."""
 
-    def _complete(self):
+    def _complete(self) -> Iterator[Answer]:
         *lines, self.buffer = re.split(rb'[\r\n]+', self.buffer)
         for line in lines:
             if line.strip():
                 yield from self.answers_of(line.strip())
 
-    def answers_of(self, line):
+    def answers_of(self, line: bytes) -> Iterator[Answer]:
         """Yield the answers in one line."""
         raise NotImplementedError
 
 
-def checked(azimuth, elevation):
-    """Return the Position of two numbers or texts, or the Refusal of angles that no device has."""
+def checked(azimuth: bytes, elevation: bytes) -> Position | Refusal:
+    """Return the Position of the texts of two numbers, or the Refusal of other texts and of angles that no device has.
+    """
     try:
         position = Position(float(azimuth), float(elevation))
     except ValueError:
         return Refusal(f'position {azimuth[:20]!r}, {elevation[:20]!r}: must be two numbers')
+    return in_range(position)
+
+
+def in_range(position: Position) -> Position | Refusal:
+    """Return a position, or the Refusal of angles that no device has."""
     if not all(abs(angle) <= MAX_ANGLE_DEG for angle in position):
         return Refusal(f'position {position.azimuth:g}, {position.elevation:g} deg: must be within '
                        f'+-{MAX_ANGLE_DEG:g} deg')
@@ -92,15 +97,15 @@ class Rotctld(LineProtocol):
     """Client of Hamlib's rotctld, by which every rotator that Hamlib supports is reached."""
     ASK, STOP, ANSWERS_SETS, RESOLUTION = b'p\n', b'S\n', True, 0.01
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__()
-        self._azimuth = None
+        self._azimuth: bytes | None = None     # first line of a position
 
-    def set_point(self, azimuth, elevation):
-        """Return the request to move to angles [deg]."""
+    def set_point(self, azimuth: Degrees, elevation: Degrees) -> bytes:
+        """Return the request to move to these angles."""
         return b'P %.2f %.2f\n' % (azimuth, elevation)
 
-    def answers_of(self, line):
+    def answers_of(self, line: bytes) -> Iterator[Answer]:
         """Yield the answer that a line completes: a position has two lines."""
         if line.startswith(b'RPRT'):
             self._azimuth = None
@@ -121,11 +126,11 @@ class Gs232(LineProtocol):
     ASK, STOP, RESOLUTION = b'C2\r', b'S\r', 1.0
     _POSITION = re.compile(rb'AZ=(\d{3})\s+EL=(\d{3})|\+0(\d{3})\s*\+0(\d{3})')
 
-    def set_point(self, azimuth, elevation):
-        """Return the request to move to angles [deg]."""
+    def set_point(self, azimuth: Degrees, elevation: Degrees) -> bytes:
+        """Return the request to move to these angles."""
         return b'W%03d %03d\r' % (round(azimuth), round(elevation))
 
-    def answers_of(self, line):
+    def answers_of(self, line: bytes) -> Iterator[Answer]:
         """Yield the answer of a line."""
         match = self._POSITION.fullmatch(line)
         if match:
@@ -139,15 +144,15 @@ class Easycomm(LineProtocol):
     ASK, STOP, RESOLUTION = b'AZ EL \n', b'SA SE \n', 0.1
     _WORD = re.compile(rb'(AZ|EL)([-+]?[\d.]+)')
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__()
-        self._angles = {}
+        self._angles: dict[bytes, bytes] = {}
 
-    def set_point(self, azimuth, elevation):
-        """Return the request to move to angles [deg]."""
+    def set_point(self, azimuth: Degrees, elevation: Degrees) -> bytes:
+        """Return the request to move to these angles."""
         return b'AZ%.1f EL%.1f\n' % (azimuth, elevation)
 
-    def answers_of(self, line):
+    def answers_of(self, line: bytes) -> Iterator[Answer]:
         """Yield the position once both angles have arrived; other words, such as alarms, are refused."""
         for word in line.split():
             match = self._WORD.fullmatch(word)
@@ -170,13 +175,13 @@ class Rot2prog(RotatorProtocol):
     PULSES_PER_DEG = 10
     FRAME_BYTES = 12
 
-    def set_point(self, azimuth, elevation):
-        """Return the request to move to angles [deg]."""
+    def set_point(self, azimuth: Degrees, elevation: Degrees) -> bytes:
+        """Return the request to move to these angles."""
         pulses = self.PULSES_PER_DEG
         return b'W%04d%c%04d%c\x2f ' % (round(pulses * (360.0 + azimuth)), pulses,
                                         round(pulses * (360.0 + elevation)), pulses)
 
-    def _complete(self):
+    def _complete(self) -> Iterator[Answer]:
         while True:
             begin = self.buffer.find(b'W')
             self.buffer = self.buffer[begin:] if begin >= 0 else b''
@@ -189,8 +194,8 @@ class Rot2prog(RotatorProtocol):
                 yield Refusal(f'frame {frame.hex(" ")}: must be W, eight digits with their pulses, and a space')
                 continue
             self.buffer = self.buffer[self.FRAME_BYTES:]
-            angles = (100 * d[0] + 10 * d[1] + d[2] + 0.1 * d[3] - 360 for d in (digits[:4], digits[4:]))
-            yield checked(*angles)
+            yield in_range(Position(*(100 * d[0] + 10 * d[1] + d[2] + 0.1 * d[3] - 360
+                                      for d in (digits[:4], digits[4:]))))
 
 
 PROTOCOLS: dict[str, type[RotatorProtocol]] = {

@@ -11,7 +11,10 @@ import re
 import select
 import time
 import tty
+from collections.abc import Callable
+from typing import TypeAlias
 
+from pedestal_common.quantities import Seconds
 from pedestal_hardware.rotator.protocols import Rot2prog
 
 PULSES_PER_DEG = Rot2prog.PULSES_PER_DEG
@@ -22,22 +25,22 @@ ANGLE = re.compile(rb'(AZ|EL)(-?[0-9]+(?:\.[0-9]*)?)')  # set-point of an axis i
 class Axes:
     """Azimuth and elevation [deg] of a rotator that moves at a rate [deg/s]."""
 
-    def __init__(self, rate, now):
+    def __init__(self, rate: float, now: Seconds) -> None:
         self.rate, self.now = rate, now
         self.angles, self.set_points = [0.0, 0.0], [0.0, 0.0]
 
-    def advance(self, now):
-        """Move until a time [s]."""
+    def advance(self, now: Seconds) -> None:
+        """Move until a time."""
         reach, self.now = self.rate * (now - self.now), now
         self.angles = [angle + min(max(goal - angle, -reach), reach)
                        for angle, goal in zip(self.angles, self.set_points)]
 
-    def stop(self):
+    def stop(self) -> None:
         """Stop where the axes are."""
         self.set_points = list(self.angles)
 
 
-def gs232(axes, buffer):
+def gs232(axes: Axes, buffer: bytes) -> tuple[bytes, bytes]:
     """Return (answer, rest of the buffer) to the requests of a GS-232B."""
     *requests, rest = buffer.split(b'\r')
     answer = b''
@@ -54,7 +57,7 @@ def gs232(axes, buffer):
     return answer, rest
 
 
-def easycomm(axes, buffer):
+def easycomm(axes: Axes, buffer: bytes) -> tuple[bytes, bytes]:
     """Return (answer, rest of the buffer) to the requests of an EasyComm device."""
     *requests, rest = buffer.split(b'\n')
     answer = b''
@@ -70,7 +73,7 @@ def easycomm(axes, buffer):
     return answer, rest
 
 
-def rot2prog(axes, buffer):
+def rot2prog(axes: Axes, buffer: bytes) -> tuple[bytes, bytes]:
     """Return (answer, rest of the buffer) to the frames of a Rot2Prog."""
     answer = b''
     while len(buffer) >= 13:
@@ -86,12 +89,14 @@ def rot2prog(axes, buffer):
     return answer, buffer
 
 
-DEVICES = {'gs232': gs232, 'easycomm': easycomm, 'rot2prog': rot2prog}
+Device: TypeAlias = Callable[[Axes, bytes], tuple[bytes, bytes]]
+
+DEVICES: dict[str, Device] = {'gs232': gs232, 'easycomm': easycomm, 'rot2prog': rot2prog}
 """Answers of the simulated devices, by the name of the protocol. Hamlib's `rotctld -m 1` is the device of rotctld."""
 
 
-def run(device, axes, descriptor, delay):
-    """Answer the requests on a descriptor until it closes; delay: time until an answer [s]."""
+def run(device: Device, axes: Axes, descriptor: int, delay: Seconds) -> None:
+    """Answer the requests on a descriptor until it closes; delay: time until an answer."""
     buffer = b''
     while True:
         select.select([descriptor], [], [], 0.1)
@@ -107,10 +112,10 @@ def run(device, axes, descriptor, delay):
             os.write(descriptor, answer)
 
 
-def serve(protocol, rate, delay):
+def serve(protocol: str, rate: float, delay: Seconds) -> None:
     """Open a pseudo terminal, print its path, and answer as a rotator until Ctrl-C.
 
-    protocol: one of DEVICES; rate: of both axes [deg/s]; delay: time until an answer [s].
+    protocol: one of DEVICES; rate: of both axes [deg/s]; delay: time until an answer.
     """
     end, device = pty.openpty()
     tty.setraw(device)

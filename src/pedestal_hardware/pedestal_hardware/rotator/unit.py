@@ -3,19 +3,24 @@
 The node gives the newest measurement of the device to the unit before each step, and sends what the step decides.
 """
 import math
-import typing
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from adu_drive.angle_drive import DRIVE_STATE_TOPIC, EMERGENCY_STOP_TEXT, ENABLED_TEXT, REFERENCE_TOPIC, AngleDrive
+from adu_drive.params import RunParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.modes import MODES
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
-from pedestal_common.quantities import Pair
+from pedestal_common.quantities import AnyRecord, Bit, Degrees, Nanoseconds, Pair, Records, Seconds, Stamps
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware.rotator import set_point
+
+if TYPE_CHECKING:
+    from pedestal_hardware.rotator.line import Measurement
 
 MODE_TOPIC, JOINT_STATES_TOPIC, CLOCK_TOPIC = 'acu/mode', 'joint_states', 'clock'
 
@@ -33,20 +38,20 @@ STUCK_TIME_S = 5.0  # time without motion, away from the set-point, after which 
 
 class Device(Record):
     """State of the device."""
-    angle: Pair  # angle, rate: newest measured angles [rad], and the rate between the last two measurements [rad/s]
-    rate: Pair
-    came: int  # 1 if a measurement has arrived since the last step
-    silent: int  # 1 while the newest measurement is too old
+    angle: Pair     # newest measured angles [rad]
+    rate: Pair      # between the last two measurements [rad/s]
+    came: Bit       # 1 if a measurement has arrived since the last step
+    silent: Bit     # 1 while the newest measurement is too old
 
 
 class Switches(Record):
-    """Switches of the drive: 1 after a request to enable; 1 while an emergency stop is latched."""
-    wanted: int
-    emergency: int
+    """Switches of the drive."""
+    wanted: Bit         # 1 after a request to enable
+    emergency: Bit      # 1 while an emergency stop is latched
 
 
-class UnitRecord(Record):
-    """Record."""
+class RotatorRecord(Record):
+    """All data of a rotator."""
     state: set_point.State
     constants: set_point.Constants
     inputs: set_point.Inputs
@@ -55,14 +60,14 @@ class UnitRecord(Record):
     device: Device
 
 
-class Memory(typing.NamedTuple):
-    """Memory of a rotator; record: (1,) of Record."""
-    record: np.ndarray
+class Memory(NamedTuple):
+    """Memory of a rotator."""
+    record: Records     # RotatorRecord (1,)
 
 
 @compiled
-def condition(switches, device):
-    """Return the code of STATE_TEXTS; records of Switches and Device."""
+def condition(switches: Switches, device: Device) -> int:
+    """Return the code of STATE_TEXTS."""
     if switches.emergency:
         return STATE_CODE_EMERGENCY_STOP
     if device.silent:
@@ -71,18 +76,18 @@ def condition(switches, device):
 
 
 @compiled
-def law(memory, stamp, inputs, outputs):
-    """Make the step of a stamp [ns]. A step without a new measurement publishes no angles."""
+def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
+    """Make the step of a stamp. A step without a new measurement publishes no angles."""
     record = memory.record[0]
-    u, device, reference = record.inputs, record.device, inputs[REFERENCE_TOPIC]
-    u.stamp_ns, u.reference_stamp_ns = stamp, reference.stamp
+    own, device, reference = record.inputs, record.device, inputs[REFERENCE_TOPIC]
+    own.stamp_ns, own.reference_stamp_ns = stamp, reference.stamp
     mode = inputs[MODE_TOPIC]
     moves = 0 <= mode < MODE_COUNT and mode != MODE_CODE_STANDBY and mode != MODE_CODE_STOP
-    u.enabled = 1 if condition(record.switches, device) == STATE_CODE_ENABLED and moves else 0
-    u.by_hand = 1 if mode == MODE_CODE_RATE else 0
+    own.enabled = 1 if condition(record.switches, device) == STATE_CODE_ENABLED and moves else 0
+    own.by_hand = 1 if mode == MODE_CODE_RATE else 0
     for i in range(2):
-        u.angle[i], u.rate[i], u.measured[i] = reference.position[i], reference.velocity[i], device.angle[i]
-    set_point.step(record.state, record.constants, u, record.outputs)
+        own.angle[i], own.rate[i], own.measured[i] = reference.position[i], reference.velocity[i], device.angle[i]
+    set_point.step(record.state, record.constants, own, record.outputs)
     joints = outputs[JOINT_STATES_TOPIC]
     joints.stamp = stamp if device.came else NO_STAMP
     outputs[CLOCK_TOPIC].stamp = stamp
@@ -93,33 +98,37 @@ def law(memory, stamp, inputs, outputs):
 
 
 @compiled
-def laws(memory, stamps, inputs, outputs):
+def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> None:
     """Apply `law` to each element of arrays."""
     for k in range(len(stamps)):
         law(memory, stamps[k], inputs[k], outputs[k])
 
 
 class Rotator(AngleDrive):
-    """A rotator of a RotatorParameters."""
+    """A rotator, of a RotatorParameters."""
+    memory: Memory
     NODE, LAWS, STATE_TEXTS = nodes.ROTATOR_DRIVE, {Memory: (law, laws)}, STATE_TEXTS
 
-    def __init__(self, parameters, reads):
+    def __init__(self, parameters: RunParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
-        p = parameters
+        p = self.parameters
         constants = set_point.Constants.zeros()
         constants['timeout_ns'] = p.timeout_ns
         constants['dead_band'], constants['resolution'] = math.radians(p.dead_band), math.radians(p.step_deg)
         constants['low'][0], constants['high'][0] = zip(*p.travel_rad)
         switches, device = Switches.zeros(), Device.zeros()
         switches['wanted'] = device['silent'] = 1
-        self.memory = Memory(joined(UnitRecord.dtype, constants=constants, switches=switches, device=device,
+        self.memory = Memory(joined(RotatorRecord.dtype, constants=constants, switches=switches, device=device,
                                     state=set_point.initial_state()))
-        self.measured_at, self.counts, self.fault = None, {}, ''
-        # Times of the monotonic clock [s]: of the last motion, and since when the rotator is away from the set-point.
-        self._moved_at, self._away_since, self._stuck_s = 0.0, None, 0.0
+        self.counts: dict[str, int] = {}
+        self.fault = ''
+        self.measured_at: Seconds | None = None     # times of the monotonic clock: of the newest measurement,
+        self._moved_at = 0.0                        # of the last motion,
+        self._away_since: Seconds | None = None     # and since when the rotator is away from the set-point
+        self._stuck_s = 0.0
 
-    def measure(self, measurement, now):
-        """Take the newest Measurement of the line, or None. now: time of the monotonic clock [s]."""
+    def measure(self, measurement: 'Measurement | None', now: Seconds) -> None:
+        """Take the newest measurement of the line. now: time of the monotonic clock."""
         device = self.parts['device']
         if measurement is not None and measurement.at != self.measured_at:
             angles = np.radians((measurement.azimuth, measurement.elevation))
@@ -133,32 +142,34 @@ class Rotator(AngleDrive):
             device['rate'] = 0.0
         away = self.parts['inputs']['enabled'] and self._distance_deg > self.parameters.accuracy_deg + \
             self.parameters.step_deg
-        self._away_since = (now if self._away_since is None else self._away_since) if away else None
-        self._stuck_s = now - max(self._moved_at, self._away_since) if away else 0.0
+        since = now if self._away_since is None else self._away_since
+        self._away_since = since if away else None
+        self._stuck_s = now - max(self._moved_at, since) if away else 0.0
 
     @property
-    def _distance_deg(self):
-        """Distance of the rotator from its last set-point, of the farther axis [deg]; NaN before the first."""
+    def _distance_deg(self) -> Degrees:
+        """Distance of the rotator from its last set-point, of the farther axis; NaN before the first."""
         return math.degrees(np.abs(self.parts['state']['set_point'] - self.parts['device']['angle']).max())
 
     @property
-    def decision(self):
-        """The set-point (azimuth, elevation) [deg] to send after the last step, 'stop', or None."""
+    def decision(self) -> tuple[Degrees, Degrees] | Literal['stop'] | None:
+        """The set-point (azimuth, elevation) to send after the last step, 'stop', or None."""
         outputs = self.parts['outputs']
         if outputs['send']:
-            return tuple(np.degrees(outputs['set_point']))
+            azimuth, elevation = np.degrees(outputs['set_point'])
+            return azimuth, elevation
         return 'stop' if outputs['stop'] else None
 
-    def take_text(self, topic, text):
+    def take_text(self, topic: str, text: str) -> None:
         """Take the mode of the control unit; an unknown mode does not move the rotator."""
         self.inputs[topic] = MODES.index(text) if text in MODES else MODE_COUNT
 
     @property
-    def condition_code(self):
+    def condition_code(self) -> int:
         """Present code of STATE_TEXTS, also between two steps."""
         return condition(self.parts['switches'], self.parts['device'])
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the Diagnosis: what the rotator can follow, and ERROR for a device that does not answer."""
         p, outputs, device, u = self.parameters, self.parts['outputs'], self.parts['device'], self.parts['inputs']
         switches = self.parts['switches']

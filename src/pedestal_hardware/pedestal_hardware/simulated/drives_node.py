@@ -8,29 +8,39 @@ import pedestal_common.entry  # noqa: F401
 # isort: split
 import sys
 import threading
+from collections.abc import Callable, Sequence
 
 from pedestal_common.graph.nodes import DRIVE_NODE
 from pedestal_common.node import shell, unit_node
+from pedestal_common.node.unit_node import Port
+from pedestal_common.quantities import Message
+from pedestal_common.wire import records
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware.bus import BusError
-from pedestal_hardware.params import START_KEY
+from pedestal_hardware.params import START_KEY, ServoDriveParameters
 from pedestal_hardware.simulated import law
+from pedestal_hardware.simulated.unit import SimulatedDrives
 from pedestal_hardware.unit import DRIVE_LABELS
 
 POLL_S = 0.002  # longest time between two steps of the plant [s]
 
 
 class DrivesNode(unit_node.UnitNode):
-    """Node of the simulated drives. lock: held while the unit steps or takes a command."""
+    """Node of the simulated drives."""
+    parameters: ServoDriveParameters
+    unit: SimulatedDrives
 
     PRECEDENCE = 2
     """Priority above that of the drive node, which waits for the reports of the drives in each step."""
 
-    def __init__(self):
-        self.lock, self.ending, self.newest, self.served = threading.Lock(), False, {}, None
+    def __init__(self) -> None:
+        self.lock = threading.Lock()        # held while the unit steps or takes a command
+        self.ending = False
+        self.newest: dict[str, records.Decoded] = {}
+        self.served: threading.Thread | None = None
         super().__init__('pedestal_hardware.simulated.drives_node')
 
-    def begin(self):
+    def begin(self) -> None:
         """Serve the bus."""
         try:
             from pedestal_hardware.simulated.can_drive import CanDrives
@@ -55,34 +65,34 @@ class DrivesNode(unit_node.UnitNode):
         self.served.start()
 
     @property
-    def awaits(self):
+    def awaits(self) -> str:
         """Text that names the inputs for which the node waits."""
         return f'the SYNC of a master on port {self.parameters.bus.port}'
 
-    def _take_start(self, array):
+    def _take_start(self, array: Message) -> None:
         """Take time 0 from the diagnostics of the node of the drives, which chooses it when all drives answer."""
         for status in array.status:
             for value in status.values if status.name == DRIVE_NODE else ():
                 if value.key == START_KEY and int(value.value) != self._epoch:
                     with self.lock:
-                        earlier, self._epoch = self._epoch - int(value.value), int(value.value)
+                        earlier, self._epoch = (self._epoch or 0) - int(value.value), int(value.value)
                         if self.unit.parts['tick'] != NO_STAMP:
                             self.unit.parts['tick'] += earlier // law.TICK_NS
 
-    def _newest_receiver(self, name):
-        def take(message, _):
+    def _newest_receiver(self, name: str) -> Callable[[records.Decoded, bool], None]:
+        def take(message: records.Decoded, _: bool) -> None:
             self.newest[name] = message
         return take
 
-    def _command_taker(self, port):
+    def _command_taker(self, port: Port) -> Callable[[Message], None]:
         take = super()._command_taker(port)
 
-        def locked(message):
+        def locked(message: Message) -> None:
             with self.lock:
                 take(message)
         return locked
 
-    def _serve(self):
+    def _serve(self) -> None:
         """Serve the bus and advance the plant until the node ends."""
         while not self.ending:
             self.drives.poll(POLL_S)
@@ -95,7 +105,7 @@ class DrivesNode(unit_node.UnitNode):
                 while drive.notes:
                     self.get_logger().warning(f'{DRIVE_LABELS[drive.number]}: {drive.notes.pop(0)}')
 
-    def _on_sync(self):
+    def _on_sync(self) -> None:
         """Advance the unit to now, and publish the truth of the step."""
         [port] = self.ports
         with self.lock:
@@ -109,7 +119,7 @@ class DrivesNode(unit_node.UnitNode):
             self.begin_step(utc)
             port.publish()
 
-    def close(self):
+    def close(self) -> None:
         """Close the bus and end."""
         self.ending = True
         if self.served is not None:
@@ -117,7 +127,7 @@ class DrivesNode(unit_node.UnitNode):
         super().close()
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node to its end. Return the exit code."""
     return shell.main(DrivesNode, args)
 

@@ -1,4 +1,6 @@
 """Object dictionary of a simulated drive, built in code, without a file of any maker."""
+from collections.abc import Iterable
+
 from canopen import objectdictionary as od
 
 from pedestal_hardware.simulated.law import ENCODER_TURNS
@@ -47,13 +49,13 @@ RECORDS = (
 PDO_COUNT, MAX_MAPPED_OBJECTS = 4, 8
 
 
-def _variable(index, subindex, name, kind, access, default):
+def _variable(index: int, subindex: int, name: str, kind: int, access: str, default: int) -> od.ODVariable:
     entry = od.ODVariable(name, index, subindex)
     entry.data_type, entry.access_type, entry.default = kind, access, default
     return entry
 
 
-def _record(index, name, members):
+def _record(index: int, name: str, members: Iterable[tuple[int, int, str, int]]) -> od.ODRecord:
     """Return a record; members: [(subindex, type, access, default)] from subindex 0 on."""
     record = od.ODRecord(name, index)
     for subindex, kind, access, default in members:
@@ -61,7 +63,7 @@ def _record(index, name, members):
     return record
 
 
-def dictionary(node, profile):
+def dictionary(node: int, profile: int) -> od.ObjectDictionary:
     """Return the object dictionary of the CANopen node `node`. profile: number in its device type (1000)."""
     found = od.ObjectDictionary()
     found.node_id = node

@@ -8,8 +8,12 @@ import select
 import socket
 import threading
 import time
+from collections.abc import Iterable, Sequence
 
 import can
+
+from pedestal_common.quantities import Seconds
+from pedestal_hardware.can_line import Frame
 
 HOLD_TIME_S = 0.05
 """Time after the beginning of a client's raw mode in which it gets no frames [s]. python-can takes the reply `< ok >`
@@ -19,28 +23,30 @@ MAX_LINE_BYTES = 4096  # largest number of bytes of a client without the end of 
 SEND_TIMEOUT_S = 0.2  # time after which a client that reads nothing is disconnected [s]
 
 
-def _text(cob, data):
+def _text(cob: int, data: bytes | bytearray) -> bytes:
     """Return the text of a frame."""
     return f'< frame {cob:03X} {time.time():.6f} {data.hex().upper()} >'.encode()
 
 
 class SocketcandServer(can.BusABC):
-    """End of the bus for the simulated drives. port: TCP port on 127.0.0.1."""
+    """End of the bus for the simulated drives, at a TCP port on 127.0.0.1."""
 
-    def __init__(self, port, **kwargs):
-        super().__init__(f'127.0.0.1:{port}', **kwargs)
+    def __init__(self, port: int) -> None:
+        super().__init__(f'127.0.0.1:{port}')
         self._can_protocol = can.CanProtocol.CAN_20
         self._listener = socket.create_server(('127.0.0.1', port))
-        self._received, self._buffers, self._open_from = [], {}, {}
+        self._received: list[can.Message] = []
+        self._buffers: dict[socket.socket, bytes] = {}      # begun command of each client
+        self._open_from: dict[socket.socket, Seconds] = {}  # time from which a client gets frames
         self._sending = threading.Lock()
 
-    def _recv_internal(self, timeout):
+    def _recv_internal(self, timeout: Seconds | None) -> tuple[can.Message | None, bool]:
         if not self._received:
             for ready in select.select([self._listener, *self._buffers], [], [], timeout)[0]:
                 self._take(ready)
         return (self._received.pop(0) if self._received else None), False
 
-    def _take(self, ready):
+    def _take(self, ready: socket.socket) -> None:
         """Accept a client, or take its commands."""
         if ready is self._listener:
             client, _ = ready.accept()
@@ -60,7 +66,7 @@ class SocketcandServer(can.BusABC):
         for line in lines:
             self._execute(ready, line.split()[1:])
 
-    def _execute(self, client, words):
+    def _execute(self, client: socket.socket, words: Sequence[bytes]) -> None:
         """Execute a command of a client; `< error ... >` answers an invalid command."""
         if words[:1] in ([b'open'], [b'rawmode']):
             self._write(client, b'< ok >')
@@ -83,35 +89,35 @@ class SocketcandServer(can.BusABC):
         if len(self._buffers) > 1:
             self._forward(_text(message.arbitration_id, message.data), client)
 
-    def _forward(self, text, sender):
+    def _forward(self, text: bytes, sender: socket.socket | None) -> None:
         """Send the text of frames to all clients in raw mode except their sender."""
         now = time.monotonic()
         for client in list(self._buffers):
             if client is not sender and self._open_from.get(client, now) < now:
                 self._write(client, text)
 
-    def _write(self, client, data):
+    def _write(self, client: socket.socket, data: bytes) -> None:
         with self._sending:
             try:
                 client.sendall(data)
             except OSError:
                 self._drop(client)
 
-    def _drop(self, client):
+    def _drop(self, client: socket.socket) -> None:
         self._buffers.pop(client, None)
         self._open_from.pop(client, None)
         with contextlib.suppress(OSError):
             client.close()
 
-    def send(self, msg, timeout=None):
+    def send(self, msg: can.Message, timeout: Seconds | None = None) -> None:
         """Send a frame to all clients."""
         self._forward(_text(msg.arbitration_id, msg.data), None)
 
-    def send_frames(self, frames):
-        """Send frames (identifier, data) to all clients in one write."""
+    def send_frames(self, frames: Iterable[Frame]) -> None:
+        """Send frames to all clients in one write."""
         self._forward(b''.join([_text(cob, data) for cob, data in frames]), None)
 
-    def shutdown(self):
+    def shutdown(self) -> None:
         """Close all connections."""
         super().shutdown()
         for client in list(self._buffers):

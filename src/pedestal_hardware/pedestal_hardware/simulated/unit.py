@@ -1,17 +1,22 @@
 """Unit of the simulated drives: plant, injected faults and adu/truth, without bus and without ROS."""
 import dataclasses
 import typing
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from adu_drive import drive_unit, injected
 from adu_drive import unit as adu_unit
+from adu_drive.params import AxisParameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
 from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.quantities import Records, Value
+from pedestal_common.wire.commands import Command, Reply
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware import cia402, commissioning, errors, pdo
+from pedestal_hardware.params import ServoDriveParameters
 from pedestal_hardware.simulated import law
 from pedestal_hardware.unit import DRIVE_LABELS
 
@@ -23,37 +28,40 @@ ALIGNED_REPORT_DTYPE = np.dtype([(name, 'i8') for name in pdo.REPORT_FIELDS])
 
 
 class Memory(typing.NamedTuple):
-    """Memory of the simulated drives; record: (1,) of law.Record."""
-    record: np.ndarray
+    """Memory of the simulated drives."""
+    record: Records         # law.DrivesRecord (1,)
 
 
 class SimulatedDrives(Simulated):
-    """Unit of the simulated drives, from ServoDriveParameters."""
+    """Unit of the simulated drives."""
+    parameters: ServoDriveParameters
+    memory: Memory
     NODE, LAWS = nodes.SIMULATED_DRIVES, {Memory: (law.law, law.laws)}
     VERBS, FAULTS_OF = table.INJECT_COMMANDS[nodes.DRIVE_NODE], nodes.DRIVE_NODE
 
-    def __init__(self, parameters, reads):
+    def __init__(self, parameters: ServoDriveParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
         link = adu_unit.Link.zeros()
         link['truth_stamp'] = NO_STAMP
         at_rest = dataclasses.replace(parameters, initially_enabled=False)
         self.memory = Memory(joined(
-            law.Record, state=drive_unit.initial_state(at_rest), constants=drive_unit.constants(parameters),
-            link=link, schedule=schedule.empty(), injected=injected.DriveInjected.zeros()))
+            law.DrivesRecord.dtype, state=drive_unit.initial_state(at_rest),
+            constants=drive_unit.constants(parameters), link=link, schedule=schedule.empty(),
+            injected=injected.DriveInjected.zeros()))
         self.parts['tick'], self.parts['period'] = NO_STAMP, round(parameters.period * 1e9)
         self.reports = np.zeros(pdo.DRIVE_COUNT, ALIGNED_REPORT_DTYPE)
         for drive in range(pdo.DRIVE_COUNT):
             self.power_up(drive)
 
-    def axis_of(self, drive):
+    def axis_of(self, drive: int) -> AxisParameters:
         """Return the AxisParameters of a drive."""
         return getattr(self.parameters, topics.AXES[drive // 2])
 
-    def power_up(self, drive):
+    def power_up(self, drive: int) -> None:
         """Bring a drive into its state after the supply came on."""
         d, motor = self.parts['drive'][drive], (self.axis_of(drive).motor_1, self.axis_of(drive).motor_2)[drive % 2]
         brake = d['brake_open'], d['brake_ticks']
-        self.parts['drive'][drive:drive + 1] = np.zeros(1, law.DRIVE_DTYPE)
+        self.parts['drive'][drive:drive + 1] = law.Drive.zeros()
         d['state'], d['leaving'] = cia402.State.SWITCH_ON_DISABLED, law.STAY
         # The brakes that were open close in their own time.
         d['brake_ticks'] = 0 if brake[0] else max(brake[1], law.MAX_CATCH_UP_TICKS)
@@ -61,18 +69,18 @@ class SimulatedDrives(Simulated):
         d['torque_unit'] = commissioning.PERMILLE * self.axis_of(drive).thermal.rated_torque
         d['torque_limit'] = motor.torque_limit
 
-    def measure(self):
+    def measure(self) -> Records:
         """Update `reports` (4,), the reports of the drives at their last time."""
         law.report(self.memory.record, self.reports)
         return self.reports
 
-    def execute(self, command, arguments):
+    def execute(self, command: Command, arguments: Mapping[str, Value]) -> Reply:
         """Inject a fault; see Simulated. Raises ValueError for a fault of messages, which a bus does not have."""
         if command.verb not in (*PLANT_FAULTS, table.CLEAR_COMMAND.name):
             raise ValueError(f'{command.verb}: simulated drives have the faults {", ".join(PLANT_FAULTS)}')
         return super().execute(command, arguments)
 
-    def diagnose(self):
+    def diagnose(self) -> Diagnosis:
         """Return the Diagnosis with state and error of each drive."""
         values, faulty = [], []
         for label, d in zip(DRIVE_LABELS, self.parts['drive']):
@@ -82,11 +90,11 @@ class SimulatedDrives(Simulated):
         return Diagnosis(LEVEL_WARN if faulty else LEVEL_OK, '; '.join(faulty) or 'drives run', values)
 
     @property
-    def urgent(self):
+    def urgent(self) -> tuple[object, ...]:
         """Values whose change is published at once: the errors of the drives."""
         return tuple(self.parts['drive']['error'].tolist())
 
-    def prepare_requests(self):
+    def prepare_requests(self) -> None:
         """Compile the functions that the node calls between two steps."""
         super().prepare_requests()
         self.measure()

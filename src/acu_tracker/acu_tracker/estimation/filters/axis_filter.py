@@ -10,11 +10,11 @@ The noise of the angle may be coloured by a first-order lag. The filter then use
 whose noise is white (Bryson, Henrikson 1968; kalman.update_correlated). Here y_k is the angle of measurement k, and
 rho is the correlation of the noise of two successive angles.
 
-f, c: records of Filter and of Constants; j: number of a model in the bank.
+j: number of a model in the bank.
 """
 import math
 from collections.abc import Sequence
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -25,8 +25,22 @@ from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasu
 from acu_tracker.estimation.filters.motion_models import COLUMN_NAMES
 from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Floats
+from pedestal_common.quantities import (
+    Bit,
+    Floats,
+    Hertz,
+    Radians,
+    Radians2,
+    RadiansPerSecond,
+    RadiansPerSecond2,
+    Records,
+    Seconds,
+    Times,
+)
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.estimation.params import FilterParameters
 
 BANK_SIZE = len(COLUMN_NAMES)  # largest number of models in a bank
 
@@ -36,41 +50,42 @@ P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index
 
 class Constants(Record):
     """Constants of the filter."""
-    count: int  # number of models in use
-    bank: int  # number that identifies the set of models
+    count: int      # number of models in use
+    bank: int       # number that identifies the set of models
     # parameters of the models; only the first `count` are in use
     models: Annotated[Sequence[motion_models.MotionModelRecord], (BANK_SIZE,)]
-    states: int  # largest number of states of a model: 2 or 3
-    dwell: float  # mean time for which one model holds [s]
-    alpha: float  # alpha, beta, gamma: gains of a filter of constant gain [-]; alpha is 0 for a Kalman filter
-    beta: float
-    gamma: float
-    rate_measurement: int  # 1 if measured rates are used
-    noise_bandwidth: float  # bandwidth of the noise of the angle [rad/s]; 0: white noise
+    states: int     # largest number of states of a model: 2 or 3
+    dwell: Seconds  # mean time for which one model holds
+    alpha: float    # gain of a filter of constant gain [-]; 0 for a Kalman filter
+    beta: float     # its second gain [-]
+    gamma: float    # its third gain [-]
+    rate_measurement: Bit   # 1 if measured rates are used
+    noise_bandwidth: RadiansPerSecond   # bandwidth of the noise of the angle; 0: white noise
 
 
 class Filter(Record):
     """State of the filter."""
-    bank: int  # bank, count, states: values of the constants to which x, p and mu belong
+    bank: int       # bank, count, states: values of the constants to which x, p and mu belong
     count: int
     states: int
-    T: float  # time of the prediction since the last measurement [s]
-    # x, p, mu: estimate, covariance (as in kalman.Symmetric) and probability of each model after the last measurement
-    x: Annotated[Floats, (BANK_SIZE, 3)]
-    p: Annotated[Floats, (BANK_SIZE, 6)]
-    mu: Annotated[Floats, (BANK_SIZE,)]
-    # x_prior, p_prior, mu_prior: prediction of x, p and mu by T; the prior fields
-    x_prior: Annotated[Floats, (BANK_SIZE, 3)]
+    T: Seconds      # time of the prediction since the last measurement
+    x: Annotated[Floats, (BANK_SIZE, 3)]    # estimate of each model after the last measurement
+    p: Annotated[Floats, (BANK_SIZE, 6)]    # its covariance, as in kalman.Symmetric
+    mu: Annotated[Floats, (BANK_SIZE,)]     # probability of each model after the last measurement
+    x_prior: Annotated[Floats, (BANK_SIZE, 3)]  # x_prior, p_prior, mu_prior: prediction of x, p and mu by T
     p_prior: Annotated[Floats, (BANK_SIZE, 6)]
     mu_prior: Annotated[Floats, (BANK_SIZE,)]
-    last_angle: float  # last measured angle [rad]
-    correlated: int  # 1 if the noise of the next angle is correlated with that of last_angle
+    last_angle: Radians     # last measured angle
+    correlated: Bit         # 1 if the noise of the next angle is correlated with that of last_angle
     # x1, p11, c1, c2, c3 of the kalman.PreviousAngle of each model, for this prediction
     past: Annotated[Floats, (BANK_SIZE, 5)]
-    weights: Annotated[Floats, (BANK_SIZE,)]  # scratch
+    weights: Annotated[Floats, (BANK_SIZE,)]    # scratch
     # variance per second [rad2/s] that each prediction adds to the variance of the angle, for the random walk of the
     # attitude error (estimation/target.py)
     drift_variance_rate: float
+
+
+FILTER_TYPE = Filter.dtype  # a law cannot call Filter.zeros
 
 
 class Estimate(Record):
@@ -78,22 +93,22 @@ class Estimate(Record):
 
     The innovations and nis are NaN if nothing was measured.
     """
-    angle: float  # angle, rate, acceleration: estimate [rad, rad/s, rad/s2]
-    rate: float
-    acceleration: float
-    variance: float  # variance, rate_variance: variances of angle and rate [rad2, rad2/s2]
-    covariance: float  # covariance of angle and rate [rad2/s]
-    rate_variance: float
-    innovation: float  # innovation of the angle [rad]
-    rate_innovation: float  # innovation of the rate [rad/s]
-    nis: float  # normalised innovation squared [-]
-    mu: Annotated[Floats, (BANK_SIZE,)]  # probability of each of COLUMN_NAMES; NaN for a model that is not in the bank
+    angle: Radians
+    rate: RadiansPerSecond
+    acceleration: RadiansPerSecond2
+    variance: Radians2      # of the angle
+    covariance: float       # of angle and rate [rad2/s]
+    rate_variance: float    # [rad2/s2]
+    innovation: Radians     # of the angle
+    rate_innovation: RadiansPerSecond
+    nis: float              # normalised innovation squared [-]
+    mu: Annotated[Floats, (BANK_SIZE,)]     # probability of each of COLUMN_NAMES; NaN for a model not in the bank
 
 
-def constants(params, noise_bandwidth=0.0) -> np.ndarray:
-    """Return the constants (1,) of FilterParameters.
+def constants(params: 'FilterParameters', noise_bandwidth: Hertz = 0.0) -> Records:
+    """Return the constants (1,).
 
-    noise_bandwidth: bandwidth of the noise of the measured angle [Hz]; 0: white noise.
+    noise_bandwidth: bandwidth of the noise of the measured angle; 0: white noise.
     """
     c, bank = Constants.zeros(), FILTER_KINDS[params.kind].bank(params)
     c['count'] = len(bank.models)
@@ -105,208 +120,213 @@ def constants(params, noise_bandwidth=0.0) -> np.ndarray:
 
 
 @compiled
-def _put(x, p, j, g):
-    """Write a Gaussian g to row j of x (n, 3) and of p (n, 6)."""
-    x[j, 0], x[j, 1], x[j, 2] = g.x
-    P = g.P
+def _put(x: Floats, p: Floats, j: int, gaussian: Gaussian) -> None:
+    """Write a Gaussian to row j of x (n, 3) and of p (n, 6)."""
+    x[j, 0], x[j, 1], x[j, 2] = gaussian.x
+    P = gaussian.P
     p[j, 0], p[j, 1], p[j, 2], p[j, 3], p[j, 4], p[j, 5] = P.p11, P.p12, P.p13, P.p22, P.p23, P.p33
 
 
 @compiled
-def _gaussian(x, p):
+def _gaussian(x: Floats, p: Floats) -> Gaussian:
     """Return the Gaussian of a row of `x` and a row of `p`."""
     return Gaussian(AxisMotion(x[0], x[1], x[2]), Symmetric(p[0], p[1], p[2], p[3], p[4], p[5]))
 
 
 @compiled
-def _previous_angle(row):
+def _previous_angle(row: Floats) -> PreviousAngle:
     """Return the PreviousAngle of a row of `past`."""
     return PreviousAngle(row[0], row[1], row[2], row[3], row[4])
 
 
 @compiled
-def _fill(f, c, g):
-    """Give every model in use the Gaussian g and equal probability."""
-    f.bank, f.count, f.states = c.bank, c.count, c.states
-    for j in range(c.count):
-        f.mu[j] = 1.0 / c.count
-        _put(f.x, f.p, j, g)
+def _fill(state: Filter, constants: Constants, gaussian: Gaussian) -> None:
+    """Give every model in use the same Gaussian and equal probability."""
+    state.bank, state.count, state.states = constants.bank, constants.count, constants.states
+    for j in range(constants.count):
+        state.mu[j] = 1.0 / constants.count
+        _put(state.x, state.p, j, gaussian)
 
 
 @compiled
-def _reset_acceleration_variance(f, c):
+def _reset_acceleration_variance(state: Filter, constants: Constants) -> None:
     """Set the variance of the acceleration of every model to that at its start."""
-    for j in range(c.count):
-        f.p[j, P33_COLUMN] = c.models[j].initial_sigma * c.models[j].initial_sigma
+    for j in range(constants.count):
+        state.p[j, P33_COLUMN] = constants.models[j].initial_sigma * constants.models[j].initial_sigma
 
 
 @compiled
-def start(f, c, y, R, rate_sigma):
-    """Start at a measured angle y [rad] of variance R [rad2].
+def start(state: Filter, constants: Constants, y: Radians, R: Radians2, rate_sigma: RadiansPerSecond) -> None:
+    """Start at a measured angle y of variance R.
 
-    rate_sigma: standard deviation of the unknown rate [rad/s].
+    rate_sigma: standard deviation of the unknown rate.
     """
-    _fill(f, c, Gaussian(AxisMotion(y, 0.0, 0.0), Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
-    _reset_acceleration_variance(f, c)
-    f.last_angle, f.correlated = y, 1
+    _fill(state, constants, Gaussian(AxisMotion(y, 0.0, 0.0),
+                                     Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
+    _reset_acceleration_variance(state, constants)
+    state.last_angle, state.correlated = y, 1
 
 
 @compiled
-def transfer(f, c):
+def transfer(state: Filter, constants: Constants) -> None:
     """If the bank has changed, start its models from the combined estimate and covariance of the old bank.
 
     An acceleration that the old bank did not estimate gets the variance of a `start`.
     """
-    if f.bank != c.bank:
-        unknown = f.states == 2
-        _fill(f, c, corrected(f))
+    if state.bank != constants.bank:
+        unknown = state.states == 2
+        _fill(state, constants, corrected(state))
         if unknown:
-            _reset_acceleration_variance(f, c)
+            _reset_acceleration_variance(state, constants)
 
 
 @compiled
-def move(f, c, motion):
-    """Shift the models so that together they estimate this AxisMotion; their covariances stay.
+def move(state: Filter, constants: Constants, motion: AxisMotion) -> None:
+    """Shift the models so that together they estimate this motion; their covariances stay.
 
     Because the last measured angle belongs to the old frame, the noise of the next angle counts as uncorrelated.
     Models without an acceleration state ignore the acceleration.
     """
-    x = outlook(f, c, 0.0)
-    f.correlated = 0
-    for j in range(c.count):
-        f.x[j, 0] += motion.angle - x.angle
-        f.x[j, 1] += motion.rate - x.rate
-        if c.models[j].states > 2:
-            f.x[j, 2] += motion.acceleration - x.acceleration
+    x = outlook(state, constants, 0.0)
+    state.correlated = 0
+    for j in range(constants.count):
+        state.x[j, 0] += motion.angle - x.angle
+        state.x[j, 1] += motion.rate - x.rate
+        if constants.models[j].states > 2:
+            state.x[j, 2] += motion.acceleration - x.acceleration
 
 
 @compiled
-def blend(f, c, own, share, other):
-    """Set the covariance of every model to `own` of itself plus `share` of `other`, a Symmetric.
+def blend(state: Filter, constants: Constants, own: float, share: float, other: Symmetric) -> None:
+    """Set the covariance of every model to `own` of itself plus `share` of `other`.
 
     Of a model without an acceleration state only angle and rate have a covariance.
     """
-    for j in range(c.count):
-        x, P = _gaussian(f.x[j], f.p[j])
-        of_acceleration = share if c.models[j].states > 2 else 0.0
-        _put(f.x, f.p, j, Gaussian(x, Symmetric(
+    for j in range(constants.count):
+        x, P = _gaussian(state.x[j], state.p[j])
+        of_acceleration = share if constants.models[j].states > 2 else 0.0
+        _put(state.x, state.p, j, Gaussian(x, Symmetric(
             own * P.p11 + share * other.p11, own * P.p12 + share * other.p12,
             own * P.p13 + of_acceleration * other.p13, own * P.p22 + share * other.p22,
             own * P.p23 + of_acceleration * other.p23, own * P.p33 + of_acceleration * other.p33)))
 
 
 @compiled
-def corrected(f):
+def corrected(state: Filter) -> Gaussian:
     """Return the Gaussian of the bank at the last measurement."""
-    return imm.combine(f.mu, f.x, f.p, f.count)
+    return imm.combine(state.mu, state.x, state.p, state.count)
 
 
 @compiled
-def predict(f, c, T):
-    """Predict the bank to T [s] >= 0 after its last measurement; only the prior fields change."""
-    f.T = T
-    stay, switch = imm.switching(T, c.dwell, c.count)
-    for j in range(c.count):
+def predict(state: Filter, constants: Constants, T: Seconds) -> None:
+    """Predict the bank to T >= 0 after its last measurement; only the prior fields change."""
+    state.T = T
+    stay, switch = imm.switching(T, constants.dwell, constants.count)
+    for j in range(constants.count):
         if switch == 0.0:
-            f.mu_prior[j], g = f.mu[j], imm.alone(f.x, f.p, j)
+            state.mu_prior[j], g = state.mu[j], imm.alone(state.x, state.p, j)
         else:
-            f.mu_prior[j] = imm.mix(f.mu, c.count, stay, switch, j, f.weights)
-            g = imm.combine(f.weights, f.x, f.p, c.count)
-        model = motion_models.discretised(c.models[j], g.x.acceleration, T)
-        _put(f.x_prior, f.p_prior, j, Gaussian(kalman.predicted_mean(g.x, model.mean, T),
-                                               kalman.predicted_covariance(g.P, model.F, model.Q, T)))
-        f.p_prior[j, P11_COLUMN] += f.drift_variance_rate * T
-        row = f.past[j]
+            state.mu_prior[j] = imm.mix(state.mu, constants.count, stay, switch, j, state.weights)
+            g = imm.combine(state.weights, state.x, state.p, constants.count)
+        model = motion_models.discretised(constants.models[j], g.x.acceleration, T)
+        _put(state.x_prior, state.p_prior, j, Gaussian(kalman.predicted_mean(g.x, model.mean, T),
+                                                       kalman.predicted_covariance(g.P, model.F, model.Q, T)))
+        state.p_prior[j, P11_COLUMN] += state.drift_variance_rate * T
+        row = state.past[j]
         row[0], row[1], row[2], row[3], row[4] = kalman.past(g, model.F, T)
 
 
 @compiled
-def expected(f):
+def expected(state: Filter) -> Gaussian:
     """Return the Gaussian of the prediction: mean and covariance of the whole bank."""
-    return imm.combine(f.mu_prior, f.x_prior, f.p_prior, f.count)
+    return imm.combine(state.mu_prior, state.x_prior, state.p_prior, state.count)
 
 
 @compiled
-def expected_motion(f):
+def expected_motion(state: Filter) -> AxisMotion:
     """Return the AxisMotion of `expected`."""
-    return imm.mean(f.mu_prior, f.x_prior, f.count)
+    return imm.mean(state.mu_prior, state.x_prior, state.count)
 
 
 @compiled
-def variances(g):
-    """Return the AxisVariances of a Gaussian."""
-    return AxisVariances(g.P.p11, g.P.p12, g.P.p22)
+def variances(gaussian: Gaussian) -> AxisVariances:
+    """Return the variances of angle and rate."""
+    return AxisVariances(gaussian.P.p11, gaussian.P.p12, gaussian.P.p22)
 
 
 @compiled
-def _correlation(f, c):
+def _correlation(state: Filter, constants: Constants) -> float:
     """Return rho, the correlation of the noise of the present angle with that of the last angle; 0 for white noise."""
-    return math.exp(-c.noise_bandwidth * f.T) if c.noise_bandwidth > 0.0 and f.correlated else 0.0
+    coloured = constants.noise_bandwidth > 0.0 and state.correlated
+    return math.exp(-constants.noise_bandwidth * state.T) if coloured else 0.0
 
 
 @compiled
-def innovation(f, c, m):
-    """Return the AxisInnovation of an AxisMeasurement m against the prediction.
+def innovation(state: Filter, constants: Constants, measurement: AxisMeasurement) -> AxisInnovation:
+    """Return the innovation of a measurement against the prediction.
 
     The innovation of the angle is that of the difference y_k - rho y_k-1; see the module.
     """
-    rho = _correlation(f, c)
-    x, P = expected(f)
+    rho = _correlation(state, constants)
+    x, P = expected(state)
     # u, U: mean and variance of the predicted difference y_k - rho y_k-1, without the noise of the angle; p12: its
     # covariance with the rate. w: probability of a model; d1, d2: differences between the model and the means.
     u = U = p12 = 0.0
-    for j in range(c.count):
-        u += f.mu_prior[j] * (f.x_prior[j, 0] - rho * _previous_angle(f.past[j]).x1)
-    for j in range(c.count):
-        w, g, o = f.mu_prior[j], _gaussian(f.x_prior[j], f.p_prior[j]), _previous_angle(f.past[j])
+    for j in range(constants.count):
+        u += state.mu_prior[j] * (state.x_prior[j, 0] - rho * _previous_angle(state.past[j]).x1)
+    for j in range(constants.count):
+        w, g, o = state.mu_prior[j], _gaussian(state.x_prior[j], state.p_prior[j]), _previous_angle(state.past[j])
         d1, d2 = g.x.angle - rho * o.x1 - u, g.x.rate - x.rate
         U += w * (g.P.p11 - 2.0 * rho * o.c1 + rho * rho * o.p11 + d1 * d1)
         p12 += w * (g.P.p12 - rho * o.c2 + d1 * d2)
-    nu, nu_rate, S = m.angle - rho * f.last_angle - u, m.rate - x.rate, U + (1.0 - rho * rho) * m.variance
+    nu, nu_rate = measurement.angle - rho * state.last_angle - u, measurement.rate - x.rate
+    S = U + (1.0 - rho * rho) * measurement.variance
     nu_rate_given_angle = nu_rate - p12 / S * nu
     return AxisInnovation(nu, S, nu * nu / S, nu_rate, nu_rate_given_angle * nu_rate_given_angle
-                          / (P.p22 + m.rate_variance - p12 * p12 / S))
+                          / (P.p22 + measurement.rate_variance - p12 * p12 / S))
 
 
 @compiled
-def correct(f, c, m):
-    """Correct the prediction with an AxisMeasurement m; the result becomes the state."""
-    rho = _correlation(f, c)
+def correct(state: Filter, constants: Constants, measurement: AxisMeasurement) -> None:
+    """Correct the prediction with a measurement; the result becomes the state."""
+    rho = _correlation(state, constants)
     # own: variance of the part of the noise that is not correlated with the last angle.
-    own = (1.0 - rho * rho) * m.variance
-    for j in range(c.count):
-        g, o = _gaussian(f.x_prior[j], f.p_prior[j]), _previous_angle(f.past[j])
-        nu = m.angle - rho * f.last_angle - (g.x.angle - rho * o.x1)
+    own = (1.0 - rho * rho) * measurement.variance
+    for j in range(constants.count):
+        g, o = _gaussian(state.x_prior[j], state.p_prior[j]), _previous_angle(state.past[j])
+        nu = measurement.angle - rho * state.last_angle - (g.x.angle - rho * o.x1)
         S = g.P.p11 - 2.0 * rho * o.c1 + rho * rho * o.p11 + own
-        f.weights[j] = kalman.log_likelihood(nu, S)
+        state.weights[j] = kalman.log_likelihood(nu, S)
         # A filter of constant gain uses alpha only where the Kalman gain p11 / S is below alpha. After a start or a
         # gap the Kalman gain is larger, and is used.
-        if g.P.p11 < c.alpha * S:
-            g = kalman.update_with_gain(g, nu, m.variance, constant_gain.gain(c.alpha, c.beta, c.gamma, f.T))
+        if g.P.p11 < constants.alpha * S:
+            K = constant_gain.gain(constants.alpha, constants.beta, constants.gamma, state.T)
+            g = kalman.update_with_gain(g, nu, measurement.variance, K)
         elif rho > 0.0:
             g = kalman.update_correlated(g, o, rho, nu, S)
         else:
-            g = kalman.update(g, nu, m.variance)
-        if not math.isnan(m.rate):
-            nu = m.rate - g.x.rate
-            f.weights[j] += kalman.log_likelihood(nu, g.P.p22 + m.rate_variance)
-            g = kalman.update_rate(g, nu, m.rate_variance)
-        _put(f.x, f.p, j, g)
-    imm.weigh(f.mu_prior, f.weights, c.count, f.mu)
-    f.last_angle, f.correlated = m.angle, 1
+            g = kalman.update(g, nu, measurement.variance)
+        if not math.isnan(measurement.rate):
+            nu = measurement.rate - g.x.rate
+            state.weights[j] += kalman.log_likelihood(nu, g.P.p22 + measurement.rate_variance)
+            g = kalman.update_rate(g, nu, measurement.rate_variance)
+        _put(state.x, state.p, j, g)
+    imm.weigh(state.mu_prior, state.weights, constants.count, state.mu)
+    state.last_angle, state.correlated = measurement.angle, 1
 
 
 @compiled
-def outlook(f, c, T):
-    """Return the AxisMotion that `predict` would give for T [s] >= 0 after the last measurement.
+def outlook(state: Filter, constants: Constants, T: Seconds) -> AxisMotion:
+    """Return the AxisMotion that `predict` would give for T >= 0 after the last measurement.
 
     The prior fields do not change. Because no covariance is computed, this is faster than `predict`.
     """
     angle = rate = acceleration = 0.0
-    stay, switch = imm.switching(T, c.dwell, c.count)
-    for j in range(c.count):
-        mu = imm.mix(f.mu, c.count, stay, switch, j, f.weights)
-        x = kalman.predicted_mean(imm.mean(f.weights, f.x, c.count), motion_models.mean_transition(c.models[j], T), T)
+    stay, switch = imm.switching(T, constants.dwell, constants.count)
+    for j in range(constants.count):
+        mu = imm.mix(state.mu, constants.count, stay, switch, j, state.weights)
+        x = kalman.predicted_mean(imm.mean(state.weights, state.x, constants.count),
+                                  motion_models.mean_transition(constants.models[j], T), T)
         angle += mu * x.angle
         rate += mu * x.rate
         acceleration += mu * x.acceleration
@@ -314,50 +334,51 @@ def outlook(f, c, T):
 
 
 @compiled
-def probabilities(f, c, mu):
+def probabilities(state: Filter, constants: Constants, mu: Floats) -> None:
     """Set mu (BANK_SIZE,) to the probability of each of COLUMN_NAMES, NaN if it is not in the bank."""
     mu[:] = math.nan
-    for j in range(c.count):
-        mu[c.models[j].column] = f.mu[j]
+    for j in range(constants.count):
+        mu[constants.models[j].column] = state.mu[j]
 
 
 @compiled
-def estimates(c, t, y, R, y_rate, R_rate, initial_rate, out):
+def estimates(constants: Records, t: Times, y: Floats, R: Floats, y_rate: Floats, R_rate: Floats,
+              initial_rate: RadiansPerSecond, out: Records) -> None:
     """Filter whole arrays (n,) of measurements, for tests and studies.
 
-    c                (1,) of Constants
-    t                stamps [s]
+    constants        (1,) of Constants
+    t                stamps
     y, R             angles [rad] and their variances [rad2]
     y_rate, R_rate   rates [rad/s] and their variances [rad2/s2]
-    initial_rate     standard deviation of the rate at the start [rad/s]
+    initial_rate     standard deviation of the rate at the start
     out              (n,) of Estimate; row k is the estimate after measurement k
 
     The filter starts at the first angle; earlier rows are NaN. The filter ignores an angle that is NaN or whose stamp
     does not advance. The row of such an angle is the prediction from the last accepted angle.
     """
-    state = Filter.zeros()
-    f, model = state[0], c[0]
-    f.mu[:] = last = math.nan
-    f.count = model.count
+    states = np.zeros(1, FILTER_TYPE)
+    state, model = states[0], constants[0]
+    state.mu[:] = last = math.nan
+    state.count = model.count
     for k in range(len(t)):
         o = out[k]
         o.innovation = o.rate_innovation = o.nis = math.nan
         T = t[k] - last
         measured = math.isfinite(y[k])
         if measured and math.isnan(last):
-            start(f, model, y[k], R[k], initial_rate)
+            start(state, model, y[k], R[k], initial_rate)
             last = t[k]
         elif measured and T > 0.0:
             m = AxisMeasurement(y[k], R[k], y_rate[k] if model.rate_measurement else math.nan, R_rate[k])
-            predict(f, model, T)
-            i = innovation(f, model, m)
+            predict(state, model, T)
+            i = innovation(state, model, m)
             o.innovation, o.rate_innovation, o.nis = i.nu, i.rate, i.chi_square
             if not math.isnan(i.rate_chi_square):
                 o.nis += i.rate_chi_square
-            correct(f, model, m)
+            correct(state, model, m)
             last = t[k]
-        predict(f, model, max(t[k] - last, 0.0))
-        g = expected(f)
+        predict(state, model, max(t[k] - last, 0.0))
+        g = expected(state)
         o.angle, o.rate, o.acceleration = g.x
         o.variance, o.covariance, o.rate_variance = variances(g)
-        probabilities(f, model, o.mu)
+        probabilities(state, model, o.mu)

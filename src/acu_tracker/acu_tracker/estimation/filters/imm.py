@@ -20,15 +20,16 @@ import math
 from acu_tracker.estimation.filters.kalman import Gaussian, Symmetric
 from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled, inlined
+from pedestal_common.quantities import Floats, Seconds
 
 
 @compiled
-def switching(T, dwell, count):
-    """Return (stay, switch), the probabilities of a change of model within T [s].
+def switching(T: Seconds, dwell: Seconds, count: int) -> tuple[float, float]:
+    """Return (stay, switch), the probabilities of a change of model within T.
 
     stay    probability that the same model holds after T
     switch  probability that a given other model holds after T
-    dwell   mean time for which one model holds [s]
+    dwell   mean time for which one model holds
 
     The models form a Markov chain in continuous time. After one model each other model follows with equal probability.
     The probability `stay` is near exp(-T / dwell) for short T, and near 1 / count for long T.
@@ -40,7 +41,7 @@ def switching(T, dwell, count):
 
 
 @inlined
-def mix(mu, count, stay, switch, j, weights):
+def mix(mu: Floats, count: int, stay: float, switch: float, j: int, weights: Floats) -> float:
     """Set weights[i] to the probability that model i held before, if model j holds now. Return cbar_j.
 
     stay, switch: result of `switching`. If cbar_j is 0, model j gets the weight 1 and so keeps its own state.
@@ -58,7 +59,7 @@ def mix(mu, count, stay, switch, j, weights):
 
 
 @inlined
-def alone(x, p, j):
+def alone(x: Floats, p: Floats, j: int) -> Gaussian:
     """Return the Gaussian of model j alone, equal to that of `combine` with the weight 1 for this model."""
     # Adding 0.0 turns -0.0 into 0.0, as the sum in `combine` does.
     return Gaussian(AxisMotion(0.0 + x[j, 0], 0.0 + x[j, 1], 0.0 + x[j, 2]),
@@ -67,8 +68,8 @@ def alone(x, p, j):
 
 
 @inlined
-def mean(weights, x, count):
-    """Return the mean of the weighted models (eq. 10), an AxisMotion."""
+def mean(weights: Floats, x: Floats, count: int) -> AxisMotion:
+    """Return the mean of the weighted models (eq. 10)."""
     x1 = x2 = x3 = 0.0
     for i in range(count):
         x1 += weights[i] * x[i, 0]
@@ -78,8 +79,8 @@ def mean(weights, x, count):
 
 
 @inlined
-def combine(weights, x, p, count):
-    """Return the Gaussian with the mean and the covariance of the weighted models (eq. 10, 11)."""
+def combine(weights: Floats, x: Floats, p: Floats, count: int) -> Gaussian:
+    """Return the mean and the covariance of the weighted models (eq. 10, 11)."""
     x1, x2, x3 = mean(weights, x, count)
     p11 = p12 = p13 = p22 = p23 = p33 = 0.0
     for i in range(count):
@@ -94,7 +95,7 @@ def combine(weights, x, p, count):
 
 
 @compiled
-def weigh(mu_prior, log_likelihoods, count, mu):
+def weigh(mu_prior: Floats, log_likelihoods: Floats, count: int, mu: Floats) -> None:
     """Set mu[j] to the probability of model j after the measurement (eq. 9).
 
     mu_prior: probabilities before the measurement; log_likelihoods: logarithm of the likelihood of each model.

@@ -14,38 +14,55 @@ written out.
     K       gain (k1, k2, k3) on angle, rate and acceleration
 """
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
 from acu_tracker.geometry.motion import AxisMotion
 from pedestal_common.compiled import compiled
+from pedestal_common.quantities import Radians, Radians2, RadiansPerSecond, Seconds, Xyz
 
-Symmetric = namedtuple('Symmetric', 'p11 p12 p13 p22 p23 p33')
-"""Upper triangle of a symmetric 3 x 3 matrix, a covariance of angle, rate and acceleration."""
 
-Gaussian = namedtuple('Gaussian', 'x P')
-"""Estimate of one axis: its mean x = (x1, x2, x3) [rad, rad/s, rad/s2] and covariance P."""
+class Symmetric(NamedTuple):
+    """Upper triangle of a symmetric 3 x 3 matrix, a covariance of angle, rate and acceleration."""
+    p11: float
+    p12: float
+    p13: float
+    p22: float
+    p23: float
+    p33: float
 
-Transition = namedtuple('Transition', 'f13 f23 f33')
-"""Third column of the transition F = [[1, T, f13], [0, 1, f23], [0, 0, f33]], [s2, s, -]."""
 
-PreviousAngle = namedtuple('PreviousAngle', 'x1 p11 c1 c2 c3')
-"""Estimate of the angle at the last measurement.
+class Gaussian(NamedTuple):
+    """Estimate of one axis."""
+    x: AxisMotion   # mean (x1, x2, x3)
+    P: Symmetric    # covariance
 
-x1, p11     mean [rad] and variance [rad2] of this angle
-c1, c2, c3  covariances of this angle with the present angle, rate and acceleration
-"""
+
+class Transition(NamedTuple):
+    """Third column of the transition F = [[1, T, f13], [0, 1, f23], [0, 0, f33]]."""
+    f13: float      # [s2]
+    f23: Seconds
+    f33: float      # [-]
+
+
+class PreviousAngle(NamedTuple):
+    """Estimate of the angle at the last measurement."""
+    x1: Radians     # mean of this angle
+    p11: Radians2   # variance of this angle
+    c1: Radians2    # covariance of this angle with the present angle
+    c2: float       # covariance with the present rate [rad2/s]
+    c3: float       # covariance with the present acceleration [rad2/s2]
 
 
 @compiled
-def predicted_mean(x, F, T):
-    """Return F x, the AxisMotion T [s] after x; F: a Transition over T."""
+def predicted_mean(x: AxisMotion, F: Transition, T: Seconds) -> AxisMotion:
+    """Return F x, the motion T after x; F: transition over T."""
     return AxisMotion(x.angle + T * x.rate + F.f13 * x.acceleration, x.rate + F.f23 * x.acceleration,
                       F.f33 * x.acceleration)
 
 
 @compiled
-def predicted_covariance(P, F, Q, T):
-    """Return F P F' + Q, the Symmetric covariance T [s] after P (paper 000, eq. 7)."""
+def predicted_covariance(P: Symmetric, F: Transition, Q: Symmetric, T: Seconds) -> Symmetric:
+    """Return F P F' + Q, the covariance T after P (paper 000, eq. 7)."""
     a11 = P.p11 + T * P.p12 + F.f13 * P.p13
     a12 = P.p12 + T * P.p22 + F.f13 * P.p23
     a13 = P.p13 + T * P.p23 + F.f13 * P.p33
@@ -56,74 +73,74 @@ def predicted_covariance(P, F, Q, T):
 
 
 @compiled
-def past(g, F, T):
-    """Return the PreviousAngle for a prediction over T [s]: (c1, c2, c3) = F P H'.
+def past(gaussian: Gaussian, F: Transition, T: Seconds) -> PreviousAngle:
+    """Return the PreviousAngle for a prediction over T: (c1, c2, c3) = F P H'.
 
-    g: Gaussian at the last measurement; F: Transition over T.
+    gaussian: estimate at the last measurement; F: transition over T.
     """
-    P = g.P
-    return PreviousAngle(g.x.angle, P.p11, P.p11 + T * P.p12 + F.f13 * P.p13, P.p12 + F.f23 * P.p13, F.f33 * P.p13)
+    P = gaussian.P
+    return PreviousAngle(gaussian.x.angle, P.p11, P.p11 + T * P.p12 + F.f13 * P.p13, P.p12 + F.f23 * P.p13,
+                         F.f33 * P.p13)
 
 
 @compiled
-def _corrected(x, k1, k2, k3, nu):
+def _corrected(x: AxisMotion, k1: float, k2: float, k3: float, nu: float) -> AxisMotion:
     """Return x + K nu."""
     return AxisMotion(x.angle + k1 * nu, x.rate + k2 * nu, x.acceleration + k3 * nu)
 
 
 @compiled
-def update(g, nu, R):
-    """Return the Gaussian after a measured angle of variance R [rad2] with the innovation nu [rad].
+def update(gaussian: Gaussian, nu: Radians, R: Radians2) -> Gaussian:
+    """Return the Gaussian after a measured angle of variance R with the innovation nu.
 
     H = [1 0 0], K = P H' / S (paper 000, eq. 8, 9, 10). The first row of the new P is p1j - k1 p1j. The equal form kj
     R is used, because it loses no digits in a difference.
     """
-    P, S = g.P, g.P.p11 + R
+    P, S = gaussian.P, gaussian.P.p11 + R
     k1, k2, k3 = P.p11 / S, P.p12 / S, P.p13 / S
-    return Gaussian(_corrected(g.x, k1, k2, k3, nu),
+    return Gaussian(_corrected(gaussian.x, k1, k2, k3, nu),
                     Symmetric(k1 * R, k2 * R, k3 * R, P.p22 - k2 * P.p12, P.p23 - k2 * P.p13, P.p33 - k3 * P.p13))
 
 
 @compiled
-def update_correlated(g, o, rho, nu, S):
+def update_correlated(gaussian: Gaussian, previous: PreviousAngle, rho: float, nu: Radians, S: Radians2) -> Gaussian:
     """Return the Gaussian after a measured angle whose noise is correlated with that of the last angle.
 
     The noise is rho times the noise of the last angle, plus independent noise. The difference y_k - rho y_k-1 of the
     measured angles is therefore H X_k - rho H X_k-1 plus the independent noise (Bryson, Henrikson 1968).
 
-    o      PreviousAngle; c is its (c1, c2, c3)
-    nu, S  innovation of the difference [rad] and its variance [rad2]
+    nu, S: innovation of the difference and its variance; c: (c1, c2, c3) of the previous angle.
 
     K = (P H' - rho c) / S, P -= K S K'.
     """
-    P = g.P
-    k1, k2, k3 = (P.p11 - rho * o.c1) / S, (P.p12 - rho * o.c2) / S, (P.p13 - rho * o.c3) / S
-    return Gaussian(_corrected(g.x, k1, k2, k3, nu),
+    P = gaussian.P
+    k1, k2, k3 = (P.p11 - rho * previous.c1) / S, (P.p12 - rho * previous.c2) / S, (P.p13 - rho * previous.c3) / S
+    return Gaussian(_corrected(gaussian.x, k1, k2, k3, nu),
                     Symmetric(P.p11 - k1 * k1 * S, P.p12 - k1 * k2 * S, P.p13 - k1 * k3 * S, P.p22 - k2 * k2 * S,
                               P.p23 - k2 * k3 * S, P.p33 - k3 * k3 * S))
 
 
 @compiled
-def update_rate(g, nu, R):
-    """Return the Gaussian after a measured rate of variance R [rad2/s2] with the innovation nu [rad/s].
+def update_rate(gaussian: Gaussian, nu: RadiansPerSecond, R: float) -> Gaussian:
+    """Return the Gaussian after a measured rate of variance R [rad2/s2] with the innovation nu.
 
     H = [0 1 0] (paper 004, eq. 34).
     """
-    P, S = g.P, g.P.p22 + R
+    P, S = gaussian.P, gaussian.P.p22 + R
     k1, k2, k3 = P.p12 / S, P.p22 / S, P.p23 / S
-    return Gaussian(_corrected(g.x, k1, k2, k3, nu),
+    return Gaussian(_corrected(gaussian.x, k1, k2, k3, nu),
                     Symmetric(P.p11 - k1 * P.p12, k1 * R, P.p13 - k1 * P.p23, k2 * R, k3 * R, P.p33 - k3 * P.p23))
 
 
 @compiled
-def update_with_gain(g, nu, R, K):
-    """Return the Gaussian after a measured angle of variance R [rad2] with the innovation nu [rad], by a given gain K.
+def update_with_gain(gaussian: Gaussian, nu: Radians, R: Radians2, K: Xyz) -> Gaussian:
+    """Return the Gaussian after a measured angle of variance R with the innovation nu, by a given gain K.
 
     K = (k1, k2, k3) [-, 1/s, 1/s2]. The new P is (1 - K H) P (1 - K H)' + K R K' (form of Joseph), written out.
     """
-    P, S = g.P, g.P.p11 + R
+    P, S = gaussian.P, gaussian.P.p11 + R
     k1, k2, k3 = K
-    return Gaussian(_corrected(g.x, k1, k2, k3, nu),
+    return Gaussian(_corrected(gaussian.x, k1, k2, k3, nu),
                     Symmetric(P.p11 - 2.0 * k1 * P.p11 + k1 * k1 * S,
                               P.p12 - k1 * P.p12 - k2 * P.p11 + k1 * k2 * S,
                               P.p13 - k1 * P.p13 - k3 * P.p11 + k1 * k3 * S,
@@ -133,6 +150,6 @@ def update_with_gain(g, nu, R, K):
 
 
 @compiled
-def log_likelihood(nu, S):
+def log_likelihood(nu: float, S: float) -> float:
     """Return the logarithm of the normal density of an innovation nu of variance S, without the constant term."""
     return -0.5 * (nu * nu / S + math.log(S))

@@ -3,60 +3,56 @@
 Each row defines the bank: the motion models of the filter of one axis, and its gains.
 """
 import functools
-import typing
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from acu_tracker.estimation.filters import constant_gain, motion_models
 from acu_tracker.estimation.filters.motion_models import MODEL_NAMES, MODEL_ROWS
 from pedestal_common.parameters import ParameterError
+from pedestal_common.quantities import Records, Seconds, Xyz
+
+if TYPE_CHECKING:
+    from acu_tracker.estimation.params import FilterParameters
 
 UNKNOWN_ACCELERATION_RAD_S2 = 1e3
 """Standard deviation of the acceleration at the start of a filter of constant gains: none is assumed, and the filter
 starts as a least-squares fit."""
 
 
-class Bank(typing.NamedTuple):
-    """The motion models of the filter of one axis.
-
-    models  (count,) of motion_models.MotionModelRecord
-    dwell   mean time for which one of several models holds [s]
-    gains   alpha, beta, gamma of a filter of constant gain [-]; alpha is 0 for a Kalman filter
-    """
-    models: np.ndarray
-    dwell: float = 0.0
-    gains: tuple = (0.0, 0.0, 0.0)
+class Bank(NamedTuple):
+    """The motion models of the filter of one axis."""
+    models: Records         # (count,) of motion_models.MotionModelRecord
+    dwell: Seconds = 0.0    # mean time for which one of several models holds
+    # alpha, beta, gamma of a filter of constant gain [-]; alpha is 0 for a Kalman filter
+    gains: Xyz = (0.0, 0.0, 0.0)
 
 
-class Kind(typing.NamedTuple):
-    """A row of FILTER_KINDS.
-
-    doc        meaning of the kind
-    bank       function of FilterParameters that returns the Bank of an axis
-    cartesian  True if the Cartesian filter is used as well
-    """
-    doc: str
-    bank: typing.Callable
-    cartesian: bool = False
+class Kind(NamedTuple):
+    """A row of FILTER_KINDS."""
+    doc: str                    # meaning of the kind
+    bank: 'Callable[[FilterParameters], Bank]'  # returns the bank of an axis
+    cartesian: bool = False     # True if the Cartesian filter is used as well
 
 
-def _bank_of_alpha_beta(params):
+def _bank_of_alpha_beta(params: 'FilterParameters') -> Bank:
     alpha = params.alpha_beta.alpha
     return Bank(motion_models.constants('cv', params.cv, noise=0.0),
                 gains=(alpha, constant_gain.benedict_bordner(alpha), 0.0))
 
 
-def _bank_of_alpha_beta_gamma(params):
+def _bank_of_alpha_beta_gamma(params: 'FilterParameters') -> Bank:
     alpha = params.alpha_beta_gamma.alpha
     return Bank(motion_models.constants('ca', params.ca, noise=0.0, initial_sigma=UNKNOWN_ACCELERATION_RAD_S2),
                 gains=(alpha, *constant_gain.kalata(alpha)))
 
 
-def _bank_of_one(name, params):
+def _bank_of_one(name: str, params: 'FilterParameters') -> Bank:
     return Bank(motion_models.constants(name, getattr(params, name)))
 
 
-def _bank_of_several(params):
+def _bank_of_several(params: 'FilterParameters') -> Bank:
     imm = params.imm
     models = [motion_models.ladder(imm.ca, imm.rungs, imm.rung_ratio) if name == 'ca'
               else motion_models.constants(name, getattr(imm, name)) for name in named_models(imm.models)]
@@ -74,7 +70,7 @@ FILTER_KINDS = {
 """{name of a kind: its Kind}."""
 
 
-def named_models(names) -> tuple:
+def named_models(names: str) -> tuple[str, ...]:
     """Return the names of the models in a text such as 'cv ca', in the order of MODEL_NAMES.
 
     Raise ParameterError for a wrong text.

@@ -4,51 +4,73 @@ The angles are those of the frame of the filter. In each pair of axes index 0 is
 innovation and its variance, or its covariance for several numbers.
 """
 import math
-from collections import namedtuple
+from typing import TYPE_CHECKING, NamedTuple
 
+from acu_tracker.geometry.motion import Motion
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.quantities import DecibelHertz, Meters, Radians, Radians2, RadiansPerSecond, Seconds
 
-AxisMeasurement = namedtuple('AxisMeasurement', 'angle variance rate rate_variance')
-"""Measured angle [rad] and rate [rad/s] of the target on one axis, and their variances; rate NaN: not measured."""
+if TYPE_CHECKING:
+    from acu_tracker.estimation.params import ReceiverModelParameters
 
-Measurement = namedtuple('Measurement', 'stamp axis range range_variance')
-"""Measurement of the target at one instant.
 
-stamp                  time of the measurement [s]
-axis                   AxisMeasurement of both axes
-range, range_variance  range [m], NaN if it was not measured, and its variance [m2]
-"""
+class AxisMeasurement(NamedTuple):
+    """Measured angle and rate of the target on one axis."""
+    angle: Radians
+    variance: Radians2
+    rate: RadiansPerSecond      # NaN: not measured
+    rate_variance: float        # [rad2/s2]
 
-AxisInnovation = namedtuple('AxisInnovation', 'nu S chi_square rate rate_chi_square')
-"""Innovation of an axis.
 
-    nu, S              innovation of the angle [rad] and its variance [rad2]
-    chi_square         nu^2 / S: normalised innovation squared (NIS) of the angle [-]
-    rate               innovation of the rate [rad/s]; NaN if no rate was used
-    rate_chi_square    NIS of angle and rate together, minus chi_square [-]
+class Measurement(NamedTuple):
+    """Measurement of the target at one instant."""
+    stamp: Seconds
+    axis: tuple[AxisMeasurement, AxisMeasurement]
+    range: Meters           # NaN if it was not measured
+    range_variance: float   # [m2]
 
-Both chi_square and rate_chi_square follow a chi-square distribution of one degree of freedom.
-"""
 
-Innovation = namedtuple('Innovation', 'axis range_nu range_S')
-"""axis: AxisInnovation of both axes; range_nu, range_S: innovation of the range [m] and its variance [m2]. A number is
-NaN if there was no measurement or no prediction of it."""
+class AxisInnovation(NamedTuple):
+    """Innovation of an axis.
 
-AxisVariances = namedtuple('AxisVariances', 'p11 p12 p22')
-"""p11, p12, p22: variance of the angle [rad2], its covariance with the rate, variance of the rate [rad2/s2]."""
+    Both chi_square and rate_chi_square follow a chi-square distribution of one degree of freedom.
+    """
+    nu: Radians             # innovation of the angle
+    S: Radians2             # its variance
+    chi_square: float       # nu^2 / S: normalised innovation squared (NIS) of the angle [-]
+    rate: RadiansPerSecond  # innovation of the rate; NaN if no rate was used
+    rate_chi_square: float  # NIS of angle and rate together, minus chi_square [-]
 
-Estimate = namedtuple('Estimate', 'motion variances')  # motion of a target, and the AxisVariances of both axes
+
+class Innovation(NamedTuple):
+    """Innovation of a measurement. A number is NaN if there was no measurement or no prediction of it."""
+    axis: tuple[AxisInnovation, AxisInnovation]
+    range_nu: Meters    # innovation of the range
+    range_S: float      # its variance [m2]
+
+
+class AxisVariances(NamedTuple):
+    """Variances of an angle and its rate."""
+    p11: Radians2   # variance of the angle
+    p12: float      # covariance of angle and rate [rad2/s]
+    p22: float      # variance of the rate [rad2/s2]
+
+
+class Estimate(NamedTuple):
+    """Estimate of a target."""
+    motion: Motion
+    variances: tuple[AxisVariances, AxisVariances]
+
 
 _NONE = AxisInnovation(math.nan, math.nan, math.nan, math.nan, math.nan)
 NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)  # innovation of a measurement without a prediction
 
 
 @compiled
-def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
-    """Return the variance [rad2] of a receiver error (cross_elevation, elevation) [rad] at a C/N0 [dB-Hz].
-
-    receiver: record of ReceiverModelParameters; integration in s, sigma_floor in rad.
+def error_variance(cross_elevation: Radians, elevation: Radians, cn0_dbhz: DecibelHertz,
+                   receiver: 'ReceiverModelParameters') -> Radians2:
+    """Return the variance of a receiver error (cross_elevation, elevation) at a C/N0.
 
     The variance is the sum of a floor and of thermal noise, which grows with the distance from the axis of the beam.
     """
@@ -62,7 +84,7 @@ def error_variance(cross_elevation, elevation, cn0_dbhz, receiver):
 
 
 @compiled
-def attitude_variances(verticals, tilt, heading):
+def attitude_variances(verticals: tuple[float, float], tilt: float, heading: float) -> tuple[float, float]:
     """Return (variance across, variance along) of a measured direction that errors of the attitude cause.
 
         across, along    unit vectors at a right angle to the direction: towards growing azimuth, growing elevation
@@ -77,21 +99,22 @@ def attitude_variances(verticals, tilt, heading):
 
 
 @compiled
-def with_azimuth_near(m, near):
-    """Return the Measurement with its azimuth on the wrap nearest to `near` [rad]."""
-    a = m.axis[0]
+def with_azimuth_near(measurement: Measurement, near: Radians) -> Measurement:
+    """Return the measurement with its azimuth on the wrap nearest to `near`."""
+    a = measurement.axis[0]
     a = AxisMeasurement(near + wrap(a.angle - near), a.variance, a.rate, a.rate_variance)
-    return Measurement(m.stamp, (a, m.axis[1]), m.range, m.range_variance)
+    return Measurement(measurement.stamp, (a, measurement.axis[1]), measurement.range, measurement.range_variance)
 
 
 @compiled
-def with_rate(a, rate):
-    """Return the AxisMeasurement with another rate [rad/s]."""
-    return AxisMeasurement(a.angle, a.variance, rate, a.rate_variance)
+def with_rate(axis: AxisMeasurement, rate: RadiansPerSecond) -> AxisMeasurement:
+    """Return the measurement of an axis with another rate."""
+    return AxisMeasurement(axis.angle, axis.variance, rate, axis.rate_variance)
 
 
 @compiled
-def nis(i):
-    """Return the normalised innovation squared of an AxisInnovation i: of the angle, plus the rate if it was used."""
+def nis(innovation: AxisInnovation) -> float:
+    """Return the normalised innovation squared of an axis: of the angle, plus the rate if it was used."""
     # The comparison of a rate with itself is False for NaN.
-    return i.chi_square + i.rate_chi_square if i.rate == i.rate else i.chi_square
+    rated = innovation.rate == innovation.rate
+    return innovation.chi_square + innovation.rate_chi_square if rated else innovation.chi_square

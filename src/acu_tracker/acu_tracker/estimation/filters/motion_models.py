@@ -24,29 +24,28 @@ series is used:
 """
 import dataclasses
 import math
-import typing
-from collections import namedtuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from acu_tracker.estimation.filters.kalman import Symmetric, Transition
 from pedestal_common.compiled import compiled, inlined
+from pedestal_common.parameters import Parameters
+from pedestal_common.quantities import RadiansPerSecond2, Records, Seconds
 from pedestal_common.record import Record
 
+if TYPE_CHECKING:
+    from acu_tracker.estimation.params import CaParameters
 
-class MotionModel(typing.NamedTuple):
-    """A row of MODEL_ROWS.
 
-    name           name of the model in parameters
-    doc            motion of the target
-    states         2 for a model without an acceleration, else 3
-    initial_sigma  function of the parameters of the model that returns the standard deviation of the acceleration at
-                   the start [rad/s2]
-    """
-    name: str
-    doc: str
-    states: int
-    initial_sigma: typing.Callable
+class MotionModel(NamedTuple):
+    """A row of MODEL_ROWS."""
+    name: str       # of the model in parameters
+    doc: str        # motion of the target
+    states: int     # 2 for a model without an acceleration, else 3
+    # of the parameters of the model: standard deviation of the acceleration at the start
+    initial_sigma: Callable[..., RadiansPerSecond2]
 
 
 WHITE_JERK_TIME_S = 10.0
@@ -77,19 +76,19 @@ class MotionModelRecord(Record):
 
     The density is two-sided: the integral of E[w(t) w(s)] over s is noise^2 for white noise w.
     """
-    kind: int  # index in MODEL_NAMES
-    column: int  # index in COLUMN_NAMES
-    states: int  # number of states, as in the row of the model
-    initial_sigma: float  # standard deviation of the acceleration at the start [rad/s2]
-    alpha: float  # of singer and current_statistical [1/s]
+    kind: int       # index in MODEL_NAMES
+    column: int     # index in COLUMN_NAMES
+    states: int     # number of states, as in the row of the model
+    initial_sigma: RadiansPerSecond2    # standard deviation of the acceleration at the start
+    alpha: float    # of singer and current_statistical [1/s]
     # of cv: root density of the white acceleration [rad/s2/sqrt(Hz)]; of ca: that of the white jerk [rad/s3/sqrt(Hz)]
     noise: float
-    sigma: float  # of singer: standard deviation of the acceleration [rad/s2]
-    a_max: float  # of current_statistical: largest acceleration [rad/s2]
-    floor: float  # of current_statistical: least sigma_a over a_max [-]
+    sigma: RadiansPerSecond2    # of singer: standard deviation of the acceleration
+    a_max: RadiansPerSecond2    # of current_statistical: largest acceleration
+    floor: float    # of current_statistical: least sigma_a over a_max [-]
 
 
-def constants(name, params, **changes) -> np.ndarray:
+def constants(name: str, params: Parameters, **changes: float) -> Records:
     """Return the constants (1,) of the model of this name with its parameters; changes: fields of MotionModelRecord
     with other values."""
     m, kind = MotionModelRecord.zeros(), MODEL_NAMES.index(name)
@@ -100,10 +99,10 @@ def constants(name, params, **changes) -> np.ndarray:
     return m
 
 
-def ladder(params, rungs, ratio) -> np.ndarray:
+def ladder(params: 'CaParameters', rungs: int, ratio: float) -> Records:
     """Return the constants (rungs,) of a ladder of models ca.
 
-    params: CaParameters of the first rung; ratio: noise of a rung over the noise of the rung before.
+    params: of the first rung; ratio: noise of a rung over the noise of the rung before.
     """
     m = np.concatenate([constants('ca', dataclasses.replace(params, noise=params.noise * ratio**rung))
                         for rung in range(rungs)])
@@ -111,20 +110,18 @@ def ladder(params, rungs, ratio) -> np.ndarray:
     return m
 
 
-Discrete = namedtuple('Discrete', 'mean F Q')
-"""A model, discretised over the time T.
-
-mean  Transition that predicts the mean of X
-F     Transition that predicts its covariance
-Q     process noise, a Symmetric
-"""
+class Discrete(NamedTuple):
+    """A model, discretised over the time T."""
+    mean: Transition    # predicts the mean of X
+    F: Transition       # predicts its covariance
+    Q: Symmetric        # process noise
 
 
 MAX_SERIES_ARGUMENT = 0.5  # largest x = alpha T for which the power series is used [-]
 _TERMS = range(14)  # numbers k of the terms of the power series
 
 
-def _coefficients(first, count):
+def _coefficients(first: int, count: Callable[[int], int]) -> tuple[float, ...]:
     """Return the coefficients c_k of one element of q, which is T^(first + 1) times the sum of c_k (-x)^k.
 
     The product of two elements of g has the terms count(n) s^n (-alpha)^k / n!, n = k + first. `first` is the lowest
@@ -147,17 +144,17 @@ _Q33 = _coefficients(0, lambda n: 2**n)  # coefficients of the elements of q
 
 
 @compiled
-def _series(c, x):
+def _series(coefficients: tuple[float, ...], x: float) -> float:
     """Return the sum of c_k (-x)^k."""
     total = 0.0
-    for k in range(len(c) - 1, -1, -1):
-        total = c[k] - x * total
+    for k in range(len(coefficients) - 1, -1, -1):
+        total = coefficients[k] - x * total
     return total
 
 
 @inlined
-def fading(alpha, T):
-    """Return the Transition of an acceleration that fades with e^(-alpha T), alpha [1/s], T [s] (paper 000, eq. 2)."""
+def fading(alpha: float, T: Seconds) -> Transition:
+    """Return the Transition of an acceleration that fades with e^(-alpha T), alpha [1/s] (paper 000, eq. 2)."""
     if T == 0.0:
         return Transition(0.0, 0.0, 1.0)
     x = alpha * T
@@ -168,8 +165,8 @@ def fading(alpha, T):
 
 
 @inlined
-def fading_noise(alpha, T):
-    """Return q in Q = 2 alpha sigma_a^2 q over T [s], alpha [1/s] (paper 000, eq. 4)."""
+def fading_noise(alpha: float, T: Seconds) -> Symmetric:
+    """Return q in Q = 2 alpha sigma_a^2 q over T, alpha [1/s] (paper 000, eq. 4)."""
     if T == 0.0:
         return Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     x = alpha * T
@@ -187,74 +184,74 @@ def fading_noise(alpha, T):
 
 
 @compiled
-def acceleration_variance(abar, a_max, floor):
-    """Return sigma_a^2 [rad2/s4] for a mean acceleration abar [rad/s2] (paper 000, eq. 5, with the square).
+def acceleration_variance(abar: RadiansPerSecond2, a_max: RadiansPerSecond2, floor: float) -> float:
+    """Return sigma_a^2 [rad2/s4] for a mean acceleration abar (paper 000, eq. 5, with the square).
 
-    a_max: largest acceleration [rad/s2]; floor: least sigma_a over a_max [-]. The result is the variance of the
-    modified Rayleigh density. At abar = a_max this variance is zero, and the filter would ignore its measurements.
-    Therefore sigma_a is at least floor a_max.
+    a_max: largest acceleration; floor: least sigma_a over a_max [-]. The result is the variance of the modified
+    Rayleigh density. At abar = a_max this variance is zero, and the filter would ignore its measurements. Therefore
+    sigma_a is at least floor a_max.
     """
     return max((4.0 - math.pi) / math.pi * max(a_max - abs(abar), 0.0)**2, (floor * a_max)**2)
 
 
 @inlined
-def mean_transition(m, T):
-    """Return the Transition that predicts the mean of X over T [s]; m: record of MotionModelRecord."""
-    if m.kind == MODEL_CV:
+def mean_transition(model: MotionModelRecord, T: Seconds) -> Transition:
+    """Return the transition that predicts the mean of X over T."""
+    if model.kind == MODEL_CV:
         return Transition(0.0, 0.0, 0.0)
-    if m.kind == MODEL_SINGER:
-        return fading(m.alpha, T)
+    if model.kind == MODEL_SINGER:
+        return fading(model.alpha, T)
     return Transition(0.5 * T * T, T, 1.0)
 
 
 @inlined
-def cv(m, T):
-    """Return the Discrete of the model cv (constant rate) over T [s]."""
-    F, k = mean_transition(m, T), m.noise * m.noise
+def cv(model: MotionModelRecord, T: Seconds) -> Discrete:
+    """Return the Discrete of the model cv (constant rate) over T."""
+    F, k = mean_transition(model, T), model.noise * model.noise
     return Discrete(F, F, Symmetric(k * T * T * T / 3.0, k * T * T / 2.0, 0.0, k * T, 0.0, 0.0))
 
 
 @inlined
-def ca(m, T):
-    """Return the Discrete of the model ca (constant acceleration) over T [s]."""
-    F, k, T2 = mean_transition(m, T), m.noise * m.noise, T * T
+def ca(model: MotionModelRecord, T: Seconds) -> Discrete:
+    """Return the Discrete of the model ca (constant acceleration) over T."""
+    F, k, T2 = mean_transition(model, T), model.noise * model.noise, T * T
     return Discrete(F, F, Symmetric(k * T2 * T2 * T / 20.0, k * T2 * T2 / 8.0, k * T2 * T / 6.0, k * T2 * T / 3.0,
                                     k * T2 / 2.0, k * T))
 
 
 @inlined
-def _fading_acceleration(alpha, variance, T):
-    """Return (F, Q) over T [s] of an acceleration that lasts 1 / alpha [s] and has this variance [rad2/s4]."""
+def _fading_acceleration(alpha: float, variance: float, T: Seconds) -> tuple[Transition, Symmetric]:
+    """Return (F, Q) over T of an acceleration that lasts 1 / alpha [s] and has this variance [rad2/s4]."""
     k, q = 2.0 * alpha * variance, fading_noise(alpha, T)
     return fading(alpha, T), Symmetric(k * q.p11, k * q.p12, k * q.p13, k * q.p22, k * q.p23, k * q.p33)
 
 
 @inlined
-def singer(m, T):
-    """Return the Discrete of the model singer (acceleration of mean 0) over T [s]."""
-    F, Q = _fading_acceleration(m.alpha, m.sigma * m.sigma, T)
+def singer(model: MotionModelRecord, T: Seconds) -> Discrete:
+    """Return the Discrete of the model singer (acceleration of mean 0) over T."""
+    F, Q = _fading_acceleration(model.alpha, model.sigma * model.sigma, T)
     return Discrete(F, F, Q)
 
 
 @inlined
-def current_statistical(m, abar, T):
-    """Return the Discrete of the model current_statistical over T [s]; abar: estimated acceleration [rad/s2].
+def current_statistical(model: MotionModelRecord, abar: RadiansPerSecond2, T: Seconds) -> Discrete:
+    """Return the Discrete of the model current_statistical over T; abar: estimated acceleration.
 
     Paper 000 predicts the mean by Phi X + U abar (eq. 6). Phi is the F of `fading`, U abar the effect of the mean
     acceleration. Because abar is the estimated acceleration (eq. 11), this sum equals F X with the F of constant
     acceleration. The covariance is predicted with Phi.
     """
-    F, Q = _fading_acceleration(m.alpha, acceleration_variance(abar, m.a_max, m.floor), T)
-    return Discrete(mean_transition(m, T), F, Q)
+    F, Q = _fading_acceleration(model.alpha, acceleration_variance(abar, model.a_max, model.floor), T)
+    return Discrete(mean_transition(model, T), F, Q)
 
 
 @inlined
-def discretised(m, abar, T):
-    """Return the Discrete of the model m over T [s]; abar: estimated acceleration [rad/s2]."""
-    if m.kind == MODEL_CV:
-        return cv(m, T)
-    if m.kind == MODEL_CA:
-        return ca(m, T)
-    if m.kind == MODEL_SINGER:
-        return singer(m, T)
-    return current_statistical(m, abar, T)
+def discretised(model: MotionModelRecord, abar: RadiansPerSecond2, T: Seconds) -> Discrete:
+    """Return the discretised model over T; abar: estimated acceleration."""
+    if model.kind == MODEL_CV:
+        return cv(model, T)
+    if model.kind == MODEL_CA:
+        return ca(model, T)
+    if model.kind == MODEL_SINGER:
+        return singer(model, T)
+    return current_statistical(model, abar, T)

@@ -11,11 +11,10 @@ is imm_ukf and the receiver measures the range:
    axis filters then continue from its estimate.
 
 Measured rates go to the axis filters only. The prior fields of a filter hold its prediction.
-
-f, c: records of Filter and of Constants; m: a Measurement.
 """
 import math
-from typing import Annotated
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -23,38 +22,40 @@ from acu_tracker.estimation.filters import axes_filter, axis_filter, unscented
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, Estimate, Innovation, Measurement, with_rate
 from acu_tracker.geometry.motion import AxisMotion, Motion
+from acu_tracker.geometry.vector import Rotation
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry.line_of_sight import wrap
-from pedestal_common.quantities import BothAxes, Ints
+from pedestal_common.quantities import Bit, BothAxes, Floats, Hertz, Ints, Radians, RadiansPerSecond, Records, Seconds
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.estimation.params import FilterParameters, UkfParameters
 
 
 class Constants(Record):
     """Constants of the filter."""
-    axis: BothAxes[axis_filter.Constants]  # axis, cartesian: constants of the axis filters and of the Cartesian filter
+    axis: BothAxes[axis_filter.Constants]
     cartesian: unscented.Constants
-    range_share_2: float  # square of ukf.range_share [-]
-    wanted: Annotated[Ints, (2,)]  # of each axis: 1 if its kind uses the Cartesian filter
+    range_share_2: float    # square of ukf.range_share [-]
+    wanted: Annotated[Ints, (2,)]   # of each axis: 1 if its kind uses the Cartesian filter
 
 
 class Filter(Record):
     """State of the filter."""
-    axis: BothAxes[axis_filter.Filter]  # axis, cartesian: states of the axis filters and of the Cartesian filter
+    axis: BothAxes[axis_filter.Filter]
     cartesian: unscented.State
-    running: int  # 1 while the Cartesian filter runs
-    used: Annotated[Ints, (2,)]  # of each axis: 1 if the estimate of the Cartesian filter is used
-    # time by which the prior fields are predicted from the present estimate [s]; NaN if they belong to an earlier
-    # estimate
-    predicted: float
+    running: Bit        # 1 while the Cartesian filter runs
+    used: Annotated[Ints, (2,)]     # of each axis: 1 if the estimate of the Cartesian filter is used
+    # time by which the prior fields are predicted from the present estimate; NaN if they belong to an earlier estimate
+    predicted: Seconds
 
 
-def constants(ukf, axes, noise_bandwidth) -> np.ndarray:
+def constants(ukf: 'UkfParameters', axes: 'Sequence[FilterParameters]', noise_bandwidth: Hertz) -> Records:
     """Return the constants (1,).
 
-    ukf              UkfParameters
-    axes             FilterParameters of both axes
-    noise_bandwidth  bandwidth of the noise of the measured angles [Hz]; 0: white noise. The Cartesian filter always
-                     assumes white noise
+    axes             parameters of the filters of both axes
+    noise_bandwidth  bandwidth of the noise of the measured angles; 0: white noise. The Cartesian filter always assumes
+                     white noise
     """
     c = Constants.zeros()
     c['axis'] = np.concatenate([axis_filter.constants(params, noise_bandwidth) for params in axes])
@@ -64,60 +65,60 @@ def constants(ukf, axes, noise_bandwidth) -> np.ndarray:
 
 
 @compiled
-def start(f, c, m, rate_sigma):
-    """Start at a Measurement; rate_sigma: standard deviation of the unknown rates [rad/s]."""
-    axes_filter.start(f.axis, c.axis, m, rate_sigma)
-    f.running = f.used[0] = f.used[1] = 0
-    f.predicted = math.nan
+def start(state: Filter, constants: Constants, measurement: Measurement, rate_sigma: RadiansPerSecond) -> None:
+    """Start at a measurement; rate_sigma: standard deviation of the unknown rates."""
+    axes_filter.start(state.axis, constants.axis, measurement, rate_sigma)
+    state.running = state.used[0] = state.used[1] = 0
+    state.predicted = math.nan
 
 
 @compiled
-def walk(f, azimuth, elevation):
+def walk(state: Filter, azimuth: float, elevation: float) -> None:
     """Set the random walk of the error of the measured azimuth and elevation: variances per second [rad2/s].
 
     An INS with a slowly changing error causes this walk. The Cartesian filter neglects it.
     """
-    f.axis[0].drift_variance_rate, f.axis[1].drift_variance_rate = azimuth, elevation
+    state.axis[0].drift_variance_rate, state.axis[1].drift_variance_rate = azimuth, elevation
 
 
 @separate
-def predict(f, c, T):
-    """Predict by T [s] >= 0 from the last measurement; the result is in the prior fields.
+def predict(state: Filter, constants: Constants, T: Seconds) -> None:
+    """Predict by T >= 0 from the last measurement; the result is in the prior fields.
 
     A repeated call with the same T does nothing.
     """
-    if f.predicted == T:
+    if state.predicted == T:
         return
-    f.predicted = T
-    axes_filter.predict(f.axis, c.axis, T)
-    if f.running:
-        unscented.predict(f.cartesian, c.cartesian, T)
+    state.predicted = T
+    axes_filter.predict(state.axis, constants.axis, T)
+    if state.running:
+        unscented.predict(state.cartesian, constants.cartesian, T)
 
 
 @compiled
-def axes_azimuth(f):
-    """Return the azimuth [rad] that the axis filter predicted; measured azimuths are put on the wrap nearest to it."""
-    return axis_filter.expected_motion(f.axis[0]).angle
+def axes_azimuth(state: Filter) -> Radians:
+    """Return the azimuth that the axis filter predicted; measured azimuths are put on the wrap nearest to it."""
+    return axis_filter.expected_motion(state.axis[0]).angle
 
 
 @compiled
-def innovation(f, c, m):
-    """Return the Innovation of a Measurement against the prediction.
+def innovation(state: Filter, constants: Constants, measurement: Measurement) -> Innovation:
+    """Return the innovation of a measurement against the prediction.
 
     rate_chi_square is always that of the axis filter.
     """
-    axes = axes_filter.innovation(f.axis, c.axis, m)
-    if not f.running:
+    axes = axes_filter.innovation(state.axis, constants.axis, measurement)
+    if not state.running:
         return axes
-    cartesian = unscented.innovation(f.cartesian, m)
-    azimuth = _chosen_innovation(f.used[0], axes.axis[0], cartesian.axis[0])
-    elevation = _chosen_innovation(f.used[1], axes.axis[1], cartesian.axis[1])
+    cartesian = unscented.innovation(state.cartesian, measurement)
+    azimuth = _chosen_innovation(state.used[0], axes.axis[0], cartesian.axis[0])
+    elevation = _chosen_innovation(state.used[1], axes.axis[1], cartesian.axis[1])
     return Innovation((azimuth, elevation), cartesian.range_nu, cartesian.range_S)
 
 
 @compiled
-def _chosen_innovation(used, own, cartesian):
-    """Return the AxisInnovation of the Cartesian filter if it is used, otherwise that of the axis filter (own)."""
+def _chosen_innovation(used: Bit, own: AxisInnovation, cartesian: AxisInnovation) -> AxisInnovation:
+    """Return the innovation of the Cartesian filter if it is used, otherwise that of the axis filter (own)."""
     if not used:
         return own
     # The NaN is the innovation of the rate, because the Cartesian filter uses no measured rate.
@@ -125,132 +126,137 @@ def _chosen_innovation(used, own, cartesian):
 
 
 @compiled
-def correct(f, c, m):
-    """Correct the prediction with a Measurement; `innovation` must have been called with it before."""
-    axes_filter.correct(f.axis, c.axis, m)
-    if f.running:
-        unscented.correct(f.cartesian, m)
-    f.predicted = math.nan
+def correct(state: Filter, constants: Constants, measurement: Measurement) -> None:
+    """Correct the prediction with a measurement; `innovation` must have been called with it before."""
+    axes_filter.correct(state.axis, constants.axis, measurement)
+    if state.running:
+        unscented.correct(state.cartesian, measurement)
+    state.predicted = math.nan
 
 
 @compiled
-def expected(f):
+def expected(state: Filter) -> Motion:
     """Return the Motion at the instant of the last `predict`; its azimuth is on the wrap of the axis filter."""
-    axes = axes_filter.expected(f.axis)
-    if not (f.used[0] or f.used[1]):
+    axes = axes_filter.expected(state.axis)
+    if not (state.used[0] or state.used[1]):
         return axes
-    cartesian, azimuth = unscented.expected(f.cartesian), axes.azimuth
-    if f.used[0]:
+    cartesian, azimuth = unscented.expected(state.cartesian), axes.azimuth
+    if state.used[0]:
         _, dA, ddA = cartesian.azimuth
         azimuth = AxisMotion(azimuth.angle + wrap(cartesian.azimuth.angle - azimuth.angle), dA, ddA)
-    return Motion(azimuth, cartesian.elevation if f.used[1] else axes.elevation)
+    return Motion(azimuth, cartesian.elevation if state.used[1] else axes.elevation)
 
 
 @separate
-def outlook(f, c, T):
-    """Return the predicted Motion T [s] >= 0 after the last measurement.
+def outlook(state: Filter, constants: Constants, T: Seconds) -> Motion:
+    """Return the predicted Motion T >= 0 after the last measurement.
 
     The result equals that of `expected` after `predict`. If only the axis filters are used, no covariance is computed.
     """
-    if f.predicted == T or f.used[0] or f.used[1]:
-        predict(f, c, T)
-        return expected(f)
-    return axes_filter.outlook(f.axis, c.axis, T)
+    if state.predicted == T or state.used[0] or state.used[1]:
+        predict(state, constants, T)
+        return expected(state)
+    return axes_filter.outlook(state.axis, constants.axis, T)
 
 
 @compiled
-def read(f):
+def read(state: Filter) -> Estimate:
     """Return the Estimate at the instant of the last `predict`."""
-    axes = axes_filter.read(f.axis)
-    if not (f.used[0] or f.used[1]):
+    axes = axes_filter.read(state.axis)
+    if not (state.used[0] or state.used[1]):
         return axes
-    own, (cartesian, _) = axes.variances, unscented.variances(f.cartesian)
-    return Estimate(expected(f), (cartesian[0] if f.used[0] else own[0], cartesian[1] if f.used[1] else own[1]))
+    own, (cartesian, _) = axes.variances, unscented.variances(state.cartesian)
+    return Estimate(expected(state), (cartesian[0] if state.used[0] else own[0],
+                                      cartesian[1] if state.used[1] else own[1]))
 
 
 @compiled
-def probabilities(f, c, mu):
+def probabilities(state: Filter, constants: Constants, mu: Floats) -> None:
     """Set mu (2, BANK_SIZE) to the probability of each of COLUMN_NAMES on both axes, NaN if not in the filter."""
     for i in range(2):
-        axis_filter.probabilities(f.axis[i], c.axis[i], mu[i])
-        if f.used[i]:
-            unscented.probabilities(f.cartesian, mu[i])
+        axis_filter.probabilities(state.axis[i], constants.axis[i], mu[i])
+        if state.used[i]:
+            unscented.probabilities(state.cartesian, mu[i])
 
 
 @compiled
-def usable(c, m):
-    """Return the Measurement without the rates that the axis filters do not use, and without an invalid range."""
-    azimuth = with_rate(m.axis[0], m.axis[0].rate if c.axis[0].rate_measurement else math.nan)
-    elevation = with_rate(m.axis[1], m.axis[1].rate if c.axis[1].rate_measurement else math.nan)
-    ranged = m.range > 0.0 and m.range_variance > 0.0
-    return Measurement(m.stamp, (azimuth, elevation), m.range if ranged else math.nan, m.range_variance)
+def usable(constants: Constants, measurement: Measurement) -> Measurement:
+    """Return the measurement without the rates that the axis filters do not use, and without an invalid range."""
+    azimuth, elevation = measurement.axis
+    azimuth = with_rate(azimuth, azimuth.rate if constants.axis[0].rate_measurement else math.nan)
+    elevation = with_rate(elevation, elevation.rate if constants.axis[1].rate_measurement else math.nan)
+    ranged = measurement.range > 0.0 and measurement.range_variance > 0.0
+    return Measurement(measurement.stamp, (azimuth, elevation), measurement.range if ranged else math.nan,
+                       measurement.range_variance)
 
 
 @compiled
-def select(f, c, m):
-    """Start, use or leave the Cartesian filter, after a correction or a start with a Measurement."""
-    if f.running:
-        if unscented.range_known(f.cartesian, c.range_share_2):
-            _use_cartesian(f, c)
+def select(state: Filter, constants: Constants, measurement: Measurement) -> None:
+    """Start, use or leave the Cartesian filter, after a correction or a start with a measurement."""
+    if state.running:
+        if unscented.range_known(state.cartesian, constants.range_share_2):
+            _use_cartesian(state, constants)
         else:
-            _leave_cartesian(f, c, f.used[0], f.used[1])
-            f.running = 0
-    elif (c.wanted[0] or c.wanted[1]) and m.range_variance <= c.range_share_2 * m.range * m.range:
-        axes_filter.predict(f.axis, c.axis, 0.0)
-        unscented.start(f.cartesian, c.cartesian, axes_filter.read(f.axis), m.range, m.range_variance)
-        f.running, f.predicted = 1, math.nan
+            _leave_cartesian(state, constants, state.used[0], state.used[1])
+            state.running = 0
+    elif ((constants.wanted[0] or constants.wanted[1])
+          and measurement.range_variance <= constants.range_share_2 * measurement.range * measurement.range):
+        axes_filter.predict(state.axis, constants.axis, 0.0)
+        unscented.start(state.cartesian, constants.cartesian, axes_filter.read(state.axis), measurement.range,
+                        measurement.range_variance)
+        state.running, state.predicted = 1, math.nan
 
 
 @compiled
-def _use_cartesian(f, c):
+def _use_cartesian(state: Filter, constants: Constants) -> None:
     """Use the Cartesian filter on each axis that wants it, once it knows the rate twice as well as the axis filter."""
-    if (f.used[0] or not c.wanted[0]) and (f.used[1] or not c.wanted[1]):
+    if (state.used[0] or not constants.wanted[0]) and (state.used[1] or not constants.wanted[1]):
         return
-    predict(f, c, 0.0)
-    axes, (cartesian, _) = axes_filter.read(f.axis).variances, unscented.variances(f.cartesian)
+    predict(state, constants, 0.0)
+    axes, (cartesian, _) = axes_filter.read(state.axis).variances, unscented.variances(state.cartesian)
     for i in range(2):
-        if c.wanted[i] and cartesian[i].p22 <= 0.25 * axes[i].p22:
-            f.used[i] = 1
+        if constants.wanted[i] and cartesian[i].p22 <= 0.25 * axes[i].p22:
+            state.used[i] = 1
 
 
 @compiled
-def _leave_cartesian(f, c, azimuth, elevation):
+def _leave_cartesian(state: Filter, constants: Constants, azimuth: Bit, elevation: Bit) -> None:
     """Stop using the Cartesian filter on the axes whose argument is 1; their axis filters continue from its estimate.
 
     An estimate that is not finite is not taken over.
     """
     if not (azimuth or elevation):
         return
-    predict(f, c, 0.0)
-    motion = expected(f)
+    predict(state, constants, 0.0)
+    motion = expected(state)
     for i, leaves in enumerate((azimuth, elevation)):
         if leaves:
             if math.isfinite(motion[i].angle + motion[i].rate + motion[i].acceleration):
-                axis_filter.move(f.axis[i], c.axis[i], motion[i])
-            f.used[i] = 0
-    f.predicted = math.nan
+                axis_filter.move(state.axis[i], constants.axis[i], motion[i])
+            state.used[i] = 0
+    state.predicted = math.nan
 
 
 @compiled
-def transfer(f, c, running):
+def transfer(state: Filter, constants: Constants, running: Bit) -> None:
     """Adopt constants that may have changed: a filter of a new kind continues from the estimate of the old filter.
 
     running: 1 if there is an estimate.
     """
-    f.predicted = math.nan
+    state.predicted = math.nan
     if running:
         for i in range(2):
-            axis_filter.transfer(f.axis[i], c.axis[i])
-    _leave_cartesian(f, c, f.used[0] and not c.wanted[0], f.used[1] and not c.wanted[1])
-    if not (c.wanted[0] or c.wanted[1]):
-        f.running = 0
+            axis_filter.transfer(state.axis[i], constants.axis[i])
+    _leave_cartesian(state, constants, state.used[0] and not constants.wanted[0],
+                     state.used[1] and not constants.wanted[1])
+    if not (constants.wanted[0] or constants.wanted[1]):
+        state.running = 0
 
 
 @compiled
-def turn(f, c, rotation):
-    """Turn the estimate and its covariances into another frame; rotation: Rotation from the old frame into the new
-    one."""
-    axes_filter.turn(f.axis, c.axis, rotation)
-    if f.running:
-        unscented.turn(f.cartesian, rotation)
-    f.predicted = math.nan
+def turn(state: Filter, constants: Constants, rotation: Rotation) -> None:
+    """Turn the estimate and its covariances into another frame; rotation: from the old frame into the new one."""
+    axes_filter.turn(state.axis, constants.axis, rotation)
+    if state.running:
+        unscented.turn(state.cartesian, rotation)
+    state.predicted = math.nan

@@ -17,21 +17,36 @@ The angles of the points are relative to those of the centre point, so that the 
 alpha = 1, kappa = 3 - n, beta = 2 of the points no weight of the seven is negative. The covariance S of the innovation
 is then positive for every geometry.
 
-s: record of State; c: record of Constants; m: a Measurement; j: number of the mode, 0 CV, 1 CA.
+j: number of the mode, 0 CV, 1 CA.
 """
 import math
-from typing import Annotated
-
-import numpy as np
+from typing import TYPE_CHECKING, Annotated
 
 from acu_tracker.estimation.filters import imm, motion_models
-from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisVariances, Innovation
-from acu_tracker.geometry.motion import line_of_sight, motion_of_position
-from acu_tracker.geometry.vector import Vector, dot, rotated, times
+from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisVariances, Estimate, Innovation, Measurement
+from acu_tracker.estimation.filters.motion_models import MotionModelRecord
+from acu_tracker.geometry.motion import Motion, line_of_sight, motion_of_position
+from acu_tracker.geometry.vector import Rotation, Vector, dot, rotated, times
 from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, wrap
-from pedestal_common.quantities import BothAxes, Floats, Pair
+from pedestal_common.quantities import (
+    BothAxes,
+    Floats,
+    Matrix3,
+    Meters,
+    MetersPerSecond,
+    MetersPerSecond2,
+    Pair,
+    Radians,
+    Records,
+    Seconds,
+    Vector3,
+    Xyz,
+)
 from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.estimation.params import UkfParameters
 
 N = 9  # number of states n
 MODE_MODELS = motion_models.MODEL_CV, motion_models.MODEL_CA
@@ -47,33 +62,31 @@ CENTRE_COVARIANCE_WEIGHT = 1.0 - 6.0 * SIGMA_POINT_WEIGHT + 1.0 - ALPHA**2 + BET
 
 class State(Record):
     """State of both modes."""
-    # x, p, mu: estimate, covariance and probability of each mode after the last measurement
-    x: Annotated[Floats, (2, N)]
-    p: Annotated[Floats, (2, N, N)]
-    mu: Pair
-    x_prior: Annotated[Floats, (2, N)]  # x_prior, p_prior, mu_prior: their prediction by `predict`; the prior fields
+    x: Annotated[Floats, (2, N)]        # estimate of each mode after the last measurement
+    p: Annotated[Floats, (2, N, N)]     # its covariance
+    mu: Pair                            # probability of each mode after the last measurement
+    x_prior: Annotated[Floats, (2, N)]  # x_prior, p_prior, mu_prior: their prediction by `predict`
     p_prior: Annotated[Floats, (2, N, N)]
     mu_prior: Pair
-    z: Annotated[Floats, (2, 3)]  # expected measurement (azimuth, elevation, range) of each mode, set by `innovation`
-    # s, g: covariance of this measurement, and its covariance with X; `correct` overwrites g
-    s: Annotated[Floats, (2, 3, 3)]
-    g: Annotated[Floats, (2, N, 3)]
-    points: Annotated[Floats, (2, 3, 3)]  # points, weights, mean, covariance: scratch
+    z: Annotated[Floats, (2, 3)]        # expected azimuth, elevation, range of each mode, set by `innovation`
+    s: Annotated[Floats, (2, 3, 3)]     # covariance of z
+    g: Annotated[Floats, (2, N, 3)]     # covariance of z with X; `correct` overwrites it
+    points: Annotated[Floats, (2, 3, 3)]    # points, weights, mean, covariance: scratch
     weights: Pair
     mean: Annotated[Floats, (N,)]
     covariance: Annotated[Floats, (N, N)]
 
 
 class Constants(Record):
-    """Record."""
-    models: BothAxes[motion_models.MotionModelRecord]
-    dwell: float
-    initial_speed: float
-    initial_acceleration: float
+    """Constants of the filter."""
+    models: BothAxes[motion_models.MotionModelRecord]   # of CV and CA
+    dwell: Seconds          # mean time for which one mode is valid
+    initial_speed: MetersPerSecond              # standard deviation of the radial speed at the start
+    initial_acceleration: MetersPerSecond2      # standard deviation of the acceleration at the start
 
 
-def constants(params) -> np.ndarray:
-    """Return the constants (1,) of UkfParameters."""
+def constants(params: 'UkfParameters') -> Records:
+    """Return the constants (1,)."""
     c = Constants.zeros()
     c['models']['kind'] = MODE_MODELS
     c['models']['noise'] = params.cv_noise, params.ca_noise
@@ -83,12 +96,12 @@ def constants(params) -> np.ndarray:
 
 
 @compiled
-def _spread(p, along, onward, variances):
+def _spread(p: Floats, along: Vector, onward: Vector, variances: AxisVariances) -> None:
     """Add the variances of one coordinate (azimuth, elevation or range) and of its rate to the covariance p.
 
-    along      change of the position (3,) per unit of the coordinate, and of the velocity per unit of its rate
-    onward     change of the velocity (3,) per unit of the coordinate
-    variances  AxisVariances of the coordinate and its rate
+    along      change of the position per unit of the coordinate, and of the velocity per unit of its rate
+    onward     change of the velocity per unit of the coordinate
+    variances  of the coordinate and its rate
     """
     s11, s12, s22 = variances
     for i in range(3):
@@ -101,12 +114,12 @@ def _spread(p, along, onward, variances):
 
 
 @compiled
-def start(s, c, estimate, r, R_range):
-    """Start from an Estimate of the angles and a first range r [m] of variance R_range [m2].
+def start(state: State, constants: Constants, estimate: Estimate, r: Meters, R_range: float) -> None:
+    """Start from an estimate of the angles and a first range r of variance R_range [m2].
 
-    The radial speed starts at 0 with the standard deviation c.initial_speed. CA starts with the acceleration of a
-    target at constant range and the standard deviation c.initial_acceleration; CV starts without an acceleration.
-    After the start `expected` equals the Estimate.
+    The radial speed starts at 0 with the standard deviation constants.initial_speed. CA starts with the acceleration
+    of a target at constant range and the standard deviation constants.initial_acceleration; CV starts without an
+    acceleration. After the start `expected` equals this estimate.
     """
     A, dA, _ = estimate.motion.azimuth
     E, dE, _ = estimate.motion.elevation
@@ -114,30 +127,30 @@ def start(s, c, estimate, r, R_range):
     u, du, ddu = sight
     # k u: centripetal acceleration over r, which keeps the range constant.
     k = dot(du, du)
-    x = s.x[1]
+    x = state.x[1]
     x[0], x[1], x[2] = times(r, u)
     x[3], x[4], x[5] = times(r, du)
     x[6], x[7], x[8] = r * (ddu.x + k * u.x), r * (ddu.y + k * u.y), r * (ddu.z + k * u.z)
     for i in range(N):
-        s.x[0, i] = x[i] if i < 6 else 0.0
-    p = s.p[0]
+        state.x[0, i] = x[i] if i < 6 else 0.0
+    p = state.p[0]
     p[:, :] = 0.0
     rcA, rsA, sE, cE = r * math.cos(A), r * math.sin(A), math.sin(E), math.cos(E)
-    _spread(p, u, du, AxisVariances(R_range, 0.0, c.initial_speed * c.initial_speed))
+    _spread(p, u, du, AxisVariances(R_range, 0.0, constants.initial_speed * constants.initial_speed))
     _spread(p, Vector(cE * rcA, -cE * rsA, 0.0),
             Vector(-cE * rsA * dA - sE * rcA * dE, -cE * rcA * dA + sE * rsA * dE, 0.0), estimate.variances[0])
     _spread(p, Vector(-sE * rsA, -sE * rcA, r * cE),
             Vector(-sE * rcA * dA - cE * rsA * dE, sE * rsA * dA - cE * rcA * dE, -r * sE * dE), estimate.variances[1])
-    assign(s.p[1], p)
+    assign(state.p[1], p)
     for i in range(6, N):
-        s.p[1, i, i] = c.initial_acceleration * c.initial_acceleration
+        state.p[1, i, i] = constants.initial_acceleration * constants.initial_acceleration
     # Only CA has the acceleration of the Estimate, so that CA alone continues from it.
-    s.mu[0], s.mu[1] = 0.0, 1.0
+    state.mu[0], state.mu[1] = 0.0, 1.0
 
 
 @compiled
-def _mixed(x, p, w, x_out, p_out):
-    """Write the mean and the covariance of both modes, with weights w (2,), to x_out and p_out."""
+def _mixed(x: Floats, p: Floats, w: Pair, x_out: Floats, p_out: Floats) -> None:
+    """Write the mean and the covariance of both modes, with weights w, to x_out and p_out."""
     for a in range(N):
         x_out[a] = w[0] * x[0, a] + w[1] * x[1, a]
         for b in range(a, N):
@@ -146,13 +159,13 @@ def _mixed(x, p, w, x_out, p_out):
 
 
 @compiled
-def _moved(x, p, m, T):
-    """Set x = F x and p = F p F' + Q over T [s], in place; m: record of the motion model.
+def _moved(x: Floats, p: Floats, model: MotionModelRecord, T: Seconds) -> None:
+    """Set x = F x and p = F p F' + Q over T, in place.
 
     The model is the same in the directions east, north and up.
     """
-    model = motion_models.discretised(m, 0.0, T)
-    (f13, f23, f33), Q = model.F, model.Q
+    discrete = motion_models.discretised(model, 0.0, T)
+    (f13, f23, f33), Q = discrete.F, discrete.Q
     for i in range(3):
         x[i] += T * x[i + 3] + f13 * x[i + 6]
         x[i + 3] += f23 * x[i + 6]
@@ -179,21 +192,21 @@ def _moved(x, p, m, T):
 
 
 @compiled
-def predict(s, c, T):
-    """Mix the modes and predict them by T [s] into the prior fields; the estimate stays as it is."""
-    stay, switch = imm.switching(T, c.dwell, 2)
+def predict(state: State, constants: Constants, T: Seconds) -> None:
+    """Mix the modes and predict them by T into the prior fields; the estimate stays as it is."""
+    stay, switch = imm.switching(T, constants.dwell, 2)
     for j in range(2):
-        s.mu_prior[j] = imm.mix(s.mu, 2, stay, switch, j, s.weights)
-        _mixed(s.x, s.p, s.weights, s.x_prior[j], s.p_prior[j])
-        _moved(s.x_prior[j], s.p_prior[j], c.models[j], T)
+        state.mu_prior[j] = imm.mix(state.mu, 2, stay, switch, j, state.weights)
+        _mixed(state.x, state.p, state.weights, state.x_prior[j], state.p_prior[j])
+        _moved(state.x_prior[j], state.p_prior[j], constants.models[j], T)
 
 
 @compiled
-def turn(s, rotation):
-    """Turn the estimate and covariance of both modes into another frame; rotation: Rotation from the old frame into
-    the new one."""
+def turn(state: State, rotation: Rotation) -> None:
+    """Turn the estimate and covariance of both modes into another frame; rotation: from the old frame into the new
+    one."""
     for j in range(2):
-        x, p = s.x[j], s.p[j]
+        x, p = state.x[j], state.p[j]
         for k in range(0, N, 3):
             x[k], x[k + 1], x[k + 2] = rotated(rotation, Vector(x[k], x[k + 1], x[k + 2]))
             for i in range(N):
@@ -204,17 +217,17 @@ def turn(s, rotation):
 
 
 @compiled
-def _measured(east, north, up):
-    """Return (azimuth [rad], elevation [rad], range [m]) of an ENU position [m]."""
+def _measured(east: Meters, north: Meters, up: Meters) -> tuple[Radians, Radians, Meters]:
+    """Return (azimuth, elevation, range) of an ENU position."""
     azimuth, elevation = earth_angles(east, north, up)
     return azimuth, elevation, math.sqrt(east * east + north * north + up * up)
 
 
 @compiled
-def _transformed(x, p, z, s, g, d):
+def _transformed(x: Floats, p: Floats, z: Vector3, s: Matrix3, g: Floats, d: Floats) -> None:
     """Compute the expected measurement of a mode from its prediction x, p by the unscented transform.
 
-    z  result: expected measurement (3,): azimuth, elevation, range
+    z  result: expected measurement: azimuth, elevation, range
     s  result: its covariance (3, 3), without the noise of the measurement
     g  result: its covariance (9, 3) with X
     d  scratch: measurements (2, 3, 3) of the points at +L_k and -L_k, relative to that of the centre point
@@ -257,95 +270,98 @@ def _transformed(x, p, z, s, g, d):
 
 
 @compiled
-def innovation(s, m):
-    """Return the Innovation of a Measurement against the prediction of both modes together.
+def innovation(state: State, measurement: Measurement) -> Innovation:
+    """Return the innovation of a measurement against the prediction of both modes together.
 
     Rates are not used. Without a measured range (NaN) range_nu is NaN, and range_S contains no noise of a measurement.
     """
     for j in range(2):
-        _transformed(s.x_prior[j], s.p_prior[j], s.z[j], s.s[j], s.g[j], s.points)
-        s.s[j, 0, 0] += m.axis[0].variance
-        s.s[j, 1, 1] += m.axis[1].variance
-        if m.range == m.range:
-            s.s[j, 2, 2] += m.range_variance
-    range_nu, range_S = _compared(s, 2, m.range)
-    return Innovation((_axis_innovation(s, 0, m), _axis_innovation(s, 1, m)), range_nu, range_S)
+        _transformed(state.x_prior[j], state.p_prior[j], state.z[j], state.s[j], state.g[j], state.points)
+        state.s[j, 0, 0] += measurement.axis[0].variance
+        state.s[j, 1, 1] += measurement.axis[1].variance
+        if measurement.range == measurement.range:
+            state.s[j, 2, 2] += measurement.range_variance
+    range_nu, range_S = _compared(state, 2, measurement.range)
+    return Innovation((_axis_innovation(state, 0, measurement), _axis_innovation(state, 1, measurement)),
+                      range_nu, range_S)
 
 
 @compiled
-def _compared(s, i, y):
+def _compared(state: State, i: int, y: float) -> tuple[float, float]:
     """Return (innovation nu, its variance S) of a measured number y against both modes together.
 
     i: 0 azimuth, 1 elevation, 2 range. S contains the spread of the modes.
     """
-    d = s.z[1, i] - s.z[0, i]
+    d = state.z[1, i] - state.z[0, i]
     if i == 0:
         d = wrap(d)
-    nu = y - s.z[0, i] - s.mu_prior[1] * d
-    S = s.mu_prior[0] * s.s[0, i, i] + s.mu_prior[1] * s.s[1, i, i] + s.mu_prior[0] * s.mu_prior[1] * d * d
+    nu = y - state.z[0, i] - state.mu_prior[1] * d
+    mu = state.mu_prior
+    S = mu[0] * state.s[0, i, i] + mu[1] * state.s[1, i, i] + mu[0] * mu[1] * d * d
     return wrap(nu) if i == 0 else nu, S
 
 
 @compiled
-def _axis_innovation(s, i, m):
-    nu, S = _compared(s, i, m.axis[i].angle)
+def _axis_innovation(state: State, i: int, measurement: Measurement) -> AxisInnovation:
+    nu, S = _compared(state, i, measurement.axis[i].angle)
     return AxisInnovation(nu, S, nu * nu / S, math.nan, math.nan)
 
 
 @compiled
-def _corrected(s, j, azimuth, elevation, range_):
+def _corrected(state: State, j: int, azimuth: Radians, elevation: Radians, range_: Meters) -> float:
     """Correct mode j with a measurement; return the logarithm of its likelihood, without terms equal in both modes.
 
     The covariance S of the innovation nu is factored: S = G G', G lower triangular. The correction is X += w n, P -= w
     w'. Here n = G^-1 nu is the standardised innovation, and w is the gain times G. per_G22 is 1 / G22, or 0 without a
     range.
     """
-    S, g = s.s[j], s.g[j]
+    S, g = state.s[j], state.g[j]
     G00 = math.sqrt(S[0, 0])
     G10 = S[1, 0] / G00
     G11 = math.sqrt(S[1, 1] - G10 * G10)
-    n0 = wrap(azimuth - s.z[j, 0]) / G00
-    n1 = (elevation - s.z[j, 1] - G10 * n0) / G11
+    n0 = wrap(azimuth - state.z[j, 0]) / G00
+    n1 = (elevation - state.z[j, 1] - G10 * n0) / G11
     G20 = G21 = n2 = per_G22 = 0.0
     likelihood = -0.5 * (n0 * n0 + n1 * n1) - math.log(G00 * G11)
     if range_ == range_:
         G20 = S[2, 0] / G00
         G21 = (S[2, 1] - G20 * G10) / G11
         per_G22 = 1.0 / math.sqrt(S[2, 2] - G20 * G20 - G21 * G21)
-        n2 = (range_ - s.z[j, 2] - G20 * n0 - G21 * n1) * per_G22
+        n2 = (range_ - state.z[j, 2] - G20 * n0 - G21 * n1) * per_G22
         likelihood += math.log(per_G22) - 0.5 * n2 * n2
     for i in range(N):
         w0 = g[i, 0] / G00
         w1 = (g[i, 1] - G10 * w0) / G11
         w2 = (g[i, 2] - G20 * w0 - G21 * w1) * per_G22
         g[i, 0], g[i, 1], g[i, 2] = w0, w1, w2
-        s.x[j, i] = s.x_prior[j, i] + w0 * n0 + w1 * n1 + w2 * n2
+        state.x[j, i] = state.x_prior[j, i] + w0 * n0 + w1 * n1 + w2 * n2
     for a in range(N):
         for b in range(a, N):
-            s.p[j, a, b] = s.p[j, b, a] = s.p_prior[j, a, b] - (g[a, 0] * g[b, 0] + g[a, 1] * g[b, 1]
-                                                                + g[a, 2] * g[b, 2])
+            state.p[j, a, b] = state.p[j, b, a] = state.p_prior[j, a, b] - (g[a, 0] * g[b, 0] + g[a, 1] * g[b, 1]
+                                                                            + g[a, 2] * g[b, 2])
     return likelihood
 
 
 @compiled
-def correct(s, m):
-    """Correct the prediction with a Measurement; `innovation` must have been called with it before.
+def correct(state: State, measurement: Measurement) -> None:
+    """Correct the prediction with a measurement; `innovation` must have been called with it before.
 
     If the range is NaN, only the angles are used.
     """
     for j in range(2):
-        s.weights[j] = _corrected(s, j, m.axis[0].angle, m.axis[1].angle, m.range)
-    imm.weigh(s.mu_prior, s.weights, 2, s.mu)
+        state.weights[j] = _corrected(state, j, measurement.axis[0].angle, measurement.axis[1].angle,
+                                      measurement.range)
+    imm.weigh(state.mu_prior, state.weights, 2, state.mu)
 
 
 @compiled
-def range_known(s, share_2):
+def range_known(state: State, share_2: float) -> bool:
     """Return True if, in both modes, the standard deviation of the range is at most a given share of the range.
 
     share_2: square of this share [-].
     """
     for j in range(2):
-        x, p = s.x[j], s.p[j]
+        x, p = state.x[j], state.p[j]
         spread = 0.0
         for a in range(3):
             for b in range(3):
@@ -357,26 +373,26 @@ def range_known(s, share_2):
 
 
 @compiled
-def probabilities(s, mu):
+def probabilities(state: State, mu: Floats) -> None:
     """Set mu (BANK_SIZE,) to the probability of each of motion_models.COLUMN_NAMES, NaN if it is not in the filter."""
     mu[:] = math.nan
     for j in range(len(MODE_MODELS)):
-        mu[MODE_MODELS[j]] = s.mu[j]
+        mu[MODE_MODELS[j]] = state.mu[j]
 
 
 @compiled
-def expected(s):
+def expected(state: State) -> Motion:
     """Return the predicted Motion of both modes together, in the angles of the filter; the azimuth is in (-pi, pi]."""
-    _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
-    x = s.mean
+    _mixed(state.x_prior, state.p_prior, state.mu_prior, state.mean, state.covariance)
+    x = state.mean
     return motion_of_position(Vector(x[0], x[1], x[2]), Vector(x[3], x[4], x[5]), Vector(x[6], x[7], x[8]))
 
 
 @compiled
-def _projected(p, g, h, v):
-    """Return the AxisVariances of a coordinate and its rate, both linearised.
+def _projected(p: Floats, g: Xyz, h: Xyz, v: Xyz) -> AxisVariances:
+    """Return the variances of a coordinate and its rate, both linearised.
 
-    The coordinate is g x, its rate h x + v dx; x, dx: position and velocity with the covariance p; g, h, v: (3,).
+    The coordinate is g x, its rate h x + v dx; x, dx: position and velocity with the covariance p.
     """
     gg = gh = hh = 0.0
     for a in range(3):
@@ -388,13 +404,13 @@ def _projected(p, g, h, v):
 
 
 @compiled
-def variances(s):
-    """Return (AxisVariances of both axes, variance of the range [m2]) of the prediction of both modes together.
+def variances(state: State) -> tuple[tuple[AxisVariances, AxisVariances], float]:
+    """Return (variances of both axes, variance of the range [m2]) of the prediction of both modes together.
 
     The angles and the range are linearised in the position. The covariance contains the spread of the modes.
     """
-    _mixed(s.x_prior, s.p_prior, s.mu_prior, s.mean, s.covariance)
-    x, p = s.mean, s.covariance
+    _mixed(state.x_prior, state.p_prior, state.mu_prior, state.mean, state.covariance)
+    x, p = state.mean, state.covariance
     e, n, u, de, dn, du = x[0], x[1], x[2], x[3], x[4], x[5]
     # A, E, R: gradients of azimuth, elevation and range by the position; A_rate, E_rate: gradients of their rates by
     # the position. The gradient of a rate by the velocity equals that of its angle by the position. rho: horizontal
