@@ -86,7 +86,7 @@ book: install .venv/mkdocs
 	@echo 'Book: $(CURDIR)/build/book/site/index.html'
 
 numbers: install
-	.venv/bin/python -m pedestal_studies.numbers.published
+	.venv/bin/python -m tools.numbers.published
 	.venv/bin/python -m tools.reference
 
 bench: install

@@ -1,5 +1,6 @@
-"""`pedestal bench`: bags with a shorter recording than the user's, the floor of the graph with fewer laps."""
+"""`pedestal bench`: bags with a shorter recording than the user's. The bare ring with fewer laps."""
 import json
+import pathlib
 import sys
 
 import pytest
@@ -8,8 +9,8 @@ SHORT = ('import sys; from pedestal import cli; from pedestal_studies.bench impo
          'recording.BAG_DURATION_S = 2.0; recording.DISK_TEST_BYTES = 10_000_000; '
          'sys.exit(cli.main(["bench", "bag", "--json", "rows.json"]))')
 
-RING = ('from pedestal_studies.bench import lockstep; '
-        'lockstep.RING_STEPS = 200; print(lockstep.bare_lap())')
+RING = (f'import sys; sys.path.insert(0, {str(pathlib.Path(__file__).parents[1])!r}); '
+        'from tools import bare_ring; print(bare_ring.lap(200))')
 
 
 @pytest.mark.thorough

@@ -6,7 +6,7 @@ from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.node.unit import LEVEL_ERROR
-from pedestal_studies.papers import imm_feedforward
+from pedestal_studies.p003_lin_wu_zhu import imm_feedforward
 
 SECONDS = 8.0
 

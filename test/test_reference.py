@@ -3,9 +3,9 @@ import pathlib
 
 import pytest
 from tools import reference
+from tools.numbers import claims, published
 
 import pedestal_studies
-from pedestal_studies.numbers import claims, published
 
 ROOT = pathlib.Path(__file__).parent.parent
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pedestal_recording import bag as bags
-from pedestal_studies.papers import servo
+from pedestal_studies.p000_ma import servo
 from pedestal_workbench.trials.cases import Case
 
 pytestmark = pytest.mark.thorough

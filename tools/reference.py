@@ -7,6 +7,8 @@ import pathlib
 import re
 import sys
 
+from tools.numbers import published
+
 import pedestal_studies
 from acu_tracker import modes
 from acu_tracker.alarms import table as alarms
@@ -18,8 +20,7 @@ from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection.table import INJECTED_FAULTS
 from pedestal_results import results
-from pedestal_studies.numbers import published
-from pedestal_studies.rigs.fault_expectations import FAULT_EXPECTATIONS
+from pedestal_studies.system.faults import FAULT_EXPECTATIONS
 from pedestal_workbench.again import what_if
 
 GENERATED_PAGES = ('README.md', *(f'docs/{name}.md' for name in (

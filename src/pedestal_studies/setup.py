@@ -16,6 +16,6 @@ setup(
     zip_safe=False,
     maintainer='pedestal maintainers',
     maintainer_email='pedestal@example.org',
-    description='Studies of the tracking antenna: five papers, published numbers, benchmarks.',
+    description='Studies of the tracking antenna: five papers, benchmarks.',
     license='Apache-2.0',
 )

@@ -9,7 +9,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, overload
 
 import numpy as np
 
@@ -483,7 +483,11 @@ def settled(inside: Bools, t: Times) -> Bools:
     return mask
 
 
-def rms(values: Floats, axis: int | None = None) -> Floats:
+@overload
+def rms(values: Floats) -> float: ...
+@overload
+def rms(values: Floats, axis: int) -> Floats: ...
+def rms(values: Floats, axis: int | None = None) -> float | Floats:
     """Return the root mean square of all values, or along an axis; NaN where a value is NaN."""
     return np.sqrt(np.mean(np.square(values), axis=axis))
 

@@ -1,9 +1,12 @@
 """Studies: the compiled closed loop measured against the claims of papers and against our own targets.
 
-`pedestal study NAME` runs a study. A study is a module of one of STUDY_FOLDERS. The first line of its docstring
-describes the study. Its function `run(progress)` returns a rigs.rows.Result and may call progress(fraction done, text
-of the next part). In a study of many runs the function is `run(progress, runs=DEFAULT_RUNS, pool=None)`, where pool is
-a monte_carlo.Pool. Without a pool the runs are made in this process. `rigs` holds the parts that several studies use.
+`pedestal study NAME` runs a study, a module of STUDIES. The first line of its docstring describes the study. Its
+function `run(progress)` returns a result.Result and may call progress(fraction done, text of the next part). In a
+study of many runs the function is `run(progress, runs=DEFAULT_RUNS, pool=None)`, where pool is a monte_carlo.Pool.
+Without a pool the runs are made in this process.
+
+A folder p000 to p004 holds the studies of one paper of docs/papers.md and what only they use; `system` holds our own
+studies. The modules beside the folders are used by the studies of several papers.
 
 A case is one configuration that a study measures, such as a filter on a motion. If a case is a scenario with changed
 parameters, `pedestal run SCENARIO --param ...` runs it with separate nodes.
@@ -11,22 +14,34 @@ parameters, `pedestal run SCENARIO --param ...` runs it with separate nodes.
 import ast
 import importlib
 import pathlib
+import types
 
-STUDY_FOLDERS = 'papers', 'system'  # folders that hold one study in each module
-_STUDY_FILES = {file.stem.replace('_', '-'): file for folder in STUDY_FOLDERS
-                for file in pathlib.Path(__file__).with_name(folder).glob('[a-z]*.py')}
-STUDY_NAMES = tuple(sorted(_STUDY_FILES))
+STUDIES = {
+    'p000_ma': ('backlash', 'bode', 'filter_families', 'servo'),
+    'p001_zhou_yang_qin': ('alignment', 'alignment_speed'),
+    'p002_jia': ('phased_array',),
+    'p003_lin_wu_zhu': ('feedforward_speed', 'imm_feedforward', 'manoeuvre', 'pareto'),
+    'p004_li_chen_wang': ('rate_measurement', 'telemetry_flight'),
+    'system': ('acquisition', 'budget', 'calibration', 'consistency', 'faults', 'filters', 'scenarios',
+               'target_filters')}
+"""{folder: its modules that are studies}. The name of a study has hyphens for the underscores of its module."""
+
+_STUDY_MODULES = {module.replace('_', '-'): f'{folder}.{module}'
+                  for folder, modules in STUDIES.items() for module in modules}
+STUDY_NAMES = tuple(sorted(_STUDY_MODULES))
 
 
-def study(name):
+def study(name: str) -> types.ModuleType:
     """Return the module of a study; name must be one of STUDY_NAMES."""
-    return importlib.import_module(f'{__name__}.{_STUDY_FILES[name].parent.name}.{_STUDY_FILES[name].stem}')
+    return importlib.import_module(f'{__name__}.{_STUDY_MODULES[name]}')
 
 
-def descriptions():
+def descriptions() -> dict[str, str]:
     """Return {name of a study: first line of its docstring}.
 
     Because the import of all studies would take two seconds, the lines are read from the files.
     """
-    docstrings = {name: ast.get_docstring(ast.parse(_STUDY_FILES[name].read_text())) for name in STUDY_NAMES}
+    here = pathlib.Path(__file__).parent
+    files = {name: here / f'{_STUDY_MODULES[name].replace(".", "/")}.py' for name in STUDY_NAMES}
+    docstrings = {name: ast.get_docstring(ast.parse(file.read_text())) or '' for name, file in files.items()}
     return {name: text.partition('\n')[0] for name, text in docstrings.items()}

@@ -10,18 +10,24 @@ The antenna stands ashore and in still air. The plant is the drive with motors, 
   backlash  motion of the dish at rest after the step, and its error at the reversals of the sine; both with the bias
             torque of the scenario and without bias torque
 """
+import functools
 import math
+from collections.abc import Callable, Mapping
 
 import numpy as np
+from matplotlib.figure import Figure
 
+from pedestal_bringup.loop.closed_loop import Run
 from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Floats, NewtonMeters, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, TRUTH_COLOUR, new_panels
-from pedestal_studies.rigs import drawing, metrics
-from pedestal_studies.rigs.rows import Result
-from pedestal_studies.system import bode
+from pedestal_studies import drawing, metrics
+from pedestal_studies.p000_ma import bode
+from pedestal_studies.result import Result
 from pedestal_workbench.trials.cases import Case
+from pedestal_workbench.trials.monte_carlo import Progress
 from pedestal_workbench.tuning import loops
 
 STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 0.02, 0.1, 0.2
@@ -55,8 +61,8 @@ SINE_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'acu.tracker.handover': False, 
 """Parameters with which both axes follow the sine, a program track."""
 
 
-def bode_study(source, progress):
-    """Return the Result of the study bode for a scenario, a name or a path. Raises LoopError, ScenarioError."""
+def bode_study(source: str, progress: Progress) -> Result:
+    """Run the study bode for a scenario, a name or a path. Raises LoopError, ScenarioError."""
     plant, responses = loops.Loops(source), {}
     for i, name in enumerate(AXES):
         progress(i / len(AXES), f'{name}: current, speed and position loop')
@@ -67,7 +73,7 @@ def bode_study(source, progress):
                                       'loop')
             responses[f'{loop}/{name}'] = found
 
-    def drawn(loop):
+    def drawn(loop: str) -> Callable[[], Figure]:
         curves = {name: (responses[f'{loop}/{name}'], colour)
                   for name, colour in zip(AXES, (FILTERED_COLOUR, TRUTH_COLOUR))}
         return lambda: bode.bode_figure(f'{loop} loops of {plant.name}', curves, None)
@@ -76,8 +82,8 @@ def bode_study(source, progress):
                   bode.without_gain_margin(responses))
 
 
-def servo_study(source, progress):
-    """Return the Result of the study servo for a scenario, a name or a path. Raises LoopError, ScenarioError."""
+def servo_study(source: str, progress: Progress) -> Result:
+    """Run the study servo for a scenario, a name or a path. Raises LoopError, ScenarioError."""
     plant = loops.Loops(source)
     torque = {name: GUST_TORQUE_SHARE * (p.axis.motor_1.torque_limit + p.axis.motor_2.torque_limit) * p.ratio
               for name, p in plant.plants.items()}
@@ -91,11 +97,11 @@ def servo_study(source, progress):
         records[name] = Case(name, source, changes, duration).run()
     return Result([row(f'{plant.name}/{name}', metric, value, unit) for i, name in enumerate(AXES)
                    for metric, value, unit in _metrics(records, i, torque[name])],
-                  {name: lambda name=name: _figure(name, records[name]) for name in runs})
+                  {name: functools.partial(_figure, name, records[name]) for name in runs})
 
 
-def backlash_study(source, progress):
-    """Return the Result of the study backlash for a scenario, a name or a path. Raises LoopError, ScenarioError."""
+def backlash_study(source: str, progress: Progress) -> Result:
+    """Run the study backlash for a scenario, a name or a path. Raises LoopError, ScenarioError."""
     plant, records = loops.Loops(source), {}
     runs = {(kind, end): Case(kind, source, {**changes, **bias}, duration) for end, bias in BIAS_PARAMETERS.items()
             for kind, changes, duration in (('standstill', STEP_PARAMETERS, RUN_DURATION_S),
@@ -116,24 +122,25 @@ def backlash_study(source, progress):
                      row(f'{plant.name}/{name}{end}', 'reversal_error_rad', reversal_errors[end], 'rad')]
         rows.append(row(f'{plant.name}/{name}', 'reversal_ratio_off_to_on',
                         reversal_errors['/bias-off'] / reversal_errors[''], '-'))
-    return Result(rows, {kind: lambda kind=kind, motion_of=motion_of: _bias_figure(kind, motion_of, records)
+    return Result(rows, {kind: functools.partial(_bias_figure, kind, motion_of, records)
                          for kind, motion_of in (('standstill', _standstill), ('sine', _reversals))})
 
 
-def _standstill(run, i):
-    """Return (times [s], angle minus its mean [rad]) of axis i at rest; i: index in AXES, here and below."""
+def _standstill(run: Run, i: int) -> tuple[Times, Floats]:
+    """Return (times, angle minus its mean [rad]) of axis i at rest; i: index in AXES, here and below."""
     stands = run.t >= STANDSTILL_START_S
     angle = _angle(run, i)[stands]
     return run.t[stands], angle - np.mean(angle)
 
 
-def _reversals(run, i):
-    """Return (times [s], error [rad] without the part at the sine frequency) over whole periods after the first."""
+def _reversals(run: Run, i: int) -> tuple[Times, Floats]:
+    """Return (times, error [rad] without the part at the sine frequency) over whole periods after the first."""
     steady = metrics.whole_periods(run.t, 1.0 / SINE_FREQUENCY_HZ, 1.0 / SINE_FREQUENCY_HZ)
     return run.t[steady], metrics.residual(run.t[steady], _sine_error(run, i)[steady], 1.0 / SINE_FREQUENCY_HZ)
 
 
-def _bias_figure(kind, motion_of, records):
+def _bias_figure(kind: str, motion_of: Callable[[Run, int], tuple[Times, Floats]],
+                 records: Mapping[tuple[str, str], Run]) -> Figure:
     """Draw the remaining motion of both axes, with the bias torque of the scenario and without bias torque.
 
     kind: title of the panels. motion_of: `_standstill` or `_reversals`.
@@ -149,18 +156,18 @@ def _bias_figure(kind, motion_of, records):
     return drawing.legend(figure)
 
 
-def _angle(run, i):
-    """Return the true angle (n,) [rad] of an axis from its initial angle."""
+def _angle(run: Run, i: int) -> Floats:
+    """Return the true angle [rad] of an axis from its initial angle."""
     return run['adu/truth']['position'][:, i] - START_ANGLES_RAD[i]
 
 
-def _sine_error(run, i):
-    """Return the sine minus the true angle (n,) [rad] of an axis."""
+def _sine_error(run: Run, i: int) -> Floats:
+    """Return the sine minus the true angle [rad] of an axis."""
     return SINE_AMPLITUDE_RAD * np.sin(2.0 * math.pi * SINE_FREQUENCY_HZ * run.t) - _angle(run, i)
 
 
-def _metrics(records, i, torque):
-    """Return [(metric, value, unit)] of axis i; records: {name: Run}; torque: of the gust [Nm]."""
+def _metrics(records: Mapping[str, Run], i: int, torque: NewtonMeters) -> list[tuple[str, float, str]]:
+    """Return [(metric, value, unit)] of axis i; torque: of the gust."""
     step, gust, sine = (records[name] for name in ('step', 'gust', 'sine'))
     after, settled = _angle(gust, i)[gust.t >= GUST_START_S], sine.t >= 1.0 / SINE_FREQUENCY_HZ
     return [('step_overshoot_percent', metrics.overshoot_percent(_angle(step, i), STEP_SIZE_RAD), '%'),
@@ -171,7 +178,7 @@ def _metrics(records, i, torque):
             ('sine_rms_error_rad', tracking.rms(_sine_error(sine, i)[settled]), 'rad')]
 
 
-def _figure(kind, run):
+def _figure(kind: str, run: Run) -> Figure:
     """Draw both axes over time: the angle, or the error of the sine [mrad]."""
     figure, axes = new_panels(2, height=4.6, y='error [mrad]' if kind == 'sine' else 'angle [mrad]', sharex=True)
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_studies.papers import alignment
+from pedestal_studies.p001_zhou_yang_qin import alignment
 from ship_motion_sim.navigation import navigator
 
 RUNS = 30
@@ -25,7 +25,7 @@ def test_the_stated_sigma_is_honest_on_swell_without_log_or_gnss(on_swell, metho
                                     math.radians(alignment.SHIP_PARAMETERS.latitude_deg))
     every, ratios = round(alignment.EVALUATION_PERIOD_S / alignment.IMU_PERIOD_S), []
     for (angle, force, attitude), start in on_swell:
-        estimates = np.zeros(len(angle) // every, alignment.ALIGNMENT_ESTIMATE)
+        estimates = np.zeros(len(angle) // every, alignment.AlignmentEstimate.dtype)
         alignment.align(navigator.initial_state(constants, start), constants, angle, force, alignment.IMU_PERIOD_S,
                         every,
                         estimates)

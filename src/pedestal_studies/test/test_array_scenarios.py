@@ -8,8 +8,8 @@ import pytest
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_results import results, tracking
-from pedestal_studies.papers import phased_array
-from pedestal_studies.rigs.angle_loop import PaperLoop
+from pedestal_studies.p002_jia import phased_array
+from pedestal_studies.p002_jia.angle_loop import PaperLoop
 
 SWAY, FOUR = 'phased_array_sway', 'phased_array_four'
 

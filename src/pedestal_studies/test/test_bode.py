@@ -16,7 +16,7 @@ from adu_drive.params import AduParameters
 from pedestal_bringup.scenario import scenario
 from pedestal_common.parameters import as_dict, build
 from pedestal_results import tracking
-from pedestal_studies.system import bode
+from pedestal_studies.p000_ma import bode
 from pedestal_workbench.tuning import antenna_from_data_sheet, loops
 from pedestal_workbench.tuning import frequency_response as frequency
 from pedestal_workbench.tuning.data_sheet_format import DataSheet

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from pedestal_results.report import figures
-from pedestal_studies.rigs import drawing
+from pedestal_studies import drawing
 
 T = np.linspace(0.1, 1.0, 50)
 

@@ -11,10 +11,11 @@ from scipy.signal import savgol_coeffs
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import as_dict, build
-from pedestal_studies.papers import manoeuvre, pareto
-from pedestal_studies.rigs import drawing, ensemble, window_filter
-from pedestal_studies.rigs.ensemble import Noise
-from pedestal_studies.system import filter_families, filters
+from pedestal_studies import drawing, ensemble
+from pedestal_studies.ensemble import Noise
+from pedestal_studies.p000_ma import filter_families, window_filter
+from pedestal_studies.p003_lin_wu_zhu import manoeuvre, pareto
+from pedestal_studies.system import filters
 from pedestal_workbench.tuning import parameter_search
 
 RUNS = 6

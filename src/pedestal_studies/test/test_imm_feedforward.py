@@ -11,10 +11,10 @@ from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_results import intervals, tracking
-from pedestal_studies.papers import feedforward_speed
-from pedestal_studies.papers import imm_feedforward as study
-from pedestal_studies.rigs import drawing
-from pedestal_studies.rigs import feedforward_loop as loop
+from pedestal_studies import drawing
+from pedestal_studies.p003_lin_wu_zhu import feedforward_loop as loop
+from pedestal_studies.p003_lin_wu_zhu import feedforward_speed
+from pedestal_studies.p003_lin_wu_zhu import imm_feedforward as study
 from pedestal_workbench.trials import monte_carlo
 
 T, W, ZETA = loop.T, *loop.RATE_LOOP_CONSTANTS
@@ -46,7 +46,7 @@ def steady_miss(angle, late):
     t = T * np.arange(800)
     target = np.column_stack([angle.deriv(i)(t) if i else angle(t) for i in range(3)])
     known = np.column_stack([angle.deriv(i)(t + 0.5 * T - late) for i in (1, 2)])
-    out = np.zeros((1, len(t)), loop.STEP_RECORD)
+    out = np.zeros((1, len(t)), loop.Step.dtype)
     loop._follow(target, known, axis_filter.Filter.zeros(), axis_filter.constants(FilterParameters()), 0.0,
                   loop.rate_loop_step(W, ZETA), np.zeros((1, len(t))), out)
     return out['miss'][0, -1]

@@ -8,10 +8,9 @@ from scipy import linalg
 
 from acu_tracker.estimation.filters.constant_gain import benedict_bordner
 from pedestal_results import intervals, tracking
-from pedestal_studies.papers import phased_array
-from pedestal_studies.papers.phased_array import instants, settled
-from pedestal_studies.rigs import drawing, metrics
-from pedestal_studies.rigs.angle_loop import (
+from pedestal_studies import drawing, metrics
+from pedestal_studies.p002_jia import phased_array
+from pedestal_studies.p002_jia.angle_loop import (
     GRID_STEP_S,
     SMOOTHING_SAMPLES,
     FilterLoop,
@@ -19,6 +18,7 @@ from pedestal_studies.rigs.angle_loop import (
     Receiver,
     receiver_reading,
 )
+from pedestal_studies.p002_jia.phased_array import instants, settled
 from tracking_receiver_sim import monopulse
 
 

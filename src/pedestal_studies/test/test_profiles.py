@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from pedestal_studies.rigs import profiles
+from pedestal_studies import profiles
 
 T = np.arange(0.0, profiles.RECORD_DURATION_S, 1e-3)
 

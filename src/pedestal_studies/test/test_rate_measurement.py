@@ -7,8 +7,8 @@ from scipy.linalg import expm, solve_discrete_are
 
 from acu_tracker.estimation.filters import axis_filter
 from pedestal_results import intervals
-from pedestal_studies.papers import rate_measurement as study
-from pedestal_studies.rigs import drawing, metrics
+from pedestal_studies import drawing, metrics
+from pedestal_studies.p004_li_chen_wang import rate_measurement as study
 
 T, ALPHA, SIGMA = study.T, study.ALPHA, study.ANGLE_SIGMA_RAD
 CASES = [(sigma_a, rate_sigma) for sigma_a in study.ACCELERATION_SIGMAS_DEG_S2

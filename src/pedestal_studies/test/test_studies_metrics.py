@@ -7,8 +7,8 @@ import yaml
 from scipy import stats
 
 from pedestal_results import intervals, tracking
-from pedestal_studies.papers import alignment
-from pedestal_studies.rigs import metrics
+from pedestal_studies import metrics
+from pedestal_studies.p001_zhou_yang_qin import alignment
 from pedestal_workbench.trials import cases
 
 T = np.arange(0.0, 3.0, 1e-4)

@@ -6,8 +6,8 @@ import pytest
 
 from acu_tracker import modes
 from pedestal_common.injection import table
-from pedestal_studies.rigs.fault_expectations import FAULT_EXPECTATIONS, LEVEL_MODE_ERRORS_DEG, Expectation
 from pedestal_studies.system import faults as study
+from pedestal_studies.system.faults import FAULT_EXPECTATIONS, LEVEL_MODE_ERRORS_DEG, Expectation
 
 
 def test_every_fault_has_an_expectation_in_every_mode_of_the_study():

@@ -5,7 +5,6 @@ import operator
 import numpy as np
 import pytest
 
-from pedestal_studies.rigs import hard_targets
 from pedestal_studies.system import target_filters as study
 
 
@@ -21,11 +20,11 @@ def test_the_default_is_a_scenario_without_a_filter_and_tuned_is_one_of_one_mode
 def test_tables_of_hard_targets_have_the_accelerations_of_their_texts(tmp_path):
     """Differences of the written tables: the S motion reverses at 11 deg/s2, a jet turns at 6 g, and so on."""
     largest = {}
-    for name in hard_targets.HARD_TARGETS:
-        hard_targets.write(tmp_path / 'table.csv', name, 60.0)
+    for name in study.HARD_TARGETS:
+        study.write(tmp_path / 'table.csv', name, 60.0)
         t, azimuth, elevation = np.loadtxt(tmp_path / 'table.csv', delimiter=',', skiprows=1).T
         assert t[-1] == 60.0 and np.ptp(np.diff(t)) < 1e-9 and (elevation > 2.0).all()
-        largest[name] = np.abs(np.diff(azimuth, 2)[2:-2]).max() * hard_targets.STEP_RATE_HZ**2
+        largest[name] = np.abs(np.diff(azimuth, 2)[2:-2]).max() * study.STEP_RATE_HZ**2
     assert largest['s_motion'] == pytest.approx(11.0, rel=0.01)
     # 0.5 g at 120 m across the line of sight.
     assert largest['quadcopter'] == pytest.approx(math.degrees(0.5 * 9.81 / 115.0), rel=0.1)

@@ -7,8 +7,8 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from pedestal_results import intervals
-from pedestal_studies.papers import telemetry_flight as study
-from pedestal_studies.rigs import drawing
+from pedestal_studies import drawing
+from pedestal_studies.p004_li_chen_wang import telemetry_flight as study
 
 
 @pytest.fixture(scope='module')

@@ -9,7 +9,7 @@ import distributed
 import numpy as np
 import pytest
 
-from pedestal_studies.papers import manoeuvre
+from pedestal_studies.p003_lin_wu_zhu import manoeuvre
 from pedestal_workbench.trials import monte_carlo
 
 

@@ -1,8 +1,8 @@
 """Benchmark `pedestal bench core`: speed of the compiled laws of drive, closed loop and filters on this machine.
 
-The times are compared with targets, with one axis of the drive in scipy (solve_ivp_axis.py), and with the filters of
-filterpy.
+The times are compared with targets and with the filters of filterpy.
 """
+import functools
 import math
 import time
 
@@ -15,35 +15,33 @@ from acu_tracker.estimation.filters import axis_filter, unscented
 from acu_tracker.estimation.filters.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.geometry.motion import AxisMotion, Motion
-from adu_drive import axis, drive_unit, lanes
+from adu_drive import drive_unit, lanes
 from adu_drive import unit as adu_unit
 from adu_drive.params import AduParameters
 from pedestal_bringup.loop import closed_loop, side_by_side
 from pedestal_bringup.scenario import scenario
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import build
+from pedestal_common.quantities import AnyRecord, Floats, Json, Records, Row, Times, Vectors3
 from pedestal_results.results import row
-from pedestal_studies.bench import solve_ivp_axis
-from pedestal_studies.bench.table import best_of, show
+from pedestal_studies.bench import best_of, show
 from pedestal_workbench.trials import ensemble
 
 CORE_DURATION_S, TRIAL_DURATION_S = 20.0, 10.0  # simulated durations of the closed loop and of a trial [s]
 SHORT_RUN_STEPS, SHORT_RUN_COUNT = 40, 100
 """Drive steps of a run that is short enough to be rarely interrupted by other processes; number of these runs."""
 SUBSTEPS_PER_STEP = 2 * 100  # sub-steps of the plant in one drive step of 5 ms: 100 of each axis
-SOLVE_IVP_TICKS, SUBSTEPS_PER_TICK = 100, 2
-"""Periods of the current loop that scipy computes; sub-steps of the plant in one period."""
 
 
 @compiled
-def _drive_steps(state, constants, inputs, outputs, count):
+def _drive_steps(state: Records, constants: Records, inputs: Records, outputs: Records, count: int) -> None:
     """Run `count` steps of one drive."""
     for _ in range(count):
         drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 @compiled
-def _steps_on_lanes(drives, count):
+def _steps_on_lanes(drives: AnyRecord, count: int) -> None:
     """Run `count` steps of the drives on all lanes; the processor computes all lanes, one trial each, together."""
     moving = adu_unit.DRIVE_LANES(drives)
     for _ in range(count):
@@ -54,10 +52,10 @@ FILTER_STEPS, FILTERPY_STEPS, FILTER_PERIOD_S = 20_000, 500, 0.01
 """Steps of a compiled filter and of a filter of filterpy; time between two measurements [s]."""
 
 
-def filter_step(**parameters):
+def filter_step(**parameters: Json) -> float:
     """Return the time [us] of one prediction and correction of an axis_filter of FilterParameters on a noisy ramp."""
     constants = axis_filter.constants(build(FilterParameters, parameters))
-    t = FILTER_PERIOD_S * np.arange(FILTER_STEPS)
+    t = FILTER_PERIOD_S * np.arange(FILTER_STEPS, dtype=float)
     y = 0.02 * t + 5e-4 * np.random.default_rng(1).standard_normal(FILTER_STEPS)
     variance, state = np.full(FILTER_STEPS, 2.5e-7), axis_filter.Filter.zeros()
     _filter_steps(state, constants, t, y, variance)
@@ -65,8 +63,8 @@ def filter_step(**parameters):
 
 
 @compiled
-def _filter_steps(state, constants, t, y, R):
-    """Run a filter over angles y (n,) [rad] of variance R (n,) at times t (n,) [s]."""
+def _filter_steps(state: Records, constants: Records, t: Times, y: Floats, R: Floats) -> None:
+    """Run a filter over angles y [rad] of variance R at times t."""
     f, c = state[0], constants[0]
     axis_filter.start(f, c, y[0], R[0], 0.1)
     for k in range(1, len(y)):
@@ -74,7 +72,7 @@ def _filter_steps(state, constants, t, y, R):
         axis_filter.correct(f, c, AxisMeasurement(y[k], R[k], math.nan, math.nan))
 
 
-def unscented_step():
+def unscented_step() -> float:
     """Return the time [us] of one step of both Cartesian filters, with azimuth, elevation and range measured."""
     state, constants = unscented.State.zeros(), unscented.constants(UkfParameters())
     noise = np.random.default_rng(1).standard_normal((FILTER_STEPS, 3)) * (5e-4, 5e-4, 1.0)
@@ -84,8 +82,8 @@ def unscented_step():
 
 
 @compiled
-def _unscented_steps(state, constants, measured):
-    """Run the Cartesian filters over measured azimuth, elevation [rad] and range [m] (n, 3)."""
+def _unscented_steps(state: Records, constants: Records, measured: Vectors3) -> None:
+    """Run the Cartesian filters over measured azimuth, elevation [rad] and range [m]."""
     s, c = state[0], constants[0]
     R = 2.5e-7
     known = AxisVariances(R, 0.0, 0.01)
@@ -100,13 +98,13 @@ def _unscented_steps(state, constants, measured):
         unscented.correct(s, m)
 
 
-def filterpy_unscented():
+def filterpy_unscented() -> IMMEstimator:
     """Return filterpy's IMMEstimator of two UnscentedKalmanFilter, as a counterpart of the compiled Cartesian filters.
 
     The nine states x are position (east, north, up) [m], velocity and acceleration. The three measured numbers are
     azimuth [rad], elevation [rad] and range [m].
     """
-    def unscented_filter():
+    def unscented_filter() -> UnscentedKalmanFilter:
         made = UnscentedKalmanFilter(
             9, 3, FILTER_PERIOD_S, lambda x: np.array([np.arctan2(x[0], x[1]), np.arctan2(x[2], np.hypot(x[0], x[1])),
                                                        np.linalg.norm(x[:3])]),
@@ -122,20 +120,20 @@ def filterpy_unscented():
                         np.array([[0.998, 0.002], [0.002, 0.998]]))
 
 
-def filterpy_steps():
+def filterpy_steps() -> list[float]:
     """Return the times [us] of predict and update of three filters of filterpy.
 
     The filters are a KalmanFilter of three states, an IMMEstimator of three of them, and an IMMEstimator of two
     unscented filters.
     """
-    def kalman_filter():
+    def kalman_filter() -> KalmanFilter:
         made = KalmanFilter(3, 1)
         made.F = np.array([[1.0, FILTER_PERIOD_S, 0.5 * FILTER_PERIOD_S**2], [0.0, 1.0, FILTER_PERIOD_S],
                            [0.0, 0.0, 1.0]])
         made.H, made.R, made.Q = np.array([[1.0, 0.0, 0.0]]), np.array([[2.5e-7]]), 1e-6 * np.eye(3)
         return made
 
-    def steps(estimator, measured):
+    def steps(estimator: KalmanFilter | IMMEstimator, measured: Floats) -> None:
         for _ in range(FILTERPY_STEPS):
             estimator.predict()
             estimator.update(measured)
@@ -145,10 +143,10 @@ def filterpy_steps():
     cases = ((kalman_filter(), angle),
              (IMMEstimator([kalman_filter() for _ in range(3)], np.full(3, 1 / 3), switching), angle),
              (filterpy_unscented(), np.array([0.0, 0.3, 500.0])))
-    return [best_of(lambda case=case: steps(*case), 3) / FILTERPY_STEPS * 1e6 for case in cases]
+    return [best_of(functools.partial(steps, *case), 3) / FILTERPY_STEPS * 1e6 for case in cases]
 
 
-def filter_rows():
+def filter_rows() -> list[Row]:
     """Return the rows of the time of a filter step, of our filters and of the filters of filterpy.
 
     The filters are a Kalman filter of one axis, an IMM of three of them, and an IMM of two unscented filters.
@@ -165,7 +163,7 @@ def filter_rows():
     return rows
 
 
-def drive_rows():
+def drive_rows() -> list[Row]:
     """Return the rows of the time of a plant sub-step, in one drive and on a lane, and of the trial speed.
 
     The trial speed is the simulated time of all lanes over the CPU time of one core.
@@ -195,7 +193,7 @@ def drive_rows():
             row('lanes', 'realtime_factor', lanes.LANE_COUNT * TRIAL_DURATION_S / seconds, '', '>= 1000')]
 
 
-def run():
+def run() -> list[Row]:
     """Print the table and return its rows."""
     drives = drive_rows()
     loop = scenario.load('ship_pass', duration=CORE_DURATION_S)
@@ -203,11 +201,6 @@ def run():
     loops = [closed_loop.Loop(loop) for _ in range(5)]
     factor = CORE_DURATION_S / best_of(lambda: loops.pop().run())
 
-    tick = axis.CURRENT_LOOP_PERIOD_S
-    scipy_time = best_of(lambda: solve_ivp_axis.run(AduParameters().azimuth, SOLVE_IVP_TICKS, tick, (5.0, 5.0)), 3)
-    scipy_substep = scipy_time / SOLVE_IVP_TICKS / SUBSTEPS_PER_TICK * 1e9
-    rows = [*drives, row('core', 'realtime_factor', factor, '', '>= 200'),
-            row('solve_ivp', 'substep_ns', scipy_substep, 'ns'),
-            row('solve_ivp', 'ratio', scipy_substep / drives[0]['value'], ''), *filter_rows()]
+    rows = [*drives, row('core', 'realtime_factor', factor, '', '>= 200'), *filter_rows()]
     show(f'compiled core, one core of {llvmlite.binding.get_host_cpu_name()}, numba {numba.__version__}', rows)
     return rows

@@ -11,12 +11,13 @@ import sys
 import tempfile
 import time
 
+from pedestal_common.quantities import Row, Seconds
 from pedestal_common.wire import messages
 from pedestal_recording import bag
 from pedestal_recording.verify import verify
 from pedestal_results.results import row
+from pedestal_studies.bench import best_of, show
 from pedestal_studies.bench.lockstep import graph_run
-from pedestal_studies.bench.table import best_of, show
 from pedestal_workbench.again import recompute, replay
 
 ROUND_COUNT = 3  # number of measurements of recompute, of which the median counts
@@ -25,7 +26,7 @@ TRAFFIC_FACTOR = 5.0  # speed at which the bag of the run is replayed to the rec
 DISK_TEST_BYTES = 200_000_000  # size of the file that is written for the rate of the disk [bytes]
 
 
-def measure_recorder(path, again, rate):
+def measure_recorder(path: pathlib.Path, again: str, rate: float) -> tuple[float, int, float]:
     """Return (messages/s, number of lost messages, CPU time over wall time) of a recorder that receives a bag.
 
     path: bag that is replayed. again: new bag of the recorder. rate: speed of the replay as a multiple of real time.
@@ -34,7 +35,7 @@ def measure_recorder(path, again, rate):
         recorder = subprocess.Popen([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args',
                                      '--params-file', str(path.with_name(path.name + '.log') / 'parameters.yaml'),
                                      '-p', f'recorder:bag:={again}'], stdout=log, stderr=subprocess.STDOUT)
-        begun = []      # wall time and CPU time of the recorder at the first message
+        begun: list[float] = []     # wall time and CPU time of the recorder at the first message
         try:
             result = replay.replay(path, replay.ReplayOptions(rate=rate), lambda: begun.extend(
                 (time.perf_counter(), _cpu_time(recorder.pid))))
@@ -55,19 +56,19 @@ def measure_recorder(path, again, rate):
     return report['messages'] / wall, report['lost'], (used.ru_utime + used.ru_stime - begun[1]) / wall
 
 
-def _cpu_time(pid):
-    """Return the CPU time [s] that a process has used."""
+def _cpu_time(pid: int) -> Seconds:
+    """Return the CPU time that a process has used."""
     # The fields after the name in parentheses; utime and stime are the 12th and 13th of them (proc(5)).
     fields = pathlib.Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
     user_ticks, system_ticks = map(int, fields[11:13])
     return (user_ticks + system_ticks) / os.sysconf('SC_CLK_TCK')
 
 
-def disk_rate(folder):
+def disk_rate(folder: str) -> float:
     """Return the rate [bytes/s] at which a file in the folder is written, until all bytes are on the disk."""
     block = os.urandom(1_000_000)
 
-    def fill():
+    def fill() -> None:
         with open(pathlib.Path(folder) / 'block', 'wb', buffering=0) as file:
             for _ in range(DISK_TEST_BYTES // len(block)):
                 file.write(block)
@@ -75,7 +76,7 @@ def disk_rate(folder):
     return DISK_TEST_BYTES / best_of(fill, 3)
 
 
-def run():
+def run() -> list[Row]:
     """Print the table and return its rows: the recorder at TRAFFIC_FACTOR and at unlimited rate, verify, recompute."""
     with tempfile.TemporaryDirectory() as folder:
         _, path = graph_run(folder, 'demo', 'lockstep', BAG_DURATION_S)

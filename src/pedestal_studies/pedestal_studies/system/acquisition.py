@@ -10,18 +10,23 @@ found_percent       share of the runs that end in autotrack with the target in t
 found_percent_low   lower limit of its 95 % interval (Clopper and Pearson 1934)
 """
 import math
+from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.figure import Figure
 from scipy.stats import beta
 
 from acu_tracker.modes import Mode
 from acu_tracker.search.params import SearchParameters
 from acu_tracker.search.pattern import PATTERN_SPIRAL, PATTERN_SQUARE, SEARCH_PATTERNS
+from pedestal_bringup.loop.closed_loop import Run
+from pedestal_common.quantities import Floats, Pairs, Radians, Row, Seconds
 from pedestal_results.intervals import CONFIDENCE_LEVEL, row
 from pedestal_results.report.figures import FILTERED_COLOUR, new_panels
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies.result import Item, Result
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
+from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time
@@ -55,8 +60,8 @@ so it is 3 dB at half a beamwidth."""
 STEPTRACK_SETTLING_TIME_S = 90.0  # time after which step track is on its target [s]
 
 
-def case_of(name, seed):
-    """Return the Case of one run; name: one of CASE_NAMES."""
+def case_of(name: str, seed: int) -> Case:
+    """Return the case of one run; name: one of CASE_NAMES."""
     rng = np.random.default_rng(seed)
     if name == 'late_tle':
         return Case(name, name, {'scenario.program.time_offset': -rng.uniform(1.0, 3.0)}, seed=seed)
@@ -70,12 +75,11 @@ def case_of(name, seed):
                 SEARCH_DURATIONS_S[pattern], seed)
 
 
-def offset(pattern, rng, beamwidth=0.0175):
-    """Return the (cross-elevation, elevation) [rad] of a random place in the full search area, from its centre.
+def offset(pattern: int, rng: np.random.Generator, beamwidth: Radians = 0.0175) -> tuple[Radians, Radians]:
+    """Return the (cross-elevation, elevation) of a random place in the full search area, from its centre.
 
-    pattern: code of the search pattern. rng: numpy Generator. beamwidth [rad]: that of the scenario sidelobe. The area
-    of a spiral and of a square pattern is a circle; a place outside the circle is drawn again. The area of the other
-    patterns is a rectangle.
+    pattern: code of the search pattern. beamwidth: that of the scenario sidelobe. The area of a spiral and of a square
+    pattern is a circle; a place outside the circle is drawn again. The area of the other patterns is a rectangle.
     """
     p = SearchParameters()
     while True:
@@ -86,8 +90,8 @@ def offset(pattern, rng, beamwidth=0.0175):
             return x, e
 
 
-def tracked_after(run, from_loss):
-    """Return the time [s] until the target is tracked for the rest of the run; NaN if it is not tracked at the end.
+def tracked_after(run: Run, from_loss: bool) -> Seconds:
+    """Return the time until the target is tracked for the rest of the run; NaN if it is not tracked at the end.
 
     from_loss: True to measure the time from the first loss of the signal in autotrack, False from the start.
     """
@@ -103,13 +107,13 @@ def tracked_after(run, from_loss):
     return run.t[tracked_since] - run.t[lost[0]] if lost.size else math.nan
 
 
-def off_axis(run):
-    """Return the true pointing error (n,) [beamwidths] of a closed_loop.Run; NaN where it is not known."""
+def off_axis(run: Run) -> Floats:
+    """Return the true pointing error [beamwidths] of a run; NaN where it is not known."""
     return np.hypot(*run.truth['error'].T) / run.units['tracking_receiver'].parameters.antenna.beamwidth
 
 
-def batch(item):
-    """Return the values (count, 2) of an item (case, first run, number of runs).
+def batch(item: Item) -> Pairs:
+    """Return the values of every run of an item (case, first run, number of runs).
 
     The values of a run are tracked_after_s, and 1 if the target is in the beam at the end, else 0. For steptrack_geo
     the values are the rms of the lost level [dB] and the largest error [beamwidths].
@@ -129,14 +133,14 @@ def batch(item):
     return np.array(values)
 
 
-def least_share(found, runs):
+def least_share(found: int, runs: int) -> float:
     """Return the lower limit of the CONFIDENCE_LEVEL interval of a share, from `found` successes in `runs` runs
     (Clopper and Pearson, Biometrika 26 (1934) 404)."""
     return float(beta.ppf(0.5 * (1.0 - CONFIDENCE_LEVEL), found, runs - found + 1)) if found else 0.0
 
 
-def rows(values):
-    """Return the rows of the study; values: {case: (runs, 2)} as `batch` returns."""
+def rows(values: Mapping[str, Pairs]) -> list[Row]:
+    """Return the rows of the study; values: {case: as `batch` returns}."""
     table = []
     for name, of_runs in values.items():
         if name == 'steptrack_geo':
@@ -153,15 +157,15 @@ def rows(values):
     return table
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
-    """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
+    """Run every case `runs` times."""
     values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASE_NAMES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'time': lambda: time_figure(values)},
                   [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. tracked_after_s is over the runs that found their '
                    'target.'])
 
 
-def time_figure(values):
+def time_figure(values: Mapping[str, Pairs]) -> Figure:
     """Draw tracked_after_s of every run that found its target; values as of `rows`."""
     figure, axes = new_panels(1, height=3.8, x='time until the target is tracked [s]')
     for name, of_runs in values.items():

@@ -14,18 +14,24 @@ unbalance of its axis). `noise` is the deviation of that error between the seeds
 import dataclasses
 import functools
 import typing
+from collections.abc import Mapping
+from typing import Annotated
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import topics
 from pedestal_common.parameters import defaults
+from pedestal_common.quantities import Degrees, Floats, Pairs, Row, Seconds, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import pseudo_values, row
 from pedestal_results.report.figures import new_panels
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies.result import Result
 from pedestal_workbench.trials import monte_carlo
+from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 SCENARIO_NAME = 'station_real'  # scenario of all runs, in which all terms are on
 DEFAULT_RUNS, FIRST_SEED = 30, 1  # runs of the random terms; seed of the first run
@@ -42,15 +48,11 @@ MODE_OVERRIDES = {'program': ('acu.tracker.handover=false',), 'autotrack': ()}
 
 
 class Term(typing.NamedTuple):
-    """Source of error.
-
-    `parameters`: node.key, with * for both axes; with their defaults the term is off. `random`: True if its error
-    depends on the seed. `doc`: description.
-    """
+    """Source of error."""
     name: str
-    parameters: tuple
-    random: bool
-    doc: str
+    parameters: tuple[str, ...]     # node.key, with * for both axes; with their defaults the term is off
+    random: bool    # True if its error depends on the seed
+    doc: str        # description
 
 
 ERROR_TERMS = (
@@ -90,12 +92,12 @@ RECEIVER_TERMS = ('boresight', 'multipath', 'scintillation', 'polarisation')
 """Terms of the receiver, which do not affect program track."""
 
 
-def active_terms(mode):
+def active_terms(mode: str) -> list[Term]:
     """Return the ERROR_TERMS that affect the antenna in a mode."""
     return [term for term in ERROR_TERMS if not (mode == 'program' and term.name in RECEIVER_TERMS)]
 
 
-def documented(mode, random):
+def documented(mode: str, random: bool) -> dict[str, str]:
     """Return {name: description} of the systematic or of the random contributions in a mode."""
     if random:
         noise = {'noise': 'noise of the receiver'} if mode == 'autotrack' else {}
@@ -106,14 +108,14 @@ def documented(mode, random):
             **{f'{term.name}-mean': f'{term.doc}: mean over the seeds' for term in active_terms(mode) if term.random}}
 
 
-def parameters_of(term):
-    """Return the parameters node.key of a Term, separately for each axis."""
+def parameters_of(term: Term) -> list[str]:
+    """Return the parameters node.key of a term, separately for each axis."""
     return [key.replace('*', axis) for key in term.parameters
             for axis in (topics.AXES if '*' in key else topics.AXES[:1])]
 
 
-def switched_off(term):
-    """Return overrides that switch a Term off: they give its parameters their defaults."""
+def switched_off(term: Term) -> list[str]:
+    """Return overrides that switch a term off: they give its parameters their defaults."""
     texts = []
     for key in parameters_of(term):
         node, _, name = key.partition('.')
@@ -121,7 +123,7 @@ def switched_off(term):
     return texts
 
 
-def overrides(mode, on):
+def overrides(mode: str, on: str) -> list[str]:
     """Return the overrides of a run in a mode; on: name of the one term that is on, or NO_TERMS, or ALL_TERMS."""
     off = [] if on == ALL_TERMS else [text for term in ERROR_TERMS if term.name != on for text in switched_off(term)]
     return [*MODE_OVERRIDES[mode], *off]
@@ -129,16 +131,16 @@ def overrides(mode, on):
 
 @dataclasses.dataclass(frozen=True)
 class Pass:
-    """Direction of the antenna along the pass: azimuth and elevation (n,) [deg] at the times (n,) [s] of an error."""
-    times: np.ndarray
-    azimuth: np.ndarray
-    elevation: np.ndarray
+    """Direction of the antenna along the pass, at the times of an error."""
+    times: Times
+    azimuth: Floats     # [deg]
+    elevation: Floats   # [deg]
 
 
-def _run(mode, on, seed, duration):
-    """Return the closed_loop.Run of a mode, with a step every EVALUATION_PERIOD_S from EVALUATION_START_S on.
+def _run(mode: str, on: str, seed: int, duration: Seconds | None) -> Run:
+    """Return the run of a mode, with a step every EVALUATION_PERIOD_S from EVALUATION_START_S on.
 
-    on: as of `overrides`. duration: length of the run [s], None for that of the scenario.
+    on: as of `overrides`. duration: length of the run, None for that of the scenario.
     """
     chosen = scenario.load(SCENARIO_NAME, [*overrides(mode, on), f'adu.wind.field.seed={seed}'], seed=seed,
                            duration=duration)
@@ -147,51 +149,50 @@ def _run(mode, on, seed, duration):
     return run.where(np.arange(len(run.t)) % every == 0).where(run.t[::every] >= EVALUATION_START_S)
 
 
-def pass_angles(duration):
-    """Return the Pass of the scenario; duration as of `_run`."""
+def pass_angles(duration: Seconds | None) -> Pass:
+    """Return the direction along the pass of the scenario; duration as of `_run`."""
     run = _run('program', NO_TERMS, FIRST_SEED, duration)
     azimuth, elevation = np.degrees(run['joint_states']['position'].T)
     return Pass(run.t, azimuth, elevation)
 
 
-def batch(item, duration=None):
+def batch(item: tuple[tuple[str, str], int, int], duration: Seconds | None = None) -> Floats:
     """Return errors (count, n, 2) [deg], cross-elevation and elevation, of an item ((mode, on), first run, count)."""
     (mode, on), first, count = item
     return np.array([np.degrees(_run(mode, on, FIRST_SEED + first + i, duration).truth['error'])
                      for i in range(count)])
 
 
-def rms(errors):
+def rms(errors: Floats) -> Floats:
     """Return the root mean square (...,) of the length of errors (..., n, 2)."""
     return np.sqrt(np.mean(np.sum(errors ** 2, axis=-1), axis=-1))
 
 
+def _sum(contributions: Mapping[str, Pairs]) -> Pairs:
+    return sum(contributions.values(), np.zeros(()))
+
+
 @dataclasses.dataclass(frozen=True)
 class Budget:
-    """Budget of a mode. All errors are in deg; their two columns are cross-elevation and elevation.
+    """Budget of a mode. All errors are in deg; their two columns are cross-elevation and elevation."""
+    base: Annotated[Floats, '(runs, n, 2)']     # errors with all terms off; one run if no noise reaches the antenna
+    once: dict[str, Pairs]      # {systematic term: its contribution}
+    seeded: dict[str, Annotated[Floats, '(runs, n, 2)']]    # {random term: its contribution}
+    whole: Annotated[Floats, '(runs, n, 2)']    # errors with all terms on
 
-    `base` (runs, n, 2): errors with all terms off; a single run if no noise reaches the antenna. `once` {term: (n, 2)}
-    and `seeded` {term: (runs, n, 2)}: contributions of systematic and of random terms. `whole` (runs, n, 2): errors
-    with all terms on.
-    """
-    base: np.ndarray
-    once: dict
-    seeded: dict
-    whole: np.ndarray
-
-    def of(self, seeds):
-        """Return the Budget of some of its runs, a list of indices."""
+    def of(self, seeds: list[int]) -> 'Budget':
+        """Return the budget of some of its runs, whose indices are given."""
         return Budget(self.base[seeds] if len(self.base) > 1 else self.base, self.once,
                       {name: e[seeds] for name, e in self.seeded.items()}, self.whole[seeds])
 
     @property
-    def systematic(self):
-        """Systematic contributions {name: (n, 2)}."""
+    def systematic(self) -> dict[str, Pairs]:
+        """Systematic contributions."""
         return {'servo': self.base.mean(axis=0), **self.once,
                 **{f'{name}-mean': e.mean(axis=0) for name, e in self.seeded.items()}}
 
     @property
-    def random(self):
+    def random(self) -> dict[str, Floats]:
         """Random contributions {name: (runs, n, 2)}: deviations from the mean over the runs.
 
         Because the mean of n runs follows their errors, the deviations are too small. The factor sqrt(n / (n - 1))
@@ -202,20 +203,20 @@ class Budget:
                 for name, e in (off | self.seeded).items()}
 
     @property
-    def combined(self):
-        """Rms of all contributions together [deg]."""
+    def combined(self) -> Degrees:
+        """Rms of all contributions together."""
         square = sum(np.mean(rms(e) ** 2) for e in self.random.values())
         # The mean of n runs still contains one n-th of the random variance.
-        return float(np.sqrt(rms(sum(self.systematic.values())) ** 2 + square * (1.0 - 1.0 / len(self.whole))))
+        return float(np.sqrt(rms(_sum(self.systematic)) ** 2 + square * (1.0 - 1.0 / len(self.whole))))
 
     @property
-    def to_whole(self):
+    def to_whole(self) -> float:
         """`combined` over the rms of the runs with all terms on [-]."""
         return self.combined / float(np.sqrt(np.mean(rms(self.whole) ** 2)))
 
 
-def budget(mode, runs, duration, pool, progress):
-    """Return the Budget of a mode, with `runs` runs of the random terms."""
+def budget(mode: str, runs: int, duration: Seconds | None, pool: Pool, progress: Progress) -> Budget:
+    """Return the budget of a mode, with `runs` runs of the random terms."""
     of_batch = functools.partial(batch, duration=duration)
     seeded, once = ([term.name for term in active_terms(mode) if term.random == kind] for kind in (True, False))
     # Only in autotrack the noise of the receiver reaches the antenna, so only there the run without terms is random.
@@ -230,16 +231,16 @@ def budget(mode, runs, duration, pool, progress):
                   {name: errors[mode, name] - base for name in seeded}, errors[mode, ALL_TERMS])
 
 
-def _sizes(case, e):
+def _sizes(case: str, e: Floats) -> list[Row]:
     """Return the rows of the rms of an error e (n, 2), or of the error of several runs (runs, n, 2) [deg]."""
     return [row(case, 'rms_deg', rms(e), 'deg'),
             *(row(case, f'{axis}_rms_deg', tracking.rms(e[..., i], axis=-1), 'deg')
               for i, axis in enumerate(ERROR_COLUMNS))]
 
 
-def rows(mode, made, place):
-    """Return the rows of a mode; made: its Budget; place: the Pass."""
-    systematic = {**made.systematic, 'systematic': sum(made.systematic.values())}
+def rows(mode: str, made: Budget, place: Pass) -> list[Row]:
+    """Return the rows of a mode."""
+    systematic = {**made.systematic, 'systematic': _sum(made.systematic)}
     table = []
     for name, e in (*systematic.items(), *made.random.items(), ('whole', made.whole)):
         table += _sizes(f'{mode}/{name}', e)
@@ -259,19 +260,23 @@ def rows(mode, made, place):
     return table
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None, duration=None) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
+        duration: Seconds | None = None) -> Result:
     """Measure the budget of every mode.
 
-    pool: monte_carlo.Pool, None for this process. duration: length of the pass [s], None for the length of the
+    duration: length of the pass, None for the length of the
     scenario.
     """
     if runs < 3:
         raise ValueError(f'--runs {runs}: must be at least 3, because random and systematic errors are separated by '
                          'their spread over the runs')
-    pool, place, made = pool or monte_carlo.Pool(1), pass_angles(duration), {}
+    def progress_of(i: int) -> Progress:
+        return lambda share, text: progress((i + share) / len(MODE_OVERRIDES), text)
+
+    pool, place = pool or monte_carlo.Pool(1), pass_angles(duration)
+    made: dict[str, Budget] = {}
     for i, mode in enumerate(MODE_OVERRIDES):
-        made[mode] = budget(mode, runs, duration, pool,
-                            lambda share, text, i=i: progress((i + share) / len(MODE_OVERRIDES), text))
+        made[mode] = budget(mode, runs, duration, pool, progress_of(i))
     table = [line for mode, of_mode in made.items() for line in rows(mode, of_mode, place)]
     return Result(table, {'budget': functools.partial(figure, made, place)},
                   [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. `pedestal run {SCENARIO_NAME}` is a run of case '
@@ -279,11 +284,8 @@ def run(progress, runs=DEFAULT_RUNS, pool=None, duration=None) -> Result:
                   [line for line in table if not line['case'].endswith('s')])
 
 
-def figure(made, place):
-    """Draw the rms of all contributions in every mode, and the systematic sum beside the runs with all terms on.
-
-    made: {mode: Budget}. place: Pass.
-    """
+def figure(made: Mapping[str, Budget], place: Pass) -> Figure:
+    """Draw the rms of all contributions in every mode, and the systematic sum beside the runs with all terms on."""
     drawn, axes = new_panels(len(made), 2, height=7.0, x='')
     for (left, right), (mode, of_mode) in zip(axes, made.items()):
         sizes = {name: np.mean(rms(e)) for name, e in (*of_mode.systematic.items(), *of_mode.random.items())}
@@ -291,7 +293,7 @@ def figure(made, place):
         left.invert_yaxis()
         left.set_title(mode)
         left.set_xlabel('rms [deg]')
-        total = sum(of_mode.systematic.values())
+        total = _sum(of_mode.systematic)
         for i, axis in enumerate(ERROR_COLUMNS):
             line, = right.plot(place.times, of_mode.whole.mean(axis=0)[:, i], linewidth=0.7, label=axis)
             right.plot(place.times, total[:, i], '--', color=line.get_color())

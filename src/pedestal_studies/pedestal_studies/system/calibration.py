@@ -20,19 +20,29 @@ counts with the value 0 and the sigma that it had before.
 """
 import functools
 import math
+from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
 
+from acu_tracker.program.program_track import checked
+from adu_drive.params import AxisParameters
 from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
+from pedestal_bringup.scenario.scenario import Scenario
+from pedestal_common.quantities import Degrees, Floats, Radians, Seconds
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import new_panels
 from pedestal_results.tracking import rms
-from pedestal_studies.rigs.rows import Result
-from pedestal_workbench.calibration import collect, pointing, predicted, scan
+from pedestal_studies.result import Result
+from pedestal_workbench.calibration import collect, pointing, scan
+from pedestal_workbench.calibration.collect import Point
+from pedestal_workbench.calibration.offsets import Offsets
+from pedestal_workbench.calibration.pointing import Calibration
 from pedestal_workbench.calibration.terms import DEFAULT_TERMS
 from pedestal_workbench.trials import monte_carlo
+from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 SCENARIO_NAME, SCAN_SCENARIO_NAME = 'station_new', 'station_sun'  # scenario of the passes, and of the scans of the sun
 DEFAULT_RUNS, FIRST_SEED = 30, 1  # number of runs; seed of the first run
@@ -57,12 +67,13 @@ TEST_PASS = '2019-12-12T15:49:47Z'
 EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1  # start and period of the evaluation of the error [s]
 
 
-def of_pass(begin, seed, changes=(), duration=None, name=SCENARIO_NAME, low=-np.pi):
-    """Return the Scenario of a pass or a scan that begins at a UTC.
+def of_pass(begin: str, seed: int, changes: Sequence[str] = (), duration: Seconds | None = None,
+            name: str = SCENARIO_NAME, low: Radians = -np.pi) -> Scenario:
+    """Return the scenario of a pass or a scan that begins at a UTC.
 
     The antenna begins at the first predicted direction.
 
-    low: least azimuth at which the antenna begins [rad]
+    low: least azimuth at which the antenna begins
     """
     chosen = [f'tracking_receiver.target.leo_pass.start_time={begin}', f'adu.wind.field.seed={seed}', *changes]
     _, angles = Plan(scenario.load(name, chosen, seed, duration)).tables['']
@@ -71,14 +82,14 @@ def of_pass(begin, seed, changes=(), duration=None, name=SCENARIO_NAME, low=-np.
                                 f'adu.initial_elevation={elevation:.4f}'], seed, duration)
 
 
-def offsets_of(begin, seed, duration=None):
+def offsets_of(begin: str, seed: int, duration: Seconds | None = None) -> tuple[str, list[Point]]:
     """Return (label, points) of a pass in autotrack, for collect.joined."""
     chosen = of_pass(begin, seed, CALM_OVERRIDES, duration)
-    track = predicted.checked(*Plan(chosen).tables[''])
+    track = checked(*Plan(chosen).tables[''])
     return begin, collect.listed('', collect.points(memory_recording.record(chosen), [track], POINTS_PER_PASS))
 
 
-def offset_of_sun(begin, seed):
+def offset_of_sun(begin: str, seed: int) -> tuple[str, list[Point]]:
     """Return (label, points) of a scan of the sun, for collect.joined.
 
     The azimuth begins on the turn of the wrap that holds the whole day of the sun.
@@ -87,13 +98,13 @@ def offset_of_sun(begin, seed):
     return begin, collect.listed('scan', scan.points(memory_recording.record(chosen), [])[:3])
 
 
-def overrides(found):
-    """Return the overrides that give the control unit the model of a pointing.Calibration."""
+def overrides(found: Calibration) -> list[str]:
+    """Return the overrides that give the control unit the model of a calibration."""
     return [f'acu.{name}={value}' for name, value in pointing.parameters(found, 'study').items() if value]
 
 
-def program_error(seed, changes=(), duration=None):
-    """Return the rms of the true error of the beam in program track [deg], of both axes together."""
+def program_error(seed: int, changes: Sequence[str] = (), duration: Seconds | None = None) -> Degrees:
+    """Return the rms of the true error of the beam in program track, of both axes together."""
     chosen = of_pass(TEST_PASS, SEEDS_PER_RUN * (seed + 1) - 1, (*PROGRAM_OVERRIDES, *changes), duration)
     run = closed_loop.Loop(chosen).run()
     every = round(EVALUATION_PERIOD_S / (run.t[1] - run.t[0]))
@@ -101,15 +112,15 @@ def program_error(seed, changes=(), duration=None):
     return rms(np.degrees(errors))
 
 
-def measured(seed, duration=None):
-    """Return the offsets.Offsets of the calibration passes and the scans of a run."""
+def measured(seed: int, duration: Seconds | None = None) -> Offsets:
+    """Return the offsets of the calibration passes and the scans of a run."""
     passes = [offsets_of(begin, SEEDS_PER_RUN * seed + i, duration) for i, begin in enumerate(CALIBRATION_PASSES)]
     scans = [offset_of_sun(begin, SEEDS_PER_RUN * seed + len(passes) + i) for i, begin in enumerate(SCANS)]
     return collect.joined([*passes, *scans], SCENARIO_NAME)
 
 
-def bending(axis):
-    """Return the largest deflection of the dish by its unbalance, at elevation 0 [rad]; axis: AxisParameters.
+def bending(axis: AxisParameters) -> Radians:
+    """Return the largest deflection of the dish by its unbalance, at elevation 0.
 
     The stiffness of the structure follows from the frequency at which the dish swings on it.
     """
@@ -117,8 +128,8 @@ def bending(axis):
     return load.unbalance / ((2.0 * math.pi * structure.frequency)**2 * structure.inertia_share * load.inertia)
 
 
-def truth():
-    """Return {name of a term: true value [deg]} of the scenario.
+def truth() -> dict[str, Degrees]:
+    """Return {name of a term: true value} of the scenario.
 
     The null of the difference channels is not on the axis of the beam. Because autotrack follows the null, this angle
     is a part of the collimation and of the zero of the elevation. The bending of the structure by the unbalance and
@@ -140,7 +151,7 @@ MEASURED_NAMES = ('raw_rms_deg', 'calibrated_rms_deg', 'residual_rms_deg', 'leav
 """Names of the numbers of a run, before the values and the sigmas of the terms."""
 
 
-def batch(item, duration=None):
+def batch(item: tuple[None, int, int], duration: Seconds | None = None) -> Floats:
     """Return numbers (count, k) of an item (None, first run, count).
 
     The numbers are MEASURED_NAMES, then the values of TERMS and their sigmas.
@@ -149,8 +160,8 @@ def batch(item, duration=None):
     return np.array([_numbers(FIRST_SEED + first + i, duration) for i in range(count)])
 
 
-def _numbers(seed, duration):
-    """Return the numbers of a run as a list."""
+def _numbers(seed: int, duration: Seconds | None) -> list[float]:
+    """Return the numbers of a run."""
     offsets = measured(seed, duration)
     found, default = (pointing.calibrate(offsets, names, 'exact') for names in (TERMS, DEFAULT_TERMS))
     return [program_error(seed, (), duration), program_error(seed, overrides(found), duration),
@@ -158,17 +169,18 @@ def _numbers(seed, duration):
             len(offsets.places), *_of_terms(found)]
 
 
-def _of_terms(found):
-    """Return the values of TERMS of a pointing.Calibration, then their sigmas."""
+def _of_terms(found: Calibration) -> tuple[float, ...]:
+    """Return the values of TERMS, then their sigmas."""
     values = dict(zip(found.fit.names, zip(found.fit.values, found.fit.sigma)))
     values |= {name: (0.0, sigma) for name, _, sigma in found.dropped}
     return *(values[name][0] for name in TERMS), *(values[name][1] for name in TERMS)
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None, duration=None) -> Result:
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
+        duration: Seconds | None = None) -> Result:
     """Measure the calibration over seeds.
 
-    pool: monte_carlo.Pool, None for this process. duration: length of a pass [s], None for that of the scenario.
+    duration: length of a pass, None for that of the scenario.
     """
     pool = pool or monte_carlo.Pool(1)
     numbers = pool.of_cases(functools.partial(batch, duration=duration), [None], runs, 1, progress)[None]
@@ -190,7 +202,7 @@ def run(progress, runs=DEFAULT_RUNS, pool=None, duration=None) -> Result:
                    f'{TEST_PASS}.'])
 
 
-def figure(numbers, errors, sigmas):
+def figure(numbers: Floats, errors: Floats, sigmas: Floats) -> Figure:
     """Draw the program-track error of each run before and after, and the errors of the terms in sigmas."""
     drawn, ((left, right),) = new_panels(1, 2, height=3.0, x=('run', 'term'))
     for i, name in enumerate(('without a model', 'calibrated')):

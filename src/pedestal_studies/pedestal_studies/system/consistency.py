@@ -6,18 +6,22 @@ value means that the filter is too sure. Cases are scenarios; a metric nees_AXIS
 T [s] after the first estimate of the filter.
 """
 import functools
+from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Floats, Pairs, Row
 from pedestal_results import consistency, tracking
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, TRUTH_COLOUR, new_panels
-from pedestal_studies.rigs import drawing
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing
+from pedestal_studies.result import Item, Result
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
+from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time
@@ -32,10 +36,11 @@ CASES = {name: Case(name, name, duration=DURATION_S) for name in SCENARIOS}  # {
 MAX_NEES = 2.4  # largest NEES of a filter that is not too sure: 2 plus 20 %
 
 
-def nees(case):
-    """Return the NEES (len(TIMES_S), 2) of one run of a Case at TIMES_S, NaN without an estimate at that time."""
+def nees(case: Case) -> Pairs:
+    """Return the NEES of one run of a case at TIMES_S, NaN without an estimate at that time."""
     recorded = memory_recording.record(case.loaded())
     found = consistency.read(recorded, tracking.read(recorded))
+    assert found is not None
     known = np.isfinite(found.nees[:, 0])
     if not known.any():
         return np.full((len(TIMES_S), 2), np.nan)
@@ -44,27 +49,27 @@ def nees(case):
     return np.array([value.mean(axis=0) if len(value) else (np.nan, np.nan) for value in values])
 
 
-def batch(item):
+def batch(item: Item) -> Floats:
     """Return the NEES (count, len(TIMES_S), 2) of an item (case, first run, number of runs)."""
     name, first, count = item
     return np.array([nees(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)])
 
 
-def rows(values):
+def rows(values: Mapping[str, Floats]) -> list[Row]:
     """Return the rows of values {case: (runs, len(TIMES_S), 2)}; a time that no run reaches has no row."""
     return [row(name, f'nees_{axis}_{time:g}_s', of_runs[known, k, i], '', target=f'<= {MAX_NEES:g}')
             for name, of_runs in values.items() for k, time in enumerate(TIMES_S) for i, axis in enumerate(AXES)
             if (known := np.isfinite(of_runs[:, k, i])).sum() > 1]
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
-    """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
+    """Run every case `runs` times."""
     values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'nees': functools.partial(figure, values)},
                   [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. A filter is too sure above {MAX_NEES:g}.'])
 
 
-def figure(values):
+def figure(values: Mapping[str, Floats]) -> Figure:
     """Draw the mean NEES of both axes over the time after the start, a panel for each scenario."""
     drawn, axes = new_panels(len(values), height=1.1 * len(values) + 1.0, y='NEES', sharex=True)
     for panel, (name, of_runs) in zip(axes[:, 0], values.items()):

@@ -1,6 +1,6 @@
 """Filters compared: angle and rate noise of every filter on four target motions, white and coloured noise.
 
-Cases are <profile>/<filter>/<noise>. A profile is a target motion of rigs/profiles.py, whose angle is measured at 100
+Cases are <profile>/<filter>/<noise>. A profile is a target motion of profiles.py, whose angle is measured at 100
 Hz. Every filter except UNTUNED_FILTERS is tuned for each profile and noise. The tuning minimises the angle rms over
 TUNING_RUNS records of other seeds (pedestal_workbench/tuning/parameter_search.py).
 
@@ -13,20 +13,28 @@ Every run gives its own rms and means, from SETTLING_TIME_S on.
 """
 import dataclasses
 import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from pedestal_common.parameters import build
+from pedestal_common.quantities import Floats, Radians, Records, Row, Times
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
+from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, Panels, new_panels
 from pedestal_results.report.filter_figures import MODEL_COLOURS
-from pedestal_studies.rigs import drawing, ensemble, profiles
-from pedestal_studies.rigs.ensemble import Noise
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing, ensemble, profiles
+from pedestal_studies.ensemble import Noise
+from pedestal_studies.result import Drawings, Result
 from pedestal_workbench.trials import monte_carlo
+from pedestal_workbench.trials.monte_carlo import Pool, Progress
 from pedestal_workbench.tuning import parameter_search
+
+CaseName: TypeAlias = tuple[str, str, str]      # profile, filter, noise
+Means: TypeAlias = dict[CaseName, dict[str, float]]     # {case: {metric: mean over the runs}}
 
 DEFAULT_RUNS = 200  # runs of each case
 BATCH_RUNS = 25  # runs that one worker makes at a time
@@ -54,7 +62,7 @@ FILTERS = {**{kind: FilterParameters(kind=kind) for kind in FILTER_KINDS if kind
            'imm-manoeuvre': build(FilterParameters, {'kind': 'imm', **MANOEUVRE_PARAMETERS}),
            **{name: FilterParameters(kind=name.partition('-')[0])
               for name in (*RATE_SIGMAS_RAD_S, *NOISE_AWARE_FILTERS)}}
-"""{filter: FilterParameters}."""
+"""{filter: its parameters}."""
 
 UNTUNED_FILTERS = ('imm', 'imm-manoeuvre', 'imm-expecting', 'imm_ukf')  # filters that are not tuned
 
@@ -83,24 +91,25 @@ CONSISTENCY_LIMITS = (0.8, 1.25)
 rms error over the sigma that the filter states."""
 
 
-def degrees_of_freedom(name):
+def degrees_of_freedom(name: str) -> int:
     """Return the degrees of freedom of the innovation of a filter: 1 for the angle, and 1 for a measured rate."""
     return 1 + (name in RATE_SIGMAS_RAD_S)
 
 
-def times():
-    """Return the instants of the measurements of a record (n,) [s]."""
-    return ensemble.MEASUREMENT_PERIOD_S * np.arange(round(profiles.RECORD_DURATION_S / ensemble.MEASUREMENT_PERIOD_S))
+def times() -> Times:
+    """Return the instants of the measurements of a record."""
+    n = round(profiles.RECORD_DURATION_S / ensemble.MEASUREMENT_PERIOD_S)
+    return ensemble.MEASUREMENT_PERIOD_S * np.arange(n, dtype=float)
 
 
-def noise_of(noise, name):
-    """Return the Noise for a filter; noise: name of NOISE_CASES; name: of FILTERS."""
+def noise_of(noise: str, name: str) -> Noise:
+    """Return the noise for a filter; noise: name of NOISE_CASES; name: of FILTERS."""
     return dataclasses.replace(NOISE_CASES[noise], rate_sigma=RATE_SIGMAS_RAD_S.get(name),
                                expected=name in NOISE_AWARE_FILTERS)
 
 
-def measured(params, profile, noise, seed, first, count):
-    """Return ensemble.MOMENTS (count, n) of one filter (FilterParameters) with a Noise.
+def measured(params: FilterParameters, profile: str, noise: Noise, seed: int, first: int, count: int) -> Records:
+    """Return ensemble.Moments (count, n) of one filter.
 
     The runs are first ... first + count - 1.
     """
@@ -109,20 +118,20 @@ def measured(params, profile, noise, seed, first, count):
     return ensemble.moments(params, t, truth, noise, ensemble.records(truth, noise, seed, first, count))
 
 
-def settled(sums):
-    """Return the sum (runs,) of MOMENTS (runs, n) over the time after SETTLING_TIME_S."""
+def settled(sums: Records) -> Records:
+    """Return the sum (runs,) of Moments (runs, n) over the time after SETTLING_TIME_S."""
     return ensemble.over_time(sums[:, round(SETTLING_TIME_S / ensemble.MEASUREMENT_PERIOD_S):])
 
 
-def tune(item):
-    """Return the FilterParameters of an item (profile, noise, filter), tuned on the records of TUNING_SEED."""
+def tune(item: tuple[str, str, str]) -> FilterParameters:
+    """Return the parameters of an item (profile, noise, filter), tuned on the records of TUNING_SEED."""
     profile, noise, name = item
     t = times()
     noise_known = noise_of(noise, name)
     truth = profiles.truth(profile, t)
     records = ensemble.records(truth, noise_known, TUNING_SEED, 0, TUNING_RUNS)
 
-    def angle_rms(params):
+    def angle_rms(params: FilterParameters) -> Radians:
         sums = settled(ensemble.moments(params, t, truth, noise_known, records))
         return math.sqrt(sums['angle2'].sum() / sums['runs'].sum())
 
@@ -132,13 +141,13 @@ def tune(item):
 THINNING_STEPS = 10  # steps between two measurements that the figures show
 
 
-def batch(item):
-    """Return {filter: (MOMENTS (count,) of every run, MOMENTS of all runs at the drawn times)} of an item.
+def batch(item: tuple[str, str, dict[str, FilterParameters], int, int]) -> dict[str, tuple[Records, Records]]:
+    """Return {filter: (Moments (count,) of every run, Moments of all runs at the drawn times)} of an item.
 
     An item is (profile, noise, {filter: parameters}, first run, number of runs).
     """
     profile, noise, filters, first, count = item
-    sums_of = {}
+    sums_of: dict[str, tuple[Records, Records]] = {}
     for name, params in filters.items():
         sums = measured(params, profile, noise_of(noise, name), NOISE_SEED, first, count)
         sums_of[name] = settled(sums), ensemble.over_runs(sums[:, ::THINNING_STEPS])
@@ -150,8 +159,9 @@ def batch(item):
     return sums_of
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None, on=profiles.PROFILES, noises=tuple(NOISE_CASES)) -> Result:
-    """Compare all filters in `runs` runs of each case; pool: monte_carlo.Pool, None for this process.
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None, on: Sequence[str] = profiles.PROFILES,
+        noises: Sequence[str] = tuple(NOISE_CASES)) -> Result:
+    """Compare all filters in `runs` runs of each case.
 
     on: names of profiles; noises: names of NOISE_CASES.
     """
@@ -166,8 +176,8 @@ def run(progress, runs=DEFAULT_RUNS, pool=None, on=profiles.PROFILES, noises=tup
             tune, wanted, lambda share, text: progress(0.5 * share, f'tuning, {text}'))):
         tuned[profile, noise][name] = params
     items = [(*key, tuned[key], *part) for key in tuned for part in monte_carlo.batches(runs, BATCH_RUNS)]
-    of_runs: dict[tuple, list] = {}
-    over_time: dict[tuple, np.ndarray] = {}
+    of_runs: dict[CaseName, list[Records]] = {}
+    over_time: dict[CaseName, Records] = {}
     for (profile, noise, *_), sums_of in zip(items, pool.map(
             batch, items, lambda share, text: progress(0.5 + 0.5 * share, f'{runs} runs of each case, {text}'))):
         for name, (sums, thinned) in sums_of.items():
@@ -181,8 +191,8 @@ def run(progress, runs=DEFAULT_RUNS, pool=None, on=profiles.PROFILES, noises=tup
     return Result(table, figures(means, over_time), remarks(means, tuned, runs), shown=shown(table))
 
 
-def metrics(sums):
-    """Return {metric: (values (runs,), unit)} of MOMENTS (runs,).
+def metrics(sums: Records) -> dict[str, tuple[Floats, str]]:
+    """Return {metric: (values (runs,), unit)} of Moments (runs,).
 
     `reduction`: rms of the measured angle over that of the estimate. nis, nees: normalised innovation squared and
     normalised estimation error squared. `..._over_sigma`: rms error over the sigma that the filter states. A
@@ -198,19 +208,19 @@ def metrics(sums):
             'rate_over_sigma': (rate / np.sqrt(sums['rate_variance'] / n), '')}
 
 
-def rows(values):
-    """Return a row for every metric of every case; values: {(profile, filter, noise): as `metrics` returns}."""
+def rows(values: Mapping[CaseName, dict[str, tuple[Floats, str]]]) -> list[Row]:
+    """Return a row for every metric of every case; values: {case: as `metrics` returns}."""
     return [row('/'.join(case), metric, value, unit,
                 target=METRIC_TARGETS.get((*case[:2], metric)) if case[2] == SHOWN_NOISE else None)
             for case, measured in values.items() for metric, (value, unit) in measured.items()]
 
 
-def shown(table):
+def shown(table: list[Row]) -> list[Row]:
     """Return the rows that are printed: the rows with a target, because all rows are too many for a terminal."""
     return [row for row in table if row['target']]
 
 
-def _cell(measured):
+def _cell(measured: Mapping[str, float] | None) -> str:
     """Return a cell of the printed table, 34 characters."""
     if measured is None:
         return 34 * ' '
@@ -218,10 +228,10 @@ def _cell(measured):
             f'{measured["angle_over_sigma"]:.2f} {measured["rate_over_sigma"]:.2f}').ljust(34)
 
 
-def remarks(values, tuned, runs):
+def remarks(values: Means, tuned: Mapping[tuple[str, str], Mapping[str, FilterParameters]], runs: int) -> list[str]:
     """Return the sentences that explain the rows, with a table of the profiles.
 
-    values: {case: {metric: mean over the runs}}. tuned: {(profile, noise): {filter: FilterParameters}}.
+    tuned: {(profile, noise): {filter: its parameters}}.
     """
     lines = [f'{runs} runs of each case. The columns are angle rms [deg] (reduction), rate rms [deg/s], and the error '
              f'over own sigma of angle and rate, for the noise {SHOWN_NOISE} deg. --json gives the rows of all cases.']
@@ -231,7 +241,7 @@ def remarks(values, tuned, runs):
         lines += [f'{name:30}' + ''.join(_cell(values.get((profile, name, SHOWN_NOISE))) for profile in on).rstrip()
                   for name in SHOWN_FILTERS]
     for colour in ('white', 'coloured'):
-        inconsistent = {}
+        inconsistent: dict[str, dict[str, list[float]]] = {}
         for (_, name, noise), measured in values.items():
             measures = {'NIS': measured['nis_mean'] / degrees_of_freedom(name), 'angle': measured['angle_over_sigma'],
                         'rate': measured['rate_over_sigma']}
@@ -259,8 +269,8 @@ def remarks(values, tuned, runs):
     return lines
 
 
-def figures(values, over_time):
-    """Return {name: function that draws it} of the cases with the noise SHOWN_NOISE; values as of `remarks`."""
+def figures(values: Means, over_time: Mapping[CaseName, Records]) -> Drawings:
+    """Return the figures of the cases with the noise SHOWN_NOISE."""
     on = list(dict.fromkeys(profile for profile, _, noise in values if noise == SHOWN_NOISE))
     if not on:
         return {}
@@ -275,10 +285,10 @@ FILTER_COLOURS = {'current_statistical': RAW_COLOUR, 'current_statistical-rate-0
 """{filter of the error figures: its colour}."""
 
 
-def errors_figure(over_time, on, what='angle'):
+def errors_figure(over_time: Mapping[CaseName, Records], on: Sequence[str], what: str = 'angle') -> Figure:
     """Draw the error over time: mean +-1 sigma over the runs, and dashed the sigma that the filter states.
 
-    over_time: {case: MOMENTS of all runs at the drawn times}; on: names of profiles, here and below.
+    over_time: {case: Moments of all runs at the drawn times}; on: names of profiles, here and below.
     """
     unit = 'deg' if what == 'angle' else 'deg/s'
     figure, axes = new_panels(len(on), len(FILTER_COLOURS), height=1.0 + 1.4 * len(on),
@@ -301,8 +311,8 @@ def errors_figure(over_time, on, what='angle'):
     return figure
 
 
-def profile_panels(on):
-    """Return (figure, panels (n,)) with a panel for each profile, two in a row, and room for a line of each filter."""
+def profile_panels(on: Sequence[str]) -> tuple[Figure, Panels]:
+    """Return (figure, panels) with a panel for each profile, two in a row, and room for a line of each filter."""
     rows = (len(on) + 1) // 2
     figure, axes = new_panels(rows, 2, x='', height=0.8 + rows * (0.5 + 0.2 * len(SHOWN_FILTERS)), sharey=True)
     for panel in axes.flat[len(on):]:
@@ -310,8 +320,9 @@ def profile_panels(on):
     return figure, axes.flat[:len(on)]
 
 
-def bars(values, on, metric, label, colour, text):
-    """Return (figure, panels (n,)) with a panel of bars for each profile.
+def bars(values: Means, on: Sequence[str], metric: Callable[[str, Mapping[str, float]], float], label: str,
+         colour: Callable[[str], str], text: Callable[[str, Mapping[str, float]], str]) -> tuple[Figure, Panels]:
+    """Return (figure, panels) with a panel of bars for each profile.
 
     metric, text: functions (filter, its metrics) that return the length of a bar and the text at its end. label: of
     the x axis. colour: function that returns the colour of a filter.
@@ -331,20 +342,20 @@ def bars(values, on, metric, label, colour, text):
     return figure, panels
 
 
-def _colour(name):
+def _colour(name: str) -> str:
     """Return the colour of a filter in a figure."""
     return TRUTH_COLOUR if name in UNTUNED_FILTERS else FILTERED_COLOUR if name in RATE_SIGMAS_RAD_S else RAW_COLOUR
 
 
-def rms_figure(values, on):
+def rms_figure(values: Means, on: Sequence[str]) -> Figure:
     """Draw the angle rms of every filter; the number on a bar is the reduction."""
     return bars(values, on, lambda name, at: at['angle_rms_deg'], 'angle rms [deg]', _colour,
                 lambda name, at: f'{at["reduction"]:.1f}')[0]
 
 
-def nis_figure(values, on):
+def nis_figure(values: Means, on: Sequence[str]) -> Figure:
     """Draw the mean NIS per degree of freedom of every filter; a consistent filter has 1."""
-    def nis(name, at):
+    def nis(name: str, at: Mapping[str, float]) -> float:
         return at['nis_mean'] / degrees_of_freedom(name)
 
     figure, panels = bars(values, on, nis, 'NIS per degree of freedom', _colour,
@@ -355,7 +366,7 @@ def nis_figure(values, on):
     return figure
 
 
-def probabilities_figure(over_time, on):
+def probabilities_figure(over_time: Mapping[CaseName, Records], on: Sequence[str]) -> Figure:
     """Draw the probability of each motion model in the filter imm, mean over the runs."""
     figure, axes = new_panels(len(on), height=1.0 + 1.2 * len(on), sharex=True, sharey=True)
     for panel, profile in zip(axes[:, 0], on):
@@ -369,7 +380,7 @@ def probabilities_figure(over_time, on):
     return drawing.legend(figure)
 
 
-def noise_figure(values, on):
+def noise_figure(values: Means, on: Sequence[str]) -> Figure:
     """Draw the reduction of every filter under each noise, which shows the effect of the bandwidth of the noise."""
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):

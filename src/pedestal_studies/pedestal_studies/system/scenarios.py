@@ -6,17 +6,22 @@ A ratio to another case divides the results of two runs with the same seed. `ped
 metrics, except the metrics of `extra_results`.
 """
 import math
+from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.figure import Figure
 
+from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.loop.memory_recording import MemoryRecording
+from pedestal_common.quantities import Floats, Row
 from pedestal_results import results, tracking
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
-from pedestal_studies.rigs import drawing
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import drawing
+from pedestal_studies.result import Item, Result
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
+from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time
@@ -78,10 +83,10 @@ EXTRA_METRIC_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 
 """{metric of `extra_results`: unit}."""
 
 
-def extra_results(values, run):
+def extra_results(values: Mapping[str, float], run: Run) -> dict[str, float]:
     """Return {name: value} of results that a recording does not give.
 
-    values: {name: value} of the other results; run: closed_loop.Run.
+    values: {name: value} of the other results.
 
         keyhole_loss_predicted_s        time with the target outside the beam, as the control unit predicts it for a
                                         slew through a keyhole [s]
@@ -102,22 +107,22 @@ def extra_results(values, run):
     return more
 
 
-def measured(case):
-    """Return {name: value} of one run of a Case."""
+def measured(case: Case) -> dict[str, float]:
+    """Return {name: value} of one run of a case."""
     scenario, run = case.loaded(), case.run()
     found = results.measured(results.of_bag(MemoryRecording(scenario, run)))
     values = {name: value for name, (value, _) in found.items()}
     return {**values, **extra_results(values, run)}
 
 
-def batch(item):
+def batch(item: Item) -> Floats:
     """Return the values (count, len(CASE_METRICS[case])) of an item (case, first run, number of runs)."""
     name, first, count = item
     runs = [measured(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)]
     return np.array([[values[metric] for metric in CASE_METRICS[name]] for values in runs])
 
 
-def rows(values):
+def rows(values: Mapping[str, Floats]) -> list[Row]:
     """Return the rows of the study; values: {case: (runs, len(CASE_METRICS[case]))}."""
     table = []
     for name, of_runs in values.items():
@@ -132,15 +137,15 @@ def rows(values):
     return table
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
-    """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
+    """Run every case `runs` times."""
     values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'pointing': lambda: pointing_figure(values), 'uav-flyby': flyby_figure},
                   [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. The variants as commands for the nodes:',
                    *(f'{name}: {CASES[name].command()}' for name in ('ship_pass-late', 'uav_flyby-60m'))])
 
 
-def flyby_figure():
+def flyby_figure() -> Figure:
     """Draw paper 000's figures 7 to 11 for uav_flyby: error and angle before and after the filter, and the azimuth."""
     figure, axes = new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
     case = CASES['uav_flyby'].with_seed(FIRST_SEED)
@@ -163,7 +168,7 @@ def flyby_figure():
     return drawing.legend(figure)
 
 
-def pointing_figure(values):
+def pointing_figure(values: Mapping[str, Floats]) -> Figure:
     """Draw the pointing error of every seed, rms to the left and largest to the right; values as of `rows`."""
     figure, axes = new_panels(1, 2, height=3.8, x=('pointing error, rms [deg]', 'pointing error, largest [deg]'),
                               sharey=True)

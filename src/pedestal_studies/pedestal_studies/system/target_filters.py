@@ -8,26 +8,109 @@ manoeuvre             IMM that expects a manoeuvre at any time
 current-statistical   filter of paper 000 with its default a_max, the largest acceleration of its model
 
 A ratio divides the pointing error of a case by that of `tuned` under the same seed. A target whose name ends in -ship
-is seen from the deck of the scenario ship_pass. The targets that manoeuvre hard are those of `hard_targets`.
+is seen from the deck of the scenario ship_pass. The targets that manoeuvre hard are those of HARD_TARGETS.
 """
 import dataclasses
 import functools
 import math
 import pathlib
 import tempfile
+from collections.abc import Callable, Mapping
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from pedestal_bringup.loop import memory_recording
+from pedestal_bringup.scenario.scenario import Scenario
+from pedestal_common.quantities import Degrees, Floats, Json, Meters, MetersPerSecond, Radians, Row, Seconds, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, new_panels
-from pedestal_studies.rigs import hard_targets
-from pedestal_studies.rigs.hard_targets import HARD_TARGETS
-from pedestal_studies.rigs.rows import Result
+from pedestal_studies import profiles
+from pedestal_studies.result import Item, Result
 from pedestal_studies.system.filters import MANOEUVRE_PARAMETERS
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
+from pedestal_workbench.trials.monte_carlo import Pool, Progress
+
+# Targets that manoeuvre hard. Positions are in metres east, north and up of the antenna. Each function takes times at
+# a constant period, and returns (azimuth, elevation) [rad].
+
+G_M_S2 = 9.81  # acceleration of gravity [m/s2]
+STEP_RATE_HZ = 100.0  # rate of the rows of a table
+
+
+def _seen(east: Floats, north: Floats, up: Floats) -> tuple[Floats, Floats]:
+    """Return (azimuth, elevation) of positions [m]."""
+    return np.unwrap(np.arctan2(east, north)), np.arctan2(up, np.hypot(east, north))
+
+
+def _integrated(t: Times, rate: Floats, start: float) -> Floats:
+    """Return the integral of `rate` (n,) over t by the rule of the trapezium, from a value `start`."""
+    return start + np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))))
+
+
+def s_motion(t: Times) -> tuple[Floats, Floats]:
+    """Return the S motion of paper 003: 20 deg to and fro at 3.5 deg/s, reversals of 1 s (11 deg/s2)."""
+    azimuth = profiles.s_motion(t, math.radians(20.0), math.radians(3.5), 1.0)[0]
+    return azimuth, np.full(t.size, math.radians(30.0))
+
+
+def quadcopter(t: Times) -> tuple[Floats, Floats]:
+    """Return dashes of 12 m/s across the line of sight at 120 m, with 0.5 g and stops of 2 s between them."""
+    speed, push, stop, cruise = 12.0, 0.5 * G_M_S2, 2.0, 4.0
+    ramp = speed / push
+    dash = 2.0 * ramp + cruise
+    half, r = np.divmod(t, dash + stop)
+    v = np.clip(np.minimum(push * r, push * (dash - r)), 0.0, speed) * (1.0 - 2.0 * (half % 2))
+    east = _integrated(t, v, -0.5 * speed * (cruise + ramp))
+    return _seen(east, np.full(t.size, 115.0), np.full(t.size, 35.0))
+
+
+def launch_vehicle(t: Times) -> tuple[Floats, Floats]:
+    """Return an ascent 5 km away: thrust acceleration from 0.4 g to 3 g in 60 s, tilted from the vertical by
+    0.6 deg/s after 10 s."""
+    net = G_M_S2 * (0.4 + 2.6 * np.minimum(t / 60.0, 1.0))
+    pitch = np.radians(0.6) * np.maximum(t - 10.0, 0.0)
+    v_up, v_east = _integrated(t, net * np.cos(pitch), 0.0), _integrated(t, net * np.sin(pitch), 0.0)
+    return _seen(_integrated(t, v_east, 0.0), np.full(t.size, 5000.0), _integrated(t, v_up, 200.0))
+
+
+def _turning(t: Times, speed: MetersPerSecond, turn: Radians, leg: Seconds, load: float,
+             start: tuple[Meters, Meters, Meters]) -> tuple[Floats, Floats]:
+    """Return (azimuth, elevation) of an aircraft that turns left and right alternately, with straight legs between.
+
+    turn: angle of each turn; leg: duration of a straight leg; load: lateral acceleration [g]; start: position at the
+    start, on the way to the east.
+    """
+    rate = load * G_M_S2 / speed
+    half, r = np.divmod(t, leg + turn / rate)
+    turning = np.where(r >= leg, rate, 0.0) * (1.0 - 2.0 * (half % 2))
+    # An aircraft takes 0.5 s to bank.
+    width = round(0.5 * STEP_RATE_HZ)
+    turning = np.convolve(np.pad(turning, (width, 0), 'edge'), np.full(width + 1, 1.0 / (width + 1)), 'valid')
+    (east, north, up), psi = start, _integrated(t, turning, 0.5 * math.pi)
+    return _seen(_integrated(t, speed * np.sin(psi), east), _integrated(t, speed * np.cos(psi), north),
+                 np.full(t.size, up))
+
+
+HARD_TARGETS: dict[str, Callable[[Times], tuple[Floats, Floats]]] = {
+    's_motion': s_motion, 'quadcopter': quadcopter, 'launch_vehicle': launch_vehicle,
+    'jet': functools.partial(_turning, speed=250.0, turn=math.pi, leg=4.0, load=6.0, start=(-2000.0, 2500.0, 1200.0)),
+    'stunt_plane': functools.partial(_turning, speed=60.0, turn=2.0 * math.pi, leg=2.0, load=3.0,
+                                     start=(-250.0, 750.0, 250.0)),
+    'helicopter': functools.partial(_turning, speed=50.0, turn=0.5 * math.pi, leg=12.0, load=0.4,
+                                    start=(-1000.0, 2000.0, 500.0))}
+"""{name of a target that manoeuvres hard: function of t}."""
+
+
+def write(path: pathlib.Path, name: str, duration: Seconds) -> None:
+    """Write the table of a target over a duration as a CSV that a track_file reads."""
+    t = np.arange(round(duration * STEP_RATE_HZ) + 1) / STEP_RATE_HZ
+    azimuth, elevation = HARD_TARGETS[name](t)
+    np.savetxt(path, np.column_stack((t, np.degrees(azimuth), np.degrees(elevation))), '%.9f', ',',
+               header='time [s],azimuth [deg],elevation [deg]', comments='')
+
 
 DEFAULT_RUNS, FIRST_SEED = 30, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time
@@ -38,7 +121,7 @@ FIXED_TARGET_PARAMETERS = {'tracking_receiver.target.kind': 'step', f'{ANGLE_PRE
                            f'{ANGLE_PREFIX}.elevation_amplitude': 0.0, f'{ANGLE_PREFIX}.range': 5e5}
 """Parameters of a target that stands still, with the C/N0 of a satellite."""
 
-TARGET_SCENARIOS: dict[str, tuple[str, dict]] = {
+TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {
     'uav-60m': ('uav_flyby', {f'{FLYBY_PREFIX}.closest_distance': 60.0, f'{FLYBY_PREFIX}.height': 20.0}),
     'uav-150m': ('uav_flyby', {f'{FLYBY_PREFIX}.closest_distance': 150.0, f'{FLYBY_PREFIX}.height': 40.0}),
     'uav-500m': ('uav_flyby', {}), 'leo': ('leo_pass', {}), 'geo': ('leo_pass', FIXED_TARGET_PARAMETERS),
@@ -46,26 +129,26 @@ TARGET_SCENARIOS: dict[str, tuple[str, dict]] = {
     'geo-ship': ('ship_pass', FIXED_TARGET_PARAMETERS)}
 """{target: (scenario, parameters that it changes)}."""
 
-HARD_TARGET_SCENARIOS = {
+HARD_TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {
     'ashore': ('track_file', {}), 'ship': ('ship_pass', {'tracking_receiver.target.kind': 'track_file'})}
-"""{place: (scenario, its parameters)} of a target of hard_targets."""
+"""{place: (scenario, its parameters)} of a target of HARD_TARGETS."""
 TARGET_SCENARIOS |= {name.replace('_', '-') + suffix: HARD_TARGET_SCENARIOS[place] for name in HARD_TARGETS
                      for place, suffix in (('ashore', ''), ('ship', SHIP_SUFFIX))}
 
 HARD_TARGET_DURATION_S = 60.0
 
 
-def _both(**changes):
+def _both(**changes: Json) -> dict[str, Json]:
     """Return parameters of the control unit with the same changes for the filters of both axes."""
     return {f'{axis}.filter.{name}': value for axis in ('azimuth', 'elevation') for name, value in changes.items()}
 
 
-def _one(kind, azimuth, elevation):
+def _one(kind: str, azimuth: float, elevation: float) -> dict[str, Json]:
     """Return parameters of a filter cv or ca with a noise in each axis."""
     return {**_both(kind=kind), f'azimuth.filter.{kind}.noise': azimuth, f'elevation.filter.{kind}.noise': elevation}
 
 
-def _singer(alpha, sigma_deg):
+def _singer(alpha: float, sigma_deg: float) -> dict[str, Json]:
     """Return parameters of a filter singer: alpha [1/s], sigma [deg/s2]."""
     return _both(kind='singer', **{'singer.alpha': alpha, 'singer.sigma': math.radians(sigma_deg)})
 
@@ -79,16 +162,16 @@ TUNED_FILTERS = {
 """{target: parameters of its filter of one model}. A target seen from a ship has the filter of the target ashore.
 
 The filter is the best of a grid: over the noise of cv and ca, and over alpha and sigma of singer. The targets of
-hard_targets had two seeds from 101 on. The other targets had three seeds, and a noise for each axis.
+HARD_TARGETS had two seeds from 101 on. The other targets had three seeds, and a noise for each axis.
 """
 
 
-def _ashore(target):
+def _ashore(target: str) -> str:
     """Return the name that a target has ashore."""
     return target.partition(SHIP_SUFFIX)[0]
 
 
-def filters(target):
+def filters(target: str) -> dict[str, dict[str, Json]]:
     """Return {filter: parameters of the control unit} for a target of TARGET_SCENARIOS."""
     return {'default': {}, 'tuned': TUNED_FILTERS[_ashore(target)],
             'manoeuvre': _both(kind='imm', **MANOEUVRE_PARAMETERS),
@@ -105,25 +188,25 @@ MAX_POINTING_RATIO = 1.15
 
 
 @functools.cache
-def _folder():
+def _folder() -> tempfile.TemporaryDirectory[str]:
     """Return the folder of the tables of hard targets; it ends with the process."""
     return tempfile.TemporaryDirectory(prefix='pedestal-targets-')
 
 
-def loaded(case):
-    """Return the scenario.Scenario of a Case of CASES; for a target of hard_targets its table is written first."""
+def loaded(case: Case) -> Scenario:
+    """Return the scenario of one of CASES; for a target of HARD_TARGETS its table is written first."""
     name = _ashore(case.name.partition('/')[0]).replace('-', '_')
     if name not in HARD_TARGETS:
         return case.loaded()
     path = pathlib.Path(_folder().name) / f'{name}.csv'
     if not path.exists():
-        hard_targets.write(path, name, HARD_TARGET_DURATION_S)
+        write(path, name, HARD_TARGET_DURATION_S)
     return dataclasses.replace(case, duration=HARD_TARGET_DURATION_S, parameters={
         **case.parameters, 'tracking_receiver.target.track_file.path': path}).loaded()
 
 
-def pointing(case):
-    """Return the rms of the true pointing error [deg] of one run of a Case, both axes; NaN if it left autotrack."""
+def pointing(case: Case) -> Degrees:
+    """Return the rms of the true pointing error of one run of a case, both axes; NaN if it left autotrack."""
     tracked = tracking.read(memory_recording.record(loaded(case)))
     begun = np.flatnonzero(tracked.mode == 'autotrack')
     if not begun.size or np.any(tracked.mode[begun[0]:] != 'autotrack'):
@@ -131,14 +214,14 @@ def pointing(case):
     return tracked.pointing(tracking.known_rms)
 
 
-def batch(item):
+def batch(item: Item) -> Floats:
     """Return the pointing (count,) [deg] of an item (case, first run, number of runs)."""
     name, first, count = item
     return np.array([pointing(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)])
 
 
-def rows(values):
-    """Return the rows of the study; values: {case: pointing error (runs,) [deg]}."""
+def rows(values: Mapping[str, Floats]) -> list[Row]:
+    """Return the rows of the study; values: {case: pointing error [deg]}."""
     table = []
     for name, of_runs in values.items():
         target, _, filter_name = name.partition('/')
@@ -149,14 +232,14 @@ def rows(values):
     return table
 
 
-def run(progress, runs=DEFAULT_RUNS, pool=None) -> Result:
-    """Run every case `runs` times; pool: monte_carlo.Pool, None for this process."""
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
+    """Run every case `runs` times."""
     values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
     return Result(rows(values), {'pointing': lambda: figure(values)},
                   [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}.'])
 
 
-def figure(values):
+def figure(values: Mapping[str, Floats]) -> Figure:
     """Draw the pointing error of every seed, divided by the mean of the tuned filter; values as of `rows`."""
     drawn, axes = new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
     for name, of_runs in values.items():

@@ -17,7 +17,7 @@ import threading
 import types
 import typing
 import warnings
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator
 from typing import TypeAlias, TypeVar
 
 import joblib
@@ -100,7 +100,7 @@ class Pool:
             progress(done / len(items), f'{done} of {len(items)} batches')
             yield result
 
-    def of_cases(self, function: Callable[[tuple[_Case, int, int]], ArrayLike], cases: Sequence[_Case], runs: int,
+    def of_cases(self, function: Callable[[tuple[_Case, int, int]], ArrayLike], cases: Collection[_Case], runs: int,
                  size: int, progress: Progress = lambda share, text: None) -> dict[_Case, Floats]:
         """Return {case: array (runs, ...) of the values of its runs}, for several cases of a study.
 

@@ -52,7 +52,7 @@ def main(options: argparse.Namespace) -> int:
               f'{", ".join(pedestal_studies.STUDY_NAMES)}', file=sys.stderr)
         return console.EXIT_WRONG_COMMAND
     from pedestal_results import intervals
-    from pedestal_studies.rigs import drawing
+    from pedestal_studies import drawing
     kinds = ['png', options.vector] if options.vector else ['png']
     output = options.output or pathlib.Path('studies', options.name)
     console.check_json(options.json)

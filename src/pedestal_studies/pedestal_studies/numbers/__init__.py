@@ -1,1 +1,0 @@
-"""The numbers that the documentation prints, and the source of each number."""

@@ -1,0 +1,411 @@
+"""The numbers of the documentation: rows of the studies, kept in docs/rows.json, and the tables made from these rows.
+
+`python -m tools.numbers.published [STUDY ...]` (`make numbers`) runs all published studies, or the named studies only.
+The program writes the rows that the tables use. `make docs` writes the tables from these rows.
+
+A row is a measured number with study, case, metric, value, unit, interval and target. A table is (heads of the
+columns, lines of cells).
+"""
+import inspect
+import json
+import math
+import pathlib
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
+
+from tools.numbers import claims
+
+import pedestal_studies
+from pedestal import console
+from pedestal_common.quantities import Row
+from pedestal_results import row_text
+from pedestal_results.intervals import missed
+from pedestal_studies.p000_ma import filter_families
+from pedestal_studies.p001_zhou_yang_qin import alignment, alignment_speed
+from pedestal_studies.p002_jia import phased_array
+from pedestal_studies.p003_lin_wu_zhu import feedforward_speed, imm_feedforward, manoeuvre, pareto
+from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import REVERSAL_S_BY_AXIS
+from pedestal_studies.p004_li_chen_wang import rate_measurement, telemetry_flight
+from pedestal_studies.profiles import PROFILES
+from pedestal_studies.system import acquisition, budget, filters
+from pedestal_workbench.trials import monte_carlo
+
+Key: TypeAlias = tuple[str, str, str]   # of a row: study, case, metric
+Content: TypeAlias = tuple[Sequence[str], Sequence[Sequence[str]]]  # of a table: heads of the columns, lines of cells
+Maker: TypeAlias = Callable[['Rows'], Content]   # of a table
+
+ROWS_FILE = 'docs/rows.json'  # file of the rows in a checkout
+
+SCENARIO_RESULTS = (
+    ('`leo_pass`: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
+    ('`leo_pass`: largest pointing error', 'leo_pass', 'pointing_max_deg'),
+    ('`leo_pass`: rms pointing error divided by the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
+    ('`ship_pass`, sea state 5, INS one step late: pointing error, rms', 'ship_pass', 'pointing_rms_deg'),
+    ('`ship_pass`: rms pointing error divided by that of `leo_pass`', 'ship_pass', 'pointing_to_leo_pass'),
+    ('`ship_pass`, INS 20 ms late (`ins.latency=0.02`): rms pointing error divided by that of `leo_pass`',
+     'ship_pass-late', 'pointing_to_leo_pass'),
+    ("`ship_pass`: isolation from the ship's rotation", 'ship_pass', 'isolation_db'),
+    ('`ship_pass`: isolation that a perfect antenna would show with this noise', 'ship_pass', 'isolation_limit_db'),
+    ('`ship_pass` without noise: isolation', 'ship_pass-quiet', 'isolation_db'),
+    ('`ship_pass_ss6`: rms pointing error divided by that of `leo_pass`', 'ship_pass_ss6', 'pointing_to_leo_pass'),
+    ('`ship_pass_ss6`: isolation', 'ship_pass_ss6', 'isolation_db'),
+    ('`ship_overhead`: time outside half a beamwidth', 'ship_overhead', 'loss_s'),
+    ('`ship_overhead`: time outside half a beamwidth, divided by the time announced before the slew', 'ship_overhead',
+     'loss_to_predicted'),
+    ('`ship_align_and_track`: time from a start heading wrong by 180 deg until the INS states a 1 sigma of 0.2 deg',
+     'ship_align_and_track', 'aligned_s'),
+    ('`ship_align_and_track`: heading error after the alignment, rms', 'ship_align_and_track',
+     'heading_error_rms_deg'),
+    ('`ship_align_and_track`: time from the alignment to autotrack', 'ship_align_and_track',
+     'autotrack_after_alignment_s'),
+    ('`uav_flyby`, 500 m: noise of a sample divided by noise of the estimate, cross-elevation', 'uav_flyby',
+     'noise_reduction_cross_elevation'),
+    ('`uav_flyby`, 500 m: the same ratio, elevation', 'uav_flyby', 'noise_reduction_elevation'),
+    ('`uav_flyby` at 60 m (`pedestal study scenarios` prints its command): the same ratio, cross-elevation',
+     'uav_flyby-60m', 'noise_reduction_cross_elevation'),
+    ('`uav_flyby` at 60 m: the same ratio, elevation', 'uav_flyby-60m', 'noise_reduction_elevation'))
+"""(text, case, metric) of the results of the study scenarios in docs/measured.md."""
+HEADLINE_RESULTS = (
+    ('a satellite pass ashore: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
+    ('the same pass: rms pointing error divided by the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
+    ('a UAV at 500 m: noise of a sample divided by noise of the estimate, elevation', 'uav_flyby',
+     'noise_reduction_elevation'),
+    ('a satellite pass from a ship in sea state 5: rms pointing error divided by that ashore', 'ship_pass',
+     'pointing_to_leo_pass'),
+    ("a satellite pass from a ship in sea state 6: isolation from the ship's rotation", 'ship_pass_ss6',
+     'isolation_db'))
+"""(text, case, metric) of the results of the study scenarios in README.md."""
+
+
+class Rows(dict[Key, Row]):
+    """The published rows. `used` holds the rows that were read, which are the rows of the tables."""
+
+    def __init__(self, rows: Mapping[Key, Row]) -> None:
+        super().__init__(rows)
+        self.used: dict[Key, Row] = {}
+
+    def __getitem__(self, key: Key) -> Row:
+        self.used[key] = super().__getitem__(key)
+        return self.used[key]
+
+
+def rows_by_key(rows_of: Mapping[str, list[Row]]) -> Rows:
+    """Return the rows of {study: its rows}."""
+    return Rows({(study, row['case'], row['metric']): row for study, rows in rows_of.items() for row in rows})
+
+
+def read(root: str | pathlib.Path = '.') -> Rows:
+    """Return the rows in ROWS_FILE of a checkout."""
+    return rows_by_key(json.loads(pathlib.Path(root, ROWS_FILE).read_text()))
+
+
+def write(rows: Rows, root: str | pathlib.Path = '.') -> None:
+    """Write the rows that the tables use into ROWS_FILE."""
+    # The tables are made only to note the rows that they read in rows.used.
+    for table in TABLES.values():
+        table(rows)
+    lines: dict[str, list[str]] = {}
+    for (study, *_), row in sorted(rows.used.items()):
+        lines.setdefault(study, []).append('  ' + json.dumps(row))
+    content = ',\n'.join(f' "{study}": [\n' + ',\n'.join(of) + ']' for study, of in lines.items())
+    pathlib.Path(root, ROWS_FILE).write_text('{\n' + content + '\n}\n')
+
+
+def _cells(row: Row) -> tuple[str, str, str]:
+    """Return the texts of a row: value with unit, interval, number of runs."""
+    value = f'{row_text.number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
+    return value, row_text.interval(row), str(row.get('runs', ''))
+
+
+def _target_text(row: Row) -> str:
+    """Return the target of a row with its unit, marked MISSED if the row misses it."""
+    if row['target'] is None:
+        return ''
+    return ' '.join(filter(None, (row['target'], row['unit'].removeprefix('-'), 'MISSED' if missed(row) else '')))
+
+
+def _spread(row: Row) -> str:
+    """Return the mean of a row and half its interval to two digits, 'a +- b'.
+
+    Return the mean alone if all runs give the same value.
+    """
+    half = 0.5 * (row['ci_high'] - row['ci_low']) if 'runs' in row else 0.0
+    if half <= 1e-9 * abs(row['value']):
+        return row_text.number(row['value'])
+    decimals = max(0, 1 - math.floor(math.log10(half)))
+    return f'{row["value"]:.{decimals}f} +- {half:.{decimals}f}'
+
+
+def results_table(results: Sequence[tuple[str, str, str]]) -> Maker:
+    """Return the function that makes the table of results, which are given as SCENARIO_RESULTS is."""
+    def table(rows: Rows) -> Content:
+        of_results = [rows['scenarios', case, metric] for _, case, metric in results]
+        return ('result', 'mean', '95 % interval', 'seeds', 'target'), [
+            (text, *_cells(row), _target_text(row)) for (text, *_), row in zip(results, of_results)]
+    return table
+
+
+def claim_table(paper: str) -> Maker:
+    """Return the function that makes the table of the claims of a paper; paper: its number, such as '000'."""
+    def table(rows: Rows) -> Content:
+        lines = []
+        for claim in claims.CLAIMS_BY_PAPER[paper]:
+            place, target, cells = '', '', ('', '', '')
+            if claim.study:
+                row = rows[claim.study, claim.case, claim.metric]
+                place, target, cells = f'{claim.study}: {claim.case}', _target_text(row), _cells(row)
+            lines.append((claim.claim, claim.reading, *cells, target, claim.verdict, place))
+        return ('claim', 'reading', 'ours', '95 % interval', 'runs', 'target', 'verdict', 'study: case'), lines
+    return table
+
+
+COLOURED_NOISE = filters.SHOWN_NOISE.replace('white', 'coloured')
+"""Name of the coloured noise with the rms of SHOWN_NOISE."""
+FILTER_METRICS = ('angle_rms_deg', 'reduction', 'rate_rms_deg_s', 'nis_mean', 'rate_over_sigma')
+"""Metrics of the study filters in its table."""
+
+
+def filter_numbers(rows: Rows) -> Content:
+    """Return the table of angle rms, reduction, rate rms and consistency of every filter on every motion."""
+    lines = []
+    for name in filters.SHOWN_FILTERS:
+        cases = {profile: f'{profile}/{name}/{filters.SHOWN_NOISE}' for profile in PROFILES}
+        lines += [(name, profile, *(_spread(rows['filters', case, metric]) for metric in FILTER_METRICS),
+                   _spread(rows['filters', f'{profile}/{name}/{COLOURED_NOISE}', 'reduction']))
+                  for profile, case in cases.items() if ('filters', case, 'reduction') in rows]
+    return ('filter', 'motion', 'angle rms deg', 'reduction', 'rate rms deg/s', 'mean NIS',
+            'rate error divided by own sigma', 'reduction, noise within 5 Hz'), lines
+
+
+def manoeuvre_numbers(rows: Rows) -> Content:
+    """Return the table of the errors of rate and acceleration inside every reversal."""
+    lines = [(name, f'{reversal:g} s', *(_spread(rows['manoeuvre', f'reversal-{reversal:g}s/{name}', metric])
+                                         for metric in ('rate_rms_deg_s', 'acceleration_rms_deg_s2')))
+             for name in manoeuvre.FILTERS for reversal in manoeuvre.REVERSAL_DURATIONS_S]
+    return ('filter', 'reversal', 'rate deg/s', 'acceleration deg/s2'), lines
+
+
+def feedforward_numbers(rows: Rows) -> Content:
+    """Return the table of paper 003's feed-forward: miss and rate noise for each source of rate and acceleration.
+
+    The miss is the pointing error, a term of the paper.
+    """
+    lines = []
+    for axis in REVERSAL_S_BY_AXIS:
+        for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state', 'kalman-ca-40-predicted'):
+            case = f'{axis}/{name}'
+            ratio = _spread(rows['imm-feedforward', case, 'miss_ratio_at_equal_rate_noise']) if (
+                case in imm_feedforward.MISS_RATIO_TARGETS) else ''
+            lines.append((case, *(_spread(rows['imm-feedforward', case, metric]) for metric in (
+                'miss_rms_deg', 'rate_noise_deg_s')), ratio))
+        lines += [(case, _spread(rows['imm-feedforward', case, 'miss_rms_deg']), '', '')
+                  for case in imm_feedforward.DRIVE_CASES if case.startswith(axis)]
+    return ('case', 'meaning', 'miss rms deg', 'rate noise deg/s',
+            'miss of a conventional filter of equal rate noise, divided by this miss'), [
+        (case, imm_feedforward.SOURCE_MEANINGS[case.partition('/')[2]], *numbers) for case, *numbers in lines]
+
+
+def family_numbers(rows: Rows) -> Content:
+    """Return the table of the filters that paper 000 compares: geometric means of the errors over all motions."""
+    lines = []
+    for name, meaning in filter_families.FILTER_MEANINGS.items():
+        cells = [_spread(rows['filter-families', case, metric]) if ('filter-families', case, metric) in rows else ''
+                 for case in (f'{filter_families.MEAN_MOTION}/{name}/{tuning}' for tuning in filter_families.TUNINGS)
+                 for metric in ('angle_rms_deg', 'rate_rms_deg_s')]
+        lines.append((name, meaning, *cells))
+    return ('filter', 'meaning', *(f'{what}, {how}' for how in ('tuned for each motion', 'one tuning')
+                                   for what in ('angle rms deg', 'rate rms deg/s'))), lines
+
+
+def speed_numbers(rows: Rows) -> Content:
+    """Return the table of paper 003's feed-forward with differences, and with targets of 30 and 50 m/s."""
+    lines = [(case, *(_spread(rows['feedforward-speed', case, metric]) for metric in (
+        'miss_rms_deg', 'rate_noise_deg_s', 'rate_rms_deg_s', 'acceleration_rms_deg_s2')))
+             for case in feedforward_speed.CASES]
+    lines += [(case, _spread(rows['feedforward-speed', case, 'miss_rms_deg'])
+               if ('feedforward-speed', case, 'miss_rms_deg') in rows else 'leaves autotrack', '', '', '')
+              for case in feedforward_speed.DRIVE_CASES]
+    return ('case', 'miss rms deg', 'rate noise deg/s', 'rate error deg/s', 'acceleration error deg/s2'), lines
+
+
+def alignment_speed_numbers(rows: Rows) -> Content:
+    """Return the table of the ADRC alignment with all its times divided by a factor."""
+    lines = [(f'{speed:g}', f'{alignment_speed.faster(speed).adrc.observer:g}',
+              *(_spread(rows['alignment-speed', f'adrc/{speed:g}', metric]) for metric in alignment_speed.METRICS))
+             for speed in alignment_speed.SPEEDS]
+    return ('times divided by', 'bandwidth of the observer, rad/s', 'level below 30 arcmin after, s',
+            'azimuth below 12 arcmin after, s', 'azimuth at 100 s, arcmin', 'azimuth at 250 s, arcmin',
+            'level, arcmin', 'azimuth at 600 s, arcmin'), lines
+
+
+def matrix_table(rows: Rows) -> Content:
+    """Return the table of the matrices of paper 004's proof of stability, in seconds, with rank and condition."""
+    lines = [(name, '; '.join(' '.join(f'{value:.4g}' for value in line) for line in matrix),
+              *(row_text.number(rows['telemetry-flight', name, metric]['value'])
+                for metric in ('rank', 'condition', 'condition_in_seconds')))
+             for name, (matrix, _) in telemetry_flight.matrices().items()]
+    return ('matrix', 'rows of the matrix, in seconds', 'rank', 'condition, time in T',
+            'condition, time in seconds'), lines
+
+
+def pareto_numbers(rows: Rows) -> Content:
+    """Return the table of the least miss of each filter over its tunings, and the miss at the IMM's rate noise."""
+    lines = [(name, pareto.FILTER_MEANINGS[name], *(_spread(rows['pareto', name, metric]) for metric in (
+        'least_miss_deg', 'rate_noise_at_least_miss_deg_s')),
+        _spread(rows['pareto', name, 'miss_ratio_at_equal_rate_noise'])
+        if ('pareto', name, 'miss_ratio_at_equal_rate_noise') in rows else '') for name in pareto.FILTER_TUNINGS]
+    return ('filter', 'meaning', 'least miss of any tuning, deg', 'rate noise at the least miss, deg/s',
+            'miss at the rate noise of imm-predicted, divided by the miss of imm-predicted'), lines
+
+
+def flyby_numbers(rows: Rows) -> Content:
+    """Return the table of the errors on the 60 m flyby with a measured rate and with a differenced rate."""
+    lines = [(name, rate_measurement.RATE_SOURCE_MEANINGS[name],
+              *(_spread(rows['rate-measurement', f'{rate_measurement.FLYBY_PROFILE}/{name}', metric])
+                      for metric in ('angle_rms_deg', 'rate_rms_deg_s'))) for name in rate_measurement.FLYBY_CASES]
+    return ('case', 'source of the rate', 'angle rms deg', 'rate rms deg/s'), lines
+
+
+def alignment_numbers(rows: Rows) -> Content:
+    """Return the table of the methods of alignment beside the information limit."""
+    metrics = ('time_to_12arcmin_rms_s', *(f'azimuth_rms_arcmin_{t}s' for t in (100, 250, 300, 600)),
+               'level_rms_arcmin')
+    swell = [f'azimuth_{metric}_{alignment.SWELL_EVALUATION_TIME_S}s' for metric in ('rms_arcmin', 'error_over_sigma')]
+    lines = [(name, alignment.CASE_MEANINGS[name], *(_spread(rows['alignment', name, metric]) for metric in metrics),
+              *(_spread(rows['alignment', f'{name}/swell', metric]) for metric in swell))
+             for name in alignment.CASE_METHODS]
+    return ('method', 'meaning', 'time to 12 arcmin, s', *(f'azimuth at {t} s, arcmin' for t in (100, 250, 300, 600)),
+            'level, arcmin', 'azimuth on swell at 200 s, arcmin', 'that error divided by own sigma'), [
+        *lines, ('limit', alignment.CASE_MEANINGS['limit'],
+                 *(_spread(rows['alignment', 'limit', metric]) for metric in metrics), '', '')]
+
+
+def acquisition_numbers(rows: Rows) -> Content:
+    """Return the table of the time that acquisition takes, and of the share of runs in which it succeeds."""
+    lines = []
+    for case in acquisition.CASE_NAMES:
+        if case == 'steptrack_geo':
+            continue
+        time, found, least = (rows['acquisition', case, metric] for metric in (
+            'tracked_after_s', 'found_percent', 'found_percent_low'))
+        lines.append((f'`{case}`: time until tracked', *_cells(time), f'{found["value"]:.0f} %',
+                      f'{least["value"]:.1f} %', f'found {_target_text(found)}'))
+    loss, off = (rows['acquisition', 'steptrack_geo', metric] for metric in (
+        'level_loss_rms_db', 'pointing_max_beamwidths'))
+    return ('case', 'result', '95 % interval', 'runs', 'found', 'found, lower limit', 'target'), [
+        *lines, ('`steptrack_geo`: level lost after 90 s, rms', *_cells(loss), '', '', _target_text(loss)),
+        ('`steptrack_geo`: largest error after 90 s', *_cells(off), '', '', '')]
+
+
+CALIBRATION_RESULTS = (
+    ('program track of the test pass without a model, rms', 'program track', 'raw_rms_deg'),
+    ('program track of the test pass with the model, rms', 'program track', 'calibrated_rms_deg'),
+    ('residuals of the fit, rms', 'program track', 'residual_rms_deg'),
+    ('leave-one-out rms', 'program track', 'leave_one_out_rms_deg'),
+    ('leave-one-out rms of the default terms alone', 'program track', 'leave_one_out_default_rms_deg'),
+    ('share of the terms within three of their sigmas', 'terms', 'within_3_sigma'),
+    ('number of terms, over all runs', 'terms', 'cases'))
+"""(text, case, metric) of the results of the study calibration in docs/measured.md."""
+
+
+def calibration_numbers(rows: Rows) -> Content:
+    """Return the table of the calibration of a new station."""
+    of_results = [rows['calibration', case, metric] for _, case, metric in CALIBRATION_RESULTS]
+    return ('result', 'mean', '95 % interval', 'runs', 'target'), [
+        (text, *_cells(row), _target_text(row)) for (text, *_), row in zip(CALIBRATION_RESULTS, of_results)]
+
+
+ARRAY_LOOPS = ('paper', 'paper-delta', 'type-2', 'type-2-delta', 'tracked-10ms', 'best')
+"""Loops of the study phased-array in the table of its loops."""
+
+
+def array_numbers(rows: Rows) -> Content:
+    """Return the table of the loops of paper 002's plant: true errors without noise, and jitter due to noise."""
+    lines = []
+    for case in (*(f'{loop}/{target}' for loop in ARRAY_LOOPS for target in ('ramp', 'sine', 'sway')
+                   if target == 'sway' or not loop.endswith('-delta')),
+                 *phased_array.INS_LOOPS, *phased_array.GRAPH_CASES):
+        isolation = _spread(rows['phased-array', case, 'isolation_db']) if (
+            'phased-array', case, 'isolation_db') in rows else ''
+        lines.append((case, _spread(rows['phased-array', case, 'max_error_deg']), isolation,
+                      _spread(rows['phased-array', case, 'jitter_rms_deg'])))
+    return ('loop', 'largest error without noise, deg', 'isolation dB', 'jitter rms deg'), lines
+
+
+MDEG_PER_DEG = 1e3
+
+
+def _milli(row: Row) -> str:
+    """Return a row in degrees as text in millidegrees, mean and half its interval."""
+    return _spread({key: value * MDEG_PER_DEG if key in ('value', 'ci_low', 'ci_high') else value
+                    for key, value in row.items()})
+
+
+def budget_table(mode: str) -> Maker:
+    """Return the function that makes the table of the error budget of a mode: each term alone, then the sums."""
+    sums = {'systematic': ('', 'sum of the systematic terms, added as signed vectors'),
+            'whole': ('', 'runs with every term on')}
+
+    def table(rows: Rows) -> Content:
+        kinds = {**{name: ('systematic', doc) for name, doc in budget.documented(mode, random=False).items()},
+                 **{name: ('random', doc) for name, doc in budget.documented(mode, random=True).items()}, **sums}
+        lines = [(name, kind, doc, *(_milli(rows['budget', f'{mode}/{name}', metric]) for metric in (
+            'cross_elevation_rms_deg', 'elevation_rms_deg', 'rms_deg'))) for name, (kind, doc) in kinds.items()]
+        whole = lines.pop()         # The row of `whole` follows the row of `combined`, with which it is compared.
+        ratio = rows['budget', f'{mode}/combined', 'to_whole']
+        combined = ('combined', '', f'all terms; combined over whole: {_spread(ratio)}, target {_target_text(ratio)}',
+                    '', '', _milli(rows['budget', f'{mode}/combined', 'rms_deg']))
+        return ('term', 'kind', 'source', 'cross-elevation, mdeg rms', 'elevation, mdeg rms', 'both axes, mdeg rms'), [
+            *lines, combined, whole]
+    return table
+
+
+def direction_table(mode: str) -> Maker:
+    """Return the function that makes the table of the signed systematic errors of a mode along the pass."""
+    def table(rows: Rows) -> Content:
+        cases = [f'{mode}/{time}s' for time in budget.TABLE_TIMES_S]
+        head = [f'az {rows["budget", case, "azimuth_deg"]["value"]:.0f}, '
+                f'el {rows["budget", case, "elevation_deg"]["value"]:.0f} deg' for case in cases]
+        names = [*budget.documented(mode, random=False), 'systematic']
+        return ('term', *head), [
+            (name, *(', '.join(f'{MDEG_PER_DEG * rows["budget", case, f"{name}_{axis}_deg"]["value"]:+.2f}'
+                               for axis in budget.ERROR_COLUMNS) for case in cases)) for name in names]
+    return table
+
+
+TABLES = {'results over seeds': results_table(SCENARIO_RESULTS), 'headline results': results_table(HEADLINE_RESULTS),
+          **{f'budget of {mode}': budget_table(mode) for mode in budget.MODE_OVERRIDES},
+          **{f'directions of {mode}': direction_table(mode) for mode in budget.MODE_OVERRIDES},
+          **{f'claims of paper {paper}': claim_table(paper) for paper in claims.CLAIMS_BY_PAPER},
+          'filters compared': filter_numbers, 'manoeuvre': manoeuvre_numbers, 'feed forward': feedforward_numbers,
+          'pareto': pareto_numbers, 'flyby with a rate': flyby_numbers, 'alignment': alignment_numbers,
+          'filters of paper 000': family_numbers, 'feed forward by speed': speed_numbers,
+          'speed of alignment': alignment_speed_numbers, 'acquisition': acquisition_numbers,
+          'array loops': array_numbers, 'calibration': calibration_numbers, 'matrices': matrix_table}
+"""{name of a table: function that makes it}."""
+
+PUBLISHED_STUDIES = tuple(dict.fromkeys((
+    *(claim.study for of_paper in claims.CLAIMS_BY_PAPER.values() for claim in of_paper if claim.study),
+    'filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration')))
+"""Names of the studies whose rows are in the tables."""
+
+
+def main(names: Sequence[str] = (), root: str | pathlib.Path = '.') -> int:
+    """Run PUBLISHED_STUDIES with their default number of runs and write ROWS_FILE. Return exit code 0.
+
+    names: studies to run, () for all; the rows of the other studies stay. root: folder of the checkout.
+    """
+    rows_of = json.loads(pathlib.Path(root, ROWS_FILE).read_text()) if names else {}
+    with monte_carlo.Pool() as pool, console.progress_of_share() as progress:
+        for name in names or PUBLISHED_STUDIES:
+            study = pedestal_studies.study(name)
+            many = {'pool': pool} if 'pool' in inspect.signature(study.run).parameters else {}
+            print(name, flush=True)
+            rows_of[name] = study.run(progress, **many).rows
+    write(rows_by_key(rows_of), root)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1:]))
