@@ -299,7 +299,7 @@ def misaligned(attitude: Quaternion, angles: Vector3) -> Quaternion:
     n: the ENU frame; n': the misaligned frame that the INS takes for ENU. angles: a_x, a_y, a_z [rad].
     """
     for axis in (2, 0, 1):      # z, x, y: the order of the factors from right to left
-        attitude = product(quaternion(axis, -angles[axis]), attitude)
+        attitude = np.array(product(quaternion(axis, -angles[axis]), attitude))
     return attitude
 
 
