@@ -61,9 +61,9 @@ def yaw_rate(truth: AnyRecord) -> RadiansPerSecond:
 
 
 def sentences(kind: str, truth: AnyRecord, stamp: Nanoseconds) -> bytes:
-    """Return the bytes of one sample: the sentence of a kind of pedestal_hardware.ins.sentences.KINDS, behind HDT and ROT.
+    """Return the bytes of one sample: a sentence behind HDT and ROT.
 
-    truth: a motion.Truth; stamp: UTC.
+    kind: of pedestal_hardware.ins.sentences.KINDS; truth: a motion.Truth; stamp: UTC.
     """
     roll, pitch, yaw = float(truth['roll']), float(truth['pitch']), float(truth['yaw'])
     turn = nmea.turn(yaw_rate(truth))

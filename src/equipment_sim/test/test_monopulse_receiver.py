@@ -13,7 +13,7 @@ from pedestal_common.wire import commands, records
 from pedestal_hardware.monopulse import blocks, feed
 from pedestal_hardware.monopulse.params import MonopulseParameters
 from pedestal_hardware.monopulse.unit import ANGLE_ERROR_TOPIC, MonopulseReceiver
-from tracking_receiver_sim.monopulse import sum_pattern, thermal_noise
+from receiver_law.monopulse import sum_pattern, thermal_noise
 
 PERIOD = 0.005
 BEAMWIDTH = 0.0175

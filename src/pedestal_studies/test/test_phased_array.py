@@ -19,7 +19,7 @@ from pedestal_studies.rigs.angle_loop import (
     Receiver,
     receiver_reading,
 )
-from tracking_receiver_sim import monopulse
+from receiver_law import monopulse
 
 
 @pytest.fixture(scope='module', name='result')

@@ -190,7 +190,7 @@ def test_the_command_line_finds_phases_and_coupling(recorded, capfd, tmp_path):
     output, page = tmp_path / 'matrix.yaml', tmp_path / 'page.html'
     code, content, _ = calibrated(capfd, recorded, '--output', str(output), '--report', str(page))
     rows = {row['metric']: row for row in content['rows']}
-    # D / S has 5 % more slope at 0.33 beamwidths than on the axis (tracking_receiver_sim.monopulse).
+    # D / S has 5 % more slope at 0.33 beamwidths than on the axis (receiver_law.monopulse).
     M = np.linalg.inv(1.02 * phased(*COUPLING_RAD[1:]) @ turned(COUPLING_RAD[0]))
     for i, names in enumerate(iq_phasing.ELEMENT_NAMES):
         for j, name in enumerate(names):

@@ -19,7 +19,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Radians, Seconds
 from pedestal_hardware.monopulse.params import FEED_KINDS, ONE_CHANNEL, THREE_CHANNELS, MonopulseParameters
-from tracking_receiver_sim.monopulse import sum_pattern
+from receiver_law.monopulse import sum_pattern
 
 THREE_CHANNELS_KIND, ONE_CHANNEL_KIND = FEED_KINDS.index(THREE_CHANNELS), FEED_KINDS.index(ONE_CHANNEL)
 

@@ -35,7 +35,7 @@ from pedestal_studies.rigs.metrics import crossings, overshoot_percent, peak
 from pedestal_studies.rigs.rows import Result
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
-from tracking_receiver_sim import receiver
+from receiver_law import detector
 from tracking_receiver_sim.params import ReceiverParameters
 
 DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case with noise; seed of the first run
@@ -433,7 +433,7 @@ def graph_case(case, quiet=False):
         return noisy
     # The control unit still assumes the noise of the noisy case, so that its filter has the same gains.
     tracking = noisy.loaded().node_parameters('tracking_receiver')
-    sigma = receiver.angle_noise(tracking, tracking.receiver.cn0_dbhz, tracking.period)
+    sigma = detector.angle_noise(tracking.antenna, tracking.receiver, tracking.receiver.cn0_dbhz, tracking.period)
     return dataclasses.replace(noisy, parameters={**GRAPH_CASES[case], **NOISELESS_PARAMETERS,
                                                   'acu.tracker.receiver.sigma_floor': sigma})
 

@@ -28,7 +28,7 @@ from acu_tracker.geometry import attitude as attitudes
 from acu_tracker.servo import beam_loop
 from adu_drive.array import electronic_beam
 from pedestal_common.compiled import compiled
-from tracking_receiver_sim import monopulse, smoothing
+from receiver_law import monopulse, smoothing
 from tracking_receiver_sim.params import AntennaParameters, ReceiverParameters
 
 GRID_STEP_S = 1e-3  # step of the grid [s]

@@ -31,7 +31,7 @@ from pedestal_common.quantities import Floats
 if typing.TYPE_CHECKING:
     import distributed
 
-PACKAGES = ('pedestal_common', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
+PACKAGES = ('pedestal_common', 'receiver_law', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
             'pedestal_hardware', 'equipment_sim', 'pedestal_bringup', 'pedestal_results', 'pedestal_workbench',
             'pedestal_studies')
 """Packages with laws, or with code that calls laws in trials and studies."""
