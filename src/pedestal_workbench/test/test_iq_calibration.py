@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pedestal import cli
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_common import parameters
 from pedestal_hardware.monopulse import blocks, sigmf
 from pedestal_hardware.monopulse.params import CHANNELS, MonopulseParameters
@@ -210,7 +210,7 @@ def test_the_command_line_finds_phases_and_coupling(recorded, capfd, tmp_path):
     second = {row['metric']: row['value'] for row in content['rows']}
     assert code == 0 and content['faults'] == [] and second['circle_error_before_percent'] < 5.0
     assert second['skew_before_percent'] < 5.0 and second['cross_talk_before_db'] < -20.0
-    chosen = scenario.load('leo_pass', ['scenario.receiver=simulated-iq', *scenario.file_overrides(output)],
+    chosen = scenario.load('leo_pass', ['scenario.receiver=simulated-iq', *files.file_overrides(output)],
                            pacing='realtime')
     in_force = np.array(chosen.node_parameters('tracking_receiver').calibration.matrix)
     np.testing.assert_allclose(in_force, M, atol=0.02)

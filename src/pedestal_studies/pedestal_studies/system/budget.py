@@ -18,7 +18,7 @@ import typing
 import numpy as np
 
 from pedestal_bringup.loop import closed_loop
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import scenario, sections
 from pedestal_common.graph import topics
 from pedestal_common.parameters import defaults
 from pedestal_results import tracking
@@ -117,7 +117,7 @@ def switched_off(term):
     texts = []
     for key in parameters_of(term):
         node, _, name = key.partition('.')
-        texts.append(f'{key}={str(defaults(scenario.parameters_of(node))[name]).lower()}')
+        texts.append(f'{key}={str(defaults(sections.parameters_of(node))[name]).lower()}')
     return texts
 
 
