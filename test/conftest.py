@@ -246,9 +246,9 @@ def recorded(reserve_domain, tmp_path_factory):
 MODULES = {'ship_motion': 'ship_motion_sim.ship_motion_node', 'ins': 'ship_motion_sim.ins_node',
            'tracking_receiver': 'tracking_receiver_sim.tracking_receiver_node', 'acu': 'acu_tracker.acu_node',
            'adu': 'adu_drive.adu_node', 'beam_steering': 'adu_drive.beam_steering_node',
-           'drive': 'pedestal_hardware.drive_node', 'drives': 'pedestal_hardware.simulated.drives_node',
+           'drive': 'pedestal_hardware.drive_node', 'drives': 'equipment_sim.drives.drives_node',
            'monopulse': 'pedestal_hardware.monopulse.monopulse_receiver_node',
-           'iq': 'pedestal_hardware.monopulse.iq_node', 'ins_input': 'pedestal_hardware.ins.ins_input_node',
+           'iq': 'equipment_sim.iq.iq_node', 'ins_input': 'pedestal_hardware.ins.ins_input_node',
            'level_receiver': 'pedestal_hardware.level.level_receiver_node',
            'recorder': 'pedestal_recording.recorder_node', 'page': 'pedestal_operator.page_node'}
 

@@ -8,7 +8,7 @@ import yaml
 from tools import book
 
 from pedestal import cli
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.sections import parameters_of
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
 
@@ -28,7 +28,7 @@ def test_every_parameter_verb_and_law_is_there(pages):
     listed = (pages / 'reference' / 'parameters.md').read_text()
     for node in ('acu', 'adu', 'tracking_receiver', 'ship_motion', 'ins', 'beam_steering', 'scenario'):
         section = listed.partition(f'\n## {node}\n')[2].partition('\n## ')[0]
-        assert all(f'| `{name}` |' in section for name in parameters.defaults(scenario.parameters_of(node)))
+        assert all(f'| `{name}` |' in section for name in parameters.defaults(parameters_of(node)))
     verbs = (pages / 'reference' / 'verbs.md').read_text()
     assert all(f'\n## {name}\n' in verbs and f'usage: pedestal {name}' in verbs for name in cli.VERBS)
     laws = (pages / 'reference' / 'laws.md').read_text()

@@ -15,8 +15,9 @@ EXECUTABLES = {
     'acu_tracker': ['acu_node'],
     'adu_drive': ['adu_node', 'beam_steering_node'],
     'pedestal_recording': ['recorder_node'],
-    'pedestal_hardware': ['drive_node', 'ins_input_node', 'iq_node', 'level_receiver_node', 'monopulse_receiver_node',
-                          'rotator_node', 'simulated_drives_node'],
+    'pedestal_hardware': ['drive_node', 'ins_input_node', 'level_receiver_node', 'monopulse_receiver_node',
+                          'rotator_node'],
+    'equipment_sim': ['iq_node', 'simulated_drives_node'],
     'pedestal': ['pedestal'],
 }
 

@@ -19,6 +19,7 @@ from std_srvs.srv import Trigger
 from pedestal_bringup.graph import processes
 from pedestal_bringup.graph.start import START_LEAD_TIME_S
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_common.wire import messages
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify
@@ -266,7 +267,7 @@ def test_lockstep_has_no_drives():
     ('bus.interface=socketcan', 'bus.interface = socketcan: must be socketcand'),
     ('bus.host=192.168.1.9', 'bus.host = 192.168.1.9: must be 127.0.0.1')])
 def test_simulated_drives_have_a_bus_of_this_machine(change, message):
-    with pytest.raises(scenario.ScenarioError, match=f'{message} with drives = simulated'):
+    with pytest.raises(ScenarioError, match=f'{message} with drives = simulated'):
         scenario.load('leo_pass', ['scenario.drives=simulated', f'adu.{change}'], pacing='realtime')
 
 

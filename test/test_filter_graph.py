@@ -8,6 +8,7 @@ from rcl_interfaces.srv import SetParameters
 
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_common.graph import layouts, topics
 from pedestal_recording import bag as bags
 from pedestal_recording import export
@@ -136,13 +137,13 @@ def test_a_filter_changed_while_it_tracks_makes_no_bump(runs):
     ('recorder.receiver_range=true', 'recorder: receiver_range = True: must be False'),
     ('acu.ins_error=true', 'acu: ins_error = True: must be False')])
 def test_a_topic_nobody_measures_is_not_waited_for(override, text):
-    with pytest.raises(scenario.ScenarioError, match=text):
+    with pytest.raises(ScenarioError, match=text):
         scenario.load('leo_pass', [override])
 
 
 def test_a_model_of_an_ins_that_tells_its_error_is_refused():
     chosen = ['acu.tracker.attitude.tilt_noise=1e-4']
-    with pytest.raises(scenario.ScenarioError, match='acu: tracker.attitude.tilt_noise: the INS publishes its errors; '
+    with pytest.raises(ScenarioError, match='acu: tracker.attitude.tilt_noise: the INS publishes its errors; '
                                                      'this parameter needs ins.error_told = false'):
         scenario.load('ship_pass', chosen)
     assert scenario.load('ship_pass', [*chosen, 'ins.error_told=false']).node_parameters('acu').ins_error is False

@@ -14,6 +14,7 @@ pytestmark = pytest.mark.every_case
 ROOT = pathlib.Path(__file__).parents[1]
 EXECUTABLES = {
     'pedestal_common': {},
+    'receiver_law': {},
     'ship_motion_sim': {'ship_motion_node': 'ship_motion_sim.ship_motion_node:main',
                         'ins_node': 'ship_motion_sim.ins_node:main'},
     'tracking_receiver_sim': {'tracking_receiver_node': 'tracking_receiver_sim.tracking_receiver_node:main'},
@@ -28,20 +29,24 @@ EXECUTABLES = {
     'pedestal_recording': {'recorder_node': 'pedestal_recording.recorder_node:main'},
     'pedestal_results': {},
     'pedestal_hardware': {'drive_node': 'pedestal_hardware.drive_node:main',
-                          'iq_node': 'pedestal_hardware.monopulse.iq_node:main',
                           'monopulse_receiver_node': 'pedestal_hardware.monopulse.monopulse_receiver_node:main',
                           'ins_input_node': 'pedestal_hardware.ins.ins_input_node:main',
                           'level_receiver_node': 'pedestal_hardware.level.level_receiver_node:main',
-                          'rotator_node': 'pedestal_hardware.rotator_node:main',
-                          'simulated_drives_node': 'pedestal_hardware.simulated.drives_node:main'},
+                          'rotator_node': 'pedestal_hardware.rotator_node:main'},
+    'equipment_sim': {'iq_node': 'equipment_sim.iq.iq_node:main',
+                      'simulated_drives_node': 'equipment_sim.drives.drives_node:main'},
     'pedestal_bringup': {},
     'pedestal_workbench': {},
     'pedestal_studies': {},
     'pedestal': {'pedestal': 'pedestal.cli:main'},
 }
 PACKAGES = tuple(EXECUTABLES)
-COLUMNS = PACKAGES[1:5]
-STANDING_ALONE = PACKAGES[:7]
+WITHOUT_ROS = PACKAGES[1:6]     # but for the nodes
+BELOW = {'pedestal_common': (), 'receiver_law': ('pedestal_common',), 'ship_motion_sim': ('pedestal_common',),
+         'tracking_receiver_sim': ('pedestal_common', 'receiver_law'), 'acu_tracker': ('pedestal_common',),
+         'adu_drive': ('pedestal_common',), 'pedestal_operator': ('pedestal_common',),
+         'pedestal_recording': ('pedestal_common',)}
+"""{package that does not stand on all packages above it in EXECUTABLES: those on which it stands}."""
 MESSAGES = ('_msgs', '_interfaces', '_srvs')
 
 
@@ -139,7 +144,7 @@ def test_the_installed_command_finds_its_scenarios(installed, run_process):
     assert 'leo_pass' in done.stdout
 
 
-@pytest.mark.parametrize('package', COLUMNS)
+@pytest.mark.parametrize('package', WITHOUT_ROS)
 def test_only_nodes_know_ros(package):
     offenders = [f'{path.name} imports {name}' for path in modules(package) if not path.name.endswith('_node.py')
                  for name in imported(path) if name == 'rclpy' or name.endswith(MESSAGES)]
@@ -148,9 +153,9 @@ def test_only_nodes_know_ros(package):
 
 def test_laws_load_without_ros(run_process):
     names = ['.'.join(path.relative_to(ROOT / 'src' / package).with_suffix('').parts)
-             for package in COLUMNS for path in modules(package)
+             for package in WITHOUT_ROS for path in modules(package)
              if not path.name.endswith('_node.py') and path.stem != '__init__']
-    assert {name.partition('.')[0] for name in names} == set(COLUMNS)
+    assert {name.partition('.')[0] for name in names} == set(WITHOUT_ROS)
     code = f'import sys, importlib\nsys.modules["rclpy"] = None\nfor name in {names}: importlib.import_module(name)'
     done = run_process([sys.executable, '-c', code], 120.0)
     assert done.returncode == 0, done.stderr
@@ -158,11 +163,19 @@ def test_laws_load_without_ros(run_process):
 
 @pytest.mark.parametrize('package', PACKAGES)
 def test_packages_import_only_what_is_below_them(package):
-    """A column stands on pedestal_common alone; above the columns stands one package on the other."""
-    place = PACKAGES.index(package)
-    allowed = {package, *PACKAGES[:1 if package in STANDING_ALONE else place]}
+    """A column stands on the packages of BELOW; above the columns stands one package on the other."""
+    allowed = {package, *BELOW.get(package, PACKAGES[:PACKAGES.index(package)])}
     offenders = [f'{path.name} imports {name}' for path in modules(package)
                  for name in imported(path) if name in PACKAGES and name not in allowed]
+    assert offenders == []
+
+
+def test_real_equipment_runs_no_law_of_a_simulator():
+    """Of the simulated receiver and ship, pedestal_hardware knows the parameters only."""
+    offenders = [f'{path.name} imports {node.module}' for path in modules('pedestal_hardware')
+                 for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ImportFrom)
+                 and node.module.startswith(('tracking_receiver_sim', 'ship_motion_sim'))
+                 and node.module != 'tracking_receiver_sim.params']
     assert offenders == []
 
 

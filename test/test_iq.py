@@ -13,8 +13,9 @@ import pytest
 import zmq
 from shared import free_port
 
+from equipment_sim.iq import sinks
 from pedestal_common import parameters
-from pedestal_hardware.monopulse import sigmf, sinks, vita49
+from pedestal_hardware.monopulse import sigmf, vita49
 from pedestal_hardware.monopulse.params import CHANNELS, MonopulseParameters
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify

@@ -12,6 +12,7 @@ from shared import PEDESTAL
 
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.sections import parameters_of
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from pedestal_common.wire import messages
@@ -70,8 +71,8 @@ def test_the_recording_says_how_it_was_made(runs, name):
     said = bag.configuration['parameters']
     assert set(said) == set(chosen.nodes) - {'operator'}
     for node in set(said) - {'recorder'}:
-        assert parameters.build(scenario.parameters_of(node), said[node]) == chosen.node_parameters(node)
-        assert set(said[node]) == set(parameters.defaults(scenario.parameters_of(node)))
+        assert parameters.build(parameters_of(node), said[node]) == chosen.node_parameters(node)
+        assert set(said[node]) == set(parameters.defaults(parameters_of(node)))
     assert {'git', 'version.python', 'version.numpy', 'version.numba', 'version.rclpy'} <= set(bag.metadata)
     made = f'made by: scenario {case}, lockstep, seed 1, git '
     assert any(line.startswith(made) for line in verify(load(runs[name].bag)).lines())

@@ -14,7 +14,7 @@ import pytest
 import pedestal
 from pedestal import cli, samples
 from pedestal.console import EXIT_DISTURBED
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_workbench.trials import plan as trial_plans
 
 pytestmark = pytest.mark.every_case
@@ -137,7 +137,7 @@ def changes_of_code(text):
     for call, name in calls:
         for values in [ast.literal_eval(arg) for arg in call.args if isinstance(arg, ast.Dict)]:
             if name in ('load', 'changed'):
-                yield ast.unparse(call), source, [], [scenario.override(*item) for item in values.items()]
+                yield ast.unparse(call), source, [], [files.override(*item) for item in values.items()]
 
 
 def without_effect(changes):
@@ -145,7 +145,7 @@ def without_effect(changes):
     found = []
     for command, source, before, texts in changes:
         for text in texts:
-            node, key, value = scenario.parse_override(text)
+            node, key, value = files.parse_override(text)
             # The other changes of a command may need each other, for example the file of a flight and its kind.
             if trial_plans.value_in(scenario.load(source, before), f'{node}.{key}') == value:
                 found.append((command, text))

@@ -14,6 +14,7 @@ import pytest
 from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_common.graph import layouts
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
@@ -40,7 +41,7 @@ def test_a_recorded_motion_sets_its_own_heading(tmp_path):
     x, y, z, w = closed_loop.Loop(chosen).run()['ship/truth']['orientation'][-1]
     yaw = math.degrees(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
     assert (90.0 - yaw) % 360.0 == pytest.approx(200.0)
-    with pytest.raises(scenario.ScenarioError, match='heading_deg = 30 deg: must be 0 with motion = recorded'):
+    with pytest.raises(ScenarioError, match='heading_deg = 30 deg: must be 0 with motion = recorded'):
         scenario.load('ship_pass', (*recorded, 'ship_motion.ship.heading_deg=30'))
 
 

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from rcl_interfaces.srv import GetParameters
 
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_common import parameters
 from pedestal_common.graph import topics
 from pedestal_recording import bag as bags
@@ -100,7 +100,7 @@ def test_scenario_and_the_file_in_a_run(pedestal, folder, one_line):
     assert warning in output and f'# {warning}' in file.read_text()
     values = written(file)
     assert set(values) == {'azimuth.filter.kind', 'azimuth.filter.alpha_beta.alpha'}
-    chosen = scenario.load('uav_flyby', scenario.file_overrides(file))
+    chosen = scenario.load('uav_flyby', files.file_overrides(file))
     assert chosen.node_parameters('acu').azimuth.filter.alpha_beta.alpha == values['azimuth.filter.alpha_beta.alpha']
     file.write_text(file.read_text().replace('alpha_beta.alpha', 'alpha_beta.alfa'))
     code, _, errors = pedestal('run', 'uav_flyby', '--bag', folder / 'no', '--params-file', file)
@@ -126,7 +126,7 @@ def test_of_several_beams_the_file_is_for_pedestal_run(pedestal, folder):
                                     '--runs', '1', '--duration', '4', '--output', file)
     assert (code, errors) == (0, '')
     assert f'pedestal run ... --params-file {file}' in output and 'ros2 run' not in output
-    chosen = scenario.load('phased_array_four', scenario.file_overrides(file))
+    chosen = scenario.load('phased_array_four', files.file_overrides(file))
     alpha = written(file)['azimuth.filter.alpha_beta.alpha']
     assert [chosen.node_parameters(f'{prefix}acu').azimuth.filter.alpha_beta.alpha for prefix in chosen.prefixes] == [
         alpha] * 4

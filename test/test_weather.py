@@ -2,7 +2,7 @@
 are named."""
 import pytest
 
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.sections import parameters_of
 from pedestal_common.parameters import build
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
@@ -63,6 +63,6 @@ def test_the_readings_are_recorded_and_recomputed(run):
         assert (bag.table(topic)[field] == value).any(), topic
     recording = recompute.FedRecording(run.bag)
     acu = {key: value for key, value in bag.configuration['parameters']['acu'].items() if not key.startswith('graph.')}
-    done = recompute.recompute(recording, 'acu', build(scenario.parameters_of('acu'), acu))
+    done = recompute.recompute(recording, 'acu', build(parameters_of('acu'), acu))
     assert done.unit.air.revision == 1
     assert done.unit.air.dropped['weather/humidity', 'out of range'] == 2

@@ -15,12 +15,13 @@ import sys
 from tools import notebooks
 
 from pedestal import cli
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.sections import parameters_of
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from pedestal_common.graph.graph_parameters import GraphParameters
 
-LAW_PACKAGES = ('pedestal_common', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive', 'ship_motion_sim')
+LAW_PACKAGES = ('pedestal_common', 'receiver_law', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
+                'ship_motion_sim')
 """Packages with laws, in the order of the page of laws."""
 
 
@@ -29,7 +30,7 @@ def parameter_page():
     lines = ['# Parameters', '', 'Every parameter of every node, as the node declares it. `pedestal parameters NODE` '
              'prints the same. The units are SI units and radians. A name that ends in `_deg` or `_dbhz` has this '
              'unit instead.']
-    kinds = {node: scenario.parameters_of(node) for node in
+    kinds = {node: parameters_of(node) for node in
              ('scenario', *(node.name for node in nodes.NODES if node.module), 'beam_steering')}
     for node, kind in {**kinds, 'graph, of every node': GraphParameters}.items():
         values = parameters.defaults(kind)

@@ -15,7 +15,8 @@ from acu_tracker.alarms import table as alarms
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from adu_drive.controller import faults
 from pedestal import console
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files
+from pedestal_bringup.scenario.sections import parameters_of
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection.table import INJECTED_FAULTS
@@ -155,7 +156,7 @@ def alarm_table():
 
 def scenario_table():
     """Return the table of the scenarios that come with the product."""
-    return _table(('scenario', 'events'), [(f'`{name}`', title) for name, title in scenario.available().items()])
+    return _table(('scenario', 'events'), [(f'`{name}`', title) for name, title in files.available().items()])
 
 
 def study_table():
@@ -169,7 +170,7 @@ def parameter_table():
     rows = []
     for name in TABLE_PARAMETERS:
         node, _, key = name.partition('.')
-        kind = scenario.parameters_of(node)
+        kind = parameters_of(node)
         field, value = dict(parameters.flatten(kind))[key], parameters.defaults(kind)[key]
         meta = field.metadata
         allowed = (f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ())))

@@ -17,7 +17,7 @@ setup(
     zip_safe=False,
     maintainer='pedestal maintainers',
     maintainer_email='pedestal@example.org',
-    description='Servo drives, rotators, level receivers and INS in place of simulated nodes, and simulated devices.',
+    description='Servo drives, rotators, receivers and INS in place of simulated nodes.',
     license='Apache-2.0',
     entry_points={'console_scripts': [
         'drive_node = pedestal_hardware.drive_node:main',
@@ -25,7 +25,5 @@ setup(
         'level_receiver_node = pedestal_hardware.level.level_receiver_node:main',
         'rotator_node = pedestal_hardware.rotator_node:main',
         'monopulse_receiver_node = pedestal_hardware.monopulse.monopulse_receiver_node:main',
-        'iq_node = pedestal_hardware.monopulse.iq_node:main',
-        'simulated_drives_node = pedestal_hardware.simulated.drives_node:main',
     ]},
 )

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from pedestal_bringup.scenario import files
 from pedestal_bringup.scenario import scenario as bringup
 from pedestal_common.parameters import Parameters, as_dict, flatten
 from pedestal_common.quantities import Seconds
@@ -21,7 +22,7 @@ def scenarios() -> dict[str, str]:
     >>> 'leo_pass' in pedestal.scenarios()
     True
     """
-    return bringup.available()
+    return files.available()
 
 
 def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None, *, duration: float | None = None,
@@ -36,7 +37,7 @@ def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None,
     >>> pedestal.load('leo_pas')
     Traceback (most recent call last):
         ...
-    pedestal_bringup.scenario.scenario.ScenarioError: unknown scenario 'leo_pas'; did you mean 'leo_pass'? ...
+    pedestal_bringup.scenario.sections.ScenarioError: unknown scenario 'leo_pas'; did you mean 'leo_pass'? ...
     """
     return Scenario(str(source), dict(changes or {}), duration, seed)
 
@@ -64,7 +65,7 @@ class Scenario:
         >>> pedestal.load('leo_pass', {'acu.azimuth.filter.ca.noise': 0.05}).overrides
         ['acu.azimuth.filter.ca.noise=0.05']
         """
-        return [bringup.override(name, value.item() if isinstance(value, np.generic) else value)
+        return [files.override(name, value.item() if isinstance(value, np.generic) else value)
                 for name, value in self.changes.items()]
 
     def changed(self, changes: Mapping[str, Value] | None = None, *, duration: float | None = None,

@@ -5,8 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_bringup.scenario.program import Plan
+from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from tracking_receiver_sim import target
@@ -79,11 +80,11 @@ def test_the_default_limits_of_the_control_unit_are_those_of_the_drive():
 
 
 def test_every_scenario_keeps_its_limits():
-    assert [name for name in scenario.available() if scenario.load(name).notes] == []
+    assert [name for name in files.available() if scenario.load(name).notes] == []
 
 
 def test_a_stow_angle_that_the_drive_does_not_reach_is_refused_with_both_limits():
-    with pytest.raises(scenario.ScenarioError) as error:
+    with pytest.raises(ScenarioError) as error:
         scenario.load('uav_flyby', ['adu.elevation.limits.upper=1.5'])
     assert 'elevation.stow = 1.5708 rad: must be limits.low to limits.high' in str(error.value)
     assert 'adu.elevation.limits.upper = 1.5 rad (85.9 deg) holds' in str(error.value)

@@ -1,18 +1,13 @@
-"""Settings of a drive, the reaction of a simulated drive to a lost connection, and a bus that was left."""
+"""Settings of a drive, and a bus that was left."""
 import struct
-import time
 
-import can
-import canopen
 import numpy as np
 import pytest
 
 from pedestal_common import parameters
 from pedestal_hardware import canopen_bus, commissioning, pdo
 from pedestal_hardware.bus import BusError
-from pedestal_hardware.cia402 import State
 from pedestal_hardware.params import ServoDriveParameters
-from pedestal_hardware.simulated.can_drive import CanDrive
 from pedestal_hardware.unit import DRIVE_LABELS
 
 UNIT = commissioning.RAD_S_PER_RPM * 1e-3
@@ -83,22 +78,6 @@ def test_the_largest_torque_is_a_share_of_the_rated_torque_of_the_drive(share):
 
 def test_a_lost_connection_is_set_to_a_fault():
     assert value_of(commissioning.settings(made(), 0, UNIT, 5.0), 0x6007) == 1
-
-
-@pytest.mark.parametrize('reaction, state', [
-    (0, State.OPERATION_ENABLED), (1, State.FAULT_REACTION_ACTIVE), (2, State.SWITCH_ON_DISABLED),
-    (3, State.QUICK_STOP_ACTIVE)])
-def test_a_simulated_drive_reacts_to_a_lost_connection_by_6007(rig, reaction, state):
-    unit = rig().drives
-    with can.Bus(interface='virtual', channel='lost connection') as bus:
-        drive = CanDrive(canopen.Network(bus), 1, 0, unit)
-        drive.record['state'], drive.record['power'] = State.OPERATION_ENABLED, 1
-        drive.local.sdo[0x6007].raw = reaction
-        drive._supervise(127, 0.01)
-        drive._note_heartbeat(0, b'', 0.0)
-        time.sleep(0.02)
-        drive.watch()
-    assert drive.record['state'] == state
 
 
 def test_a_bus_that_was_left_starts_no_drive():

@@ -1,6 +1,6 @@
 """Loss of received power of a recorded run by its pointing error, from the pattern of the beam.
 
-The pattern is the sum pattern of tracking_receiver_sim.monopulse: the received voltage by the angle from the beam
+The pattern is the sum pattern of receiver_law.monopulse: the received voltage by the angle from the beam
 axis.
 """
 import math
@@ -10,7 +10,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Decibels, Floats, Pairs, Radians
 from pedestal_results.tracking import Tracking
-from tracking_receiver_sim.monopulse import sum_pattern
+from receiver_law.monopulse import sum_pattern
 
 LEAST_POWER = 1e-12
 """Smallest received power over that on the beam axis [-]. This avoids an infinite loss in a null of the pattern."""

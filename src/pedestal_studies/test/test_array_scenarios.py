@@ -7,6 +7,7 @@ import pytest
 
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_results import results, tracking
 from pedestal_studies.p002_jia import phased_array
 from pedestal_studies.p002_jia.angle_loop import PaperLoop
@@ -79,7 +80,7 @@ def test_a_beam_that_only_leads_is_seen_at_the_beginning_of_its_intervals():
                                               'nodes; leave it out here'),
 ])
 def test_what_does_not_go_together_is_refused(name, overrides, line):
-    with pytest.raises(scenario.ScenarioError) as error:
+    with pytest.raises(ScenarioError) as error:
         scenario.load(name, overrides)
     assert str(error.value).partition(', ')[2] == line
 

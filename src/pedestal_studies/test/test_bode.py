@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from adu_drive.params import AduParameters
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_common.parameters import as_dict, build
 from pedestal_results import tracking
 from pedestal_studies.p000_ma import bode
@@ -270,7 +270,7 @@ def test_loops_of_a_flexible_dish_hold_their_margins_with_another_inertia_and_fr
     file.write_text(antenna_from_data_sheet.text(antenna_from_data_sheet.sections(sheet, 'a3'), []))
     tuned = loops.Loops(file)
     loops.design(tuned, ('azimuth',), loops.LoopRequirements(), lambda share, text: None)
-    changes = [scenario.override(*gain) for gain in tuned.gains.items()]
+    changes = [files.override(*gain) for gain in tuned.gains.items()]
     for inertia, mode in ((1.0, 1.0), *loops.PLANT_CORNERS):
         changed = scenario.load(file, [*changes, f'adu.azimuth.load.inertia={350.0 * inertia}',
                                        f'adu.azimuth.structure.frequency={4.0 * mode}'])

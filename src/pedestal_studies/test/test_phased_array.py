@@ -19,7 +19,7 @@ from pedestal_studies.p002_jia.angle_loop import (
     receiver_reading,
 )
 from pedestal_studies.p002_jia.phased_array import instants, settled
-from tracking_receiver_sim import monopulse
+from receiver_law import monopulse
 
 
 @pytest.fixture(scope='module', name='result')

@@ -9,7 +9,7 @@ import pytest
 
 from adu_drive import drive_state
 from pedestal_bringup.loop import closed_loop, memory_recording
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_common.parameters import ParameterError, as_dict
 from pedestal_results import results
 from pedestal_workbench.tuning import antenna_from_data_sheet, data_sheet_limits, loops
@@ -69,11 +69,11 @@ def test_what_ships_tracks_within_a_twentieth_of_its_beam(name):
 @pytest.mark.parametrize('name', SHIPPED)
 def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name):
     """`pedestal new`, then `tune --loops`: the same antenna, and the loops with the required margins."""
-    _, text = scenario.text(name)
+    _, text = files.text(name)
     made, _, tuned, *_ = (line.removeprefix('# ') for line in text.splitlines())
     assert pedestal(*shlex.split(made.removeprefix('made by: '))[1:])[0] == 0
     assert pedestal(*shlex.split(tuned.partition('of: ')[2])[1:])[0] == 0
-    again = scenario.load(tmp_path / f'{name}.yaml', scenario.file_overrides(tmp_path / f'{name}-loops.yaml'))
+    again = scenario.load(tmp_path / f'{name}.yaml', files.file_overrides(tmp_path / f'{name}-loops.yaml'))
     shipped = scenario.load(name)
     for node in ('adu', 'acu'):
         ours, theirs = as_dict(again.node_parameters(node)), as_dict(shipped.node_parameters(node))

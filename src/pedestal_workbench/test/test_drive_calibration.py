@@ -10,7 +10,7 @@ import pytest
 from acu_tracker.operating.command_table import ACU_COMMANDS
 from pedestal import cli
 from pedestal_bringup.loop import memory_recording
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_common.parameters import as_dict
 from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import commands
@@ -123,7 +123,7 @@ def test_a_result_that_is_not_verified_is_not_written(tmp_path, capfd):
 def test_the_file_is_for_control_unit_and_plant(result):
     """The feed-forward has the inertia of load and motors, and the friction of the load."""
     _, content, file, page = result
-    chosen = scenario.load('leo_pass', scenario.file_overrides(file), duration=1.0)
+    chosen = scenario.load('leo_pass', files.file_overrides(file), duration=1.0)
     acu, drive = chosen.node_parameters('acu'), as_dict(chosen.node_parameters('adu'))
     assert acu.azimuth.feedforward.inertia == pytest.approx(273.0 + 64.0**2 * 2.0 * 0.0085, rel=0.01)
     assert acu.azimuth.feedforward.friction == pytest.approx(90.0, rel=0.01)
@@ -140,7 +140,7 @@ def test_the_plan_stays_inside_the_stated_limits(tmp_path, capfd):
     file = tmp_path / 'plan.yaml'
     assert cli.main(['calibrate', 'drive', '--scenario', 'leo_pass', '--plan', str(file)]) == 0
     assert 'at most 1.15 rad/s' in capfd.readouterr().out
-    chosen = scenario.load('leo_pass', scenario.file_overrides(file))
+    chosen = scenario.load('leo_pass', files.file_overrides(file))
     run = memory_recording.record(chosen)
     joints, acu = run.table('joint_states'), chosen.node_parameters('acu')
     for name in ('azimuth', 'elevation'):
@@ -179,7 +179,7 @@ def test_the_plan_stays_above_the_floor(tmp_path, capfd):
     assert 'acu.floor: leaves' in capfd.readouterr().err
     assert cli.main([*given, 'acu.floor=-3 0.5; 0 0.5; 3 0.5']) == 0
     assert 'elevation: 31.9 to 88.8 deg' in capfd.readouterr().out
-    chosen = scenario.load('leo_pass', scenario.file_overrides(tmp_path / 'plan.yaml'))
+    chosen = scenario.load('leo_pass', files.file_overrides(tmp_path / 'plan.yaml'))
     assert memory_recording.record(chosen).table('joint_states')['elevation.position'].min() > 0.5
 
 

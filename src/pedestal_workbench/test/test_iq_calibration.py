@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pedestal import cli
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_common import parameters
 from pedestal_hardware.monopulse import blocks, sigmf
 from pedestal_hardware.monopulse.params import CHANNELS, MonopulseParameters
@@ -190,7 +190,7 @@ def test_the_command_line_finds_phases_and_coupling(recorded, capfd, tmp_path):
     output, page = tmp_path / 'matrix.yaml', tmp_path / 'page.html'
     code, content, _ = calibrated(capfd, recorded, '--output', str(output), '--report', str(page))
     rows = {row['metric']: row for row in content['rows']}
-    # D / S has 5 % more slope at 0.33 beamwidths than on the axis (tracking_receiver_sim.monopulse).
+    # D / S has 5 % more slope at 0.33 beamwidths than on the axis (receiver_law.monopulse).
     M = np.linalg.inv(1.02 * phased(*COUPLING_RAD[1:]) @ turned(COUPLING_RAD[0]))
     for i, names in enumerate(iq_phasing.ELEMENT_NAMES):
         for j, name in enumerate(names):
@@ -210,7 +210,7 @@ def test_the_command_line_finds_phases_and_coupling(recorded, capfd, tmp_path):
     second = {row['metric']: row['value'] for row in content['rows']}
     assert code == 0 and content['faults'] == [] and second['circle_error_before_percent'] < 5.0
     assert second['skew_before_percent'] < 5.0 and second['cross_talk_before_db'] < -20.0
-    chosen = scenario.load('leo_pass', ['scenario.receiver=simulated-iq', *scenario.file_overrides(output)],
+    chosen = scenario.load('leo_pass', ['scenario.receiver=simulated-iq', *files.file_overrides(output)],
                            pacing='realtime')
     in_force = np.array(chosen.node_parameters('tracking_receiver').calibration.matrix)
     np.testing.assert_allclose(in_force, M, atol=0.02)

@@ -7,7 +7,7 @@ import pytest
 
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup.loop import memory_recording
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_results import results
 from pedestal_workbench.tuning import loops
 
@@ -22,7 +22,7 @@ def test_the_plant_that_comes_with_the_product_gets_the_gains_it_has(pedestal, t
     """Those were found by hand; the file is one that `pedestal run --params-file` takes."""
     code, output, errors = pedestal('tune', 'leo_pass', '--loops')
     assert (code, errors) == (0, '')
-    chosen = scenario.load('leo_pass', scenario.file_overrides(tmp_path / 'leo_pass-loops.yaml'))
+    chosen = scenario.load('leo_pass', files.file_overrides(tmp_path / 'leo_pass-loops.yaml'))
     before = scenario.load('leo_pass')
     for axis in loops.AXES:
         new, old = (getattr(each.node_parameters('adu'), axis) for each in (chosen, before))
@@ -100,7 +100,7 @@ def test_a_flexible_dish_is_tracked_also_if_inertia_and_frequency_are_wrong(pede
     assert pedestal('new', 'dish.yaml', *NINE_METRES, '--mode', '4', '--mode-share', '0.4')[0] == 0
     code, output, _ = pedestal('tune', 'dish.yaml', '--loops')
     assert code == 0 and sum('worst' in line for line in output.splitlines()) == 4
-    tuned = scenario.file_overrides(tmp_path / 'dish-loops.yaml')
+    tuned = files.file_overrides(tmp_path / 'dish-loops.yaml')
 
     def tracked(changes):
         overrides = [*tuned, *(f'{key}={value}' for key, value in changes.items())]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pedestal import cli
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_common.geometry import pointing_report
 from pedestal_common.text_files import csv_table
 from pedestal_workbench.calibration import offsets, terms
@@ -204,7 +204,7 @@ def test_the_verb_prints_rows_and_writes_a_parameter_file(tmp_path, capfd):
         assert row['unit'] == 'deg' and row['ci_low'] < row['value'] < row['ci_high'] and row['runs'] == 40
         assert abs(row['value'] - value) < 2.0 * (row['ci_high'] - row['ci_low'])
     assert 0.001 < rows['residual_rms_deg']['value'] < rows['leave_one_out_rms_deg']['value'] < 0.003
-    changes = scenario.file_overrides(tmp_path / 'model.yaml')
+    changes = files.file_overrides(tmp_path / 'model.yaml')
     model = scenario.load('station_new', changes).node_parameters('acu').pointing
     assert abs(model.p1 - rows['P1']['value']) < 1e-8 and model.p22 == 0.0
     assert (model.file, model.date, model.antenna) == ('model.yaml', '2026-11-26', 'dish')

@@ -7,7 +7,7 @@ from pedestal_bringup.scenario import scenario
 from pedestal_results import tracking
 from pedestal_studies.system import calibration
 from pedestal_workbench.calibration import collect, exact, scan
-from tracking_receiver_sim import monopulse
+from receiver_law import monopulse
 
 FIVE_POINTS = np.array([(0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)])
 RASTER = 0.4 * (np.indices((7, 7)).reshape(2, -1).T - 3.0)

@@ -10,7 +10,8 @@ import pytest
 
 from pedestal import cli
 from pedestal_bringup.loop import memory_recording
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
+from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_results import tracking
 from pedestal_workbench.calibration.receiver import matrix, offsets, phasing
 
@@ -183,7 +184,7 @@ def test_the_result_closes_a_loop_that_does_not_close_without_it(capfd, tmp_path
     code, _ = calibrated(capfd, '--param', antenna, '--output', str(output))
     assert code == 0
     errors = []
-    for more in ((), scenario.file_overrides(output)):
+    for more in ((), files.file_overrides(output)):
         run = tracking.read(memory_recording.record(scenario.load('leo_pass', (*more, antenna), duration=25.0)))
         errors.append(tracking.known_rms(run.true[-1000:]) / run.beamwidth if run.true.size else math.inf)
     print(f'pointing error in autotrack: {errors[0]:.3g} beamwidths without, {errors[1]:.3g} with the matrix')
@@ -194,7 +195,7 @@ def test_the_result_closes_a_loop_that_does_not_close_without_it(capfd, tmp_path
     ('acu.tracker.matrix.xx=0', 'xx ee - xe ex = 0: must be at least 0.01 in size'),
     ('acu.tracker.matrix.xe=11', 'tracker.matrix.xe = 11'), ('acu.tracker.matrix.ex=.nan', 'tracker.matrix.ex = nan')])
 def test_the_control_unit_refuses_a_matrix_that_loses_a_direction(change, message):
-    with pytest.raises(scenario.ScenarioError, match=message):
+    with pytest.raises(ScenarioError, match=message):
         scenario.load('receiver_phasing', (change,)).node_parameters('acu')
 
 

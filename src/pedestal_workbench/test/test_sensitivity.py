@@ -10,7 +10,7 @@ from scipy.integrate import dblquad
 
 from pedestal import cli
 from pedestal_bringup.loop import memory_recording
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_workbench.calibration.sensitivity import beam, levels, sensitivity
 
 G_OVER_T_DB_K, FLUX_SFU, FREQUENCY_GHZ, DIAMETER_DEG = 31.0, 300.0, 8.5, 0.53
@@ -74,7 +74,7 @@ def test_the_verb_finds_beamwidth_squint_and_g_over_t(tmp_path, capfd):
     assert found['beamwidth_elevation_deg'] == pytest.approx(WIDTH[1], abs=0.005)
     assert found['peak_cross_elevation_deg'] == pytest.approx(PLACE[0], abs=0.003)
     assert found['peak_elevation_deg'] == pytest.approx(PLACE[1], abs=0.003)
-    acu = scenario.load('leo_pass', scenario.file_overrides(output)).node_parameters('acu')
+    acu = scenario.load('leo_pass', files.file_overrides(output)).node_parameters('acu')
     assert acu.tracker.receiver.beamwidth == pytest.approx(math.radians(math.sqrt(WIDTH.prod())), rel=0.01)
     assert page.read_text().count('<svg') == 1
     assert cli.main([*given, '--attenuation', '0.5', '--json', '-']) == 0

@@ -9,7 +9,8 @@ import pytest
 from pedestal_common.geometry import geodesy, orbit
 from pedestal_common.geometry.line_of_sight import earth_direction
 from pedestal_common.parameters import build
-from tracking_receiver_sim import monopulse, target
+from receiver_law import monopulse
+from tracking_receiver_sim import target
 from tracking_receiver_sim.params import TargetParameters
 from tracking_receiver_sim.path import arrival, polarisation
 from tracking_receiver_sim.path.params import PathParameters, PolarisationParameters

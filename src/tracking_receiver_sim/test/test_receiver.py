@@ -6,7 +6,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pedestal_common.parameters import ParameterError, build
-from tracking_receiver_sim import monopulse, receiver, smoothing, target
+from receiver_law import detector, monopulse, smoothing
+from tracking_receiver_sim import receiver, target
 from tracking_receiver_sim.params import TrackingReceiverParameters
 
 PERIOD = 0.005
@@ -28,14 +29,15 @@ def test_noise_law(Bench, cn0_dbhz, samples):
     out = bench.run(8000, np.random.default_rng(3))[200:]
     law = BEAMWIDTH / (1.6 * math.sqrt(2.0 * 10.0**(cn0_dbhz / 10.0) * PERIOD))
     assert errors(out).std(axis=0) == pytest.approx([law, law], rel=0.05)
-    assert receiver.angle_noise(bench.params, cn0_dbhz, PERIOD) == pytest.approx(law, rel=1e-12)
+    predicted = detector.angle_noise(bench.params.antenna, bench.params.receiver, cn0_dbhz, PERIOD)
+    assert predicted == pytest.approx(law, rel=1e-12)
     assert np.abs(errors(out).mean(axis=0)).max() < 5.0 * law / math.sqrt(len(out))
     assert 10.0 * np.log10(np.mean(10.0**(out['cn0_dbhz'] / 10.0))) == pytest.approx(cn0_dbhz, abs=0.1)
 
 
 def test_default_noise_is_about_30_millidegrees():
     params = TrackingReceiverParameters()
-    sigma = receiver.angle_noise(params, params.receiver.cn0_dbhz, PERIOD)
+    sigma = detector.angle_noise(params.antenna, params.receiver, params.receiver.cn0_dbhz, PERIOD)
     assert math.degrees(sigma) == pytest.approx(0.03, abs=5e-4)
 
 
@@ -63,7 +65,7 @@ def test_noise_in_the_sum_channel_does_not_lower_the_slope(Bench):
 def test_recursion_noise_as_predicted(Bench):
     bench = Bench(FIXED | {'receiver.cn0_dbhz': 55.0, 'receiver.smoothing': 'recursion'})
     out = bench.run(12000, np.random.default_rng(5))[200:]
-    predicted = receiver.angle_noise(bench.params, 55.0, PERIOD)
+    predicted = detector.angle_noise(bench.params.antenna, bench.params.receiver, 55.0, PERIOD)
     assert errors(out).std(axis=0) == pytest.approx([predicted, predicted], rel=0.05)
 
 
@@ -216,7 +218,7 @@ def test_moving_average_over_several_steps_is_the_mean_of_their_samples(Bench):
     assert errors(out)[first + 10:] == pytest.approx(np.array(expected)[first + 10:], abs=1e-15)
     noise = Bench(values | {'receiver.smoothing': 'moving_average', 'receiver.cn0_dbhz': 55.0})
     out = noise.run(12000, np.random.default_rng(5))[200:]
-    predicted = receiver.angle_noise(noise.params, 55.0, PERIOD)
+    predicted = detector.angle_noise(noise.params.antenna, noise.params.receiver, 55.0, PERIOD)
     assert errors(out).std(axis=0) == pytest.approx([predicted, predicted], rel=0.05)
 
 

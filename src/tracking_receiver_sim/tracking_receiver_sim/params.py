@@ -9,8 +9,8 @@ from pedestal_common.geometry.lever_arm import LeverArm
 from pedestal_common.injection import table
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 from pedestal_common.sky import bodies
+from receiver_law.smoothing import MAX_WINDOW_SAMPLES, SMOOTHING_KINDS
 from tracking_receiver_sim.path.params import PathParameters, PolarisationParameters
-from tracking_receiver_sim.smoothing import MAX_WINDOW_SAMPLES, SMOOTHING_KINDS
 
 TARGET_KINDS = ('leo_pass', 'track_file', 'flyby', 'sine', 'step', 'ramp', *bodies.POSITIONS)
 TARGET_SINE, TARGET_STEP, TARGET_RAMP = map(TARGET_KINDS.index, ('sine', 'step', 'ramp'))

@@ -38,10 +38,11 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
-from tracking_receiver_sim import detector, smoothing, target
-from tracking_receiver_sim.detector import Voltages, hertz
+from receiver_law import detector, smoothing
+from receiver_law.detector import Voltages, hertz
+from receiver_law.monopulse import channels, disk_channels
+from tracking_receiver_sim import target
 from tracking_receiver_sim.error_rate import error_rate
-from tracking_receiver_sim.monopulse import channels, disk_channels, thermal_noise
 from tracking_receiver_sim.params import BEAM_HELD, BEAM_MOTIONS, ReceiverParameters, TrackingReceiverParameters
 from tracking_receiver_sim.path import arrival, multipath, polarisation, scintillation
 
@@ -235,16 +236,6 @@ def _receiver_normals(params: TrackingReceiverParameters) -> int:
 def normals_per_step(params: TrackingReceiverParameters) -> int:
     """Return the number of standard normals that `step` takes."""
     return _receiver_normals(params) + scintillation.NORMALS_PER_STEP * params.path.scintillation.on
-
-
-def angle_noise(params: TrackingReceiverParameters, cn0_dbhz: DecibelHertz, period: Seconds) -> Radians:
-    """Return the predicted 1-sigma of one published error on axis at a C/N0 and a drive step `period`."""
-    antenna, receiver = params.antenna, params.receiver
-    tau = period / receiver.samples_per_step
-    one_sample = thermal_noise(antenna.beamwidth, antenna.slope, hertz(cn0_dbhz), tau)
-    independent = {'none': receiver.samples_per_step, 'recursion': 2.0 * receiver.smoothing_samples - 1.0,
-                   'moving_average': receiver.smoothing_samples}
-    return one_sample / math.sqrt(independent[receiver.smoothing])
 
 
 def age(params: TrackingReceiverParameters, period: Seconds) -> Seconds:

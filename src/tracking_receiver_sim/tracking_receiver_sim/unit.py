@@ -17,6 +17,7 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnos
 from pedestal_common.quantities import AnyRecord, Floats, Nanoseconds, Records, Stamps, Times
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
+from receiver_law import detector
 from tracking_receiver_sim import injected, receiver, target
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
@@ -149,7 +150,7 @@ class TrackingReceiver(Simulated):
         outputs, fault = self.parts['outputs'], int(self.parts['fault'])
         self.parts['fault'] = receiver.Status.LOCKED
         status, p = int(outputs['status']), self.parameters
-        sigma = receiver.angle_noise(p, float(outputs['cn0_dbhz']), p.period)
+        sigma = detector.angle_noise(p.antenna, p.receiver, float(outputs['cn0_dbhz']), p.period)
         values = [('cn0_dbhz', f'{outputs["cn0_dbhz"]:.2f}'), ('locked', str(int(outputs['locked']))),
                   ('target', p.target.kind), ('angle_noise_deg', f'{math.degrees(sigma):.4g}')]
         if self.target.start_time:

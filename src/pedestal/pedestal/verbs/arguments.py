@@ -152,8 +152,8 @@ def add_params_file(parser: argparse.ArgumentParser) -> None:
 
 def changes(options: argparse.Namespace) -> list[str]:
     """Return the texts 'node.key=value' of --params-file, then of --param. Raises ValueError."""
-    from pedestal_bringup.scenario import scenario
-    return [change for file in options.params_file for change in scenario.file_overrides(file)] + options.param
+    from pedestal_bringup.scenario import files as scenario_files
+    return [change for file in options.params_file for change in scenario_files.file_overrides(file)] + options.param
 
 
 def check_recording(options: argparse.Namespace) -> None:

@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeVar
 from pedestal_bringup.graph import graph, operator_servers, supervisor
 from pedestal_bringup.graph.processes import Graph
 from pedestal_bringup.graph.start import begins, parameters_of_all
+from pedestal_bringup.scenario import files as scenario_files
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common import parameters
@@ -63,7 +64,7 @@ def load_scenario(given: Mapping[str, str]) -> scenario.Scenario:
     """Return the Scenario that the arguments select and change. given: {argument: text}. Raises ValueError."""
     from pedestal_common.node import middleware  # loads rclpy, which --show-args does not need
     namespace = middleware.namespace('namespace:=', given['namespace'])
-    changes = scenario.file_overrides(given['params_file'], namespace) if given['params_file'] else ()
+    changes = scenario_files.file_overrides(given['params_file'], namespace) if given['params_file'] else ()
     return scenario.load(given['scenario'], changes,
                          _number(given, 'seed', int, 'a whole number'),
                          _number(given, 'duration', float, 'a number of seconds'), given['pacing'] or None)

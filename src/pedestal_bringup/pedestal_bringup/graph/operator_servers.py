@@ -11,7 +11,7 @@ import typing
 from collections.abc import Mapping
 
 from pedestal_bringup.graph.processes import ServerProcess
-from pedestal_bringup.scenario.scenario import ScenarioParameters
+from pedestal_bringup.scenario.header import ScenarioParameters
 from pedestal_operator import tcp_port
 from pedestal_operator.page.page_security import PAGE_ROLES
 

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from equipment_sim.iq import sinks
+from equipment_sim.iq.unit import SimulatedIq
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.scenario import Scenario
@@ -12,8 +14,6 @@ from pedestal_common.geometry import orbit
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.quantities import Nanoseconds, Seconds
-from pedestal_hardware.monopulse import sinks
-from pedestal_hardware.monopulse.iq_unit import SimulatedIq
 
 TRUTH_TOPICS = 'adu/truth', 'ship/truth'
 IQ_SECTIONS = tuple(f'{node}.{group}.' for node in ('tracking_receiver', 'iq')

@@ -125,9 +125,9 @@ SERVO_DRIVE = Node(DRIVE_NODE, 'pedestal_hardware.drive_node', 'pedestal_hardwar
                    stands_for='nothing: this node commands the real drives')
 """Drive of an antenna with servo drives on a bus. Real drives publish no true direction of the dish."""
 
-SIMULATED_DRIVES = Node('drives', 'pedestal_hardware.simulated.drives_node',
+SIMULATED_DRIVES = Node('drives', 'equipment_sim.drives.drives_node',
                         'pedestal_hardware.params:ServoDriveParameters',
-                        'pedestal_hardware.simulated.unit:SimulatedDrives',
+                        'equipment_sim.drives.unit:SimulatedDrives',
                         reads=('clock', 'ship/truth'), writes=('adu/truth',),
                         obeys='adu/inject', replies='adu/injected',
                         doc='four simulated CiA 402 drives with the simulated mechanics, on a socketcand server',
@@ -153,9 +153,9 @@ MONOPULSE_RECEIVER = Node('tracking_receiver', 'pedestal_hardware.monopulse.mono
                           stands_for='nothing: this node receives the samples of a real front end')
 """Receiver of the I/Q samples of an antenna."""
 
-SIMULATED_IQ = Node('iq', 'pedestal_hardware.monopulse.iq_node',
+SIMULATED_IQ = Node('iq', 'equipment_sim.iq.iq_node',
                     'pedestal_hardware.monopulse.params:MonopulseParameters',
-                    'pedestal_hardware.monopulse.iq_unit:SimulatedIq',
+                    'equipment_sim.iq.unit:SimulatedIq',
                     reads=('adu/truth', 'ship/truth'), writes=('target/truth',),
                     obeys='tracking_receiver/inject', replies='tracking_receiver/injected',
                     doc='simulated I/Q samples of target, antenna and front end, sent to the monopulse receiver',

@@ -1,4 +1,4 @@
-"""Feeds of the antenna: the signal at their outputs, and what a scanned feed makes of an error.
+"""Feeds of the antenna, and what a scanned feed makes of an error.
 
     three_channels  sum S and both differences D_x, D_e
     one_channel     a coupler with the share c: sqrt(1 - c) S + sqrt(c) D, with D = D_x, D_e, -D_x, -D_e in turn
@@ -12,19 +12,14 @@ beam is moved by q towards r. The power of the signal at an error v [beamwidths]
 
 with the modulation slope g. Sherman and Barton, Monopulse Principles and Techniques, 2nd ed., chapter 4.
 """
-import cmath
 import math
-from typing import Annotated
 
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Complexes, Radians, RadiansPerSample, Records, Seconds
-from pedestal_common.record import Record
+from pedestal_common.quantities import Radians, Seconds
 from pedestal_hardware.monopulse.params import FEED_KINDS, ONE_CHANNEL, THREE_CHANNELS, MonopulseParameters
-from tracking_receiver_sim import receiver
-from tracking_receiver_sim.monopulse import sum_pattern
-from tracking_receiver_sim.path.multipath import Image
+from receiver_law.monopulse import sum_pattern
 
 THREE_CHANNELS_KIND, ONE_CHANNEL_KIND = FEED_KINDS.index(THREE_CHANNELS), FEED_KINDS.index(ONE_CHANNEL)
 
@@ -34,28 +29,6 @@ DIFFERENTIATION_STEP_BEAMWIDTHS, CIRCLE_DIRECTIONS = 1e-4, 64
 SPREAD_PHASES, SPREAD_POINTS = 16, 32
 """Number of phases of the scan at the begin of a window, and points of an integral, for the spread of the reference.
 """
-
-
-class Feed(Record):
-    """Simulated feed."""
-    kind: int                       # index into FEED_KINDS
-    of_sum: float                   # share of the sum voltage in the signal [-]
-    of_difference: Annotated[Complexes, (2,)]   # shares of the differences, with their phases [-]
-    squint: Radians                 # angle between beam and axis of rotation
-    angle: Radians                  # of the scan
-    turn: RadiansPerSample          # change of this angle in a sample
-
-
-def record(params: MonopulseParameters) -> Records:
-    """Return the Feed (1,), at the angle 0."""
-    record, feed = Feed.zeros(), params.feed
-    record['kind'] = FEED_KINDS.index(feed.kind)
-    record['of_sum'] = math.sqrt(1.0 - feed.coupling)
-    record['of_difference'] = [cmath.rect(math.sqrt(feed.coupling), phase)
-                          for phase in (params.simulated.x_phase, params.simulated.e_phase)]
-    record['squint'] = feed.squint * params.antenna.beamwidth
-    record['turn'] = 2.0 * math.pi * feed.scan_rate / params.source.rate
-    return record
 
 
 def modulation_slope(params: MonopulseParameters) -> float:
@@ -111,36 +84,3 @@ def reference(kind: int, angle: Radians) -> complex:
     if kind == ONE_CHANNEL_KIND:
         angle = 0.5 * math.pi * math.floor(angle / (0.5 * math.pi))
     return complex(math.cos(angle), math.sin(angle))
-
-
-@compiled
-def turn(voltages: Complexes, simulated: Feed) -> None:
-    """Set the scan reference in the second channel of voltages (rows, 2), one row a sample, and turn the scan on."""
-    for k in range(voltages.shape[0]):
-        voltages[k, 1] = reference(simulated.kind, simulated.angle + (k + 0.5) * simulated.turn)
-    simulated.angle = (simulated.angle + voltages.shape[0] * simulated.turn) % (2.0 * math.pi)
-
-
-@compiled
-def fill(voltages: Complexes, simulated: Feed, state: receiver.State, constants: receiver.Constants,
-         seen: receiver.Incidence) -> None:
-    """Set voltages (rows, channels) of a step without noise; the second channel of a scanned feed holds
-    its reference. state, constants: of the simulated receiver."""
-    for k in range(voltages.shape[0]):
-        part = (k + 0.5) / voltages.shape[0]
-        if simulated.kind == THREE_CHANNELS_KIND or simulated.kind == ONE_CHANNEL_KIND:
-            v = receiver.voltages_at(state, constants, seen, part, seen.amplitude)
-            total, x, e = complex(v.s_real, v.s_imag), complex(v.x_real, v.x_imag), complex(v.e_real, v.e_imag)
-            if simulated.kind == THREE_CHANNELS_KIND:
-                voltages[k, 0], voltages[k, 1], voltages[k, 2] = total, x, e
-            else:
-                r = voltages[k, 1]
-                voltages[k, 0] = (simulated.of_sum * total + r.real * simulated.of_difference[0] * x
-                                  + r.imag * simulated.of_difference[1] * e)
-        else:
-            X, E = receiver.error_at(state, seen, part)
-            x, e = simulated.squint * voltages[k, 1].real, simulated.squint * voltages[k, 1].imag
-            image = Image(seen.image.real, seen.image.imaginary, seen.image.dX - x, seen.image.dE - e)
-            v = receiver.voltages(constants, seen.amplitude, (X - x - constants.boresight[0]) / constants.beamwidth,
-                                  (E - e - constants.boresight[1]) / constants.beamwidth, image)
-            voltages[k, 0] = complex(v.s_real, v.s_imag)

@@ -2,7 +2,7 @@
 
 A block of samples is mixed down by a numerically controlled oscillator (NCO) and integrated over the parts of a step
 (integrate and dump). Each integral is divided by the square root of its noise power. These are the voltages of
-tracking_receiver_sim.detector, whose functions make errors, C/N0 and lock of them.
+receiver_law.detector, whose functions make errors, C/N0 and lock of them.
 
 The noise power is the power of the sum channel that is orthogonal to its integrals. A frequency-locked loop (FLL) of
 second order keeps the NCO on the carrier. Its frequency error is the phase between two integrals. A constant Doppler
@@ -34,8 +34,8 @@ from pedestal_common.quantities import (
 from pedestal_common.record import Record
 from pedestal_hardware.monopulse.blocks import Samples
 from pedestal_hardware.monopulse.params import MonopulseParameters
-from tracking_receiver_sim import detector
-from tracking_receiver_sim.detector import Voltages
+from receiver_law import detector
+from receiver_law.detector import Voltages
 
 STATUS_TEXTS = dict(LOCKED='locked', NO_LOCK='no lock', SEARCH='search for the carrier',
                     NOT_FINITE='samples hold NaN or infinity', NO_SCAN='no scan reference, or it stands still',

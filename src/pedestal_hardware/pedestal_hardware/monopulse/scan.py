@@ -10,7 +10,7 @@ demodulation. It needs no whole number of scans, and its integrals may straddle 
 power is averaged, noise causes no bias.
 
 The product of difference and sum becomes b k_m / g, and the sum power becomes a. The functions of
-tracking_receiver_sim.detector make an error of both. Fading at the rate of the scan causes an error.
+receiver_law.detector make an error of both. Fading at the rate of the scan causes an error.
 
 Samples have the shape (n, 2): signal, reference. Dumps have the shape (parts, 2): integral of the signal, mean of the
 reference.
@@ -24,8 +24,8 @@ from pedestal_hardware.monopulse import feed, front_end
 from pedestal_hardware.monopulse.blocks import Samples
 from pedestal_hardware.monopulse.front_end import Constants, Outputs, State
 from pedestal_hardware.monopulse.params import MonopulseParameters
-from tracking_receiver_sim import detector
-from tracking_receiver_sim.detector import Voltages
+from receiver_law import detector
+from receiver_law.detector import Voltages
 
 MIN_SPREAD = 0.05
 """Smallest variance of the averaged reference in any direction, over its power [-]. A complete scan has 0.5, and less

@@ -15,7 +15,7 @@ from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware.monopulse import feed, front_end, scan
 from pedestal_hardware.monopulse.blocks import Block, Samples
 from pedestal_hardware.monopulse.params import MonopulseParameters
-from tracking_receiver_sim import receiver
+from receiver_law import detector
 
 ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
 
@@ -158,7 +158,8 @@ class MonopulseReceiver(Unit):
         """
         p, state, outputs = self.parameters, self.parts['state'], self.parts['outputs']
         hertz = p.source.rate / (2.0 * math.pi)
-        sigma = receiver.angle_noise(p, float(outputs['cn0_dbhz']), p.period) * math.sqrt(p.period / self.integration)
+        sigma = (detector.angle_noise(p.antenna, p.receiver, float(outputs['cn0_dbhz']), p.period)
+                 * math.sqrt(p.period / self.integration))
         values = [('cn0_dbhz', f'{outputs["cn0_dbhz"]:.2f}'), ('locked', str(int(outputs['locked']))),
                   ('carrier_hz', f'{state["turn"] * hertz:.1f}'), ('residual_hz', f'{state["error"] * hertz:.2f}'),
                   ('search_level_db', f'{self.search.level:.1f}'),

@@ -4,5 +4,4 @@
     line         connection to the device, in a thread of its own
     set_point    law: the set-point of a step, from the reference of the control unit
     unit         unit of the node: reference in, measured angles and state out
-    simulator    rotator of a protocol on a pseudo terminal, to rehearse with
 """

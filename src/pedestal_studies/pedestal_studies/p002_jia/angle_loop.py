@@ -30,7 +30,7 @@ from adu_drive.array import electronic_beam
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Floats, Radians, Radians2, Records, Seconds
 from pedestal_common.record import Record
-from tracking_receiver_sim import monopulse, smoothing
+from receiver_law import monopulse, smoothing
 from tracking_receiver_sim.params import AntennaParameters, ReceiverParameters
 
 GRID_STEP_S = 1e-3  # step of the grid [s]

@@ -50,7 +50,7 @@ from pedestal_studies.result import Drawings, Result
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
-from tracking_receiver_sim import receiver
+from receiver_law import detector
 from tracking_receiver_sim.params import ReceiverParameters
 
 Line: TypeAlias = tuple[str, str, float | list[Degrees], str]   # case, metric, value or the values of all runs, unit
@@ -452,7 +452,7 @@ def graph_case(case: str, quiet: bool = False) -> Case:
         return noisy
     # The control unit still assumes the noise of the noisy case, so that its filter has the same gains.
     tracking = noisy.loaded().node_parameters('tracking_receiver')
-    sigma = receiver.angle_noise(tracking, tracking.receiver.cn0_dbhz, tracking.period)
+    sigma = detector.angle_noise(tracking.antenna, tracking.receiver, tracking.receiver.cn0_dbhz, tracking.period)
     return dataclasses.replace(noisy, parameters={**GRAPH_CASES[case], **NOISELESS_PARAMETERS,
                                                   'acu.tracker.receiver.sigma_floor': sigma})
 

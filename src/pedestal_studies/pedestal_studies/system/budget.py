@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.loop.closed_loop import Run
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import scenario, sections
 from pedestal_common.graph import topics
 from pedestal_common.parameters import defaults
 from pedestal_common.quantities import Degrees, Floats, Pairs, Row, Seconds, Times
@@ -119,7 +119,7 @@ def switched_off(term: Term) -> list[str]:
     texts = []
     for key in parameters_of(term):
         node, _, name = key.partition('.')
-        texts.append(f'{key}={str(defaults(scenario.parameters_of(node))[name]).lower()}')
+        texts.append(f'{key}={str(defaults(sections.parameters_of(node))[name]).lower()}')
     return texts
 
 

@@ -22,7 +22,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
+from pedestal_bringup.scenario.sections import SECTION_NODES
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.steps import NS_PER_SECOND, GraphError, Steps
@@ -433,7 +434,7 @@ def file_parameters(path: str | pathlib.Path, beam: str = '') -> Values:
 
     Raises ScenarioError or ParameterFileError.
     """
-    sections = scenario.file_sections(path)
+    sections = files.file_sections(path)
     if 'scenario' in sections and 'recorder' not in sections:
         chosen = scenario.load(str(path))
         return {node: chosen.given(beam + node if nodes.row(node).of_beam else node) for node in chosen.values
@@ -449,9 +450,9 @@ def overrides(texts: Iterable[str], names: Sequence[str]) -> dict[str, dict[str,
     """
     found: dict[str, dict[str, Json]] = {}
     for text in texts:
-        if text.partition('=')[0].partition('.')[0] not in scenario.SECTION_NODES and len(names) == 1:
+        if text.partition('=')[0].partition('.')[0] not in SECTION_NODES and len(names) == 1:
             text = f'{names[0]}.{text}'
-        node, key, value = scenario.parse_override(text)
+        node, key, value = files.parse_override(text)
         if node not in names:
             raise RecomputeError(f'--param {text}: {node} is not recomputed; must be one of {", ".join(names)}')
         found.setdefault(node, {})[key] = value

@@ -6,7 +6,7 @@ bytes of the files, the messages and the metadata.
 import dataclasses
 import pathlib
 
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import rules, scenario
 from pedestal_common import parameters
 from pedestal_common.quantities import Nanoseconds
 from pedestal_common.text_files import files
@@ -98,7 +98,7 @@ def scenario_of_recording(bag: bags.Bag) -> scenario.Scenario:
         values[node].update({key: value for key, value in then.items() if key not in now or now[key] != value})
         # A recording without the flag of an optional topic was made by a version that did not have this topic.
         # Because the rerun must not have the topic either, its flags are set to false.
-        values[node].update({key: False for _, *flags in scenario.MEASUREMENT_FLAGS for key in flags
+        values[node].update({key: False for _, *flags in rules.MEASUREMENT_FLAGS for key in flags
                              if key in now and key not in then})
     changed = dataclasses.replace(chosen, values=values)
     for node in recorded:

@@ -14,8 +14,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from scipy.stats import qmc
 
+from pedestal_bringup.scenario import files as scenario_files
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.scenario import Scenario
+from pedestal_bringup.scenario.sections import ScenarioError, parameters_of
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from pedestal_common.parameters import Parameters
@@ -48,7 +50,7 @@ class Plan:
 
     def changes(self, i: int) -> tuple[str, ...]:
         """Return the texts 'node.key=value' of all changed and varied parameters of trial i."""
-        return (*self.overrides, *(scenario.override(name, values[i]) for name, values in self.varied.items()))
+        return (*self.overrides, *(scenario_files.override(name, values[i]) for name, values in self.varied.items()))
 
     def scenario(self, i: int) -> Scenario:
         """Return the scenario of trial i. Raises ScenarioError."""
@@ -90,8 +92,8 @@ def plan(source: str, runs: int | None = None, vary: Sequence[str] = (), overrid
 
     Raises ScenarioError, ParameterFileError, VaryError or TableError if a trial could not be run.
     """
-    name, content = scenario.text(source)
-    of_files = [change for file in files for change in scenario.file_overrides(file)]
+    name, content = scenario_files.text(source)
+    of_files = [change for file in files for change in scenario_files.file_overrides(file)]
     overrides = (*of_files, *overrides)
     nominal = scenario.parse(name, content, overrides, seed, duration)
     if nominal.header.pacing != 'lockstep':
@@ -171,7 +173,7 @@ def field(nominal: Scenario, column: str, option: str = '--vary') -> dataclasses
     VaryError, ScenarioError.
     """
     node, _, key = column.partition('.')
-    scenario.parameters_of(node)
+    parameters_of(node)
     if node == 'scenario' and key in PLAN_HEADER_KEYS:
         raise VaryError(f'{option} {column}: cannot vary, because trials share it or derive it from their number')
     present = dict.fromkeys((*map(nodes.plain, nominal.nodes), *nominal.nodes, 'scenario'))
@@ -230,9 +232,9 @@ def _check(nominal: Scenario, made: Plan, column: str, distribution: Distributio
         extremes += _rounded(scaled.tolist(), field(nominal, column).type is int)
     for value in extremes:
         try:
-            scenario.parse(made.name, made.content, [*made.overrides, scenario.override(column, value)], made.seed,
-                           made.duration)
-        except scenario.ScenarioError as error:
+            scenario.parse(made.name, made.content, [*made.overrides, scenario_files.override(column, value)],
+                           made.seed, made.duration)
+        except ScenarioError as error:
             text = f'={distribution.text}' if distribution else ''
             trial = f', trial {values.index(value)}' if value in values else ''
             raise VaryError(f'--vary {column}{text}{trial}: {error}') from None

@@ -19,8 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files
 from pedestal_bringup.scenario.scenario import Scenario
+from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_common.graph import nodes
 from pedestal_common.quantities import Row
 from pedestal_results import intervals
@@ -154,8 +155,8 @@ class Search:
         made, refused = {}, {}
         for value in values:
             try:
-                made[value] = self._make_plan([scenario.override(self._wanted.key, value)])
-            except scenario.ScenarioError as error:
+                made[value] = self._make_plan([files.override(self._wanted.key, value)])
+            except ScenarioError as error:
                 refused[value] = str(error)
         found = [Tried(value, {}, text, False) for value, text in refused.items()]
         with contextlib.ExitStack() as stack:

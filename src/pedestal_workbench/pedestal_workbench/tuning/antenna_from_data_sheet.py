@@ -25,8 +25,10 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from acu_tracker.servo import ends
 from adu_drive.params import PLANT_PERIOD_S, AduParameters, MotorParameters, mesh_inertia
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
+from pedestal_bringup.scenario.header import PROGRAM_ERRORS
 from pedestal_bringup.scenario.program import Plan
+from pedestal_bringup.scenario.sections import parameters_of
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import ParameterError, as_dict, build, flatten
 from pedestal_common.quantities import DecibelHertz, Json, Radians
@@ -183,11 +185,11 @@ def sections(sheet: DataSheet, title: str) -> dict[str, dict[str, Json]]:
     Raises ScenarioError, ParameterError, LoopError.
     """
     from pedestal_workbench.tuning import loops
-    _, content = scenario.text(sheet.like)
-    found = scenario.by_node(parameter_file.parse(content))
+    _, content = files.text(sheet.like)
+    found = files.by_node(parameter_file.parse(content))
     found['scenario']['title'] = title
     # A narrower beam needs a smaller error, equal in beamwidths.
-    for key in scenario.PROGRAM_ERRORS.keys() & set(found['scenario']):
+    for key in PROGRAM_ERRORS.keys() & set(found['scenario']):
         found['scenario'][key] *= min(1.0, sheet.theta / 0.0175)
     found['tracking_receiver'] |= {'antenna.beamwidth': sheet.theta, 'receiver.cn0_dbhz': cn0(sheet)}
     found['adu']['wind.field.diameter'] = sheet.mirror
@@ -226,12 +228,12 @@ def text(found: Mapping[str, Mapping[str, Json]], head: Iterable[str]) -> str:
     """
     lines = [f'# {line}'.rstrip() for line in head]
     for node, values in found.items():
-        fields = dict(flatten(scenario.parameters_of(node)))
+        fields = dict(flatten(parameters_of(node)))
         lines += [node + ':' if node == 'scenario' else f'{parameter_file.ANY_NAMESPACE}{node}:', '  ros__parameters:']
         for key, value in values.items():
             meta = fields[key].metadata
             unit = f'[{meta["unit"]}] ' if meta.get('unit') else ''
-            written = scenario.override(key, value).replace('=', ': ', 1)
+            written = files.override(key, value).replace('=', ': ', 1)
             lines.append(f'    {written:44}  # {unit}{meta["doc"]}')
     return '\n'.join(lines) + '\n'
 

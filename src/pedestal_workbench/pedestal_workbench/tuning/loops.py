@@ -53,7 +53,7 @@ import numpy as np
 
 from acu_tracker.estimation.params import FilterParameters, ImmParameters
 from adu_drive.params import SPEED_LOOP_PERIOD_S, AxisParameters
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import files, scenario
 from pedestal_common import parameters
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import (
@@ -446,7 +446,7 @@ def design(loops: Loops, axes: Sequence[str], required: LoopRequirements,
 
 def refuse_outside(loops: Loops) -> None:
     """Raise ScenarioError if a gain is outside its range."""
-    scenario.load(loops.source, [*loops.overrides, *(scenario.override(*gain) for gain in loops.gains.items())])
+    scenario.load(loops.source, [*loops.overrides, *(files.override(*gain) for gain in loops.gains.items())])
 
 
 def table(rows: Iterable[LoopRow], required: LoopRequirements) -> list[str]:

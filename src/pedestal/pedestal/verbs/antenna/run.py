@@ -198,10 +198,10 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
 def _without_prediction_errors(draft: 'Draft', changes: list[str]) -> list[str]:
     """Return the changes that end the errors of the prediction in a scenario, which are of its own satellite, and
     print them; an error in `changes` stays."""
-    from pedestal_bringup.scenario import scenario
+    from pedestal_bringup.scenario.header import PROGRAM_ERRORS
     given, header = {change.partition('=')[0] for change in changes}, parameters.as_dict(draft.header)
     found = []
-    for key, unit in scenario.PROGRAM_ERRORS.items():
+    for key, unit in PROGRAM_ERRORS.items():
         if header[key] and f'scenario.{key}' not in given:
             print(f'scenario.{key} = 0 {unit} in place of {header[key]:g} {unit}, which belongs to the satellite of '
                   f'{draft.name}')

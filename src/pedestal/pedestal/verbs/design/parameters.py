@@ -15,11 +15,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Print a row for each parameter of the node and of the graph. Return exit code 0."""
-    from pedestal_bringup.scenario import scenario
+    from pedestal_bringup.scenario.sections import parameters_of
     from pedestal_common import parameters
     from pedestal_common.graph.graph_parameters import GraphParameters
     rows = []
-    for prefix, parameters_type in (('', scenario.parameters_of(options.node)), ('graph.', GraphParameters)):
+    for prefix, parameters_type in (('', parameters_of(options.node)), ('graph.', GraphParameters)):
         values = parameters.defaults(parameters_type)
         rows += [(prefix + name, *_columns(field.metadata, values[name]))
                  for name, field in parameters.flatten(parameters_type)]

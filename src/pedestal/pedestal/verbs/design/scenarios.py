@@ -10,6 +10,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(_options: argparse.Namespace) -> int:
     """Print name and title of every scenario. Return exit code 0."""
-    from pedestal_bringup.scenario import scenario
-    console.show_list(scenario.available().items())
+    from pedestal_bringup.scenario import files
+    console.show_list(files.available().items())
     return 0

@@ -28,7 +28,7 @@ def main(options: argparse.Namespace) -> int:
     chosen = scenario.load(options.scenario or 'leo_pass',
                            ['scenario.drives=simulated', *arguments.changes(options), *port], pacing='realtime')
     name = nodes.SIMULATED_DRIVES.name
-    from pedestal_hardware.simulated import drives_node
+    from equipment_sim.drives import drives_node
     with tempfile.NamedTemporaryFile('w', suffix='.yaml') as file:
         file.write(parameter_file.text({name: {**chosen.given(name), 'graph.nodes': name}}))
         file.flush()

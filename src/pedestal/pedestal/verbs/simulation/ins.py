@@ -33,8 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Send the sentences until Ctrl-C, and return the exit code. Raises ValueError."""
+    from equipment_sim import ins as simulator
     from pedestal_bringup.scenario import scenario
-    from pedestal_hardware.ins import simulator
     if not 1 <= options.port <= 65535:
         raise ValueError(f'--port {options.port}: must be 1 to 65535')
     if not MIN_RATE_HZ <= options.rate <= MAX_RATE_HZ:

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(options: argparse.Namespace) -> int:
     """Serve the rotator until Ctrl-C, and return the exit code. Raises ValueError."""
-    from pedestal_hardware.rotator import simulator
+    from equipment_sim import rotator as simulator
     if not 0.0 < options.rate <= MAX_RATE_DEG_S:
         raise ValueError(f'--rate {options.rate:g}: must be above 0 and at most {MAX_RATE_DEG_S:g} deg/s')
     if not (math.isfinite(options.delay) and 0.0 <= options.delay <= MAX_DELAY_S):

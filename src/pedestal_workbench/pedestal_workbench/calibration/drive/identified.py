@@ -14,6 +14,7 @@ import numpy as np
 
 from adu_drive.params import AduParameters
 from pedestal_bringup.loop import memory_recording
+from pedestal_bringup.scenario import files
 from pedestal_bringup.scenario import scenario as scenarios
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.graph.topics import AXES
@@ -229,7 +230,7 @@ def in_memory(name: str, overrides: Sequence[str]) -> list[twin.DriveRecording]:
     chosen = scenarios.load(name, overrides)
     nominal = scenarios.load(name).node_parameters('adu')
     _, plan = plan_parameters(chosen)
-    motion = [scenarios.override(f'{node}.{key}', value) for node, values in plan.items()
+    motion = [files.override(f'{node}.{key}', value) for node, values in plan.items()
               for key, value in values.items()]
     without_bias = [f'adu.{axis}.bias.schedule=off' for axis in AXES]
     found = []

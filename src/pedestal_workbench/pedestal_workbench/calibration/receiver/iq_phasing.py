@@ -13,12 +13,12 @@ import pathlib
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from pedestal_hardware.monopulse.iq_unit import SimulatedIq
 
 from pedestal_bringup.loop import iq_run, memory_recording
 from pedestal_common.graph import nodes
 from pedestal_common.quantities import Complexes, Floats, Json, Pair, Pairs, Radians, Row
 from pedestal_hardware.monopulse import sigmf
-from pedestal_hardware.monopulse.iq_unit import SimulatedIq
 from pedestal_hardware.monopulse.params import THREE_CHANNELS, MonopulseParameters
 from pedestal_recording.recording import Recording
 from pedestal_results import tracking

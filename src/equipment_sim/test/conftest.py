@@ -3,11 +3,11 @@ import numpy as np
 import pytest
 
 from adu_drive import unit as adu_unit
+from equipment_sim.drives import law
+from equipment_sim.drives.unit import SimulatedDrives
 from pedestal_common import parameters
 from pedestal_hardware import commissioning, errors, pdo
 from pedestal_hardware.params import ServoDriveParameters
-from pedestal_hardware.simulated import law
-from pedestal_hardware.simulated.unit import SimulatedDrives
 from pedestal_hardware.unit import ServoDrives
 
 

@@ -10,6 +10,8 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 
+from equipment_sim.drives import law
+from equipment_sim.drives.unit import SimulatedDrives
 from pedestal_common.graph.nodes import DRIVE_NODE
 from pedestal_common.node import shell, unit_node
 from pedestal_common.node.unit_node import Port
@@ -18,8 +20,6 @@ from pedestal_common.wire import records
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware.bus import BusError
 from pedestal_hardware.params import START_KEY, ServoDriveParameters
-from pedestal_hardware.simulated import law
-from pedestal_hardware.simulated.unit import SimulatedDrives
 from pedestal_hardware.unit import DRIVE_LABELS
 
 POLL_S = 0.002  # longest time between two steps of the plant [s]
@@ -38,13 +38,13 @@ class DrivesNode(unit_node.UnitNode):
         self.ending = False
         self.newest: dict[str, records.Decoded] = {}
         self.served: threading.Thread | None = None
-        super().__init__('pedestal_hardware.simulated.drives_node')
+        super().__init__('equipment_sim.drives.drives_node')
 
     def begin(self) -> None:
         """Serve the bus."""
         try:
-            from pedestal_hardware.simulated.can_drive import CanDrives
-            from pedestal_hardware.simulated.socketcand_server import SocketcandServer
+            from equipment_sim.drives.can_drive import CanDrives
+            from equipment_sim.drives.socketcand_server import SocketcandServer
         except ImportError as error:
             raise BusError(f"{error}: pip install 'pedestal_hardware[can]'") from None
         p = self.parameters

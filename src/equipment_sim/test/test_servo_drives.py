@@ -1,12 +1,17 @@
 """Four servo drives with their simulated mechanics, in simulated time: control, phases, faults, limits."""
 import math
+import time
 
+import can
+import canopen
 import numpy as np
 import pytest
 
 from adu_drive.drive_state import PHASE_ENGAGING_BRAKES
+from equipment_sim.drives import law
+from equipment_sim.drives.can_drive import CanDrive
 from pedestal_hardware import cia402, errors, pdo, servo_drives
-from pedestal_hardware.simulated import law
+from pedestal_hardware.cia402 import State
 
 ENABLED = [cia402.State.OPERATION_ENABLED] * pdo.DRIVE_COUNT
 
@@ -411,9 +416,9 @@ def test_faults_that_no_drive_has_are_refused(running, verb):
 
 
 def test_every_fault_of_the_drive_unit_is_injected_or_refused():
+    from equipment_sim.drives.unit import PLANT_FAULTS
     from pedestal_common.graph.nodes import DRIVE_NODE
     from pedestal_common.injection.table import INJECTED_FAULTS
-    from pedestal_hardware.simulated.unit import PLANT_FAULTS
     refused = {'pin_stuck', 'drop', 'delay', 'freeze', 'bias', 'nan', 'noise'}
     assert {fault.name for fault in INJECTED_FAULTS[DRIVE_NODE]} == {*PLANT_FAULTS} | refused
 
@@ -440,3 +445,19 @@ def test_a_gust_is_compensated(running):
 def test_parameters_that_do_not_fit(rig, values, text):
     with pytest.raises(ValueError, match=text):
         rig(**values)
+
+
+@pytest.mark.parametrize('reaction, state', [
+    (0, State.OPERATION_ENABLED), (1, State.FAULT_REACTION_ACTIVE), (2, State.SWITCH_ON_DISABLED),
+    (3, State.QUICK_STOP_ACTIVE)])
+def test_a_simulated_drive_reacts_to_a_lost_connection_by_6007(rig, reaction, state):
+    unit = rig().drives
+    with can.Bus(interface='virtual', channel='lost connection') as bus:
+        drive = CanDrive(canopen.Network(bus), 1, 0, unit)
+        drive.record['state'], drive.record['power'] = State.OPERATION_ENABLED, 1
+        drive.local.sdo[0x6007].raw = reaction
+        drive._supervise(127, 0.01)
+        drive._note_heartbeat(0, b'', 0.0)
+        time.sleep(0.02)
+        drive.watch()
+    assert drive.record['state'] == state

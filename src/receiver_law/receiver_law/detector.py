@@ -6,22 +6,77 @@ s are the voltages of difference and sum. The error is limited to the full scale
 Voltages are scaled so that the noise of one channel has the power 1 in one sample. The carrier power on axis is then
 C/N0 tau, with the time tau of a sample. The noise power 1 is subtracted from the measured sum power.
 
-The simulated receiver (`receiver`) and a receiver of I/Q samples (pedestal_hardware.monopulse) both call these
-functions.
+The simulated receiver (tracking_receiver_sim.receiver) and a receiver of I/Q samples (pedestal_hardware.monopulse)
+both call these functions.
 """
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Bit, DecibelHertz, Hertz, Nanoseconds, Radians, Records, Seconds
 from pedestal_common.record import Record
-from tracking_receiver_sim import smoothing
-from tracking_receiver_sim.monopulse import detect
-from tracking_receiver_sim.params import AntennaParameters, ReceiverParameters
-from tracking_receiver_sim.smoothing import SMOOTHING_KINDS
+from receiver_law import smoothing
+from receiver_law.monopulse import detect, thermal_noise
+from receiver_law.smoothing import SMOOTHING_KINDS
 
 MIN_POWER_OVER_NOISE = 0.01
 """Smallest ratio of carrier power to noise power in one sample that the C/N0 estimate reports (-20 dB)."""
+
+
+class Antenna(Protocol):
+    """Parameters of an antenna, of which the detector needs these."""
+
+    @property
+    def beamwidth(self) -> Radians:
+        """Half-power beamwidth theta3 of the sum pattern."""
+
+    @property
+    def slope(self) -> float:
+        """Slope k_m: difference over sum per beamwidth."""
+
+
+class Receiver(Protocol):
+    """Parameters of a receiver, of which the detector needs these."""
+
+    @property
+    def samples_per_step(self) -> int:
+        """Channel samples per step."""
+
+    @property
+    def smoothing(self) -> str:
+        """One of SMOOTHING_KINDS."""
+
+    @property
+    def smoothing_samples(self) -> int:
+        """Number of samples n of recursion and moving average."""
+
+    @property
+    def full_scale(self) -> float:
+        """Largest error [beamwidths]."""
+
+    @property
+    def agc_time_constant(self) -> Seconds:
+        """Of the sum power that normalises the errors."""
+
+    @property
+    def cn0_time_constant(self) -> Seconds:
+        """Of the C/N0."""
+
+    @property
+    def acquire_level_dbhz(self) -> DecibelHertz:
+        """C/N0 above which the receiver locks."""
+
+    @property
+    def lose_level_dbhz(self) -> DecibelHertz:
+        """C/N0 below which it loses lock."""
+
+    @property
+    def acquire_time(self) -> Seconds:
+        """Time above the upper level before lock."""
+
+    @property
+    def lose_time(self) -> Seconds:
+        """Time below the lower level before loss of lock."""
 
 
 class State(Record):
@@ -66,8 +121,7 @@ def hertz(cn0_dbhz: DecibelHertz) -> Hertz:
     return 10.0**(0.1 * cn0_dbhz)
 
 
-def set_constants(constants: Records, antenna: AntennaParameters, receiver: ReceiverParameters,
-                  period: Seconds) -> None:
+def set_constants(constants: Records, antenna: Antenna, receiver: Receiver, period: Seconds) -> None:
     """Set the constants (1,) for a step of `period`."""
     tau = period / receiver.samples_per_step
     constants['angle_scale'] = antenna.beamwidth / antenna.slope
@@ -81,6 +135,15 @@ def set_constants(constants: Records, antenna: AntennaParameters, receiver: Rece
     constants['acquire_power'] = hertz(receiver.acquire_level_dbhz) * tau
     constants['lose_power'] = hertz(receiver.lose_level_dbhz) * tau
     constants['acquire_ns'], constants['lose_ns'] = round(receiver.acquire_time * 1e9), round(receiver.lose_time * 1e9)
+
+
+def angle_noise(antenna: Antenna, receiver: Receiver, cn0_dbhz: DecibelHertz, period: Seconds) -> Radians:
+    """Return the predicted 1-sigma of one published error on axis at a C/N0 and a drive step `period`."""
+    tau = period / receiver.samples_per_step
+    one_sample = thermal_noise(antenna.beamwidth, antenna.slope, hertz(cn0_dbhz), tau)
+    independent = {'none': receiver.samples_per_step, 'recursion': 2.0 * receiver.smoothing_samples - 1.0,
+                   'moving_average': receiver.smoothing_samples}
+    return one_sample / math.sqrt(independent[receiver.smoothing])
 
 
 @compiled

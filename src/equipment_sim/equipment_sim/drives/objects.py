@@ -3,7 +3,7 @@ from collections.abc import Iterable
 
 from canopen import objectdictionary as od
 
-from pedestal_hardware.simulated.law import ENCODER_TURNS
+from equipment_sim.drives.law import ENCODER_TURNS
 
 READ_ONLY, WRITABLE = 'ro', 'rw'
 

@@ -21,7 +21,7 @@ from pedestal_hardware import cia402, pdo, servo_drives
 from pedestal_hardware.cia402 import State
 
 if TYPE_CHECKING:
-    from pedestal_hardware.simulated.unit import Memory
+    from equipment_sim.drives.unit import Memory
 
 TICK_NS = round(SPEED_LOOP_PERIOD_S * 1e9)  # period of the speed loop of a drive [ns]
 MAX_CATCH_UP_TICKS = 4000  # largest number of periods that the drives make up after a stall of the machine; 2 s

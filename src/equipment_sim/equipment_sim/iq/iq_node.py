@@ -1,6 +1,6 @@
 """ROS node of the simulated I/Q: sends the samples of all channels for each direction of the beam.
 
-The unit is iq_unit.SimulatedIq. Before the first step the node sends noise, as a front end without a signal does.
+The unit is unit.SimulatedIq. Before the first step the node sends noise, as a front end without a signal does.
 `entry` is imported first, so that a signal during the other imports ends the process without a message.
 """
 import pedestal_common.entry  # noqa: F401
@@ -9,13 +9,13 @@ import pedestal_common.entry  # noqa: F401
 import sys
 from collections.abc import Mapping, Sequence
 
+from equipment_sim.iq import sinks
+from equipment_sim.iq.unit import SimulatedIq
 from pedestal_common.graph.nodes import MONOPULSE_RECEIVER
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import shell, unit_node
 from pedestal_common.quantities import Message, Nanoseconds
 from pedestal_common.wire import records
-from pedestal_hardware.monopulse import sinks
-from pedestal_hardware.monopulse.iq_unit import SimulatedIq
 from pedestal_hardware.monopulse.params import MonopulseParameters
 from pedestal_hardware.params import START_KEY
 
@@ -32,7 +32,7 @@ class IqNode(unit_node.UnitNode):
         self.sink: sinks.Sink | None = None
         self.sent: Nanoseconds | None = None    # UTC of the end of the samples that were sent
         self.number = 0                         # of the next sample
-        super().__init__('pedestal_hardware.monopulse.iq_node')
+        super().__init__('equipment_sim.iq.iq_node')
 
     def begin(self) -> None:
         """Open the sink, and begin to follow the trigger."""

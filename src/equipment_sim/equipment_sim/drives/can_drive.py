@@ -10,6 +10,9 @@ from canopen import objectdictionary
 from canopen.sdo.base import SdoVariable
 
 from adu_drive.params import SPEED_LOOP_PERIOD_S
+from equipment_sim.drives import law, objects
+from equipment_sim.drives.socketcand_server import SocketcandServer
+from equipment_sim.drives.unit import SimulatedDrives
 from pedestal_common.quantities import AnyRecord, Seconds
 from pedestal_hardware import cia402, commissioning, errors, pdo
 from pedestal_hardware.can_line import Frame
@@ -20,9 +23,6 @@ from pedestal_hardware.canopen_bus import (
     NMT_RESET_COMMUNICATION,
     SYNC_COB_ID,
 )
-from pedestal_hardware.simulated import law, objects
-from pedestal_hardware.simulated.socketcand_server import SocketcandServer
-from pedestal_hardware.simulated.unit import SimulatedDrives
 
 NMT_RESET_NODE = 129
 OBJECT_OF_FIELD = dict(zip(

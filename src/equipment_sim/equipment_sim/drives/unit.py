@@ -8,6 +8,7 @@ import numpy as np
 from adu_drive import drive_unit, injected
 from adu_drive import unit as adu_unit
 from adu_drive.params import AxisParameters
+from equipment_sim.drives import law
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.simulated import Simulated
@@ -17,7 +18,6 @@ from pedestal_common.wire.commands import Command, Reply
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware import cia402, commissioning, errors, pdo
 from pedestal_hardware.params import ServoDriveParameters
-from pedestal_hardware.simulated import law
 from pedestal_hardware.unit import DRIVE_LABELS
 
 PLANT_FAULTS = ('motor_loss', 'encoder_jump', 'encoder_stuck', 'brake_stuck', 'lost_tooth', 'gust')

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from equipment_sim import ins as simulator
 from pedestal_common.parameters import build
-from pedestal_hardware.ins import simulator
 from pedestal_hardware.ins.params import InsInputParameters
 from pedestal_hardware.ins.unit import InsInputUnit
 from ship_motion_sim.params import ShipParameters

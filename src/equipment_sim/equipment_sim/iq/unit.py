@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from equipment_sim.iq import feed
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import nodes, noise
@@ -31,8 +32,8 @@ from pedestal_common.quantities import (
 )
 from pedestal_common.record import Record
 from pedestal_common.wire.commands import Command, Reply
-from pedestal_hardware.monopulse import feed
 from pedestal_hardware.monopulse.blocks import Samples
+from pedestal_hardware.monopulse.feed import THREE_CHANNELS_KIND
 from pedestal_hardware.monopulse.params import CONICAL_SCAN, ONE_CHANNEL, THREE_CHANNELS, MonopulseParameters
 from tracking_receiver_sim import injected, receiver, target
 from tracking_receiver_sim import unit as receiver_unit
@@ -97,7 +98,7 @@ def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecor
     true, elapsed_ns = receiver.begin(state, constants, own, results, memory.breaks, memory.coefficients)
     voltages = memory.voltages
     voltages[:] = 0.0
-    if record.feed.kind != feed.THREE_CHANNELS_KIND:
+    if record.feed.kind != THREE_CHANNELS_KIND:
         feed.turn(voltages, record.feed)
     if elapsed_ns > 0 and receiver.inputs_known(own):
         seen = receiver.incidence(state, constants, own, results, true, normals)

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.signal import argrelmax
 
-from tracking_receiver_sim import monopulse
+from receiver_law import monopulse
 
 POINTS = [0.0, 0.2, 0.5 * math.pi / monopulse.U_PER_BEAMWIDTH, 0.5, -0.7, math.pi / monopulse.U_PER_BEAMWIDTH, -1.0,
           1.3, 2.6, 6.0]
