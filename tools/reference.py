@@ -13,7 +13,7 @@ from acu_tracker.alarms import table as alarms
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from adu_drive.controller import faults
 from pedestal import console
-from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario import scenario, shipped
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection.table import INJECTED_FAULTS
@@ -154,7 +154,7 @@ def alarm_table():
 
 def scenario_table():
     """Return the table of the scenarios that come with the product."""
-    return _table(('scenario', 'events'), [(f'`{name}`', title) for name, title in scenario.available().items()])
+    return _table(('scenario', 'events'), [(f'`{name}`', title) for name, title in shipped.available().items()])
 
 
 def study_table():

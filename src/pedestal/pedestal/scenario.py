@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pedestal_bringup.scenario import scenario as bringup
+from pedestal_bringup.scenario import shipped
 from pedestal_common.parameters import Parameters, as_dict, flatten
 from pedestal_common.quantities import Seconds
 
@@ -21,7 +22,7 @@ def scenarios() -> dict[str, str]:
     >>> 'leo_pass' in pedestal.scenarios()
     True
     """
-    return bringup.available()
+    return shipped.available()
 
 
 def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None, *, duration: float | None = None,

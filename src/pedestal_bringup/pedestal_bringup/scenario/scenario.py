@@ -8,7 +8,6 @@ a node in a namespace, name the sections /**/NODE. The node then lacks the param
 import contextlib
 import dataclasses
 import functools
-import importlib.resources
 import itertools
 import json
 import math
@@ -19,6 +18,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 import yaml
 
+from pedestal_bringup.scenario import shipped
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.graph_parameters import GraphParameters
@@ -27,8 +27,6 @@ from pedestal_common.quantities import Seconds, Value
 from pedestal_common.text_files import files, parameter_file, plain_yaml
 
 if typing.TYPE_CHECKING:
-    from importlib.abc import Traversable
-
     from pedestal_common.node.unit import Unit
     from pedestal_hardware.monopulse.params import MonopulseParameters
     from tracking_receiver_sim.params import TargetParameters
@@ -234,21 +232,6 @@ def _row(node: str, header: ScenarioParameters) -> Node:
     return nodes.row(node, header.beam, header.servo, header.iq)
 
 
-def _folder() -> 'Traversable':
-    """Return the folder of the scenarios that come with the product."""
-    return importlib.resources.files('pedestal_bringup') / 'scenarios'
-
-
-def available() -> dict[str, str]:
-    """Return {name: title} of the scenarios that come with the product."""
-    titles = {}
-    for entry in sorted(_folder().iterdir(), key=lambda entry: entry.name):
-        if entry.name.endswith('.yaml'):
-            sections = plain_yaml.parse(entry.read_text())
-            titles[entry.name[:-5]] = sections['scenario']['ros__parameters']['title']
-    return titles
-
-
 def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
     """Return (name, YAML text) of a scenario that comes with the product, or of a .yaml file. Raises ScenarioError."""
     path = pathlib.Path(name_or_path)
@@ -258,9 +241,9 @@ def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
         except (OSError, UnicodeDecodeError) as error:
             raise ScenarioError(f'scenario file {path}: {plain_yaml.problem(error)}') from None
     name = str(name_or_path)
-    entry = _folder() / f'{name}.yaml'
+    entry = shipped.folder() / f'{name}.yaml'
     if not entry.is_file():
-        names = list(available())
+        names = list(shipped.available())
         raise ScenarioError(f'unknown scenario {name!r};{parameters.did_you_mean(name, names)} there are '
                             f'{", ".join(names)} (or give a path that ends in .yaml)')
     return name, entry.read_text()

@@ -1,12 +1,7 @@
-"""run a scenario as separate nodes and record it
-
-Starts a process for each node, records every topic in a new bag, and prints a verdict and the results.
-
-Exit codes (1, 3 and 130 take precedence over 4):
-
-"""
+"""Verb `run`: a scenario as separate nodes, with its recording and its results."""
 import argparse
 import datetime
+import inspect
 import os
 import sys
 import typing
@@ -14,16 +9,21 @@ from collections.abc import Collection
 
 from pedestal import console, stop
 from pedestal.verbs import arguments
+from pedestal.verbs.arguments import Verb
 from pedestal_common import parameters
-
-__doc__ += console.exit_codes()
 
 if typing.TYPE_CHECKING:
     from pedestal_bringup.scenario.scenario import Draft, Scenario
 
+START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
+MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a realtime run, outside announced restarts
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add scenario, pacing, duration, seed, bag, parameters, satellite and servers."""
+
+def _add_run(parser: argparse.ArgumentParser) -> None:
+    """Starts a process for each node, records every topic in a new bag, and prints a verdict and the results.
+
+    Exit codes (1, 3 and 130 take precedence over 4):
+    """
     arguments.add_scenario(parser)
     parser.add_argument('--pacing',
                         choices=('lockstep', 'realtime'), help='lockstep: as fast as the nodes can; realtime: by '
@@ -50,15 +50,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--receiver', choices=('simulated', 'simulated-iq'), help='simulated-iq: simulated I/Q '
                         'samples by UDP on this machine, and monopulse_receiver_node in place of the simulated '
                         'receiver; needs --pacing realtime; default: value of the scenario')
-    from pedestal_bringup.graph import operator_servers
-    operator_servers.add_arguments(parser)
+    from pedestal_bringup.graph.operator_servers import SERVER_ADDRESS, SERVERS, port
+    for name, server in SERVERS.items():
+        if server.port:
+            parser.add_argument(f'--{name}', nargs='?', type=port, const=server.port, metavar='PORT',
+                                help=f'in realtime: {server.does} on {SERVER_ADDRESS}; default port: {server.port}')
+        else:
+            parser.add_argument(f'--{name}', action='store_const', const=0, help=f'in realtime: {server.does}')
 
 
-START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
-MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a realtime run, outside announced restarts
+_add_run.__doc__ = f'{inspect.getdoc(_add_run)}\n\n{console.exit_codes()}'
 
 
-def main(options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace) -> int:
     """Run, record and print the results. Return the exit code. Raises RuntimeError for an incomplete recording."""
     from pedestal_bringup.graph import graph, operator_servers
     from pedestal_bringup.scenario.program import Plan
@@ -74,7 +78,9 @@ def main(options: argparse.Namespace) -> int:
             print(unchecked)
     bag = graph.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
-    servers = operator_servers.selected(options, chosen.header)
+    ports = {name: getattr(options, name) for name in operator_servers.SERVERS}
+    servers = operator_servers.processes({name: port for name, port in ports.items() if port is not None},
+                                         chosen.header)
     plan = Plan(chosen)
     for line in plan.announced():
         print(line)
@@ -161,8 +167,6 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     arguments.check_elements(options)
     if options.tle is options.station is options.which is None:
         return scenario.load(options.scenario, changes, options.seed, duration, options.pacing)
-    import datetime
-
     from pedestal import satellite
     from pedestal_common.geometry import orbit
     now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
@@ -184,7 +188,10 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     if options.which is not None or options.tle and not started:
         selection = satellite.PassSelection(draft.changed(changes), now)
         if options.which == 'list':
-            _refuse_with_list(options)
+            from pedestal_bringup.graph import operator_servers
+            arguments.refuse_given(options, ('bag', 'json', 'all', 'explain', 'duration', 'seed', 'pacing', 'drives',
+                                             'receiver', *operator_servers.SERVERS),
+                                   'has no effect with --pass list, which runs nothing')
             selection.print_passes()
             return None
         start, duration, line = selection.choose('next' if options.which is None else options.which, duration)
@@ -209,10 +216,4 @@ def _without_prediction_errors(draft: 'Draft', changes: list[str]) -> list[str]:
     return found
 
 
-def _refuse_with_list(options: argparse.Namespace) -> None:
-    """Raise ValueError for an option of a run beside --pass list, which runs nothing."""
-    from pedestal_bringup.graph import operator_servers
-    for name in ('bag', 'json', 'all', 'explain', 'duration', 'seed', 'pacing', 'drives', 'receiver',
-                 *operator_servers.SERVERS):
-        if not (getattr(options, name) is None or getattr(options, name) is False):
-            raise ValueError(f'--{name}: has no effect with --pass list, which runs nothing')
+VERBS = {'run': Verb(_add_run, _run)}

@@ -1,26 +1,4 @@
-"""run a scenario many times with varied parameters, and print statistics and the worst trials
-
-Each trial has its own seed and gives the same kinds of results as `pedestal run`. A trial runs all nodes in one
-process, without ROS. For each of the worst trials a `pedestal run` command is printed, which runs separate nodes and
-gives the same numbers.
-
---vary NODE.KEY=DISTRIBUTION draws a parameter from uniform(low, high), normal(mean, sigma) or choice(a, b, ...). With
-an x after the distribution, as in normal(1, 0.1)x, the drawn number is a factor of the value of the scenario. The
-form --vary FILE.csv reads the trials from a file with a column for each parameter and a row for each trial.
-
-Rows are written to OUTPUT/trials.csv as soon as they exist. Repeat the command to continue after Ctrl-C or a crash.
-The column `why` of the table holds the verdict on each trial that did not track.
-
---side NAME NODE.KEY=VALUE ... adds a side to a comparison and may be repeated. A side is a variant of the scenario
-with parameters of its own. --against and --against-param add one side. Trial i of all sides has the same seed and
-drawn values. The side with the best result of --by is printed first.
-
---require 'RESULT < LIMIT' prints the share of the trials that meet a criterion, with its 95 % interval. A trial
-without the result does not meet it.
-
---solve NODE.KEY=LOW:HIGH --until 'RESULT = LIMIT' searches for the value of a parameter at which the mean of a result
-reaches a limit. Without LOW:HIGH the search covers the range of the parameter.
-"""
+"""Verb `trials`: many runs with varied parameters, their statistics, comparison and search."""
 import argparse
 import contextlib
 import math
@@ -32,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_common.parameters import option_of
+from pedestal.verbs.arguments import Verb
 from pedestal_common.quantities import Row
 from pedestal_results import row_text
 
@@ -44,8 +22,28 @@ WORST_TRIAL_COUNT = 10  # number of the worst trials whose commands are printed
 BASE_SIDE = 'base'  # label of the side with the parameters of --param alone, beside labels of --side
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add scenario, varied parameters, number and processes of the trials, sides of a comparison, criteria, search."""
+def _add_trials(parser: argparse.ArgumentParser) -> None:
+    """Each trial has its own seed and gives the same kinds of results as `pedestal run`. A trial runs all nodes in one
+    process, without ROS. For each of the worst trials a `pedestal run` command is printed, which runs separate nodes
+    and gives the same numbers.
+
+    --vary NODE.KEY=DISTRIBUTION draws a parameter from uniform(low, high), normal(mean, sigma) or choice(a, b, ...).
+    With an x after the distribution, as in normal(1, 0.1)x, the drawn number is a factor of the value of the scenario.
+    The form --vary FILE.csv reads the trials from a file with a column for each parameter and a row for each trial.
+
+    Rows are written to OUTPUT/trials.csv as soon as they exist. Repeat the command to continue after Ctrl-C or a
+    crash. The column `why` of the table holds the verdict on each trial that did not track.
+
+    --side NAME NODE.KEY=VALUE ... adds a side to a comparison and may be repeated. A side is a variant of the scenario
+    with parameters of its own. --against and --against-param add one side. Trial i of all sides has the same seed and
+    drawn values. The side with the best result of --by is printed first.
+
+    --require 'RESULT < LIMIT' prints the share of the trials that meet a criterion, with its 95 % interval. A trial
+    without the result does not meet it.
+
+    --solve NODE.KEY=LOW:HIGH --until 'RESULT = LIMIT' searches for the value of a parameter at which the mean of a
+    result reaches a limit. Without LOW:HIGH the search covers the range of the parameter.
+    """
     arguments.add_scenario(parser)
     parser.add_argument('--runs', type=int, metavar='N', help='number of trials; default: 100, or the rows of a .csv; '
                         'at each value of --solve: 12')
@@ -79,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     console.add_json(parser)
 
 
-def main(options: argparse.Namespace) -> int:
+def _trials(options: argparse.Namespace) -> int:
     """Run the trials, print their statistics, write table, page and rows. Return exit code 0."""
     _check_together(options)
     console.check_json(options.json)
@@ -90,9 +88,9 @@ def _check_together(options: argparse.Namespace) -> None:
     """Raise ValueError for options that exclude or need each other."""
     if bool(options.solve) != bool(options.until):
         raise ValueError(f'--{"solve" if options.solve else "until"}: needs --{"until" if options.solve else "solve"}')
-    for name in ('side', 'against', 'against_param', 'require', 'by'):
-        if options.solve and getattr(options, name):
-            raise ValueError(f'{option_of(name)}: has no effect with --solve')
+    if options.solve:
+        arguments.refuse_given(options, ('side', 'against', 'against_param', 'require', 'by'),
+                               'has no effect with --solve')
 
 
 def _compare(options: argparse.Namespace) -> int:
@@ -244,3 +242,8 @@ def _sensitivity_lines(rows: Iterable[Row], ranking: str) -> list[str]:
     return [f'{row["case"]}: ' * several
             + f'{row["metric"]}: {row_text.number(row["value"])} ({row_text.interval(row)})'
             for row in sorted(found, key=lambda row: -abs(row['value'])**powers[row['metric'].partition('(')[0]])]
+
+
+VERBS = {
+    'trials': Verb(_add_trials, _trials),
+}
