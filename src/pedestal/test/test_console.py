@@ -69,7 +69,7 @@ def test_a_verb_that_computes_nothing_imports_no_compiler(command):
 
 
 def test_a_verb_imports_its_own_module_only():
-    """And the list of the scenarios needs no numpy, so it starts in a third of a second."""
+    """And the list of the scenarios needs no numpy, so it starts in a quarter of a second."""
     code = ('import sys; from pedestal import cli; cli.main(["scenarios"]); print(sorted(name for name in sys.modules '
             'if name.startswith("pedestal.verbs.")), "numpy" in sys.modules, file=sys.stderr)')
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, timeout=60)

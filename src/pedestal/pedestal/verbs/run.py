@@ -13,7 +13,9 @@ from pedestal.verbs.arguments import Verb
 from pedestal_common import parameters
 
 if typing.TYPE_CHECKING:
+    from pedestal_bringup.graph.start import Outcome
     from pedestal_bringup.scenario.scenario import Draft, Scenario
+    from pedestal_recording.bag import Bag
 
 START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
 MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a realtime run, outside announced restarts
@@ -66,7 +68,6 @@ def _run(options: argparse.Namespace) -> int:
     """Run, record and print the results. Return the exit code. Raises RuntimeError for an incomplete recording."""
     from pedestal_bringup.graph import graph, operator_servers
     from pedestal_bringup.scenario.program import Plan
-    from pedestal_common.graph import nodes
     chosen = _chosen(options)
     if chosen is None:
         return 0
@@ -85,24 +86,32 @@ def _run(options: argparse.Namespace) -> int:
     for line in plan.announced():
         print(line)
     outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration), servers)
-    # Because these modules import scipy, which takes half a second, the verb loads them after the run.
-    from pedestal_recording.bag import read
-    from pedestal_recording.verify import verify
-    from pedestal_results import results, tracking, verdict
     if outcome.stopped:
         print(f'pedestal: stopped; the recorded part is in {bag}', file=sys.stderr)
         if not outcome.recorder.get('messages'):
             return stop.STOP_EXIT_CODE
+    # Because this module imports numpy and scipy, which takes half a second, the verb loads it after the run.
+    from pedestal_recording.bag import read
     recording = read(bag)
+    failed = _results(options, chosen, outcome, recording)
+    if outcome.stopped:
+        return stop.STOP_EXIT_CODE
+    if _disturbed(chosen, outcome, recording):
+        return console.EXIT_DISTURBED
+    return console.EXIT_FAILED_RUN if failed else 0
+
+
+def _results(options: argparse.Namespace, chosen: 'Scenario', outcome: 'Outcome', recording: 'Bag') -> bool:
+    """Print verdicts and results of a run and write --json. Return True if the verdict on a beam is a failure."""
+    from pedestal_results import results, tracking, verdict
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     views = [recording.view(beam) for beam in beams]
     runs = [tracking.read(view) for view in views]
     verdicts = [verdict.of(view, run) for view, run in zip(views, runs)]
     parts = [results.of_run(view, run) for view, run in zip(views, runs)]
     of_beams = [results.measured(part) for part in parts]
-    realtime = chosen.header.pacing == 'realtime'
     # whole: results of the run, such as lost steps, in contrast to the results of each beam
-    whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
+    whole = results.measured({'run': outcome, 'supervised': outcome if chosen.header.pacing == 'realtime' else None})
     lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
     for beam, found in zip(beams, verdicts):
         print(f'{beam}: {found.text}' if beam else found.text)
@@ -118,30 +127,34 @@ def _run(options: argparse.Namespace) -> int:
         print('--all prints all results, --explain their definitions')
     if options.explain:
         console.explain(results.RESULTS, shown)
-    print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
+    print(f'{recording.path}  mcap sha256 {outcome.recorder["sha256"]}')
     rows = [row for beam, values in zip(beams, of_beams)
             for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
     console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
                                       'verdicts': {beam: found._asdict() for beam, found in zip(beams, verdicts)},
                                       'mcap_sha256': outcome.recorder['sha256']})
-    if outcome.stopped:
-        return stop.STOP_EXIT_CODE
+    return any(found.failed for found in verdicts)
+
+
+def _disturbed(chosen: 'Scenario', outcome: 'Outcome', recording: 'Bag') -> bool:
+    """Return True, with a line on stderr for each reason, if a realtime run ended early or lost too many steps. Raises
+    RuntimeError for an incomplete recording."""
+    from pedestal_common.graph import nodes
+    from pedestal_recording.verify import verify
     check = verify(recording)
-    if not realtime and check.aborted or not (check.complete or outcome.restarts):
+    if chosen.header.pacing != 'realtime' and check.aborted or not (check.complete or outcome.restarts):
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     if not check.complete:
         print('pedestal: the recording has gaps because a node was restarted:\n' + '\n'.join(check.problems),
               file=sys.stderr)
     planned = chosen.header.duration / chosen.node_parameters(nodes.DRIVE_NODE).period
-    disturbed = [check.ending] if check.aborted else []
+    reasons = [check.ending] if check.aborted else []
     if outcome.losses > MAX_LOST_STEP_SHARE * planned:
-        disturbed.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than '
-                         f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts: {_cure(chosen.header.priority)}')
-    for reason in disturbed:
+        reasons.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than '
+                       f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts: {_cure(chosen.header.priority)}')
+    for reason in reasons:
         print(f'pedestal: {reason}', file=sys.stderr)
-    if disturbed:
-        return console.EXIT_DISTURBED
-    return console.EXIT_FAILED_RUN if any(found.failed for found in verdicts) else 0
+    return bool(reasons)
 
 
 def _cure(priority: int) -> str:

@@ -17,6 +17,7 @@ from pedestal_results import row_text
 if typing.TYPE_CHECKING:
     from pedestal_workbench.trials.plan import Plan
     from pedestal_workbench.trials.statistics import Requirement
+    from pedestal_workbench.trials.table import Table
 
 WORST_TRIAL_COUNT = 10  # number of the worst trials whose commands are printed
 BASE_SIDE = 'base'  # label of the side with the parameters of --param alone, beside labels of --side
@@ -57,6 +58,16 @@ def _add_trials(parser: argparse.ArgumentParser) -> None:
                         'scenario')
     arguments.add_param(parser)
     arguments.add_params_file(parser)
+    _add_questions(parser)
+    arguments.add_workers(parser)
+    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='output folder; default: '
+                        'trials/SCENARIO')
+    console.add_all(parser, 'statistics of all results; default: of the result of --by and of the most important ones')
+    console.add_json(parser)
+
+
+def _add_questions(parser: argparse.ArgumentParser) -> None:
+    """Add sides of a comparison, criteria and search."""
     parser.add_argument('--side', action='append', nargs='+', default=[], metavar=('NAME', 'NODE.KEY=VALUE'),
                         help='side of a comparison: its name, then the parameters that it changes; may be repeated')
     parser.add_argument('--against', metavar='SCENARIO', help='scenario of the second side of a comparison')
@@ -70,11 +81,6 @@ def _add_trials(parser: argparse.ArgumentParser) -> None:
                         'range of the search')
     parser.add_argument('--until', metavar="'RESULT = LIMIT'", help="limit that the mean of a result reaches at the "
                         "value of --solve, for example 'pointing_rms_deg = 0.02'")
-    arguments.add_workers(parser)
-    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='output folder; default: '
-                        'trials/SCENARIO')
-    console.add_all(parser, 'statistics of all results; default: of the result of --by and of the most important ones')
-    console.add_json(parser)
 
 
 def _trials(options: argparse.Namespace) -> int:
@@ -96,24 +102,14 @@ def _check_together(options: argparse.Namespace) -> None:
 def _compare(options: argparse.Namespace) -> int:
     """Run the trials of all sides. Return exit code 0."""
     from pedestal_results import results
-    from pedestal_workbench.trials import comparison, ensemble, monte_carlo, statistics, trials_page
+    from pedestal_workbench.trials import comparison, statistics, trials_page
     plans, labels, files = _sides(options)
     known = _result_names(plans[0])
     required = [statistics.requirement(text, known) for text in options.require]
     if options.by:
         statistics.check_result(f'--by {options.by}', options.by, known)
     folder = options.output or pathlib.Path('trials', plans[0].name)
-    with contextlib.ExitStack() as stack:
-        tables = [stack.enter_context(ensemble.open_table(plan, folder, file)) for plan, file in zip(plans, files)]
-        pool = stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))
-        progress = stack.enter_context(console.progress_of_trials())
-        try:
-            ensemble.run_missing_trials(plans, tables, pool, progress)
-        except KeyboardInterrupt:
-            done = sum(table.count_in_file for table in tables)
-            print(f'pedestal: {done} of {sum(plan.runs for plan in plans)} trials are in {folder}; the same command '
-                  'continues', file=sys.stderr)
-            raise
+    tables = _tables(options, plans, files, folder)
     # differences: parameters in which the sides differ; names: label of a side, else these; full: both
     differences = comparison.names(*plans)
     names = [label or text for label, text in zip(labels, differences)]
@@ -148,14 +144,36 @@ def _compare(options: argparse.Namespace) -> int:
                         None if options.all else shown_names)
     if sensitivities := _sensitivity_lines(rows, by):
         print('\n'.join(sensitivities))
-    print(f'the worst trials by {ranking}:')
-    values, whys = tables[0].column(ranking), tables[0].text(statistics.why_column(ranking))
-    for i in shown.worst:
-        value = row_text.number(values[i] if math.isfinite(values[i]) else None)
-        print(f'{value:>10}  {plans[0].command(i)}' + (f'  # {whys[i]}' if whys[i] else ''))
+    print(f'the worst trials by {ranking}:', *_worst_lines(plans[0], tables[0], ranking, shown.worst), sep='\n')
     print(f'table {tables[0].file}, page {file}' + ('' if options.all else '; --all prints all results'))
     console.write_json(options.json, {'name': plans[0].name, 'rows': rows})
     return 0
+
+
+def _tables(options: argparse.Namespace, plans: 'Sequence[Plan]', files: Iterable[str],
+            folder: pathlib.Path) -> 'list[Table]':
+    """Run the trials that are not yet in the tables of a folder, and return the tables, one for each plan."""
+    from pedestal_workbench.trials import ensemble, monte_carlo
+    with contextlib.ExitStack() as stack:
+        tables = [stack.enter_context(ensemble.open_table(plan, folder, file)) for plan, file in zip(plans, files)]
+        pool = stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))
+        progress = stack.enter_context(console.progress_of_trials())
+        try:
+            ensemble.run_missing_trials(plans, tables, pool, progress)
+        except KeyboardInterrupt:
+            done = sum(table.count_in_file for table in tables)
+            print(f'pedestal: {done} of {sum(plan.runs for plan in plans)} trials are in {folder}; the same command '
+                  'continues', file=sys.stderr)
+            raise
+    return tables
+
+
+def _worst_lines(plan: 'Plan', table: 'Table', ranking: str, worst: Iterable[int]) -> list[str]:
+    """Return a line for each of the worst trials: its result, its command and the verdict on it."""
+    from pedestal_workbench.trials import statistics
+    values, whys = table.column(ranking), table.text(statistics.why_column(ranking))
+    return [f'{row_text.number(values[i] if math.isfinite(values[i]) else None):>10}  {plan.command(i)}'
+            + (f'  # {whys[i]}' if whys[i] else '') for i in worst]
 
 
 def _solve(options: argparse.Namespace) -> int:
