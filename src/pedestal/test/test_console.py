@@ -68,6 +68,12 @@ def test_a_verb_that_computes_nothing_imports_no_compiler(command):
     assert (done.returncode, done.stderr) == (0, '')
 
 
+def test_a_list_without_rows_is_empty(capsys):
+    """As of `recompute --explain` without --param, which has no results to explain."""
+    console.show_list([])
+    assert capsys.readouterr().out == ''
+
+
 def test_a_verb_imports_its_own_module_only():
     """And the list of the scenarios needs no numpy, so it starts in a quarter of a second."""
     code = ('import sys; from pedestal import cli; cli.main(["scenarios"]); print(sorted(name for name in sys.modules '
