@@ -51,8 +51,9 @@ def typed(kind: type[_Options], options: argparse.Namespace, **more: object) -> 
 
     more: values of fields that are no options.
     """
-    return kind(**{field.name: getattr(options, field.name)
-                   for field in dataclasses.fields(kind) if field.name not in more}, **more)    # type: ignore[arg-type]
+    given = {field.name: getattr(options, field.name)
+             for field in dataclasses.fields(kind) if field.name not in more}   # type: ignore[arg-type]  # a dataclass
+    return kind(**given, **more)
 
 
 def add_scenario(parser: argparse.ArgumentParser) -> None:
