@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from pedestal import cli, samples
+from pedestal import cli
 from pedestal.verbs import arguments
 from pedestal_bringup.scenario import scenario
 
@@ -67,8 +67,8 @@ def test_an_option_without_effect_is_refused(arguments, message, capsys, one_lin
 
 
 def test_elements_are_given_once(tmp_path, capsys, one_line):
+    assert cli.main(['samples', str(tmp_path)]) == 0
     file = tmp_path / 'iss.tle'
-    file.write_text(samples.tle())
     assert cli.main(['mode', 'tle', 'line_1=x', '--tle', str(file)]) == 1
     assert f'--tle {file}: line_1 is given twice' in one_line(capsys.readouterr().err)
 

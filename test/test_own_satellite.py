@@ -8,7 +8,7 @@ import yaml
 
 from acu_tracker.modes import Mode
 from pedestal import cli, satellite
-from pedestal.verbs.antenna import run as run_verb
+from pedestal.verbs import run as run_verb
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag as bags

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pedestal import cli
-from pedestal.verbs.antenna import ask
+from pedestal.verbs import operate
 from pedestal_recording import bag as bags
 from pedestal_results import beam_direction, tdm, tracking
 
@@ -55,10 +55,10 @@ def test_a_parameter_file_gives_the_arguments_of_the_command(tmp_path):
     path = tmp_path / 'north.yaml'
     path.write_text('/**/acu:\n  ros__parameters:\n    pointing.p1: 0.3\n    pointing: {file: north.yaml, date: ""}\n'
                     '    initial_mode: stop\n/**/adu:\n  ros__parameters: {stow_pins: true}\n')
-    assert ask.pointing_model(path) == {'p1': 0.3, 'file': 'north.yaml'}
+    assert operate.pointing_model(path) == {'p1': 0.3, 'file': 'north.yaml'}
     path.write_text('/**/adu:\n  ros__parameters: {stow_pins: true}\n')
     with pytest.raises(ValueError, match='has no parameter pointing'):
-        ask.pointing_model(path)
+        operate.pointing_model(path)
 
 
 def test_a_run_refuses_a_model_of_the_future(capsys):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pedestal_bringup.loop import closed_loop
-from pedestal_bringup.scenario import files, scenario
+from pedestal_bringup.scenario import scenario, shipped
 
 NEEDS_FILE = {'track_file'}
 OTHER = {'NPY_DISABLE_CPU_FEATURES': 'X86_V3 X86_V4', 'OPENBLAS_CORETYPE': 'Prescott',
@@ -26,7 +26,7 @@ def numbers(memory):
 
 
 def print_digests():
-    for name in sorted(set(files.available()) - NEEDS_FILE):
+    for name in sorted(set(shipped.available()) - NEEDS_FILE):
         for node, unit in closed_loop.Loop(scenario.load(name, duration=2.0)).units.items():
             print(name, node, hashlib.sha256(numbers(unit.memory)).hexdigest())
 

@@ -12,10 +12,12 @@ import sys
 import pytest
 
 import pedestal
-from pedestal import cli, samples
+from pedestal import cli
 from pedestal.console import EXIT_DISTURBED
+from pedestal.verbs import design
 from pedestal_bringup.scenario import files, scenario
 from pedestal_workbench.trials import plan as trial_plans
+from tracking_receiver_sim.params import LeoPassParameters
 
 pytestmark = pytest.mark.every_case
 
@@ -80,7 +82,7 @@ def test_readme_runs_in_its_own_order(reserve_domain, tmp_path, capsys):
                           env={**os.environ, 'ROS_DOMAIN_ID': str(reserve_domain())})
     assert done.returncode == 0, done.stderr[-3000:]
     assert (tmp_path / 'my_flyby' / 'report.html').is_file() and (tmp_path / 'studies' / 'servo').is_dir()
-    assert all((tmp_path / name).is_file() for name in samples.SAMPLE_FILES)
+    assert all((tmp_path / name).is_file() for name in design.SAMPLE_FILES)
     with capsys.disabled():
         for line in README:
             if of_table(line, NOT_RUN):
@@ -188,6 +190,16 @@ def test_every_change_of_a_docstring_changes_something(module):
             code = '\n'.join(example.source for example in doctest.DocTestParser().get_examples(text))
             found += without_effect([*documented_changes(text), *changes_of_code(code)])
     assert found == []
+
+
+def test_samples_are_the_files_of_the_package(tmp_path):
+    """Byte by byte; the elements are those of the scenario leo_pass."""
+    assert cli.main(['samples', str(tmp_path)]) == 0
+    shipped = pathlib.Path(pedestal.__file__).parent / 'samples'
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {
+        name: (shipped / name).read_bytes() for name in design.SAMPLE_FILES}
+    default = LeoPassParameters()
+    assert (tmp_path / 'iss.tle').read_text() == f'ISS (ZARYA)\n{default.line_1}\n{default.line_2}\n'
 
 
 def test_samples_are_never_overwritten(tmp_path, capsys, one_line):

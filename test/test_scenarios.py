@@ -5,7 +5,7 @@ import pytest
 
 from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
-from pedestal_bringup.scenario import files, scenario
+from pedestal_bringup.scenario import scenario, shipped
 
 pytestmark = pytest.mark.every_case
 
@@ -17,7 +17,7 @@ OF_THEIR_WHOLE_LENGTH = ('ship_overhead', 'ship_align_and_track', 'late_tle', 's
 """Runs of seconds say nothing about these; test_ship, test_acquisition, test_data_sheet, test_pointing_collect,
 test_pointing_scan and test_receiver_calibration make them."""
 
-TRACKED = [name for name in files.available()
+TRACKED = [name for name in shipped.available()
            if not name.startswith('servo_') and name not in OF_THEIR_WHOLE_LENGTH]
 
 

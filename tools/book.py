@@ -47,13 +47,13 @@ def parameter_page():
 def verb_page():
     """Return the lines of the page of verbs: purpose and options of every verb, as its --help prints them."""
     lines = ['# Verbs', '', 'The help texts that `pedestal VERB --help` prints.']
-    for name in cli.VERBS:
-        verb = cli.module_of(name)
-        summary, _, more = inspect.cleandoc(verb.__doc__).partition('\n\n')
+    for name, (_, summary) in cli.VERBS.items():
+        verb = cli.found(name)
         parser = argparse.ArgumentParser(prog=f'pedestal {name}', add_help=False,
                                          formatter_class=lambda prog: argparse.HelpFormatter(prog, width=100))
         verb.add_arguments(parser)
-        lines += ['', f'## {name}', '', f'{summary[0].upper()}{summary[1:]}.', '', more, '', '```',
+        lines += ['', f'## {name}', '', f'{summary[0].upper()}{summary[1:]}.', '',
+                  inspect.getdoc(verb.add_arguments) or '', '', '```',
                   *parser.format_help().rstrip().splitlines(), '```']
     return lines
 

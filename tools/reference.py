@@ -15,7 +15,7 @@ from acu_tracker.alarms import table as alarms
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from adu_drive.controller import faults
 from pedestal import console
-from pedestal_bringup.scenario import files
+from pedestal_bringup.scenario import shipped
 from pedestal_bringup.scenario.sections import parameters_of
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
@@ -156,7 +156,7 @@ def alarm_table():
 
 def scenario_table():
     """Return the table of the scenarios that come with the product."""
-    return _table(('scenario', 'events'), [(f'`{name}`', title) for name, title in files.available().items()])
+    return _table(('scenario', 'events'), [(f'`{name}`', title) for name, title in shipped.available().items()])
 
 
 def study_table():

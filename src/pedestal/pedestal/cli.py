@@ -1,7 +1,7 @@
 """Command line `pedestal`: the parser of the arguments, and the call of the verb that the user names.
 
-A verb, such as `run`, is a module in `verbs`. The docstring of the module is the help of the verb. Its function
-`add_arguments(parser)` adds the arguments, and its function `main(options)` does the work and returns the exit code.
+A verb, such as `run`, is a row of VERBS, and a row of VERBS in a module of the package `verbs`. Only the module of the
+named verb is imported.
 """
 from pedestal import stop  # first, because a signal during the imports below must end the process with its message
 
@@ -9,32 +9,55 @@ from pedestal import stop  # first, because a signal during the imports below mu
 import argparse
 import contextlib
 import importlib
-import importlib.metadata
 import os
 import re
 import shlex
 import sys
-import types
-from collections.abc import Sequence
+import typing
+from collections.abc import Container, Sequence
 
 from pedestal.console import STDOUT_PATH
-from pedestal_common.parameters import ParameterError, did_you_mean
 
-VERBS = {'run': 'antenna', 'scenarios': 'design', 'samples': 'design', 'new': 'design', 'parameters': 'design',
-         'status': 'antenna', 'mode': 'antenna', 'ask': 'antenna', 'operate': 'antenna', 'live': 'antenna',
-         'program': 'antenna', 'simulate': 'simulation', 'verify': 'recordings', 'recover': 'recordings',
-         'rerun': 'recordings', 'report': 'recordings', 'study': 'design', 'trials': 'design',
-         'export': 'recordings', 'recompute': 'recordings', 'tune': 'design', 'calibrate': 'calibration',
-         'replay': 'recordings', 'bench': 'design'}
-"""{verb: its package in `verbs`}, in the order of the help."""
+if typing.TYPE_CHECKING:
+    from pedestal.verbs.arguments import Verb
 
+VERBS = {
+    'run': ('run', 'run a scenario as separate nodes and record it'),
+    'scenarios': ('design', 'list the scenarios that come with this package'),
+    'samples': ('design', 'write sample files: a flight log, a ship log, a satellite, an antenna'),
+    'new': ('design', 'write a scenario of your own antenna from the numbers of its data sheet'),
+    'parameters': ('design', 'list the parameters of a node: default, range, unit, meaning'),
+    'status': ('operate', 'print the state of a running antenna'),
+    'mode': ('operate', 'set the mode of a running antenna control unit (ACU)'),
+    'ask': ('operate', 'send a command to a running node'),
+    'operate': ('operate', 'operate a running antenna by hand on this terminal'),
+    'live': ('operate', 'show a running graph in Foxglove or Lichtblick'),
+    'program': ('operate', 'send a table of times and angles (program track) of a scenario to a running ACU'),
+    'simulate': ('simulate', 'simulate equipment as a program of its own, to rehearse with'),
+    'verify': ('recordings', 'prove that a recording is complete up to the planned end of its run'),
+    'recover': ('recordings', 'make a readable bag from the undamaged part of a bag'),
+    'rerun': ('recordings', 'repeat a recorded run and compare the two recordings'),
+    'report': ('recordings', 'write a recording as one HTML file with its figures'),
+    'study': ('design', 'repeat the experiments of the source papers and compare the numbers'),
+    'trials': ('trials', 'run a scenario many times with varied parameters, and print statistics and the worst '
+               'trials'),
+    'export': ('recordings', 'write a recording as one table per topic, CSV or Parquet, or its tracking data as a '
+               'CCSDS TDM'),
+    'recompute': ('recordings', 'feed recorded inputs to a node again and compare its outputs'),
+    'tune': ('design', 'tune a filter, the feed-forward, or the loops of your own plant'),
+    'calibrate': ('calibrate', 'calibrate an antenna from measurements: each step is a verb of its own'),
+    'replay': ('recordings', 'publish a recording into a running graph'),
+    'bench': ('design', 'measure the speed of this machine: nodes in lockstep, compiled control laws, recordings'),
+}
+"""{verb: (module of `verbs` that holds it, first line of its help)}, in the order of the help."""
 
 NEGATIVE_NUMBER_PATTERN = re.compile(r'-\.?\d')  # beginning of an argument that is a negative number
 
 
-def module_of(verb: str) -> types.ModuleType:
-    """Return the module of a verb."""
-    return importlib.import_module(f'pedestal.verbs.{VERBS[verb]}.{verb}')
+def found(name: str) -> 'Verb':
+    """Return the verb of a name. This imports its module, and no other module of `verbs`."""
+    verb: Verb = importlib.import_module(f'pedestal.verbs.{VERBS[name][0]}').VERBS[name]
+    return verb
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -43,11 +66,13 @@ def main(args: Sequence[str] | None = None) -> int:
     Return its exit code: 0; 1 with a line on stderr for an error; 2 for a wrong command line; 130 after a stop.
     """
     given = sys.argv[1:] if args is None else args
-    parser = _parser(next((word for word in given if word in VERBS), ''))
+    named = next((word for word in given if word in VERBS), None)
+    parser = _parser(() if named is None else (named,))
     if not given:
         parser.print_help()
         return 0
     if given[0][:1] not in ('-', '') and given[0] not in VERBS:
+        from pedestal_common.parameters import did_you_mean
         parser.error(f"no verb '{given[0]}':{did_you_mean(given[0], VERBS)} pedestal --help lists the verbs")
     options = parser.parse_args(given)
     options.command = shlex.join(('pedestal', *given))
@@ -63,7 +88,7 @@ def main(args: Sequence[str] | None = None) -> int:
         # avoids a second error when Python writes its buffers at its exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (ParameterError, ValueError, RuntimeError, OSError) as error:
+    except (ValueError, RuntimeError, OSError) as error:
         print(f'pedestal: error: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -107,20 +132,27 @@ class Parser(argparse.ArgumentParser):
         return namespace
 
 
-def _parser(named: str = '') -> argparse.ArgumentParser:
-    """Return the parser of the command line with all verbs. named: the only verb that gets its arguments, because the
-    arguments of `run` import the code of a graph; '' for all."""
-    parser = Parser(prog='pedestal', description='Run, record and analyse the control system of a tracking antenna.')
-    parser.add_argument('--version', action='version', version=f'pedestal {importlib.metadata.version("pedestal")}')
+class _Version(argparse.Action):
+    """Option --version. It looks the version up only when it is given, because the look-up is slow."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        import importlib.metadata
+        print(f'pedestal {importlib.metadata.version("pedestal")}')
+        parser.exit()
+
+
+def _parser(named: Container[str] = VERBS) -> argparse.ArgumentParser:
+    """Return the parser of the command line. Only the verbs in `named` get their arguments, because these import the
+    module of the verb."""
+    parser: argparse.ArgumentParser = Parser(
+        prog='pedestal', description='Run, record and analyse the control system of a tracking antenna.')
+    parser.add_argument('--version', action=_Version, nargs=0, help="show program's version number and exit")
     verbs = parser.add_subparsers(title='verbs', required=True, metavar='VERB')
-    for name in VERBS:
-        verb = module_of(name)
-        description = (verb.__doc__ or '').strip()
-        verb_parser = verbs.add_parser(name, help=description.partition('\n\n')[0], description=description,
-                                       formatter_class=argparse.RawDescriptionHelpFormatter)
-        if named in ('', name):
-            verb.add_arguments(verb_parser)
-        verb_parser.set_defaults(main=verb.main)
+    for name, (_, line) in VERBS.items():
+        if name in named:
+            found(name).add_to(verbs, name, line)
+        else:
+            verbs.add_parser(name, help=line)
     return parser
 
 

@@ -147,6 +147,8 @@ def show_list(rows: Iterable[Sequence[str]]) -> None:
     On a terminal the sentence is wrapped to the width of the terminal. In a pipe a row is one line.
     """
     rows = list(rows)
+    if not rows:
+        return
     widths = [min(max(len(row[i]) for row in rows), MAX_CELL_COLUMNS if i else MAX_NAME_COLUMNS)
               for i in range(len(rows[0]) - 1)]
     indent = sum(widths) + 2 * len(widths)

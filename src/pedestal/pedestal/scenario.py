@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pedestal_bringup.scenario import files
+from pedestal_bringup.scenario import files, shipped
 from pedestal_bringup.scenario import scenario as bringup
 from pedestal_common.parameters import Parameters, as_dict, flatten
 from pedestal_common.quantities import Seconds
@@ -22,7 +22,7 @@ def scenarios() -> dict[str, str]:
     >>> 'leo_pass' in pedestal.scenarios()
     True
     """
-    return files.available()
+    return shipped.available()
 
 
 def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None, *, duration: float | None = None,

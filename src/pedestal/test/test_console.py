@@ -1,4 +1,5 @@
 """Lists on terminals of all widths, and in a pipe."""
+import importlib
 import os
 import signal
 import subprocess
@@ -65,6 +66,27 @@ def test_a_verb_that_computes_nothing_imports_no_compiler(command):
             'sys.stderr.write(", ".join({"numba", "rclpy", "scipy"} & set(sys.modules)))')
     done = subprocess.run([sys.executable, '-c', code, *command], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (0, '')
+
+
+def test_a_list_without_rows_is_empty(capsys):
+    """As of `recompute --explain` without --param, which has no results to explain."""
+    console.show_list([])
+    assert capsys.readouterr().out == ''
+
+
+def test_a_verb_imports_its_own_module_only():
+    """And the list of the scenarios needs no numpy, so it starts in a quarter of a second."""
+    code = ('import sys; from pedestal import cli; cli.main(["scenarios"]); print(sorted(name for name in sys.modules '
+            'if name.startswith("pedestal.verbs.")), "numpy" in sys.modules, file=sys.stderr)')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, timeout=60)
+    assert done.stderr == "['pedestal.verbs.arguments', 'pedestal.verbs.design'] False\n"
+
+
+def test_every_verb_is_in_both_tables():
+    modules = {module for module, _ in cli.VERBS.values()}
+    rows = [(name, module) for module in modules
+            for name in importlib.import_module(f'pedestal.verbs.{module}').VERBS]
+    assert sorted(rows) == sorted((name, module) for name, (module, _) in cli.VERBS.items())
 
 
 @pytest.mark.parametrize('code, without', [

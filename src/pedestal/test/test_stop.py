@@ -11,7 +11,7 @@ import signal
 import time
 
 from pedestal import cli
-from pedestal.verbs.design import samples
+from pedestal.verbs import design
 
 class Module:
     def __del__(self):
@@ -22,7 +22,7 @@ def main(options):
     time.sleep(20.0)
     print('went on')
 
-samples.main = main
+design.VERBS['samples'] = design.VERBS['samples']._replace(main=main)
 raise SystemExit(cli.main(['samples']))
 """
 
@@ -43,7 +43,7 @@ def hook(cls, module, code):
 
 JITCodeLibrary._object_compiled_hook = classmethod(hook)    # before numba makes its code generator
 from pedestal import cli
-from pedestal.verbs.design import samples
+from pedestal.verbs import design
 from pedestal_common.compiled import compiled
 
 @compiled
@@ -56,7 +56,7 @@ def main(options):
     time.sleep(20.0)
     print('went on')
 
-samples.main = main
+design.VERBS['samples'] = design.VERBS['samples']._replace(main=main)
 raise SystemExit(cli.main(['samples']))
 """
 

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from pedestal_bringup.scenario import files, scenario
+from pedestal_bringup.scenario import scenario, shipped
 from pedestal_bringup.scenario.program import Plan
 from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_common import parameters
@@ -80,7 +80,7 @@ def test_the_default_limits_of_the_control_unit_are_those_of_the_drive():
 
 
 def test_every_scenario_keeps_its_limits():
-    assert [name for name in files.available() if scenario.load(name).notes] == []
+    assert [name for name in shipped.available() if scenario.load(name).notes] == []
 
 
 def test_a_stow_angle_that_the_drive_does_not_reach_is_refused_with_both_limits():

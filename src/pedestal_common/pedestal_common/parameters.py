@@ -2,6 +2,8 @@
 
 node/shell.py declares these parameters in ROS and refuses wrong values. No ROS here.
 """
+from __future__ import annotations
+
 import dataclasses
 import difflib
 import functools
@@ -10,9 +12,8 @@ import operator
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
-import numpy as np
-
-from pedestal_common.quantities import DType, Records, Value
+if typing.TYPE_CHECKING:    # numpy is slow to import, and `pedestal scenarios` needs none
+    from pedestal_common.quantities import DType, Records, Value
 
 Field: typing.TypeAlias = 'dataclasses.Field[Value]'     # one parameter of a dataclass
 _N = typing.TypeVar('_N', bound=float)
@@ -48,7 +49,7 @@ def text(default: str, doc: str) -> str:
     return dataclasses.field(default=default, metadata={'doc': doc})
 
 
-def group(cls: 'type[_P]', **changes: Value) -> '_P':
+def group(cls: type[_P], **changes: Value) -> _P:
     """Declare a nested dataclass, with some of its defaults changed."""
     return dataclasses.field(default_factory=lambda: cls(**changes), metadata={'group': True})
 
@@ -170,7 +171,7 @@ def as_dict(instance: Parameters, prefix: str = '') -> dict[str, Value]:
 
 
 def option_of(name: str) -> str:
-    """Return the option of a name in the namespace of argparse: --params-file for params_file."""
+    """Return the option of a field of options: --params-file for params_file."""
     return f'--{name.replace("_", "-")}'
 
 
@@ -243,6 +244,7 @@ def record_type(cls: type[Parameters]) -> DType:
             fields.append((field.name, 'i8'))
         elif hints[field.name] is float:
             fields.append((field.name, 'f8'))
+    import numpy as np
     return np.dtype(fields, align=True)
 
 
@@ -265,4 +267,5 @@ def record(instance: Parameters, cls: type[Parameters] | None = None) -> Records
     cls: base class of the instance, whose fields alone are in the record; None: all fields of the instance.
     """
     cls = cls or type(instance)
+    import numpy as np
     return np.array([_record_values(instance, cls)], record_type(cls))

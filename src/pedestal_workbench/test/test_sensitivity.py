@@ -1,5 +1,4 @@
 """Beam cut and G/T: against a computed beam and disk, an antenna of known G/T, and the simulated receiver."""
-import argparse
 import csv
 import json
 import math
@@ -16,8 +15,6 @@ from pedestal_workbench.calibration.sensitivity import beam, levels, sensitivity
 G_OVER_T_DB_K, FLUX_SFU, FREQUENCY_GHZ, DIAMETER_DEG = 31.0, 300.0, 8.5, 0.53
 """An antenna of 7 m at X band, and the quiet sun."""
 WIDTH, PLACE = np.array((0.36, 0.34)), np.array((0.02, -0.03))
-NO_OPTIONS = argparse.Namespace(flux=None, frequency=None, diameter=None, bandwidth=None, attenuation=None,
-                                elevation=None)
 
 
 def measured(noise, seed=0, diameter=DIAMETER_DEG, width=WIDTH):
@@ -84,7 +81,7 @@ def test_the_verb_finds_beamwidth_squint_and_g_over_t(tmp_path, capfd):
 
 def test_the_intervals_hold_the_truth(tmp_path):
     """In 95 % of 30 noisy rasters, within the spread of such a share."""
-    inside, options = [], argparse.Namespace(**{**vars(NO_OPTIONS), 'flux': FLUX_SFU, 'frequency': FREQUENCY_GHZ})
+    inside, options = [], sensitivity.SensitivityOptions(flux=FLUX_SFU, frequency=FREQUENCY_GHZ)
     for seed in range(30):
         found = sensitivity.calibrate(levels.read(write(tmp_path / 'x.csv', measured(0.02, seed))), options)
         rows = {row['metric']: row for row in sensitivity.rows(found)}
@@ -163,7 +160,8 @@ def test_the_beam_of_the_simulated_receiver():
         'tracking_receiver.receiver.cn0_dbhz=60',
         f'tracking_receiver.antenna.boresight_cross_elevation={boresight[0]}',
         f'tracking_receiver.antenna.boresight_elevation={boresight[1]}'), duration=45.0)
-    found = sensitivity.calibrate(levels.of_recording(memory_recording.record(chosen), 'raster'), NO_OPTIONS)
+    found = sensitivity.calibrate(levels.of_recording(memory_recording.record(chosen), 'raster'),
+                                  sensitivity.SensitivityOptions())
     print(sensitivity.lines(found))
     made = sensitivity.parameters(found)
     assert made['tracking_receiver']['antenna.beamwidth'] == pytest.approx(width, rel=0.02)

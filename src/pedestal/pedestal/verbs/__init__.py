@@ -1,1 +1,1 @@
-"""Verbs of `pedestal`, a module each with `add_arguments` and `main`."""
+"""Verbs of `pedestal`, a module for each theme. Its table VERBS has a row (arguments, work) for each of its verbs."""

@@ -1,11 +1,12 @@
 """Arguments that several verbs of the command line share: their definition, and the check of their values."""
 import argparse
+import dataclasses
+import inspect
 import itertools
 import os
 import pathlib
-import types
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from pedestal import console
 from pedestal_common.parameters import option_of
@@ -14,19 +15,45 @@ if typing.TYPE_CHECKING:
     from pedestal_operator.remote_node import RemoteSession
     from pedestal_recording.recording import Recording
 
+    Verbs: typing.TypeAlias = 'argparse._SubParsersAction[argparse.ArgumentParser]'
 
-def add_subcommands(parser: argparse.ArgumentParser, title: str, modules: Mapping[str, types.ModuleType]) -> None:
-    """Add a subcommand for each module; its main function is the value `subcommand` of the options.
 
-    title: noun for the help; modules: {name: module with a docstring, add_arguments and main}.
+class Verb(typing.NamedTuple):
+    """Verb of the command line, or step of a verb. The docstring of `add_arguments` is its help, below the line in the
+    table of the verbs."""
+    add_arguments: Callable[[argparse.ArgumentParser], None]
+    main: Callable[[argparse.Namespace], int] | None = None     # does the work and returns the exit code; None: a step
+                                                                # of the verb does
+
+    def add_to(self, verbs: 'Verbs', name: str, line: str) -> None:
+        """Add the parser of this verb to those of other verbs. line: first line of its help."""
+        description = '\n\n'.join(filter(None, (line, inspect.getdoc(self.add_arguments))))
+        parser = verbs.add_parser(name, help=line, description=description,
+                                  formatter_class=argparse.RawDescriptionHelpFormatter)
+        self.add_arguments(parser)
+        if self.main:
+            parser.set_defaults(main=self.main)
+
+
+def add_steps(parser: argparse.ArgumentParser, title: str, steps: Mapping[str, tuple[str, Verb]]) -> None:
+    """Add a subcommand for each step of a verb. title: noun for the help; steps: {name: (first line of its help,
+    step)}."""
+    verbs = parser.add_subparsers(title=title, required=True, metavar=title.upper())
+    for name, (line, step) in steps.items():
+        step.add_to(verbs, name, line)
+
+
+_Options = typing.TypeVar('_Options')
+
+
+def typed(kind: type[_Options], options: argparse.Namespace, **more: object) -> _Options:
+    """Return the options dataclass of a function, whose fields have the names of the options.
+
+    more: values of fields that are no options.
     """
-    found = parser.add_subparsers(title=title, required=True, metavar=title.upper())
-    for name, module in modules.items():
-        description = (module.__doc__ or '').strip()
-        subparser = found.add_parser(name, help=description.partition('\n\n')[0], description=description,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-        module.add_arguments(subparser)
-        subparser.set_defaults(subcommand=module.main)
+    given = {field.name: getattr(options, field.name)
+             for field in dataclasses.fields(kind) if field.name not in more}   # type: ignore[arg-type]  # a dataclass
+    return kind(**given, **more)
 
 
 def add_scenario(parser: argparse.ArgumentParser) -> None:
@@ -158,9 +185,8 @@ def changes(options: argparse.Namespace) -> list[str]:
 
 def check_recording(options: argparse.Namespace) -> None:
     """Raise ValueError for parameters with --bag, whose run is over."""
-    for name in ('param', 'params_file'):
-        if options.bag is not None and getattr(options, name):
-            raise ValueError(f'{option_of(name)}: has no effect with --bag')
+    if options.bag is not None:
+        refuse_given(options, ('param', 'params_file'), 'has no effect with --bag')
 
 
 def recording(options: argparse.Namespace) -> 'tuple[Recording, str]':
@@ -185,11 +211,12 @@ def add_result_files(parser: argparse.ArgumentParser, output: str, report: str) 
     console.add_json(parser)
 
 
-def refuse_unused(options: argparse.Namespace, names: Iterable[str], other: str) -> None:
-    """Raise ValueError for a given option that has no effect with the option `other`; names: those options."""
+def refuse_given(options: argparse.Namespace, names: Iterable[str], reason: str) -> None:
+    """Raise ValueError for a given option of some names, with the reason, such as 'has no effect with --bag'."""
     for name in names:
-        if getattr(options, name) is not None:
-            raise ValueError(f'{option_of(name)}: has no effect with {option_of(other)}')
+        value = getattr(options, name)
+        if not (value is None or value is False or value == []):
+            raise ValueError(f'{option_of(name)}: {reason}')
 
 
 def check_result_files(options: argparse.Namespace, *more: str) -> None:

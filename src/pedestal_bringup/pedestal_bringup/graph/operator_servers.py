@@ -3,7 +3,6 @@
 `pedestal run` starts the requested servers beside a realtime run. Each server is a node of its own that uses only the
 topics of the graph.
 """
-import argparse
 import contextlib
 import importlib.util
 import sys
@@ -48,16 +47,6 @@ SERVERS = {'rotctld': Server('pedestal_operator.rotctld_node', 'rotctld_node', 4
                             'publish robot_description and tf, for RViz')}
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add an option for each server to a parser, such as --rotctld [PORT]."""
-    for name, server in SERVERS.items():
-        if server.port:
-            parser.add_argument(f'--{name}', nargs='?', type=port, const=server.port, metavar='PORT',
-                                help=f'in realtime: {server.does} on {SERVER_ADDRESS}; default port: {server.port}')
-        else:
-            parser.add_argument(f'--{name}', action='store_const', const=0, help=f'in realtime: {server.does}')
-
-
 def port(text: str) -> int:
     """Return the TCP port that the text of an option states. Raises ValueError outside 1 to 65535."""
     port = int(text)
@@ -87,9 +76,8 @@ def check(ports: Mapping[str, int], header: ScenarioParameters, option: str = '-
                 raise ValueError(f'{requested}: {error}: {option.format(name)}PORT selects another port') from None
 
 
-def selected(options: argparse.Namespace, header: ScenarioParameters) -> dict[str, ServerProcess]:
-    """Return {name: process} of the servers that the options request. Raises ValueError, see `check`."""
-    ports = {name: getattr(options, name) for name in SERVERS if getattr(options, name) is not None}
+def processes(ports: Mapping[str, int], header: ScenarioParameters) -> dict[str, ServerProcess]:
+    """Return {name: process} of servers. ports: {name: TCP port, 0 without one}. Raises ValueError, see `check`."""
     check(ports, header)
     return {name: ServerProcess(
         [sys.executable, '-m', SERVERS[name].module, '--ros-args', '-p', f'graph.beams:={header.graph_beams}',

@@ -1,13 +1,12 @@
 """Texts of a scenario: its file, other ROS 2 parameter files, and changes 'node.key=value' of the option --param."""
 import contextlib
-import importlib.resources
 import json
 import pathlib
-import typing
 from collections.abc import Mapping
 
 import yaml
 
+from pedestal_bringup.scenario import shipped
 from pedestal_bringup.scenario.sections import (
     SECTION_NODES,
     ScenarioError,
@@ -21,24 +20,6 @@ from pedestal_common.graph import nodes
 from pedestal_common.quantities import Value
 from pedestal_common.text_files import files, parameter_file, plain_yaml
 
-if typing.TYPE_CHECKING:
-    from importlib.abc import Traversable
-
-
-def _folder() -> 'Traversable':
-    """Return the folder of the scenarios that come with the product."""
-    return importlib.resources.files('pedestal_bringup') / 'scenarios'
-
-
-def available() -> dict[str, str]:
-    """Return {name: title} of the scenarios that come with the product."""
-    titles = {}
-    for entry in sorted(_folder().iterdir(), key=lambda entry: entry.name):
-        if entry.name.endswith('.yaml'):
-            sections = plain_yaml.parse(entry.read_text())
-            titles[entry.name[:-5]] = sections['scenario']['ros__parameters']['title']
-    return titles
-
 
 def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
     """Return (name, YAML text) of a scenario that comes with the product, or of a .yaml file. Raises ScenarioError."""
@@ -49,9 +30,9 @@ def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
         except (OSError, UnicodeDecodeError) as error:
             raise ScenarioError(f'scenario file {path}: {plain_yaml.problem(error)}') from None
     name = str(name_or_path)
-    entry = _folder() / f'{name}.yaml'
+    entry = shipped.folder() / f'{name}.yaml'
     if not entry.is_file():
-        names = list(available())
+        names = list(shipped.available())
         raise ScenarioError(f'unknown scenario {name!r};{parameters.did_you_mean(name, names)} there are '
                             f'{", ".join(names)} (or give a path that ends in .yaml)')
     return name, entry.read_text()

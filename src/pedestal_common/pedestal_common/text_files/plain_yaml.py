@@ -5,14 +5,19 @@ parameter which is a number refuses them. A section has each key once. Tags are 
 parameter file, because rcl refuses them. Where aliases are accepted, MAX_VALUES counts them with all their values. A
 few lines can therefore not stand for billions of values.
 """
+from __future__ import annotations
+
 import re
+import typing
 from collections.abc import Iterable
 
 import yaml
 
-from pedestal_common.quantities import Json
 from pedestal_common.text_files import files
 from pedestal_common.text_files.files import FilePath
+
+if typing.TYPE_CHECKING:    # numpy is slow to import, and `pedestal scenarios` needs none
+    from pedestal_common.quantities import Json
 
 try:
     from yaml import CSafeLoader as _Base

@@ -3,7 +3,7 @@ errors in a bag of the same run.
 
 The samples hold all inputs of the receiver. An equal version on the same machine therefore gives equal bytes.
 """
-import argparse
+import pathlib
 from collections.abc import Iterator
 
 import numpy as np
@@ -58,22 +58,22 @@ def angle_errors(recording: sigmf.Recording, parameters: MonopulseParameters,
     return found, unit
 
 
-def main(options: argparse.Namespace) -> tuple[list[str], list[Row], bool]:
+def main(bag: pathlib.Path, samples: pathlib.Path) -> tuple[list[str], list[Row], bool]:
     """Return (lines to print, rows of --json, True if all errors in the bag are equal to the last bit). Raises
     ValueError for a bag or a file that does not fit."""
-    recording = recompute.FedRecording(options.bag)
+    recording = recompute.FedRecording(bag)
     node = nodes.MONOPULSE_RECEIVER.name
     if not recording.has(ANGLE_ERROR_TOPIC):
-        raise recompute.RecomputeError(f'{options.bag}: no {ANGLE_ERROR_TOPIC} in the bag')
+        raise recompute.RecomputeError(f'{bag}: no {ANGLE_ERROR_TOPIC} in the bag')
     parameters = parameters_of(recording)
-    file = sigmf.Recording(options.iq, parameters.feed.channels, parameters.source.rate)
+    file = sigmf.Recording(samples, parameters.feed.channels, parameters.source.rate)
     found, _ = angle_errors(file, parameters, recording.bag.start)
     stamps = (recording.output(ANGLE_ERROR_TOPIC).stamps + recording.bag.start).tolist()
     recorded = dict(zip(stamps, map(bytes, recording.data(ANGLE_ERROR_TOPIC))))
     missing = [stamp for stamp in recorded if stamp not in found]
     different = [stamp for stamp in recorded if stamp in found and found[stamp] != recorded[stamp]]
     equal = len(recorded) - len(missing) - len(different)
-    lines = [f'{options.iq}: {file.count} samples, {len(found)} errors',
+    lines = [f'{samples}: {file.count} samples, {len(found)} errors',
              f'{ANGLE_ERROR_TOPIC}: {len(recorded)} in the bag, {equal} equal, '
              f'{len(different)} differ, {len(missing)} not in the samples']
     for text, of_stamps in (('differs', different), ('not in the samples', missing)):

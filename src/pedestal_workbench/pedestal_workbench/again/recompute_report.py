@@ -1,5 +1,4 @@
 """Report of `pedestal recompute`: its printed lines and verdicts, the rows of --json, and the bag of --output."""
-import argparse
 import dataclasses
 import math
 import pathlib
@@ -31,10 +30,26 @@ class NodeReport:
     well: bool = True   # True if the outputs are as required
 
 
-def main(options: argparse.Namespace) -> tuple[list[str], list[Row], bool]:
+@dataclasses.dataclass(frozen=True)
+class RecomputeOptions:
+    """Recording, what is recomputed of it, and how the outputs are compared."""
+    bag: pathlib.Path
+    beam: str               # name of the beam, '' for the first
+    node: list[str]         # nodes to recompute; empty: every node
+    param: list[str]        # changes, texts [NODE.]KEY=VALUE
+    params_file: pathlib.Path | None        # parameters of the recorded nodes, for a bag without them
+    pacing: str | None      # lockstep or realtime; None: as the bag states
+    absolute: float | None  # tolerance of every field, in its unit; None: that of the field
+    relative: float | None  # tolerance [-]; None: the default
+    ignore: list[str]       # patterns of topics and fields that are not compared
+    allow_idle: bool        # True to accept a node that did nothing
+    live: bool              # True to feed a process of the node
+    output: pathlib.Path | None             # new bag with the recomputed outputs
+
+
+def main(options: RecomputeOptions) -> tuple[list[str], list[Row], bool]:
     """Return (lines to print, rows of --json, True if the outputs of all nodes are as required).
 
-    options: options of the verb.
     Raises ValueError for an option that does not fit the bag, RunError if a live node does not answer.
     """
     lockstep = None if options.pacing is None else options.pacing == 'lockstep'     # None: as the bag states
@@ -64,11 +79,11 @@ def main(options: argparse.Namespace) -> tuple[list[str], list[Row], bool]:
 
 
 def _node_report(recording: FedRecording, node: str, given: recompute.Values | None,
-                 changes: Mapping[str, Json] | None, options: argparse.Namespace) -> NodeReport:
+                 changes: Mapping[str, Json] | None, options: RecomputeOptions) -> NodeReport:
     """Return the NodeReport of a node.
 
     given: of --params-file, None for the recorded parameters; changes: {key: value} of --param, None to compare with
-    the recorded outputs; options: of the verb.
+    the recorded outputs.
     """
     params = recompute.parameters_of(recording, node, given)
     done = recompute.recompute(recording, node, params)

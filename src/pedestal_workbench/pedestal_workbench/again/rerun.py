@@ -1,6 +1,6 @@
 """Two parts of `pedestal rerun`: the scenario of a recorded run, and the comparison of the old and new recordings.
 
-The verb (pedestal/verbs/recordings/rerun.py) runs the scenario between these two parts. The comparison covers the
+The verb (pedestal/verbs/recordings.py) runs the scenario between these two parts. The comparison covers the
 bytes of the files, the messages and the metadata.
 """
 import dataclasses

@@ -1,5 +1,6 @@
 """Files that each step of `pedestal calibrate` writes: a parameter file and a page."""
-import argparse
+import dataclasses
+import pathlib
 import shlex
 from collections.abc import Callable, Iterable, Mapping
 
@@ -9,26 +10,34 @@ from pedestal_common.quantities import Json
 from pedestal_common.text_files import parameter_file
 
 
-def write(options: argparse.Namespace, printed: Iterable[str], sections: Mapping[str, Mapping[str, Json]],
+@dataclasses.dataclass(frozen=True)
+class ResultFiles:
+    """Files that a step writes."""
+    output: pathlib.Path | None     # parameter file
+    report: pathlib.Path | None     # HTML page
+    command: str                    # whole command line, for the heads of the files
+
+
+def write(files: ResultFiles, printed: Iterable[str], sections: Mapping[str, Mapping[str, Json]],
           page: Callable[[], str], iq: bool = False, verified: bool = True) -> list[str]:
-    """Write the files that the options `output` and `report` of a step name. Return a line for each of them.
+    """Write the files of a step. Return a line for each of them.
 
     printed: lines that the step prints, for the head of the parameter file; sections: {node: {parameter: value}};
     page(): HTML text of the page; iq: True for the parameters of a receiver of I/Q samples. A result that is not
     `verified` gets no parameter file, because it must not be used. Raises ParameterError for a value out of its range.
     """
     said = []
-    if options.output and not verified:
-        said.append(f'not written: {options.output}, because the result is not verified')
-    elif options.output:
+    if files.output and not verified:
+        said.append(f'not written: {files.output}, because the result is not verified')
+    elif files.output:
         for node, values in sections.items():
             check_each(nodes.row(node, iq=iq).parameters_type(), values)
-        head = ''.join(f'# {line}'.rstrip() + '\n' for line in (f'made by: {" ".join(options.command.split())}',
+        head = ''.join(f'# {line}'.rstrip() + '\n' for line in (f'made by: {" ".join(files.command.split())}',
                                                                *printed))
-        options.output.write_text(head + parameter_file.text(sections), encoding='utf-8')
-        said.append(f'written: {options.output}  (pedestal run SCENARIO '
-                    f'--params-file {shlex.quote(str(options.output))})')
-    if options.report:
-        options.report.write_text(page(), encoding='utf-8')
-        said.append(f'page: {options.report}')
+        files.output.write_text(head + parameter_file.text(sections), encoding='utf-8')
+        said.append(f'written: {files.output}  (pedestal run SCENARIO '
+                    f'--params-file {shlex.quote(str(files.output))})')
+    if files.report:
+        files.report.write_text(page(), encoding='utf-8')
+        said.append(f'page: {files.report}')
     return said

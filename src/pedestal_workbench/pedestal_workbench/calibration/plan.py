@@ -1,6 +1,6 @@
 """Plan of directions in which pointing offsets are measured: spread over the sky, within the travel of the axes."""
-import argparse
 import math
+import pathlib
 
 import numpy as np
 
@@ -61,17 +61,18 @@ def travel(name: str) -> tuple[tuple[Degrees, Degrees], tuple[Degrees, Degrees]]
     return azimuth, elevation
 
 
-def main(options: argparse.Namespace) -> list[str]:
-    """Plan for the options of the verb, write the file of --output and return the lines to print. Raises ValueError.
+def main(count: int, scenario_name: str | None, output: pathlib.Path | None) -> list[str]:
+    """Plan `count` directions in the travel of the scenario, write the file `output` and return the lines to print.
+    Raises ValueError.
 
     The lines are a CSV table, if no file is written.
     """
-    limits = travel(options.scenario) if options.scenario else (TRAVEL_RANGE_DEG, (0.0, 90.0))
-    planned = directions(options.plan, *limits)
-    said = (f'{options.plan} directions, azimuth {planned[0, 0]:.1f} to {planned[-1, 0]:.1f} deg of the encoder; with '
+    limits = travel(scenario_name) if scenario_name else (TRAVEL_RANGE_DEG, (0.0, 90.0))
+    planned = directions(count, *limits)
+    said = (f'{count} directions, azimuth {planned[0, 0]:.1f} to {planned[-1, 0]:.1f} deg of the encoder; with '
             f'the default terms the error of the model is {noise_gain(planned):.2f} times the noise of one offset')
     table = ['az_deg,el_deg', *(f'{az:.3f},{el:.3f}' for az, el in planned)]
-    if not options.output:
+    if not output:
         return [f'# {said}', *table]
-    options.output.write_text('\n'.join((f'# {said}', *table)) + '\n')
-    return [said, f'written: {options.output}']
+    output.write_text('\n'.join((f'# {said}', *table)) + '\n')
+    return [said, f'written: {output}']

@@ -3,7 +3,6 @@
 The result is a table of the terms, rows for --json, a page with the residuals, and a ROS 2 parameter file with the
 parameters acu.pointing.*. The file states where the model comes from: source, date and rms.
 """
-import argparse
 import dataclasses
 import datetime
 import pathlib
@@ -193,13 +192,26 @@ def collected(paths: Sequence[pathlib.Path], count: int | None) -> offsets.Offse
     return joined._replace(date=max(dates, default=''))
 
 
-def main(options: argparse.Namespace) -> tuple[list[str], dict[str, Json]]:
-    """Calibrate for the options of the verb, write its files and return (lines to print, content for --json). Raises
-    ValueError."""
+@dataclasses.dataclass(frozen=True)
+class PointingOptions:
+    """Measured offsets and their fit."""
+    offsets: pathlib.Path | None        # file of measured offsets
+    bag: list[pathlib.Path]             # recordings of passes, in place of offsets
+    points: int | None                  # number of offsets from each recording; None: the default
+    collected: pathlib.Path | None      # new file of the offsets that were read
+    terms: str | None                   # terms to fit, such as P1,P3; None: the default
+    form: str | None                    # linear or exact; None: the better one
+    keep_all: bool                      # no drop of terms whose sigma exceeds their value
+    date: str | None                    # of the measurement
+    antenna: str | None                 # its name
+
+
+def main(options: PointingOptions, files: output_files.ResultFiles) -> tuple[list[str], dict[str, Json]]:
+    """Calibrate, write the files and return (lines to print, content for --json). Raises ValueError."""
     names = terms.chosen(options.terms) if options.terms is not None else terms.DEFAULT_TERMS
     today = datetime.datetime.now(datetime.timezone.utc).date().isoformat()
     date = offsets.valid_date(options.date, today) if options.date else ''
-    measured = collected(options.bag, options.points) if options.bag else offsets.read(options.offsets, today)
+    measured = offsets.read(options.offsets, today) if options.offsets else collected(options.bag, options.points)
     if options.collected:
         options.collected.write_text(offsets.table(measured), encoding='utf-8')
     try:
@@ -208,7 +220,7 @@ def main(options: argparse.Namespace) -> tuple[list[str], dict[str, Json]]:
         raise ValueError(f'{options.offsets or measured.source}: {error}') from None
     notes, residuals = remarks(found), residual_lines(found)
     printed = [*term_lines(found), *residuals, *notes]
-    values = parameters(found, options.output.name if options.output else '', options.antenna or '')
-    printed += output_files.write(options, printed, {'acu': values},
-                                  lambda: pointing_page.page(found, residuals, notes, options.command))
+    values = parameters(found, files.output.name if files.output else '', options.antenna or '')
+    printed += output_files.write(files, printed, {'acu': values},
+                                  lambda: pointing_page.page(found, residuals, notes, files.command))
     return printed, content(found)

@@ -41,7 +41,6 @@ Of the two designs the smaller value counts, of h0 the larger. The margins are t
 plant. They are measured again with the load inertia changed by 30 % and f by 20 %, within the ranges of these
 parameters. The smallest margins count.
 """
-import argparse
 import dataclasses
 import math
 import pathlib
@@ -118,11 +117,6 @@ STILL_AIR_PARAMETERS = {'scenario.ship': False, 'scenario.program.source': 'targ
 
 class LoopError(ValueError):
     """Error of loops that cannot be designed, or not be closed with the required margins. Its text is one line."""
-
-
-REQUIREMENT_OPTIONS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'position', 'phase_margin': 'phase_margin',
-                       'gain_margin': 'gain_margin'}
-"""{option of the verb: field of LoopRequirements}."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -491,16 +485,21 @@ def remarks(loops: Loops, rows: Sequence[LoopRow]) -> list[str]:
                                                     if math.isnan(margins['gain_margin_db'][0])])]
 
 
-def main(options: argparse.Namespace, progress: Callable[[float, str], object]) -> list[str]:
-    """Design the loops for the options of the verb, write the parameter file and return the lines to print.
+@dataclasses.dataclass(frozen=True)
+class LoopOptions:
+    """Plant whose loops are designed."""
+    source: str             # scenario, name or .yaml file
+    param: list[str]        # its changes, texts NODE.KEY=VALUE
+    axis: str               # azimuth, elevation or both
+    output: pathlib.Path | None     # parameter file; None: the default
+    command: str            # whole command line, for the head of the file
+
+
+def main(options: LoopOptions, required: LoopRequirements, progress: Callable[[float, str], object]) -> list[str]:
+    """Design the loops, write the parameter file and return the lines to print.
 
     progress: function, see `design`. Raises LoopError.
     """
-    for name in ('filter', 'feedforward', 'runs', 'seed', 'duration'):
-        if not (getattr(options, name) is None or getattr(options, name) is False):
-            raise LoopError(f'--{name}: cannot be combined with --loops, which measures the plant')
-    required = LoopRequirements(**{field: getattr(options, name) for name, field in REQUIREMENT_OPTIONS.items()
-                                   if getattr(options, name) is not None})
     axes = AXES if options.axis == 'both' else (options.axis,)
     loops = Loops(options.source, options.param)
     file = options.output or pathlib.Path(f'{loops.name}-loops.yaml')

@@ -16,7 +16,6 @@ feed-forward               The rate loop of the drive is identified (identificat
 
 The search is that of parameter_search.py. The result is a ROS 2 parameter file for nodes and for `pedestal run`.
 """
-import argparse
 import dataclasses
 import math
 import pathlib
@@ -38,14 +37,13 @@ from pedestal_common import parameters
 from pedestal_common.graph import layouts, topics
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node.unit import Unit
-from pedestal_common.parameters import option_of
-from pedestal_common.quantities import Floats, Json, Pair, Pairs, Records
+from pedestal_common.quantities import Floats, Json, Pair, Pairs, Records, Seconds
 from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import records
 from pedestal_recording import configuration
 from pedestal_results.tracking import HANDOVER_SETTLING_S
 from pedestal_workbench.again import recompute, what_if
-from pedestal_workbench.tuning import identification, loops, parameter_search
+from pedestal_workbench.tuning import identification, parameter_search
 
 HUBER_LIMIT_SIGMAS = 4.0  # size above which an innovation is an outlier [standard deviations]
 CONVERGENCE_TIME_S, PIECE_LENGTH_S = 1.0, 0.5
@@ -60,6 +58,25 @@ TUNED_UKF_PARAMETERS = ('cv_noise', 'ca_noise', 'dwell')
 
 class TuneError(ValueError):
     """Error of options or data that do not allow tuning. Its text is one line."""
+
+
+@dataclasses.dataclass(frozen=True)
+class TuneOptions:
+    """What is tuned, with which runs."""
+    source: str             # recording, or scenario (name or .yaml file)
+    filter: str | None      # kind of the tuned filter; None: the feed-forward is tuned
+    axis: str               # azimuth, elevation or both
+    seed: int | None        # first seed; None: that of the scenario
+    runs: int | None        # number of runs with different seeds; None: the default
+    duration: Seconds | None    # length of a run; None: that of the scenario
+    param: list[str]        # changes of the scenario, texts NODE.KEY=VALUE
+    output: pathlib.Path | None     # parameter file; None: the default
+    command: str            # whole command line, for the head of the file
+
+    @property
+    def feedforward(self) -> bool:
+        """True if the feed-forward is tuned, in place of a filter."""
+        return self.filter is None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -301,11 +318,8 @@ def feedforward(chosen: Scenario, source: Source, axes: Iterable[str],
     return params, settings
 
 
-def main(options: argparse.Namespace, command: str, progress: Callable[[float, str], object]) -> list[str]:
-    """Tune for the options of the verb, write the parameter file and return the lines to print.
-
-    command: the whole command line, for the head of the file. Raises TuneError.
-    """
+def main(options: TuneOptions, progress: Callable[[float, str], object]) -> list[str]:
+    """Tune, write the parameter file and return the lines to print. Raises TuneError."""
     is_bag = pathlib.Path(options.source).is_dir() or options.source.endswith('.mcap')
     axes = AXES if options.axis == 'both' else (options.axis,)
     target = options.filter or 'feedforward'
@@ -319,7 +333,7 @@ def main(options: argparse.Namespace, command: str, progress: Callable[[float, s
         def load(seed: int | None) -> Scenario:
             return scenario.load(options.source, options.param, seed, options.duration)
         source = SimulatedSource(load, options.seed, options.runs or DEFAULT_SEED_COUNT, options.feedforward)
-    if options.feedforward:
+    if options.filter is None:
         params, settings = feedforward(load(options.seed), source, axes, progress)
     else:
         params, settings = filters(source, options.filter, axes, progress)
@@ -330,7 +344,8 @@ def main(options: argparse.Namespace, command: str, progress: Callable[[float, s
     if options.duration and options.duration < whole:
         lines.append(f'tuned on the first {options.duration:g} s of the {whole:g} s of the scenario: the parameters '
                      'may be worse in the rest; without --duration the whole scenario counts')
-    made = [f'made by: {" ".join(command.split())}', f'git {configuration.git_revision() or "unknown"}', *lines]
+    made = [f'made by: {" ".join(options.command.split())}', f'git {configuration.git_revision() or "unknown"}',
+            *lines]
     file.write_text(''.join(f'# {line}\n' for line in made) + parameter_file.text({'acu': settings}))
     values = [f'{name:48} {value}' for name, value in settings.items()]
     hint = f'pedestal run ... --params-file {shlex.quote(str(file))}'
@@ -339,14 +354,9 @@ def main(options: argparse.Namespace, command: str, progress: Callable[[float, s
     return [*lines, '', *values, f'written: {file}  ({hint})']
 
 
-def _check(options: argparse.Namespace, is_bag: bool, file: pathlib.Path) -> None:
+def _check(options: TuneOptions, is_bag: bool, file: pathlib.Path) -> None:
     """Raise TuneError for options that do not fit together, or for an existing file."""
-    if bool(options.filter) == options.feedforward:
-        raise TuneError('one of --filter KIND and --feedforward must be given')
-    for name in loops.REQUIREMENT_OPTIONS:
-        if getattr(options, name) is not None:
-            raise TuneError(f'{option_of(name)} {getattr(options, name):g}: needs --loops')
-    if options.filter and options.filter not in FILTER_KINDS:
+    if options.filter is not None and options.filter not in FILTER_KINDS:
         raise TuneError(f'--filter {options.filter}: must be one of {", ".join(FILTER_KINDS)}')
     if is_bag and options.feedforward:
         raise TuneError('--feedforward: identifies the drive of a scenario; use a scenario instead of a recording')

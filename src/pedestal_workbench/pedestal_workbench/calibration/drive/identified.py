@@ -3,7 +3,6 @@
 The result is a table with nominal and identified values, rows for --json, a page, and a ROS 2 parameter file with
 acu.AXIS.feedforward.* and adu.AXIS.*. The twin with these values must reproduce the torques of the recording.
 """
-import argparse
 import dataclasses
 import math
 import pathlib
@@ -265,19 +264,20 @@ def of_bags(paths: Iterable[pathlib.Path]) -> list[twin.DriveRecording]:
     return found
 
 
-def main(options: argparse.Namespace, changes: Sequence[str]) -> tuple[list[str], dict[str, Json], bool]:
-    """Calibrate for the options of the verb, write its files, and return (lines, content, verified).
+def main(bags: Sequence[pathlib.Path], scenario_name: str, changes: Sequence[str],
+         files: output_files.ResultFiles) -> tuple[list[str], dict[str, Json], bool]:
+    """Calibrate recordings, or without them a scenario; write the files and return (lines, content, verified).
 
     changes: texts 'node.key=value' of --params-file and --param. Raises ValueError.
     """
-    source = options.scenario or ', '.join(str(path) for path in options.bag)
+    source = ', '.join(str(path) for path in bags) or scenario_name
     try:
-        recordings = of_bags(options.bag) if options.bag else in_memory(options.scenario, changes)
+        recordings = of_bags(bags) if bags else in_memory(scenario_name, changes)
         result = calibrate(recordings, source)
     except motion_data.MotionError as error:
         raise ValueError(f'{source}: {error}') from None
     printed = [f'drive of {source}, {len(recordings)} recordings', '', *lines(result)]
-    printed += output_files.write(options, printed, {'acu': acu_parameters(result), 'adu': result.changes},
-                                  lambda: identified_page.page(result, lines(result), options.command),
+    printed += output_files.write(files, printed, {'acu': acu_parameters(result), 'adu': result.changes},
+                                  lambda: identified_page.page(result, lines(result), files.command),
                                   verified=passed(result))
     return printed, content(result), passed(result)

@@ -5,7 +5,6 @@ run. The result is a table of the elements, the named faults, the verification o
 --json, a page, and a ROS 2 parameter file. It holds tracking_receiver.calibration.*. The errors then need no further
 matrix, so the file sets acu.tracker.matrix.* to the identity. acu.tracker.receiver.slope is the measured slope.
 """
-import argparse
 import cmath
 import dataclasses
 import math
@@ -13,8 +12,8 @@ import pathlib
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from pedestal_hardware.monopulse.iq_unit import SimulatedIq
 
+from equipment_sim.iq.unit import SimulatedIq
 from pedestal_bringup.loop import iq_run, memory_recording
 from pedestal_common.graph import nodes
 from pedestal_common.quantities import Complexes, Floats, Json, Pair, Pairs, Radians, Row
@@ -159,8 +158,16 @@ def content(found: IqPhasing) -> dict[str, Json]:
             'verified': phasing.passed(found), 'parameters': parameters(found)}
 
 
-def opened(options: argparse.Namespace, changes: Sequence[str]) -> tuple[Recording, str, ratios.Samples]:
-    """Return (recording, its name, samples) of the options of the verb. Raises ValueError.
+@dataclasses.dataclass(frozen=True)
+class IqPhasingOptions:
+    """Recording of a run with its I/Q samples, or scenario to run in memory; one of bag and scenario is given."""
+    bag: pathlib.Path | None
+    scenario: str
+    iq: pathlib.Path        # .sigmf-meta file of the samples
+
+
+def opened(options: IqPhasingOptions, changes: Sequence[str]) -> tuple[Recording, str, ratios.Samples]:
+    """Return (recording, its name, samples). Raises ValueError.
 
     changes: texts 'node.key=value' of a scenario. Its samples are those of `pedestal simulate receiver --output` with
     the same scenario and the same changes.
@@ -188,8 +195,9 @@ def _of_three_channels(parameters: MonopulseParameters, source: str) -> Monopuls
     return parameters
 
 
-def main(options: argparse.Namespace, changes: Sequence[str]) -> tuple[list[str], dict[str, Json], bool]:
-    """Calibrate by the options of the verb, write their files, and return (lines, content, verified).
+def main(options: IqPhasingOptions, changes: Sequence[str],
+         files: output_files.ResultFiles) -> tuple[list[str], dict[str, Json], bool]:
+    """Calibrate, write the files and return (lines, content, verified).
 
     changes: texts 'node.key=value' of a scenario. Raises ValueError.
     """
@@ -203,7 +211,7 @@ def main(options: argparse.Namespace, changes: Sequence[str]) -> tuple[list[str]
                f'{options.iq}, C/N0 {points.level.mean():.1f} dB-Hz', '', *table(found), '', *summary(found)]
     if samples.file.cut:
         printed.append(samples.file.cut)
-    printed += output_files.write(options, printed, parameters(found),
-                                  lambda: iq_phasing_page.page(found, table(found), summary(found), options.command),
+    printed += output_files.write(files, printed, parameters(found),
+                                  lambda: iq_phasing_page.page(found, table(found), summary(found), files.command),
                                   iq=True, verified=phasing.passed(found))
     return printed, content(found), phasing.passed(found)

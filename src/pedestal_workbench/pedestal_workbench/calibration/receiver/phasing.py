@@ -3,7 +3,6 @@
 The result is a table of the elements, the named faults, the verification on the circle before and after, rows for
 --json, a page, and a ROS 2 parameter file with acu.tracker.matrix.* and acu.tracker.receiver.slope.
 """
-import argparse
 import dataclasses
 import math
 import typing
@@ -156,8 +155,9 @@ def content(found: Phasing) -> dict[str, Json]:
             'faults': matrix.faults(found.slopes), 'verified': passed(found), 'parameters': parameters(found)}
 
 
-def main(bag: Recording, source: str, options: argparse.Namespace) -> tuple[list[str], dict[str, Json], bool]:
-    """Calibrate a recording, write the files of the options of the verb, and return (lines, content, verified).
+def main(bag: Recording, source: str,
+         files: output_files.ResultFiles) -> tuple[list[str], dict[str, Json], bool]:
+    """Calibrate a recording, write the files and return (lines, content, verified).
 
     Raises ValueError.
     """
@@ -168,7 +168,7 @@ def main(bag: Recording, source: str, options: argparse.Namespace) -> tuple[list
     count, level = int(found.points.fitted.sum()), found.points.level.mean()
     printed = [f'{count} offsets and {int(found.points.circle.sum())} points of the circle in {source}, '
                f'C/N0 {level:.1f} dB-Hz', '', *table(found), '', *summary(found)]
-    printed += output_files.write(options, printed, {'acu': parameters(found)},
-                                  lambda: phasing_page.page(found, table(found), summary(found), options.command),
+    printed += output_files.write(files, printed, {'acu': parameters(found)},
+                                  lambda: phasing_page.page(found, table(found), summary(found), files.command),
                                   verified=passed(found))
     return printed, content(found), passed(found)

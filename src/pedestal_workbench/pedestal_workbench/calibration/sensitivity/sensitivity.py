@@ -1,11 +1,11 @@
 """`pedestal calibrate sensitivity`: beamwidth and squint, and with the flux of the source G/T."""
-import argparse
 import dataclasses
 import math
+import pathlib
 
 import numpy as np
 
-from pedestal_common.quantities import Degrees, Json, Pair, Row
+from pedestal_common.quantities import Decibels, Degrees, Hertz, Json, Pair, Row
 from pedestal_recording import bag as bags
 from pedestal_results.intervals import estimated, row
 from pedestal_workbench.calibration import output_files
@@ -19,6 +19,17 @@ OPTION_RANGES = {'flux': (1.0, 1e6, 'sfu'), 'frequency': (0.1, 300.0, 'GHz'), 'd
 
 
 @dataclasses.dataclass(frozen=True)
+class SensitivityOptions:
+    """Properties of the source and of the receiver. None: the default."""
+    flux: float | None = None               # flux density of the source [sfu]; None: no G/T
+    frequency: float | None = None          # of the receiver [GHz]
+    diameter: Degrees | None = None         # of the source
+    bandwidth: Hertz | None = None          # noise bandwidth of the receiver in a recording
+    attenuation: Decibels | None = None     # by the atmosphere towards the source
+    elevation: Degrees | None = None        # of the source, for offsets in azimuth
+
+
+@dataclasses.dataclass(frozen=True)
 class Sensitivity:
     """Result of a beam cut."""
     levels: levels.Levels
@@ -29,7 +40,7 @@ class Sensitivity:
     g_over_t: float     # G/T [dB/K], NaN without a flux
 
 
-def diameter_of_source(measured: levels.Levels, options: argparse.Namespace) -> Degrees:
+def diameter_of_source(measured: levels.Levels, options: SensitivityOptions) -> Degrees:
     """Return the diameter of the source of levels: that of the options, of the sun with a flux, or that which the
     recording states. Raises ValueError without any of them."""
     if options.diameter is not None:
@@ -42,8 +53,8 @@ def diameter_of_source(measured: levels.Levels, options: argparse.Namespace) -> 
     return measured.diameter
 
 
-def calibrate(measured: levels.Levels, options: argparse.Namespace) -> Sensitivity:
-    """Return the result of levels for the options of the verb. Raises LevelError and ValueError."""
+def calibrate(measured: levels.Levels, options: SensitivityOptions) -> Sensitivity:
+    """Return the result of levels. Raises LevelError and ValueError."""
     diameter = diameter_of_source(measured, options)
     found = beam.fit(measured, diameter)
     scale = found.floor
@@ -53,7 +64,7 @@ def calibrate(measured: levels.Levels, options: argparse.Namespace) -> Sensitivi
             raise ValueError('--bandwidth: is needed with --flux, because the recording states no noise bandwidth')
     ratio = found.amplitude / scale
     g_over_t = beam.g_over_t_db(ratio, options.flux, 1e9 * options.frequency,
-                                options.attenuation or 0.0) if options.flux else math.nan
+                                options.attenuation or 0.0) if options.flux and options.frequency else math.nan
     return Sensitivity(measured, found, diameter, beam.null(measured, found.place, found.width), ratio, g_over_t)
 
 
@@ -116,32 +127,31 @@ def parameters(found: Sensitivity) -> dict[str, dict[str, float]]:
     return {'acu': {'tracker.receiver.beamwidth': width}, 'tracking_receiver': {'antenna.beamwidth': width}}
 
 
-def check_options(options: argparse.Namespace) -> None:
-    """Raise ValueError for an option out of its range, for a flux without a frequency, and for an option without
-    effect."""
+def check_options(options: SensitivityOptions) -> None:
+    """Raise ValueError for an option out of its range, and for a flux without a frequency."""
     for name, (low, high, unit) in OPTION_RANGES.items():
         value = getattr(options, name)
         if value is not None and not low <= value <= high:
             raise ValueError(f'--{name} {value:g}: must be {low:g} to {high:g} {unit}')
     if (options.flux is None) != (options.frequency is None):
         raise ValueError('--flux and --frequency: G/T needs both')
-    for name, other in (('attenuation', 'flux'), ('bandwidth', 'bag'), ('elevation', 'levels')):
-        if getattr(options, name) is not None and getattr(options, other) is None:
-            raise ValueError(f'--{name}: has no effect without --{other}')
 
 
-def main(options: argparse.Namespace) -> tuple[list[str], dict[str, Json]]:
-    """Calibrate for the options of the verb, write its files, and return (lines, content). Raises ValueError."""
+def main(source: pathlib.Path, recorded: bool, options: SensitivityOptions,
+         files: output_files.ResultFiles) -> tuple[list[str], dict[str, Json]]:
+    """Calibrate, write the files and return (lines, content). Raises ValueError.
+
+    source: CSV file of offsets and levels, or if `recorded` is True, recording of a scan.
+    """
     check_options(options)
-    source = options.levels or options.bag
     try:
-        measured = (levels.read(options.levels, options.elevation) if options.levels else
-                    levels.of_recording(bags.read(options.bag, ''), str(options.bag)))
+        measured = (levels.of_recording(bags.read(source, ''), str(source)) if recorded else
+                    levels.read(source, options.elevation))
         found = calibrate(measured, options)
     except levels.LevelError as error:
         raise ValueError(f'{source}: {error}') from None
     printed = lines(found)
-    printed += output_files.write(options, printed, parameters(found),
-                                  lambda: sensitivity_page.page(found, lines(found), options.command))
+    printed += output_files.write(files, printed, parameters(found),
+                                  lambda: sensitivity_page.page(found, lines(found), files.command))
     return printed, {'name': 'calibrate sensitivity', 'rows': rows(found), 'source': measured.source,
                      'parameters': parameters(found)}

@@ -1,12 +1,7 @@
-"""run a scenario as separate nodes and record it
-
-Starts a process for each node, records every topic in a new bag, and prints a verdict and the results.
-
-Exit codes (1, 3 and 130 take precedence over 4):
-
-"""
+"""Verb `run`: a scenario as separate nodes, with its recording and its results."""
 import argparse
 import datetime
+import inspect
 import os
 import sys
 import typing
@@ -14,16 +9,23 @@ from collections.abc import Collection
 
 from pedestal import console, stop
 from pedestal.verbs import arguments
+from pedestal.verbs.arguments import Verb
 from pedestal_common import parameters
 
-__doc__ += console.exit_codes()
-
 if typing.TYPE_CHECKING:
+    from pedestal_bringup.graph.start import Outcome
     from pedestal_bringup.scenario.scenario import Draft, Scenario
+    from pedestal_recording.bag import Bag
+
+START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
+MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a realtime run, outside announced restarts
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add scenario, pacing, duration, seed, bag, parameters, satellite and servers."""
+def _add_run(parser: argparse.ArgumentParser) -> None:
+    """Starts a process for each node, records every topic in a new bag, and prints a verdict and the results.
+
+    Exit codes (1, 3 and 130 take precedence over 4):
+    """
     arguments.add_scenario(parser)
     parser.add_argument('--pacing',
                         choices=('lockstep', 'realtime'), help='lockstep: as fast as the nodes can; realtime: by '
@@ -50,19 +52,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--receiver', choices=('simulated', 'simulated-iq'), help='simulated-iq: simulated I/Q '
                         'samples by UDP on this machine, and monopulse_receiver_node in place of the simulated '
                         'receiver; needs --pacing realtime; default: value of the scenario')
-    from pedestal_bringup.graph import operator_servers
-    operator_servers.add_arguments(parser)
+    from pedestal_bringup.graph.operator_servers import SERVER_ADDRESS, SERVERS, port
+    for name, server in SERVERS.items():
+        if server.port:
+            parser.add_argument(f'--{name}', nargs='?', type=port, const=server.port, metavar='PORT',
+                                help=f'in realtime: {server.does} on {SERVER_ADDRESS}; default port: {server.port}')
+        else:
+            parser.add_argument(f'--{name}', action='store_const', const=0, help=f'in realtime: {server.does}')
 
 
-START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
-MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a realtime run, outside announced restarts
+_add_run.__doc__ = f'{inspect.getdoc(_add_run)}\n\n{console.exit_codes()}'
 
 
-def main(options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace) -> int:
     """Run, record and print the results. Return the exit code. Raises RuntimeError for an incomplete recording."""
     from pedestal_bringup.graph import graph, operator_servers
     from pedestal_bringup.scenario.program import Plan
-    from pedestal_common.graph import nodes
     chosen = _chosen(options)
     if chosen is None:
         return 0
@@ -74,29 +79,39 @@ def main(options: argparse.Namespace) -> int:
             print(unchecked)
     bag = graph.new_bag(options.bag, chosen.name)
     console.check_json(options.json)
-    servers = operator_servers.selected(options, chosen.header)
+    ports = {name: getattr(options, name) for name in operator_servers.SERVERS}
+    servers = operator_servers.processes({name: port for name, port in ports.items() if port is not None},
+                                         chosen.header)
     plan = Plan(chosen)
     for line in plan.announced():
         print(line)
     outcome = graph.run(plan, bag, console.progress_of_run(chosen.header.duration), servers)
-    # Because these modules import scipy, which takes half a second, the verb loads them after the run.
-    from pedestal_recording.bag import read
-    from pedestal_recording.verify import verify
-    from pedestal_results import results, tracking, verdict
     if outcome.stopped:
         print(f'pedestal: stopped; the recorded part is in {bag}', file=sys.stderr)
         if not outcome.recorder.get('messages'):
             return stop.STOP_EXIT_CODE
+    # Because this module imports numpy and scipy, which takes half a second, the verb loads it after the run.
+    from pedestal_recording.bag import read
     recording = read(bag)
+    failed = _results(options, chosen, outcome, recording)
+    if outcome.stopped:
+        return stop.STOP_EXIT_CODE
+    if _disturbed(chosen, outcome, recording):
+        return console.EXIT_DISTURBED
+    return console.EXIT_FAILED_RUN if failed else 0
+
+
+def _results(options: argparse.Namespace, chosen: 'Scenario', outcome: 'Outcome', recording: 'Bag') -> bool:
+    """Print verdicts and results of a run and write --json. Return True if the verdict on a beam is a failure."""
+    from pedestal_results import results, tracking, verdict
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     views = [recording.view(beam) for beam in beams]
     runs = [tracking.read(view) for view in views]
     verdicts = [verdict.of(view, run) for view, run in zip(views, runs)]
     parts = [results.of_run(view, run) for view, run in zip(views, runs)]
     of_beams = [results.measured(part) for part in parts]
-    realtime = chosen.header.pacing == 'realtime'
     # whole: results of the run, such as lost steps, in contrast to the results of each beam
-    whole = results.measured({'run': outcome, 'supervised': outcome if realtime else None})
+    whole = results.measured({'run': outcome, 'supervised': outcome if chosen.header.pacing == 'realtime' else None})
     lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
     for beam, found in zip(beams, verdicts):
         print(f'{beam}: {found.text}' if beam else found.text)
@@ -112,30 +127,34 @@ def main(options: argparse.Namespace) -> int:
         print('--all prints all results, --explain their definitions')
     if options.explain:
         console.explain(results.RESULTS, shown)
-    print(f'{bag}  mcap sha256 {outcome.recorder["sha256"]}')
+    print(f'{recording.path}  mcap sha256 {outcome.recorder["sha256"]}')
     rows = [row for beam, values in zip(beams, of_beams)
             for row in results.rows(f'{chosen.name}/{beam}'.rstrip('/'), values)]
     console.write_json(options.json, {'name': chosen.name, 'rows': rows + results.rows(chosen.name, whole),
                                       'verdicts': {beam: found._asdict() for beam, found in zip(beams, verdicts)},
                                       'mcap_sha256': outcome.recorder['sha256']})
-    if outcome.stopped:
-        return stop.STOP_EXIT_CODE
+    return any(found.failed for found in verdicts)
+
+
+def _disturbed(chosen: 'Scenario', outcome: 'Outcome', recording: 'Bag') -> bool:
+    """Return True, with a line on stderr for each reason, if a realtime run ended early or lost too many steps. Raises
+    RuntimeError for an incomplete recording."""
+    from pedestal_common.graph import nodes
+    from pedestal_recording.verify import verify
     check = verify(recording)
-    if not realtime and check.aborted or not (check.complete or outcome.restarts):
+    if chosen.header.pacing != 'realtime' and check.aborted or not (check.complete or outcome.restarts):
         raise RuntimeError('the recording is not complete:\n' + '\n'.join(check.lines()))
     if not check.complete:
         print('pedestal: the recording has gaps because a node was restarted:\n' + '\n'.join(check.problems),
               file=sys.stderr)
     planned = chosen.header.duration / chosen.node_parameters(nodes.DRIVE_NODE).period
-    disturbed = [check.ending] if check.aborted else []
+    reasons = [check.ending] if check.aborted else []
     if outcome.losses > MAX_LOST_STEP_SHARE * planned:
-        disturbed.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than '
-                         f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts: {_cure(chosen.header.priority)}')
-    for reason in disturbed:
+        reasons.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than '
+                       f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts: {_cure(chosen.header.priority)}')
+    for reason in reasons:
         print(f'pedestal: {reason}', file=sys.stderr)
-    if disturbed:
-        return console.EXIT_DISTURBED
-    return console.EXIT_FAILED_RUN if any(found.failed for found in verdicts) else 0
+    return bool(reasons)
 
 
 def _cure(priority: int) -> str:
@@ -161,8 +180,6 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     arguments.check_elements(options)
     if options.tle is options.station is options.which is None:
         return scenario.load(options.scenario, changes, options.seed, duration, options.pacing)
-    import datetime
-
     from pedestal import satellite
     from pedestal_common.geometry import orbit
     now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
@@ -184,7 +201,10 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     if options.which is not None or options.tle and not started:
         selection = satellite.PassSelection(draft.changed(changes), now)
         if options.which == 'list':
-            _refuse_with_list(options)
+            from pedestal_bringup.graph import operator_servers
+            arguments.refuse_given(options, ('bag', 'json', 'all', 'explain', 'duration', 'seed', 'pacing', 'drives',
+                                             'receiver', *operator_servers.SERVERS),
+                                   'has no effect with --pass list, which runs nothing')
             selection.print_passes()
             return None
         start, duration, line = selection.choose('next' if options.which is None else options.which, duration)
@@ -209,10 +229,4 @@ def _without_prediction_errors(draft: 'Draft', changes: list[str]) -> list[str]:
     return found
 
 
-def _refuse_with_list(options: argparse.Namespace) -> None:
-    """Raise ValueError for an option of a run beside --pass list, which runs nothing."""
-    from pedestal_bringup.graph import operator_servers
-    for name in ('bag', 'json', 'all', 'explain', 'duration', 'seed', 'pacing', 'drives', 'receiver',
-                 *operator_servers.SERVERS):
-        if not (getattr(options, name) is None or getattr(options, name) is False):
-            raise ValueError(f'--{name}: has no effect with --pass list, which runs nothing')
+VERBS = {'run': Verb(_add_run, _run)}

@@ -1,26 +1,4 @@
-"""run a scenario many times with varied parameters, and print statistics and the worst trials
-
-Each trial has its own seed and gives the same kinds of results as `pedestal run`. A trial runs all nodes in one
-process, without ROS. For each of the worst trials a `pedestal run` command is printed, which runs separate nodes and
-gives the same numbers.
-
---vary NODE.KEY=DISTRIBUTION draws a parameter from uniform(low, high), normal(mean, sigma) or choice(a, b, ...). With
-an x after the distribution, as in normal(1, 0.1)x, the drawn number is a factor of the value of the scenario. The
-form --vary FILE.csv reads the trials from a file with a column for each parameter and a row for each trial.
-
-Rows are written to OUTPUT/trials.csv as soon as they exist. Repeat the command to continue after Ctrl-C or a crash.
-The column `why` of the table holds the verdict on each trial that did not track.
-
---side NAME NODE.KEY=VALUE ... adds a side to a comparison and may be repeated. A side is a variant of the scenario
-with parameters of its own. --against and --against-param add one side. Trial i of all sides has the same seed and
-drawn values. The side with the best result of --by is printed first.
-
---require 'RESULT < LIMIT' prints the share of the trials that meet a criterion, with its 95 % interval. A trial
-without the result does not meet it.
-
---solve NODE.KEY=LOW:HIGH --until 'RESULT = LIMIT' searches for the value of a parameter at which the mean of a result
-reaches a limit. Without LOW:HIGH the search covers the range of the parameter.
-"""
+"""Verb `trials`: many runs with varied parameters, their statistics, comparison and search."""
 import argparse
 import contextlib
 import math
@@ -32,20 +10,41 @@ from collections.abc import Iterable, Sequence
 
 from pedestal import console
 from pedestal.verbs import arguments
-from pedestal_common.parameters import option_of
+from pedestal.verbs.arguments import Verb
 from pedestal_common.quantities import Row
 from pedestal_results import row_text
 
 if typing.TYPE_CHECKING:
     from pedestal_workbench.trials.plan import Plan
     from pedestal_workbench.trials.statistics import Requirement
+    from pedestal_workbench.trials.table import Table
 
 WORST_TRIAL_COUNT = 10  # number of the worst trials whose commands are printed
 BASE_SIDE = 'base'  # label of the side with the parameters of --param alone, beside labels of --side
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add scenario, varied parameters, number and processes of the trials, sides of a comparison, criteria, search."""
+def _add_trials(parser: argparse.ArgumentParser) -> None:
+    """Each trial has its own seed and gives the same kinds of results as `pedestal run`. A trial runs all nodes in one
+    process, without ROS. For each of the worst trials a `pedestal run` command is printed, which runs separate nodes
+    and gives the same numbers.
+
+    --vary NODE.KEY=DISTRIBUTION draws a parameter from uniform(low, high), normal(mean, sigma) or choice(a, b, ...).
+    With an x after the distribution, as in normal(1, 0.1)x, the drawn number is a factor of the value of the scenario.
+    The form --vary FILE.csv reads the trials from a file with a column for each parameter and a row for each trial.
+
+    Rows are written to OUTPUT/trials.csv as soon as they exist. Repeat the command to continue after Ctrl-C or a
+    crash. The column `why` of the table holds the verdict on each trial that did not track.
+
+    --side NAME NODE.KEY=VALUE ... adds a side to a comparison and may be repeated. A side is a variant of the scenario
+    with parameters of its own. --against and --against-param add one side. Trial i of all sides has the same seed and
+    drawn values. The side with the best result of --by is printed first.
+
+    --require 'RESULT < LIMIT' prints the share of the trials that meet a criterion, with its 95 % interval. A trial
+    without the result does not meet it.
+
+    --solve NODE.KEY=LOW:HIGH --until 'RESULT = LIMIT' searches for the value of a parameter at which the mean of a
+    result reaches a limit. Without LOW:HIGH the search covers the range of the parameter.
+    """
     arguments.add_scenario(parser)
     parser.add_argument('--runs', type=int, metavar='N', help='number of trials; default: 100, or the rows of a .csv; '
                         'at each value of --solve: 12')
@@ -59,6 +58,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'scenario')
     arguments.add_param(parser)
     arguments.add_params_file(parser)
+    _add_questions(parser)
+    arguments.add_workers(parser)
+    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='output folder; default: '
+                        'trials/SCENARIO')
+    console.add_all(parser, 'statistics of all results; default: of the result of --by and of the most important ones')
+    console.add_json(parser)
+
+
+def _add_questions(parser: argparse.ArgumentParser) -> None:
+    """Add sides of a comparison, criteria and search."""
     parser.add_argument('--side', action='append', nargs='+', default=[], metavar=('NAME', 'NODE.KEY=VALUE'),
                         help='side of a comparison: its name, then the parameters that it changes; may be repeated')
     parser.add_argument('--against', metavar='SCENARIO', help='scenario of the second side of a comparison')
@@ -72,14 +81,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'range of the search')
     parser.add_argument('--until', metavar="'RESULT = LIMIT'", help="limit that the mean of a result reaches at the "
                         "value of --solve, for example 'pointing_rms_deg = 0.02'")
-    arguments.add_workers(parser)
-    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='output folder; default: '
-                        'trials/SCENARIO')
-    console.add_all(parser, 'statistics of all results; default: of the result of --by and of the most important ones')
-    console.add_json(parser)
 
 
-def main(options: argparse.Namespace) -> int:
+def _trials(options: argparse.Namespace) -> int:
     """Run the trials, print their statistics, write table, page and rows. Return exit code 0."""
     _check_together(options)
     console.check_json(options.json)
@@ -90,32 +94,22 @@ def _check_together(options: argparse.Namespace) -> None:
     """Raise ValueError for options that exclude or need each other."""
     if bool(options.solve) != bool(options.until):
         raise ValueError(f'--{"solve" if options.solve else "until"}: needs --{"until" if options.solve else "solve"}')
-    for name in ('side', 'against', 'against_param', 'require', 'by'):
-        if options.solve and getattr(options, name):
-            raise ValueError(f'{option_of(name)}: has no effect with --solve')
+    if options.solve:
+        arguments.refuse_given(options, ('side', 'against', 'against_param', 'require', 'by'),
+                               'has no effect with --solve')
 
 
 def _compare(options: argparse.Namespace) -> int:
     """Run the trials of all sides. Return exit code 0."""
     from pedestal_results import results
-    from pedestal_workbench.trials import comparison, ensemble, monte_carlo, statistics, trials_page
+    from pedestal_workbench.trials import comparison, statistics, trials_page
     plans, labels, files = _sides(options)
     known = _result_names(plans[0])
     required = [statistics.requirement(text, known) for text in options.require]
     if options.by:
         statistics.check_result(f'--by {options.by}', options.by, known)
     folder = options.output or pathlib.Path('trials', plans[0].name)
-    with contextlib.ExitStack() as stack:
-        tables = [stack.enter_context(ensemble.open_table(plan, folder, file)) for plan, file in zip(plans, files)]
-        pool = stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))
-        progress = stack.enter_context(console.progress_of_trials())
-        try:
-            ensemble.run_missing_trials(plans, tables, pool, progress)
-        except KeyboardInterrupt:
-            done = sum(table.count_in_file for table in tables)
-            print(f'pedestal: {done} of {sum(plan.runs for plan in plans)} trials are in {folder}; the same command '
-                  'continues', file=sys.stderr)
-            raise
+    tables = _tables(options, plans, files, folder)
     # differences: parameters in which the sides differ; names: label of a side, else these; full: both
     differences = comparison.names(*plans)
     names = [label or text for label, text in zip(labels, differences)]
@@ -150,14 +144,36 @@ def _compare(options: argparse.Namespace) -> int:
                         None if options.all else shown_names)
     if sensitivities := _sensitivity_lines(rows, by):
         print('\n'.join(sensitivities))
-    print(f'the worst trials by {ranking}:')
-    values, whys = tables[0].column(ranking), tables[0].text(statistics.why_column(ranking))
-    for i in shown.worst:
-        value = row_text.number(values[i] if math.isfinite(values[i]) else None)
-        print(f'{value:>10}  {plans[0].command(i)}' + (f'  # {whys[i]}' if whys[i] else ''))
+    print(f'the worst trials by {ranking}:', *_worst_lines(plans[0], tables[0], ranking, shown.worst), sep='\n')
     print(f'table {tables[0].file}, page {file}' + ('' if options.all else '; --all prints all results'))
     console.write_json(options.json, {'name': plans[0].name, 'rows': rows})
     return 0
+
+
+def _tables(options: argparse.Namespace, plans: 'Sequence[Plan]', files: Iterable[str],
+            folder: pathlib.Path) -> 'list[Table]':
+    """Run the trials that are not yet in the tables of a folder, and return the tables, one for each plan."""
+    from pedestal_workbench.trials import ensemble, monte_carlo
+    with contextlib.ExitStack() as stack:
+        tables = [stack.enter_context(ensemble.open_table(plan, folder, file)) for plan, file in zip(plans, files)]
+        pool = stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))
+        progress = stack.enter_context(console.progress_of_trials())
+        try:
+            ensemble.run_missing_trials(plans, tables, pool, progress)
+        except KeyboardInterrupt:
+            done = sum(table.count_in_file for table in tables)
+            print(f'pedestal: {done} of {sum(plan.runs for plan in plans)} trials are in {folder}; the same command '
+                  'continues', file=sys.stderr)
+            raise
+    return tables
+
+
+def _worst_lines(plan: 'Plan', table: 'Table', ranking: str, worst: Iterable[int]) -> list[str]:
+    """Return a line for each of the worst trials: its result, its command and the verdict on it."""
+    from pedestal_workbench.trials import statistics
+    values, whys = table.column(ranking), table.text(statistics.why_column(ranking))
+    return [f'{row_text.number(values[i] if math.isfinite(values[i]) else None):>10}  {plan.command(i)}'
+            + (f'  # {whys[i]}' if whys[i] else '') for i in worst]
 
 
 def _solve(options: argparse.Namespace) -> int:
@@ -244,3 +260,8 @@ def _sensitivity_lines(rows: Iterable[Row], ranking: str) -> list[str]:
     return [f'{row["case"]}: ' * several
             + f'{row["metric"]}: {row_text.number(row["value"])} ({row_text.interval(row)})'
             for row in sorted(found, key=lambda row: -abs(row['value'])**powers[row['metric'].partition('(')[0]])]
+
+
+VERBS = {
+    'trials': Verb(_add_trials, _trials),
+}

@@ -1,1 +1,0 @@
-"""Verbs for a running antenna: start, observe and command the graph."""

@@ -1,1 +1,0 @@
-"""Verb for the calibration of an antenna, and the steps of this verb."""

@@ -1,0 +1,291 @@
+"""Verbs for the design of an antenna: scenarios, sample files, parameters, studies, tuning, speed of the machine."""
+import argparse
+import contextlib
+import functools
+import importlib.resources
+import inspect
+import pathlib
+import shlex
+import sys
+import types
+import typing
+from collections.abc import Callable, Mapping
+
+from pedestal import console
+from pedestal.verbs import arguments
+from pedestal.verbs.arguments import Verb
+from pedestal_common import parameters
+from pedestal_common.parameters import did_you_mean, option_of
+
+if typing.TYPE_CHECKING:    # a list of the scenarios does not wait for numpy
+    from pedestal_common.quantities import Json
+    from pedestal_studies.result import Result
+
+SAMPLE_FILES = {
+    'flight.csv': 'ADS-B of a helicopter as CSV, one row a second: a turn of 2 km radius at 45 m/s that climbs at 2 '
+                  'm/s; rounded to 1e-5 deg and 25 ft, as ADS-B is.',
+    'ship.csv': 'Motion of a ship as CSV, four rows a second for 150 s: roll 6 deg in 9 s, pitch 2 deg in 7 s, yaw 1 '
+                'deg in 13 s about heading 60 deg, heave 1 m.',
+    'iss.tle': 'Elements of the ISS on 2019-12-09, which the scenario leo_pass also has.',
+    'my_antenna.yaml': 'A scenario: another antenna that tracks the flight of uav_flyby.',
+}
+"""{name of a file in the folder samples of this package: its content in a sentence}."""
+
+LOOP_REQUIREMENTS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'position', 'phase_margin': 'phase_margin',
+                     'gain_margin': 'gain_margin'}
+"""{option of `tune --loops`: field of LoopRequirements}."""
+
+
+def _add_scenarios(parser: argparse.ArgumentParser) -> None:
+    pass
+
+
+def _scenarios(_options: argparse.Namespace) -> int:
+    """Print name and title of every scenario. Return exit code 0."""
+    from pedestal_bringup.scenario import shipped
+    console.show_list(shipped.available().items())
+    return 0
+
+
+def _add_samples(parser: argparse.ArgumentParser) -> None:
+    """Writes flight.csv, ship.csv, iss.tle and my_antenna.yaml. If one of these files exists, nothing is written."""
+    parser.add_argument('folder', nargs='?', type=pathlib.Path, default=pathlib.Path(), metavar='DIR',
+                        help='output folder; default: the current folder')
+
+
+def _samples(options: argparse.Namespace) -> int:
+    """Write the files and list them. Return exit code 0. Raises FileExistsError for an existing file."""
+    options.folder.mkdir(parents=True, exist_ok=True)
+    for name in SAMPLE_FILES:
+        if (options.folder / name).exists():
+            raise FileExistsError(f'{options.folder / name} already exists and is not overwritten')
+    for name in SAMPLE_FILES:
+        (options.folder / name).write_bytes((importlib.resources.files('pedestal') / 'samples' / name).read_bytes())
+    console.show_list((str(options.folder / name), text) for name, text in SAMPLE_FILES.items())
+    return 0
+
+
+def _add_new(parser: argparse.ArgumentParser) -> None:
+    """All other values of the antenna are scaled from the antenna of the scenario leo_pass. A comment in the file
+    explains each value. `pedestal tune FILE --loops` then tunes the loops and measures their margins.
+    """
+    from pedestal_workbench.tuning.data_sheet_format import DataSheet
+    parser.add_argument('file', type=pathlib.Path, metavar='FILE.yaml', help='new scenario file')
+    for name, field in parameters.flatten(DataSheet):
+        unit = field.metadata.get('unit')
+        allowed = ', '.join(field.metadata.get('options', ()))
+        described = f'{field.metadata["doc"]}{f": {allowed}" if allowed else ""}; default: {field.default}'
+        parser.add_argument(option_of(name), type=field.type, default=field.default,
+                            metavar=unit.upper().replace(' ', '') if unit else 'SCENARIO' if allowed else 'RATIO',
+                            help=described.replace('%', '%%'))
+
+
+def _new(options: argparse.Namespace) -> int:
+    """Write the file. Return exit code 0. Raises ValueError for a wrong value, FileExistsError for an
+    existing file."""
+    from pedestal_workbench.tuning import antenna_from_data_sheet
+    from pedestal_workbench.tuning.data_sheet_format import DataSheet
+    if options.file.suffix not in ('.yaml', '.yml'):
+        raise ValueError(f'{options.file}: must end in .yaml or .yml')
+    if options.file.exists():
+        raise FileExistsError(f'{options.file} already exists and is not overwritten')
+    try:
+        sheet = DataSheet(**{name: getattr(options, name) for name, _ in parameters.flatten(DataSheet)})
+    except parameters.ParameterError as error:
+        name, equals, rest = str(error).partition(' = ')
+        raise ValueError(f'{option_of(name)}{equals}{rest}') from None
+    content, remarks = antenna_from_data_sheet.new(sheet, options.file.stem, options.command)
+    options.file.write_text(content)
+    print(*remarks, sep='\n', end='\n' if remarks else '')
+    following = shlex.join(('pedestal', 'tune', str(options.file), '--loops'))
+    print(f'written: {options.file}  ({following})')
+    return 0
+
+
+def _add_parameters(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('node',
+                        help='name of the node: acu, adu, beam_steering (drive of an array), tracking_receiver, '
+                        'ship_motion, ins, recorder; or scenario')
+
+
+def _parameters(options: argparse.Namespace) -> int:
+    """Print a row for each parameter of the node and of the graph. Return exit code 0."""
+    from pedestal_bringup.scenario import scenario
+    from pedestal_common.graph.graph_parameters import GraphParameters
+    rows = []
+    for prefix, parameters_type in (('', scenario.parameters_of(options.node)), ('graph.', GraphParameters)):
+        values = parameters.defaults(parameters_type)
+        rows += [(prefix + name, *_columns(field.metadata, values[name]))
+                 for name, field in parameters.flatten(parameters_type)]
+    console.show_list(rows)
+    return 0
+
+
+def _columns(meta: 'Mapping[str, Json]', value: object) -> tuple[str, str, str]:
+    """Return default, range or options, and meaning with unit of a parameter, as texts."""
+    allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ' | '.join(meta.get('options', ()))
+    unit = f' [{meta["unit"]}]' if meta.get('unit') else ''
+    return f'{value:g}' if isinstance(value, float) else str(value), allowed, f'{meta["doc"]}{unit}'
+
+
+def _add_study(parser: argparse.ArgumentParser) -> None:
+    """Runs the compiled laws of all nodes in one process. Prints a table with remarks and draws the figures of the
+    study."""
+    parser.add_argument('name', nargs='?', metavar='NAME', help='name of the study; default: list the studies')
+    console.add_json(parser)
+    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='output folder of the figures; default: '
+                        'studies/NAME')
+    parser.add_argument('--runs', type=int, metavar='N', help='number of runs of each case; default: set by the '
+                        'study')
+    arguments.add_vector(parser)
+    parser.add_argument('--scenario', metavar='SCENARIO', help='scenario (name or .yaml file) whose plant '
+                        'replaces the plant of the paper, for studies servo, backlash and bode')
+    arguments.add_workers(parser)
+
+
+def _study(options: argparse.Namespace) -> int:
+    """Run a study, print its table and remarks, draw its figures; without a name list the studies.
+
+    Return the exit code, 2 for an unknown study.
+    """
+    import pedestal_studies
+    if not options.name:
+        arguments.refuse_given(options, ('json', 'output', 'runs', 'vector', 'scenario', 'workers', 'scheduler'),
+                               'needs the NAME of a study')
+        console.show_list(pedestal_studies.descriptions().items())
+        return 0
+    if options.name not in pedestal_studies.STUDY_NAMES:
+        guess = did_you_mean(options.name, pedestal_studies.STUDY_NAMES)
+        print(f'pedestal: error: unknown study {options.name!r};{guess} there are '
+              f'{", ".join(pedestal_studies.STUDY_NAMES)}', file=sys.stderr)
+        return console.EXIT_WRONG_COMMAND
+    from pedestal_results import intervals
+    from pedestal_studies import drawing
+    kinds = ['png', options.vector] if options.vector else ['png']
+    output = options.output or pathlib.Path('studies', options.name)
+    console.check_json(options.json)
+    study = pedestal_studies.study(options.name)
+    with contextlib.ExitStack() as stack:
+        run = _of_scenario(options) if options.scenario else study.run
+        many = {} if options.scenario else _many_runs(options, study, stack)
+        output.mkdir(parents=True, exist_ok=True)
+        progress = stack.enter_context(console.progress_of_share())
+        result = run(progress, **many)
+        for name, draw in result.figures.items():
+            progress(None, f'drawing {name}')
+            drawing.save(draw, *(output / f'{name}.{kind}' for kind in kinds))
+    console.show_study(f'study {options.name}', result.rows if result.shown is None else result.shown,
+                       intervals.missed)
+    for remark in result.remarks:
+        print(remark)
+    print(f'figures in {output}: {", ".join(f"{name}.png" for name in result.figures)}')
+    console.write_json(options.json, {'name': options.name, 'rows': result.rows})
+    return 0
+
+
+def _of_scenario(options: argparse.Namespace) -> 'Callable[..., Result]':
+    """Return the function(progress) that runs the study for the plant of --scenario."""
+    from pedestal_studies import plant_studies
+    if options.name not in plant_studies.PLANT_STUDIES:
+        raise ValueError(f'--scenario: study {options.name} has the plant of the papers; must be one of '
+                         f'{", ".join(plant_studies.PLANT_STUDIES)}')
+    arguments.refuse_given(options, ('runs', 'workers', 'scheduler'),
+                           'does not go with --scenario, which makes one run of each case')
+    return functools.partial(plant_studies.PLANT_STUDIES[options.name], options.scenario)
+
+
+def _many_runs(options: argparse.Namespace, study: types.ModuleType,
+               stack: contextlib.ExitStack) -> dict[str, object]:
+    """Return the keyword arguments of a study of many runs, except its progress. The stack closes the pool."""
+    given = {name: getattr(options, name) for name in ('runs', 'workers', 'scheduler')}
+    if 'runs' not in inspect.signature(study.run).parameters:
+        for name, value in given.items():
+            if value is not None:
+                raise ValueError(f'--{name} {value}: study {options.name} has one run of each case')
+        return {}
+    if given['runs'] is not None and given['runs'] < 1:
+        raise ValueError(f'--runs {options.runs}: must be at least 1')
+    from pedestal_workbench.trials import monte_carlo
+    return {'runs': options.runs or study.DEFAULT_RUNS,
+            'pool': stack.enter_context(monte_carlo.Pool(options.workers, options.scheduler))}
+
+
+def _add_tune(parser: argparse.ArgumentParser) -> None:
+    """Give exactly one of --filter, --feedforward and --loops. --filter needs a recording or a scenario; --feedforward
+    and --loops need a scenario.
+    """
+    parser.add_argument('source', metavar='BAG|SCENARIO', help='input of the tuning. With a recording, the filter is '
+                        'tuned for the largest likelihood of the innovations; with a scenario, for the smallest true '
+                        'pointing error')
+    parser.add_argument('--filter', metavar='KIND', help='kind of the filter to tune, for example imm (all kinds: '
+                        '`pedestal parameters acu`, filter.kind); excludes --feedforward and --loops')
+    parser.add_argument('--feedforward', action='store_true', help='compute the gains of the feed-forward from the '
+                        'rate loop of the drive; needs a scenario; excludes --filter and --loops')
+    parser.add_argument('--loops', action='store_true', help='tune speed and position loop, shaper and bias for the '
+                        'plant of a scenario, and measure the margins on it; excludes --filter and --feedforward')
+    parser.add_argument('--speed-bandwidth', type=float, metavar='HZ', help='crossover of the speed loop [Hz], for '
+                        '--loops; default: 8 times --position-bandwidth if this option is given, else 28')
+    parser.add_argument('--position-bandwidth', type=float, metavar='HZ', help='crossover of the position loop [Hz], '
+                        'for --loops; default: an eighth of --speed-bandwidth')
+    parser.add_argument('--phase-margin', type=float, metavar='DEG', help='smallest phase margin '
+                        '[deg], for --loops; 20 to 80; default: 45')
+    parser.add_argument('--gain-margin', type=float, metavar='DB', help='smallest gain margin [dB], '
+                        'for --loops; 3 to 20; default: 6')
+    parser.add_argument('--axis', choices=('azimuth', 'elevation', 'both'), default='both', help='axis to tune; '
+                        'default: both')
+    parser.add_argument('--seed', type=int, metavar='N', help='first seed; default: value of the scenario')
+    parser.add_argument('--runs', type=int, metavar='N', help='number of runs with different seeds for the '
+                        'tuning; one more run, with the next seed, checks the result; default: 2')
+    arguments.add_duration(parser)
+    arguments.add_param(parser)
+    parser.add_argument('--output', type=pathlib.Path, metavar='FILE', help='output parameter file; default: '
+                        'SCENARIO-KIND.yaml, SCENARIO-feedforward.yaml or SCENARIO-loops.yaml')
+
+
+def _tune(options: argparse.Namespace) -> int:
+    """Tune, write the parameter file and print the comparison. Return exit code 0."""
+    from pedestal_workbench.tuning import loops, tune
+    required = {name: getattr(options, name) for name in LOOP_REQUIREMENTS if getattr(options, name) is not None}
+    if options.loops:
+        arguments.refuse_given(options, ('filter', 'feedforward', 'runs', 'seed', 'duration'),
+                               'cannot be combined with --loops, which measures the plant')
+    elif bool(options.filter) == options.feedforward:
+        raise ValueError('one of --filter KIND and --feedforward must be given')
+    elif required:
+        name, value = next(iter(required.items()))
+        raise ValueError(f'{option_of(name)} {value:g}: needs --loops')
+    with console.progress_of_share() as progress:
+        if options.loops:
+            lines = loops.main(arguments.typed(loops.LoopOptions, options), loops.LoopRequirements(
+                **{LOOP_REQUIREMENTS[name]: value for name, value in required.items()}), progress)
+        else:
+            lines = tune.main(arguments.typed(tune.TuneOptions, options, filter=options.filter or None), progress)
+    print('\n'.join(lines))
+    return 0
+
+
+def _add_bench(parser: argparse.ArgumentParser) -> None:
+    from pedestal_studies import bench
+    parser.add_argument('what', nargs='?', choices=tuple(bench.BENCH_MODULES), help='benchmark to run; default: all')
+    console.add_json(parser)
+
+
+def _bench(options: argparse.Namespace) -> int:
+    """Run one benchmark or all, and write the rows. Return exit code 0."""
+    from pedestal_studies import bench
+    content: dict[str, Json] = {'name': 'bench', 'rows': []}
+    for what in (options.what,) if options.what else bench.BENCH_MODULES:
+        content['rows'] += importlib.import_module(f'{bench.__name__}.{bench.BENCH_MODULES[what]}').run()
+    console.write_json(options.json, content)
+    return 0
+
+
+VERBS = {
+    'scenarios': Verb(_add_scenarios, _scenarios),
+    'samples': Verb(_add_samples, _samples),
+    'new': Verb(_add_new, _new),
+    'parameters': Verb(_add_parameters, _parameters),
+    'study': Verb(_add_study, _study),
+    'tune': Verb(_add_tune, _tune),
+    'bench': Verb(_add_bench, _bench),
+}

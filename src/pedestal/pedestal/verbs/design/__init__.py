@@ -1,1 +1,0 @@
-"""Verbs for the design of an antenna: scenarios, parameters, studies, trials, tuning, benchmarks."""

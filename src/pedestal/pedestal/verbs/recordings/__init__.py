@@ -1,1 +1,0 @@
-"""Verbs for a recording: verify, recover, report, export, rerun, recompute, replay."""

@@ -1,1 +1,0 @@
-"""Verb that simulates equipment, and the equipment of this verb."""
