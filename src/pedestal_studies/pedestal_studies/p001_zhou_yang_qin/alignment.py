@@ -52,6 +52,7 @@ from pedestal_common.quantities import (
     Vector3,
     Vectors3,
     Xyz,
+    Xyzw,
 )
 from pedestal_common.record import Record
 from pedestal_studies import drawing
@@ -293,14 +294,15 @@ def quaternion(axis: int, angle: Radians) -> Quaternion:
     return q
 
 
-def misaligned(attitude: Quaternion, angles: Vector3) -> Quaternion:
+def misaligned(attitude: Quaternion, angles: Vector3) -> Quaternion | Xyzw:
     """Return the attitude deck -> n' for a given attitude deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T.
 
     n: the ENU frame; n': the misaligned frame that the INS takes for ENU. angles: a_x, a_y, a_z [rad].
     """
+    turned: Quaternion | Xyzw = attitude
     for axis in (2, 0, 1):      # z, x, y: the order of the factors from right to left
-        attitude = product(quaternion(axis, -angles[axis]), attitude)
-    return attitude
+        turned = product(quaternion(axis, -angles[axis]), turned)
+    return turned
 
 
 def draw_conditions(batch: Batch, random: np.random.Generator) -> Conditions:
@@ -324,7 +326,7 @@ def disturbance(batch: Batch, random: np.random.Generator, n: int) -> Vectors3:
     return velocity
 
 
-def simulated_run(batch: Batch, run: int) -> tuple[Increments, Quaternion]:
+def simulated_run(batch: Batch, run: int) -> tuple[Increments, Quaternion | Xyzw]:
     """Return (samples, misaligned attitude at 0 s) of one run of a batch."""
     seed = {'': BASE_SEED, 'swell': SWELL_SEED}.get(batch.kind, QUADRANT_SEED)
     # The last character of the kind, its number, gives each quadrant a noise of its own; the kind '' has none.
