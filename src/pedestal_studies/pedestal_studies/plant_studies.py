@@ -26,9 +26,9 @@ from pedestal_analysis.tuning import loops
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Floats, NewtonMeters, Times
-from pedestal_studies import drawing, metrics
+from pedestal_studies import metrics
 from pedestal_studies.p000_ma import bode
-from pedestal_studies.result import Result
+from pedestal_studies.result import Result, legend
 
 STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 0.02, 0.1, 0.2
 """Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; torque of the gust over the largest torque
@@ -153,7 +153,7 @@ def _bias_figure(kind: str, motion_of: Callable[[Run, int], tuple[Times, Floats]
             t, remaining = motion_of(records[kind, end], i)
             panel.plot(t, 1e6 * remaining, color=colour, label=label)
         panel.set_title(f'{kind}, {name}')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def _angle(run: Run, i: int) -> Floats:

@@ -28,10 +28,10 @@ from pedestal_analysis.trials.cases import Case
 from pedestal_analysis.trials.monte_carlo import Progress
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_common.quantities import Floats, Json, NewtonMeters, Radians, RadiansPerSecond, Row, Seconds, Times
-from pedestal_studies import drawing, metrics
+from pedestal_studies import metrics
 from pedestal_studies.p000_ma import servo
 from pedestal_studies.p000_ma.servo import Runs
-from pedestal_studies.result import Drawings, Metrics, Result
+from pedestal_studies.result import Drawings, Metrics, Result, draw_torques, legend
 
 STANDSTILL_START_S = 2.0  # time after a step from which the standstill is evaluated [s]
 REVERSAL_AMPLITUDE_RAD = 0.05  # amplitude of the sine of the reversals [rad]
@@ -217,10 +217,10 @@ def standstill_figure(done: Runs) -> Figure:
         t, y = standstill(record)
         axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(TRUTH_COLOUR, FILTERED_COLOUR)[column])
         axes[0, column].set_title(f'{name}: {1e6 * np.ptp(y):.1f} \N{MICRO SIGN}rad peak to peak')
-        drawing.draw_torques(axes[1, column], record)
+        draw_torques(axes[1, column], record)
     axes[0, 0].set_xlim(STANDSTILL_START_S, STANDSTILL_START_S + 0.5)
     axes[1, 0].set_ylim(-20.0, 20.0)
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def reversal_figure(done: Runs) -> Figure:
@@ -251,10 +251,10 @@ def torques_figure(done: Runs) -> Figure:
     figure, axes = new_panels(len(PAPER_CASES), height=5.6, y='torque [Nm]', sharex=True, sharey=True)
     for panel, name in zip(axes[:, 0], PAPER_CASES):
         record = done['reversal', name]
-        drawing.draw_torques(panel, record)
+        draw_torques(panel, record)
         panel.set_title(name)
     axes[-1, 0].set_xlim(*reversal_window())
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def schedules_figure(done: Runs) -> Figure:
@@ -283,8 +283,8 @@ def structures_figure(done: Runs) -> Figure:
     figure, axes = new_panels(2, 2, height=4.6, y=('torque [Nm]', 'opposing torque [Nm]'), sharex=True, sharey='row')
     for column, name in enumerate(SPEED_LOOP_STRUCTURES):
         record = done['structure', name]
-        drawing.draw_torques(axes[0, column], record)
+        draw_torques(axes[0, column], record)
         axes[1, column].plot(record.t, opposing_torque(record), color=INK_COLOUR)
         axes[0, column].set_title(name)
     axes[0, 0].set_xlim(0.0, 1.0)
-    return drawing.legend(figure)
+    return legend(figure)

@@ -24,15 +24,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pedestal_analysis.report.figures import (
-    FILTERED_COLOUR,
-    INK_COLOUR,
-    MOTOR_1_COLOUR,
-    MOTOR_2_COLOUR,
-    RAW_COLOUR,
-    TRUTH_COLOUR,
-    new_panels,
-)
+from pedestal_analysis.report import figures as fig
 from pedestal_analysis.results import tracking
 from pedestal_analysis.results.intervals import pseudo_values, row
 from pedestal_analysis.trials import monte_carlo
@@ -55,8 +47,7 @@ from pedestal_common.quantities import (
     Xyzw,
 )
 from pedestal_common.record import Record
-from pedestal_studies import drawing
-from pedestal_studies.result import Drawings, Result
+from pedestal_studies.result import Drawings, Result, legend
 from ship_motion_sim import imu
 from ship_motion_sim.navigation import navigator
 from ship_motion_sim.params import (
@@ -117,7 +108,8 @@ CASE_MEANINGS = {
     'oba': 'optimisation-based alignment: the rotation that best maps the measured specific force onto gravity',
     'limit': 'information limit: 1 sigma of the Riccati filter and of the error by the bias of an east gyro'}
 """{case: description} of the methods and of the limit, for the table of the documentation."""
-CASE_COLOURS = dict(zip(CASE_METHODS, (RAW_COLOUR, TRUTH_COLOUR, MOTOR_1_COLOUR, FILTERED_COLOUR, MOTOR_2_COLOUR)))
+CASE_COLOURS = dict(zip(CASE_METHODS, (fig.RAW_COLOUR, fig.TRUTH_COLOUR, fig.MOTOR_1_COLOUR,
+                                       fig.FILTERED_COLOUR, fig.MOTOR_2_COLOUR)))
 SETTLED_AZIMUTH_ARCMIN = 12.0  # rms over the runs below which the azimuth counts as settled [arcmin]
 EVALUATION_TIMES_S = (100, 250, 300, 600)  # instants of the rows of the azimuth's rms [s]
 SWELL_EVALUATION_TIME_S = 200  # instant of the rows of the azimuth on swell [s]
@@ -513,7 +505,7 @@ RMS_LABEL = 'rms of the error [arcmin]'
 
 def azimuth_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) -> Figure:
     """Draw figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs."""
-    figure, axes = new_panels(3, height=9.0, y=('azimuth error [deg]', 'azimuth error [arcmin]', RMS_LABEL))
+    figure, axes = fig.new_panels(3, height=9.0, y=('azimuth error [deg]', 'azimuth error [arcmin]', RMS_LABEL))
     t = EVALUATION_PERIOD_S * np.arange(1, len(bound.azimuth) + 1)
     for case, a in accuracy.items():
         axes[0, 0].plot(t, np.degrees(a.first[:, AZIMUTH_COLUMN]), color=CASE_COLOURS[case], label=case)
@@ -524,20 +516,20 @@ def azimuth_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) ->
     axes[1, 0].set_xlim(100.0, RUN_DURATION_S)
     axes[1, 0].set_ylim(-60.0, 60.0)
     finish_panel(axes[2, 0], bound.azimuth, 'azimuth: rms over the runs')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def finish_panel(axes: Axes, bound: Floats, title: str) -> None:
     """Add the limit, a logarithmic scale and a title to a panel of rms over time."""
     t = EVALUATION_PERIOD_S * np.arange(1, len(bound) + 1)
-    axes.plot(t, bound / ARCMIN_RAD, color=INK_COLOUR, linestyle='--', linewidth=1.0, label='information limit')
+    axes.plot(t, bound / ARCMIN_RAD, color=fig.INK_COLOUR, linestyle='--', linewidth=1.0, label='information limit')
     axes.set_yscale('log')
     axes.set_title(title)
 
 
 def level_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) -> Figure:
     """Draw figure 4 of the paper for level: one run after 100 s; then the rms over all runs."""
-    figure, axes = new_panels(2, height=6.4, y=('level error [arcmin]', RMS_LABEL))
+    figure, axes = fig.new_panels(2, height=6.4, y=('level error [arcmin]', RMS_LABEL))
     t = EVALUATION_PERIOD_S * np.arange(1, len(bound.level) + 1)
     for case, a in accuracy.items():
         axes[0, 0].plot(t, a.first[:, EAST_TILT_COLUMN] / ARCMIN_RAD, color=CASE_COLOURS[case], linewidth=0.8,
@@ -547,15 +539,15 @@ def level_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) -> F
     axes[0, 0].set_xlim(100.0, RUN_DURATION_S)
     axes[0, 0].set_ylim(-4.0, 4.0)
     finish_panel(axes[1, 0], bound.level, 'level: rms over the runs')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def swell_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) -> Figure:
     """Draw the rms of the azimuth on swell beside the limit."""
-    figure, axes = new_panels(1, height=3.8, y=RMS_LABEL)
+    figure, axes = fig.new_panels(1, height=3.8, y=RMS_LABEL)
     for case, a in accuracy.items():
         axes[0, 0].plot(EVALUATION_PERIOD_S * np.arange(1, len(a.rms) + 1), a.azimuth, color=CASE_COLOURS[case],
                         label=case)
     finish_panel(axes[0, 0], bound.azimuth[:round(SHORT_RUN_DURATION_S / EVALUATION_PERIOD_S)],
                  f'azimuth on swell of {SWELL_VELOCITY_M_S:g} m/s, {SWELL_FREQUENCY_HZ:g} Hz: rms over the runs')
-    return drawing.legend(figure)
+    return legend(figure)

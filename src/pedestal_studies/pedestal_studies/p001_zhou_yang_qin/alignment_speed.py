@@ -24,7 +24,7 @@ from pedestal_analysis.results.intervals import row
 from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.monte_carlo import Pool, Progress
 from pedestal_common.quantities import Floats, Seconds
-from pedestal_studies import drawing, metrics
+from pedestal_studies import metrics
 from pedestal_studies.p001_zhou_yang_qin import alignment
 from pedestal_studies.p001_zhou_yang_qin.alignment import (
     EVALUATION_PERIOD_S,
@@ -32,7 +32,7 @@ from pedestal_studies.p001_zhou_yang_qin.alignment import (
     LEVEL_COLUMNS,
     Accuracy,
 )
-from pedestal_studies.result import Result
+from pedestal_studies.result import Result, legend
 from ship_motion_sim.params import AlignmentParameters
 
 DEFAULT_RUNS = 100  # runs of each case
@@ -93,4 +93,4 @@ def speed_figure(accuracy: Mapping[str, Accuracy]) -> Figure:
             panel.semilogy(t, values, color=FILTERED_COLOUR, alpha=shade, label=case)
     axes[0, 0].set_title('rms over the runs')
     axes[1, 0].axhline(alignment.SETTLED_AZIMUTH_ARCMIN, color=INK_COLOUR, linewidth=0.8, linestyle='--')
-    return drawing.legend(figure)
+    return legend(figure)

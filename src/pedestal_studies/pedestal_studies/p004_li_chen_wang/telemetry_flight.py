@@ -35,10 +35,10 @@ from pedestal_analysis.trials import monte_carlo
 from pedestal_analysis.trials.monte_carlo import Pool, Progress
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Floats, Matrix3, Row, Seconds, Times, Vector3, Vectors3
-from pedestal_studies import drawing, ensemble
+from pedestal_studies import ensemble
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S
 from pedestal_studies.p004_li_chen_wang.rate_measurement import ALPHA, ANGLE_SIGMA_RAD, differenced_rate, filtered
-from pedestal_studies.result import Drawings, Item, Result
+from pedestal_studies.result import Drawings, Item, Result, legend
 
 DEFAULT_RUNS, NOISE_SEED = 40, 1  # number of flights; seed of their noise
 BATCH_RUNS = 5  # flights that one worker makes at a time
@@ -190,7 +190,7 @@ def axis_figure(axis: str, first_number: int) -> Figure:
         panel.set_ylabel(f'{name} [{unit}]')
         panel.set_title(f'{axis}: {name} (figure {first_number + i} of the paper)')
     axes[3, 0].set_ylim(*np.degrees(2.0 * np.abs(target[axis][:, 2]).max() * np.array((-1.0, 1.0))))
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:

@@ -20,8 +20,7 @@ from pedestal_analysis.trials.monte_carlo import Pool, Progress
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Floats, Pairs, Row
-from pedestal_studies import drawing
-from pedestal_studies.result import Item, Result
+from pedestal_studies.result import Item, Result, legend
 
 DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time
@@ -79,4 +78,4 @@ def figure(values: Mapping[str, Floats]) -> Figure:
                            label=axis)
         panel.axhline(2.0, linewidth=0.8)
         panel.set_title(name)
-    return drawing.legend(drawn)
+    return legend(drawn)

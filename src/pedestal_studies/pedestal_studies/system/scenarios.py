@@ -20,8 +20,7 @@ from pedestal_analysis.trials.monte_carlo import Pool, Progress
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.loop.memory_recording import MemoryRecording
 from pedestal_common.quantities import Floats, Row
-from pedestal_studies import drawing
-from pedestal_studies.result import Item, Result
+from pedestal_studies.result import Item, Result, legend
 
 DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case; seed of the first run
 BATCH_RUNS = 5  # runs that one worker makes at a time
@@ -165,7 +164,7 @@ def flyby_figure() -> Figure:
         panel.set_title(title)
     axes[2, 0].plot(flown.t, np.degrees(flown.encoders[:, 0]), color=FILTERED_COLOUR)
     axes[2, 0].set_title('azimuth of the antenna over the flight (figure 11)')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def pointing_figure(values: Mapping[str, Floats]) -> Figure:

@@ -52,7 +52,7 @@ def main(options: argparse.Namespace) -> int:
               f'{", ".join(pedestal_studies.STUDY_NAMES)}', file=sys.stderr)
         return console.EXIT_WRONG_COMMAND
     from pedestal_analysis.results import intervals
-    from pedestal_studies import drawing
+    from pedestal_studies.result import save
     kinds = ['png', options.vector] if options.vector else ['png']
     output = options.output or pathlib.Path('studies', options.name)
     console.check_json(options.json)
@@ -65,7 +65,7 @@ def main(options: argparse.Namespace) -> int:
         result = run(progress, **many)
         for name, draw in result.figures.items():
             progress(None, f'drawing {name}')
-            drawing.save(draw, *(output / f'{name}.{kind}' for kind in kinds))
+            save(draw, *(output / f'{name}.{kind}' for kind in kinds))
     console.show_study(f'study {options.name}', result.rows if result.shown is None else result.shown,
                        intervals.missed)
     for remark in result.remarks:
