@@ -115,7 +115,7 @@ def moments(params: FilterParameters, t: Times, truth: profiles.Motion, noise: N
     """
     y, y_rate = measured
     c = axis_filter.constants(dataclasses.replace(params, rate_measurement=noise.rate_sigma is not None),
-                              noise.bandwidth if noise.expected and noise.bandwidth else 0.0)
+                              (noise.bandwidth or 0.0) if noise.expected else 0.0)
     series = Series(t, y, np.full(len(t), noise.sigma**2), y_rate, np.full(len(t), (noise.rate_sigma or 0.0) ** 2))
     sums = np.zeros(y.shape, Moments.dtype)
     _add_runs(c, profiles.Motion(*truth), series, INITIAL_RATE_SIGMA_RAD_S, axis_filter.Estimate.zeros(len(t)), sums)

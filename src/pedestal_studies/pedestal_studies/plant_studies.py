@@ -23,9 +23,9 @@ from pedestal_common.quantities import Floats, NewtonMeters, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, TRUTH_COLOUR, new_panels
-from pedestal_studies import drawing, metrics
+from pedestal_studies import metrics
 from pedestal_studies.p000_ma import bode
-from pedestal_studies.result import Result
+from pedestal_studies.result import Result, legend
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Progress
 from pedestal_workbench.tuning import loops
@@ -153,7 +153,7 @@ def _bias_figure(kind: str, motion_of: Callable[[Run, int], tuple[Times, Floats]
             t, remaining = motion_of(records[kind, end], i)
             panel.plot(t, 1e6 * remaining, color=colour, label=label)
         panel.set_title(f'{kind}, {name}')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def _angle(run: Run, i: int) -> Floats:

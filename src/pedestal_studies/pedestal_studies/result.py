@@ -1,11 +1,20 @@
-"""The result of a study, which its function `run` returns and `pedestal study` prints and draws."""
+"""The result of a study, which its function `run` returns and `pedestal study` prints and draws.
+
+All figures have one style. They are saved as PNG and, on request, as a vector file.
+"""
 import dataclasses
+import pathlib
 from collections.abc import Callable
 from typing import TypeAlias
 
+import matplotlib
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pedestal_bringup.loop.closed_loop import Run
 from pedestal_common.quantities import Row
+from pedestal_results.report import figures
 
 Drawings: TypeAlias = dict[str, Callable[[], Figure]]   # {name of a figure: function that draws it}
 Metrics: TypeAlias = dict[str, tuple[float, str]]       # {metric: (value, unit)}
@@ -19,3 +28,30 @@ class Result:
     figures: Drawings
     remarks: list[str] = dataclasses.field(default_factory=list)    # sentences
     shown: list[Row] | None = None  # the printed rows, if all rows are too many for a terminal; None for all rows
+
+
+def legend(figure: Figure) -> Figure:
+    """Return the figure with one legend below all panels, where it covers no curve; every label occurs once."""
+    handles: dict[str, Artist] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels()):
+            handles.setdefault(label, handle)
+    longest = max(map(len, handles))
+    columns = max(1, min(len(handles), int(figure.get_figwidth() / (0.6 + 0.075 * longest))))
+    figure.legend(handles.values(), handles.keys(), loc='outside lower center', ncols=columns)
+    return figure
+
+
+def draw_torques(axes: Axes, record: Run) -> None:
+    """Draw the torque [Nm] of both azimuth motors of a run over time."""
+    for i, (colour, style) in enumerate(((figures.MOTOR_1_COLOUR, '-'), (figures.MOTOR_2_COLOUR, '--'))):
+        axes.plot(record.t, record['adu/motor_states']['effort'][:, i], style, color=colour, label=f'motor {i + 1}')
+
+
+def save(draw: Callable[[], Figure], *paths: pathlib.Path) -> None:
+    """Draw a figure once into files, with the same bytes every time."""
+    with matplotlib.rc_context({**figures.MATPLOTLIB_STYLE, 'svg.hashsalt': paths[0].stem}):
+        figure = draw()
+        figures.tidy(figure)
+        for path in paths:
+            figures.store(figure, path)

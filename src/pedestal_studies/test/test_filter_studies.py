@@ -11,10 +11,11 @@ from scipy.signal import savgol_coeffs
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.parameters import as_dict, build
-from pedestal_studies import drawing, ensemble
+from pedestal_studies import ensemble
 from pedestal_studies.ensemble import Noise
 from pedestal_studies.p000_ma import filter_families, window_filter
 from pedestal_studies.p003_lin_wu_zhu import manoeuvre, pareto
+from pedestal_studies.result import save
 from pedestal_studies.system import filters
 from pedestal_workbench.tuning import parameter_search
 
@@ -100,7 +101,7 @@ def test_rows_with_a_target_are_printed_and_doubts_are_said(filters_result):
 def test_figures_of_filters(filters_result, tmp_path):
     assert set(filters_result.figures) == {'errors', 'rates', 'rms', 'nis', 'probabilities', 'noise'}
     for name, draw in filters_result.figures.items():
-        drawing.save(draw, tmp_path / f'{name}.png')
+        save(draw, tmp_path / f'{name}.png')
 
 
 def test_tuning_saw_other_noise():

@@ -11,10 +11,10 @@ from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_results import intervals, tracking
-from pedestal_studies import drawing
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop as loop
 from pedestal_studies.p003_lin_wu_zhu import feedforward_speed
 from pedestal_studies.p003_lin_wu_zhu import imm_feedforward as study
+from pedestal_studies.result import save
 from pedestal_workbench.trials import monte_carlo
 
 T, W, ZETA = loop.T, *loop.RATE_LOOP_CONSTANTS
@@ -137,7 +137,7 @@ def test_no_row_misses_its_target_but_those_that_are_said_to(result):
 @pytest.mark.thorough
 def test_every_figure_is_drawn(result, tmp_path):
     for name, draw in result.figures.items():
-        drawing.save(draw, tmp_path / f'{name}.png')
+        save(draw, tmp_path / f'{name}.png')
         assert (tmp_path / f'{name}.png').stat().st_size > 10000
 
 

@@ -8,7 +8,7 @@ from scipy import linalg
 
 from acu_tracker.estimation.filters.constant_gain import benedict_bordner
 from pedestal_results import intervals, tracking
-from pedestal_studies import drawing, metrics
+from pedestal_studies import metrics
 from pedestal_studies.p002_jia import phased_array
 from pedestal_studies.p002_jia.angle_loop import (
     GRID_STEP_S,
@@ -19,6 +19,7 @@ from pedestal_studies.p002_jia.angle_loop import (
     receiver_reading,
 )
 from pedestal_studies.p002_jia.phased_array import instants, settled
+from pedestal_studies.result import save
 from receiver_law import monopulse
 
 
@@ -89,7 +90,7 @@ def test_figures_are_drawn(result, tmp_path):
         figure = draw()
         lines = [line for axes in figure.axes for line in axes.get_lines()]
         assert lines and all(np.isfinite(line.get_ydata()).any() for line in lines), name
-    drawing.save(result.figures['figure-7'], tmp_path / 'figure-7.png')
+    save(result.figures['figure-7'], tmp_path / 'figure-7.png')
     assert (tmp_path / 'figure-7.png').stat().st_size > 10000
 
 

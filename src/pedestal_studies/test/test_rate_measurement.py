@@ -7,8 +7,9 @@ from scipy.linalg import expm, solve_discrete_are
 
 from acu_tracker.estimation.filters import axis_filter
 from pedestal_results import intervals
-from pedestal_studies import drawing, metrics
+from pedestal_studies import metrics
 from pedestal_studies.p004_li_chen_wang import rate_measurement as study
+from pedestal_studies.result import save
 
 T, ALPHA, SIGMA = study.T, study.ALPHA, study.ANGLE_SIGMA_RAD
 CASES = [(sigma_a, rate_sigma) for sigma_a in study.ACCELERATION_SIGMAS_DEG_S2
@@ -100,5 +101,5 @@ def test_only_an_independent_rate_helps(result):
 @pytest.mark.thorough
 def test_every_figure_is_drawn(result, tmp_path):
     for name, draw in result.figures.items():
-        drawing.save(draw, tmp_path / f'{name}.png')
+        save(draw, tmp_path / f'{name}.png')
         assert (tmp_path / f'{name}.png').stat().st_size > 10000

@@ -7,8 +7,8 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from pedestal_results import intervals
-from pedestal_studies import drawing
 from pedestal_studies.p004_li_chen_wang import telemetry_flight as study
+from pedestal_studies.result import save
 
 
 @pytest.fixture(scope='module')
@@ -50,5 +50,5 @@ def test_the_filter_is_better_than_what_is_measured_and_both_pairs_have_full_ran
 @pytest.mark.thorough
 def test_every_figure_is_drawn(result, tmp_path):
     for name, draw in result.figures.items():
-        drawing.save(draw, tmp_path / f'{name}.png')
+        save(draw, tmp_path / f'{name}.png')
         assert (tmp_path / f'{name}.png').stat().st_size > 10000

@@ -110,10 +110,10 @@ def _add_parameters(parser: argparse.ArgumentParser) -> None:
 
 def _parameters(options: argparse.Namespace) -> int:
     """Print a row for each parameter of the node and of the graph. Return exit code 0."""
-    from pedestal_bringup.scenario import scenario
+    from pedestal_bringup.scenario.sections import parameters_of
     from pedestal_common.graph.graph_parameters import GraphParameters
     rows = []
-    for prefix, parameters_type in (('', scenario.parameters_of(options.node)), ('graph.', GraphParameters)):
+    for prefix, parameters_type in (('', parameters_of(options.node)), ('graph.', GraphParameters)):
         values = parameters.defaults(parameters_type)
         rows += [(prefix + name, *_columns(field.metadata, values[name]))
                  for name, field in parameters.flatten(parameters_type)]
@@ -160,7 +160,7 @@ def _study(options: argparse.Namespace) -> int:
               f'{", ".join(pedestal_studies.STUDY_NAMES)}', file=sys.stderr)
         return console.EXIT_WRONG_COMMAND
     from pedestal_results import intervals
-    from pedestal_studies import drawing
+    from pedestal_studies.result import save
     kinds = ['png', options.vector] if options.vector else ['png']
     output = options.output or pathlib.Path('studies', options.name)
     console.check_json(options.json)
@@ -173,7 +173,7 @@ def _study(options: argparse.Namespace) -> int:
         result = run(progress, **many)
         for name, draw in result.figures.items():
             progress(None, f'drawing {name}')
-            drawing.save(draw, *(output / f'{name}.{kind}' for kind in kinds))
+            save(draw, *(output / f'{name}.{kind}' for kind in kinds))
     console.show_study(f'study {options.name}', result.rows if result.shown is None else result.shown,
                        intervals.missed)
     for remark in result.remarks:

@@ -64,10 +64,10 @@ def _add_receiver(parser: argparse.ArgumentParser) -> None:
 
 def _receiver(options: argparse.Namespace) -> int:
     """Write or send the samples of all channels, and return the exit code. Raises ValueError."""
-    from pedestal_bringup.scenario import scenario
+    from pedestal_bringup.scenario import files
     if options.output is not None and options.address is not None:
         raise ValueError(f'--address {options.address}: has no effect with --output')
-    own = [scenario.override(f'tracking_receiver.source.{key}', value) for key, value in
+    own = [files.override(f'tracking_receiver.source.{key}', value) for key, value in
            (('kind', options.stream or 'sigmf'), ('address', options.output or options.address or ''))]
     from pedestal_bringup.loop import iq_run
     loop, chosen = iq_run.scenarios(options.scenario, arguments.changes(options), own, options.duration)

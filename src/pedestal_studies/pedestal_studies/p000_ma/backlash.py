@@ -25,10 +25,10 @@ from pedestal_common.quantities import Floats, Json, NewtonMeters, Radians, Radi
 from pedestal_results import tracking
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
-from pedestal_studies import drawing, metrics
+from pedestal_studies import metrics
 from pedestal_studies.p000_ma import servo
 from pedestal_studies.p000_ma.servo import Runs
-from pedestal_studies.result import Drawings, Metrics, Result
+from pedestal_studies.result import Drawings, Metrics, Result, draw_torques, legend
 from pedestal_workbench.trials import cases
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Progress
@@ -217,10 +217,10 @@ def standstill_figure(done: Runs) -> Figure:
         t, y = standstill(record)
         axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(TRUTH_COLOUR, FILTERED_COLOUR)[column])
         axes[0, column].set_title(f'{name}: {1e6 * np.ptp(y):.1f} \N{MICRO SIGN}rad peak to peak')
-        drawing.draw_torques(axes[1, column], record)
+        draw_torques(axes[1, column], record)
     axes[0, 0].set_xlim(STANDSTILL_START_S, STANDSTILL_START_S + 0.5)
     axes[1, 0].set_ylim(-20.0, 20.0)
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def reversal_figure(done: Runs) -> Figure:
@@ -251,10 +251,10 @@ def torques_figure(done: Runs) -> Figure:
     figure, axes = new_panels(len(PAPER_CASES), height=5.6, y='torque [Nm]', sharex=True, sharey=True)
     for panel, name in zip(axes[:, 0], PAPER_CASES):
         record = done['reversal', name]
-        drawing.draw_torques(panel, record)
+        draw_torques(panel, record)
         panel.set_title(name)
     axes[-1, 0].set_xlim(*reversal_window())
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def schedules_figure(done: Runs) -> Figure:
@@ -283,8 +283,8 @@ def structures_figure(done: Runs) -> Figure:
     figure, axes = new_panels(2, 2, height=4.6, y=('torque [Nm]', 'opposing torque [Nm]'), sharex=True, sharey='row')
     for column, name in enumerate(SPEED_LOOP_STRUCTURES):
         record = done['structure', name]
-        drawing.draw_torques(axes[0, column], record)
+        draw_torques(axes[0, column], record)
         axes[1, column].plot(record.t, opposing_torque(record), color=INK_COLOUR)
         axes[0, column].set_title(name)
     axes[0, 0].set_xlim(0.0, 1.0)
-    return drawing.legend(figure)
+    return legend(figure)

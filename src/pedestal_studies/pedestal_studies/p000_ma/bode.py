@@ -23,18 +23,9 @@ from adu_drive.params import AduParameters
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Complexes, Floats, Row
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import (
-    FILTERED_COLOUR,
-    INK_COLOUR,
-    MOTOR_1_COLOUR,
-    MOTOR_2_COLOUR,
-    RAW_COLOUR,
-    TRUTH_COLOUR,
-    new_panels,
-)
-from pedestal_studies import drawing
+from pedestal_results.report import figures as fig
 from pedestal_studies.p000_ma import servo
-from pedestal_studies.result import Drawings, Result
+from pedestal_studies.result import Drawings, Result, legend
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Progress
 from pedestal_workbench.tuning import frequency_response as frequency
@@ -135,25 +126,25 @@ def drawings(responses: Mapping[str, Response], drive: AduParameters) -> Drawing
 
     return {
         'current': chosen('current loops of the azimuth motors',
-                          {'motor 1': ('current/motor_1', MOTOR_1_COLOUR),
-                           'motor 2': ('current/motor_2', MOTOR_2_COLOUR)},
+                          {'motor 1': ('current/motor_1', fig.MOTOR_1_COLOUR),
+                           'motor 2': ('current/motor_2', fig.MOTOR_2_COLOUR)},
                           lambda s: w_c / s),
         'speed': chosen('speed loops',
-                        {'azimuth': ('speed/azimuth', FILTERED_COLOUR),
-                         'elevation': ('speed/elevation', TRUTH_COLOUR)},
+                        {'azimuth': ('speed/azimuth', fig.FILTERED_COLOUR),
+                         'elevation': ('speed/elevation', fig.TRUTH_COLOUR)},
                         lambda s: (p.speed_loop.proportional + p.speed_loop.integral / s) / (J * s)),
         'position': chosen('position loops',
-                           {'feed-forward (and pid), azimuth': ('position/azimuth/feedforward', FILTERED_COLOUR),
-                            'feed-forward (and pid), elevation': ('position/elevation/feedforward', TRUTH_COLOUR),
-                            'adrc, azimuth': ('position/azimuth/adrc', MOTOR_2_COLOUR)},
+                           {'feed-forward (and pid), azimuth': ('position/azimuth/feedforward', fig.FILTERED_COLOUR),
+                            'feed-forward (and pid), elevation': ('position/elevation/feedforward', fig.TRUTH_COLOUR),
+                            'adrc, azimuth': ('position/azimuth/adrc', fig.MOTOR_2_COLOUR)},
                            lambda s: c.bandwidth / s + c.integral * c.bandwidth ** 2 / s ** 2),
         'structure': chosen('position loop, azimuth, with a flexible load',
-                            {'rigid': ('position/azimuth/rigid', RAW_COLOUR),
-                             'flexible': ('position/azimuth/structure', TRUTH_COLOUR),
-                             'flexible, notch': ('position/azimuth/structure-notch', FILTERED_COLOUR)}),
+                            {'rigid': ('position/azimuth/rigid', fig.RAW_COLOUR),
+                             'flexible': ('position/azimuth/structure', fig.TRUTH_COLOUR),
+                             'flexible, notch': ('position/azimuth/structure-notch', fig.FILTERED_COLOUR)}),
         'paper': chosen('position loop, azimuth, of paper 000 and ours',
-                        {'paper': ('position/azimuth/paper-r1', RAW_COLOUR),
-                         'best': ('position/azimuth/best', FILTERED_COLOUR)})}
+                        {'paper': ('position/azimuth/paper-r1', fig.RAW_COLOUR),
+                         'best': ('position/azimuth/best', fig.FILTERED_COLOUR)})}
 
 
 def decibel(x: Complexes) -> Floats:
@@ -174,7 +165,7 @@ def bode_figure(title: str, curves: Mapping[str, tuple[Response, str]], design: 
     Crosses mark the crossover in gain and phase, and the legend gives the margins. The first of two or more curves is
     drawn wide, so that it remains visible behind a curve that coincides with it.
     """
-    figure, axes = new_panels(2, 2, height=5.4, x='frequency [Hz]', y=('gain [dB]', 'phase [deg]'), sharex=True)
+    figure, axes = fig.new_panels(2, 2, height=5.4, x='frequency [Hz]', y=('gain [dB]', 'phase [deg]'), sharex=True)
     figure.suptitle(title)
     for column, loop in enumerate(('open loop', 'closed loop')):
         gain, phase = axes[:, column]
@@ -182,8 +173,8 @@ def bode_figure(title: str, curves: Mapping[str, tuple[Response, str]], design: 
             f = next(iter(curves.values()))[0].frequency
             L = design(2j * math.pi * f.astype(complex))
             x = L / (1.0 + L) if column else L
-            gain.semilogx(f, decibel(x), color=INK_COLOUR, lw=0.8, ls='--', label='as designed')
-            phase.semilogx(f, degrees(x), color=INK_COLOUR, lw=0.8, ls='--')
+            gain.semilogx(f, decibel(x), color=fig.INK_COLOUR, lw=0.8, ls='--', label='as designed')
+            phase.semilogx(f, degrees(x), color=fig.INK_COLOUR, lw=0.8, ls='--')
         for i, (label, (measured, colour)) in enumerate(curves.items()):
             keep = measured.deviation < MAX_DRAWN_DEVIATION
             f, x = measured.frequency[keep], (measured.closed_loop if column else measured.open_loop)[keep]
@@ -194,17 +185,17 @@ def bode_figure(title: str, curves: Mapping[str, tuple[Response, str]], design: 
             at = frequency.margins(measured)['crossover_hz'][0]
             if not column and math.isfinite(at):
                 phase_there = float(np.interp(math.log(at), np.log(f), degrees(x)))
-                gain.plot(at, 0.0, 'x', color=INK_COLOUR, ms=6.0)
-                phase.plot(at, phase_there, 'x', color=INK_COLOUR, ms=6.0)
+                gain.plot(at, 0.0, 'x', color=fig.INK_COLOUR, ms=6.0)
+                phase.plot(at, phase_there, 'x', color=fig.INK_COLOUR, ms=6.0)
                 phase.plot([at, at], [-180.0, phase_there], color=colour, lw=0.8, ls=':')
         gain.set_title(loop)
-        gain.axhline(-3.0 if column else 0.0, color=INK_COLOUR, lw=0.6, ls=':')
+        gain.axhline(-3.0 if column else 0.0, color=fig.INK_COLOUR, lw=0.6, ls=':')
         gain.set_ylim(bottom=-40.0)
         if not column:
-            phase.axhline(-180.0, color=INK_COLOUR, lw=0.6, ls=':')
+            phase.axhline(-180.0, color=fig.INK_COLOUR, lw=0.6, ls=':')
         phase.set_ylim(-360.0, 60.0)
         phase.set_yticks(np.arange(-360.0, 1.0, 90.0))
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def margin_text(measured: Response) -> str:

@@ -26,17 +26,9 @@ from pedestal_bringup.loop.closed_loop import Run
 from pedestal_common.quantities import Floats, Json, Radians, RadiansPerSecond, Row, Seconds
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import (
-    FILTERED_COLOUR,
-    INK_COLOUR,
-    MOTOR_1_COLOUR,
-    MOTOR_2_COLOUR,
-    RAW_COLOUR,
-    TRUTH_COLOUR,
-    new_panels,
-)
-from pedestal_studies import drawing, metrics
-from pedestal_studies.result import Drawings, Result
+from pedestal_results.report import figures as fig
+from pedestal_studies import metrics
+from pedestal_studies.result import Drawings, Result, draw_torques, legend
 from pedestal_workbench.trials import cases
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Progress
@@ -260,8 +252,9 @@ def remarks(done: Runs) -> list[str]:
     ]
 
 
-CASE_COLOURS = {'paper-r1': TRUTH_COLOUR, 'paper-r2': RAW_COLOUR, 'best': FILTERED_COLOUR, 'adrc': MOTOR_2_COLOUR,
-                'best-inertia-plus': TRUTH_COLOUR, 'best-inertia-minus': MOTOR_1_COLOUR}
+CASE_COLOURS = {
+    'paper-r1': fig.TRUTH_COLOUR, 'paper-r2': fig.RAW_COLOUR, 'best': fig.FILTERED_COLOUR, 'adrc': fig.MOTOR_2_COLOUR,
+    'best-inertia-plus': fig.TRUTH_COLOUR, 'best-inertia-minus': fig.MOTOR_1_COLOUR}
 
 
 def figures(done: Runs) -> Drawings:
@@ -273,49 +266,52 @@ def figures(done: Runs) -> Drawings:
 def step_figure(done: Runs) -> Figure:
     """Draw figure 5: the load's angle, and the torque of both motors below."""
     names = ('paper-r1', 'paper-r2', 'best')
-    figure, axes = new_panels(4, height=8.0, y=('azimuth [rad]', *3 * ['torque [Nm]']), sharex=True,
-                              height_ratios=(2.2, 1, 1, 1))
+    figure, axes = fig.new_panels(4, height=8.0, y=('azimuth [rad]', *3 * ['torque [Nm]']), sharex=True,
+                                  height_ratios=(2.2, 1, 1, 1))
     top = axes[0, 0]
-    top.axhline(STEP_SIZE_RAD, color=INK_COLOUR, linewidth=0.8, linestyle='--', label='reference')
+    top.axhline(STEP_SIZE_RAD, color=fig.INK_COLOUR, linewidth=0.8, linestyle='--', label='reference')
     for name, below in zip(names, axes[1:, 0]):
         record = done[name, 'step']
         t = record.t
         top.plot(t, record['adu/truth']['position'][:, 0], color=CASE_COLOURS[name], linewidth=1.4, label=name)
-        drawing.draw_torques(below, record)
+        draw_torques(below, record)
         below.set_title(f'{name}: torque of the motors')
         below.set_ylim(-100.0, 100.0)
     top.set_xlim(0.0, 0.6)
     top.set_title('step of 0.174 rad (figure 5 of the paper)')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def sine_figure(done: Runs) -> Figure:
     """Draw figure 6: reference and load, errors of the paper's controllers, and the error of best on its own scale."""
-    figure, axes = new_panels(3, height=7.0, x='time [periods of the sine]', sharex=True, height_ratios=(1.4, 1.2, 1),
-                              y=('azimuth [rad]', 'error [mrad]', 'error [\N{MICRO SIGN}rad]'))
+    figure, axes = fig.new_panels(3, height=7.0, x='time [periods of the sine]', sharex=True,
+                                  height_ratios=(1.4, 1.2, 1),
+                                  y=('azimuth [rad]', 'error [mrad]', 'error [\N{MICRO SIGN}rad]'))
     period = 2.0 * math.pi / SINE_FREQUENCIES_RAD_S['0p4hz']
     record = done['paper-r1', '0p4hz']
     t = record.t / period
-    axes[0, 0].plot(t, SINE_AMPLITUDE_RAD * np.sin(SINE_FREQUENCIES_RAD_S['0p4hz'] * record.t), color=INK_COLOUR,
+    axes[0, 0].plot(t, SINE_AMPLITUDE_RAD * np.sin(SINE_FREQUENCIES_RAD_S['0p4hz'] * record.t), color=fig.INK_COLOUR,
                     linestyle='--', label='reference')
-    axes[0, 0].plot(t, record['adu/truth']['position'][:, 0], color=TRUTH_COLOUR, linewidth=1.4,
+    axes[0, 0].plot(t, record['adu/truth']['position'][:, 0], color=fig.TRUTH_COLOUR, linewidth=1.4,
                     label='paper-r1, 0.4 Hz')
     axes[0, 0].set_title('sine of 0.87 rad (figure 6 of the paper)')
     for name, reading, colour, style, scale, panel in (
-            ('paper-r1', '0p4hz', TRUTH_COLOUR, '-', 1e3, 1), ('paper-r2', '0p4rads', INK_COLOUR, '--', 1e3, 1),
-            ('best', '0p4hz', FILTERED_COLOUR, '-', 1e6, 2), ('best', '0p4rads', MOTOR_1_COLOUR, '-', 1e6, 2)):
+            ('paper-r1', '0p4hz', fig.TRUTH_COLOUR, '-', 1e3, 1),
+            ('paper-r2', '0p4rads', fig.INK_COLOUR, '--', 1e3, 1),
+            ('best', '0p4hz', fig.FILTERED_COLOUR, '-', 1e6, 2),
+            ('best', '0p4rads', fig.MOTOR_1_COLOUR, '-', 1e6, 2)):
         record, w = done[name, reading], SINE_FREQUENCIES_RAD_S[reading]
         axes[panel, 0].plot(record.t * w / (2.0 * math.pi), scale * sine_error(record, w), style, color=colour,
                             label=f'{name}, {SINE_READINGS[reading]}')
     axes[2, 0].set_title('best, with its start outside the scale')
     axes[2, 0].set_ylim(-100.0, 100.0)
     axes[2, 0].set_xlim(0.0, SINE_PERIODS)
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def gust_figure(done: Runs) -> Figure:
     """Draw the deflection of the load by the gust."""
-    figure, axes = new_panels(1, height=3.4, y='deflection of the azimuth [\N{MICRO SIGN}rad]')
+    figure, axes = fig.new_panels(1, height=3.4, y='deflection of the azimuth [\N{MICRO SIGN}rad]')
     axes = axes[0, 0]
     for name in ('paper-r1', 'adrc', 'best'):
         record = done[name, 'gust']
@@ -323,16 +319,16 @@ def gust_figure(done: Runs) -> Figure:
         axes.plot(record.t, 1e6 * (y - y[record.t < GUST_START_S][-1]), color=CASE_COLOURS[name], linewidth=1.3,
                   label=name)
     stiffness = 2.0 * step_case('best').loaded().node_parameters('adu').azimuth.gear_train.stiffness
-    axes.axhline(1e6 * GUST_TORQUE_NM / stiffness, color=INK_COLOUR, linewidth=0.8, linestyle='--',
+    axes.axhline(1e6 * GUST_TORQUE_NM / stiffness, color=fig.INK_COLOUR, linewidth=0.8, linestyle='--',
                  label='deflection of the gear by the gust torque')
     axes.set_xlim(GUST_START_S - 0.05, GUST_START_S + 0.5)
     axes.set_title(f'gust: a step of {GUST_TORQUE_NM:g} Nm at {GUST_START_S:g} s')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def inertia_figure(done: Runs) -> Figure:
     """Draw the end of the step of best with 20 % more and 20 % less load inertia, and the torque of the motors."""
-    figure, axes = new_panels(2, height=5.2, y=('azimuth - 0.174 rad [mrad]', 'torque [Nm]'), sharex=True)
+    figure, axes = fig.new_panels(2, height=5.2, y=('azimuth - 0.174 rad [mrad]', 'torque [Nm]'), sharex=True)
     for name, label in (('best-inertia-minus', 'load 20 % lighter'), ('best', 'load as assumed'),
                         ('best-inertia-plus', 'load 20 % heavier')):
         record = done[name, 'step']
@@ -341,12 +337,12 @@ def inertia_figure(done: Runs) -> Figure:
         torque = record['adu/motor_states']['effort'][:, :2].mean(axis=1)
         axes[1, 0].plot(record.t, torque, color=CASE_COLOURS[name], label=label)
     for side in (-SETTLING_BAND, SETTLING_BAND):
-        axes[0, 0].axhline(1e3 * side * STEP_SIZE_RAD, color=INK_COLOUR, linewidth=0.8, linestyle='--')
+        axes[0, 0].axhline(1e3 * side * STEP_SIZE_RAD, color=fig.INK_COLOUR, linewidth=0.8, linestyle='--')
     axes[0, 0].set_xlim(0.0, 0.3)
     axes[0, 0].set_ylim(-8.0, 6.0)
     axes[0, 0].set_title('step of best: the end of the move, 2 % band dashed')
     axes[1, 0].set_title('mean torque of the two motors')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def run(progress: Progress) -> Result:

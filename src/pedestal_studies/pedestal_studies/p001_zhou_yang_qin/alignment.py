@@ -39,21 +39,13 @@ from pedestal_common.quantities import (
     Vector3,
     Vectors3,
     Xyz,
+    Xyzw,
 )
 from pedestal_common.record import Record
 from pedestal_results import tracking
 from pedestal_results.intervals import pseudo_values, row
-from pedestal_results.report.figures import (
-    FILTERED_COLOUR,
-    INK_COLOUR,
-    MOTOR_1_COLOUR,
-    MOTOR_2_COLOUR,
-    RAW_COLOUR,
-    TRUTH_COLOUR,
-    new_panels,
-)
-from pedestal_studies import drawing
-from pedestal_studies.result import Drawings, Result
+from pedestal_results.report import figures as fig
+from pedestal_studies.result import Drawings, Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 from ship_motion_sim import imu
@@ -116,7 +108,8 @@ CASE_MEANINGS = {
     'oba': 'optimisation-based alignment: the rotation that best maps the measured specific force onto gravity',
     'limit': 'information limit: 1 sigma of the Riccati filter and of the error by the bias of an east gyro'}
 """{case: description} of the methods and of the limit, for the table of the documentation."""
-CASE_COLOURS = dict(zip(CASE_METHODS, (RAW_COLOUR, TRUTH_COLOUR, MOTOR_1_COLOUR, FILTERED_COLOUR, MOTOR_2_COLOUR)))
+CASE_COLOURS = dict(zip(CASE_METHODS, (fig.RAW_COLOUR, fig.TRUTH_COLOUR, fig.MOTOR_1_COLOUR,
+                                       fig.FILTERED_COLOUR, fig.MOTOR_2_COLOUR)))
 SETTLED_AZIMUTH_ARCMIN = 12.0  # rms over the runs below which the azimuth counts as settled [arcmin]
 EVALUATION_TIMES_S = (100, 250, 300, 600)  # instants of the rows of the azimuth's rms [s]
 SWELL_EVALUATION_TIME_S = 200  # instant of the rows of the azimuth on swell [s]
@@ -293,14 +286,15 @@ def quaternion(axis: int, angle: Radians) -> Quaternion:
     return q
 
 
-def misaligned(attitude: Quaternion, angles: Vector3) -> Quaternion:
+def misaligned(attitude: Quaternion, angles: Vector3) -> Quaternion | Xyzw:
     """Return the attitude deck -> n' for a given attitude deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T.
 
     n: the ENU frame; n': the misaligned frame that the INS takes for ENU. angles: a_x, a_y, a_z [rad].
     """
+    turned: Quaternion | Xyzw = attitude
     for axis in (2, 0, 1):      # z, x, y: the order of the factors from right to left
-        attitude = np.array(product(quaternion(axis, -angles[axis]), attitude))
-    return attitude
+        turned = product(quaternion(axis, -angles[axis]), turned)
+    return turned
 
 
 def draw_conditions(batch: Batch, random: np.random.Generator) -> Conditions:
@@ -324,7 +318,7 @@ def disturbance(batch: Batch, random: np.random.Generator, n: int) -> Vectors3:
     return velocity
 
 
-def simulated_run(batch: Batch, run: int) -> tuple[Increments, Quaternion]:
+def simulated_run(batch: Batch, run: int) -> tuple[Increments, Quaternion | Xyzw]:
     """Return (samples, misaligned attitude at 0 s) of one run of a batch."""
     seed = {'': BASE_SEED, 'swell': SWELL_SEED}.get(batch.kind, QUADRANT_SEED)
     # The last character of the kind, its number, gives each quadrant a noise of its own; the kind '' has none.
@@ -511,7 +505,7 @@ RMS_LABEL = 'rms of the error [arcmin]'
 
 def azimuth_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) -> Figure:
     """Draw figures 3 and 4 of the paper for azimuth, one run; then the rms over all runs."""
-    figure, axes = new_panels(3, height=9.0, y=('azimuth error [deg]', 'azimuth error [arcmin]', RMS_LABEL))
+    figure, axes = fig.new_panels(3, height=9.0, y=('azimuth error [deg]', 'azimuth error [arcmin]', RMS_LABEL))
     t = EVALUATION_PERIOD_S * np.arange(1, len(bound.azimuth) + 1)
     for case, a in accuracy.items():
         axes[0, 0].plot(t, np.degrees(a.first[:, AZIMUTH_COLUMN]), color=CASE_COLOURS[case], label=case)
@@ -522,20 +516,20 @@ def azimuth_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) ->
     axes[1, 0].set_xlim(100.0, RUN_DURATION_S)
     axes[1, 0].set_ylim(-60.0, 60.0)
     finish_panel(axes[2, 0], bound.azimuth, 'azimuth: rms over the runs')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def finish_panel(axes: Axes, bound: Floats, title: str) -> None:
     """Add the limit, a logarithmic scale and a title to a panel of rms over time."""
     t = EVALUATION_PERIOD_S * np.arange(1, len(bound) + 1)
-    axes.plot(t, bound / ARCMIN_RAD, color=INK_COLOUR, linestyle='--', linewidth=1.0, label='information limit')
+    axes.plot(t, bound / ARCMIN_RAD, color=fig.INK_COLOUR, linestyle='--', linewidth=1.0, label='information limit')
     axes.set_yscale('log')
     axes.set_title(title)
 
 
 def level_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) -> Figure:
     """Draw figure 4 of the paper for level: one run after 100 s; then the rms over all runs."""
-    figure, axes = new_panels(2, height=6.4, y=('level error [arcmin]', RMS_LABEL))
+    figure, axes = fig.new_panels(2, height=6.4, y=('level error [arcmin]', RMS_LABEL))
     t = EVALUATION_PERIOD_S * np.arange(1, len(bound.level) + 1)
     for case, a in accuracy.items():
         axes[0, 0].plot(t, a.first[:, EAST_TILT_COLUMN] / ARCMIN_RAD, color=CASE_COLOURS[case], linewidth=0.8,
@@ -545,15 +539,15 @@ def level_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) -> F
     axes[0, 0].set_xlim(100.0, RUN_DURATION_S)
     axes[0, 0].set_ylim(-4.0, 4.0)
     finish_panel(axes[1, 0], bound.level, 'level: rms over the runs')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def swell_figure(accuracy: Mapping[str, Accuracy], bound: InformationLimit) -> Figure:
     """Draw the rms of the azimuth on swell beside the limit."""
-    figure, axes = new_panels(1, height=3.8, y=RMS_LABEL)
+    figure, axes = fig.new_panels(1, height=3.8, y=RMS_LABEL)
     for case, a in accuracy.items():
         axes[0, 0].plot(EVALUATION_PERIOD_S * np.arange(1, len(a.rms) + 1), a.azimuth, color=CASE_COLOURS[case],
                         label=case)
     finish_panel(axes[0, 0], bound.azimuth[:round(SHORT_RUN_DURATION_S / EVALUATION_PERIOD_S)],
                  f'azimuth on swell of {SWELL_VELOCITY_M_S:g} m/s, {SWELL_FREQUENCY_HZ:g} Hz: rms over the runs')
-    return drawing.legend(figure)
+    return legend(figure)

@@ -22,7 +22,7 @@ from pedestal_common.quantities import Floats, Seconds
 from pedestal_results import tracking
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, new_panels
-from pedestal_studies import drawing, metrics
+from pedestal_studies import metrics
 from pedestal_studies.p001_zhou_yang_qin import alignment
 from pedestal_studies.p001_zhou_yang_qin.alignment import (
     EVALUATION_PERIOD_S,
@@ -30,7 +30,7 @@ from pedestal_studies.p001_zhou_yang_qin.alignment import (
     LEVEL_COLUMNS,
     Accuracy,
 )
-from pedestal_studies.result import Result
+from pedestal_studies.result import Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 from ship_motion_sim.params import AlignmentParameters
@@ -93,4 +93,4 @@ def speed_figure(accuracy: Mapping[str, Accuracy]) -> Figure:
             panel.semilogy(t, values, color=FILTERED_COLOUR, alpha=shade, label=case)
     axes[0, 0].set_title('rms over the runs')
     axes[1, 0].axhline(alignment.SETTLED_AZIMUTH_ARCMIN, color=INK_COLOUR, linewidth=0.8, linestyle='--')
-    return drawing.legend(figure)
+    return legend(figure)

@@ -9,28 +9,19 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pedestal_common.quantities import Floats, Seconds
-from pedestal_results.report.figures import (
-    FILTERED_COLOUR,
-    INK_COLOUR,
-    MOTOR_1_COLOUR,
-    MOTOR_2_COLOUR,
-    RAW_COLOUR,
-    TRUTH_COLOUR,
-    Panels,
-    new_panels,
-)
-from pedestal_studies import drawing
+from pedestal_results.report import figures as fig
 from pedestal_studies.p002_jia.angle_loop import GRID_STEP_S, PaperLoop
+from pedestal_studies.result import legend
 
 Readings: TypeAlias = dict[str, tuple[Floats, Floats]]   # {smoothing: (error that the receiver measures, true error)}
 
-LINE_COLOURS = (FILTERED_COLOUR, TRUTH_COLOUR, MOTOR_2_COLOUR, MOTOR_1_COLOUR, INK_COLOUR)
+LINE_COLOURS = (fig.FILTERED_COLOUR, fig.TRUTH_COLOUR, fig.MOTOR_2_COLOUR, fig.MOTOR_1_COLOUR, fig.INK_COLOUR)
 SMOOTHING_TITLES = {'S0': 'S0, no smoothing', 'S1': 'S1, recursion', 'S2': 'S2, moving average'}
 
 
-def side_by_side(rows: int, **options: Any) -> tuple[Figure, Panels]:    # of new_panels, which has many
+def side_by_side(rows: int, **options: Any) -> tuple[Figure, fig.Panels]:    # of new_panels, which has many
     """Return (figure, axes (rows, 3)) with a column for each smoothing."""
-    figure, axes = new_panels(rows, 3, height=1.2 + 2.4 * rows, width=9.6, sharey='row', sharex=True, **options)
+    figure, axes = fig.new_panels(rows, 3, height=1.2 + 2.4 * rows, width=9.6, sharey='row', sharex=True, **options)
     for column, title in zip(axes.T, SMOOTHING_TITLES.values()):
         column[0].set_title(title, fontsize=10)
     return figure, axes
@@ -47,11 +38,11 @@ def steps(done: Mapping[PaperLoop, Floats], label: Callable[[PaperLoop], str], t
         for loop, colour in zip(loops, LINE_COLOURS):
             panel.step(GRID_STEP_S * np.arange(len(done[loop])), done[loop], color=colour, linewidth=1.2, where='post',
                        label=label(loop))
-        panel.axhline(1.0, color=INK_COLOUR, linewidth=0.6, linestyle='--')
+        panel.axhline(1.0, color=fig.INK_COLOUR, linewidth=0.6, linestyle='--')
         panel.set_xlim(0.0, seconds)
     axes[0, 0].set_ylim(-0.05, 2.3)
     figure.suptitle(title)
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def lags(done: Mapping[str, Readings], title: str, seconds: tuple[Seconds, Seconds]) -> Figure:
@@ -67,13 +58,13 @@ def lags(done: Mapping[str, Readings], title: str, seconds: tuple[Seconds, Secon
                 error = np.degrees(error[slice(*window)])
                 panel.plot(GRID_STEP_S * np.arange(*window), error, color=colour, linewidth=0.9, label=label)
     figure.suptitle(title)
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def stability(limits: Mapping[PaperLoop, tuple[int, int]]) -> Figure:
     """Draw the largest stable delays {PaperLoop: (by bisection, by eigenvalues) [ms]} over alpha and over slope."""
-    figure, axes = new_panels(1, 3, height=3.6, width=9.6, x=('alpha', 'alpha', 'true slope over assumed'),
-                              y='largest stable delay [ms]')
+    figure, axes = fig.new_panels(1, 3, height=3.6, width=9.6, x=('alpha', 'alpha', 'true slope over assumed'),
+                                  y='largest stable delay [ms]')
     for panel, T in zip(axes[0], (10, 5)):
         for S, colour in zip(SMOOTHING_TITLES, LINE_COLOURS):
             by_alpha = {loop.alpha: both for loop, both in limits.items() if loop.smoothing == S and loop.period == T
@@ -85,19 +76,19 @@ def stability(limits: Mapping[PaperLoop, tuple[int, int]]) -> Figure:
     by_slope = {loop.slope: both for loop, both in limits.items() if loop.alpha == 0.1 and loop.smoothing == 'S1'
              and loop.period == 10 and loop.form == 'type_1'}
     order = sorted(by_slope)
-    axes[0, 2].plot(order, [by_slope[slope][0] for slope in order], color=TRUTH_COLOUR)
-    axes[0, 2].plot(order, [by_slope[slope][1] for slope in order], 'o', color=TRUTH_COLOUR, markersize=4)
+    axes[0, 2].plot(order, [by_slope[slope][0] for slope in order], color=fig.TRUTH_COLOUR)
+    axes[0, 2].plot(order, [by_slope[slope][1] for slope in order], 'o', color=fig.TRUTH_COLOUR, markersize=4)
     axes[0, 2].set_title('alpha 0.1, T = 10 ms, S1')
     axes[0, 2].set_ylim(0.0, 220.0)
     figure.suptitle('largest stable delay: bisection (lines) and eigenvalues (dots)')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def filter_loop_errors(errors: Mapping[str, Floats], seconds: tuple[Seconds, Seconds]) -> Figure:
     """Draw true errors {case: error [rad]} without noise, of the paper's loop and of loops with a filter."""
-    figure, axes = new_panels(3, height=7.6, y='largest error [deg]', sharex=True)
-    lines = {'paper': RAW_COLOUR, 'paper-delta': INK_COLOUR, 'type-2': MOTOR_2_COLOUR, 'tracked-10ms': MOTOR_1_COLOUR,
-             'best': FILTERED_COLOUR}
+    figure, axes = fig.new_panels(3, height=7.6, y='largest error [deg]', sharex=True)
+    lines = {'paper': fig.RAW_COLOUR, 'paper-delta': fig.INK_COLOUR, 'type-2': fig.MOTOR_2_COLOUR,
+             'tracked-10ms': fig.MOTOR_1_COLOUR, 'best': fig.FILTERED_COLOUR}
     window = slice(*(round(t / GRID_STEP_S) for t in seconds))
     t = GRID_STEP_S * np.arange(window.start, window.stop)
     for panel, target, title in zip(axes[:, 0], ('ramp', 'sine', 'sway'),
@@ -108,10 +99,10 @@ def filter_loop_errors(errors: Mapping[str, Floats], seconds: tuple[Seconds, Sec
                                linewidth=1.1, label=loop)
         panel.set_title(title, fontsize=10)
         panel.set_ylim(1e-5, 1.0)
-    axes[2, 0].semilogy(t, envelope(np.degrees(np.abs(errors['best/sway-ins'][window]))), color=TRUTH_COLOUR,
+    axes[2, 0].semilogy(t, envelope(np.degrees(np.abs(errors['best/sway-ins'][window]))), color=fig.TRUTH_COLOUR,
                         linewidth=1.1, label='best with INS, 5 ms late')
     figure.suptitle('true error without noise, delay 20 ms (best has no error on the ramp)')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def envelope(x: Floats, width: int = 10) -> Floats:
@@ -121,13 +112,13 @@ def envelope(x: Floats, width: int = 10) -> Floats:
 
 def loss(records: Mapping[str, Floats], seconds: tuple[Seconds, Seconds]) -> Figure:
     """Draw true errors {label: error [beamwidths]} of a loop that keeps the target and of a loop that loses it."""
-    figure, axes = new_panels(1, height=3.6, y='true error [beamwidths]')
+    figure, axes = fig.new_panels(1, height=3.6, y='true error [beamwidths]')
     panel, window = axes[0, 0], slice(*(round(t / GRID_STEP_S) for t in seconds))
     for (label, error), colour in zip(records.items(), LINE_COLOURS):
         panel.plot(GRID_STEP_S * np.arange(window.start, window.stop), error[window], color=colour, linewidth=1.0,
                    label=label)
     for half in (-0.5, 0.5):
-        panel.axhline(half, color=INK_COLOUR, linewidth=0.8, linestyle='--')
+        panel.axhline(half, color=fig.INK_COLOUR, linewidth=0.8, linestyle='--')
     panel.set_ylim(-1.5, 1.5)
     panel.set_title('no signal beyond half a beamwidth (dashed)')
-    return drawing.legend(figure)
+    return legend(figure)

@@ -293,7 +293,7 @@ def statistics(cases: Mapping[_Name, tuple[str, Source]], count: int, pool: Pool
         miss, values = np.zeros(()), []
         for _ in pieces:
             more, of_runs = next(done)
-            miss += more
+            miss = miss + more
             values.append(of_runs)
         result[name] = MissStatistics(axis, miss / count, np.concatenate(values))
     return result

@@ -26,7 +26,6 @@ from pedestal_common.quantities import Floats, Pairs, RadiansPerSecond, Records,
 from pedestal_results import tracking
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, MOTOR_1_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
-from pedestal_studies import drawing
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop, imm_feedforward
 from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     METRIC_UNITS,
@@ -35,7 +34,7 @@ from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     Source,
 )
 from pedestal_studies.profiles import S_MOTION_RATE_RAD_S
-from pedestal_studies.result import Item, Result
+from pedestal_studies.result import Item, Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
@@ -167,4 +166,4 @@ def rate_figure(speed: str) -> Figure:
         panel.plot(since, np.degrees(steps['rate'][0, counts]), color=colour, label=name, linewidth=0.9)
         panel.set_title(name)
     axes[0, 0].set_xlim(reversal - 1.5, reversal + 2.5)
-    return drawing.legend(figure)
+    return legend(figure)

@@ -33,16 +33,8 @@ from pedestal_common.parameters import as_dict
 from pedestal_common.quantities import Bools, Degrees, Floats, Pairs, RadiansPerSecond, Row, Times, Vectors3
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import (
-    FILTERED_COLOUR,
-    INK_COLOUR,
-    MOTOR_1_COLOUR,
-    MOTOR_2_COLOUR,
-    RAW_COLOUR,
-    TRUTH_COLOUR,
-    new_panels,
-)
-from pedestal_studies import drawing, metrics, profiles
+from pedestal_results.report import figures as fig
+from pedestal_studies import metrics, profiles
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
 from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
@@ -58,7 +50,7 @@ from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     imm,
     statistics,
 )
-from pedestal_studies.result import Drawings, Result
+from pedestal_studies.result import Drawings, Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
@@ -251,8 +243,8 @@ def remarks(misses: Misses) -> list[str]:
     ]
 
 
-SOURCE_COLOURS = {'kalman-cv': TRUTH_COLOUR, 'imm': MOTOR_1_COLOUR, 'imm-predicted': FILTERED_COLOUR,
-                  'perfect-state': INK_COLOUR}
+SOURCE_COLOURS = {'kalman-cv': fig.TRUTH_COLOUR, 'imm': fig.MOTOR_1_COLOUR, 'imm-predicted': fig.FILTERED_COLOUR,
+                  'perfect-state': fig.INK_COLOUR}
 
 
 def figures(misses: Misses) -> Drawings:
@@ -273,77 +265,80 @@ def from_first_reversal(axis: str) -> tuple[Times, Bools, Vectors3]:
 def miss_figure(axis: str, figures_of_paper: str, misses: Misses) -> Figure:
     """Draw the miss: one run of each case and the mean over the runs."""
     names = ('kalman-cv', 'imm', 'imm-predicted')
-    figure, axes = new_panels(len(names), height=6.4, y='miss [deg]', sharex=True, sharey=True)
+    figure, axes = fig.new_panels(len(names), height=6.4, y='miss [deg]', sharex=True, sharey=True)
     t, counts, _ = from_first_reversal(axis)
     for name, panel in zip(names, axes[:, 0]):
         case = f'{axis}/{name}'
         one = feedforward_loop.steps_of(*CASES[case], first=0, count=1)['miss'][0, counts]
-        panel.plot(t, np.degrees(one), color=RAW_COLOUR, linewidth=0.7, label='one run')
-        panel.plot(t, np.degrees(misses[case].miss_mean[counts]), color=FILTERED_COLOUR, linewidth=1.4,
+        panel.plot(t, np.degrees(one), color=fig.RAW_COLOUR, linewidth=0.7, label='one run')
+        panel.plot(t, np.degrees(misses[case].miss_mean[counts]), color=fig.FILTERED_COLOUR, linewidth=1.4,
                    label='mean of the runs')
         panel.set_title(f'{name}: {misses[case].mean("miss_rms_deg"):.3f} deg rms')
     axes[0, 0].set_title(f'{axis}, {figures_of_paper} of the paper. {axes[0, 0].get_title(loc="left")}')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def feedforward_figure() -> Figure:
     """Draw the rate and acceleration that are fed forward in one reversal of one run, beside the truth."""
-    figure, axes = new_panels(2, height=5.4, y=('rate [deg/s]', 'acceleration [deg/s2]'), sharex=True)
+    figure, axes = fig.new_panels(2, height=5.4, y=('rate [deg/s]', 'acceleration [deg/s2]'), sharex=True)
     t, counts, target = from_first_reversal('azimuth')
     for panel, field, column in ((axes[0, 0], 'rate', 1), (axes[1, 0], 'acceleration', 2)):
-        panel.plot(t, np.degrees(target[counts, column]), color=INK_COLOUR, linestyle='--', label='truth')
+        panel.plot(t, np.degrees(target[counts, column]), color=fig.INK_COLOUR, linestyle='--', label='truth')
         for name in ('kalman-cv', 'imm', 'imm-predicted'):
             one = feedforward_loop.steps_of(*CASES[f'azimuth/{name}'], first=0, count=1)[field][0, counts]
             panel.plot(t, np.degrees(one), color=SOURCE_COLOURS[name], label=name)
     reversal = t[np.argmax(np.abs(target[counts, 2]))]
     axes[0, 0].set_xlim(reversal - 1.5, reversal + 2.5)
     axes[0, 0].set_title('fed forward through a reversal of the azimuth')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def probability_figure() -> Figure:
     """Draw the model probabilities of the IMM through reversals, mean over BATCH_RUNS runs."""
-    figure, axes = new_panels(2, height=4.6, y=('acceleration\n[deg/s2]', 'probability'), sharex=True,
-                              height_ratios=(1, 1.6))
+    figure, axes = fig.new_panels(2, height=4.6, y=('acceleration\n[deg/s2]', 'probability'), sharex=True,
+                                  height_ratios=(1, 1.6))
     t, counts, target = from_first_reversal('azimuth')
     steps = feedforward_loop.steps_of(*CASES['azimuth/imm'], first=0, count=feedforward_loop.BATCH_RUNS)
     mu = steps['mu'][:, counts].mean(axis=0)        # probability of each model
-    axes[0, 0].plot(t, np.degrees(target[counts, 2]), color=INK_COLOUR)
+    axes[0, 0].plot(t, np.degrees(target[counts, 2]), color=fig.INK_COLOUR)
     axes[0, 0].set_title('the target, and the probability of each model of imm')
-    for model, colour in (('cv', TRUTH_COLOUR), ('ca', MOTOR_2_COLOUR), ('current_statistical', FILTERED_COLOUR)):
+    for model, colour in (('cv', fig.TRUTH_COLOUR), ('ca', fig.MOTOR_2_COLOUR),
+                          ('current_statistical', fig.FILTERED_COLOUR)):
         axes[1, 0].plot(t, mu[:, MODEL_NAMES.index(model)], color=colour, label=model)
     axes[1, 0].set_ylim(0.0, 1.0)
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def tuning_figure(misses: Misses) -> Figure:
     """Draw the miss of every filter over the noise of the rate that it feeds forward."""
-    figure, axes = new_panels(1, 2, height=3.8, x='noise of the rate fed forward [deg/s]', y='miss rms [deg]',
-                              sharex=True, sharey=True)
+    figure, axes = fig.new_panels(1, 2, height=3.8, x='noise of the rate fed forward [deg/s]', y='miss rms [deg]',
+                                  sharex=True, sharey=True)
     for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[0]):
-        panel.loglog(*conventional_curve(misses, axis).mean(axis=-1), '.-', color=TRUTH_COLOUR, label='kalman-cv, q '
-                     f'{CV_NOISES[0]:g} to {CV_NOISES[-1]:g}')
-        for name, colour, marker in (('kalman-ca-0.1', RAW_COLOUR, 'v'), ('kalman-ca-40-predicted', RAW_COLOUR, '^'),
-                                     ('imm', MOTOR_1_COLOUR, 'o'), ('imm-predicted', FILTERED_COLOUR, 'o'),
-                                     ('imm-b-predicted', MOTOR_2_COLOUR, 's')):
+        panel.loglog(*conventional_curve(misses, axis).mean(axis=-1), '.-', color=fig.TRUTH_COLOUR,
+                     label=f'kalman-cv, q {CV_NOISES[0]:g} to {CV_NOISES[-1]:g}')
+        for name, colour, marker in (('kalman-ca-0.1', fig.RAW_COLOUR, 'v'),
+                                     ('kalman-ca-40-predicted', fig.RAW_COLOUR, '^'),
+                                     ('imm', fig.MOTOR_1_COLOUR, 'o'), ('imm-predicted', fig.FILTERED_COLOUR, 'o'),
+                                     ('imm-b-predicted', fig.MOTOR_2_COLOUR, 's')):
             case = misses[f'{axis}/{name}']
             panel.loglog(case.mean('rate_noise_deg_s'), case.mean('miss_rms_deg'), marker, color=colour, label=name)
         panel.set_title(axis)
         panel.set_xlim(0.015, 1.0)
         panel.set_ylim(0.012, 0.3)
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def drive_figure() -> Figure:
     """Draw the miss of the whole chain over time, one run of each filter."""
-    figure, axes = new_panels(2, height=4.8, y='miss [deg]', sharex=True)
+    figure, axes = fig.new_panels(2, height=4.8, y='miss [deg]', sharex=True)
     for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[:, 0]):
-        for name, colour in (('kalman-cv', TRUTH_COLOUR), ('imm', MOTOR_1_COLOUR), ('imm-default', FILTERED_COLOUR)):
+        for name, colour in (('kalman-cv', fig.TRUTH_COLOUR), ('imm', fig.MOTOR_1_COLOUR),
+                             ('imm-default', fig.FILTERED_COLOUR)):
             t, miss = drive_error(DRIVE_CASES[f'{axis}/drive-{name}'], NOISE_SEED)
             panel.plot(t, np.degrees(miss), color=colour, label=name)
         panel.set_xlim(DRIVE_EVALUATION_START_S, DRIVE_EVALUATION_START_S + 8.0)
         panel.set_title(f'{axis}: control unit, motors and gears, reversals of {REVERSAL_S_BY_AXIS[axis]:g} s')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:

@@ -15,18 +15,11 @@ from matplotlib.figure import Figure
 
 from pedestal_common.quantities import Bools, Floats, Records, Row, Seconds, Times
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import (
-    FILTERED_COLOUR,
-    INK_COLOUR,
-    MOTOR_1_COLOUR,
-    RAW_COLOUR,
-    TRUTH_COLOUR,
-    new_panels,
-)
-from pedestal_studies import drawing, ensemble, profiles
+from pedestal_results.report import figures as fig
+from pedestal_studies import ensemble, profiles
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
 from pedestal_studies.profiles import Motion
-from pedestal_studies.result import Item, Result
+from pedestal_studies.result import Item, Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
@@ -51,7 +44,8 @@ FILTERS = {'cv': feedforward_loop.cv(0.1).own_filter, 'ca': feedforward_loop.ca(
 """{filter: its parameters}. The numbers are the process noise of the filter: cv in deg/s2/sqrt(Hz), ca and imm in
 deg/s3/sqrt(Hz)."""
 
-FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'imm-a': MOTOR_1_COLOUR, 'imm-b': FILTERED_COLOUR}
+FILTER_COLOURS = {'cv': fig.TRUTH_COLOUR, 'ca': fig.RAW_COLOUR, 'imm-a': fig.MOTOR_1_COLOUR,
+                  'imm-b': fig.FILTERED_COLOUR}
 
 ACCELERATION_ROW = 1  # row of the acceleration in the rms of `measured`; row 0 is the rate
 RATE_RATIO_TARGET = '>= 3'  # required ratio: rate error of cv divided by rate error of imm-b [-]
@@ -152,9 +146,9 @@ def moments_figure(sums_of: Mapping[str, Records], what: str, label: str) -> Fig
     sums_of: {filter: Moments (n,) of the errors, estimate minus truth}; what: 'rate' or 'acceleration'.
     """
     t, truth, _ = motion()
-    figure, axes = new_panels(2, height=5.4, y=(label, f'error of the {label}'), sharex=True)
+    figure, axes = fig.new_panels(2, height=5.4, y=(label, f'error of the {label}'), sharex=True)
     true_value = truth[('angle', 'rate', 'acceleration').index(what)]
-    axes[0, 0].plot(t, np.degrees(true_value), color=INK_COLOUR, linestyle='--', linewidth=0.8, label='truth')
+    axes[0, 0].plot(t, np.degrees(true_value), color=fig.INK_COLOUR, linestyle='--', linewidth=0.8, label='truth')
     for name in ('cv', 'imm-b'):
         sums = sums_of[name]
         mean = sums[what] / sums['runs']
@@ -164,12 +158,12 @@ def moments_figure(sums_of: Mapping[str, Records], what: str, label: str) -> Fig
         axes[1, 0].fill_between(t, np.degrees(mean - sigma), np.degrees(mean + sigma), color=FILTER_COLOURS[name],
                                 alpha=0.25, linewidth=0.0)
     axes[1, 0].set_xlim(LEAD_TIME_S - 1.0, t[-1])
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def sharpness_figure(values: Errors) -> Figure:
     """Draw the errors of rate and acceleration over the peak acceleration of the reversal."""
-    figure, axes = new_panels(1, 2, height=3.6, x='peak acceleration of the reversal [deg/s2]', sharex=True)
+    figure, axes = fig.new_panels(1, 2, height=3.6, x='peak acceleration of the reversal [deg/s2]', sharex=True)
     x = [peak_acceleration(reversal) for reversal in REVERSAL_DURATIONS_S]
     for i, (panel, label) in enumerate(zip(axes[0], ('rate rms [deg/s]', 'acceleration rms [deg/s2]'))):
         for name, colour in FILTER_COLOURS.items():
@@ -178,4 +172,4 @@ def sharpness_figure(values: Errors) -> Figure:
         panel.set_ylabel(label)
         panel.set_xticks(x, [f'{value:.2g}' for value in x])
         panel.set_xticks([], minor=True)
-    return drawing.legend(figure)
+    return legend(figure)

@@ -19,19 +19,10 @@ from matplotlib.figure import Figure
 
 from pedestal_common.quantities import Degrees, Floats, Row
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import (
-    FILTERED_COLOUR,
-    INK_COLOUR,
-    MOTOR_1_COLOUR,
-    MOTOR_2_COLOUR,
-    RAW_COLOUR,
-    TRUTH_COLOUR,
-    new_panels,
-)
-from pedestal_studies import drawing
+from pedestal_results.report import figures as fig
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
 from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import MissStatistics, Source
-from pedestal_studies.result import Result
+from pedestal_studies.result import Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
@@ -71,7 +62,8 @@ FILTER_MEANINGS = {'cv': 'Kalman filter of constant rate', 'ca': 'Kalman filter 
                    'imm': 'IMM of cv, ca and current_statistical, with other noises of its ca'}
 """{filter: description}, for the table of the documentation."""
 
-FILTER_COLOURS = {'cv': TRUTH_COLOUR, 'ca': RAW_COLOUR, 'current_statistical': MOTOR_2_COLOUR, 'imm': FILTERED_COLOUR}
+FILTER_COLOURS = {'cv': fig.TRUTH_COLOUR, 'ca': fig.RAW_COLOUR, 'current_statistical': fig.MOTOR_2_COLOUR,
+                  'imm': fig.FILTERED_COLOUR}
 
 MISS_RATIO_TARGET = '>= 5'
 """Target of the miss of cv at the rate noise of imm-predicted, divided by the miss of imm-predicted."""
@@ -169,8 +161,8 @@ def remarks(points: Points) -> list[str]:
 
 def miss_figure(points: Points) -> Figure:
     """Draw miss over rate noise, a curve for every filter."""
-    figure, axes = new_panels(1, height=4.8, x='noise of the rate fed forward, at constant rate [deg/s]',
-                              y='miss rms [deg]')
+    figure, axes = fig.new_panels(1, height=4.8, x='noise of the rate fed forward, at constant rate [deg/s]',
+                                  y='miss rms [deg]')
     panel = axes[0, 0]
     for name, colour in FILTER_COLOURS.items():
         panel.loglog(*curve(points, name), '.-', ms=5.0, color=colour, label=f'{name}, {FILTER_TUNINGS[name][0]}')
@@ -179,7 +171,7 @@ def miss_figure(points: Points) -> Figure:
             panel.annotate(f'{value:g}', points[name, value], xytext=(3, 3), textcoords='offset points', color=colour,
                            fontsize=8)
     noise, miss = points[REFERENCE_POINT]
-    panel.loglog(noise, miss, 'o', ms=7.0, color=MOTOR_1_COLOUR, fillstyle='none', label='imm-predicted')
-    panel.axvline(noise, color=INK_COLOUR, linewidth=0.6, linestyle=':')
-    panel.axhline(miss, color=INK_COLOUR, linewidth=0.6, linestyle=':')
-    return drawing.legend(figure)
+    panel.loglog(noise, miss, 'o', ms=7.0, color=fig.MOTOR_1_COLOUR, fillstyle='none', label='imm-predicted')
+    panel.axvline(noise, color=fig.INK_COLOUR, linewidth=0.6, linestyle=':')
+    panel.axhline(miss, color=fig.INK_COLOUR, linewidth=0.6, linestyle=':')
+    return legend(figure)

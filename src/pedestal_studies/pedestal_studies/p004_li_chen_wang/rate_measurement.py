@@ -44,17 +44,10 @@ from pedestal_common.quantities import (
 )
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import (
-    FILTERED_COLOUR,
-    INK_COLOUR,
-    MOTOR_2_COLOUR,
-    RAW_COLOUR,
-    TRUTH_COLOUR,
-    new_panels,
-)
-from pedestal_studies import drawing, ensemble, profiles
+from pedestal_results.report import figures as fig
+from pedestal_studies import ensemble, profiles
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
-from pedestal_studies.result import Drawings, Item, Metrics, Result
+from pedestal_studies.result import Drawings, Item, Metrics, Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
@@ -295,7 +288,8 @@ def remarks(measured: Mapping[str, Metrics], errors: Mapping[str, Pairs]) -> lis
     ]
 
 
-CASE_COLOURS = {'position': TRUTH_COLOUR, 'position-rate': FILTERED_COLOUR, 'position-rate-0.02': MOTOR_2_COLOUR}
+CASE_COLOURS = {'position': fig.TRUTH_COLOUR, 'position-rate': fig.FILTERED_COLOUR,
+                'position-rate-0.02': fig.MOTOR_2_COLOUR}
 
 
 def figures() -> Drawings:
@@ -305,8 +299,8 @@ def figures() -> Drawings:
 
 def bode_figure() -> Figure:
     """Draw the responses of angle and rate with and without a measured rate, and their dynamic errors."""
-    figure, axes = new_panels(2, 2, height=5.6, x='frequency [Hz]', y=('gain [dB]', 'dynamic error |1 - G|'),
-                              sharex=True)
+    figure, axes = fig.new_panels(2, 2, height=5.6, x='frequency [Hz]', y=('gain [dB]', 'dynamic error |1 - G|'),
+                                  sharex=True)
     for name, colour in CASE_COLOURS.items():
         angle, rate = responses(*steady_state_matrices(MAIN_SIGMA_DEG_S2, RATE_SIGMAS_DEG_S[name]),
                                 RESPONSE_FREQUENCIES_HZ)
@@ -315,29 +309,29 @@ def bode_figure() -> Figure:
             axes[1, column].loglog(RESPONSE_FREQUENCIES_HZ, np.abs(1.0 - G), color=colour, label=name)
     for column, title in enumerate(('estimated over true angle', 'estimated over true rate')):
         axes[0, column].set_title(title)
-        axes[0, column].axhline(-3.0, color=INK_COLOUR, linewidth=0.6, linestyle=':')
+        axes[0, column].axhline(-3.0, color=fig.INK_COLOUR, linewidth=0.6, linestyle=':')
         axes[0, column].set_ylim(-25.0, 5.0)
-        axes[1, column].axvline(DYNAMIC_ERROR_FREQUENCY_HZ, color=INK_COLOUR, linewidth=0.6, linestyle=':')
+        axes[1, column].axvline(DYNAMIC_ERROR_FREQUENCY_HZ, color=fig.INK_COLOUR, linewidth=0.6, linestyle=':')
         axes[1, column].set_ylim(1e-5, 3.0)
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def sigma_a_figure() -> Figure:
     """Draw bandwidth of the rate and dynamic error of the angle over sigma_a, with and without a measured rate."""
-    figure, axes = new_panels(1, 2, height=3.4, x='sigma_a [deg/s2]', y='bandwidth of the rate [Hz]', sharex=True)
+    figure, axes = fig.new_panels(1, 2, height=3.4, x='sigma_a [deg/s2]', y='bandwidth of the rate [Hz]', sharex=True)
     sigma_a = np.geomspace(ACCELERATION_SIGMAS_DEG_S2[0], ACCELERATION_SIGMAS_DEG_S2[-1], 13)
     for name, colour in CASE_COLOURS.items():
         values = [measures(s, RATE_SIGMAS_DEG_S[name]) for s in sigma_a]
         for panel, metric in zip(axes[0], ('rate_bandwidth_hz', 'dynamic_error_0p2hz')):
             panel.loglog(sigma_a, [value[metric][0] for value in values], color=colour, label=name)
     axes[0, 1].set_ylabel(f'dynamic error of the angle at {DYNAMIC_ERROR_FREQUENCY_HZ:g} Hz')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def flyby_figure() -> Figure:
     """Draw the quantities of the paper's figures 1 to 8 on the flyby: rate, error of angle and rate, acceleration."""
     labels = ('rate [deg/s]', 'error of the angle [deg]', 'error of the rate [deg/s]', 'acceleration [deg/s2]')
-    figure, axes = new_panels(4, height=8.6, y=labels, sharex=True)
+    figure, axes = fig.new_panels(4, height=8.6, y=labels, sharex=True)
     t, target = flyby()
     record = flyby_record('position-rate', run=0)
     near = np.abs(t - 0.5 * profiles.RECORD_DURATION_S) <= 0.2 * profiles.RECORD_DURATION_S
@@ -345,16 +339,16 @@ def flyby_figure() -> Figure:
     truth = (target[:, 1], 0.0 * t, 0.0 * t, target[:, 2])
     for panel, values in zip(axes[:, 0], measured):
         if values is not None:
-            panel.plot(t[near], np.degrees(values[near]), color=RAW_COLOUR, linewidth=0.5, label='measured')
+            panel.plot(t[near], np.degrees(values[near]), color=fig.RAW_COLOUR, linewidth=0.5, label='measured')
     for name in ('position', 'position-rate'):
         out = flyby_record(name, run=0).estimate
         for panel, values in zip(axes[:, 0], (out['rate'], out['angle'] - target[:, 0], out['rate'] - target[:, 1],
                                               out['acceleration'])):
             panel.plot(t[near], np.degrees(values[near]), color=CASE_COLOURS[name], label=name)
     for panel, values in zip(axes[:, 0], truth):
-        panel.plot(t[near], np.degrees(values[near]), color=INK_COLOUR, linestyle='--', label='truth')
+        panel.plot(t[near], np.degrees(values[near]), color=fig.INK_COLOUR, linestyle='--', label='truth')
     axes[0, 0].set_title(f'{FLYBY_PROFILE}, one run')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:

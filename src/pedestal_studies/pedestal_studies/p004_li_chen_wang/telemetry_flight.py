@@ -33,10 +33,10 @@ from pedestal_common.quantities import Floats, Matrix3, Row, Seconds, Times, Vec
 from pedestal_results import tracking
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
-from pedestal_studies import drawing, ensemble
+from pedestal_studies import ensemble
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S
 from pedestal_studies.p004_li_chen_wang.rate_measurement import ALPHA, ANGLE_SIGMA_RAD, differenced_rate, filtered
-from pedestal_studies.result import Drawings, Item, Result
+from pedestal_studies.result import Drawings, Item, Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
@@ -190,7 +190,7 @@ def axis_figure(axis: str, first_number: int) -> Figure:
         panel.set_ylabel(f'{name} [{unit}]')
         panel.set_title(f'{axis}: {name} (figure {first_number + i} of the paper)')
     axes[3, 0].set_ylim(*np.degrees(2.0 * np.abs(target[axis][:, 2]).max() * np.array((-1.0, 1.0))))
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:

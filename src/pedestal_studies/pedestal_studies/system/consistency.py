@@ -17,8 +17,7 @@ from pedestal_common.quantities import Floats, Pairs, Row
 from pedestal_results import consistency, tracking
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, TRUTH_COLOUR, new_panels
-from pedestal_studies import drawing
-from pedestal_studies.result import Item, Result
+from pedestal_studies.result import Item, Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
@@ -79,4 +78,4 @@ def figure(values: Mapping[str, Floats]) -> Figure:
                            label=axis)
         panel.axhline(2.0, linewidth=0.8)
         panel.set_title(name)
-    return drawing.legend(drawn)
+    return legend(drawn)

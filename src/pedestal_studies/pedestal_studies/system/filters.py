@@ -24,11 +24,11 @@ from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from pedestal_common.parameters import build
 from pedestal_common.quantities import Floats, Radians, Records, Row, Times
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, Panels, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_results.report.filter_figures import MODEL_COLOURS
-from pedestal_studies import drawing, ensemble, profiles
+from pedestal_studies import ensemble, profiles
 from pedestal_studies.ensemble import Noise
-from pedestal_studies.result import Drawings, Result
+from pedestal_studies.result import Drawings, Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 from pedestal_workbench.tuning import parameter_search
@@ -280,8 +280,8 @@ def figures(values: Means, over_time: Mapping[CaseName, Records]) -> Drawings:
             'noise': lambda: noise_figure(values, on)}
 
 
-FILTER_COLOURS = {'current_statistical': RAW_COLOUR, 'current_statistical-rate-0.1': FILTERED_COLOUR,
-                  'imm': TRUTH_COLOUR}
+FILTER_COLOURS = {'current_statistical': fig.RAW_COLOUR, 'current_statistical-rate-0.1': fig.FILTERED_COLOUR,
+                  'imm': fig.TRUTH_COLOUR}
 """{filter of the error figures: its colour}."""
 
 
@@ -291,8 +291,8 @@ def errors_figure(over_time: Mapping[CaseName, Records], on: Sequence[str], what
     over_time: {case: Moments of all runs at the drawn times}; on: names of profiles, here and below.
     """
     unit = 'deg' if what == 'angle' else 'deg/s'
-    figure, axes = new_panels(len(on), len(FILTER_COLOURS), height=1.0 + 1.4 * len(on),
-                              y=[f'{profile}\n[{unit}]' for profile in on], sharex=True, sharey='row')
+    figure, axes = fig.new_panels(len(on), len(FILTER_COLOURS), height=1.0 + 1.4 * len(on),
+                                  y=[f'{profile}\n[{unit}]' for profile in on], sharex=True, sharey='row')
     t = times()[::THINNING_STEPS]
     after = t >= SETTLING_TIME_S
     for line, profile in zip(axes, on):
@@ -305,23 +305,23 @@ def errors_figure(over_time: Mapping[CaseName, Records], on: Sequence[str], what
             panel.fill_between(t[after], mean - sigma, mean + sigma, color=colour, alpha=0.35, linewidth=0.0)
             panel.plot(t[after], mean, color=colour, linewidth=0.8)
             for side in (-1.0, 1.0):
-                panel.plot(t[after], side * own_sigma, color=INK_COLOUR, linewidth=0.7, linestyle='--')
+                panel.plot(t[after], side * own_sigma, color=fig.INK_COLOUR, linewidth=0.7, linestyle='--')
     for panel, name in zip(axes[0], FILTER_COLOURS):
         panel.set_title(name)
     return figure
 
 
-def profile_panels(on: Sequence[str]) -> tuple[Figure, Panels]:
+def profile_panels(on: Sequence[str]) -> tuple[Figure, fig.Panels]:
     """Return (figure, panels) with a panel for each profile, two in a row, and room for a line of each filter."""
     rows = (len(on) + 1) // 2
-    figure, axes = new_panels(rows, 2, x='', height=0.8 + rows * (0.5 + 0.2 * len(SHOWN_FILTERS)), sharey=True)
+    figure, axes = fig.new_panels(rows, 2, x='', height=0.8 + rows * (0.5 + 0.2 * len(SHOWN_FILTERS)), sharey=True)
     for panel in axes.flat[len(on):]:
         panel.set_visible(False)
     return figure, axes.flat[:len(on)]
 
 
 def bars(values: Means, on: Sequence[str], metric: Callable[[str, Mapping[str, float]], float], label: str,
-         colour: Callable[[str], str], text: Callable[[str, Mapping[str, float]], str]) -> tuple[Figure, Panels]:
+         colour: Callable[[str], str], text: Callable[[str, Mapping[str, float]], str]) -> tuple[Figure, fig.Panels]:
     """Return (figure, panels) with a panel of bars for each profile.
 
     metric, text: functions (filter, its metrics) that return the length of a bar and the text at its end. label: of
@@ -344,7 +344,9 @@ def bars(values: Means, on: Sequence[str], metric: Callable[[str, Mapping[str, f
 
 def _colour(name: str) -> str:
     """Return the colour of a filter in a figure."""
-    return TRUTH_COLOUR if name in UNTUNED_FILTERS else FILTERED_COLOUR if name in RATE_SIGMAS_RAD_S else RAW_COLOUR
+    if name in UNTUNED_FILTERS:
+        return fig.TRUTH_COLOUR
+    return fig.FILTERED_COLOUR if name in RATE_SIGMAS_RAD_S else fig.RAW_COLOUR
 
 
 def rms_figure(values: Means, on: Sequence[str]) -> Figure:
@@ -361,14 +363,14 @@ def nis_figure(values: Means, on: Sequence[str]) -> Figure:
     figure, panels = bars(values, on, nis, 'NIS per degree of freedom', _colour,
                           lambda name, at: f'{nis(name, at):.2f}')
     for panel in panels:
-        panel.axvline(1.0, color=INK_COLOUR, linewidth=0.8)
-        panel.axvspan(*CONSISTENCY_LIMITS, color=INK_COLOUR, alpha=0.12, linewidth=0.0)
+        panel.axvline(1.0, color=fig.INK_COLOUR, linewidth=0.8)
+        panel.axvspan(*CONSISTENCY_LIMITS, color=fig.INK_COLOUR, alpha=0.12, linewidth=0.0)
     return figure
 
 
 def probabilities_figure(over_time: Mapping[CaseName, Records], on: Sequence[str]) -> Figure:
     """Draw the probability of each motion model in the filter imm, mean over the runs."""
-    figure, axes = new_panels(len(on), height=1.0 + 1.2 * len(on), sharex=True, sharey=True)
+    figure, axes = fig.new_panels(len(on), height=1.0 + 1.2 * len(on), sharex=True, sharey=True)
     for panel, profile in zip(axes[:, 0], on):
         sums = over_time[profile, 'imm', SHOWN_NOISE]
         for j, (name, colour) in enumerate(MODEL_COLOURS.items()):
@@ -377,24 +379,24 @@ def probabilities_figure(over_time: Mapping[CaseName, Records], on: Sequence[str
                 panel.plot(times()[::THINNING_STEPS], mu, color=colour, label=name)
         panel.set_title(profile)
         panel.set_ylim(0.0, 1.0)
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def noise_figure(values: Means, on: Sequence[str]) -> Figure:
     """Draw the reduction of every filter under each noise, which shows the effect of the bandwidth of the noise."""
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
-        for noise, colour, marker in zip(NOISE_CASES, (RAW_COLOUR, RAW_COLOUR, FILTERED_COLOUR, FILTERED_COLOUR),
-                                         'o^o^'):
+        colours = fig.RAW_COLOUR, fig.RAW_COLOUR, fig.FILTERED_COLOUR, fig.FILTERED_COLOUR
+        for noise, colour, marker in zip(NOISE_CASES, colours, 'o^o^'):
             there = [name for name in SHOWN_FILTERS if (profile, name, noise) in values]
             panel.plot([values[profile, name, noise]['reduction'] for name in there], there, marker,
                            color=colour, ms=4.0, linestyle='', label=f'{noise} deg',
                            fillstyle='full' if marker == 'o' else 'none')
-        panel.axvline(1.0, color=INK_COLOUR, linewidth=0.8)
+        panel.axvline(1.0, color=fig.INK_COLOUR, linewidth=0.8)
         panel.margins(x=0.06)
         panel.set_xlim(left=0.0)
         panel.locator_params(axis='x', nbins=4)
         panel.set_title(profile)
         panel.set_xlabel('reduction')
     panels[0].invert_yaxis()
-    return drawing.legend(figure)
+    return legend(figure)

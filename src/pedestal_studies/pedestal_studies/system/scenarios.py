@@ -17,8 +17,7 @@ from pedestal_common.quantities import Floats, Row
 from pedestal_results import results, tracking
 from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
-from pedestal_studies import drawing
-from pedestal_studies.result import Item, Result
+from pedestal_studies.result import Item, Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
@@ -165,7 +164,7 @@ def flyby_figure() -> Figure:
         panel.set_title(title)
     axes[2, 0].plot(flown.t, np.degrees(flown.encoders[:, 0]), color=FILTERED_COLOUR)
     axes[2, 0].set_title('azimuth of the antenna over the flight (figure 11)')
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def pointing_figure(values: Mapping[str, Floats]) -> Figure:

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from pedestal_results.report import figures
-from pedestal_studies import drawing
+from pedestal_studies.result import legend, save
 
 T = np.linspace(0.1, 1.0, 50)
 
@@ -16,7 +16,7 @@ def sheet():
         for colour, label in ((figures.FILTERED_COLOUR, 'a'), (figures.TRUTH_COLOUR, 'b'),
                               (figures.MOTOR_2_COLOUR, 'a much longer name')):
             panel.loglog(T, 3.0 * T, color=colour, label=label)
-    return drawing.legend(figure)
+    return legend(figure)
 
 
 def test_the_legend_is_outside_of_every_panel_and_names_a_line_once():
@@ -52,6 +52,6 @@ def test_every_format_is_the_same_bytes_again(tmp_path, kind, begins):
     paths = [tmp_path / folder / f'sheet.{kind}' for folder in ('a', 'b')]
     for path in paths:
         path.parent.mkdir()
-        drawing.save(sheet, path)
+        save(sheet, path)
     first, second = (path.read_bytes() for path in paths)
     assert first == second and first.startswith(begins)
