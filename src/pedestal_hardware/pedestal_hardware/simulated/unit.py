@@ -10,7 +10,7 @@ from adu_drive import unit as adu_unit
 from adu_drive.params import AxisParameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
-from pedestal_common.injection.simulated import Simulated
+from pedestal_common.injection.schedule import Simulated
 from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis, joined
 from pedestal_common.quantities import Records, Value
 from pedestal_common.wire.commands import Command, Reply

@@ -23,8 +23,7 @@ from collections import namedtuple
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import to_deck
-from pedestal_common.geometry.quaternion import product
+from pedestal_common.geometry.line_of_sight import product, to_deck
 from pedestal_results import tracking
 from pedestal_results.intervals import pseudo_values, row
 from pedestal_results.report.figures import (
