@@ -1,6 +1,7 @@
 """What the control unit predicts itself, against skyfield, printed examples and SGP4 between the rows."""
 import math
 
+import erfa
 import numpy as np
 import pytest
 from skyfield.api import EarthSatellite, load, wgs84
@@ -8,10 +9,9 @@ from skyfield.api import EarthSatellite, load, wgs84
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.program import prediction, program_track
 from acu_tracker.program.prediction import PredictionParameters, Predictor
-from pedestal_common.geometry import orbit
+from pedestal_common.geometry import bodies, orbit
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.parameters import ParameterError
-from pedestal_common.sky import ecliptic, sun
 
 LINES = ('1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',
          '2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482')
@@ -26,9 +26,9 @@ def predictor(start=START, lines=LINES, **values):
 def test_the_sun_of_meeus():
     """Astronomical Algorithms, 2nd edition, example 25.b: 1992 October 13.0 TD. Its right ascension is from the true
     equinox, which the nutation in longitude, 15.908 arcsec, moves along the equator."""
-    [(x, y, z)] = sun.position(np.array([2448908.5 - ecliptic.J2000 - ecliptic.TT_MINUS_UTC_S / 86400.0]))
+    [(x, y, z)] = bodies.position('sun', np.array([2448908.5 - erfa.DJ00 - bodies.TT_MINUS_UTC_S / 86400.0]))
     R = math.hypot(x, y, z)
-    assert R / sun.AU == pytest.approx(0.99760775, abs=5e-6)
+    assert R / erfa.DAU == pytest.approx(0.99760775, abs=5e-6)
     equinox = 15.908 / 3600.0 * math.cos(math.radians(23.4401443))
     assert math.degrees(math.atan2(y, x)) % 360.0 + equinox == pytest.approx(198.378121, abs=5e-5)
     assert math.degrees(math.asin(z / R)) == pytest.approx(-7.783817, abs=5e-5)

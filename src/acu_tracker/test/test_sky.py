@@ -13,10 +13,9 @@ from skyfield.data import iers
 from skyfield_data import get_skyfield_data_path
 
 from acu_tracker.program.prediction import PredictionParameters, Predictor
-from pedestal_common.geometry import orbit
+from pedestal_common.geometry import bodies, orbit
 from pedestal_common.geometry.earth_orientation import EarthOrientationParameters
 from pedestal_common.geometry.geodesy import StationParameters
-from pedestal_common.sky import bodies
 
 pytestmark = pytest.mark.filterwarnings('ignore:The file finals2000A.all has expired:RuntimeWarning')
 

@@ -15,7 +15,7 @@ from adu_drive.plant import thermal
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
-from pedestal_common.injection.simulated import Simulated
+from pedestal_common.injection.schedule import Simulated
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import AnyRecord, Bit, Floats, Message, Nanoseconds, Records, Seconds, Stamps, Vector3
 from pedestal_common.record import Record

@@ -49,7 +49,7 @@ def run(*writers, strangers=lambda: 0):
 
 def test_one_writer_is_taken_whole():
     gate, taken, resets = run(Writer('acu', jitter=4 * MS))
-    assert len(taken['acu']) == 2000 and not resets and not gate.dropped
+    assert len(taken['acu']) == 2000 and not resets and not gate.drops.counts
 
 
 @pytest.mark.parametrize('period', [T // 50, T, T + 1, 100 * MS, S])
@@ -59,7 +59,7 @@ def test_a_second_writer_is_dropped_however_fast_it_is(period, number):
     gate, taken, resets = run(Writer('acu', jitter=MS), stranger)
     assert not taken['stranger'] and not resets
     assert len(taken['acu']) > 1960
-    assert gate.dropped[publisher_gate.DROP_OTHER_PUBLISHER] >= 0.95 * len(stranger.times)
+    assert gate.drops.counts[publisher_gate.DROP_OTHER_PUBLISHER] >= 0.95 * len(stranger.times)
 
 
 @pytest.mark.parametrize('number', [201, 195, 199])
@@ -67,7 +67,7 @@ def test_two_writers_that_cannot_be_told_apart_are_both_dropped(number):
     """A second control unit, with the numbers of the first at the same pace."""
     gate, taken, _ = run(Writer('acu', jitter=MS), Writer('twin', begin=S, number=number, jitter=MS, seed=2))
     assert max(taken['acu'] + taken['twin']) < S + 10 * MS and len(taken['twin']) <= 1
-    assert gate.reason in publisher_gate.WARNING_DROP_REASONS
+    assert gate.drops.kind in publisher_gate.WARNING_DROP_REASONS
 
 
 def test_of_twins_the_one_that_stays_is_taken_again_when_it_is_alone():
@@ -209,8 +209,8 @@ def test_stamps_of_the_future_are_dropped_and_do_no_harm():
         wrong = k in (300, 500)
         stamp = UTC + k * T + (3600 * S if wrong else 0)
         assert (gate.take(stamp, k + 1, UTC + k * T, k * T, UTC + k * T) is None) == wrong
-    assert gate.dropped == {publisher_gate.DROP_FUTURE: 2}
-    assert '3600.000 s ahead' in gate.detail
+    assert gate.drops.counts == {publisher_gate.DROP_FUTURE: 2}
+    assert '3600.000 s ahead' in gate.drops.reason
 
 
 def test_a_future_within_the_limit_costs_no_more_than_its_time():
@@ -218,7 +218,7 @@ def test_a_future_within_the_limit_costs_no_more_than_its_time():
     taken = [gate.take(UTC + k * T + (45 * MS if k == 300 else 0), k + 1, UTC + k * T, k * T, UTC + k * T) is not None
              for k in range(400)]
     assert taken == [True] * 301 + [False] * 9 + [True] * 90
-    assert gate.dropped == {publisher_gate.DROP_STALE: 9}
+    assert gate.drops.counts == {publisher_gate.DROP_STALE: 9}
 
 
 def test_stamps_that_went_back_for_good_are_believed_after_the_silence():
@@ -236,7 +236,7 @@ def test_what_is_no_message_is_dropped_and_counted():
     gate = PublisherGate(decode, FUTURE)
     taken = [gate.take(None if k % 3 else UTC + k * T, k + 1, UTC + k * T, k * T, UTC + k * T) for k in range(300)]
     assert sum(one is not None for one in taken) == 100
-    assert gate.dropped == {publisher_gate.DROP_UNDECODABLE: 200} and gate.detail == 'no message'
+    assert gate.drops.counts == {publisher_gate.DROP_UNDECODABLE: 200} and gate.drops.reason == 'no message'
 
 
 def test_losses_of_two_writers_are_those_of_each():
@@ -253,7 +253,7 @@ def test_beside_a_stranger_nothing_is_taken_of_a_topic_without_a_pace():
         return gate.take(text, number, UTC + time, time, UTC + time)
     assert take('enabled', 1, 0) == 'enabled'
     strangers = 1
-    assert take('disabled', 2, 60 * S) is None and gate.reason == publisher_gate.DROP_OTHER_PUBLISHER
+    assert take('disabled', 2, 60 * S) is None and gate.drops.kind == publisher_gate.DROP_OTHER_PUBLISHER
     strangers = 0
     assert take('stopping', 2, 70 * S) == 'stopping'
 
@@ -293,7 +293,7 @@ def test_a_burst_after_a_pause_of_which_most_is_lost_is_the_same_writer(held):
     assert all(take(number, number * T) for number in range(1, 401))
     began, missed = 400 * T + held, held // T
     assert take(401, began) and all(take(401 + missed - left, began + 3 * MS) for left in range(7, -1, -1))
-    assert all(take(401 + missed + i, began + i * T) for i in range(1, 400)) and not gate.dropped
+    assert all(take(401 + missed + i, began + i * T) for i in range(1, 400)) and not gate.drops.counts
 
 
 def test_a_shared_topic_without_a_steady_rate_has_every_publisher():

@@ -58,7 +58,7 @@ def test_the_stamp_of_the_device():
                                                  (300_000_000, 'future', '0.300 s in the future')])
 def test_stale_and_future_stamps_are_dropped(shift, kind, reason):
     unit = unit_of(stamp='device')
-    assert fed(unit, 3, lambda k: pashr(k, shift=shift)) is None and unit.counts[kind] == 3
+    assert fed(unit, 3, lambda k: pashr(k, shift=shift)) is None and unit.drops.counts[kind] == 3
     diagnosis = unit.diagnose(NOON + 3 * STEP)
     assert diagnosis.level == 1 and reason in diagnosis.message
 
@@ -66,7 +66,7 @@ def test_stale_and_future_stamps_are_dropped(shift, kind, reason):
 def test_a_stamp_that_repeats_is_dropped():
     unit = unit_of(stamp='device')
     fed(unit, 5)
-    assert unit.take_line(pashr(4), NOON + 5 * STEP) is None and unit.counts['not_newer'] == 1
+    assert unit.take_line(pashr(4), NOON + 5 * STEP) is None and unit.drops.counts['not_newer'] == 1
 
 
 @pytest.mark.parametrize('line, kind, reason', [
@@ -76,7 +76,7 @@ def test_a_stamp_that_repeats_is_dropped():
 def test_a_bad_sentence_is_dropped_and_named(line, kind, reason):
     unit = unit_of()
     fed(unit, 5)
-    assert unit.take_line(line, NOON + 5 * STEP) is None and unit.counts[kind] == 1
+    assert unit.take_line(line, NOON + 5 * STEP) is None and unit.drops.counts[kind] == 1
     diagnosis = unit.diagnose(NOON + 5 * STEP)
     assert diagnosis.level and reason in diagnosis.message
     assert fed(unit, 3, first=6) is not None and unit.diagnose(NOON + 99 * STEP).level == 0
@@ -88,7 +88,7 @@ def test_a_single_wrong_attitude_disturbs_no_rate(heading):
     unit = unit_of()
     still = fed(unit, 50, lambda k: pashr(k, heading=40.0))
     assert np.abs(still.w).max() < 1e-6
-    assert unit.take_line(pashr(50, heading=heading), NOON + 50 * STEP) is None and unit.counts['too_fast'] == 1
+    assert unit.take_line(pashr(50, heading=heading), NOON + 50 * STEP) is None and unit.drops.counts['too_fast'] == 1
     for k in range(51, 80):
         found = unit.take_line(pashr(k, heading=40.0), NOON + k * STEP)
         assert found is not None and np.abs(found.w).max() < 1e-6
@@ -98,7 +98,7 @@ def test_an_attitude_that_stays_elsewhere_is_taken():
     unit = unit_of()
     fed(unit, 50, lambda k: pashr(k, heading=40.0))
     found = fed(unit, 50, lambda k: pashr(k, heading=90.0), first=50)
-    assert found is not None and np.abs(found.w).max() < 1e-6 and unit.counts['too_fast'] == 3
+    assert found is not None and np.abs(found.w).max() < 1e-6 and unit.drops.counts['too_fast'] == 3
 
 
 def test_a_status_that_is_missing_is_not_aligned():
@@ -157,7 +157,7 @@ def test_a_mounting():
 
 def test_prdid_takes_its_heading_from_hdt():
     unit = unit_of(nmea__sentence='prdid')
-    assert fed(unit, 5, lambda k: nmea.sentence('PRDID,3.0,2.0,')) is None and unit.counts['no_heading'] == 5
+    assert fed(unit, 5, lambda k: nmea.sentence('PRDID,3.0,2.0,')) is None and unit.drops.counts['no_heading'] == 5
     for k in range(5, 15):
         unit.take_line(nmea.sentence('HEHDT,40.0,T'), NOON + k * STEP)
         sample = unit.take_line(nmea.sentence('PRDID,3.0,2.0,'), NOON + k * STEP + 1)
@@ -192,7 +192,7 @@ def imu(k, q=(0.0, 0.0, 0.0, 1.0), w=(0.0, 0.0, 0.0), force=(0.0, 0.0, 9.8)):
 def test_an_imu_without_orientation_is_never_used():
     unit, message = unit_of(source='imu'), imu(1)
     message.orientation_covariance[0] = -1.0
-    assert unit.take_imu(message, NOON + 20_000_000) is None and unit.counts['no_orientation'] == 1
+    assert unit.take_imu(message, NOON + 20_000_000) is None and unit.drops.counts['no_orientation'] == 1
     assert 'declares no orientation' in unit.diagnose(NOON).message and unit.state == 'aligning'
 
 
@@ -200,13 +200,13 @@ def test_an_imu_without_orientation_is_never_used():
                                   ((0.0, 0.0, 0.0, 1.0), (math.nan, 0.0, 0.0)), ((2.0, 0.0, 0.0, 0.0), (0.0,) * 3)])
 def test_an_imu_without_numbers_is_dropped(q, w):
     unit = unit_of(source='imu')
-    assert unit.take_imu(imu(1, q, w), NOON) is None and unit.counts['no_attitude'] == 1
+    assert unit.take_imu(imu(1, q, w), NOON) is None and unit.drops.counts['no_attitude'] == 1
     assert unit.take_imu(imu(2), NOON) is not None
 
 
 def test_an_imu_too_fast_is_dropped():
     unit = unit_of(source='imu')
-    assert unit.take_imu(imu(1, w=(3.0, 0.0, 0.0)), NOON) is None and unit.counts['too_fast'] == 1
+    assert unit.take_imu(imu(1, w=(3.0, 0.0, 0.0)), NOON) is None and unit.drops.counts['too_fast'] == 1
 
 
 @pytest.mark.parametrize('number', [math.nan, math.inf, -1e300])
@@ -220,7 +220,7 @@ def test_one_bad_message_leaves_the_check_as_it_was(number):
             message.orientation_covariance[8] = number
         sample = unit.take_imu(message, NOON + k * 20_000_000)
         assert sample is None or np.isfinite([*sample.q, *sample.w, *sample.variances]).all()
-    assert unit.verdict == 'agrees' and unit.counts['published'] == 599 and unit.state == 'aligned'
+    assert unit.verdict == 'agrees' and unit.published == 599 and unit.state == 'aligned'
 
 
 SEA_TIME = 0.02 * np.arange(1, 751)
@@ -295,7 +295,7 @@ def test_the_default_frames_of_a_novatel_are_found_wrong_within_10_s_and_the_rig
     unit = unit_of(source='imu')
     _, _, sample = given_to(unit, novatel_default, 10.0)
     diagnosis = unit.diagnose(NOON + 10 * 10**9)
-    assert sample is None and diagnosis.level == 2 and unit.state == 'aligning' and unit.counts['published'] > 100
+    assert sample is None and diagnosis.level == 2 and unit.state == 'aligning' and unit.published > 100
     assert 'imu.earth = enu, imu.body = flu, imu.rate_body = rfu' in diagnosis.message
 
 
@@ -336,4 +336,4 @@ def test_prepare_changes_nothing():
     unit = unit_of()
     before = unit.record.copy()
     unit.prepare()
-    assert unit.record.tobytes() == before.tobytes() and not any(unit.counts.values())
+    assert unit.record.tobytes() == before.tobytes() and not unit.published and not any(unit.drops.counts.values())

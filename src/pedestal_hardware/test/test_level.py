@@ -10,6 +10,7 @@ import tty
 import pytest
 
 from pedestal_common.parameters import ParameterError, build
+from pedestal_common.stream import connection
 from pedestal_hardware.level.line_format import LineFormat
 from pedestal_hardware.level.params import LevelReceiverParameters
 from pedestal_hardware.level.unit import LevelUnit
@@ -75,11 +76,11 @@ def test_levels_and_dropped_lines_are_counted_and_named():
     for line, kind, reason in ((b'x', 'unreadable', 'not of the form'), (b'nan', 'not_finite', 'finite'),
                                (b'-inf', 'not_finite', 'finite'), (b'-60', 'out_of_range', 'level -119 dB: must be'),
                                (b'1e999', 'not_finite', 'finite')):
-        before = unit.counts[kind]
-        assert unit.take(line, 2 * 10**9) is None and unit.counts[kind] == before + 1
+        before = unit.drops.counts[kind]
+        assert unit.take(line, 2 * 10**9) is None and unit.drops.counts[kind] == before + 1
         diagnosis = unit.diagnose(2 * 10**9)
         assert diagnosis.level == 1 and reason in diagnosis.message
-    assert unit.take(b'20', 10**9) is None and unit.counts['not_newer'] == 1
+    assert unit.take(b'20', 10**9) is None and unit.drops.counts['not_newer'] == 1
     assert unit.take(b'21', 5 * 10**9).level == 43.0 and unit.diagnose(5 * 10**9).level == 0
 
 
@@ -90,29 +91,30 @@ def counted():
 def test_the_first_half_line_of_a_stream_is_discarded():
     splitter = LineSplitter(counted())
     splitter.begin(whole=False)
-    assert splitter.stream(b'5.33\r\n-65.', 0.0) == []
-    assert splitter.stream(b'34\r\n', 0.1) == [b'-65.34']
+    assert splitter.take(b'5.33\r\n-65.', 0.0) == []
+    assert splitter.take(b'34\r\n', 0.1) == [b'-65.34']
 
 
 def test_a_line_that_stops_is_no_line():
     splitter = LineSplitter(counted())
     splitter.begin(whole=False)
-    assert splitter.stream(b'\n-6', 0.0) == []
-    assert splitter.stream(b'', reader.LINE_TIMEOUT_S + 0.1) == []
-    assert splitter.stream(b'5.33\n-65.34\n', 9.0) == [b'-65.34'] and splitter.counts['cut_lines'] == 1
-    splitter.stream(b'-6', 9.1)
+    assert splitter.take(b'\n-6', 0.0) == []
+    assert splitter.take(b'', reader.LINE_TIMEOUT_S + 0.1) == []
+    assert splitter.take(b'5.33\n-65.34\n', 9.0) == [b'-65.34'] and splitter.counts['cut_lines'] == 1
+    splitter.take(b'-6', 9.1)
     splitter.begin(whole=False)         # the device vanished in the middle of a line
-    assert splitter.stream(b'5.3\n-65.35\n', 9.2) == [b'-65.35'] and splitter.counts['cut_lines'] == 2
+    assert splitter.take(b'5.3\n-65.35\n', 9.2) == [b'-65.35'] and splitter.counts['cut_lines'] == 2
 
 
 def test_lines_are_bounded():
     splitter = LineSplitter(counted())
     splitter.begin(whole=False)
-    splitter.stream(b'\n', 0.0)
+    splitter.take(b'\n', 0.0)
     for _ in range(1000):
-        assert splitter.stream(b'7' * 1000, 0.0) == []
-    assert splitter.stream(b'8\n9\n', 0.0) == [b'9'] and splitter.counts['long_lines'] == 1
-    assert splitter.datagram(b'1\0' + b'7' * 300 + b'\0' + b'2') == [b'1', b'2'] and splitter.counts['long_lines'] == 2
+        assert splitter.take(b'7' * 1000, 0.0) == []
+    assert splitter.take(b'8\n9\n', 0.0) == [b'9'] and splitter.counts['long_lines'] == 1
+    assert splitter.take(b'1\0' + b'7' * 300 + b'\0' + b'2\n', 0.0) == [b'1', b'2']
+    assert splitter.counts['long_lines'] == 2
 
 
 def wait_until(condition):
@@ -198,7 +200,7 @@ def test_a_serial_device_that_vanishes_and_returns(tmp_path):
 
 def test_a_tcp_device_that_falls_silent_is_opened_again(monkeypatch):
     monkeypatch.setattr(reader, 'TCP_SILENCE_S', 0.3)
-    monkeypatch.setattr(reader, 'RETRY_PERIOD_S', 0.05)
+    monkeypatch.setattr(connection, 'RETRY_PERIOD_S', 0.05)
     with socket.create_server(('127.0.0.1', 0)) as server:
         kept = []
         threading.Thread(target=lambda: [kept.append(server.accept()) for _ in range(2)], daemon=True).start()

@@ -1,4 +1,5 @@
 """The rotctld protocol: what a line asks for, how it is answered; against Hamlib's server where it is installed."""
+import io
 import shutil
 import socket
 import subprocess
@@ -6,8 +7,7 @@ import time
 
 import pytest
 
-from pedestal_operator.rotator import rotctld
-from pedestal_operator.rotator.line_server import Lines
+from pedestal_operator.rotator import line_server, rotctld
 from pedestal_operator.rotator.rotctld import (
     RESULT_INVALID,
     RESULT_NOT_AVAILABLE,
@@ -92,36 +92,54 @@ def test_a_pass_through_north_never_unwinds():
 
 
 def test_lines_are_cut_and_long_ones_kept_out_of_memory():
-    lines = Lines(rotctld.MAX_LINE_BYTES)
-    assert lines.take(b'p\nP 1 2\nS') == ['p', 'P 1 2'] and lines.take(b'\n') == ['S']
+    program = sender()
+    assert taken(program, b'p\nP 1 2\nS') == ['p', 'P 1 2'] and taken(program, b'\n') == ['S']
+    assert taken(program, b'x' * 10_000) == [None]
     for _ in range(100):
-        assert lines.take(b'x' * 10_000) == []
-    assert len(lines._remainder) <= rotctld.MAX_LINE_BYTES
-    assert lines.take(b'x\np\n') == [None, 'p']
+        assert taken(program, b'x' * 10_000) == []
+    assert taken(program, b'x\np\n') == ['p']
 
 
-def unterminated(lines):
-    return lines.take_unterminated(rotctld.is_complete)
+@pytest.fixture(autouse=True)
+def pause(monkeypatch):
+    """Every pause of a program is long enough to end a line."""
+    monkeypatch.setattr(line_server, 'LINE_END_TIMEOUT_S', -1.0)
+
+
+def sender():
+    """A program, without its stream."""
+    return line_server.Client(io.BytesIO(), 'rotctld', rotctld.MAX_LINE_BYTES)
+
+
+def taken(program, data=b''):
+    """The lines that end with these bytes."""
+    if data:
+        program.take(data)
+    else:
+        program.end_line(rotctld.is_complete)
+    lines = list(program.lines)
+    program.lines.clear()
+    return lines
 
 
 @pytest.mark.parametrize('command', ('p', 'P  10.00   20.00', '+p', '\\dump_state', 'S', 'P 10,5 20,5'))
 def test_a_complete_command_of_a_program_without_line_ends_is_a_line(command):
     """gpredict for Windows sends no line ends."""
-    lines = Lines(rotctld.MAX_LINE_BYTES)
+    program = sender()
     for _ in range(2):
-        assert lines.take(command.encode()) == [] and unterminated(lines) == [command] and unterminated(lines) == []
+        assert taken(program, command.encode()) == [] and taken(program) == [command] and taken(program) == []
 
 
 @pytest.mark.parametrize('text', ('P', 'P 10', 'P 10 x', '\\dump', 'xyz', '', '#p'))
 def test_half_a_command_is_no_line(text):
-    lines = Lines(rotctld.MAX_LINE_BYTES)
-    assert lines.take(text.encode()) == [] and unterminated(lines) == []
+    program = sender()
+    assert taken(program, text.encode()) == [] and taken(program) == []
 
 
 def test_a_program_with_line_ends_is_never_cut():
-    lines = Lines(rotctld.MAX_LINE_BYTES)
-    assert lines.take(b'p\nP 12 3') == ['p'] and unterminated(lines) == []
-    assert lines.take(b'0\n') == ['P 12 30']
+    program = sender()
+    assert taken(program, b'p\nP 12 3') == ['p'] and taken(program) == []
+    assert taken(program, b'0\n') == ['P 12 30']
 
 
 def test_status_words():

@@ -93,7 +93,7 @@ class TopicPublishers:
         if taken is not None and ours is not None:
             self.lost += ours.lost - self._counted.get(ours, 0)
             self._counted[ours] = ours.lost
-        return not (taken is None and self._gate.reason == DROP_OTHER_PUBLISHER and ours is not None
+        return not (taken is None and self._gate.drops.kind == DROP_OTHER_PUBLISHER and ours is not None
                     and ours in self._gate.streams.streams and now - ours.arrival < CONFIRMED_TAKEOVER_NS
                     and self._named(now))
 

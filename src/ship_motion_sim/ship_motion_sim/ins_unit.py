@@ -10,9 +10,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.graph import nodes, noise
+from pedestal_common.graph import nodes
 from pedestal_common.injection import schedule, table
-from pedestal_common.injection.simulated import Simulated
+from pedestal_common.injection.schedule import Simulated
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import AnyRecord, Bit, Floats, Nanoseconds, Records, Stamps
 from pedestal_common.record import Record
@@ -150,7 +150,7 @@ class Ins(Simulated):
 
     def __init__(self, parameters: InsParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
-        self._noise = noise.generator(parameters.seed, self.NODE.name)
+        self._noise = nodes.noise(parameters.seed, self.NODE.name)
         normals = np.zeros((1, ins.INS_NORMALS_PER_STEP))
         model = parameters.method == 'model'
         constants = ins.constants(parameters) if model else aligning_ins.constants(parameters)

@@ -5,9 +5,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.graph import nodes, noise
+from pedestal_common.graph import nodes
 from pedestal_common.injection import schedule, table
-from pedestal_common.injection.simulated import Simulated
+from pedestal_common.injection.schedule import Simulated
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import AnyRecord, Floats, Nanoseconds, Records, Stamps
 from pedestal_common.record import Record
@@ -92,7 +92,7 @@ class ShipMotion(Simulated):
 
     def __init__(self, parameters: ShipMotionParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
-        self._noise = noise.generator(parameters.imu.seed, self.NODE.name)
+        self._noise = nodes.noise(parameters.imu.seed, self.NODE.name)
         record = UnitRecord.of(ship=motion.constants(parameters.ship), imu_state=imu.initial_state(),
                                imu=imu.constants(parameters), last=NO_STAMP, schedule=schedule.empty())
         self.memory = Memory(record, np.zeros((1, imu.IMU_NORMALS_PER_STEP)))

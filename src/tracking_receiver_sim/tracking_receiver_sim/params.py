@@ -2,13 +2,13 @@
 import dataclasses
 import math
 
+from pedestal_common.geometry import bodies
 from pedestal_common.geometry.blockage import BLOCKAGE_DOC as SECTORS_DOC
 from pedestal_common.geometry.blockage import sectors
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.geometry.lever_arm import LeverArm
 from pedestal_common.injection import table
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
-from pedestal_common.sky import bodies
 from receiver_law.smoothing import MAX_WINDOW_SAMPLES, SMOOTHING_KINDS
 from tracking_receiver_sim.path.params import PathParameters, PolarisationParameters
 

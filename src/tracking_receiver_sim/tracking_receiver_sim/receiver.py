@@ -38,6 +38,7 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
+from pedestal_common.stream import ring
 from receiver_law import detector, smoothing
 from receiver_law.detector import Voltages, hertz
 from receiver_law.monopulse import channels, disk_channels
@@ -400,17 +401,13 @@ def rate_and_range(state: State, constants: Constants, inputs: Inputs, target_st
 @compiled
 def delay(state: State, constants: Constants, outputs: Outputs, stamp_ns: Nanoseconds, result: Result) -> None:
     """Put a result into the ring and release the newest result measured at or before stamp_ns - latency."""
-    slot = state.written % RESULT_RING_SIZE
-    state.ring_stamp_ns[slot], state.ring_locked[slot] = stamp_ns, state.detector.locked
+    slot = ring.put(state, stamp_ns)
+    state.ring_locked[slot] = state.detector.locked
     state.ring_cross_elevation[slot], state.ring_elevation[slot] = result.error
     state.ring_rate[slot, 0], state.ring_rate[slot, 1] = result.rates
     state.ring_cn0_dbhz[slot], state.ring_range[slot] = result.cn0_dbhz, result.range
-    state.written += 1
-    state.released = max(state.released, state.written - RESULT_RING_SIZE)
-    latest_ns = stamp_ns - constants.latency_ns
-    while state.released < state.written and state.ring_stamp_ns[state.released % RESULT_RING_SIZE] <= latest_ns:
-        slot = state.released % RESULT_RING_SIZE
-        state.released += 1
+    slot = ring.release(state, stamp_ns - constants.latency_ns)
+    if slot != ring.NONE_DUE:
         outputs.due, outputs.stamp_ns, outputs.locked = 1, state.ring_stamp_ns[slot], state.ring_locked[slot]
         outputs.cross_elevation, outputs.elevation = state.ring_cross_elevation[slot], state.ring_elevation[slot]
         outputs.cn0_dbhz = state.ring_cn0_dbhz[slot]

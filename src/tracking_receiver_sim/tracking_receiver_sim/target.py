@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry import orbit
+from pedestal_common.geometry import bodies, orbit
 from pedestal_common.geometry.interval import interval
 from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction
 from pedestal_common.geometry.orbit import TargetError
@@ -34,7 +34,6 @@ from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import record
 from pedestal_common.quantities import Bit, Degrees, Floats, Radians, Records, Seconds, Times, Vectors3, Xyz
 from pedestal_common.record import Record
-from pedestal_common.sky import bodies
 from tracking_receiver_sim.params import (
     TARGET_KINDS,
     TARGET_RAMP,

@@ -10,9 +10,9 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
-from pedestal_common.graph import nodes, noise
+from pedestal_common.graph import nodes
 from pedestal_common.injection import schedule, table
-from pedestal_common.injection.simulated import Simulated
+from pedestal_common.injection.schedule import Simulated
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
 from pedestal_common.quantities import AnyRecord, Floats, Nanoseconds, Records, Stamps, Times
 from pedestal_common.record import Record
@@ -116,7 +116,7 @@ class TrackingReceiver(Simulated):
     def __init__(self, parameters: TrackingReceiverNodeParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
         self.target = target.build(parameters.target, parameters.duration, parameters.receiver.horizon_mask)
-        self._noise = noise.generator(parameters.seed, self.NODE.name)
+        self._noise = nodes.noise(parameters.seed, self.NODE.name)
         self._air, = self._noise.spawn(1)
         constants = receiver.constants(parameters, parameters.period, self.target)
         record = joined(ReceiverRecord.dtype, state=receiver.initial_state(), constants=constants,

@@ -13,8 +13,7 @@ from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, push
 from acu_tracker.geometry.motion import Motion, angles, line_of_sight
 from acu_tracker.geometry.vector import Rotation, Vector, turn
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
-from pedestal_common.geometry.quaternion import product
+from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE, product
 from pedestal_common.quantities import (
     Bit,
     Floats,

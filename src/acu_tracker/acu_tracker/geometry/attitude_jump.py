@@ -15,7 +15,7 @@ by the attitude follows the decay so slowly that the operator can check the new 
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.quaternion import product
+from pedestal_common.geometry.line_of_sight import product
 from pedestal_common.quantities import Bit, Quaternion, Radians, Seconds, Xyzw
 from pedestal_common.record import Record
 

@@ -21,7 +21,7 @@ import numpy as np
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.program.air import Air, RefractionParameters
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
-from pedestal_common.geometry import earth_orientation, orbit
+from pedestal_common.geometry import bodies, earth_orientation, orbit
 from pedestal_common.geometry.earth_orientation import MJD_ZERO_JULIAN_DATE, EarthOrientationParameters
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.geometry.orbit import TargetError
@@ -30,7 +30,6 @@ from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY
 from pedestal_common.parameters import ParameterError, Parameters, flag, group, parameter, text
 from pedestal_common.quantities import Floats, Nanoseconds, Pairs, Seconds, Times, Vectors3
 from pedestal_common.reproducible import arctan2
-from pedestal_common.sky import bodies
 
 TABLE_ROW_COUNT = 2400  # number of rows of a table
 TABLE_LEAD_TIME_S = 10.0  # time before the present at which a table begins [s]

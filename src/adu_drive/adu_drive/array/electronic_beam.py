@@ -10,6 +10,7 @@ from adu_drive.params import BEAM_RING_SIZE, check_delay
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Bit, Floats, Ints, Nanoseconds, Pair, Radians, Records, Seconds
 from pedestal_common.record import Record
+from pedestal_common.stream import ring
 from pedestal_common.wire.records import NO_STAMP
 
 MAX_COMMAND_ANGLE_RAD = 1e3  # largest valid angle of a command [rad]; a command beyond it, infinite or NaN is ignored
@@ -65,22 +66,18 @@ def receive(beam: State, inputs: Inputs) -> bool:
     if not (abs(azimuth) <= MAX_COMMAND_ANGLE_RAD and abs(elevation) <= MAX_COMMAND_ANGLE_RAD
             and inputs.command_stamp_ns > beam.command_stamp_ns):
         return False
-    slot = beam.written % BEAM_RING_SIZE
-    beam.ring_stamp_ns[slot] = beam.command_stamp_ns = inputs.command_stamp_ns
+    beam.command_stamp_ns = inputs.command_stamp_ns
+    slot = ring.put(beam, inputs.command_stamp_ns)
     beam.ring_position[slot, 0], beam.ring_position[slot, 1] = azimuth, elevation
-    beam.written += 1
-    beam.released = max(beam.released, beam.written - BEAM_RING_SIZE)
     return True
 
 
 @compiled
 def release(beam: State, constants: Constants, stamp_ns: Nanoseconds) -> None:
     """Release all commands whose delay has ended at stamp_ns; the newest of them is active."""
-    while (beam.released < beam.written
-           and beam.ring_stamp_ns[beam.released % BEAM_RING_SIZE] <= stamp_ns - constants.delay_ns):
-        slot = beam.released % BEAM_RING_SIZE
+    slot = ring.release(beam, stamp_ns - constants.delay_ns)
+    if slot != ring.NONE_DUE:
         beam.position[0], beam.position[1] = beam.ring_position[slot, 0], beam.ring_position[slot, 1]
-        beam.released += 1
 
 
 @compiled

@@ -11,7 +11,7 @@ from adu_drive.params import AxisParameters
 from equipment_sim.drives import law
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
-from pedestal_common.injection.simulated import Simulated
+from pedestal_common.injection.schedule import Simulated
 from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis, joined
 from pedestal_common.quantities import Records, Value
 from pedestal_common.wire.commands import Command, Reply

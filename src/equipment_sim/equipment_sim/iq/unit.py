@@ -13,9 +13,9 @@ import numpy as np
 from equipment_sim.iq import feed
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
-from pedestal_common.graph import nodes, noise
+from pedestal_common.graph import nodes
 from pedestal_common.injection import schedule, table
-from pedestal_common.injection.simulated import Simulated
+from pedestal_common.injection.schedule import Simulated
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, Diagnosis, joined
 from pedestal_common.quantities import (
     AnyRecord,
@@ -156,7 +156,7 @@ class SimulatedIq(Simulated):
         p = parameters
         self.target = target.build(p.target, p.duration, p.receiver.horizon_mask)
         # The scintillation has the stream that it has in the simulated receiver.
-        self._air, self._iq = noise.generator(p.seed, 'tracking_receiver').spawn(2)
+        self._air, self._iq = nodes.noise(p.seed, 'tracking_receiver').spawn(2)
         constants = receiver.constants(p, p.period, self.target)
         constants['first_scintillation_normal'] = 0
         count = receiver.normals_per_step(p) - receiver.NORMALS_PER_SAMPLE * p.receiver.samples_per_step

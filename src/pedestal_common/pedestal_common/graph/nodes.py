@@ -10,6 +10,8 @@ import re
 import typing
 from collections.abc import Collection, Iterable
 
+import numpy as np
+
 from pedestal_common.graph.topics import REALTIME_RATES, TOPIC_BY_NAME, TOPICS
 from pedestal_common.parameters import AnyParameters
 
@@ -313,3 +315,12 @@ def reads(node: Node, names: Iterable[str], flags: Collection[str] = ()) -> tupl
         flag = TOPIC_BY_NAME[topic].flag
         return topic == node.reads[0] or not absent and (not flag or flag in flags)
     return tuple(topic for topic in node.reads if is_read(topic))
+
+
+def noise(seed: int, node: str) -> np.random.Generator:
+    """Return the noise of a simulated node for a run's seed: a stream of its own, the same on every machine.
+
+    The stream depends on the place of the node in NODES. A node that is inserted changes the noise of all nodes
+    after it.
+    """
+    return np.random.default_rng((seed, NODE_NAMES.index(node)))

@@ -1,4 +1,4 @@
-"""Schedule of the injected faults of a simulated node: a record of the faults in force.
+"""Schedule of the injected faults of a simulated node: a record of the faults in force, and the unit that fills it.
 
 The law of the node checks the record once per step. It begins with these lines:
 
@@ -8,7 +8,7 @@ The law of the node checks the record once per step. It begins with these lines:
 A node without a fault therefore behaves as if faults did not exist. `take` clears all faults, then applies again the
 fault of every row that is in force. No state must be restored after a fault.
 """
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 import numpy as np
@@ -16,8 +16,10 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import table
-from pedestal_common.quantities import Bit, Floats, Nanoseconds, Records, Seconds
+from pedestal_common.node.unit import Unit
+from pedestal_common.quantities import Bit, Floats, Nanoseconds, Records, Seconds, Value
 from pedestal_common.record import Record
+from pedestal_common.wire.commands import Command, Reply
 from pedestal_common.wire.records import NO_STAMP
 
 MAX_ACTIVE_FAULTS = 16  # largest number of faults in force in a node at a time
@@ -89,3 +91,37 @@ def clear(schedule: np.void) -> None:
     """End all faults from the next step."""
     schedule['row']['used'] = 0
     schedule['pending'] = 1
+
+
+class Simulated(Unit):
+    """Unit of simulated equipment. Its record has a field `schedule` (Schedule), which its law reads.
+    Its parameters have the field `inject`.
+    """
+    FAULTS_OF = ''      # node of table.INJECTED_FAULTS whose faults it has; '': its own node
+
+    @property
+    def _faulty(self) -> str:
+        return self.FAULTS_OF or self.NODE.name
+
+    def schedule(self) -> list[tuple[Nanoseconds, Command]]:
+        """Return the commands of the parameter `inject` with their times."""
+        return table.scheduled_commands(self._faulty, self.parameters.inject)
+
+    def execute(self, command: Command, arguments: Mapping[str, Value]) -> Reply:
+        """Inject a fault from the next step; the Reply states the stamp of the step before."""
+        part, node = self.parts['schedule'], self._faulty
+        since = '' if part['stamp'] == NO_STAMP else f' from the step after {part["stamp"] / NS_PER_SECOND:.6f} s on'
+        if command.verb == table.CLEAR_COMMAND.name:
+            clear(part)
+            return Reply(True, f'no fault{since}')
+        refusal = self.lockstep and table.refused_in_lockstep(node, command.verb)
+        if refusal:
+            raise ValueError(refusal)
+        *values, duration = [argument.options.index(arguments[argument.name]) if argument.options else
+                             arguments[argument.name] for argument in self._fault(command.verb).arguments]
+        add(part, table.code(node, command.verb), values, duration)
+        return Reply(True, f'{command.verb}{since}' + (f', for {duration:g} s' if duration < table.MAX_FAULT_DURATION_S
+                                                       else ''))
+
+    def _fault(self, name: str) -> table.Fault:
+        return table.INJECTED_FAULTS[self._faulty][table.code(self._faulty, name)]

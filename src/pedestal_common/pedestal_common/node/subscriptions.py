@@ -25,7 +25,6 @@ MessageInfo: TypeAlias = Mapping[str, int]      # of rclpy: numbers and times of
 Take: TypeAlias = Callable[[bytes, MessageInfo], object]      # callback of a subscription, for the CDR bytes
 _M = TypeVar('_M')      # a decoded message
 
-DROP_REPORT_NS = 2_000_000_000  # time for which the diagnostics report a dropped message [ns]
 UNDISCOVERED_NODE_NAME = '_NODE_NAME_UNKNOWN_'  # name that rmw gives to a node before its discovery
 
 MAX_DISCOVERY_NS = 10_000_000_000
@@ -187,7 +186,7 @@ class TopicSubscriber(Generic[_M]):
         present is dropped. After that publisher has left, a new subscription brings the last text again."""
         while self._held and (not self._undiscovered() or self._node.clock()[0] - self._held[0][0] > MAX_DISCOVERY_NS):
             self._receive(*self._held.popleft()[1:])
-        missed = self.gate.dropped[publisher_gate.DROP_OTHER_PUBLISHER]
+        missed = self.gate.drops.counts[publisher_gate.DROP_OTHER_PUBLISHER]
         if missed > self._missed and not self.unexpected_publishers():
             self._missed = missed
             for subscription in self._subscriptions:
@@ -204,7 +203,7 @@ class TopicSubscriber(Generic[_M]):
         message = gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
         if message is not None:
             self._take(message, gate.after_gap)
-        elif gate.reason in publisher_gate.WARNING_DROP_REASONS:
+        elif gate.drops.kind in publisher_gate.WARNING_DROP_REASONS:
             self._node.diagnose_now()
 
     def unexpected_publishers(self) -> list[str]:
@@ -222,23 +221,23 @@ class TopicSubscriber(Generic[_M]):
         return max(len(self._node.publishers_of(self._ros_name)) - 1, 0)
 
     def finding(self, now: Nanoseconds) -> tuple[int, str] | None:
-        """Return (level, text) for the diagnostics, about messages dropped within DROP_REPORT_NS; None without any.
-        now: steady clock."""
-        gate = self.gate
-        if gate.dropped_at is None or now - gate.dropped_at > DROP_REPORT_NS:
+        """Return (level, text) for the diagnostics, about messages that Drops reports; None without any. now: steady
+        clock."""
+        drops = self.gate.drops
+        if not drops.reported(now):
             return None
-        reason, count = gate.reason, gate.dropped[gate.reason]
-        if reason not in publisher_gate.WARNING_DROP_REASONS:
-            return LEVEL_WARN, f'{self.link.name}: {count} dropped: {reason}: {gate.detail}'
+        kind, count = drops.kind, drops.counts[drops.kind]
+        if kind not in publisher_gate.WARNING_DROP_REASONS:
+            return LEVEL_WARN, f'{self.link.name}: {count} dropped: {kind}: {drops.reason}'
         names = self.unexpected_publishers() if self._expected else self._node.publishers_of(self._ros_name)
         who = ', '.join(names) or 'it has left'
-        return LEVEL_ERROR, f'{self.link.name}: {count} dropped: {reason}: {who}'
+        return LEVEL_ERROR, f'{self.link.name}: {count} dropped: {kind}: {who}'
 
     def values(self) -> list[tuple[str, str]]:
         """Return [(key, text)] for the diagnostics: the number of dropped messages, the smallest time from sending to
         reception."""
         gate = self.gate
-        values = [(f'dropped {self.link.name}: {reason}', str(count)) for reason, count in gate.dropped.items()]
+        values = [(f'dropped {self.link.name}: {kind}', str(count)) for kind, count in gate.drops.counts.items()]
         if gate.offset is not None:
             values.append((f'offset {self.link.name}_ms', f'{gate.offset * 1e-6:.3f}'))
         return values

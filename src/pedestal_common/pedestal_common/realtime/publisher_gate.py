@@ -15,12 +15,12 @@ this silence. Publishers are unclear if a message may be of several of them. Bec
 motion that the topic commands stops. An unexpected publisher is a node that should not publish the topic, according to
 the table of nodes. The module uses neither ROS nor a clock.
 """
-import collections
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from pedestal_common.quantities import Nanoseconds
 from pedestal_common.realtime.streams import Stream, Streams
+from pedestal_common.stream.drops import Drops
 
 SILENCE_LIMIT_NS = 200_000_000
 """Silence of the active publisher after which another may become active, and time after which stamps that went back
@@ -36,9 +36,9 @@ PUBLISHER_POLL_NS = 50_000_000
 
 DROP_UNDECODABLE, DROP_STALE, DROP_FUTURE, DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER = (
     'undecodable', 'stale', 'future', 'another publisher', 'publishers unclear')
-"""Reasons to drop a message."""
+"""Kinds of dropped messages."""
 
-WARNING_DROP_REASONS = DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER  # reasons that need the attention of the operator
+WARNING_DROP_REASONS = DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER  # kinds that need the attention of the operator
 
 _M = TypeVar('_M')      # what `decode` returns
 
@@ -70,9 +70,7 @@ class PublisherGate(Generic[_M]):
         self._oldest = oldest
         self.streams = Streams()
         self.active: Stream | None = None
-        self.dropped: collections.Counter[str] = collections.Counter()      # {reason: count}
-        self.reason = self.detail = ''      # of the last dropped message
-        self.dropped_at: Nanoseconds | None = None      # its time of reception
+        self.drops = Drops()
         # messages may be missing before the last accepted message: the publisher changed, or the stamps went back
         self.after_gap = False
         # smallest time from sending to reception since the publisher became active
@@ -91,17 +89,17 @@ class PublisherGate(Generic[_M]):
         self.after_gap = False
         if not self._paced:
             if self._unexpected():
-                self._drop(DROP_OTHER_PUBLISHER, '', now)
+                self.drops.drop(DROP_OTHER_PUBLISHER, '', now)
                 return None
         elif not self._is_open and not self._admit(self.streams.of(number, source, now), now):
             return None
         if self._oldest is not None and utc - source > self._oldest:
-            self._drop(DROP_STALE, f'{(utc - source) * 1e-9:.3f} s from sending to reception', now)
+            self.drops.drop(DROP_STALE, f'{(utc - source) * 1e-9:.3f} s from sending to reception', now)
             return None
         try:
             stamp, message = self._decode(data)
         except ValueError as error:
-            self._drop(DROP_UNDECODABLE, str(error), now)
+            self.drops.drop(DROP_UNDECODABLE, str(error), now)
             return None
         if stamp is not None and not self._in_order(stamp, now, utc):
             return None
@@ -116,7 +114,7 @@ class PublisherGate(Generic[_M]):
         if stream is not None and stream is self.active and self._may_be_another(stream, now):
             self.active = None
         if stream is None:
-            self._drop(DROP_UNCLEAR_PUBLISHER, '', now)
+            self.drops.drop(DROP_UNCLEAR_PUBLISHER, '', now)
         elif stream is self.active:
             for other in self._other_active(stream, now):
                 other.overlapped = True
@@ -128,7 +126,7 @@ class PublisherGate(Generic[_M]):
             self._active_at = now
             return True
         else:
-            self._drop(DROP_OTHER_PUBLISHER, '', now)
+            self.drops.drop(DROP_OTHER_PUBLISHER, '', now)
         return False
 
     def _may_be_another(self, stream: Stream, now: Nanoseconds) -> bool:
@@ -171,7 +169,7 @@ class PublisherGate(Generic[_M]):
         """Return True if a stamp is later than the last one and not ahead of the time. A stamp that goes back is
         accepted once such stamps have arrived for SILENCE_LIMIT_NS."""
         if stamp > utc + self._future:
-            self._drop(DROP_FUTURE, f'{(stamp - utc) * 1e-9:.3f} s ahead', now)
+            self.drops.drop(DROP_FUTURE, f'{(stamp - utc) * 1e-9:.3f} s ahead', now)
             return False
         if self._stamp is None or stamp > self._stamp:
             self._stamp, self._back_since = stamp, None
@@ -182,13 +180,8 @@ class PublisherGate(Generic[_M]):
         if now - self._back_since >= SILENCE_LIMIT_NS:
             self._stamp, self._back_since, self.after_gap = stamp, None, True
             return True
-        self._drop(DROP_STALE, f'{(self._stamp - stamp) * 1e-9:.3f} s older than the last', now)
+        self.drops.drop(DROP_STALE, f'{(self._stamp - stamp) * 1e-9:.3f} s older than the last', now)
         return False
 
     def _note_offset(self, offset: Nanoseconds) -> None:
         self.offset = offset if self.offset is None else min(self.offset, offset)
-
-    def _drop(self, reason: str, detail: str, now: Nanoseconds) -> None:
-        """Count a dropped message, and note its reason and time."""
-        self.dropped[reason] += 1
-        self.reason, self.detail, self.dropped_at = reason, detail, now

@@ -69,7 +69,7 @@ class InsInputNode(LineNode):
         try:
             message = messages.deserialize(bytes(data), IMU_TYPE)
         except ValueError:
-            self.unit.counts['unreadable'] += 1
+            self.unit.drops.counts['unreadable'] += 1
             return
         with self.lock:
             self.send(self.unit.take_imu(message, self.clock()[1]))

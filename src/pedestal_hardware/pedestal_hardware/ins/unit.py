@@ -1,6 +1,5 @@
 """From the sentences or the messages of an INS to attitudes of the graph. No ROS and no clock here: the caller gives
 the time of arrival."""
-import collections
 import math
 import typing
 
@@ -8,12 +7,12 @@ import numpy as np
 
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import Degrees, Message, Nanoseconds, Quaternion, Radians, Radians2, Records, Vector3
+from pedestal_common.stream.drops import Drops
 from pedestal_common.wire import messages
 from pedestal_hardware.ins import conventions, frame_check, frames, input_law, sentences
 from pedestal_hardware.ins.input_law import Outcome
 from pedestal_hardware.ins.params import InsInputParameters
 
-REPORT_NS = 2_000_000_000  # time for which the diagnosis reports a dropped sample [ns]
 TURN_AGE_NS = 1_000_000_000  # age from which a rate of turn is not compared any more [ns]
 
 DROP_KINDS = ('bad_checksum', 'unreadable', 'out_of_range', 'no_heading', 'no_time', 'no_orientation', 'stale',
@@ -48,8 +47,10 @@ class Memory(typing.NamedTuple):
 
 class InsInputUnit:
     """Attitudes of a device."""
-    counts: collections.Counter[str]    # of the published samples, of the dropped ones, and of unused sentences
-    state: str                          # text of ins/state
+    published: int          # number of the published samples
+    drops: Drops            # dropped samples
+    other_sentences: int    # number of the unused sentences
+    state: str              # text of ins/state
 
     def __init__(self, parameters: InsInputParameters) -> None:
         p = self.parameters = parameters
@@ -61,8 +62,8 @@ class InsInputUnit:
         constants['frame'] = frames.constants(*frame, p.mounting.radians, math.radians(p.heading_zero))[0]
         constants['bandwidth'], constants['max_gap_ns'] = p.rate_bandwidth, round(p.max_gap * 1e9)
         constants['checked'] = p.frame_check
-        self.counts = collections.Counter(dict.fromkeys(('published', *DROP_KINDS, 'other_sentences'), 0))
-        self.state, self._dropped, self._dropped_at, self._blocking = 'aligning', '', 0, ''
+        self.published, self.drops, self.other_sentences = 0, Drops(DROP_KINDS), 0
+        self.state, self._blocking = 'aligning', ''
         self._heading, self._turn, self._age_ns = (math.nan, 0), (0.0, 0), 0
 
     def prepare(self) -> None:
@@ -86,7 +87,7 @@ class InsInputUnit:
         if found is not None and found.kind == 'hdt':
             self._heading = found.heading, arrival
         if found is None or found.kind != p.nmea.sentence:
-            self.counts['other_sentences'] += 1
+            self.other_sentences += 1
             return None
         heading = found.heading
         if math.isnan(heading):
@@ -151,7 +152,7 @@ class InsInputUnit:
         if outcome != Outcome.PUBLISHED:
             self.state = 'aligning' if outcome == Outcome.WRONG_FRAME else self.state
             return self._drop(input_law.OUTCOMES[outcome], self._blocking or OUTCOME_TEXTS[outcome], arrival)
-        self.counts['published'] += 1
+        self.published += 1
         self.state = 'aligned' if aligned else 'aligning'
         outputs = self.record['outputs'][0]
         return Sample(int(u['stamp']), outputs['q'], outputs['w'], outputs['force'], variances)
@@ -177,10 +178,11 @@ class InsInputUnit:
         return f'wrong frame: {reason}; {conventions.text(fitting)}'
 
     def _drop(self, kind: str, reason: str, arrival: Nanoseconds) -> Sample | None:
-        """Count and note what is dropped. Return None, for the caller to return."""
-        self.counts[kind] += 1
-        if kind != 'settling':
-            self._dropped, self._dropped_at = f'dropped a sample: {reason}', arrival
+        """Drop a sample. Return None, for the caller to return. Rates that settle are counted only."""
+        if kind == 'settling':
+            self.drops.counts[kind] += 1
+        else:
+            self.drops.drop(kind, reason, arrival)
         return None
 
     @property
@@ -189,8 +191,7 @@ class InsInputUnit:
         return VERDICT_TEXTS[self.record['state'][0]['check']['verdict']]
 
     def diagnose(self, now: Nanoseconds) -> Diagnosis:
-        """Return the Diagnosis at a UTC: ERROR for a wrong frame, WARN for REPORT_NS after a dropped
-        sample."""
+        """Return the Diagnosis at a UTC: ERROR for a wrong frame, WARN while Drops reports a sample."""
         state, o = self.record['state'][0], self.record['outputs'][0]
         values = [*((f'{name}_deg', f'{angle:.2f}') for name, angle in self._angles(o['q'])),
                   *((f'{name}_rate_deg_s', f'{math.degrees(rate):.2f}') for name, rate in zip(AXIS_NAMES, o['w'])),
@@ -199,13 +200,15 @@ class InsInputUnit:
                     for i, name in enumerate(AXIS_NAMES) if state['check']['moved'][i] > 0.0),
                   ('age_s', f'{self._age_ns * 1e-9:.3f}'), ('gaps', str(state['gaps'])),
                   ('jumps', str(state['check']['jumps'])),
-                  *((name, str(count)) for name, count in self.counts.items())]
+                  ('published', str(self.published)),
+                  *((name, str(count)) for name, count in self.drops.counts.items()),
+                  ('other_sentences', str(self.other_sentences))]
         if self._blocking:
             return Diagnosis(LEVEL_ERROR, self._blocking, values)
-        if self._dropped and now - self._dropped_at < REPORT_NS:
-            return Diagnosis(LEVEL_WARN, self._dropped, values)
-        if not self.counts['published']:
-            if not self.counts['settling']:
+        if self.drops.reported(now):
+            return Diagnosis(LEVEL_WARN, f'dropped a sample: {self.drops.reason}', values)
+        if not self.published:
+            if not self.drops.counts['settling']:
                 return Diagnosis(LEVEL_OK, 'no attitude so far', values)
             return Diagnosis(LEVEL_WARN, 'the rates settle: two samples must be at most max_gap = '
                              f'{self.parameters.max_gap:g} s apart', values)

@@ -4,10 +4,11 @@ import typing
 
 from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import Decibels, Nanoseconds
+from pedestal_common.stream.drops import Drops
 from pedestal_hardware.level.line_format import LineFormat
 from pedestal_hardware.level.params import LevelReceiverParameters
 
-REPORT_NS = 2_000_000_000  # time for which the diagnosis reports a dropped line [ns]
+DROP_KINDS = 'unreadable', 'not_finite', 'out_of_range', 'not_newer'  # reasons to drop a line
 
 
 class Level(typing.NamedTuple):
@@ -18,12 +19,12 @@ class Level(typing.NamedTuple):
 
 class LevelUnit:
     """Levels of a receiver."""
-    counts: dict[str, int]      # of the published levels and of the dropped lines
+    levels: int     # number of the published levels
+    drops: Drops    # dropped lines
 
     def __init__(self, parameters: LevelReceiverParameters) -> None:
         self.parameters, self._format = parameters, LineFormat(parameters.format)
-        self.counts = {'levels': 0, 'unreadable': 0, 'not_finite': 0, 'out_of_range': 0, 'not_newer': 0}
-        self._dropped, self._dropped_at = '', 0
+        self.levels, self.drops = 0, Drops(DROP_KINDS)
         self._newest: Level | None = None
 
     def take(self, line: bytes, arrival: Nanoseconds) -> Level | None:
@@ -41,19 +42,18 @@ class LevelUnit:
         if self._newest is not None and stamp <= self._newest.stamp:
             return self._drop('not_newer', 'a line without a later time of arrival', arrival)
         self._newest = Level(stamp, level)
-        self.counts['levels'] += 1
+        self.levels += 1
         return self._newest
 
     def _drop(self, kind: str, reason: str, arrival: Nanoseconds) -> Level | None:
-        """Count and note what is dropped. Return None, for the caller to return."""
-        self.counts[kind] += 1
-        self._dropped, self._dropped_at = f'dropped a line: {reason}', arrival
+        """Drop a line. Return None, for the caller to return."""
+        self.drops.drop(kind, reason, arrival)
         return None
 
     def diagnose(self, now: Nanoseconds) -> Diagnosis:
-        """Return the Diagnosis at a UTC: WARN for REPORT_NS after a dropped line."""
+        """Return the Diagnosis at a UTC: WARN while Drops reports a line."""
         values = [('level_db', 'none' if self._newest is None else f'{self._newest.level:.2f}'),
-                  *((name, str(count)) for name, count in self.counts.items())]
-        if self._dropped and now - self._dropped_at < REPORT_NS:
-            return Diagnosis(LEVEL_WARN, self._dropped, values)
+                  ('levels', str(self.levels)), *((name, str(count)) for name, count in self.drops.counts.items())]
+        if self.drops.reported(now):
+            return Diagnosis(LEVEL_WARN, f'dropped a line: {self.drops.reason}', values)
         return Diagnosis(LEVEL_OK, 'receives levels', values)

@@ -15,7 +15,7 @@ URL_FORMS_TEXT = 'udp://HOST:PORT, socket://HOST:PORT, or the path of a serial d
 
 class Source(Protocol):
     """Source of bytes."""
-    WHOLE: bool     # True if each `read` returns whole lines, as a datagram does
+    WHOLE: bool     # True if each `read` returns whole lines, as that of a datagram does
 
     def read(self) -> bytes:
         """Wait at most READ_TIMEOUT_S, and return the received bytes, b'' for none. Raises OSError if the device has
@@ -39,9 +39,9 @@ class UdpSource:
         self.socket.settimeout(READ_TIMEOUT_S)
 
     def read(self) -> bytes:
-        """Return the next datagram."""
+        """Return the next datagram, with the end of its last line."""
         try:
-            return self.socket.recv(MAX_READ_BYTES)
+            return self.socket.recv(MAX_READ_BYTES) + b'\n'
         except TimeoutError:
             return b''
 

@@ -1,8 +1,7 @@
 """Connection to a rotator, by TCP or a serial line, in a thread of its own.
 
 The thread asks for the position once in `poll_period`, and sends the newest set-point between two polls. Because a
-rotator needs up to 0.6 s for an answer, no step of the node may wait for one. After an error the thread opens the
-connection again, once in RETRY_PERIOD_S.
+rotator needs up to 0.6 s for an answer, no step of the node may wait for one.
 """
 import threading
 import time
@@ -11,9 +10,9 @@ import typing
 import serial
 
 from pedestal_common.quantities import Degrees, Seconds
+from pedestal_common.stream.connection import Connection
 from pedestal_hardware.rotator.protocols import Accepted, Answer, Position, Refusal, RotatorProtocol
 
-RETRY_PERIOD_S = 1.0  # time between two attempts to open the connection [s]
 READ_TIMEOUT_S = 0.02  # longest wait for the next byte [s]
 MAX_READ_BYTES = 4096  # number of bytes that are read at once
 
@@ -25,7 +24,7 @@ class Measurement(typing.NamedTuple):
     at: Seconds     # time of the monotonic clock at which they arrived
 
 
-class Line:
+class Line(Connection):
     """Connection to one rotator.
 
     url         `socket://host:port` for TCP, or the path of a serial device, as pyserial takes it
@@ -33,31 +32,25 @@ class Line:
     baud_rate   of a serial device; 0: that of the protocol
     """
     newest: Measurement | None  # None before the first
-    silence: str                # reason why no position arrives, '' while positions arrive
     refusal: str                # of the device for the last set-point or stop, '' after an accepted one
     counts: dict[str, int]      # positions, set-points, refusals and missing answers
 
     def __init__(self, url: str, protocol: type[RotatorProtocol], poll_period: Seconds, timeout: Seconds,
                  baud_rate: int = 0) -> None:
-        self.url, self.protocol, self.poll_period, self.timeout = url, protocol, poll_period, timeout
+        super().__init__(url, 'rotator')
+        self.protocol, self.poll_period, self.timeout = protocol, poll_period, timeout
         self.baud_rate = baud_rate or protocol.BAUD_RATE
-        self.newest, self.silence, self.refusal = None, f'{url}: not connected so far', ''
+        self.newest, self.refusal = None, ''
         self.counts = {'positions': 0, 'set_points': 0, 'refusals': 0, 'missing_answers': 0}
         self._request, self._lock = b'', threading.Lock()
         # True from a request that the protocol does not answer until the next position: a refusal belongs to it.
         self._unanswered = False
-        self._ended, self._wake = threading.Event(), threading.Event()
-        self._thread = threading.Thread(target=self._run, name='rotator', daemon=True)
-        self._reader = protocol()
+        self._wake, self._reader = threading.Event(), protocol()
 
     @property
     def fault(self) -> str:
         """Reason why the device does not follow, '' if it does."""
         return self.silence or self.refusal
-
-    def start(self) -> None:
-        """Start the thread."""
-        self._thread.start()
 
     def send_set_point(self, azimuth: Degrees, elevation: Degrees) -> None:
         """Send a set-point at the next opportunity, in place of an earlier one that was not sent."""
@@ -74,26 +67,20 @@ class Line:
     def close(self) -> None:
         """Stop the device and end the thread."""
         self.send_stop()
-        self._ended.set()
+        self.ended.set()        # after the stop, which the thread sends last
         self._wake.set()
-        if self._thread.is_alive():
-            self._thread.join(2.0 * self.timeout + RETRY_PERIOD_S)
+        self.end(2.0 * self.timeout)
 
-    def _run(self) -> None:
-        while not self._ended.is_set():
-            try:
-                with serial.serial_for_url(self.url, baudrate=self.baud_rate, timeout=READ_TIMEOUT_S,
-                                           write_timeout=self.timeout) as device:
-                    self._serve(device)
-            except (OSError, ValueError) as error:     # SerialException is an OSError
-                self.silence = f'{self.url}: {error}'
-                self._ended.wait(RETRY_PERIOD_S)
-
-    def _serve(self, device: serial.Serial) -> None:
+    def serve(self) -> None:
         """Exchange requests and answers until the thread ends; raises OSError when the device vanishes."""
+        with serial.serial_for_url(self.url, baudrate=self.baud_rate, timeout=READ_TIMEOUT_S,
+                                   write_timeout=self.timeout) as device:
+            self._exchange(device)
+
+    def _exchange(self, device: serial.Serial) -> None:
         self._reader = self.protocol()
         while True:
-            begun, ending = time.monotonic(), self._ended.is_set()
+            begun, ending = time.monotonic(), self.ended.is_set()
             self._wake.clear()
             self._send_request(device)
             if ending:

@@ -9,8 +9,9 @@ from collections.abc import Iterator
 from typing import ClassVar, NamedTuple, TypeAlias
 
 from pedestal_common.quantities import Degrees
+from pedestal_common.stream.splitter import Overlong, Splitter
 
-MAX_ANSWER_BYTES = 512  # number of bytes without a complete answer after which the bytes are refused
+MAX_ANSWER_BYTES = 512  # largest length of a line; a longer one is refused
 MAX_ANGLE_DEG = 1000.0  # largest angle that a device may report [deg]
 
 
@@ -40,35 +41,30 @@ class RotatorProtocol:
     BAUD_RATE: ClassVar[int] = 9600         # usual speed of the serial line
     RESOLUTION: ClassVar[Degrees] = 0.01    # smallest step of a set-point
 
-    def __init__(self) -> None:
-        self.buffer = b''
-
     def set_point(self, azimuth: Degrees, elevation: Degrees) -> bytes:
         """Return the request to move to these angles."""
         raise NotImplementedError
 
     def answers(self, received: bytes) -> list[Answer]:
         """Return the complete answers in the received bytes."""
-        self.buffer += received
-        found = list(self._complete())
-        if len(self.buffer) > MAX_ANSWER_BYTES:
-            found.append(Refusal(f'{len(self.buffer)} bytes without an answer: {self.buffer[:20]!r} ...'))
-            self.buffer = b''
-        return found
-
-    def _complete(self) -> Iterator[Answer]:
-        """Yield the complete answers, and remove their bytes from the buffer."""
         raise NotImplementedError
 
 
 class LineProtocol(RotatorProtocol):
     """Base of the protocols of text lines."""
 
-    def _complete(self) -> Iterator[Answer]:
-        *lines, self.buffer = re.split(rb'[\r\n]+', self.buffer)
-        for line in lines:
-            if line.strip():
-                yield from self.answers_of(line.strip())
+    def __init__(self) -> None:
+        self._splitter = Splitter(b'\r\n', MAX_ANSWER_BYTES)
+
+    def answers(self, received: bytes) -> list[Answer]:
+        """Return the complete answers in the received bytes."""
+        found: list[Answer] = []
+        for line in self._splitter.take(received):
+            if isinstance(line, Overlong):
+                found.append(Refusal(f'{len(line)} bytes without an answer: {line[:20]!r} ...'))
+            elif line.strip():
+                found += self.answers_of(line.strip())
+        return found
 
     def answers_of(self, line: bytes) -> Iterator[Answer]:
         """Yield the answers in one line."""
@@ -175,27 +171,35 @@ class Rot2prog(RotatorProtocol):
     PULSES_PER_DEG = 10
     FRAME_BYTES = 12
 
+    def __init__(self) -> None:
+        self._begun = b''   # of a frame
+
     def set_point(self, azimuth: Degrees, elevation: Degrees) -> bytes:
         """Return the request to move to these angles."""
         pulses = self.PULSES_PER_DEG
         return b'W%04d%c%04d%c\x2f ' % (round(pulses * (360.0 + azimuth)), pulses,
                                         round(pulses * (360.0 + elevation)), pulses)
 
-    def _complete(self) -> Iterator[Answer]:
+    def answers(self, received: bytes) -> list[Answer]:
+        """Return the complete answers in the received bytes."""
+        found: list[Answer] = []
+        data = self._begun + received
         while True:
-            begin = self.buffer.find(b'W')
-            self.buffer = self.buffer[begin:] if begin >= 0 else b''
-            if len(self.buffer) < self.FRAME_BYTES:
-                return
-            frame = self.buffer[:self.FRAME_BYTES]
+            begin = data.find(b'W')
+            data = data[begin:] if begin >= 0 else b''
+            if len(data) < self.FRAME_BYTES:
+                self._begun = data
+                return found
+            frame = data[:self.FRAME_BYTES]
             digits = frame[1:5] + frame[6:10]
             if frame[-1:] != b' ' or max(digits) > 9:     # the W of a text, or a damaged frame
-                self.buffer = self.buffer[1:]
-                yield Refusal(f'frame {frame.hex(" ")}: must be W, eight digits with their pulses, and a space')
+                data = data[1:]
+                found.append(Refusal(f'frame {frame.hex(" ")}: must be W, eight digits with their pulses, and a '
+                                     'space'))
                 continue
-            self.buffer = self.buffer[self.FRAME_BYTES:]
-            yield in_range(Position(*(100 * d[0] + 10 * d[1] + d[2] + 0.1 * d[3] - 360
-                                      for d in (digits[:4], digits[4:]))))
+            data = data[self.FRAME_BYTES:]
+            found.append(in_range(Position(*(100 * d[0] + 10 * d[1] + d[2] + 0.1 * d[3] - 360
+                                             for d in (digits[:4], digits[4:])))))
 
 
 PROTOCOLS: dict[str, type[RotatorProtocol]] = {

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeAlias, TypeVar
 
+from pedestal_common.stream.splitter import Overlong, Splitter
 from pedestal_operator import tcp_port
 
 MAX_UNREAD_BYTES = 65_536  # largest size of unread answers of a client [bytes]; further answers are dropped
@@ -18,6 +19,7 @@ MAX_WAITING_LINES = 100  # largest number of waiting lines of a client; further 
 LINE_END_TIMEOUT_S = 0.05
 """Time without a byte after which a complete command of a program without line ends counts as a line [s]."""
 
+LINE_ENDS = b'\r\n'
 READ_CHUNK_BYTES = 65_536  # largest size of one read [bytes]
 
 Stream: TypeAlias = socket.socket | io.FileIO   # connection to a program, or a serial device
@@ -26,34 +28,6 @@ Stream: TypeAlias = socket.socket | io.FileIO   # connection to a program, or a 
 def address_of(name: str) -> str:
     """Return the name of a client without its TCP port. All connections from one address have this name in common."""
     return name.rsplit(':', 1)[0]
-
-
-class Lines:
-    """Splitter of bytes into lines of at most `longest` bytes; a longer line is dropped."""
-
-    def __init__(self, longest: int) -> None:
-        self._longest, self._remainder, self._skips_line = longest, b'', False
-        self._has_line_ends = False
-
-    def take(self, data: bytes) -> list[str | None]:
-        """Return a list of the lines that these bytes complete; None stands for a line that is too long."""
-        *lines, self._remainder = (self._remainder + data).replace(b'\r', b'\n').split(b'\n')
-        found, self._has_line_ends = [], self._has_line_ends or bool(lines)
-        for line in lines:
-            too_long, self._skips_line = self._skips_line or len(line) > self._longest, False
-            found.append(None if too_long else line.decode('ascii', 'replace'))
-        if len(self._remainder) > self._longest:
-            self._remainder, self._skips_line = b'', True
-        return found
-
-    def take_unterminated(self, is_complete: Callable[[str], bool]) -> list[str]:
-        """Return a list with the received text without a line end, if is_complete(text) and if the program has never
-        sent a line end; else []."""
-        line = self._remainder.decode('ascii', 'replace')
-        if self._has_line_ends or self._skips_line or not is_complete(line):
-            return []
-        self._remainder = b''
-        return [line]
 
 
 class Client:
@@ -68,7 +42,8 @@ class Client:
     def __init__(self, stream: Stream, name: str, longest: int) -> None:
         self.stream, self.name = stream, name
         self.lines, self.dropped, self.gone = deque(), 0, None
-        self._splitter, self._out, self._receive_time = Lines(longest), bytearray(), 0.0
+        self._splitter, self._has_line_ends = Splitter(LINE_ENDS, longest), False
+        self._out, self._receive_time = bytearray(), 0.0
         self.refusals = {}
 
     def receive(self) -> None:
@@ -81,18 +56,28 @@ class Client:
             self.gone = error.strerror
             return
         if data:
-            self.lines += self._splitter.take(data)
-            self._receive_time = time.monotonic()
+            self.take(data)
         else:
             self.gone = ''
 
+    def take(self, data: bytes) -> None:
+        """Take received bytes."""
+        self.lines += [None if isinstance(line, Overlong) else line.decode('ascii', 'replace')
+                       for line in self._splitter.take(data)]
+        self._has_line_ends = self._has_line_ends or any(end in data for end in LINE_ENDS)
+        self._receive_time = time.monotonic()
+
     def end_line(self, is_complete: Callable[[str], bool]) -> None:
-        """Take the bytes of a program without line ends after LINE_END_TIMEOUT_S as a line, if is_complete(line).
+        """Take the bytes of a program that never sends line ends after LINE_END_TIMEOUT_S as a line, if
+        is_complete(line).
 
         This serves gpredict for Windows.
         """
-        if not self.lines and time.monotonic() - self._receive_time > LINE_END_TIMEOUT_S:
-            self.lines += self._splitter.take_unterminated(is_complete)
+        line = self._splitter.rest.decode('ascii', 'replace')
+        if (not self.lines and time.monotonic() - self._receive_time > LINE_END_TIMEOUT_S
+                and not self._has_line_ends and not self._splitter.skips and is_complete(line)):
+            self._splitter.restart()
+            self.lines.append(line)
 
     def queue_answer(self, data: bytes) -> None:
         """Queue an answer behind the waiting answers."""

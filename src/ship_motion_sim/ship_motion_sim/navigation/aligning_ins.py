@@ -10,9 +10,10 @@ from pedestal_common.geometry.line_of_sight import quaternion, rotation, to_deck
 from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import Bit, Floats, Matrix3, MetersPerSecond, Nanoseconds, Records, Vector3
 from pedestal_common.record import Record
+from pedestal_common.stream import ring
 from ship_motion_sim import earth
 from ship_motion_sim.navigation import ins, navigator
-from ship_motion_sim.navigation.ins import LATENCY_RING_SIZE, NO_STAMP, LatencyRing
+from ship_motion_sim.navigation.ins import NO_STAMP, LatencyRing
 from ship_motion_sim.navigation.navigator import State as NavigatorState
 from ship_motion_sim.params import InsParameters
 from ship_motion_sim.sea import motion
@@ -113,7 +114,7 @@ def integrate(constants: Constants, state: State, stamp_ns: Nanoseconds, rate: V
 @compiled
 def measure(constants: Constants, state: State, stamp_ns: Nanoseconds, rate: Vector3, force: Vector3) -> None:
     """Put attitude and deck rate of the navigator at stamp_ns into the ring; rate, force: of the IMU message."""
-    n = state.measured % LATENCY_RING_SIZE
+    n = ring.put(state, stamp_ns)
     q, w = state.quaternion, state.angular_velocity
     q[n, 0], q[n, 1], q[n, 2], q[n, 3] = navigator.attitude(state.navigator, constants.navigator)
     rotation(q[n, 0], q[n, 1], q[n, 2], q[n, 3], state.mat_ed)
@@ -129,8 +130,7 @@ def measure(constants: Constants, state: State, stamp_ns: Nanoseconds, rate: Vec
     state.variance[n, 0] = state.variance[n, 1] = state.navigator.level_sigma**2
     state.variance[n, 2] = state.navigator.azimuth_sigma**2
     state.stage[n] = state.navigator.stage
-    state.stamp_ns[n] = state.imu_stamp_ns = stamp_ns
-    state.measured += 1
+    state.imu_stamp_ns = stamp_ns
 
 
 @compiled
@@ -145,8 +145,7 @@ def step(state: State, constants: Constants, inputs: ins.Inputs, out: ins.Output
         if not (math.isfinite(inputs.angular_velocity[n]) and math.isfinite(inputs.linear_acceleration[n])):
             out.status = ins.Status.BAD_IMU
     if out.status == ins.Status.OK:
-        if state.measured - state.released == LATENCY_RING_SIZE:
-            state.released += 1
+        if ring.full(state):
             out.status = ins.Status.BUFFER_FULL
         measure_aid(constants, state, inputs.stamp_ns, normals)
         if not integrate(constants, state, inputs.stamp_ns, inputs.angular_velocity, inputs.linear_acceleration):

@@ -23,6 +23,7 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
+from pedestal_common.stream import ring
 from ship_motion_sim import earth, imu
 from ship_motion_sim.params import InsParameters
 from ship_motion_sim.sea import motion
@@ -58,9 +59,9 @@ class Constants(Record):
 
 class LatencyRing(Record):
     """Ring of the samples whose latency has not passed."""
-    measured: int           # numbers of samples in and out; n has the index n % LATENCY_RING_SIZE
+    written: int            # numbers of samples in and out, see pedestal_common.stream.ring
     released: int
-    stamp_ns: Annotated[Ints, (LATENCY_RING_SIZE,)]
+    ring_stamp_ns: Annotated[Ints, (LATENCY_RING_SIZE,)]
     quaternion: Annotated[Floats, (LATENCY_RING_SIZE, 4)]
     angular_velocity: Annotated[Floats, (LATENCY_RING_SIZE, 3)]     # [rad/s]
     linear_acceleration: Annotated[Floats, (LATENCY_RING_SIZE, 3)]  # [m/s2]
@@ -162,7 +163,7 @@ def disagrees(truth: motion.Truth, constants: Constants, measured: Vector3) -> b
 @compiled
 def measure(constants: Constants, state: State, stamp_ns: Nanoseconds, force: Vector3, normals: Floats) -> None:
     """Put attitude and rate at stamp_ns, with errors, and the specific force of the IMU [m/s2] into the ring."""
-    n, truth = state.measured % LATENCY_RING_SIZE, state.truth
+    n, truth = ring.put(state, stamp_ns), state.truth
     roll = truth.roll + constants.bias[0] + state.wander[0] + constants.noise[0] * normals[3]
     pitch = truth.pitch + constants.bias[1] + state.wander[1] + constants.noise[1] * normals[4]
     yaw = truth.yaw + constants.bias[2] + state.wander[2] + constants.noise[2] * normals[5]
@@ -173,31 +174,25 @@ def measure(constants: Constants, state: State, stamp_ns: Nanoseconds, force: Ve
         state.linear_acceleration[n, i] = force[i]
         state.variance[n, i] = constants.variance[i]
     state.stage[n] = NO_STAGE
-    state.stamp_ns[n] = stamp_ns
-    state.measured += 1
 
 
 @compiled
-def release(constants: LateIns, ring: LatencyRing, now_ns: Nanoseconds, out: Outputs) -> None:
+def release(constants: LateIns, samples: LatencyRing, now_ns: Nanoseconds, out: Outputs) -> None:
     """Put the newest sample whose age at now_ns has reached the latency into the outputs `out`.
 
     out.due is 0 if no sample has reached the latency since the last step.
     """
-    out.due = 0
-    while (ring.released < ring.measured
-           and ring.stamp_ns[ring.released % LATENCY_RING_SIZE] <= now_ns - constants.latency_ns):
-        ring.released += 1
-        out.due = 1
+    n = ring.release(samples, now_ns - constants.latency_ns)
+    out.due = 0 if n == ring.NONE_DUE else 1
     if out.due == 1:
-        n = (ring.released - 1) % LATENCY_RING_SIZE
-        out.stamp_ns = ring.stamp_ns[n]
+        out.stamp_ns = samples.ring_stamp_ns[n]
         for i in range(4):
-            out.quaternion[i] = ring.quaternion[n, i]
+            out.quaternion[i] = samples.quaternion[n, i]
         for i in range(3):
-            out.angular_velocity[i] = ring.angular_velocity[n, i]
-            out.linear_acceleration[i] = ring.linear_acceleration[n, i]
-            out.variance[i] = ring.variance[n, i]
-        out.stage = ring.stage[n]
+            out.angular_velocity[i] = samples.angular_velocity[n, i]
+            out.linear_acceleration[i] = samples.linear_acceleration[n, i]
+            out.variance[i] = samples.variance[n, i]
+        out.stage = samples.stage[n]
 
 
 @compiled
@@ -219,8 +214,7 @@ def step(state: State, constants: Constants, inputs: Inputs, out: Outputs, norma
     if out.status == Status.OK:
         if disagrees(state.truth, constants, inputs.angular_velocity):
             out.status = Status.IMU_DISAGREES
-        if state.measured - state.released == LATENCY_RING_SIZE:
-            state.released += 1
+        if ring.full(state):
             out.status = Status.BUFFER_FULL
         measure(constants, state, inputs.stamp_ns, inputs.linear_acceleration, normals)
     for n in range(3):
