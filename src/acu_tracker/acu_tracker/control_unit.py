@@ -11,7 +11,8 @@ import numpy as np
 
 from acu_tracker import measurements, modes, signals, tracking
 from acu_tracker.alarms import annunciator, conditions
-from acu_tracker.estimation import divergence, tracker
+from acu_tracker.estimation import monitors, receiver_error, target
+from acu_tracker.estimation.filters import target_filter
 from acu_tracker.geometry import attitude, direction, encoders
 from acu_tracker.guidance import guidance
 from acu_tracker.lookahead import levelled_deck, planner
@@ -60,7 +61,7 @@ class Constants(Record):
     axis: BothAxes[AxisConstants]
     # t_m - t_k; t_m: middle of the interval in which the command of the step at t_k is in force
     lead: Seconds
-    tracker: tracker.Constants
+    target: target.Constants
     lookahead: planner.Constants
     floor: floor.Floor
 
@@ -82,7 +83,7 @@ def constants(params: AcuParameters) -> Records:
     made['axis'] = np.concatenate([axis_constants(position_loop.slowed(axis, params.command_delay), params.period,
                                                   params.reaction) for axis in axes])
     made['floor'] = floor.table(params.floor)
-    made['tracker'] = tracker.constants(params.tracker, [axis.filter for axis in axes])
+    made['target'] = target.constants(params.tracker, [axis.filter for axis in axes])
     made['lookahead'] = planner.constants(params)
     return made
 
@@ -145,7 +146,7 @@ def reset(state: State) -> int:
         return cause
     uncommanded_motion.release(state.unasked)
     frozen.release(state.frozen, t)
-    divergence.release(state.tracking.divergence)
+    monitors.release_divergence(state.tracking.divergence)
     if supervision.reset(alarms, t) or fault:
         mode_change.set_pending(state.mode, modes.NO_REQUEST)
         resumption.cancel(state.resumption)
@@ -198,7 +199,8 @@ def _observe(state: State, constants: Constants, inputs: Inputs, outputs: Output
     """
     way = bridge.way(state.guidance.bridge, program)
     model.step(state.tracking.pointing, state.stamp)
-    tracker.transfer(state.tracking.target.tracker, constants.tracker)
+    estimate = state.tracking.target
+    target_filter.transfer(estimate.filter, constants.target.filter, estimate.running)
     flags = signals.Flag.STEP_GAP if silence else 0
     flags |= measurements.take_encoders(state.tracking.encoders, inputs) | _take_attitude(state, constants, inputs)
     flags |= _take_receiver(state, constants, inputs, outputs, way)
@@ -208,7 +210,7 @@ def _observe(state: State, constants: Constants, inputs: Inputs, outputs: Output
     if int(constants.axis[0].p.controller) != position_loop.CONTROLLER_BEAM:
         frozen.watch(state.frozen, inputs, constants.p.step_gap + constants.p.command_delay, silence)
     if signal_level_modes.advance(state.guidance.acquisition, state.mode.now, constants, inputs, way):
-        divergence.latch(state.tracking.divergence)
+        monitors.latch_divergence(state.tracking.divergence)
     return flags
 
 
@@ -230,14 +232,15 @@ def _take_receiver(state: State, constants: Constants, inputs: Inputs, outputs: 
     """Take the error of the receiver of this step. Return flags if it is not accepted, else 0."""
     mode = state.mode.now
     offset = guidance.pointing_offset(state.guidance, inputs.error_stamp - constants.p.tracker.receiver.age)
-    flags, used, at = tracking.used_error(state.tracking, constants, inputs, modes.USES_SIGNAL_LEVEL[mode], offset)
+    flags, used, at = receiver_error.used_error(state.tracking, constants, inputs, modes.USES_SIGNAL_LEVEL[mode],
+                                                offset)
     if not used:
         return flags
     if mode == Mode.ACQUIRE:
         guidance.check_slope(state.guidance, state.tracking, constants, inputs, at, way)
     restart_gap = math.inf if _outage(state, constants).permitted else constants.p.tracker.restart_gap
     judged = not guidance.held(state.guidance, constants, state.stamp)
-    return tracking.take_error(state.tracking, constants, inputs, outputs, at, restart_gap,
+    return receiver_error.take_error(state.tracking, constants, inputs, outputs, at, restart_gap,
                                mode == Mode.AUTOTRACK and judged,
                                supervision.axes_follow_commands(state.supervision) and judged)
 
@@ -245,7 +248,7 @@ def _take_receiver(state: State, constants: Constants, inputs: Inputs, outputs: 
 @compiled
 def _outage(state: State, constants: Constants) -> outage.Outage:
     """Return the outage of the receiver at the stamp of the step."""
-    return outage.now(state.outage, state.tracking.target.tracker.stamp, state.stamp, constants.p)
+    return outage.now(state.outage, state.tracking.target.stamp, state.stamp, constants.p)
 
 
 @compiled
@@ -265,13 +268,13 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
     now, flags = _situation(state, constants, inputs, all_tables, request, no_signal)
     # A divergence, or a slope of the wrong sign, is latched.
     if now.conditions.slope != Reason.NONE:
-        divergence.latch(state.tracking.divergence)
+        monitors.latch_divergence(state.tracking.divergence)
     outputs.locked = now.conditions.lock == Reason.NONE
     result = mode_change.change(state.mode, now, request)
     mode = state.mode.now
     if result == modes.REQUEST_ACCEPTED and modes.FOLLOWS_TABLE[mode]:
         # After this, autotrack needs lock_count new measurements to begin.
-        tracker.reset_accepted_count(state.tracking.target.tracker)
+        target.reset_accepted_count(state.tracking.target)
     if state.mode.table != table:
         bridge.clear(state.guidance.bridge)
     if mode != before:
@@ -282,7 +285,7 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
                                    tables.of_mode(all_tables, state.mode.table), state.stamp)
             guidance.begin_by_level(state.guidance, state.tracking, constants, before, mode, state.stamp)
         if before == Mode.AUTOTRACK and now.conditions.track != Reason.NONE:
-            tracker.stop(state.tracking.target.tracker)
+            target.stop(state.tracking.target)
         tracking.restart(state.tracking)
     return result, flags
 
@@ -304,7 +307,7 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
         track = Reason.SIDE_LOBE
     # The fallback AUTOTRACK means coasting. Because a filter without an estimate cannot coast, the fallback is then
     # the program.
-    possible = state.mode.fallback != Mode.AUTOTRACK or state.tracking.target.tracker.running
+    possible = state.mode.fallback != Mode.AUTOTRACK or state.tracking.target.running
     chosen = state.mode.fallback if possible else Mode.PROGRAM
     falls_back = mode == Mode.SEARCH or (mode == Mode.AUTOTRACK and track != Reason.NONE)
     wanted = request, mode, state.mode.table if falls_back else mode, chosen if falls_back else mode
@@ -395,8 +398,8 @@ def _note_outage_reason(state: State, constants: Constants) -> bool:
 
     The target may be hidden, the beam may slew through the keyhole, or the azimuth may turn at a limit of its travel.
     """
-    follows, target = modes.FOLLOWS_TARGET[state.mode.now], state.guidance.direction
-    hidden = follows and blockage.blocked(constants.lookahead.sectors, target[0], target[1])
+    follows, aim = modes.FOLLOWS_TARGET[state.mode.now], state.guidance.direction
+    hidden = follows and blockage.blocked(constants.lookahead.sectors, aim[0], aim[1])
     turning = state.guidance.turn.under_way and supervision.axes_follow_commands(state.supervision)
     slewing = follows and planner.slewing(state.guidance.lookahead, state.stamp)
     reason = outage.watch(state.outage, hidden, slewing, follows and turning, state.stamp)

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acu_tracker import control_unit, measurements, modes, signals
+from acu_tracker import control_unit, modes, signals
 from acu_tracker.alarms import annunciator, report, table
+from acu_tracker.estimation import receiver_error
 from acu_tracker.geometry import direction
 from acu_tracker.mode import mode_change
 from acu_tracker.modes import Mode, Reason
@@ -151,7 +152,7 @@ def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecor
     """Run one step; the arguments are those of the law of a unit (pedestal_common.node.unit.Unit)."""
     record = memory.record[0]
     decode(record.inputs, stamp, inputs)
-    measurements.correct_error(record.constants.p.tracker.matrix, record.inputs)
+    receiver_error.correct_error(record.constants.p.tracker.matrix, record.inputs)
     control_unit.step(record.state, record.constants, record.inputs, record.outputs, memory.tables)
     record.inputs.preset_valid = 0
     record.invalid |= record.outputs.invalid_input

@@ -1,7 +1,7 @@
 """Statistics of the error of the measured attitude: noise and slow random walk of tilt and heading.
 
-The INS may publish these statistics on ins/error; otherwise parameters define the statistics. `estimation.target` adds
-the noise to the variance of each measured direction. Tilt stands for roll and for pitch.
+The INS may publish these statistics on ins/error; otherwise parameters define the statistics. `receiver_error`
+adds the noise to the variance of each measured direction. Tilt stands for roll and for pitch.
 """
 
 from typing import TYPE_CHECKING

@@ -172,7 +172,7 @@ def _source(guidance: Guidance, tracking: Tracking, constants: 'Constants', mode
         return signal_level_modes.source(guidance.acquisition, mode, constants, way, t)
     if way.valid and gap.coasting and gap.permitted and program_track.status(way.program, t) == Reason.NONE:
         return target.Source(0, bridge.motion_at(way, t))
-    return target.outlook(tracking.target, constants.tracker, t)
+    return target.Source(1, target.outlook(tracking.target, constants.target, t))
 
 
 @compiled

@@ -81,7 +81,7 @@ class Filter(Record):
     past: Annotated[Floats, (BANK_SIZE, 5)]
     weights: Annotated[Floats, (BANK_SIZE,)]    # scratch
     # variance per second [rad2/s] that each prediction adds to the variance of the angle, for the random walk of the
-    # attitude error (estimation/target.py)
+    # attitude error (estimation/receiver_error.py)
     drift_variance_rate: float
 
 
