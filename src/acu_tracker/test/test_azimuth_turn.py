@@ -132,7 +132,7 @@ def test_an_error_belongs_to_a_turn_by_its_own_time(turn):
 def test_the_announcement_says_what_the_azimuth_will_do(limits, said):
     unit = Acu(build(AcuParameters, {**limits}), ())
     times = np.arange(20.0)
-    unit._append(times, np.column_stack((4.0 + 0.4 * times, np.full(20, 0.7))))
+    unit.followed.append(unit.parts, times, np.column_stack((4.0 + 0.4 * times, np.full(20, 0.7))))
     unit.inputs['joint_states']['position'][0] = 4.0, 0.7
     unit.inputs['joint_states']['stamp'] = 0
     unit.step(np.zeros(1, np.int64), unit.inputs, unit.outputs)
