@@ -13,16 +13,16 @@ from acu_tracker import measurements, modes, signals, tracking
 from acu_tracker.alarms import annunciator, conditions
 from acu_tracker.estimation import monitors, receiver_error, target
 from acu_tracker.estimation.filters import target_filter
-from acu_tracker.geometry import attitude, direction, encoders
+from acu_tracker.geometry import attitude, direction, history
 from acu_tracker.guidance import guidance
 from acu_tracker.lookahead import levelled_deck, planner
-from acu_tracker.mode import mode_change, outage, reachability, resumption, signal_level_modes, stow, supervision
+from acu_tracker.mode import interruptions, mode_change, reachability, signal_level_modes, stow
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.params import AcuParameters, AxisParameters, SharedParameters
 from acu_tracker.pointing import model
 from acu_tracker.program import bridge, tables
 from acu_tracker.program.program_track import ProgramTrack
-from acu_tracker.servo import axes, ends, floor, frozen, notch, position_loop, uncommanded_motion
+from acu_tracker.servo import axes, controllers, drive_watch, ends, floor, position_loop
 from acu_tracker.servo.position_loop import Instants
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled, separate
@@ -36,14 +36,14 @@ class State(Record):
     """State of the control unit. Each part is written by its own module."""
     stamp: Seconds  # t_k of the last step
     mode: mode_change.ModeState
-    resumption: resumption.Resumption
+    resumption: interruptions.Resumption
     stow: stow.Stow
     tracking: tracking.Tracking
-    outage: outage.OutageRecord
+    outage: interruptions.OutageRecord
     guidance: guidance.Guidance
     axis: BothAxes[position_loop.AxisLoop]
-    unasked: uncommanded_motion.Envelope
-    frozen: frozen.Frozen
+    unasked: drive_watch.Envelope
+    frozen: drive_watch.Frozen
     supervision: conditions.Supervision
 
 
@@ -68,9 +68,9 @@ class Constants(Record):
 
 def axis_constants(params: AxisParameters, period: Seconds, reaction: Seconds) -> Records:
     """Return the constants (1,) of an axis; period: of the steps; reaction: AcuParameters.reaction."""
-    made, notch_params = AxisConstants.zeros(), params.notch
+    made, notch = AxisConstants.zeros(), params.notch
     made['p'] = record(params, AxisParameters)
-    made['notch'] = notch.coefficients(notch_params.frequency, notch_params.width, notch_params.depth, period)
+    made['notch'] = controllers.notch_coefficients(notch.frequency, notch.width, notch.depth, period)
     made['reaction'], made['braking'] = reaction, params.limits.deceleration
     return made
 
@@ -98,16 +98,18 @@ def initial_state(params: AcuParameters) -> Records:
     mode_change.initialise(state['mode'], params)
     guidance.initialise(state['guidance'], (params.azimuth.preset, params.elevation.preset))
     tracking.initialise(state['tracking'], params.pointing)
-    for name, module in (('resumption', resumption), ('stow', stow), ('outage', outage),
-                         ('unasked', uncommanded_motion), ('supervision', conditions)):
-        module.initialise(state[name])
+    interruptions.initialise_resumption(state['resumption'])
+    interruptions.initialise_outage(state['outage'])
+    stow.initialise(state['stow'])
+    drive_watch.initialise(state['unasked'])
+    conditions.initialise(state['supervision'])
     return state
 
 
 @compiled
 def latched(state: State) -> int:
     """Return the bits of the alarms of the latched faults, which wait for a reset."""
-    return supervision.latched(state.unasked.moves, state.frozen.frozen, state.tracking.divergence.diverged)
+    return interruptions.latched(state.unasked.moves, state.frozen.frozen, state.tracking.divergence.diverged)
 
 
 @compiled
@@ -139,17 +141,17 @@ def reset(state: State) -> int:
     changed. A reset also discards a mode that waits to be entered, so that nothing moves until a mode is commanded.
     """
     alarms, t, fault = state.supervision.alarms, state.stamp, latched(state) != 0
-    if state.unasked.moves and uncommanded_motion.beyond(state.unasked, t):
-        return supervision.UNCOMMANDED_MOTION_ALARM
-    cause = annunciator.persisting_alarm(alarms, supervision.LATCHED_FAULT_BITS)
+    if state.unasked.moves and drive_watch.motion_beyond(state.unasked, t):
+        return interruptions.UNCOMMANDED_MOTION_ALARM
+    cause = annunciator.persisting_alarm(alarms, interruptions.LATCHED_FAULT_BITS)
     if cause != annunciator.NO_ALARM:
         return cause
-    uncommanded_motion.release(state.unasked)
-    frozen.release(state.frozen, t)
+    drive_watch.release_motion(state.unasked)
+    drive_watch.release_frozen(state.frozen, t)
     monitors.release_divergence(state.tracking.divergence)
-    if supervision.reset(alarms, t) or fault:
+    if interruptions.reset_latched(alarms, t) or fault:
         mode_change.set_pending(state.mode, modes.NO_REQUEST)
-        resumption.cancel(state.resumption)
+        interruptions.cancel_resumption(state.resumption)
     return annunciator.NO_ALARM
 
 
@@ -169,7 +171,7 @@ def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, a
     silence = constants.p.step_gap < dt < math.inf
     if silence and state.mode.now != Mode.STANDBY:
         # The axes have stopped. After a short silence the mode continues from their actual angles.
-        mode_change.continue_in(state.mode, resumption.mode_after(state.resumption, state.mode.now, state.stamp,
+        mode_change.continue_in(state.mode, interruptions.mode_after(state.resumption, state.mode.now, state.stamp,
                                                                   inputs.stamp, constants.p.resume_time))
     state.stamp = inputs.stamp
     flags = _observe(state, constants, inputs, outputs, tables.of_mode(all_tables, state.mode.table), silence)
@@ -178,7 +180,7 @@ def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, a
     waiting = state.mode.pending if state.mode.now == Mode.STANDBY else modes.NO_REQUEST
     _, of_tables = _change(state, constants, inputs, outputs, all_tables, waiting, no_signal)
     _wait(state, constants, inputs, outputs)
-    if encoders.taken(state.tracking.encoders, state.stamp):
+    if history.encoders_taken(state.tracking.encoders, state.stamp):
         _start_from_actual(state, constants, inputs, rested, silence)
     # The table that was followed last: the program track, or the predicted track of satellite or sun.
     program = tables.of_mode(all_tables, state.mode.table)
@@ -205,10 +207,10 @@ def _observe(state: State, constants: Constants, inputs: Inputs, outputs: Output
     flags |= measurements.take_encoders(state.tracking.encoders, inputs) | _take_attitude(state, constants, inputs)
     flags |= _take_receiver(state, constants, inputs, outputs, way)
     flags |= measurements.take_preset(state.guidance.preset, inputs)
-    uncommanded_motion.watch(state.unasked, state.stamp, inputs.velocity, constants.p.unasked_rate,
+    drive_watch.watch_motion(state.unasked, state.stamp, inputs.velocity, constants.p.unasked_rate,
                              silence or not inputs.drive_ready)
     if int(constants.axis[0].p.controller) != position_loop.CONTROLLER_BEAM:
-        frozen.watch(state.frozen, inputs, constants.p.step_gap + constants.p.command_delay, silence)
+        drive_watch.watch_frozen(state.frozen, inputs, constants.p.step_gap + constants.p.command_delay, silence)
     if signal_level_modes.advance(state.guidance.acquisition, state.mode.now, constants, inputs, way):
         monitors.latch_divergence(state.tracking.divergence)
     return flags
@@ -242,13 +244,13 @@ def _take_receiver(state: State, constants: Constants, inputs: Inputs, outputs: 
     judged = not guidance.held(state.guidance, constants, state.stamp)
     return receiver_error.take_error(state.tracking, constants, inputs, outputs, at, restart_gap,
                                mode == Mode.AUTOTRACK and judged,
-                               supervision.axes_follow_commands(state.supervision) and judged)
+                               interruptions.axes_follow_commands(state.supervision) and judged)
 
 
 @compiled
-def _outage(state: State, constants: Constants) -> outage.Outage:
+def _outage(state: State, constants: Constants) -> interruptions.Outage:
     """Return the outage of the receiver at the stamp of the step."""
-    return outage.now(state.outage, state.tracking.target.stamp, state.stamp, constants.p)
+    return interruptions.outage_now(state.outage, state.tracking.target.stamp, state.stamp, constants.p)
 
 
 @compiled
@@ -259,7 +261,7 @@ def _rests(state: State, constants: Constants, inputs: Inputs) -> bool:
 
 @separate
 def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, all_tables: tables.Tables,
-            request: int, no_signal: outage.Outage) -> tuple[int, int]:
+            request: int, no_signal: interruptions.Outage) -> tuple[int, int]:
     """Select the mode at the stamp of the step, and carry out the consequences of a change of mode.
 
     request: a mode or NO_REQUEST. Return (result of the request, flags of bad tables).
@@ -292,7 +294,7 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
 
 @separate
 def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: tables.Tables, request: int,
-               no_signal: outage.Outage) -> tuple[modes.Situation, int]:
+               no_signal: interruptions.Outage) -> tuple[modes.Situation, int]:
     """Return (Situation at the stamp of the step, flags of bad tables).
 
     To save time, a table is evaluated only if its mode can matter in this step. `wanted` holds these modes: the
@@ -301,7 +303,7 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
     mode, azimuth, t = state.mode.now, state.guidance.azimuth, state.stamp
     unstable = tracking.unstable(state.tracking, constants, inputs, t)
     pins = stow.obstacle(state.stow, constants.p.stow_pins, inputs.pins)
-    closed = mode == Mode.AUTOTRACK and supervision.axes_follow_commands(state.supervision)
+    closed = mode == Mode.AUTOTRACK and interruptions.axes_follow_commands(state.supervision)
     lock, slope, track = tracking.conditions(state.tracking, constants, t, no_signal, closed)
     if track == Reason.NONE and signal_level_modes.in_side_lobe(state.guidance.acquisition, constants, t):
         track = Reason.SIDE_LOBE
@@ -332,9 +334,10 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
         program=program, tle=tle, sun=sun, lock=lock, slope=slope, track=track,
         level=signal_level_modes.end(state.guidance.acquisition, mode, constants, t))
     return modes.Situation(
-        encoder_valid=encoders.taken(state.tracking.encoders, t), attitude=unstable, pins=pins,
+        encoder_valid=history.encoders_taken(state.tracking.encoders, t), attitude=unstable, pins=pins,
         table=state.mode.table, chosen=chosen,
-        drive=supervision.drive_refusal(inputs.drive_ready, state.unasked.moves, state.frozen.frozen), conditions=why,
+        drive=interruptions.drive_refusal(inputs.drive_ready, state.unasked.moves, state.frozen.frozen),
+        conditions=why,
         handover=(signal_level_modes.found(state.guidance.acquisition, mode, constants)
                   if modes.USES_SIGNAL_LEVEL[mode] else constants.p.tracker.handover != 0)), flags
 
@@ -344,10 +347,10 @@ def _wait(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) 
     """Advance the stow pins. When the drive is ready again, resume the mode that the drive interrupted."""
     if constants.p.stow_pins and stow.step(state.stow, constants, inputs, state.mode.now):
         mode_change.mark_stowed(state.mode)
-    if resumption.is_pending(state.resumption):
+    if interruptions.resumption_pending(state.resumption):
         ended = state.mode.now == Mode.STANDBY and state.mode.reason == Reason.DRIVE_NOT_READY
-        mode_change.set_pending(state.mode, resumption.pending(state.resumption, state.stamp, ended, outputs.locked,
-                                                               state.mode.pending))
+        mode_change.set_pending(state.mode, interruptions.pending_mode(state.resumption, state.stamp, ended,
+                                                                       outputs.locked, state.mode.pending))
 
 
 @compiled
@@ -362,7 +365,7 @@ def _start_from_actual(state: State, constants: Constants, inputs: Inputs, reste
 
 @compiled
 def _move(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, program: ProgramTrack,
-          no_signal: outage.Outage, rested: bool, dt: Seconds) -> None:
+          no_signal: interruptions.Outage, rested: bool, dt: Seconds) -> None:
     """Move the axes, or let the axes rest; dt: duration of the motion."""
     mode, t = state.mode.now, state.stamp
     actual = axes.now(state.axis)
@@ -387,9 +390,9 @@ def _move(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, 
             guidance.bridge_to(state.guidance, state.tracking, constants, program, t)
         outputs.blocked, outputs.coasting = state.outage.blocked, mode == Mode.AUTOTRACK and no_signal.coasting
     for i in range(2):
-        uncommanded_motion.command(state.unasked, i, outputs.rate[i], t, min(dt, constants.p.period),
+        drive_watch.command_motion(state.unasked, i, outputs.rate[i], t, min(dt, constants.p.period),
                                    constants.p.step_gap + constants.p.command_delay)
-        frozen.command(state.frozen, i, outputs.rate[i], constants.p.period)
+        drive_watch.command_frozen(state.frozen, i, outputs.rate[i], constants.p.period)
 
 
 @compiled
@@ -400,9 +403,9 @@ def _note_outage_reason(state: State, constants: Constants) -> bool:
     """
     follows, aim = modes.FOLLOWS_TARGET[state.mode.now], state.guidance.direction
     hidden = follows and blockage.blocked(constants.lookahead.sectors, aim[0], aim[1])
-    turning = state.guidance.turn.under_way and supervision.axes_follow_commands(state.supervision)
+    turning = state.guidance.turn.under_way and interruptions.axes_follow_commands(state.supervision)
     slewing = follows and planner.slewing(state.guidance.lookahead, state.stamp)
-    reason = outage.watch(state.outage, hidden, slewing, follows and turning, state.stamp)
+    reason = interruptions.explain_outage(state.outage, hidden, slewing, follows and turning, state.stamp)
     mode_change.set_outage_reason(state.mode, reason)
     return reason != Reason.NONE
 

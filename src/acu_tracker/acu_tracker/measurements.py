@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 from acu_tracker import signals
-from acu_tracker.geometry import attitude, attitude_error, direction, encoders
+from acu_tracker.geometry import attitude, direction, history
 from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 @compiled
-def take_encoders(history: encoders.Encoders, inputs: Inputs) -> int:
+def take_encoders(encoders: history.Encoders, inputs: Inputs) -> int:
     """Take the encoder angles of this step. Return signals.Flag.ENCODER if they are invalid, else 0."""
-    taken = inputs.encoder_valid and encoders.take(history, inputs.stamp, inputs.position, inputs.velocity)
+    taken = inputs.encoder_valid and history.take_encoders(encoders, inputs.stamp, inputs.position, inputs.velocity)
     return 0 if taken else signals.Flag.ENCODER
 
 
@@ -31,7 +31,8 @@ def take_attitude(deck: attitude.DeckAttitude, params: 'SharedParameters', input
     if not inputs.stabilised:
         return 0, False
     flags = 0
-    if inputs.attitude_error_came and not attitude_error.take(deck.error, inputs.attitude_noise, inputs.attitude_walk):
+    if inputs.attitude_error_came and not attitude.take_statistics(deck.error, inputs.attitude_noise,
+                                                                   inputs.attitude_walk):
         flags = signals.Flag.ATTITUDE_ERROR
     if not inputs.attitude_valid:
         return flags | signals.Flag.ATTITUDE, False

@@ -3,31 +3,31 @@
 `control_unit` and `guidance` call this module. The functions take each error of the receiver, and return the estimate
 of the target and the conditions for autotrack. `gap` is the time without a signal of the receiver.
 """
+import math
 from typing import TYPE_CHECKING
 
 from acu_tracker.estimation import monitors, target
 from acu_tracker.estimation.filters import target_filter
-from acu_tracker.geometry import attitude, deck_reference, encoders
-from acu_tracker.geometry.motion import LineOfSight
-from acu_tracker.geometry.vector import Vector, rotated
+from acu_tracker.geometry import attitude, deck_reference, history
+from acu_tracker.geometry.vector import LineOfSight, Vector, rotated
 from acu_tracker.modes import Reason
 from acu_tracker.pointing import model
 from acu_tracker.pointing.params import PointingParameters
-from acu_tracker.search import coast, place
+from acu_tracker.search import place
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
-from pedestal_common.quantities import Pair, Radians, RadiansPerSecond, Records, Seconds
+from pedestal_common.quantities import Pair, Radians, Radians2, RadiansPerSecond, Records, Seconds
 from pedestal_common.record import Record
 
 if TYPE_CHECKING:
     from acu_tracker.control_unit import Constants
-    from acu_tracker.mode.outage import Outage
+    from acu_tracker.mode.interruptions import Outage
 
 
 class Tracking(Record):
     """State of the tracking."""
-    encoders: encoders.Encoders         # history of the encoder angles
+    encoders: history.Encoders         # history of the encoder angles
     pointing: model.PointingRecord      # pointing model in force, between encoder angles and directions
     attitude: attitude.DeckAttitude     # history of the deck
     target: target.Target               # target filter
@@ -75,7 +75,7 @@ def conditions(tracking: Tracking, constants: 'Constants', t: Seconds, gap: 'Out
     # unexplained: no keyhole, turn or hidden sector explains the outage; lost: autotrack must end.
     p, unexplained, running = constants.p.tracker, not gap.permitted, tracking.target.running
     spread_now = spread(tracking, constants, t) if running and unexplained and gap.coasting else 0.0
-    lost = not running or (unexplained and coast.over(gap.since, p.coast_time, spread_now, p.receiver.beamwidth))
+    lost = not running or (unexplained and coast_over(gap.since, p.coast_time, spread_now, p.receiver.beamwidth))
     if tracking.divergence.diverged or (
             closed and monitors.diverges(tracking.divergence, gap.coasting and unexplained)):
         return Reason.DIVERGED, Reason.DIVERGED, Reason.DIVERGED
@@ -95,7 +95,24 @@ def spread(tracking: Tracking, constants: 'Constants', t: Seconds) -> Radians:
     """Return the standard deviation of the estimate across the line of sight at t."""
     estimate = target.read(tracking.target, constants.p, constants.target, tracking.attitude, t)
     azimuth, elevation = estimate.variances
-    return coast.sigma(azimuth.p11, elevation.p11, estimate.motion.elevation.angle)
+    return sigma_across(azimuth.p11, elevation.p11, estimate.motion.elevation.angle)
+
+
+@compiled
+def sigma_across(azimuth_variance: Radians2, elevation_variance: Radians2, elevation: Radians) -> Radians:
+    """Return the larger of the two standard deviations across the line of sight: cross-elevation and elevation."""
+    c = math.cos(elevation)
+    return math.sqrt(max(azimuth_variance * c * c, elevation_variance))
+
+
+@compiled
+def coast_over(since: Seconds, coast_time: Seconds, sigma: Radians, beamwidth: Radians) -> bool:
+    """Return True if coasting ends: after coast_time, or with a sigma above half a beamwidth.
+
+    since, coast_time: age of the last accepted measurement and its limit; sigma: standard deviation across the line of
+    sight.
+    """
+    return since > coast_time or sigma > 0.5 * beamwidth
 
 
 @compiled
@@ -107,7 +124,7 @@ def sight(tracking: Tracking, constants: 'Constants', t: Seconds) -> LineOfSight
 @compiled
 def beam(tracking: Tracking, constants: 'Constants', t: Seconds) -> tuple[Vector, Vector]:
     """Return (ENU unit vector along the beam at t, rate of the vector: taken as zero)."""
-    _, at = encoders.at(tracking.encoders, t)
+    _, at = history.encoders_at(tracking.encoders, t)
     at = model.to_sky(tracking.pointing.model, at)
     _, deck = attitude.at(tracking.attitude, constants.p, t)
     return rotated(deck.mat, Vector(*pointing.direction(at.A, at.E))), place.ZERO_VECTOR
@@ -126,7 +143,7 @@ def deck_rates(tracking: Tracking, constants: 'Constants', t: Seconds, A: Radian
     if compensated and tracking.attitude.stabilised:
         known, deck = attitude.at(tracking.attitude, constants.p, t)
         if known:
-            at = model.to_sky(tracking.pointing.model, encoders.Pointing(A, E, 0.0, 0.0))
+            at = model.to_sky(tracking.pointing.model, history.Pointing(A, E, 0.0, 0.0))
             return deck_reference.fixed_rates(deck.w, at.A, at.E)
     return 0.0, 0.0
 

@@ -10,8 +10,7 @@ from acu_tracker.estimation.filters.measurement import AxisMeasurement, Measurem
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.geometry import estimate_frame
 from acu_tracker.geometry.deck_reference import ZERO_VECTOR
-from acu_tracker.geometry.motion import AxisMotion, Motion, line_of_sight
-from acu_tracker.geometry.vector import Vector, rotated, rotation
+from acu_tracker.geometry.vector import AxisMotion, Motion, Vector, line_of_sight, rotated, rotation
 from acu_tracker.program import bridge, program_track
 from acu_tracker.program.program_track import ProgramTrack
 

@@ -2,7 +2,7 @@
 
 from acu_tracker import signals
 from acu_tracker.estimation import monitors
-from acu_tracker.geometry.encoders import Pointing
+from acu_tracker.geometry.history import Pointing
 
 
 def test_the_same_numbers_count_once_the_beam_has_moved_and_until_they_change():

@@ -74,7 +74,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from acu_tracker.estimation.filters.measurement import Innovation, Measurement
-from acu_tracker.geometry.encoders import Pointing
+from acu_tracker.geometry.history import Pointing
 from acu_tracker.geometry.vector import Rotation, Vector, dot, rotated
 from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled

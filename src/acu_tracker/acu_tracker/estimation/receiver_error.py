@@ -26,10 +26,10 @@ from acu_tracker.estimation.filters.measurement import (
 )
 from acu_tracker.estimation.params import ErrorMatrixParameters, ReceiverModelParameters, TrackerParameters
 from acu_tracker.estimation.target import Target
-from acu_tracker.geometry import attitude, attitude_error, deck_reference, encoders, estimate_frame, lever_arm
-from acu_tracker.geometry.azimuth_turn import MAX_OFFSET_BEAMWIDTHS
+from acu_tracker.geometry import attitude, deck_reference, estimate_frame, history, lever_arm
+from acu_tracker.geometry.azimuth_wrap import MAX_OFFSET_BEAMWIDTHS
 from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
-from acu_tracker.geometry.encoders import Pointing
+from acu_tracker.geometry.history import Pointing
 from acu_tracker.geometry.vector import Rotation, Vector, rotated, rotation
 from acu_tracker.pointing import model
 from acu_tracker.signals import Inputs, Outputs
@@ -82,7 +82,7 @@ def used_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, by_
 
 
 @compiled
-def _error_at(history: encoders.Encoders, receiver: ReceiverModelParameters, inputs: Inputs, uses_level: bool,
+def _error_at(encoders: history.Encoders, receiver: ReceiverModelParameters, inputs: Inputs, uses_level: bool,
              intended_offset: Radians) -> tuple[int, bool, Pointing]:
     """Return (flags of the receiver's message, True if its error is used, the Pointing of the beam at the error).
 
@@ -95,19 +95,19 @@ def _error_at(history: encoders.Encoders, receiver: ReceiverModelParameters, inp
     (docs/graph.md, Age of the error). The pointing between two steps is interpolated linearly. For an axis of constant
     rate this is exact, whatever the weights of the samples are.
     """
-    wrong = _wrong_level(history, inputs) if uses_level else 0
+    wrong = _wrong_level(encoders, inputs) if uses_level else 0
     if wrong or not inputs.error_valid:
         return wrong, False, UNKNOWN_POINTING
     if not math.isfinite(inputs.cross_elevation + inputs.elevation + inputs.cn0_dbhz):
         return signals.Flag.ERROR, False, UNKNOWN_POINTING
     if intended_offset > MAX_OFFSET_BEAMWIDTHS * receiver.beamwidth:
         return 0, False, UNKNOWN_POINTING
-    known, pointing = encoders.at(history, inputs.error_stamp - receiver.beam_age)
+    known, pointing = history.encoders_at(encoders, inputs.error_stamp - receiver.beam_age)
     return 0 if known else signals.Flag.ERROR_STAMP, known, pointing
 
 
 @compiled
-def _wrong_level(history: encoders.Encoders, inputs: Inputs) -> int:
+def _wrong_level(encoders: history.Encoders, inputs: Inputs) -> int:
     """Return the flag of a message of the receiver with an invalid signal level or stamp, else 0.
 
     The modes that use the signal level use it also while the receiver is not locked.
@@ -116,7 +116,7 @@ def _wrong_level(history: encoders.Encoders, inputs: Inputs) -> int:
         return 0
     if not math.isfinite(inputs.cn0_dbhz):
         return signals.Flag.ERROR
-    known, _ = encoders.at(history, inputs.error_stamp)
+    known, _ = history.encoders_at(encoders, inputs.error_stamp)
     return 0 if known else signals.Flag.ERROR_STAMP
 
 
@@ -171,7 +171,7 @@ def _measure(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, at: P
     walk_cross = walk_elevation = 0.0
     if deck.stabilised:
         verticals = estimate_frame.verticals(state.frame, azimuth, elevation)
-        noise, walk = attitude_error.expected(deck.error, params.attitude)
+        noise, walk = attitude.expected_error(deck.error, params.attitude)
         cross, along = attitude_variances(verticals, *noise)
         R_cross, R_elevation = R_cross + cross, R_elevation + along
         walk_cross, walk_elevation = attitude_variances(verticals, *walk)

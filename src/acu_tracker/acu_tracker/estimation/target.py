@@ -17,8 +17,7 @@ from acu_tracker.estimation.params import FilterParameters, TrackerParameters
 from acu_tracker.geometry import attitude, deck_reference, estimate_frame, lever_arm
 from acu_tracker.geometry.attitude import DeckAttitude
 from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
-from acu_tracker.geometry.motion import LineOfSight, Motion, angles, earth_angles, line_of_sight
-from acu_tracker.geometry.vector import Rotation
+from acu_tracker.geometry.vector import LineOfSight, Motion, Rotation, angles, earth_angles, line_of_sight
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Bit, Ints, Pair, Records, Seconds
 from pedestal_common.record import Record

@@ -15,15 +15,14 @@ import numpy as np
 from acu_tracker import modes
 from acu_tracker import tracking as target_tracking
 from acu_tracker.estimation import target
-from acu_tracker.geometry import attitude, azimuth_turn, azimuth_wrap, direction
+from acu_tracker.geometry import attitude, azimuth_wrap, direction
 from acu_tracker.geometry.azimuth_wrap import Travel
-from acu_tracker.geometry.encoders import Pointing
-from acu_tracker.geometry.motion import AxisMotion, Motion, line_of_sight
-from acu_tracker.geometry.vector import rotation
+from acu_tracker.geometry.history import Pointing
+from acu_tracker.geometry.vector import AxisMotion, Motion, line_of_sight, rotation
 from acu_tracker.guidance import manual
 from acu_tracker.lookahead import planner
 from acu_tracker.mode import signal_level_modes
-from acu_tracker.mode.outage import Outage
+from acu_tracker.mode.interruptions import Outage
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.pointing import model
 from acu_tracker.program import bridge, program_track
@@ -50,7 +49,7 @@ class Guidance(Record):
     bridge: bridge.Bridge           # rotation of the program to the place where the target was last tracked
     acquisition: acquisition.Acquisition    # state of the modes that use the signal level
     lookahead: planner.Planner      # planned slews through keyholes, and predicted hidden sectors
-    turn: azimuth_turn.Turn         # turn of the azimuth to another wrap at a limit of its travel
+    turn: azimuth_wrap.Turn         # turn of the azimuth to another wrap at a limit of its travel
     azimuth: Radians                # azimuth of the last reference, before the shaper
     target_angles: Pair             # encoder angles of the target for that reference [rad]
     direction: Pair                 # deck angles of the target on the sky [rad]
@@ -75,7 +74,7 @@ def initialise(guidance: Records, preset: tuple[Radians, Radians]) -> None:
     manual.initialise(guidance['manual'])
     acquisition.initialise(guidance['acquisition'])
     planner.initialise(guidance['lookahead'])
-    azimuth_turn.initialise(guidance['turn'])
+    azimuth_wrap.initialise_turn(guidance['turn'])
     guidance['held'] = -math.inf
 
 
@@ -190,7 +189,7 @@ def _wrapped(guidance: Guidance, params: 'AxisParameters', order: Order, program
     guidance.azimuth = azimuth_wrap.nearest(azimuth.angle, before, limits.low, limits.high, travel)
     has_motors = int(params.controller) != position_loop.CONTROLLER_BEAM
     if not begins and abs(guidance.azimuth - before) > math.pi and has_motors:
-        azimuth_turn.begin(guidance.turn, t)
+        azimuth_wrap.begin_turn(guidance.turn, t)
         if guidance.overtravel and program_track.status(program, t) == Reason.NONE:
             begins, travel = True, program_track.azimuth_travel(program, t)
     if begins:
@@ -207,10 +206,10 @@ def watch_beam(guidance: Guidance, constants: 'Constants', mode: int, references
     references: shaped references of the axes at t; limited: True if an axis is held at a limit.
     """
     beamwidth, elevation = constants.p.tracker.receiver.beamwidth, guidance.target_angles[1]
-    azimuth_turn.watch(guidance.turn, references.azimuth.angle, (guidance.azimuth, elevation), beamwidth, t)
+    azimuth_wrap.watch_turn(guidance.turn, references.azimuth.angle, (guidance.azimuth, elevation), beamwidth, t)
     if limited and modes.FOLLOWS_TARGET[mode] and math.hypot(
             (guidance.azimuth - references.azimuth.angle) * math.cos(elevation),
-            elevation - references.elevation.angle) > azimuth_turn.MAX_OFFSET_BEAMWIDTHS * beamwidth:
+            elevation - references.elevation.angle) > azimuth_wrap.MAX_OFFSET_BEAMWIDTHS * beamwidth:
         guidance.held = t
 
 
@@ -220,7 +219,7 @@ def pointing_offset(guidance: Guidance, t: Seconds) -> Radians:
 
     During a turn of the azimuth the angle is inf, so that no error is used.
     """
-    return math.inf if azimuth_turn.covers(guidance.turn, t) else guidance.pointing_offset
+    return math.inf if azimuth_wrap.turn_covers(guidance.turn, t) else guidance.pointing_offset
 
 
 @compiled
@@ -284,7 +283,7 @@ def look_ahead(guidance: Guidance, tracking: Tracking, constants: 'Constants', m
         planner.clear_plan(lookahead)
         guidance.overtravel, guidance.pointing_offset = 0, 0.0
         if mode != Mode.SLAVE:
-            azimuth_turn.stop(guidance.turn)
+            azimuth_wrap.stop_turn(guidance.turn)
             guidance.held = -math.inf
         return False
     another = planner.another_program(lookahead, program)

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 
 from acu_tracker import modes
 from acu_tracker.estimation import target
-from acu_tracker.geometry.encoders import Pointing
-from acu_tracker.geometry.motion import Motion
-from acu_tracker.geometry.vector import Vector
+from acu_tracker.geometry.history import Pointing
+from acu_tracker.geometry.vector import Motion, Vector
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.program import bridge, program_track
 from acu_tracker.search import acquisition, level, pattern, place, side_lobe, step_track

@@ -17,7 +17,7 @@ FAULT_TEXTS = {
                     'is known',
     'diverged': "autotrack diverged: the receiver's errors led away from the target; call acu/reset_faults once "
                 'slope, phase and sign of the errors are right'}
-"""Text of each latched fault of mode.supervision, the gravest first."""
+"""Text of each latched fault of mode.interruptions, the gravest first."""
 
 GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was outside the gate and was not used',
                      ('error_noisy',): 'the errors of the receiver are noise and are not used',

@@ -23,7 +23,7 @@ from acu_tracker.estimation.filters.kalman import Gaussian, PreviousAngle, Symme
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasurement, AxisVariances
 from acu_tracker.estimation.filters.motion_models import COLUMN_NAMES
-from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.geometry.vector import AxisMotion
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
     Bit,

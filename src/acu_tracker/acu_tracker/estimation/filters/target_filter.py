@@ -21,8 +21,16 @@ import numpy as np
 from acu_tracker.estimation.filters import axis_filter, unscented
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, Estimate, Innovation, Measurement, with_rate
-from acu_tracker.geometry.motion import AxisMotion, Motion, earth_angles, line_of_sight, turned
-from acu_tracker.geometry.vector import Rotation, Vector, rotated
+from acu_tracker.geometry.vector import (
+    AxisMotion,
+    Motion,
+    Rotation,
+    Vector,
+    earth_angles,
+    line_of_sight,
+    rotated,
+    turned,
+)
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_common.quantities import Bit, BothAxes, Floats, Hertz, Ints, Radians, RadiansPerSecond, Records, Seconds
