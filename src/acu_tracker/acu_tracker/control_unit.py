@@ -16,12 +16,13 @@ from acu_tracker.estimation.filters import target_filter
 from acu_tracker.geometry import attitude, direction, history
 from acu_tracker.guidance import guidance
 from acu_tracker.lookahead import levelled_deck, planner
-from acu_tracker.mode import interruptions, mode_change, reachability, signal_level_modes, stow
+from acu_tracker.mode import interruptions, mode_change, reachability, stow
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.params import AcuParameters, AxisParameters, SharedParameters
 from acu_tracker.pointing import model
 from acu_tracker.program import bridge, tables
 from acu_tracker.program.program_track import ProgramTrack
+from acu_tracker.search import level_modes
 from acu_tracker.servo import axes, controllers, drive_watch, ends, floor, position_loop
 from acu_tracker.servo.position_loop import Instants
 from acu_tracker.signals import Inputs, Outputs
@@ -211,7 +212,7 @@ def _observe(state: State, constants: Constants, inputs: Inputs, outputs: Output
                              silence or not inputs.drive_ready)
     if int(constants.axis[0].p.controller) != position_loop.CONTROLLER_BEAM:
         drive_watch.watch_frozen(state.frozen, inputs, constants.p.step_gap + constants.p.command_delay, silence)
-    if signal_level_modes.advance(state.guidance.acquisition, state.mode.now, constants, inputs, way):
+    if level_modes.advance(state.guidance.acquisition, state.mode.now, constants, inputs, way):
         monitors.latch_divergence(state.tracking.divergence)
     return flags
 
@@ -305,7 +306,7 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
     pins = stow.obstacle(state.stow, constants.p.stow_pins, inputs.pins)
     closed = mode == Mode.AUTOTRACK and interruptions.axes_follow_commands(state.supervision)
     lock, slope, track = tracking.conditions(state.tracking, constants, t, no_signal, closed)
-    if track == Reason.NONE and signal_level_modes.in_side_lobe(state.guidance.acquisition, constants, t):
+    if track == Reason.NONE and level_modes.in_side_lobe(state.guidance.acquisition, constants, t):
         track = Reason.SIDE_LOBE
     # The fallback AUTOTRACK means coasting. Because a filter without an estimate cannot coast, the fallback is then
     # the program.
@@ -332,13 +333,13 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
                                             state.guidance.preset.angle[1]),
         direction=Reason.NONE if direction.valid_at(state.guidance.slave, t) else Reason.NO_DIRECTION,
         program=program, tle=tle, sun=sun, lock=lock, slope=slope, track=track,
-        level=signal_level_modes.end(state.guidance.acquisition, mode, constants, t))
+        level=level_modes.end(state.guidance.acquisition, mode, constants, t))
     return modes.Situation(
         encoder_valid=history.encoders_taken(state.tracking.encoders, t), attitude=unstable, pins=pins,
         table=state.mode.table, chosen=chosen,
         drive=interruptions.drive_refusal(inputs.drive_ready, state.unasked.moves, state.frozen.frozen),
         conditions=why,
-        handover=(signal_level_modes.found(state.guidance.acquisition, mode, constants)
+        handover=(level_modes.found(state.guidance.acquisition, mode, constants)
                   if modes.USES_SIGNAL_LEVEL[mode] else constants.p.tracker.handover != 0)), flags
 
 
