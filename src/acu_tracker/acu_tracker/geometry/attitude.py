@@ -5,19 +5,13 @@ DeckAttitude interpolates or extrapolates the last measurements of the INS to an
 w, dw: angular rate [rad/s] and angular acceleration [rad/s2] of the deck, FLU; T: time between two samples, or
 since the last sample.
 
-AttitudeError
--------------
-Statistics of the error of the measured attitude: noise and slow random walk of tilt and heading.
+AttitudeError: statistics of the error of the measured attitude, which are noise and slow random walk of tilt and
+heading. The INS may publish these statistics on ins/error; otherwise parameters define the statistics.
+`receiver_error` adds the noise to the variance of each measured direction. Tilt stands for roll and for pitch.
 
-The INS may publish these statistics on ins/error; otherwise parameters define the statistics. `receiver_error` adds
-the noise to the variance of each measured direction. Tilt stands for roll and for pitch.
-
-AttitudeJump
-------------
-Correction of jumps in the attitude of the INS: changes that the measured rates of the deck do not explain.
-
-A rotation c keeps the corrected attitude continuous at a jump. Afterwards the angle of c decays slowly to 0, so that
-the corrected attitude returns to the measured one.
+AttitudeJump: correction of jumps in the attitude of the INS, which are changes that the measured rates of the deck do
+not explain. A rotation c keeps the corrected attitude continuous at a jump. Afterwards the angle of c decays slowly to
+0, so that the corrected attitude returns to the measured one.
 
     p_k = b_k-1 (x) exp(w T / 2)    attitude of sample k, predicted by the rate w from b_k-1
     b_k = c (x) q_k                 corrected attitude; q_k: measured by the INS; c = 1 before any jump

@@ -1,14 +1,7 @@
-"""Azimuth wraps: the choice of a wrap, and the turn of the axis to another one.
+"""The azimuth wrap: of the azimuths that point in the same direction, the one to which the axis goes.
 
-Travel
-------
-Choice of the azimuth wrap: of the azimuths that point in the same direction, the one to which the axis goes.
-
-The choice matters for an axis with more than one revolution of travel.
-
-Turn
-----
-The turn of the azimuth axis: at a limit of its travel the axis goes round to another azimuth wrap of its target.
+The choice matters for an axis with more than one revolution of travel. At a limit of its travel the axis turns: it
+goes round to another azimuth wrap of its target.
 
 During the turn the beam is off the target on purpose. Errors of the receiver that belong to this time are not used,
 and the outage of the receiver counts as explained. The turn ends when the reference of the axis is near the azimuth of

@@ -1,12 +1,4 @@
-"""Histories of the last steps, and that of the load encoders.
-
-History
--------
-Stamped samples of the last steps, and their interpolation to an instant; used for the encoders and the attitude.
-
-Encoders
---------
-The angles of the load encoders of both axes in the last steps, interpolated to any instant among these steps.
+"""Stamped samples of the last steps, interpolated to any instant among these steps; and those of the load encoders.
 """
 import math
 from typing import Annotated, NamedTuple

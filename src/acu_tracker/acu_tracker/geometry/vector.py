@@ -1,22 +1,11 @@
-"""Vectors, and the motion of a direction.
+"""Vectors of three components, and the motion of a direction, for compiled functions.
 
-Vector
-------
-Vectors of three components, their products and their rotations, for compiled functions.
+A motion is azimuth and elevation, or a unit vector, with their first and second time derivatives. Azimuth is
+clockwise: from north in the earth frame, from the bow on the deck. FLU on the deck and the axes north, west and up of
+the earth therefore have the same formulas. Because earth vectors are ENU in the other modules, `north_west_up`
+converts them.
 
 M': the transpose of a Rotation M, which is its inverse.
-
-Motion
-------
-The motion of a direction: azimuth and elevation, or a unit vector, with their first and second time derivatives.
-
-Azimuth is clockwise: from north in the earth frame, from the bow on the deck. FLU on the deck and the axes north, west
-and up of the earth therefore have the same formulas. Because earth vectors are ENU in the other modules,
-`north_west_up` converts them.
-
-Great circle
-------------
-A direction that keeps its angular rate, and so moves along a great circle.
 """
 import math
 from typing import NamedTuple

@@ -1,24 +1,14 @@
 """What interrupts a mode: an outage of the receiver, a latched fault, a silence of the drive.
 
-Outage
-------
-Outage of the receiver: the time without an accepted error, and why the signal may be missing.
+Outage: the time without an accepted error of the receiver. A keyhole, a turn of the azimuth or a hidden sector
+explains an outage: autotrack then coasts on.
 
-A keyhole, a turn of the azimuth or a hidden sector explains an outage: autotrack then coasts on.
+Latched faults stay until a reset: uncommanded motion of an axis, a drive that repeats its angles (frozen), and
+divergence of the filter.
 
-Latched faults
---------------
-Latched faults of the control unit, which stay until a reset, and their effect on the modes.
-
-The faults are uncommanded motion of an axis, a drive that repeats its angles (frozen), and divergence of the filter.
-
-Resumption
-----------
-Resumption of the mode that a silence interrupted.
-
-A silence is a time without steps, because the drive or the control unit did not run. After a short silence the mode
-continues. If the drive was restarted during the silence, the mode ends because the drive is not ready. This module
-keeps the mode, and the control unit requests it again when the drive is ready.
+Resumption: a silence is a time without steps, because the drive or the control unit did not run. After a short silence
+the mode continues. If the drive was restarted during the silence, the mode ends because the drive is not ready. This
+module keeps the mode, and the control unit requests it again when the drive is ready.
 """
 import math
 from typing import TYPE_CHECKING, NamedTuple

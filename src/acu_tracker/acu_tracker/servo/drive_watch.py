@@ -1,8 +1,6 @@
-"""The tests of the drive by its commands: a frozen drive, and uncommanded motion.
+"""Detection of a drive that does not do what it is commanded: frozen, or in uncommanded motion.
 
-Frozen
-------
-Detection of a frozen drive: one that repeats its measurements while its axes are commanded to move.
+A frozen drive repeats its measurements while its axes are commanded to move.
 
     dx/dt = u    while every measurement equals that of the step before, else x = 0
 
@@ -12,9 +10,7 @@ Detection of a frozen drive: one that repeats its measurements while its axes ar
 A drive that moves has noise in its currents and steps in its encoders. The measurements are therefore constant only at
 rest. If all measurements repeat while x grows, the motion is not measured, and the position loop is open.
 
-Envelope
---------
-Detection of uncommanded motion: a rate of an axis outside the envelope of its recent rate commands.
+Uncommanded motion is a rate of an axis outside the envelope of its recent rate commands.
 
     h_k = max(u_k, h_k-1 + a (u_k - h_k-1)),    l_k = min(u_k, l_k-1 + a (u_k - l_k-1))
 

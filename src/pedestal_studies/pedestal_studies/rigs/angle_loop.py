@@ -24,7 +24,7 @@ import numpy as np
 from acu_tracker.estimation.filters import axis_filter, constant_gain
 from acu_tracker.estimation.filters.measurement import AxisMeasurement
 from acu_tracker.estimation.params import CaParameters, FilterParameters
-from acu_tracker.geometry import attitude
+from acu_tracker.geometry import attitude as attitudes
 from acu_tracker.servo import beam_loop
 from adu_drive.array import electronic_beam
 from pedestal_common.compiled import compiled
@@ -234,7 +234,7 @@ def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
         # The angle of the target minus the rotation of the carrier is the angle in the earth frame.
         smoothing.put(s, beam[i] + (target.angle[i] - beam[i] + target.noise[i]) - target.attitude[i], 0.0)
         if i > 0 and constants.tau > 0.0:
-            acceleration = attitude.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID_STEP_S,
+            acceleration = attitudes.smoothed_acceleration(acceleration, rate[i], rate[i - 1], GRID_STEP_S,
                                                            constants.tau)
         if (i + 1) % period == 0:
             y = smoothing.smoothed(s, smoothing.SMOOTHING_NONE, period, period)
@@ -252,7 +252,7 @@ def _filter_loop(constants, target, smoothers, filters, plant, beam, errors):
             lead = constants.delay + 0.5 * hold * GRID_STEP_S
             earth = axis_filter.outlook(f, c, (i - last_sample + 0.5 * period) * GRID_STEP_S + lead).angle
             beam_command = (earth + target.attitude[i]
-                            + attitude.rotation_angle(rate[i], acceleration, 0.5 * GRID_STEP_S + lead))
+                            + attitudes.rotation_angle(rate[i], acceleration, 0.5 * GRID_STEP_S + lead))
         command(plant.inputs[0], i, running and i % hold == 0, beam_command)
         electronic_beam.step(plant.state[0], plant.constants[0], plant.inputs[0], plant.outputs[0])
 
