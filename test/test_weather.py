@@ -64,5 +64,5 @@ def test_the_readings_are_recorded_and_recomputed(run):
     recording = recompute.FedRecording(run.bag)
     acu = {key: value for key, value in bag.configuration['parameters']['acu'].items() if not key.startswith('graph.')}
     done = recompute.recompute(recording, 'acu', build(parameters_of('acu'), acu))
-    assert done.unit.air.revision == 1
-    assert done.unit.air.dropped['weather/humidity', 'out of range'] == 2
+    assert done.unit.followed.air.revision == 1
+    assert done.unit.followed.air.dropped['weather/humidity', 'out of range'] == 2

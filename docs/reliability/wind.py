@@ -13,7 +13,7 @@ import sys
 
 import numpy as np
 
-from acu_tracker.servo import uncommanded_motion
+from acu_tracker.servo import drive_watch
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.wire import records
@@ -37,9 +37,9 @@ def loop_of(name, torque, intensity, seed, seconds):
 def watched(t, enabled, rates):
     """Return the largest of rates (n, 2) [rad/s] at t (n,) [s] that lasted as long as the alarm needs while armed."""
     ready = np.maximum.accumulate(np.where(enabled, -np.inf, t))
-    stay = round(uncommanded_motion.MIN_EXCESS_TIME_S / (t[1] - t[0])) + 1
+    stay = round(drive_watch.MIN_EXCESS_TIME_S / (t[1] - t[0])) + 1
     windows = np.lib.stride_tricks.sliding_window_view(np.abs(rates).max(axis=1), stay).min(axis=1)
-    least = uncommanded_motion.RESTART_SETTLING_TIME_S
+    least = drive_watch.RESTART_SETTLING_TIME_S
     settled = (t - ready >= least)[stay - 1:] & (t[stay - 1:] >= least)
     return windows[settled].max()
 

@@ -11,17 +11,19 @@ import numpy as np
 
 from acu_tracker import measurements, modes, signals, tracking
 from acu_tracker.alarms import annunciator, conditions
-from acu_tracker.estimation import divergence, tracker
-from acu_tracker.geometry import attitude, direction, encoders
+from acu_tracker.estimation import monitors, receiver_error, target
+from acu_tracker.estimation.filters import target_filter
+from acu_tracker.geometry import attitude, direction, history
 from acu_tracker.guidance import guidance
 from acu_tracker.lookahead import levelled_deck, planner
-from acu_tracker.mode import mode_change, outage, reachability, resumption, signal_level_modes, stow, supervision
+from acu_tracker.mode import interruptions, mode_change, reachability, stow
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.params import AcuParameters, AxisParameters, SharedParameters
 from acu_tracker.pointing import model
 from acu_tracker.program import bridge, tables
 from acu_tracker.program.program_track import ProgramTrack
-from acu_tracker.servo import axes, ends, floor, frozen, notch, position_loop, uncommanded_motion
+from acu_tracker.search import level_modes
+from acu_tracker.servo import axes, controllers, drive_watch, ends, floor, position_loop
 from acu_tracker.servo.position_loop import Instants
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled, separate
@@ -35,14 +37,14 @@ class State(Record):
     """State of the control unit. Each part is written by its own module."""
     stamp: Seconds  # t_k of the last step
     mode: mode_change.ModeState
-    resumption: resumption.Resumption
+    resumption: interruptions.Resumption
     stow: stow.Stow
     tracking: tracking.Tracking
-    outage: outage.OutageRecord
+    outage: interruptions.OutageRecord
     guidance: guidance.Guidance
     axis: BothAxes[position_loop.AxisLoop]
-    unasked: uncommanded_motion.Envelope
-    frozen: frozen.Frozen
+    unasked: drive_watch.Envelope
+    frozen: drive_watch.Frozen
     supervision: conditions.Supervision
 
 
@@ -60,16 +62,16 @@ class Constants(Record):
     axis: BothAxes[AxisConstants]
     # t_m - t_k; t_m: middle of the interval in which the command of the step at t_k is in force
     lead: Seconds
-    tracker: tracker.Constants
+    target: target.Constants
     lookahead: planner.Constants
     floor: floor.Floor
 
 
 def axis_constants(params: AxisParameters, period: Seconds, reaction: Seconds) -> Records:
     """Return the constants (1,) of an axis; period: of the steps; reaction: AcuParameters.reaction."""
-    made, notch_params = AxisConstants.zeros(), params.notch
+    made, notch = AxisConstants.zeros(), params.notch
     made['p'] = record(params, AxisParameters)
-    made['notch'] = notch.coefficients(notch_params.frequency, notch_params.width, notch_params.depth, period)
+    made['notch'] = controllers.notch_coefficients(notch.frequency, notch.width, notch.depth, period)
     made['reaction'], made['braking'] = reaction, params.limits.deceleration
     return made
 
@@ -82,7 +84,7 @@ def constants(params: AcuParameters) -> Records:
     made['axis'] = np.concatenate([axis_constants(position_loop.slowed(axis, params.command_delay), params.period,
                                                   params.reaction) for axis in axes])
     made['floor'] = floor.table(params.floor)
-    made['tracker'] = tracker.constants(params.tracker, [axis.filter for axis in axes])
+    made['target'] = target.constants(params.tracker, [axis.filter for axis in axes])
     made['lookahead'] = planner.constants(params)
     return made
 
@@ -97,16 +99,18 @@ def initial_state(params: AcuParameters) -> Records:
     mode_change.initialise(state['mode'], params)
     guidance.initialise(state['guidance'], (params.azimuth.preset, params.elevation.preset))
     tracking.initialise(state['tracking'], params.pointing)
-    for name, module in (('resumption', resumption), ('stow', stow), ('outage', outage),
-                         ('unasked', uncommanded_motion), ('supervision', conditions)):
-        module.initialise(state[name])
+    interruptions.initialise_resumption(state['resumption'])
+    interruptions.initialise_outage(state['outage'])
+    stow.initialise(state['stow'])
+    drive_watch.initialise(state['unasked'])
+    conditions.initialise(state['supervision'])
     return state
 
 
 @compiled
 def latched(state: State) -> int:
     """Return the bits of the alarms of the latched faults, which wait for a reset."""
-    return supervision.latched(state.unasked.moves, state.frozen.frozen, state.tracking.divergence.diverged)
+    return interruptions.latched(state.unasked.moves, state.frozen.frozen, state.tracking.divergence.diverged)
 
 
 @compiled
@@ -138,17 +142,17 @@ def reset(state: State) -> int:
     changed. A reset also discards a mode that waits to be entered, so that nothing moves until a mode is commanded.
     """
     alarms, t, fault = state.supervision.alarms, state.stamp, latched(state) != 0
-    if state.unasked.moves and uncommanded_motion.beyond(state.unasked, t):
-        return supervision.UNCOMMANDED_MOTION_ALARM
-    cause = annunciator.persisting_alarm(alarms, supervision.LATCHED_FAULT_BITS)
+    if state.unasked.moves and drive_watch.motion_beyond(state.unasked, t):
+        return interruptions.UNCOMMANDED_MOTION_ALARM
+    cause = annunciator.persisting_alarm(alarms, interruptions.LATCHED_FAULT_BITS)
     if cause != annunciator.NO_ALARM:
         return cause
-    uncommanded_motion.release(state.unasked)
-    frozen.release(state.frozen, t)
-    divergence.release(state.tracking.divergence)
-    if supervision.reset(alarms, t) or fault:
+    drive_watch.release_motion(state.unasked)
+    drive_watch.release_frozen(state.frozen, t)
+    monitors.release_divergence(state.tracking.divergence)
+    if interruptions.reset_latched(alarms, t) or fault:
         mode_change.set_pending(state.mode, modes.NO_REQUEST)
-        resumption.cancel(state.resumption)
+        interruptions.cancel_resumption(state.resumption)
     return annunciator.NO_ALARM
 
 
@@ -168,7 +172,7 @@ def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, a
     silence = constants.p.step_gap < dt < math.inf
     if silence and state.mode.now != Mode.STANDBY:
         # The axes have stopped. After a short silence the mode continues from their actual angles.
-        mode_change.continue_in(state.mode, resumption.mode_after(state.resumption, state.mode.now, state.stamp,
+        mode_change.continue_in(state.mode, interruptions.mode_after(state.resumption, state.mode.now, state.stamp,
                                                                   inputs.stamp, constants.p.resume_time))
     state.stamp = inputs.stamp
     flags = _observe(state, constants, inputs, outputs, tables.of_mode(all_tables, state.mode.table), silence)
@@ -177,7 +181,7 @@ def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, a
     waiting = state.mode.pending if state.mode.now == Mode.STANDBY else modes.NO_REQUEST
     _, of_tables = _change(state, constants, inputs, outputs, all_tables, waiting, no_signal)
     _wait(state, constants, inputs, outputs)
-    if encoders.taken(state.tracking.encoders, state.stamp):
+    if history.encoders_taken(state.tracking.encoders, state.stamp):
         _start_from_actual(state, constants, inputs, rested, silence)
     # The table that was followed last: the program track, or the predicted track of satellite or sun.
     program = tables.of_mode(all_tables, state.mode.table)
@@ -198,17 +202,18 @@ def _observe(state: State, constants: Constants, inputs: Inputs, outputs: Output
     """
     way = bridge.way(state.guidance.bridge, program)
     model.step(state.tracking.pointing, state.stamp)
-    tracker.transfer(state.tracking.target.tracker, constants.tracker)
+    estimate = state.tracking.target
+    target_filter.transfer(estimate.filter, constants.target.filter, estimate.running)
     flags = signals.Flag.STEP_GAP if silence else 0
     flags |= measurements.take_encoders(state.tracking.encoders, inputs) | _take_attitude(state, constants, inputs)
     flags |= _take_receiver(state, constants, inputs, outputs, way)
     flags |= measurements.take_preset(state.guidance.preset, inputs)
-    uncommanded_motion.watch(state.unasked, state.stamp, inputs.velocity, constants.p.unasked_rate,
+    drive_watch.watch_motion(state.unasked, state.stamp, inputs.velocity, constants.p.unasked_rate,
                              silence or not inputs.drive_ready)
     if int(constants.axis[0].p.controller) != position_loop.CONTROLLER_BEAM:
-        frozen.watch(state.frozen, inputs, constants.p.step_gap + constants.p.command_delay, silence)
-    if signal_level_modes.advance(state.guidance.acquisition, state.mode.now, constants, inputs, way):
-        divergence.latch(state.tracking.divergence)
+        drive_watch.watch_frozen(state.frozen, inputs, constants.p.step_gap + constants.p.command_delay, silence)
+    if level_modes.advance(state.guidance.acquisition, state.mode.now, constants, inputs, way):
+        monitors.latch_divergence(state.tracking.divergence)
     return flags
 
 
@@ -230,22 +235,23 @@ def _take_receiver(state: State, constants: Constants, inputs: Inputs, outputs: 
     """Take the error of the receiver of this step. Return flags if it is not accepted, else 0."""
     mode = state.mode.now
     offset = guidance.pointing_offset(state.guidance, inputs.error_stamp - constants.p.tracker.receiver.age)
-    flags, used, at = tracking.used_error(state.tracking, constants, inputs, modes.USES_SIGNAL_LEVEL[mode], offset)
+    flags, used, at = receiver_error.used_error(state.tracking, constants, inputs, modes.USES_SIGNAL_LEVEL[mode],
+                                                offset)
     if not used:
         return flags
     if mode == Mode.ACQUIRE:
         guidance.check_slope(state.guidance, state.tracking, constants, inputs, at, way)
     restart_gap = math.inf if _outage(state, constants).permitted else constants.p.tracker.restart_gap
     judged = not guidance.held(state.guidance, constants, state.stamp)
-    return tracking.take_error(state.tracking, constants, inputs, outputs, at, restart_gap,
+    return receiver_error.take_error(state.tracking, constants, inputs, outputs, at, restart_gap,
                                mode == Mode.AUTOTRACK and judged,
-                               supervision.axes_follow_commands(state.supervision) and judged)
+                               interruptions.axes_follow_commands(state.supervision) and judged)
 
 
 @compiled
-def _outage(state: State, constants: Constants) -> outage.Outage:
+def _outage(state: State, constants: Constants) -> interruptions.Outage:
     """Return the outage of the receiver at the stamp of the step."""
-    return outage.now(state.outage, state.tracking.target.tracker.stamp, state.stamp, constants.p)
+    return interruptions.outage_now(state.outage, state.tracking.target.stamp, state.stamp, constants.p)
 
 
 @compiled
@@ -256,7 +262,7 @@ def _rests(state: State, constants: Constants, inputs: Inputs) -> bool:
 
 @separate
 def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, all_tables: tables.Tables,
-            request: int, no_signal: outage.Outage) -> tuple[int, int]:
+            request: int, no_signal: interruptions.Outage) -> tuple[int, int]:
     """Select the mode at the stamp of the step, and carry out the consequences of a change of mode.
 
     request: a mode or NO_REQUEST. Return (result of the request, flags of bad tables).
@@ -265,13 +271,13 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
     now, flags = _situation(state, constants, inputs, all_tables, request, no_signal)
     # A divergence, or a slope of the wrong sign, is latched.
     if now.conditions.slope != Reason.NONE:
-        divergence.latch(state.tracking.divergence)
+        monitors.latch_divergence(state.tracking.divergence)
     outputs.locked = now.conditions.lock == Reason.NONE
     result = mode_change.change(state.mode, now, request)
     mode = state.mode.now
     if result == modes.REQUEST_ACCEPTED and modes.FOLLOWS_TABLE[mode]:
         # After this, autotrack needs lock_count new measurements to begin.
-        tracker.reset_accepted_count(state.tracking.target.tracker)
+        target.reset_accepted_count(state.tracking.target)
     if state.mode.table != table:
         bridge.clear(state.guidance.bridge)
     if mode != before:
@@ -282,14 +288,14 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
                                    tables.of_mode(all_tables, state.mode.table), state.stamp)
             guidance.begin_by_level(state.guidance, state.tracking, constants, before, mode, state.stamp)
         if before == Mode.AUTOTRACK and now.conditions.track != Reason.NONE:
-            tracker.stop(state.tracking.target.tracker)
+            target.stop(state.tracking.target)
         tracking.restart(state.tracking)
     return result, flags
 
 
 @separate
 def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: tables.Tables, request: int,
-               no_signal: outage.Outage) -> tuple[modes.Situation, int]:
+               no_signal: interruptions.Outage) -> tuple[modes.Situation, int]:
     """Return (Situation at the stamp of the step, flags of bad tables).
 
     To save time, a table is evaluated only if its mode can matter in this step. `wanted` holds these modes: the
@@ -298,13 +304,13 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
     mode, azimuth, t = state.mode.now, state.guidance.azimuth, state.stamp
     unstable = tracking.unstable(state.tracking, constants, inputs, t)
     pins = stow.obstacle(state.stow, constants.p.stow_pins, inputs.pins)
-    closed = mode == Mode.AUTOTRACK and supervision.axes_follow_commands(state.supervision)
+    closed = mode == Mode.AUTOTRACK and interruptions.axes_follow_commands(state.supervision)
     lock, slope, track = tracking.conditions(state.tracking, constants, t, no_signal, closed)
-    if track == Reason.NONE and signal_level_modes.in_side_lobe(state.guidance.acquisition, constants, t):
+    if track == Reason.NONE and level_modes.in_side_lobe(state.guidance.acquisition, constants, t):
         track = Reason.SIDE_LOBE
     # The fallback AUTOTRACK means coasting. Because a filter without an estimate cannot coast, the fallback is then
     # the program.
-    possible = state.mode.fallback != Mode.AUTOTRACK or state.tracking.target.tracker.running
+    possible = state.mode.fallback != Mode.AUTOTRACK or state.tracking.target.running
     chosen = state.mode.fallback if possible else Mode.PROGRAM
     falls_back = mode == Mode.SEARCH or (mode == Mode.AUTOTRACK and track != Reason.NONE)
     wanted = request, mode, state.mode.table if falls_back else mode, chosen if falls_back else mode
@@ -327,12 +333,13 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
                                             state.guidance.preset.angle[1]),
         direction=Reason.NONE if direction.valid_at(state.guidance.slave, t) else Reason.NO_DIRECTION,
         program=program, tle=tle, sun=sun, lock=lock, slope=slope, track=track,
-        level=signal_level_modes.end(state.guidance.acquisition, mode, constants, t))
+        level=level_modes.end(state.guidance.acquisition, mode, constants, t))
     return modes.Situation(
-        encoder_valid=encoders.taken(state.tracking.encoders, t), attitude=unstable, pins=pins,
+        encoder_valid=history.encoders_taken(state.tracking.encoders, t), attitude=unstable, pins=pins,
         table=state.mode.table, chosen=chosen,
-        drive=supervision.drive_refusal(inputs.drive_ready, state.unasked.moves, state.frozen.frozen), conditions=why,
-        handover=(signal_level_modes.found(state.guidance.acquisition, mode, constants)
+        drive=interruptions.drive_refusal(inputs.drive_ready, state.unasked.moves, state.frozen.frozen),
+        conditions=why,
+        handover=(level_modes.found(state.guidance.acquisition, mode, constants)
                   if modes.USES_SIGNAL_LEVEL[mode] else constants.p.tracker.handover != 0)), flags
 
 
@@ -341,10 +348,10 @@ def _wait(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) 
     """Advance the stow pins. When the drive is ready again, resume the mode that the drive interrupted."""
     if constants.p.stow_pins and stow.step(state.stow, constants, inputs, state.mode.now):
         mode_change.mark_stowed(state.mode)
-    if resumption.is_pending(state.resumption):
+    if interruptions.resumption_pending(state.resumption):
         ended = state.mode.now == Mode.STANDBY and state.mode.reason == Reason.DRIVE_NOT_READY
-        mode_change.set_pending(state.mode, resumption.pending(state.resumption, state.stamp, ended, outputs.locked,
-                                                               state.mode.pending))
+        mode_change.set_pending(state.mode, interruptions.pending_mode(state.resumption, state.stamp, ended,
+                                                                       outputs.locked, state.mode.pending))
 
 
 @compiled
@@ -359,7 +366,7 @@ def _start_from_actual(state: State, constants: Constants, inputs: Inputs, reste
 
 @compiled
 def _move(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, program: ProgramTrack,
-          no_signal: outage.Outage, rested: bool, dt: Seconds) -> None:
+          no_signal: interruptions.Outage, rested: bool, dt: Seconds) -> None:
     """Move the axes, or let the axes rest; dt: duration of the motion."""
     mode, t = state.mode.now, state.stamp
     actual = axes.now(state.axis)
@@ -384,9 +391,9 @@ def _move(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, 
             guidance.bridge_to(state.guidance, state.tracking, constants, program, t)
         outputs.blocked, outputs.coasting = state.outage.blocked, mode == Mode.AUTOTRACK and no_signal.coasting
     for i in range(2):
-        uncommanded_motion.command(state.unasked, i, outputs.rate[i], t, min(dt, constants.p.period),
+        drive_watch.command_motion(state.unasked, i, outputs.rate[i], t, min(dt, constants.p.period),
                                    constants.p.step_gap + constants.p.command_delay)
-        frozen.command(state.frozen, i, outputs.rate[i], constants.p.period)
+        drive_watch.command_frozen(state.frozen, i, outputs.rate[i], constants.p.period)
 
 
 @compiled
@@ -395,11 +402,11 @@ def _note_outage_reason(state: State, constants: Constants) -> bool:
 
     The target may be hidden, the beam may slew through the keyhole, or the azimuth may turn at a limit of its travel.
     """
-    follows, target = modes.FOLLOWS_TARGET[state.mode.now], state.guidance.direction
-    hidden = follows and blockage.blocked(constants.lookahead.sectors, target[0], target[1])
-    turning = state.guidance.turn.under_way and supervision.axes_follow_commands(state.supervision)
+    follows, aim = modes.FOLLOWS_TARGET[state.mode.now], state.guidance.direction
+    hidden = follows and blockage.blocked(constants.lookahead.sectors, aim[0], aim[1])
+    turning = state.guidance.turn.under_way and interruptions.axes_follow_commands(state.supervision)
     slewing = follows and planner.slewing(state.guidance.lookahead, state.stamp)
-    reason = outage.watch(state.outage, hidden, slewing, follows and turning, state.stamp)
+    reason = interruptions.explain_outage(state.outage, hidden, slewing, follows and turning, state.stamp)
     mode_change.set_outage_reason(state.mode, reason)
     return reason != Reason.NONE
 

@@ -9,7 +9,8 @@ from acu_tracker.params import AcuParameters
 from acu_tracker.program import program_track
 from acu_tracker.program.air import CHANGE_TIME_S, Air, RefractionParameters
 from acu_tracker.program.prediction import PredictionParameters
-from acu_tracker.unit import JOINT_STATES_TOPIC, Acu
+from acu_tracker.unit import Acu
+from acu_tracker.unit_law import JOINT_STATES_TOPIC
 from pedestal_common.geometry import refraction
 from pedestal_common.geometry.earth_orientation import EarthOrientationParameters
 from pedestal_common.parameters import ParameterError
@@ -168,7 +169,8 @@ def test_the_tables_of_the_unit_are_apparent_and_follow_the_weather():
 def test_a_program_is_true_or_apparent_as_the_parameter_says():
     for kind, added in (('geometric', refraction_of(1013.25, 15.0, 0.5)), ('apparent', 0.0)):
         unit = acu(refraction=RefractionParameters(kind='radio', program=kind))
-        unit._append(*level_track())
+        unit.followed.append(unit.parts, *level_track())
+        unit.update_tables()
         assert unit.memory.tables.program.angles[10, 1] == pytest.approx(ELEVATION + added, abs=1e-15)
 
 

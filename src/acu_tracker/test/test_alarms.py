@@ -9,7 +9,8 @@ from acu_tracker import control_unit, signals
 from acu_tracker.alarms import annunciator, conditions, detectors, machine, report, table
 from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
-from acu_tracker.unit import ALARMS_TOPIC, DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, Acu
+from acu_tracker.unit import Acu
+from acu_tracker.unit_law import ALARMS_TOPIC, DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC
 from pedestal_common.graph.modes import MODES
 from pedestal_common.parameters import build
 from pedestal_common.wire.commands import Command
@@ -364,6 +365,17 @@ def test_a_schedule_obeys_alarm_verbs():
     acu = Acu(build(AcuParameters, {'commands': schedule}), (JOINT_STATES_TOPIC,))
     step(acu, 6)
     assert names(acu) == {'INS lost'} and [reply.granted for _, reply in acu.pending_replies] == [True, True]
+
+
+def test_the_alarm_commands_reach_the_records_of_a_trial():
+    """Trials that run side by side move the records of their units into one array (pedestal_bringup.loop)."""
+    acu = Acu(build(AcuParameters, {}), (JOINT_STATES_TOPIC,))
+    record = acu.memory.record.copy()
+    acu.memory = acu.memory._replace(record=record)
+    shelve = Command('shelve', 'page', '1', {'alarm': 'INS lost', 'seconds': '5', 'reason': 'tests'})
+    assert acu.command(shelve).granted
+    state = record['state']['supervision']['alarms']['alarm'][0, table.ALARM_INDEX['INS lost']]['state']
+    assert state == machine.State.SHELVED
 
 
 def test_the_silence_of_the_drive_is_told_without_a_step():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from acu_tracker.estimation.params import AttitudeModelParameters
-from acu_tracker.geometry import attitude_error
+from acu_tracker.geometry import attitude
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import Acu
 from pedestal_common.parameters import build, record
@@ -17,11 +17,11 @@ PARAMETERS = record(AttitudeModelParameters(tilt_noise=1e-3, heading_noise=2e-3,
 
 @pytest.fixture
 def error():
-    return attitude_error.AttitudeError.zeros()[0]
+    return attitude.AttitudeError.zeros()[0]
 
 
 def expected(error):
-    return np.ravel(attitude_error.expected(error, PARAMETERS))
+    return np.ravel(attitude.expected_error(error, PARAMETERS))
 
 
 def test_the_parameters_hold_until_the_ins_has_said_it(error):
@@ -29,7 +29,7 @@ def test_the_parameters_hold_until_the_ins_has_said_it(error):
     T = 1e-4
     walk = [2.0 * sigma**2 * -math.expm1(-T / 50.0) / T for sigma in (3e-3, 4e-3)]
     assert expected(error) == pytest.approx([1e-6, 4e-6, *walk], rel=1e-5)
-    assert attitude_error.take(error, np.array([3e-5, 4e-5, 5e-5]), np.array([0.0, 2e-4, 1e-4]))
+    assert attitude.take_statistics(error, np.array([3e-5, 4e-5, 5e-5]), np.array([0.0, 2e-4, 1e-4]))
     assert expected(error) == pytest.approx([12.5e-10, 25e-10, 2e-8, 1e-8])
 
 
@@ -37,10 +37,10 @@ def test_the_parameters_hold_until_the_ins_has_said_it(error):
 @pytest.mark.parametrize('place', range(6))
 def test_what_cannot_be_is_not_believed(error, place, wrong):
     said = np.full(6, 1e-4)
-    attitude_error.take(error, said[:3], said[3:])
+    attitude.take_statistics(error, said[:3], said[3:])
     before = expected(error)
     said[place] = wrong
-    assert not attitude_error.take(error, said[:3], said[3:])
+    assert not attitude.take_statistics(error, said[:3], said[3:])
     assert (expected(error) == before).all()
 
 

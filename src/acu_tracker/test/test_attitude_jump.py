@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker.geometry import attitude, attitude_jump
+from acu_tracker.geometry import attitude
 from acu_tracker.params import AcuParameters, SharedParameters
 from pedestal_common.parameters import record
 
@@ -53,12 +53,12 @@ def test_a_jump_is_let_in_slowly_and_so_is_its_end(deck, jump):
     jump = Rotation.from_rotvec(jump)
     for k in range(400):
         deck.take(jump)
-        assert deck.error == pytest.approx(attitude_jump.JUMP_DECAY_RATE_RAD_S * T * k, abs=2e-5)
+        assert deck.error == pytest.approx(attitude.JUMP_DECAY_RATE_RAD_S * T * k, abs=2e-5)
     assert deck.s['jump']['apart']
     let_in = deck.error
     for k in range(600):
         deck.take()
-        assert deck.error == pytest.approx(max(let_in - attitude_jump.JUMP_DECAY_RATE_RAD_S * T * k, 0.0), abs=4e-5)
+        assert deck.error == pytest.approx(max(let_in - attitude.JUMP_DECAY_RATE_RAD_S * T * k, 0.0), abs=4e-5)
     assert not deck.s['jump']['apart']
 
 
@@ -72,8 +72,8 @@ def test_an_attitude_of_noise_is_carried_by_its_rates(deck):
 
 
 def test_below_the_angle_and_while_it_aligns_an_attitude_is_what_it_is_told(deck):
-    deck.take(Rotation.from_rotvec([0.0, 0.9 * attitude_jump.MAX_UNEXPLAINED_ANGLE_RAD, 0.0]))
-    assert deck.error == pytest.approx(0.9 * attitude_jump.MAX_UNEXPLAINED_ANGLE_RAD)
+    deck.take(Rotation.from_rotvec([0.0, 0.9 * attitude.MAX_UNEXPLAINED_ANGLE_RAD, 0.0]))
+    assert deck.error == pytest.approx(0.9 * attitude.MAX_UNEXPLAINED_ANGLE_RAD)
     for turned in (0.3, -0.3):
         deck.take(Rotation.from_rotvec([0.0, 0.0, turned]), aligning=1)
         assert deck.error == pytest.approx(0.3)

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker.geometry import azimuth_turn
+from acu_tracker.geometry import azimuth_wrap
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.program_track import NO_TRACK
 from acu_tracker.unit import Acu
@@ -108,21 +108,21 @@ def test_a_slope_that_is_reversed_still_diverges_after_a_turn(BeamRig):
 
 @pytest.fixture
 def turn():
-    state = azimuth_turn.Turn.zeros()[0]
-    azimuth_turn.initialise(state)
+    state = azimuth_wrap.Turn.zeros()[0]
+    azimuth_wrap.initialise_turn(state)
     return state
 
 
 def test_an_error_belongs_to_a_turn_by_its_own_time(turn):
-    assert not azimuth_turn.covers(turn, 0.0)
-    azimuth_turn.begin(turn, 10.0)
-    azimuth_turn.begin(turn, 11.0)
-    assert [azimuth_turn.covers(turn, t) for t in (9.99, 10.0, 99.0)] == [False, True, True]
-    azimuth_turn.watch(turn, 3.0, (0.0, 0.7), 0.02, 12.0)
-    assert turn['under_way'] and azimuth_turn.covers(turn, 12.01)
-    azimuth_turn.watch(turn, 0.005, (0.0, 0.7), 0.02, 13.0)
+    assert not azimuth_wrap.turn_covers(turn, 0.0)
+    azimuth_wrap.begin_turn(turn, 10.0)
+    azimuth_wrap.begin_turn(turn, 11.0)
+    assert [azimuth_wrap.turn_covers(turn, t) for t in (9.99, 10.0, 99.0)] == [False, True, True]
+    azimuth_wrap.watch_turn(turn, 3.0, (0.0, 0.7), 0.02, 12.0)
+    assert turn['under_way'] and azimuth_wrap.turn_covers(turn, 12.01)
+    azimuth_wrap.watch_turn(turn, 0.005, (0.0, 0.7), 0.02, 13.0)
     assert not turn['under_way']
-    assert [azimuth_turn.covers(turn, t) for t in (12.5, 13.0, 13.01)] == [True, True, False]
+    assert [azimuth_wrap.turn_covers(turn, t) for t in (12.5, 13.0, 13.01)] == [True, True, False]
 
 
 @pytest.mark.parametrize(('limits', 'said'), (
@@ -132,7 +132,7 @@ def test_an_error_belongs_to_a_turn_by_its_own_time(turn):
 def test_the_announcement_says_what_the_azimuth_will_do(limits, said):
     unit = Acu(build(AcuParameters, {**limits}), ())
     times = np.arange(20.0)
-    unit._append(times, np.column_stack((4.0 + 0.4 * times, np.full(20, 0.7))))
+    unit.followed.append(unit.parts, times, np.column_stack((4.0 + 0.4 * times, np.full(20, 0.7))))
     unit.inputs['joint_states']['position'][0] = 4.0, 0.7
     unit.inputs['joint_states']['stamp'] = 0
     unit.step(np.zeros(1, np.int64), unit.inputs, unit.outputs)

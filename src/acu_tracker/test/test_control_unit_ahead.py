@@ -252,7 +252,7 @@ def test_the_lever_arm_moves_a_near_target(Rig, ranged):
         if k > 1400:
             worst = max(worst, error)
             estimate = rig.outputs['estimate'][0]
-            azimuth = rig.state[0]['tracking']['target']['tracker']['filter']['axis'][0]
+            azimuth = rig.state[0]['tracking']['target']['filter']['axis'][0]
             swing.append((*(estimate[:, 0] - direction(t)), azimuth['x'][0, 1]))
     swing = np.array(swing)
     print(f'range measured {ranged}: off {worst:.2e} rad, filtered rate {np.ptp(swing[:, 2]):.2e} rad/s')

@@ -48,7 +48,7 @@ def test_error_stamps_that_stand_still_go_back_or_lie_ahead(Rig):
     rig = Rig(initial_mode='autotrack', **Rig.QUICK)
     rig.run(1.0)
     for stamp in (0.99, 0.5, -3.0, 1.2):
-        tracker = rig.state['tracking']['target']['tracker']
+        tracker = rig.state['tracking']['target']
         before = tracker.copy()
         rig.step(error_stamp=stamp if stamp != 0.99 else tracker['stamp'][0])
         assert rig.invalid == {'error_stamp'} and tracker['stamp'] == before['stamp']

@@ -4,8 +4,10 @@ import pytest
 
 from acu_tracker import modes
 from acu_tracker.modes import Mode
+from acu_tracker.operating import refusals
 from acu_tracker.params import AcuParameters
-from acu_tracker.unit import DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, SILENCE_REFUSAL, Acu
+from acu_tracker.unit import Acu
+from acu_tracker.unit_law import DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC
 from pedestal_common.parameters import build
 
 MODES = ('preset', 'program')
@@ -156,12 +158,12 @@ def test_normal_work_is_no_alarm(Rig):
 def test_every_mode_except_standby_is_refused_in_advance_while_the_drive_is_silent():
     acu = Acu(build(AcuParameters, {}), (JOINT_STATES_TOPIC, DRIVE_STATE_TOPIC))
     acu.silent = True
-    refused = acu.refusals()
+    refused = refusals.now(acu)
     assert set(modes.MODES) - set(refused) == {'standby'}
     for mode, reason in refused.items():
         assert acu.request(f'acu/{mode}').text.startswith(f'refused: {reason}')
     acu.silent = False
-    assert SILENCE_REFUSAL not in acu.refusals().values()
+    assert refusals.SILENCE_REFUSAL not in refusals.now(acu).values()
 
 
 def test_a_reset_reports_a_drive_in_fault_and_requests_its_reset_for_a_short_time():

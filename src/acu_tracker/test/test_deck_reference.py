@@ -4,12 +4,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker.geometry import attitude as attitudes
+from acu_tracker.geometry import attitude as deck_attitude
 from acu_tracker.geometry import deck_reference, lever_arm
 from acu_tracker.geometry.azimuth_wrap import Travel, nearest
 from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
-from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, angles, line_of_sight, north_west_up
-from acu_tracker.geometry.vector import Vector, rotation, turn
+from acu_tracker.geometry.vector import (
+    AxisMotion,
+    LineOfSight,
+    Motion,
+    Vector,
+    angles,
+    line_of_sight,
+    north_west_up,
+    rotation,
+    turn,
+)
 from acu_tracker.lookahead.slew import best_elevation
 from acu_tracker.params import AcuParameters, SharedParameters
 from pedestal_common.geometry.line_of_sight import ashore_matrix
@@ -69,26 +78,26 @@ def test_turned_is_the_rotation_by_a_vector():
     rng = np.random.default_rng(1)
     for size in (0.0, 1e-9, 0.1, 2.0):
         q, r = Rotation.from_rotvec(rng.normal(size=3)), size * rng.normal(size=3)
-        got = Rotation.from_quat(attitudes.rotated(q.as_quat(), tuple(r)))
+        got = Rotation.from_quat(deck_attitude.rotated(q.as_quat(), tuple(r)))
         assert (got.inv() * q * Rotation.from_rotvec(r)).magnitude() < 1e-14
 
 
 def test_every_instant_has_its_own_attitude():
     """Between two samples and ahead of them against scipy; NaN where nothing is known; ashore always the same."""
-    p, s = record(AcuParameters(), SharedParameters)[0], attitudes.DeckAttitude.zeros()
+    p, s = record(AcuParameters(), SharedParameters)[0], deck_attitude.DeckAttitude.zeros()
     s['stabilised'] = 1
-    known, deck = attitudes.at(s[0], p, 0.0)
+    known, deck = deck_attitude.at(s[0], p, 0.0)
     assert not known and np.isnan(np.array(deck.mat)).all()
     for k in range(20):
-        attitudes.take(s[0], p, 0.005 * k, 0.005 * k, attitude(0.005 * k).as_quat(), body_rate(0.005 * k), False)
-    asked = {t: attitudes.at(s[0], p, t) for t in (0.0521, 0.1, 0.0, 0.4)}
+        deck_attitude.take(s[0], p, 0.005 * k, 0.005 * k, attitude(0.005 * k).as_quat(), body_rate(0.005 * k), False)
+    asked = {t: deck_attitude.at(s[0], p, t) for t in (0.0521, 0.1, 0.0, 0.4)}
     for t, (known, deck) in asked.items():
         assert known == (t < 0.3)
         if known:
             np.testing.assert_allclose(np.array(deck.mat), attitude(t).as_matrix(), atol=1e-6)
             np.testing.assert_allclose(deck.w, body_rate(t), atol=1e-3)
     s['stabilised'] = 0
-    _, deck = attitudes.at(s[0], p, 9.0)
+    _, deck = deck_attitude.at(s[0], p, 9.0)
     assert np.array(deck.mat) == pytest.approx(ashore_matrix(), abs=1e-15)
 
 

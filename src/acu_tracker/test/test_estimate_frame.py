@@ -5,13 +5,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker.estimation.filters import axes_filter, target_filter, unscented
+from acu_tracker.estimation.filters import target_filter, unscented
 from acu_tracker.estimation.filters.measurement import AxisMeasurement, Measurement
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.geometry import estimate_frame
 from acu_tracker.geometry.deck_reference import ZERO_VECTOR
-from acu_tracker.geometry.motion import AxisMotion, Motion, line_of_sight
-from acu_tracker.geometry.vector import Vector, rotated, rotation
+from acu_tracker.geometry.vector import AxisMotion, Motion, Vector, line_of_sight, rotated, rotation
 from acu_tracker.program import bridge, program_track
 from acu_tracker.program.program_track import ProgramTrack
 
@@ -81,16 +80,16 @@ def test_a_filter_turns_with_its_frame():
     target_filter.start(f, c, Measurement(0.0, tuple(axis), math.nan, math.nan), 0.1)
     for i in range(2):
         f['axis'][i]['x'][0] = motion[i]
-    axes_filter.predict(f['axis'], c['axis'], 0.0)
-    unscented.start(f['cartesian'], c['cartesian'], axes_filter.read(f['axis']), 1000.0, 1.0)
+    target_filter.predict(f, c, 0.0)
+    unscented.start(f['cartesian'], c['cartesian'], target_filter.read_axes(f), 1000.0, 1.0)
     cartesian = f['cartesian']['p'].copy()
     f['running'] = 1
     target_filter.turn(f, c, turn)
     R = np.kron(np.eye(3), np.array(turn))
     np.testing.assert_allclose(f['cartesian']['p'], R @ cartesian @ R.T, atol=1e-12 * np.abs(cartesian).max())
 
-    axes_filter.predict(f['axis'], c['axis'], 0.0)
-    turned = axes_filter.read(f['axis'])
+    target_filter.predict(f, c, 0.0)
+    turned = target_filter.read_axes(f)
     np.testing.assert_allclose(np.ravel(estimate_frame.to_earth(after, turned.motion)), np.ravel(sight), atol=1e-14)
     # Against samples of the errors in both old axes, projected on both new axes.
     a, b = np.random.default_rng(3).normal(size=(2, 20_000)) * [[2e-4 * math.cos(0.35)], [1e-4]]

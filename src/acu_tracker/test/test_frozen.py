@@ -2,7 +2,7 @@
 import pytest
 
 from acu_tracker import signals
-from acu_tracker.servo import frozen
+from acu_tracker.servo import drive_watch
 
 T, HOLD = 0.005, 0.05
 
@@ -11,15 +11,15 @@ class Watch:
     """The law on a drive that tells what it is given, commanded at a rate on the azimuth."""
 
     def __init__(self):
-        self.s, self.u, self.k = frozen.Frozen.zeros()[0], signals.Inputs.zeros()[0], 0
+        self.s, self.u, self.k = drive_watch.Frozen.zeros()[0], signals.Inputs.zeros()[0], 0
 
     def step(self, rate, **told):
         self.k += 1
         self.u['stamp'] = self.k * T
         for name, value in told.items():
             self.u[name][0] = value
-        seen = frozen.watch(self.s, self.u, HOLD, False)
-        frozen.command(self.s, 0, rate, T)
+        seen = drive_watch.watch_frozen(self.s, self.u, HOLD, False)
+        drive_watch.command_frozen(self.s, 0, rate, T)
         return seen
 
 
@@ -33,9 +33,9 @@ def watch():
 @pytest.mark.parametrize('rate', (0.02, -0.02, 2.0))
 def test_numbers_that_stand_while_it_is_sent_on_a_way(watch, rate):
     steps = next(k for k in range(1, 1000) if watch.step(rate))
-    assert steps * T == pytest.approx(HOLD + frozen.FROZEN_TEST_TRAVEL_RAD / abs(rate), abs=2.1 * T)
+    assert steps * T == pytest.approx(HOLD + drive_watch.FROZEN_TEST_TRAVEL_RAD / abs(rate), abs=2.1 * T)
     assert watch.step(0.0, position=0.5)                # until it is reset
-    frozen.release(watch.s, watch.k * T)
+    drive_watch.release_frozen(watch.s, watch.k * T)
     assert not any(watch.step(0.0, position=0.5) for _ in range(1000))
 
 

@@ -4,7 +4,9 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker.estimation import tracker
+from acu_tracker.estimation import receiver_error
+from acu_tracker.estimation import target as estimate
+from acu_tracker.estimation.filters import target_filter
 from acu_tracker.estimation.filters.measurement import AxisMeasurement, Measurement
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters, UkfParameters
 from pedestal_common.parameters import build, record
@@ -33,18 +35,19 @@ class Pass:
         self.rates = np.gradient(self.truth, T, axis=0)
         self.range = np.sqrt(east**2 + north**2 + up**2)
         self.params = TrackerParameters(**params)
-        self.p, self.state = record(self.params)[0], tracker.Tracker.zeros()
+        self.p, self.state = record(self.params)[0], estimate.Target.zeros()
         self.noise = np.random.default_rng(seed).normal(size=(len(t), 3))
         self.t, self.k, self.estimates = t, 0, np.full((len(t), 6), math.nan)
         self.put(kinds)
 
     def put(self, kinds):
         filters = [build(FilterParameters, {'kind': kind, **MANOEUVRES}) for kind in kinds]
-        self.c = tracker.constants(self.params, filters)[0]
-        tracker.transfer(self.state[0], self.c)
+        self.c = estimate.constants(self.params, filters)[0]
+        state = self.state[0]
+        target_filter.transfer(state['filter'], self.c['filter'], state['running'])
 
     def now(self, stamp=None):
-        return np.ravel(tracker.outlook(self.state[0], self.c, self.t[self.k - 1] if stamp is None else stamp))
+        return np.ravel(estimate.outlook(self.state[0], self.c, self.t[self.k - 1] if stamp is None else stamp))
 
     def take(self, seconds, ranged=True, offset=0.0, range_offset=0.0):
         """Take the errors of the next seconds; the outcomes."""
@@ -64,7 +67,8 @@ class Pass:
     def observe(self, stamp, azimuth, elevation, variances, distance, R_range, restart_gap):
         axis = (AxisMeasurement(azimuth, variances[0], math.nan, math.nan),
                 AxisMeasurement(elevation, variances[1], math.nan, math.nan))
-        return tracker.observe(self.state[0], self.p, self.c, Measurement(stamp, axis, distance, R_range), restart_gap)
+        return receiver_error.gate(self.state[0], self.p, self.c, Measurement(stamp, axis, distance, R_range),
+                                   restart_gap)
 
     def filter(self, name):
         return self.state['filter'][name][0]
@@ -78,7 +82,7 @@ def test_the_range_takes_the_geometry_out_of_the_rate():
     rms = {}
     for kinds in (BOTH, ('imm', 'imm')):
         tracked = Pass(kinds)
-        assert set(tracked.take(49.0)[1:]) == {tracker.OUTCOME_ACCEPTED}
+        assert set(tracked.take(49.0)[1:]) == {receiver_error.OUTCOME_ACCEPTED}
         assert tracked.filter('running') == (kinds == BOTH)
         rms[kinds] = tracked.rate_rms()
     print({kinds[0]: value.round(4).tolist() for kinds, value in rms.items()}, 'deg/s')
@@ -151,7 +155,9 @@ def test_a_direction_is_compared_with_what_was_told_in_the_coast():
     tracked.k += round(0.8 / T)
     stamp, (A, E) = tracked.t[tracked.k], tracked.truth[tracked.k]
     estimate = tracked.now(stamp)
-    azimuth, elevation = tracker.read(tracked.state[0], tracked.c, stamp).variances
+    f = tracked.state[0]['filter']
+    target_filter.predict(f, tracked.c['filter'], stamp - tracked.state[0]['stamp'])
+    azimuth, elevation = target_filter.read(f).variances
     _, innovation = tracked.observe(stamp, A, E, (1e-9, 1e-9), math.nan, math.nan, tracked.p['restart_gap'])
     (nu_a, S_a, *_), (nu_e, S_e, *_) = innovation.axis
     sigma = np.sqrt((S_a, S_e))
@@ -172,7 +178,7 @@ def test_a_cartesian_filter_that_is_nowhere_does_not_take_the_axes_along(ranged)
     assert tracked.filter('used').all() == ranged
     error = tracked.now()[ANGLES] - tracked.truth[tracked.k - 1]
     assert np.abs((error + math.pi) % (2.0 * math.pi) - math.pi).max() < 3.0 * SIGMA
-    assert set(tracked.take(1.0, ranged)) == {tracker.OUTCOME_ACCEPTED}
+    assert set(tracked.take(1.0, ranged)) == {receiver_error.OUTCOME_ACCEPTED}
 
 
 def test_it_ends_when_both_leave_before_it_is_used():
@@ -189,11 +195,11 @@ def test_bad_ranges_and_directions_are_not_believed():
     tracked.take(10.0)
     before = tracked.state['filter']['cartesian']['x'].copy()
     for wrong in (30.0, -1e9, math.inf, math.nan):
-        assert tracked.take(T, range_offset=wrong) == [tracker.OUTCOME_ACCEPTED]
+        assert tracked.take(T, range_offset=wrong) == [receiver_error.OUTCOME_ACCEPTED]
     # The negative one and NaN are none.
     assert tracked.state['ranges_gated'] == 2
     assert np.abs(tracked.state['filter']['cartesian']['x'] - before)[0, :, :3].max() < 3.0
-    assert tracked.take(T, offset=1.0 * DEG) == [tracker.OUTCOME_GATED]
+    assert tracked.take(T, offset=1.0 * DEG) == [receiver_error.OUTCOME_GATED]
     outcomes = tracked.take(21 * T, offset=3.0 * DEG)
-    assert tracker.OUTCOME_STARTED in outcomes and np.isfinite(tracked.now()).all()
+    assert receiver_error.OUTCOME_STARTED in outcomes and np.isfinite(tracked.now()).all()
     assert abs(tracked.now()[ELEVATION] - tracked.truth[tracked.k - 1, 1] - 3.0 * DEG) < 0.1 * DEG

@@ -3,7 +3,7 @@ from filterpy.kalman import KalmanFilter
 
 from acu_tracker.estimation.filters import kalman, motion_models
 from acu_tracker.estimation.filters.kalman import Gaussian, Symmetric
-from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.geometry.vector import AxisMotion
 
 T, ALPHA, R, R_RATE = 0.01, 0.5, 2.5e-7, 4e-6
 TRANSITION = motion_models.fading(ALPHA, T)

@@ -122,7 +122,7 @@ def test_named_points():
 
 
 def test_an_offset_shifts_the_program_as_it_runs(axes):
-    axes.unit.segments.append([-50.0, 100.0], [[0.05, 0.35], [0.8, 1.1]], 0.0, False)
+    axes.unit.followed.segments.append([-50.0, 100.0], [[0.05, 0.35], [0.8, 1.1]], 0.0, False)
     axes.unit.update_tables()
     assert axes.ask('program').granted
     axes.run(2.0)

@@ -6,7 +6,7 @@ from oracles import van_loan
 from scipy.integrate import quad
 
 from acu_tracker.estimation.filters import kalman, motion_models
-from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.geometry.vector import AxisMotion
 from pedestal_common.graph import topics
 
 CASES = [(0.1, 0.01), (0.5, 0.005), (0.5, 0.0999), (0.7, 0.3), (2.0, 0.24999), (2.0, 0.25001), (5.0, 0.4), (1.0, 3.0)]

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from acu_tracker.servo import notch
+from acu_tracker.servo import controllers
 
 T = 0.002
 
 
 def filtered(x, *parameters):
-    c, memory = np.array(notch.coefficients(*parameters, T)), np.zeros(4)
-    return np.array([value - notch.removed(value, memory, c) for value in x])
+    c, memory = np.array(controllers.notch_coefficients(*parameters, T)), np.zeros(4)
+    return np.array([value - controllers.notch_removed(value, memory, c) for value in x])
 
 
 @pytest.mark.parametrize('frequency, width, depth', [(70.0, 0.5, 0.1), (12.0, 0.1, 0.0), (240.0, 1.0, 0.5)])
 def test_it_is_the_analog_notch_on_the_warped_axis(frequency, width, depth):
-    b0, b1, b2, a1, a2 = notch.coefficients(frequency, width, depth, T)
+    b0, b1, b2, a1, a2 = controllers.notch_coefficients(frequency, width, depth, T)
     f = np.linspace(0.1, 249.0, 500)
     _, digital = signal.freqz([b0, b1, b2], [1.0, a1, a2], worN=2.0 * math.pi * f * T)
     w = 2.0 * math.pi * frequency
@@ -29,7 +29,7 @@ def test_it_is_the_analog_notch_on_the_warped_axis(frequency, width, depth):
 
 def test_it_filters_as_scipy_does():
     x = np.random.default_rng(0).normal(size=500)
-    b0, b1, b2, a1, a2 = notch.coefficients(70.0, 0.5, 0.1, T)
+    b0, b1, b2, a1, a2 = controllers.notch_coefficients(70.0, 0.5, 0.1, T)
     np.testing.assert_allclose(filtered(x, 70.0, 0.5, 0.1), signal.lfilter([b0, b1, b2], [1.0, a1, a2], x), atol=1e-13)
 
 
@@ -39,5 +39,5 @@ def test_off_it_removes_nothing():
 
 
 def test_it_may_be_changed_at_rest_without_a_bump():
-    memory = np.full(4, 0.3)
-    assert notch.removed(0.3, memory, np.array(notch.coefficients(70.0, 0.5, 0.1, T))) == pytest.approx(0.0, abs=1e-15)
+    memory, coefficients = np.full(4, 0.3), np.array(controllers.notch_coefficients(70.0, 0.5, 0.1, T))
+    assert controllers.notch_removed(0.3, memory, coefficients) == pytest.approx(0.0, abs=1e-15)

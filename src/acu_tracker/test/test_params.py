@@ -43,4 +43,4 @@ def test_constants_hold_the_parameters():
     c = control_unit.constants(build(AcuParameters, {
         'azimuth.filter.kind': 'current_statistical', 'azimuth.filter.current_statistical.a_max': 0.123,
         'command_delay': 0.01}))
-    assert c['tracker']['filter']['axis'][0, 0]['models'][0]['a_max'] == 0.123 and c['lead'] == 0.0125
+    assert c['target']['filter']['axis'][0, 0]['models'][0]['a_max'] == 0.123 and c['lead'] == 0.0125

@@ -7,7 +7,8 @@ import pytest
 from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
 from acu_tracker.pointing import model as in_force
-from acu_tracker.unit import JOINT_STATES_TOPIC, POINTING_TOPIC, Acu
+from acu_tracker.unit import Acu
+from acu_tracker.unit_law import JOINT_STATES_TOPIC, POINTING_TOPIC
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight, pointing_model, pointing_report
 from pedestal_common.parameters import ParameterError, build

@@ -5,9 +5,9 @@ import pytest
 from scipy import signal
 
 from acu_tracker import control_unit
-from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.geometry.vector import AxisMotion
 from acu_tracker.params import AxisParameters
-from acu_tracker.servo import feedforward, position_loop
+from acu_tracker.servo import controllers, position_loop
 from acu_tracker.servo.ends import Ends
 from acu_tracker.servo.params import FeedforwardParameters
 from acu_tracker.servo.position_loop import Feedback, Instants
@@ -130,9 +130,9 @@ def test_raw_target_beyond_the_travel_is_held_at_its_end():
 
 def test_torque_is_what_inertia_and_friction_take():
     c = record(FeedforwardParameters(inertia=280.0, friction=60.0, friction_rate=0.002))[0]
-    assert feedforward.torque(0.1, 0.5, c) == pytest.approx(200.0)
-    assert feedforward.torque(-0.1, 0.0, c) == pytest.approx(-60.0)
-    assert feedforward.torque(0.002, 0.0, c) == pytest.approx(60.0 * math.tanh(1.0))
+    assert controllers.torque(0.1, 0.5, c) == pytest.approx(200.0)
+    assert controllers.torque(-0.1, 0.0, c) == pytest.approx(-60.0)
+    assert controllers.torque(0.002, 0.0, c) == pytest.approx(60.0 * math.tanh(1.0))
 
 
 def tracking(t):

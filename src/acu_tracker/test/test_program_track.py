@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from acu_tracker.geometry.motion import line_of_sight
+from acu_tracker.geometry.vector import line_of_sight
 from acu_tracker.modes import Reason
 from acu_tracker.program import program_track
 from acu_tracker.program.program_track import ProgramTrack

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from acu_tracker.estimation import roughness
+from acu_tracker.estimation import monitors
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasurement, Innovation, Measurement
 
 GATE, SIGMA = 25.0, 1e-4
@@ -15,20 +15,20 @@ def take(state, x, e):
     axes = tuple(AxisInnovation(nu, 1.0, 1.0, math.nan, math.nan) for nu in (x, e))
     innovation = Innovation(axes, math.nan, math.nan)
     axis = AxisMeasurement(0.0, SIGMA**2, math.nan, math.nan)
-    return roughness.take(state, innovation, Measurement(0.0, (axis, axis), math.nan, math.nan))
+    return monitors.take_roughness(state, innovation, Measurement(0.0, (axis, axis), math.nan, math.nan))
 
 
 @pytest.fixture
 def state():
-    record = roughness.Roughness.zeros()[0]
-    roughness.restart(record)
+    record = monitors.Roughness.zeros()[0]
+    monitors.restart_roughness(record)
     return record
 
 
 def test_the_mean_square_successive_difference(state):
     nu = np.random.default_rng(1).normal(0.0, SIGMA, (400, 2))
     q = [take(state, *one) for one in nu]
-    a = 1.0 / roughness.ROUGHNESS_ERROR_COUNT
+    a = 1.0 / monitors.ROUGHNESS_ERROR_COUNT
     x = np.minimum(np.diff(nu, axis=0)**2 / (2.0 * SIGMA**2), np.inf).mean(axis=1)
     expected, _ = lfilter([a], [1.0, a - 1.0], x, zi=[1.0 - a])
     assert q[0] == 1.0 and q[1:] == pytest.approx(expected, rel=1e-12)

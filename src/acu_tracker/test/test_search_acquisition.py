@@ -5,7 +5,7 @@ from collections import namedtuple
 import numpy as np
 import pytest
 
-from acu_tracker.search import acquisition, pattern
+from acu_tracker.search import acquisition, level, pattern
 from acu_tracker.search.params import AcquisitionParameters, SearchParameters
 from pedestal_common.parameters import record
 
@@ -30,8 +30,8 @@ class Antenna:
         acquisition.initialise(s)
         self.s, self.z, self.t = s[0], dish(*target) + AXIS, 0.0
         for k in range(450):
-            acquisition.take_level(self.s, self.p, NOISE + (-1.0)**k, self.t, False)
-            acquisition.learn(self.s, self.p, NOISE + (-1.0)**k, self.t + T)
+            level.take(self.s['level'], self.p, NOISE + (-1.0)**k, self.t, False)
+            level.learn(self.s['level'], self.p, NOISE + (-1.0)**k, T)
             self.t += T
         acquisition.begin_acquire(self.s, self.t)
 
@@ -41,7 +41,7 @@ class Antenna:
         power = 10.0**(0.1 * self.z)
         power += T / TAU * (10.0**(0.1 * max(AXIS + dish(*off), NOISE)) - power)
         self.z = 10.0 * math.log10(power)
-        acquisition.take_level(self.s, self.p, self.z, self.t, self.z > self.lock)
+        level.take(self.s['level'], self.p, self.z, self.t, self.z > self.lock)
         if self.z > self.lock:
             acquisition.take_error(self.s, (-x, -e), tuple(self.slope * off * B))
         acquisition.acquire(self.s, self.p, B, self.t, math.nan)

@@ -4,7 +4,8 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker.search import coast, side_lobe, slope_check
+from acu_tracker import tracking
+from acu_tracker.search import side_lobe, slope_check
 
 B = 0.0175
 
@@ -81,7 +82,7 @@ def test_expected_level():
 
 
 def test_coast():
-    assert coast.sigma(4e-6, 1e-6, math.acos(0.25)) == pytest.approx(1e-3)
-    assert coast.sigma(4e-6, 1e-6, 0.0) == pytest.approx(2e-3)
-    assert not coast.over(1.0, 3.0, 0.49 * B, B)
-    assert coast.over(3.1, 3.0, 0.0, B) and coast.over(0.5, 3.0, 0.51 * B, B)
+    assert tracking.sigma_across(4e-6, 1e-6, math.acos(0.25)) == pytest.approx(1e-3)
+    assert tracking.sigma_across(4e-6, 1e-6, 0.0) == pytest.approx(2e-3)
+    assert not tracking.coast_over(1.0, 3.0, 0.49 * B, B)
+    assert tracking.coast_over(3.1, 3.0, 0.0, B) and tracking.coast_over(0.5, 3.0, 0.51 * B, B)

@@ -4,8 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker.geometry.motion import AxisMotion, Motion
-from acu_tracker.geometry.vector import Vector
+from acu_tracker.geometry.vector import AxisMotion, Motion, Vector
 from acu_tracker.search import place
 from acu_tracker.search.pattern import Point
 from pedestal_common.geometry import line_of_sight

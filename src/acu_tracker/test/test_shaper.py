@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.geometry.vector import AxisMotion
 from acu_tracker.servo import shaper
 from acu_tracker.servo.params import ShaperParameters
 from pedestal_common.parameters import record

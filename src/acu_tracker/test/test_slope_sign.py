@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from acu_tracker import signals
-from acu_tracker.estimation import slope_sign
+from acu_tracker.estimation import monitors
 from acu_tracker.geometry.vector import Vector, turn
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE as BOW_NORTH
 
@@ -15,8 +15,8 @@ ASHORE = turn(*BOW_NORTH)
 
 @pytest.fixture
 def state():
-    record = slope_sign.SlopeSign.zeros()[0]
-    slope_sign.restart(record)
+    record = monitors.SlopeSign.zeros()[0]
+    monitors.restart_slope(record)
     return record
 
 
@@ -24,11 +24,11 @@ def first(state, angles, errors, t=None, sigma=SIGMA):
     """Index of the first error at which the slope counts as reversed, None: it never does. angles (n, 2): azimuth and
     elevation of the beam [rad]; errors (n, 2) [rad]."""
     t = T * np.arange(len(errors)) if t is None else t
-    return next((k for k, (at, e) in enumerate(zip(angles, errors)) if slope_sign.take(
-        state, t[k], slope_sign.beam(ASHORE, *at), tuple(e), sigma**2, GAP)), None)
+    return next((k for k, (at, e) in enumerate(zip(angles, errors)) if monitors.take_slope(
+        state, t[k], monitors.slope_beam(ASHORE, *at), tuple(e), sigma**2, GAP)), None)
 
 
-TURNED = 2 * slope_sign.MIN_ERROR_COUNT
+TURNED = 2 * monitors.MIN_ERROR_COUNT
 """Error from which on a slope is reversed."""
 
 
@@ -81,11 +81,11 @@ def test_of_the_first_errors_nothing_is_said_and_of_those_off_the_straight_part_
     """Errors that lead away from the first on: what they are is seen, and said from FEWEST on."""
     way = 0.01 * np.exp(0.05 * np.arange(200))
     angles, errors = np.column_stack((np.zeros(200), 0.5 - way)), np.column_stack((np.zeros(200), -way))
-    assert first(state, angles, errors) == slope_sign.MIN_ERROR_COUNT - 1
+    assert first(state, angles, errors) == monitors.MIN_ERROR_COUNT - 1
     u = signals.Inputs.zeros()[0]
     for x, near in ((0.0, True), (0.4, True), (-0.6, False), (math.nan, False)):
         u['cross_elevation'] = 0.02 * x
-        assert slope_sign.near(u, 0.02) == near
+        assert monitors.shows_slope(u, 0.02) == near
 
 
 def test_the_other_axis_says_nothing_of_it(state):
@@ -113,8 +113,8 @@ def test_lines_are_least_squares_and_what_a_straight_line_does_is_none_of_it(sta
     k = np.arange(300)
     first(state, np.column_stack((np.zeros(300), np.full(300, 0.5))), np.column_stack((1e-5 * k, -2e-5 * k)))
     assert np.abs(state['J']).max() < 1e-12
-    restarted = slope_sign.SlopeSign.zeros()[0]
-    slope_sign.restart(restarted)
+    restarted = monitors.SlopeSign.zeros()[0]
+    monitors.restart_slope(restarted)
     e = np.random.default_rng(1).normal(0.0, SIGMA, (100, 2))
     first(restarted, np.zeros((100, 2)), e)
     line = np.polyfit(T * np.arange(100), e[:, 1], 1)
@@ -122,11 +122,11 @@ def test_lines_are_least_squares_and_what_a_straight_line_does_is_none_of_it(sta
 
 
 def test_it_begins_anew_after_a_gap_and_leaves_old_errors_alone(state):
-    beam = slope_sign.Beam(Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0))
+    beam = monitors.Beam(Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0))
     for k in range(50):
-        slope_sign.take(state, T * k, beam, (1e-3 * (-1)**k, 0.0), SIGMA**2, GAP)
+        monitors.take_slope(state, T * k, beam, (1e-3 * (-1)**k, 0.0), SIGMA**2, GAP)
     J = state['J'].copy()
-    slope_sign.take(state, T * 49, beam, (1.0, 1.0), SIGMA**2, GAP)
+    monitors.take_slope(state, T * 49, beam, (1.0, 1.0), SIGMA**2, GAP)
     assert state['n'] == 50 and (state['J'] == J).all() and J[0, 0] > 0.1
-    slope_sign.take(state, T * 49 + 1.01 * GAP, beam, (1.0, 1.0), SIGMA**2, GAP)
+    monitors.take_slope(state, T * 49 + 1.01 * GAP, beam, (1.0, 1.0), SIGMA**2, GAP)
     assert state['n'] == 1 and (state['J'] == 0.0).all()

@@ -5,7 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from acu_tracker.estimation import tracker
+from acu_tracker.estimation import receiver_error
+from acu_tracker.estimation import target as estimate
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import (
@@ -30,28 +31,29 @@ NONE = math.nan
 
 
 class Target:
-    """A tracker of both axes with the same filter; errors of variance SIGMA^2."""
+    """A filter of both axes with the same filter; errors of variance SIGMA^2."""
 
     def __init__(self, tracker_params=None, **filter_params):
         self.params = TrackerParameters(**(tracker_params or {}))
-        self.p, self.state = record(self.params)[0], tracker.Tracker.zeros()
+        self.p, self.state = record(self.params)[0], estimate.Target.zeros()
         self.put(**filter_params)
 
     def put(self, **filter_params):
         params = build(FilterParameters, {'kind': 'current_statistical', **filter_params})
-        self.c = tracker.constants(self.params, (params, params))[0]
-        tracker.transfer(self.state[0], self.c)
+        self.c = estimate.constants(self.params, (params, params))[0]
+        state = self.state[0]
+        target_filter.transfer(state['filter'], self.c['filter'], state['running'])
 
     def observe(self, stamp, azimuth, elevation=0.0, azimuth_rate=NONE, elevation_rate=NONE):
         """(outcome, AxisInnovation of the azimuth)."""
         axis = (AxisMeasurement(azimuth, SIGMA**2, azimuth_rate, RATE_SIGMA**2),
                 AxisMeasurement(elevation, SIGMA**2, elevation_rate, RATE_SIGMA**2))
-        outcome, innovation = tracker.observe(self.state[0], self.p, self.c, Measurement(stamp, axis, NONE, NONE),
+        outcome, innovation = receiver_error.gate(self.state[0], self.p, self.c, Measurement(stamp, axis, NONE, NONE),
                                               self.p['restart_gap'])
         return outcome, innovation.axis[0]
 
     def outlook(self, stamp):
-        return np.ravel(tracker.outlook(self.state[0], self.c, stamp))
+        return np.ravel(estimate.outlook(self.state[0], self.c, stamp))
 
     def variances(self, T=0.0):
         """(p11, p12, p22) of the azimuth T after the last measurement."""
@@ -60,7 +62,7 @@ class Target:
         return target_filter.read(f).variances[0]
 
     def locked(self, since_accepted=0.0):
-        return bool(tracker.locked(self.state[0], self.p, since_accepted))
+        return bool(estimate.locked(self.state[0], self.p, since_accepted))
 
 
 def test_azimuth_is_unwrapped_against_the_estimate():
@@ -68,7 +70,7 @@ def test_azimuth_is_unwrapped_against_the_estimate():
     t = np.arange(0.0, 20.0, T)
     angle = 3.0 + 0.05 * t
     outcomes = [target.observe(stamp, (y + math.pi) % (2 * math.pi) - math.pi)[0] for stamp, y in zip(t, angle)]
-    assert outcomes == [tracker.OUTCOME_STARTED] + [tracker.OUTCOME_ACCEPTED] * (len(t) - 1)
+    assert outcomes == [receiver_error.OUTCOME_STARTED] + [receiver_error.OUTCOME_ACCEPTED] * (len(t) - 1)
     assert target.outlook(t[-1])[0] == pytest.approx(angle[-1], abs=1e-6)
 
 
@@ -77,24 +79,24 @@ def test_stale_gated_counted_and_restarted_measurements():
     for k in range(300):
         target.observe(k * T, 0.1)
     before = target.state.copy()
-    assert target.observe(299 * T, 0.1)[0] == tracker.OUTCOME_STALE
-    assert target.observe(1.0, 0.1)[0] == tracker.OUTCOME_STALE
+    assert target.observe(299 * T, 0.1)[0] == receiver_error.OUTCOME_STALE
+    assert target.observe(1.0, 0.1)[0] == receiver_error.OUTCOME_STALE
     np.testing.assert_array_equal(target.state, before)
 
     outcome, azimuth = target.observe(300 * T, 0.2)
-    assert outcome == tracker.OUTCOME_GATED and azimuth.nu == pytest.approx(0.1,
+    assert outcome == receiver_error.OUTCOME_GATED and azimuth.nu == pytest.approx(0.1,
                                                                             abs=1e-9) and azimuth.chi_square > 25.0
     for name in ('x', 'p', 'mu'):
         np.testing.assert_array_equal(target.state['filter']['axis'][name], before['filter']['axis'][name])
     assert target.state['accepted_in_a_row'] == 0 and target.state['gated'] == 1
 
     for k in range(301, 301 + 18):
-        assert target.observe(k * T, 0.2)[0] == tracker.OUTCOME_GATED
-    assert target.observe(320 * T, 0.2)[0] == tracker.OUTCOME_STARTED
+        assert target.observe(k * T, 0.2)[0] == receiver_error.OUTCOME_GATED
+    assert target.observe(320 * T, 0.2)[0] == receiver_error.OUTCOME_STARTED
     assert target.outlook(320 * T)[0] == 0.2 and target.state['gated'] == 20
 
-    assert target.observe(320 * T + 0.9, 0.2)[0] == tracker.OUTCOME_ACCEPTED
-    assert target.observe(320 * T + 2.0, 0.7)[0] == tracker.OUTCOME_STARTED
+    assert target.observe(320 * T + 0.9, 0.2)[0] == receiver_error.OUTCOME_ACCEPTED
+    assert target.observe(320 * T + 2.0, 0.7)[0] == receiver_error.OUTCOME_STARTED
     assert target.outlook(320 * T + 2.0)[0] == pytest.approx(0.7)
     assert target.state['gated'] == 20
 
@@ -102,13 +104,14 @@ def test_stale_gated_counted_and_restarted_measurements():
 def test_only_refusals_in_a_row_restart():
     target = Target()
     outcomes = [target.observe(k * T, 0.1 if k < 300 or k % 15 == 0 else 0.2)[0] for k in range(400)]
-    assert outcomes[0] == tracker.OUTCOME_STARTED and tracker.OUTCOME_STARTED not in outcomes[1:]
-    assert outcomes[301:315] == [tracker.OUTCOME_GATED] * 14 and outcomes[315] == tracker.OUTCOME_ACCEPTED
+    assert outcomes[0] == receiver_error.OUTCOME_STARTED and receiver_error.OUTCOME_STARTED not in outcomes[1:]
+    assert outcomes[301:315] == [receiver_error.OUTCOME_GATED] * 14
+    assert outcomes[315] == receiver_error.OUTCOME_ACCEPTED
 
 
 @pytest.mark.parametrize('gate', [1.0, 9.0, 25.0, 600.0, 1e6])
 def test_gate_of_a_rate_is_as_rarely_exceeded(gate):
-    limit = tracker.constants(TrackerParameters(gate=gate), 2 * (FilterParameters(),))['gates'][0, 1]
+    limit = estimate.constants(TrackerParameters(gate=gate), 2 * (FilterParameters(),))['gates'][0, 1]
     assert 0.0 < limit < gate
     if gate <= 600.0:
         assert chi2.logsf(limit, 1) == pytest.approx(-gate / 2, rel=1e-9)
@@ -118,15 +121,15 @@ def test_a_rate_is_believed_by_itself():
     target, alone = (Target({'lock_count': 50}, rate_measurement=used) for used in (True, False))
     for k in range(300):
         for one in (target, alone):
-            assert one.observe(k * T, 0.1 + 0.01 * k * T, 0.0, 0.01, 0.0)[0] != tracker.OUTCOME_GATED
+            assert one.observe(k * T, 0.1 + 0.01 * k * T, 0.0, 0.01, 0.0)[0] != receiver_error.OUTCOME_GATED
         # Fifty of them have to agree with the angles first.
         assert (target.variances() == alone.variances()) == (k <= 50)
     assert target.variances()[2] < 0.7 * alone.variances()[2] and target.state['rates_gated'] == 0
     # Without a rate (the sensor is late) the angles alone are believed, and with one that is off.
-    assert target.observe(3.0, 0.13, 0.0)[0] == tracker.OUTCOME_ACCEPTED
+    assert target.observe(3.0, 0.13, 0.0)[0] == receiver_error.OUTCOME_ACCEPTED
     rate = target.outlook(3.0)[1]
     outcome, azimuth = target.observe(3.01, 0.1301, 0.0, 0.01 + 8 * RATE_SIGMA, 0.0)
-    assert outcome == tracker.OUTCOME_ACCEPTED and azimuth.rate == pytest.approx(8 * RATE_SIGMA, rel=1e-2)
+    assert outcome == receiver_error.OUTCOME_ACCEPTED and azimuth.rate == pytest.approx(8 * RATE_SIGMA, rel=1e-2)
     assert nis(azimuth) > 50.0
     assert target.outlook(3.01)[1] == pytest.approx(rate, abs=1e-6)
     assert target.state['rates_gated'] == 1 and target.state['gated'] == 0
@@ -134,7 +137,7 @@ def test_a_rate_is_believed_by_itself():
     assert target.state['rates_in_a_row'].tolist() == [[0, 300]]
     # A filter that is not to use the rate does not look at it.
     target.put(rate_measurement=False)
-    assert target.observe(3.02, 0.1302, 0.0, 1.0, 0.0)[0] == tracker.OUTCOME_ACCEPTED
+    assert target.observe(3.02, 0.1302, 0.0, 1.0, 0.0)[0] == receiver_error.OUTCOME_ACCEPTED
     assert target.state['rates_gated'] == 1
 
 
@@ -152,7 +155,7 @@ def test_a_rate_sensor_that_is_off_or_stuck_does_not_cost_the_lock(kind, share, 
                                        share * (speed + RATE_SIGMA * nu[2]) + bias, RATE_SIGMA * nu[3])[0])
         locks += target.locked()
         errors.append(target.outlook(t)[0] - 0.1 - speed * t)
-    assert outcomes.count(tracker.OUTCOME_STARTED) == 1 and np.abs(errors).max() < 5.0 * SIGMA
+    assert outcomes.count(receiver_error.OUTCOME_STARTED) == 1 and np.abs(errors).max() < 5.0 * SIGMA
     assert locks > (1000 if bias == 3.0 * RATE_SIGMA else 1800)
     assert target.state['rates_gated'] > 0
 
@@ -224,7 +227,7 @@ def test_an_error_is_compared_with_what_was_told_in_the_coast(kind, gap):
     stamp = 299 * T + gap
     angle, variance = target.outlook(stamp)[0], target.variances(gap)[0]
     outcome, azimuth = target.observe(stamp, 0.3)
-    assert outcome == tracker.OUTCOME_ACCEPTED and azimuth.nu == pytest.approx(0.3 - angle, abs=1e-12)
+    assert outcome == receiver_error.OUTCOME_ACCEPTED and azimuth.nu == pytest.approx(0.3 - angle, abs=1e-12)
     assert azimuth.S == pytest.approx(variance + SIGMA**2, rel=1e-12)
     assert nis(azimuth) == pytest.approx(azimuth.nu**2 / (variance + SIGMA**2), rel=1e-12)
 

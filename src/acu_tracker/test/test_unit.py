@@ -8,7 +8,8 @@ from acu_tracker.alarms import machine, table
 from acu_tracker.geometry import direction
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.prediction import PredictionParameters
-from acu_tracker.unit import DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, MODE_TOPIC, RATE_COMMAND_TOPIC, Acu
+from acu_tracker.unit import Acu
+from acu_tracker.unit_law import DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, MODE_TOPIC, RATE_COMMAND_TOPIC
 from pedestal_common.graph import topics
 from pedestal_common.graph.modes import MODES
 from pedestal_common.wire import messages, records

@@ -11,7 +11,7 @@ from filterpy.kalman import IMMEstimator, MerweScaledSigmaPoints, UnscentedKalma
 from acu_tracker.estimation.filters import unscented
 from acu_tracker.estimation.filters.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
 from acu_tracker.estimation.params import UkfParameters
-from acu_tracker.geometry.motion import AxisMotion, Motion
+from acu_tracker.geometry.vector import AxisMotion, Motion
 
 DEG = math.pi / 180.0
 T = 0.02

@@ -18,9 +18,20 @@ from typing import Annotated, TypeAlias
 import numpy as np
 from scipy import special
 
-from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, earth_angles, motion_of_position
-from acu_tracker.geometry.motion import line_of_sight as line_of_sight_of
-from acu_tracker.geometry.vector import Vector, cross, minus, rotated, turn, vector
+from acu_tracker.geometry.vector import (
+    AxisMotion,
+    LineOfSight,
+    Motion,
+    Vector,
+    cross,
+    earth_angles,
+    minus,
+    motion_of_position,
+    rotated,
+    turn,
+    vector,
+)
+from acu_tracker.geometry.vector import line_of_sight as line_of_sight_of
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics

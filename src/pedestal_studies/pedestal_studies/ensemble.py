@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from acu_tracker.estimation.filters import axis_filter, unscented
 from acu_tracker.estimation.filters.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters, UkfParameters
-from acu_tracker.geometry.motion import AxisMotion, Motion
+from acu_tracker.geometry.vector import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
     Floats,

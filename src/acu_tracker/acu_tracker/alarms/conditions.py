@@ -11,7 +11,7 @@ import numpy as np
 from acu_tracker import modes, signals
 from acu_tracker.alarms import annunciator, detectors, table
 from acu_tracker.modes import Mode, Reason
-from acu_tracker.servo import position_loop, uncommanded_motion
+from acu_tracker.servo import drive_watch, position_loop
 from acu_tracker.signals import Flag, Inputs, Outputs
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
@@ -78,7 +78,7 @@ def initialise(supervision: Records) -> None:
 
 
 @compiled
-def _of_motors(axis: detectors.AxisDetectors, i: int, inputs: Inputs, envelope: uncommanded_motion.Envelope,
+def _of_motors(axis: detectors.AxisDetectors, i: int, inputs: Inputs, envelope: drive_watch.Envelope,
                params: 'AxisParameters', facts: Facts) -> int:
     """Return the bits of the alarms of axis i that follow from its encoder, its motors and its commands.
 
@@ -122,7 +122,7 @@ def _of_loop(axis: detectors.AxisDetectors, i: int, e: Radians, outputs: Outputs
 
 @compiled
 def _of_axes(supervision: Supervision, mode: int, inputs: Inputs, outputs: Outputs,
-             constants: BothAxes['AxisConstants'], envelope: uncommanded_motion.Envelope, facts: Facts) -> int:
+             constants: BothAxes['AxisConstants'], envelope: drive_watch.Envelope, facts: Facts) -> int:
     """Return the bits of the alarms of both axes; an electronic beam has none of them."""
     bits, off = 0, inputs.stamp - supervision.ready > BRAKE_GRIP_DEADLINE_S
     for i in range(2):
@@ -218,7 +218,7 @@ def _judged(mode: int, constants: BothAxes['AxisConstants']) -> int:
 
 @compiled
 def take(supervision: Supervision, mode: int, inputs: Inputs, outputs: Outputs, constants: BothAxes['AxisConstants'],
-         envelope: uncommanded_motion.Envelope, facts: Facts) -> None:
+         envelope: drive_watch.Envelope, facts: Facts) -> None:
     """Determine the conditions of all alarms in a step, and update the alarms.
 
     mode: standby while the mode commands no motion.

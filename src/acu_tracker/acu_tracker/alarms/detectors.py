@@ -6,7 +6,7 @@ ends below a second level, which is half of the first unless stated otherwise.
 y          angle of the load encoder
 dy         rate of the axis by the encoders of the motors
 T          torque of the motors on the load
-high, low  envelope of the recent rate commands, from servo.uncommanded_motion
+high, low  envelope of the recent rate commands, from servo.drive_watch
 dt         time since the previous step
 """
 import math

@@ -1,7 +1,7 @@
 """Estimation of the direction of the target and of its motion, from the errors of the receiver.
 
-`target` converts the errors to the frame of the filter, `tracker` gates them, and the package `filters` filters them.
-The other modules are monitors that detect wrong errors of the receiver.
+`receiver_error` measures the direction of the target with an error, gates it and gives it to the filters of the
+package `filters`. `target` predicts the target from their estimate. `monitors` detect wrong errors.
 
 Symbols
     X = (x1 x2 x3)  estimate of one axis: angle, rate, acceleration                     [rad, rad/s, rad/s2]

@@ -1,52 +1,54 @@
-"""The estimate of the target: conversion of measurements from the deck to the frame of the filter, and back.
+"""The target: its estimate by the filter, in the frame of the filter, in earth angles and in deck angles.
 
 The equator of the filter's frame passes through the target (`estimate_frame`). With a measured range the filter
-estimates the line of sight from the INS, otherwise the one from the antenna (`lever_arm`). The module `tracking` calls
-this module.
+estimates the line of sight from the INS, otherwise the one from the antenna (`lever_arm`). Between accepted
+measurements the filter stays at the stamp of the last one; `outlook` and `read` predict from there.
 """
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
-from acu_tracker.estimation import tracker
+from acu_tracker.estimation import monitors
 from acu_tracker.estimation.filters import target_filter
-from acu_tracker.estimation.filters.measurement import (
-    NO_INNOVATION,
-    AxisMeasurement,
-    AxisVariances,
-    Estimate,
-    Innovation,
-    Measurement,
-    attitude_variances,
-    error_variance,
-)
-from acu_tracker.geometry import attitude, attitude_error, deck_reference, estimate_frame, lever_arm
+from acu_tracker.estimation.filters.measurement import AxisVariances, Estimate
+from acu_tracker.estimation.params import FilterParameters, TrackerParameters
+from acu_tracker.geometry import attitude, deck_reference, estimate_frame, lever_arm
 from acu_tracker.geometry.attitude import DeckAttitude
 from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
-from acu_tracker.geometry.encoders import Pointing
-from acu_tracker.geometry.motion import LineOfSight, Motion, angles, earth_angles, line_of_sight
-from acu_tracker.geometry.vector import Rotation, Vector, rotated, rotation
-from acu_tracker.signals import Inputs
+from acu_tracker.geometry.vector import LineOfSight, Motion, Rotation, angles, earth_angles, line_of_sight
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry import line_of_sight as pointing
-from pedestal_common.quantities import Bit, Meters, Radians, RadiansPerSecond, Records, Seconds
+from pedestal_common.quantities import Bit, Ints, Pair, Records, Seconds
 from pedestal_common.record import Record
 
 if TYPE_CHECKING:
     from acu_tracker.params import SharedParameters
 
 
+class Constants(Record):
+    """Constants of the filter and of its gate."""
+    filter: target_filter.Constants
+    # largest accepted nu' S^-1 nu [-] of the two angles, and of one rate or range; nu: innovation, S: its covariance
+    gates: Pair
+
+
 class Target(Record):
     """Estimate of the target."""
-    tracker: tracker.Tracker        # the filter with its gates
+    filter: target_filter.Filter
+    stamp: Seconds          # of the last accepted measurement
+    running: Bit            # 1 while there is an estimate
+    converged: Bit          # 1 if the rates are known well enough for lock
+    roughness: monitors.Roughness
+    accepted_in_a_row: int  # number of consecutive accepted measurements
+    gated_in_a_row: int     # number of consecutive rejected (gated) measurements
+    # of each axis: number of consecutive measured rates that agreed with the filter
+    rates_in_a_row: Annotated[Ints, (2,)]
+    gated: int              # number of rejected directions since the start
+    rates_gated: int        # number of rejected rates since the start
+    ranges_gated: int       # number of rejected ranges since the start
     frame: estimate_frame.Frame     # the frame of the filter
     lever_arm: lever_arm.LeverArm   # from the INS to the antenna
-
-
-OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY = tracker.OUTCOME_GATED, tracker.OUTCOME_STALE, tracker.OUTCOME_NOISY
-OUTCOME_NO_ATTITUDE = OUTCOME_NOISY + 1
-"""Outcome of `take` without an attitude; the other outcomes are those of the tracker."""
 
 
 class Source(NamedTuple):
@@ -55,110 +57,73 @@ class Source(NamedTuple):
     motion: Motion
 
 
+def gate_of_one(gate: float) -> float:
+    """Return the gate x of one number that is exceeded as rarely as `gate` of two numbers; both are chi-square [-].
+
+    Two numbers exceed `gate` with the probability e^(-gate/2). One number exceeds x with the probability erfc(z), z^2
+    = x/2. The function solves x - 2 log(e^z^2 erfc(z)) = gate by bisection, because e^z^2 erfc(z) does not underflow.
+    """
+    low, high = 0.0, gate
+    for _ in range(100):
+        x = 0.5 * (low + high)
+        z = math.sqrt(0.5 * x)
+        scaled_erfc = math.exp(z * z) * math.erfc(z) if z < 20.0 else 1.0 / (z * math.sqrt(math.pi))
+        if x - 2.0 * math.log(scaled_erfc) < gate:
+            low = x
+        else:
+            high = x
+    return high
+
+
+def constants(params: TrackerParameters, axes: Sequence[FilterParameters]) -> Records:
+    """Return the constants (1,) of the parameters, and of the filters of both axes."""
+    return Constants.of(filter=target_filter.constants(params.ukf, axes, params.receiver.noise_bandwidth),
+                        gates=(params.gate, gate_of_one(params.gate)))
+
+
 def initialise(record: Records) -> None:
     """Start without an estimate."""
     record['frame']['mat'] = np.eye(3)
 
 
 @compiled
-def _measured_direction(target: Target, params: 'SharedParameters', mat_ed: Rotation, distance: Meters,
-                        azimuth: Radians, elevation: Radians) -> tuple[Radians, Radians]:
-    """Return (azimuth, elevation) of a measured direction in the frame of the filter.
+def stop(target: Target) -> None:
+    """Discard the estimate; the next measurement starts the filter."""
+    target.running = 0
 
-    mat_ed              rotation deck -> earth
-    distance            measured range; NaN: no range
-    azimuth, elevation  deck angles of the direction
 
-    For a filter that does not run yet the frame is laid at this direction first.
+@compiled
+def reset_accepted_count(target: Target) -> None:
+    """Reset the count of accepted measurements, so that the lock takes lock_count new ones."""
+    target.accepted_in_a_row = 0
+
+
+@compiled
+def locked(target: Target, params: TrackerParameters, since_accepted: Seconds) -> Bit:
+    """Return True if autotrack can begin.
+
+    Three conditions make lock: lock_count consecutive measurements were accepted, the last of them is at most
+    coast_after old, and the filter has converged.
+
+    since_accepted: age of the last accepted measurement, less the receiver's latency.
     """
-    x, y, z = pointing.direction(azimuth, elevation)
-    v = lever_arm.from_ins(target.lever_arm, params.lever_arm, distance, target.tracker.running, Vector(x, y, z))
-    v = rotated(mat_ed, v)
-    azimuth, elevation = pointing.earth_angles(v.x, v.y, v.z)
-    if not target.tracker.running:
-        e, n, u = pointing.earth_direction(azimuth, elevation)
-        estimate_frame.lay(target.frame, Vector(e, n, u), ZERO_VECTOR)
-    return estimate_frame.direction_to_frame(target.frame, azimuth, elevation)
+    return (target.running and target.accepted_in_a_row >= params.lock_count and target.converged
+            and since_accepted <= params.coast_after)
 
 
 @compiled
-def _measured_rates(target: Target, deck: Attitude, inputs: Inputs,
-                    at: Pointing) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return (azimuth rate, elevation rate) of the target in the frame of the filter.
+def outlook(target: Target, constants: Constants, t: Seconds) -> Motion:
+    """Return the Motion that the filter predicts for t, in its frame.
 
-    The rates are the sum of the rates of the antenna and of the receiver error. deck, at: attitude of the deck and
-    direction of the antenna when the error was measured.
+    For a time before the last accepted measurement, return the Motion at that measurement.
     """
-    n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, inputs.cross_elevation, inputs.elevation,
-                                  inputs.error_rate[0], inputs.error_rate[1])
-    v, dv = lever_arm.to_ins(target.lever_arm, Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]))
-    return deck_reference.earth_rates(estimate_frame.of_deck(target.frame, deck), v, dv)
+    return target_filter.outlook(target.filter, constants.filter, max(t - target.stamp, 0.0))
 
 
 @compiled
-def take(target: Target, params: 'SharedParameters', constants: tracker.Constants, deck: DeckAttitude, inputs: Inputs,
-         at: Pointing, measured: tuple[Radians, Radians], restart_gap: Seconds) -> tuple[int, Innovation]:
-    """Filter an error of the receiver. Return (its outcome, the innovation).
-
-    The outcomes are those of the tracker and OUTCOME_NO_ATTITUDE.
-
-    at           direction of the antenna when the error was measured
-    measured     deck angles (azimuth, elevation) of the target: those of the antenna, displaced by the error
-    restart_gap  time without accepted errors after which the filter restarts
-    """
-    e = params.tracker.receiver
-    t = inputs.error_stamp - e.age
-    known, now = attitude.at(deck, params, t)
-    if not known:
-        return OUTCOME_NO_ATTITUDE, NO_INNOVATION
-    azimuth, elevation = _measured_direction(target, params, now.mat, inputs.range if deck.stabilised else math.nan,
-                                             measured[0], measured[1])
-    azimuth_rate, elevation_rate = math.nan, math.nan
-    if math.isfinite(inputs.error_rate[0] + inputs.error_rate[1] + inputs.error_rate_sigma):
-        azimuth_rate, elevation_rate = _measured_rates(target, now, inputs, at)
-    # R_cross, R_elevation: variances of the measured direction in cross-elevation and elevation [rad2].
-    R_cross = R_elevation = error_variance(inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz, e)
-    cos_el = max(math.cos(elevation), 0.01)     # This avoids a division by zero at the zenith.
-    # walk_cross, walk_elevation: growth of these variances by the random walk of the attitude error [rad2/s].
-    walk_cross = walk_elevation = 0.0
-    if deck.stabilised:
-        verticals = estimate_frame.verticals(target.frame, azimuth, elevation)
-        noise, walk = attitude_error.expected(deck.error, params.tracker.attitude)
-        cross, along = attitude_variances(verticals, *noise)
-        R_cross, R_elevation = R_cross + cross, R_elevation + along
-        walk_cross, walk_elevation = attitude_variances(verticals, *walk)
-    target_filter.walk(target.tracker.filter, walk_cross / (cos_el * cos_el), walk_elevation)
-    R_rate = inputs.error_rate_sigma * inputs.error_rate_sigma
-    axis = (AxisMeasurement(azimuth, R_cross / (cos_el * cos_el), azimuth_rate, R_rate / (cos_el * cos_el)),
-            AxisMeasurement(elevation, R_elevation, elevation_rate, R_rate))
-    outcome, innovation = tracker.observe(target.tracker, params.tracker, constants,
-                                          Measurement(t, axis, inputs.range, inputs.range_variance), restart_gap)
-    if outcome != OUTCOME_STALE:
-        _follow_with_frame(target, constants)
-    return outcome, innovation
-
-
-@compiled
-def _follow_with_frame(target: Target, constants: tracker.Constants) -> None:
-    """Lay the frame along the motion of a target that is too far off its equator, and turn the filter with it."""
-    motion = tracker.outlook(target.tracker, constants, target.tracker.stamp)
-    if abs(motion.elevation.angle) <= estimate_frame.MAX_FRAME_ELEVATION_RAD:
-        return
-    before, sight = rotation(target.frame.mat), estimate_frame.to_earth(target.frame, motion)
-    estimate_frame.lay(target.frame, sight.u, sight.du)
-    tracker.turn(target.tracker, constants, estimate_frame.from_earth(target.frame, before))
-
-
-@compiled
-def outlook(target: Target, constants: tracker.Constants, t: Seconds) -> Source:
-    """Return the Source that the filter predicts for t."""
-    return Source(1, tracker.outlook(target.tracker, constants, t))
-
-
-@compiled
-def earth_outlook(target: Target, constants: tracker.Constants, t: Seconds) -> LineOfSight:
+def earth_outlook(target: Target, constants: Constants, t: Seconds) -> LineOfSight:
     """Return the LineOfSight in ENU that the filter predicts for t."""
-    return estimate_frame.to_earth(target.frame, tracker.outlook(target.tracker, constants, t))
+    return estimate_frame.to_earth(target.frame, outlook(target, constants, t))
 
 
 @compiled
@@ -186,10 +151,11 @@ def on_levelled_deck(target: Target, level: Rotation, source: Source) -> Motion:
 
 
 @compiled
-def read(target: Target, params: 'SharedParameters', constants: tracker.Constants, deck: DeckAttitude,
+def read(target: Target, params: 'SharedParameters', constants: Constants, deck: DeckAttitude,
          t: Seconds) -> Estimate:
-    """Return the Estimate at t in earth angles, as seen from the antenna."""
-    framed, variances = tracker.read(target.tracker, constants, t)
+    """Return the Estimate at t in earth angles, as seen from the antenna; t as in `outlook`."""
+    target_filter.predict(target.filter, constants.filter, max(t - target.stamp, 0.0))
+    framed, variances = target_filter.read(target.filter)
     azimuth, elevation = variances
     motion = earth_angles(estimate_frame.to_earth(target.frame, framed))
     A11, E11 = estimate_frame.earth_variances(target.frame, framed, motion, azimuth.p11, elevation.p11)

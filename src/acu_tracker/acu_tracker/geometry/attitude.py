@@ -1,24 +1,43 @@
-"""The attitude of the deck: the last measurements of the INS,
-interpolated or extrapolated to any instant near them.
+"""The attitude of the deck: its history, the correction of its jumps, and the statistics of its error.
+
+DeckAttitude interpolates or extrapolates the last measurements of the INS to any instant near them.
 
 w, dw: angular rate [rad/s] and angular acceleration [rad/s2] of the deck, FLU; T: time between two samples, or
 since the last sample.
+
+AttitudeError: statistics of the error of the measured attitude, which are noise and slow random walk of tilt and
+heading. The INS may publish these statistics on ins/error; otherwise parameters define the statistics.
+`receiver_error` adds the noise to the variance of each measured direction. Tilt stands for roll and for pitch.
+
+AttitudeJump: correction of jumps in the attitude of the INS, which are changes that the measured rates of the deck do
+not explain. A rotation c keeps the corrected attitude continuous at a jump. Afterwards the angle of c decays slowly to
+0, so that the corrected attitude returns to the measured one.
+
+    p_k = b_k-1 (x) exp(w T / 2)    attitude of sample k, predicted by the rate w from b_k-1
+    b_k = c (x) q_k                 corrected attitude; q_k: measured by the INS; c = 1 before any jump
+    c = p_k (x) q_k*                set at a jump: the angle between b_k and p_k exceeds MAX_UNEXPLAINED_ANGLE_RAD
+
+(x) is the product of quaternions, q* the inverse of q, w the rate of the deck [rad/s], T the time between two samples
+[s]. The quaternions rotate deck -> earth, so that c turns about axes of the earth. The angle of c decays at
+JUMP_DECAY_RATE_RAD_S. Neither a jump of any size nor this decay disturbs tracking by the receiver. A mode that points
+by the attitude follows the decay so slowly that the operator can check the new attitude.
 """
 import math
 from typing import TYPE_CHECKING, Annotated
 
-from acu_tracker.geometry import attitude_error, attitude_jump, deck_reference
+from acu_tracker.geometry import deck_reference
 from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
 from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, push
-from acu_tracker.geometry.motion import Motion, angles, line_of_sight
-from acu_tracker.geometry.vector import Rotation, Vector, turn
+from acu_tracker.geometry.vector import Motion, Rotation, Vector, angles, line_of_sight, turn
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE, product
 from pedestal_common.quantities import (
     Bit,
     Floats,
+    Pair,
     Quaternion,
     Radians,
+    Radians2,
     RadiansPerSecond,
     RadiansPerSecond2,
     Seconds,
@@ -29,7 +48,114 @@ from pedestal_common.quantities import (
 from pedestal_common.record import Record
 
 if TYPE_CHECKING:
+    from acu_tracker.estimation.params import AttitudeModelParameters
     from acu_tracker.params import SharedParameters
+
+
+class AttitudeError(Record):
+    """Statistics that the INS published."""
+    published: Bit  # 1 after the INS published valid statistics
+    noise: Pair     # variance of the white noise of a sample, of (tilt, heading) [rad2]
+    walk: Pair      # growth of the variance by the random walk of the error, of (tilt, heading) [rad2/s]
+
+
+MAX_ATTITUDE_NOISE = 0.5  # largest accepted 1-sigma of the noise [rad] and of the random walk [rad/sqrt(s)]
+
+
+@compiled
+def take_statistics(error: AttitudeError, noise: Vector3, walk: Vector3) -> bool:
+    """Adopt the statistics that the INS published; return False, without a change, if a number is out of range.
+
+    noise  1-sigma of the noise of roll, pitch and heading [rad]
+    walk   1-sigma of their random walk [rad/sqrt(s)]
+    """
+    for i in range(3):
+        if not (0.0 <= noise[i] <= MAX_ATTITUDE_NOISE and 0.0 <= walk[i] <= MAX_ATTITUDE_NOISE):
+            return False
+    error.noise[0], error.noise[1] = 0.5 * (noise[0] * noise[0] + noise[1] * noise[1]), noise[2] * noise[2]
+    error.walk[0], error.walk[1] = 0.5 * (walk[0] * walk[0] + walk[1] * walk[1]), walk[2] * walk[2]
+    error.published = 1
+    return True
+
+
+@compiled
+def expected_error(error: AttitudeError,
+             model: 'AttitudeModelParameters') -> tuple[tuple[Radians2, Radians2], tuple[float, float]]:
+    """Return ((noise of tilt, of heading), (walk of tilt, of heading) [rad2/s]).
+
+    The parameters `model` are used if the INS published no statistics. The slow errors of these parameters are
+    Gauss-Markov processes with the standard deviation sigma (tilt_wander, heading_wander) and the correlation time tau
+    (wander_time). Their variance first grows by 2 sigma^2 / tau [rad2/s].
+    """
+    if error.published:
+        return (error.noise[0], error.noise[1]), (error.walk[0], error.walk[1])
+    k = 2.0 / model.wander_time
+    return ((model.tilt_noise * model.tilt_noise, model.heading_noise * model.heading_noise),
+            (k * model.tilt_wander * model.tilt_wander, k * model.heading_wander * model.heading_wander))
+
+
+class AttitudeJump(Record):
+    """Correction of the attitude after a jump."""
+    c: Quaternion   # correcting quaternion earth -> earth
+    apart: Bit      # 1 while c is in use, after a jump
+
+
+MAX_UNEXPLAINED_ANGLE_RAD = 3e-3
+"""Largest angle between measured and predicted attitude that is not a jump [rad].
+
+The angle is a hundred times the noise of an INS. In a step of 5 ms a rate with an error of 0.5 rad/s gives this angle.
+"""
+
+JUMP_DECAY_RATE_RAD_S = 1e-3
+"""Rate at which the angle of c decays, and with which the corrected attitude returns to the measured one [rad/s]."""
+
+
+@compiled
+def conjugate(q: Xyzw) -> Xyzw:
+    """Return the inverse of a unit quaternion."""
+    return -q[0], -q[1], -q[2], q[3]
+
+
+@compiled
+def _half_angle(q: Xyzw | Quaternion) -> Radians:
+    """Return half of the angle of a unit quaternion, 0 to pi / 2."""
+    return math.atan2(math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]), abs(q[3]))
+
+
+@compiled
+def clear_jump(jump: AttitudeJump) -> None:
+    """Discard c: the measured attitude is used without a correction."""
+    jump.apart = 0
+
+
+@compiled
+def _decay(jump: AttitudeJump, T: Seconds) -> None:
+    """Reduce the angle of c by JUMP_DECAY_RATE_RAD_S for T."""
+    half = _half_angle(jump.c)
+    left = half - 0.5 * JUMP_DECAY_RATE_RAD_S * T
+    if left <= 0.0:
+        jump.apart = 0
+        return
+    k = math.sin(left) / math.sin(half) * math.copysign(1.0, jump.c[3])
+    jump.c[0], jump.c[1], jump.c[2], jump.c[3] = k * jump.c[0], k * jump.c[1], k * jump.c[2], math.cos(left)
+
+
+@compiled
+def jump_corrected(jump: AttitudeJump, predicted: Xyzw, measured: Xyzw, T: Seconds) -> Xyzw:
+    """Return the corrected quaternion b_k of a measured quaternion q_k.
+
+    predicted: p_k; measured: q_k; T: time since the sample before.
+    """
+    q = measured
+    if jump.apart:
+        _decay(jump, T)
+        if jump.apart:
+            q = product(jump.c, measured)
+    if 2.0 * _half_angle(product(conjugate(predicted), q)) <= MAX_UNEXPLAINED_ANGLE_RAD:
+        return q
+    jump.c[0], jump.c[1], jump.c[2], jump.c[3] = product(predicted, conjugate(measured))
+    jump.apart = 1
+    return predicted
 
 
 class AttitudeHistory(History):
@@ -43,8 +169,8 @@ class DeckAttitude(Record):
     history: AttitudeHistory
     sample: Annotated[Floats, (7,)]     # last quaternion and w as received
     aligned: Bit            # 1 if the INS was aligned at the last sample
-    jump: attitude_jump.AttitudeJump
-    error: attitude_error.AttitudeError
+    jump: AttitudeJump
+    error: AttitudeError
 
 
 RATE_COLUMN, ACCELERATION_COLUMN = 4, 7
@@ -134,7 +260,7 @@ def _correct_jump(deck: DeckAttitude, row: int, last: int, T: Seconds) -> None:
     a, b = deck.history.sample[last], deck.history.sample[row]
     w_a, w_b = _vector(a, RATE_COLUMN), _vector(b, RATE_COLUMN)
     predicted = rotated(a, (0.5 * T * (w_a.x + w_b.x), 0.5 * T * (w_a.y + w_b.y), 0.5 * T * (w_a.z + w_b.z)))
-    b[0], b[1], b[2], b[3] = attitude_jump.jump_corrected(deck.jump, predicted, (b[0], b[1], b[2], b[3]), T)
+    b[0], b[1], b[2], b[3] = jump_corrected(deck.jump, predicted, (b[0], b[1], b[2], b[3]), T)
 
 
 @compiled
@@ -178,7 +304,7 @@ def take(deck: DeckAttitude, params: 'SharedParameters', t_k: Seconds, stamp: Se
     if T <= params.attitude_timeout and deck.aligned and not aligning:
         _correct_jump(deck, row, last, T)
     else:
-        attitude_jump.clear(deck.jump)
+        clear_jump(deck.jump)
     deck.aligned = not aligning
     return SAMPLE_NEW
 

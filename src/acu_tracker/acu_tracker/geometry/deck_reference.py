@@ -14,8 +14,19 @@ The conversion is exact: it differentiates the unit vector u to the target twice
 """
 from typing import NamedTuple
 
-from acu_tracker.geometry.motion import LineOfSight, angles, earth_angles, turned
-from acu_tracker.geometry.vector import Rotation, Vector, cross, minus, rotated, times, transposed
+from acu_tracker.geometry.vector import (
+    LineOfSight,
+    Rotation,
+    Vector,
+    angles,
+    cross,
+    earth_angles,
+    minus,
+    rotated,
+    times,
+    transposed,
+    turned,
+)
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.quantities import Radians, RadiansPerSecond

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from acu_tracker.geometry.motion import AxisMotion, Motion
+from acu_tracker.geometry.vector import AxisMotion, Motion
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Floats, Pair, Pairs, Records, Seconds, Times
 from pedestal_common.record import Record

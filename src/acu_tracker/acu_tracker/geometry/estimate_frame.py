@@ -10,8 +10,21 @@ equator. Between these instants the frame is fixed to the earth.
 import math
 
 from acu_tracker.geometry.deck_reference import Attitude
-from acu_tracker.geometry.motion import LineOfSight, Motion, earth_angles, line_of_sight, turned
-from acu_tracker.geometry.vector import Rotation, Vector, cross, dot, rotated, rotated_back, rotation, transposed
+from acu_tracker.geometry.vector import (
+    LineOfSight,
+    Motion,
+    Rotation,
+    Vector,
+    cross,
+    dot,
+    earth_angles,
+    line_of_sight,
+    rotated,
+    rotated_back,
+    rotation,
+    transposed,
+    turned,
+)
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import earth_direction
 from pedestal_common.quantities import Matrix3, Radians

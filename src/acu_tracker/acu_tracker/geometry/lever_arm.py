@@ -11,8 +11,17 @@ from the INS.
 """
 import math
 
-from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, normalised
-from acu_tracker.geometry.vector import Rotation, Vector, minus, rotated, vector
+from acu_tracker.geometry.vector import (
+    AxisMotion,
+    LineOfSight,
+    Motion,
+    Rotation,
+    Vector,
+    minus,
+    normalised,
+    rotated,
+    vector,
+)
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.lever_arm import LeverArm as LeverArmParameters
 from pedestal_common.geometry.line_of_sight import earth_angles, earth_direction, wrap

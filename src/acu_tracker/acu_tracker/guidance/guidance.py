@@ -15,25 +15,24 @@ import numpy as np
 from acu_tracker import modes
 from acu_tracker import tracking as target_tracking
 from acu_tracker.estimation import target
-from acu_tracker.geometry import attitude, azimuth_turn, azimuth_wrap, direction
+from acu_tracker.geometry import attitude, azimuth_wrap, direction
 from acu_tracker.geometry.azimuth_wrap import Travel
-from acu_tracker.geometry.encoders import Pointing
-from acu_tracker.geometry.motion import AxisMotion, Motion, line_of_sight
-from acu_tracker.geometry.vector import rotation
+from acu_tracker.geometry.history import Pointing
+from acu_tracker.geometry.vector import AxisMotion, Motion, line_of_sight, rotation
 from acu_tracker.guidance import manual
 from acu_tracker.lookahead import planner
-from acu_tracker.mode import signal_level_modes
-from acu_tracker.mode.outage import Outage
+from acu_tracker.mode.interruptions import Outage
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.pointing import model
 from acu_tracker.program import bridge, program_track
 from acu_tracker.program.program_track import ProgramTrack
-from acu_tracker.search import acquisition
+from acu_tracker.search import acquisition, level_modes
 from acu_tracker.servo import position_loop
 from acu_tracker.servo.ends import Ends
 from acu_tracker.signals import Inputs
 from acu_tracker.tracking import Tracking
 from pedestal_common.compiled import compiled, separate
+from pedestal_common.geometry import line_of_sight as pointing
 from pedestal_common.quantities import Bit, BothAxes, Pair, Radians, Records, Seconds
 from pedestal_common.record import Record
 
@@ -50,7 +49,7 @@ class Guidance(Record):
     bridge: bridge.Bridge           # rotation of the program to the place where the target was last tracked
     acquisition: acquisition.Acquisition    # state of the modes that use the signal level
     lookahead: planner.Planner      # planned slews through keyholes, and predicted hidden sectors
-    turn: azimuth_turn.Turn         # turn of the azimuth to another wrap at a limit of its travel
+    turn: azimuth_wrap.Turn         # turn of the azimuth to another wrap at a limit of its travel
     azimuth: Radians                # azimuth of the last reference, before the shaper
     target_angles: Pair             # encoder angles of the target for that reference [rad]
     direction: Pair                 # deck angles of the target on the sky [rad]
@@ -75,7 +74,7 @@ def initialise(guidance: Records, preset: tuple[Radians, Radians]) -> None:
     manual.initialise(guidance['manual'])
     acquisition.initialise(guidance['acquisition'])
     planner.initialise(guidance['lookahead'])
-    azimuth_turn.initialise(guidance['turn'])
+    azimuth_wrap.initialise_turn(guidance['turn'])
     guidance['held'] = -math.inf
 
 
@@ -169,10 +168,10 @@ def _source(guidance: Guidance, tracking: Tracking, constants: 'Constants', mode
     if modes.FOLLOWS_TABLE[mode]:
         return target.Source(0, program_track.motion_at(way.program, t))
     if modes.USES_SIGNAL_LEVEL[mode]:
-        return signal_level_modes.source(guidance.acquisition, mode, constants, way, t)
+        return level_modes.source(guidance.acquisition, mode, constants, way, t)
     if way.valid and gap.coasting and gap.permitted and program_track.status(way.program, t) == Reason.NONE:
         return target.Source(0, bridge.motion_at(way, t))
-    return target.outlook(tracking.target, constants.tracker, t)
+    return target.Source(1, target.outlook(tracking.target, constants.target, t))
 
 
 @compiled
@@ -190,7 +189,7 @@ def _wrapped(guidance: Guidance, params: 'AxisParameters', order: Order, program
     guidance.azimuth = azimuth_wrap.nearest(azimuth.angle, before, limits.low, limits.high, travel)
     has_motors = int(params.controller) != position_loop.CONTROLLER_BEAM
     if not begins and abs(guidance.azimuth - before) > math.pi and has_motors:
-        azimuth_turn.begin(guidance.turn, t)
+        azimuth_wrap.begin_turn(guidance.turn, t)
         if guidance.overtravel and program_track.status(program, t) == Reason.NONE:
             begins, travel = True, program_track.azimuth_travel(program, t)
     if begins:
@@ -207,10 +206,10 @@ def watch_beam(guidance: Guidance, constants: 'Constants', mode: int, references
     references: shaped references of the axes at t; limited: True if an axis is held at a limit.
     """
     beamwidth, elevation = constants.p.tracker.receiver.beamwidth, guidance.target_angles[1]
-    azimuth_turn.watch(guidance.turn, references.azimuth.angle, (guidance.azimuth, elevation), beamwidth, t)
+    azimuth_wrap.watch_turn(guidance.turn, references.azimuth.angle, (guidance.azimuth, elevation), beamwidth, t)
     if limited and modes.FOLLOWS_TARGET[mode] and math.hypot(
             (guidance.azimuth - references.azimuth.angle) * math.cos(elevation),
-            elevation - references.elevation.angle) > azimuth_turn.MAX_OFFSET_BEAMWIDTHS * beamwidth:
+            elevation - references.elevation.angle) > azimuth_wrap.MAX_OFFSET_BEAMWIDTHS * beamwidth:
         guidance.held = t
 
 
@@ -220,7 +219,7 @@ def pointing_offset(guidance: Guidance, t: Seconds) -> Radians:
 
     During a turn of the azimuth the angle is inf, so that no error is used.
     """
-    return math.inf if azimuth_turn.covers(guidance.turn, t) else guidance.pointing_offset
+    return math.inf if azimuth_wrap.turn_covers(guidance.turn, t) else guidance.pointing_offset
 
 
 @compiled
@@ -251,12 +250,12 @@ def begin_by_level(guidance: Guidance, tracking: Tracking, constants: 'Constants
     tracked = before == Mode.AUTOTRACK
     if tracked:
         sight = target_tracking.sight(tracking, constants, t)
-        signal_level_modes.remember(guidance.acquisition, t, sight.u, sight.du)
+        level_modes.remember(guidance.acquisition, t, sight.u, sight.du)
     elif not modes.USES_SIGNAL_LEVEL[before]:
         u, du = target_tracking.beam(tracking, constants, t)
-        signal_level_modes.remember(guidance.acquisition, t, u, du)
+        level_modes.remember(guidance.acquisition, t, u, du)
     spread = target_tracking.spread(tracking, constants, t) if tracked and mode == Mode.SEARCH else np.nan
-    signal_level_modes.begin(guidance.acquisition, mode, constants, t, spread)
+    level_modes.begin(guidance.acquisition, mode, constants, t, spread)
 
 
 @compiled
@@ -267,9 +266,11 @@ def check_slope(guidance: Guidance, tracking: Tracking, constants: 'Constants', 
     at: the beam when the error was measured.
     """
     t = inputs.error_stamp - constants.p.tracker.receiver.age
-    expected = signal_level_modes.expected(guidance.acquisition, way, t)
+    expected = level_modes.expected(guidance.acquisition, way, t)
     motion = attitude.on_deck(tracking.attitude, constants.p, t, expected)
-    signal_level_modes.check_slope(guidance.acquisition, at, motion, (inputs.cross_elevation, inputs.elevation))
+    x, y, z = pointing.direction(motion.azimuth.angle, motion.elevation.angle)
+    acquisition.take_error(guidance.acquisition, pointing.offsets(at.A, at.E, x, y, z),
+                           (inputs.cross_elevation, inputs.elevation))
 
 
 @separate
@@ -284,7 +285,7 @@ def look_ahead(guidance: Guidance, tracking: Tracking, constants: 'Constants', m
         planner.clear_plan(lookahead)
         guidance.overtravel, guidance.pointing_offset = 0, 0.0
         if mode != Mode.SLAVE:
-            azimuth_turn.stop(guidance.turn)
+            azimuth_wrap.stop_turn(guidance.turn)
             guidance.held = -math.inf
         return False
     another = planner.another_program(lookahead, program)
@@ -301,18 +302,18 @@ def look_ahead(guidance: Guidance, tracking: Tracking, constants: 'Constants', m
 def _plan(guidance: Guidance, tracking: Tracking, constants: 'Constants', mode: int, program: ProgramTrack,
           gap: Outage, t: Seconds) -> None:
     """Plan from t on along the program, or along the great circle of the target."""
-    pointing, lookahead, azimuth = tracking.pointing.model, guidance.lookahead, guidance.azimuth
+    terms, lookahead, azimuth = tracking.pointing.model, guidance.lookahead, guidance.azimuth
     if modes.FOLLOWS_TABLE[mode]:
         bridge.clear(guidance.bridge)
-        planner.look_along_program(lookahead, constants.lookahead, pointing, t, azimuth,
+        planner.look_along_program(lookahead, constants.lookahead, terms, t, azimuth,
                                    bridge.way(guidance.bridge, program))
         return
     if mode == Mode.AUTOTRACK and not gap.coasting:
         bridge_to(guidance, tracking, constants, program, t)
     way = bridge.way(guidance.bridge, program)
     if way.valid and program_track.status(program, t) == Reason.NONE:
-        planner.look_along_program(lookahead, constants.lookahead, pointing, t, azimuth, way)
+        planner.look_along_program(lookahead, constants.lookahead, terms, t, azimuth, way)
         return
-    sight = (line_of_sight(signal_level_modes.expected(guidance.acquisition, way, t))
+    sight = (line_of_sight(level_modes.expected(guidance.acquisition, way, t))
              if modes.USES_SIGNAL_LEVEL[mode] else target_tracking.sight(tracking, constants, t))
-    planner.look_along_great_circle(lookahead, constants.lookahead, pointing, t, azimuth, sight.u, sight.du)
+    planner.look_along_great_circle(lookahead, constants.lookahead, terms, t, azimuth, sight.u, sight.du)

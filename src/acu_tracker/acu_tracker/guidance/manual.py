@@ -9,7 +9,7 @@ i: axis, 0 azimuth, 1 elevation. Angles are deck angles.
 import math
 from collections.abc import Sequence
 
-from acu_tracker.geometry.motion import AxisMotion, Motion
+from acu_tracker.geometry.vector import AxisMotion, Motion
 from acu_tracker.servo.ends import Ends
 from acu_tracker.servo.params import ShaperParameters
 from pedestal_common.compiled import compiled

@@ -7,8 +7,7 @@ import math
 from typing import NamedTuple
 
 from acu_tracker.geometry.azimuth_wrap import Travel
-from acu_tracker.geometry.great_circle import turned
-from acu_tracker.geometry.vector import Vector, dot, minus, rotated_back, rotation
+from acu_tracker.geometry.vector import Vector, dot, minus, rotated_back, rotation, turned_along
 from acu_tracker.program import bridge
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
@@ -65,7 +64,7 @@ def along_great_circle(path: Path, mat: Matrix3, u: Vector, du: Vector) -> int:
     """
     W, level = math.sqrt(dot(du, du)), rotation(mat)
     for i in range(len(path.rows)):
-        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(level, turned(u, du, W, W * i * path.h))
+        path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(level, turned_along(u, du, W, W * i * path.h))
     return len(path.rows)
 
 

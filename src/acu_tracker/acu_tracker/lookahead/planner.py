@@ -11,8 +11,7 @@ from collections.abc import MutableSequence
 from typing import TYPE_CHECKING, Annotated
 
 from acu_tracker.geometry.azimuth_wrap import Travel
-from acu_tracker.geometry.motion import AxisMotion, Motion
-from acu_tracker.geometry.vector import Vector
+from acu_tracker.geometry.vector import AxisMotion, Motion, Vector
 from acu_tracker.lookahead import keyhole, levelled_deck
 from acu_tracker.lookahead import path as paths
 from acu_tracker.lookahead import slew as slews

@@ -4,8 +4,7 @@ At each instant the elevation takes the angle at which the beam is closest to th
 """
 import math
 
-from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, line_of_sight, north_west_up
-from acu_tracker.geometry.vector import Vector
+from acu_tracker.geometry.vector import AxisMotion, LineOfSight, Motion, Vector, line_of_sight, north_west_up
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_common.quantities import Bit, Radians, RadiansPerSecond, RadiansPerSecond2, Seconds

@@ -1,15 +1,12 @@
 """The table of the commands that the control unit accepts on acu/command: modes with arguments, and other commands.
 
-The functions at the end write the arguments of a mode into the state of the unit.
+`commands` executes them.
 """
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, TypeAlias
-
-import numpy as np
+from collections.abc import Mapping
+from typing import TypeAlias
 
 from acu_tracker.alarms.annunciator import MAX_SHELVING_TIME_S
-from acu_tracker.geometry import direction
 from acu_tracker.guidance import manual
 from acu_tracker.modes import FALLBACK_MODES
 from acu_tracker.operating.authority import CONTROL_ROLES
@@ -17,11 +14,8 @@ from acu_tracker.pointing.params import PointingParameters
 from pedestal_common.graph.modes import MODE_ROWS, MODES
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import ParameterError, as_dict, flatten
-from pedestal_common.quantities import Radians, RadiansPerSecond, Value
+from pedestal_common.quantities import Radians, Value
 from pedestal_common.wire.commands import Argument, CommandDefinition
-
-if TYPE_CHECKING:
-    from acu_tracker.unit import Acu
 
 Arguments: TypeAlias = Mapping[str, Value]  # of a command, by name
 
@@ -56,7 +50,7 @@ MODE_ARGUMENTS = {
 
 _ALARM_ARGUMENT = Argument('alarm', 'name of the alarm, with _ or blanks')
 
-ALARM_COMMANDS = (
+_ALARM_COMMANDS = (
     CommandDefinition('acknowledge', 'acknowledge an alarm and all alarms that are its consequences',
                       (_ALARM_ARGUMENT._replace(doc='name of the alarm; default: every alarm', default=''),)),
     CommandDefinition('shelve', 'shelve an alarm for a time', (
@@ -66,7 +60,6 @@ ALARM_COMMANDS = (
     CommandDefinition('reset', 'reset latched alarms; also cancel the initial mode, or a mode to be resumed, that has '
                       'not been entered yet; refused while the cause of a latched alarm is still present; in realtime '
                       'the control unit also requests the reset of a drive in fault'))
-ALARM_COMMAND_NAMES = tuple(command.name for command in ALARM_COMMANDS)
 
 ACU_COMMANDS = (
     *(CommandDefinition(mode, row.doc, MODE_ARGUMENTS.get(mode, ())) for mode, row in zip(MODES, MODE_ROWS)),
@@ -82,7 +75,7 @@ ACU_COMMANDS = (
         Argument('role', 'role of the client; a supervisor takes control from any holder', options=CONTROL_ROLES,
                  default='operator'),)),
     CommandDefinition('release', 'release control'),
-    *ALARM_COMMANDS,
+    *_ALARM_COMMANDS,
 )
 
 POINTS_DOC = "named points for `preset`: 'NAME azimuth elevation; ...' [rad], deck angles; empty: none"
@@ -101,49 +94,3 @@ def points(text: str) -> dict[str, tuple[Radians, Radians]]:
             raise ParameterError(f'points = {part!r}: each name must be unique, each angle -20 to 20 rad')
         named[name] = azimuth, elevation
     return named
-
-
-def _rates(arguments: Arguments) -> list[RadiansPerSecond]:
-    return [arguments[f'{axis}_rate'] for axis in AXES]
-
-
-def _take_preset(unit: 'Acu', arguments: Arguments) -> None:
-    """Set the direction of the mode preset: angles or a named point, and rates.
-
-    Raise ValueError for an unknown point.
-    """
-    angles: Sequence[Radians] = [arguments[axis] for axis in AXES]
-    if arguments['point']:
-        named = points(unit.parameters.points)
-        if arguments['point'] not in named:
-            raise ValueError(f'point = {arguments["point"]}: must be one of {", ".join(named) or "none"}')
-        angles = named[arguments['point']]
-    state = unit.parts['state']
-    preset = state['guidance']['preset']
-    direction.set_moving(preset, state['stamp'], np.where(np.isfinite(angles), angles, preset['angle']),
-                         _rates(arguments), arguments['moves'])
-
-
-def _take_rate(unit: 'Acu', arguments: Arguments) -> None:
-    """Set the rates of the mode rate."""
-    state = unit.parts['state']
-    manual.request_rates(state['guidance']['manual'], [arguments[axis] for axis in AXES], state['stamp'])
-
-
-def _take_slave(unit: 'Acu', arguments: Arguments) -> None:
-    """Set the direction of the mode slave. The refraction is added to a true elevation."""
-    state = unit.parts['state']
-    slave = state['guidance']['slave']
-    direction.set_moving(slave, state['stamp'], [arguments[axis] for axis in AXES], _rates(arguments),
-                         arguments['moves'], arguments['holds'])
-    unit.bend(slave.copy())
-
-
-def _take_tle(unit: 'Acu', arguments: Arguments) -> None:
-    """Take the elements of the mode tle, if the command has any; raise ValueError for invalid elements."""
-    if any(arguments.values()):
-        unit.take_elements(*arguments.values())
-
-
-ARGUMENT_SETTERS = {'preset': _take_preset, 'rate': _take_rate, 'slave': _take_slave, 'tle': _take_tle}
-"""{mode: function (unit.Acu, arguments) that takes the arguments of its command}; each raises ValueError."""

@@ -2,17 +2,13 @@
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from acu_tracker import modes, signals
-from acu_tracker.modes import Reason
-from acu_tracker.operating import announcement
-from pedestal_common.graph import layouts, topics
+from acu_tracker.operating import announcement, refusals
+from pedestal_common.graph import topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
-from pedestal_common.quantities import AnyRecord, Radians
+from pedestal_common.quantities import AnyRecord
 
 if TYPE_CHECKING:
-    from acu_tracker.params import AcuParameters
     from acu_tracker.unit import Acu
 
 FAULT_TEXTS = {
@@ -21,7 +17,7 @@ FAULT_TEXTS = {
                     'is known',
     'diverged': "autotrack diverged: the receiver's errors led away from the target; call acu/reset_faults once "
                 'slope, phase and sign of the errors are right'}
-"""Text of each latched fault of mode.supervision, the gravest first."""
+"""Text of each latched fault of mode.interruptions, the gravest first."""
 
 GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was outside the gate and was not used',
                      ('error_noisy',): 'the errors of the receiver are noise and are not used',
@@ -30,44 +26,6 @@ GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was outside the
 
 DIRECTED_MODES = tuple(i for i, row in enumerate(modes.MODE_ROWS) if row.follows or row.name == 'preset')
 """Codes of the modes that point to a direction on the sky."""
-
-NEEDED_FIELDS = {'encoder': ('joint_states', ('position', 'velocity')),
-                 'attitude': ('ship/imu/data', ('orientation', 'angular_velocity')),
-                 'attitude_error': ('ins/error', ('position', 'velocity'))}
-"""{name in signals.INVALID_INPUTS: (topic, fields of its message that the control unit needs)}."""
-
-INPUTS_OF_REASONS = {Reason.ENCODER_INVALID: 'encoder', Reason.ATTITUDE_INVALID: 'attitude'}
-"""{reason of a refused mode: name in NEEDED_FIELDS of the input that is invalid}."""
-
-
-def missing(unit: 'Acu', name: str) -> str:
-    """Return the text that names the numbers which the last message of an input lacks; '' if it lacks none.
-
-    name: name of the input in NEEDED_FIELDS. In a decoded message a number is NaN if the message does not contain it
-    or marks it as no data.
-    """
-    topic, needed = NEEDED_FIELDS.get(name, ('', ()))
-    if topic not in unit.reads and topic != unit.trigger:
-        return ''
-    message, absent = unit.inputs[0][topic], []     # inputs (1,): the record of the last step
-    for field in needed:
-        numbers = np.isnan(message[field])
-        names = [column.name for column in layouts.columns(topic) if column.field == field]
-        absent += [field] if numbers.all() else [name for name, nan in zip(names, numbers) if nan]
-    return f'{topic}: {", ".join(absent)} missing' if absent else ''
-
-
-def beyond_limits(parameters: 'AcuParameters', angles: tuple[Radians, Radians]) -> str:
-    """Return the reason why encoder angles cannot be reached: the axes outside their limits, or else the floor.
-
-    The floor is the lowest elevation that is allowed at an azimuth.
-    """
-    outside = [f'{axis} {math.degrees(angle):.2f} deg: must be {math.degrees(limits.low):.2f} to '
-               f'{math.degrees(limits.high):.2f} deg'
-               for axis, angle in zip(topics.AXES, angles)
-               if not (limits := getattr(parameters, axis).limits).low <= angle <= limits.high]
-    azimuth, elevation = (f'{math.degrees(angle):.2f} deg' for angle in angles)
-    return ', '.join(outside) or f'elevation {elevation} is below the parameter floor at azimuth {azimuth}'
 
 
 def of(unit: 'Acu') -> Diagnosis:
@@ -79,13 +37,13 @@ def of(unit: 'Acu') -> Diagnosis:
     if faults:
         text = FAULT_TEXTS[faults[0]].format(motion=_uncommanded_motion(state['unasked']))
         return Diagnosis(LEVEL_ERROR, text, values)
-    if unit.refused_model:
-        return Diagnosis(LEVEL_ERROR, f'pointing model refused, the pedestal counts as ideal: {unit.refused_model}',
+    if unit.model.refused:
+        return Diagnosis(LEVEL_ERROR, f'pointing model refused, the pedestal counts as ideal: {unit.model.refused}',
                          values)
     if invalid in GATED_ERROR_TEXTS:
         return Diagnosis(LEVEL_WARN, GATED_ERROR_TEXTS[invalid], values)
     if invalid:
-        why = [text for name in invalid if (text := missing(unit, name))]
+        why = [text for name in invalid if (text := refusals.missing(unit, name))]
         return Diagnosis(LEVEL_ERROR, '; '.join((f'invalid input: {" ".join(invalid)}', *why)), values)
     mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
     if state['guidance']['turn']['under_way']:
@@ -103,7 +61,7 @@ def of(unit: 'Acu') -> Diagnosis:
     if announcement.reaches_end(unit):
         return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {announcement.end_of_travel(unit)}', values)
     now = unit.now * 1e-9
-    if inaccurate := [*unit.predictor.problems(now), *unit.air.problems(now)]:
+    if inaccurate := [*unit.followed.predictor.problems(now), *unit.followed.air.problems(now)]:
         return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {"; ".join(inaccurate)}', values)
     return Diagnosis(LEVEL_WARN if outputs['coasting'] else LEVEL_OK, f'{mode} ({reason})', values)
 
@@ -129,11 +87,12 @@ def _values(unit: 'Acu', faults: tuple[str, ...], invalid: tuple[str, ...]) -> l
                for i, axis in enumerate(topics.AXES)]
     for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
         values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
-    if unit.pointing_model:
-        values.append(('pointing_model', unit.pointing_model))
+    if title := unit.model.title(state['tracking']['pointing']):
+        values.append(('pointing_model', title))
     return [*values, ('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['guidance']['lookahead']),
-            *unit.predictor.diagnostic_values(unit.now * 1e-9), *unit.air.diagnostic_values(unit.now * 1e-9),
-            *((f'refused {mode}', why) for mode, why in unit.refusals().items())]
+            *unit.followed.predictor.diagnostic_values(unit.now * 1e-9),
+            *unit.followed.air.diagnostic_values(unit.now * 1e-9),
+            *((f'refused {mode}', why) for mode, why in refusals.now(unit).items())]
 
 
 def _uncommanded_motion(movement: AnyRecord) -> str:

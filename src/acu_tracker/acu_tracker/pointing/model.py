@@ -13,8 +13,8 @@ from typing import Annotated
 
 import numpy as np
 
-from acu_tracker.geometry.encoders import Pointing
-from acu_tracker.geometry.motion import AxisMotion, Motion, line_of_sight, north_west_up
+from acu_tracker.geometry.history import Pointing
+from acu_tracker.geometry.vector import AxisMotion, Motion, line_of_sight, north_west_up
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
 from pedestal_common.geometry.pointing_model import FACTORS, TERMS, PointingModel

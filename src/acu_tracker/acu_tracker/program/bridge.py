@@ -7,8 +7,7 @@ angle.
 import math
 from typing import NamedTuple
 
-from acu_tracker.geometry.motion import LineOfSight, Motion, earth_angles, line_of_sight
-from acu_tracker.geometry.vector import Vector, cross, dot, vector
+from acu_tracker.geometry.vector import LineOfSight, Motion, Vector, cross, dot, earth_angles, line_of_sight, vector
 from acu_tracker.modes import Reason
 from acu_tracker.program import program_track
 from acu_tracker.program.program_track import ProgramTrack

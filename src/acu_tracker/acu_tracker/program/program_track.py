@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acu_tracker.geometry.azimuth_wrap import Travel
-from acu_tracker.geometry.motion import AxisMotion, Motion, angles, normalised, north_west_up
-from acu_tracker.geometry.vector import Vector
+from acu_tracker.geometry.vector import AxisMotion, Motion, Vector, angles, normalised, north_west_up
 from acu_tracker.modes import Reason
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry.interval import interval

@@ -11,7 +11,7 @@ import numpy as np
 
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack, ProgramTrackError, checked
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Pairs, RadiansPerSecond, RadiansPerSecond2, Seconds, Times
+from pedestal_common.quantities import Message, Pairs, RadiansPerSecond, RadiansPerSecond2, Seconds, Times
 
 MAX_GAP_INTERVALS = 3.0
 """Longest time between two segments that counts as no gap, in row intervals; the two segments are then joined.
@@ -94,6 +94,22 @@ class Segments:
                 more = number + 1 < len(self._pieces)
                 return DuePiece(piece, number > 0 and t < piece.times[0], piece.times[-1] if more else math.inf)
         return DuePiece(NO_TRACK, False, math.inf)
+
+
+def rows(message: Message) -> tuple[Times, Pairs]:
+    """Return (times since the stamp of the message, azimuth and elevation [rad]) of a JointTrajectory.
+
+    Raise ValueError if an axis or a position is missing.
+    """
+    if not set(AXES) <= set(message.joint_names):
+        raise ValueError(f'joint_names {message.joint_names}: must hold {" and ".join(AXES)}')
+    columns = [message.joint_names.index(axis) for axis in AXES]
+    for row, point in enumerate(message.points):
+        if len(point.positions) != len(message.joint_names):
+            raise ValueError(f'row {row}: {len(point.positions)} positions; must be {len(message.joint_names)}')
+    times = [point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 for point in message.points]
+    angles = [[point.positions[column] for column in columns] for point in message.points]
+    return np.array(times), np.reshape(angles, (-1, len(columns)))
 
 
 def _rows(piece: ProgramTrack, begin: Seconds, end: Seconds) -> ProgramTrack:

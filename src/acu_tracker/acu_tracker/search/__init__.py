@@ -5,8 +5,8 @@ pattern                  leads the beam over an area that may contain the target
 place                    expected place of a target that was lost
 side_lobe, slope_check   test a signal before autotrack closes the loop on it
 step_track               follows the level if the receiver measures no angle error
-coast                    limits the time of autotrack without a signal
-acquisition              combines the other modules; `mode.signal_level_modes` calls it
+acquisition              laws of search and acquire; it combines the modules above
+level_modes              the three modes, as the control unit calls them
 
     b       half-power beamwidth                                            [rad]
     z       signal level: C/N0 of the sum channel of the receiver           [dB-Hz]

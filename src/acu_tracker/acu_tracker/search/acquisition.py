@@ -80,20 +80,6 @@ def initialise(record: Records) -> None:
 
 
 @compiled
-def take_level(state: Acquisition, params: AcquisitionParameters, z: DecibelHertz, stamp: Seconds,
-               locked: bool) -> None:
-    """Take the level z of a stamp; locked: True if the receiver measures angle errors."""
-    level.take(state.level, params, z, stamp, locked)
-
-
-@compiled
-def learn(state: Acquisition, params: AcquisitionParameters, z: DecibelHertz, stamp: Seconds) -> None:
-    """Take a level z of noise alone, measured at a stamp. Call this function before `take_level`."""
-    if stamp > state.level.stamp and math.isfinite(z) and math.isfinite(state.level.stamp):
-        level.learn(state.level, params, z, min(stamp - state.level.stamp, params.time_constant))
-
-
-@compiled
 def begin_search(state: Acquisition, params: SearchParameters, beamwidth: Radians, t: Seconds, sigma: Radians) -> None:
     """Start a search at t.
 
@@ -132,19 +118,6 @@ def searched(state: Acquisition, params: SearchParameters, tau: Seconds, beamwid
     over = t >= params.rounds * (T_small + T_full)
     t -= math.floor(t / (T_small + T_full)) * (T_small + T_full)
     return (pattern.point(small, t) if t < T_small else pattern.point(full, t - T_small)), over
-
-
-@compiled
-def set_offset(state: Acquisition, x: Radians, e: Radians) -> None:
-    """Set the offset (x, e) of the beam from the expected place."""
-    state.centre[0], state.centre[1] = x, e
-
-
-@compiled
-def note_fair_level(state: Acquisition, t: Seconds, fair: bool) -> None:
-    """Keep the time t if the level is fair: not suspected to be that of a side lobe."""
-    if fair:
-        state.fair = t
 
 
 @compiled

@@ -11,9 +11,18 @@ a Singer model (Singer 1970). In the time T the target has moved by the angle
 """
 import math
 
-from acu_tracker.geometry.great_circle import turned
-from acu_tracker.geometry.motion import AxisMotion, LineOfSight, Motion, angles, earth_angles
-from acu_tracker.geometry.vector import Vector, dot, times, vector
+from acu_tracker.geometry.vector import (
+    AxisMotion,
+    LineOfSight,
+    Motion,
+    Vector,
+    angles,
+    dot,
+    earth_angles,
+    times,
+    turned_along,
+    vector,
+)
 from acu_tracker.search.pattern import Point
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
@@ -46,10 +55,10 @@ def motion_at(place: Place, t: Seconds) -> Motion:
     u, du = vector(place.u), vector(place.du)
     W, left = math.sqrt(dot(du, du)), math.exp((place.stamp - t) / RATE_FADE_TIME_S)
     angle = W * RATE_FADE_TIME_S * (1.0 - left)
-    ahead = turned(u, du, W, angle)
+    ahead = turned_along(u, du, W, angle)
     # ahead = u cos(angle) + du/W sin(angle), and the angle grows with the rate W left. The second derivative has two
     # parts: -(W left)^2 ahead of the circle, and -rate / RATE_FADE_TIME_S of the fading rate.
-    rate = times(left, turned(du, times(-W * W, u), W, angle))
+    rate = times(left, turned_along(du, times(-W * W, u), W, angle))
     bend, fading = times(-(W * left)**2, ahead), times(-1.0 / RATE_FADE_TIME_S, rate)
     return earth_angles(LineOfSight(ahead, rate, Vector(bend.x + fading.x, bend.y + fading.y, bend.z + fading.z)))
 

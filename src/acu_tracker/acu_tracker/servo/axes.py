@@ -1,7 +1,7 @@
 """The position loops of both axes of the antenna: start from the actual angles, following of the reference, rest."""
 from typing import TYPE_CHECKING, NamedTuple
 
-from acu_tracker.geometry.motion import Motion
+from acu_tracker.geometry.vector import Motion
 from acu_tracker.servo import floor, position_loop, reference
 from acu_tracker.servo.position_loop import Command, Feedback, Instants
 from acu_tracker.signals import Inputs, Outputs

@@ -15,8 +15,8 @@ import dataclasses
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from acu_tracker.estimation.filters import constant_gain
-from acu_tracker.geometry.motion import AxisMotion
-from acu_tracker.servo import adrc, beam_loop, ends, feedforward, notch, pid, reference
+from acu_tracker.geometry.vector import AxisMotion
+from acu_tracker.servo import beam_loop, controllers, ends, reference
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
     Floats,
@@ -223,7 +223,7 @@ def _step(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedba
     else:
         angle_limited, rate_limited, acceleration_limited = reference.follow(r, p, target, now.t_m, axis.command,
                                                                              feedback.ends)
-        torque = feedforward.torque(r.rate, r.acceleration, p.feedforward)
+        torque = controllers.torque(r.rate, r.acceleration, p.feedforward)
         v = reference.planned(r, now.t_k)
     e = v.angle - y
     integral = axis.integral
@@ -233,7 +233,7 @@ def _step(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedba
     else:
         _update(axis, p, e, y, now)
     u, fed = _control_law(axis, p, e, v)
-    u -= notch.removed(u - fed, axis.notch, constants.notch)
+    u -= controllers.notch_removed(u - fed, axis.notch, constants.notch)
     kept = ends.inside(u, y, feedback.ends, constants.braking, constants.reaction)
     axis.command, rate_cut, acceleration_cut = limited(kept, axis.command, now.dt, p.limits.rate,
                                                        p.limits.acceleration)
@@ -268,14 +268,15 @@ def _control_law(axis: AxisLoop, params: 'AxisParameters', e: Radians,
     """
     controller = int(params.controller)
     if controller == CONTROLLER_PID:
-        return pid.rate(e, axis.integral, axis.derivative, params.pid.bandwidth, params.pid.derivative), 0.0
+        gains = params.pid
+        return controllers.pid_rate(e, axis.integral, axis.derivative, gains.bandwidth, gains.derivative), 0.0
     r = axis.reference
     if controller == CONTROLLER_FEEDFORWARD:
         k = params.feedforward
-        fed = feedforward.fed(r.rate, r.acceleration, k.rate_feedforward, k.acceleration_feedforward)
-        return feedforward.rate(e, axis.integral, fed, k.bandwidth), fed
+        fed = controllers.fed(r.rate, r.acceleration, k.rate_feedforward, k.acceleration_feedforward)
+        return controllers.feedforward_rate(e, axis.integral, fed, k.bandwidth), fed
     loop = params.adrc
-    return adrc.rate(axis.z, v.angle, v.rate, r.rate, loop.bandwidth, loop.rate_bandwidth), r.rate
+    return controllers.adrc_rate(axis.z, v.angle, v.rate, r.rate, loop.bandwidth, loop.rate_bandwidth), r.rate
 
 
 @compiled
@@ -309,12 +310,14 @@ def _update(axis: AxisLoop, params: 'AxisParameters', e: Radians, y: Radians, no
         if h > 0.0:
             # u, v3: command and acceleration that were in force since the last instant of the observer.
             u, v3 = reference.in_force(axis.reference, now.t_k - 0.5 * h)
-            axis.z[0], axis.z[1], axis.z[2] = adrc.observed(axis.z, y, u, v3, params.adrc.observer_bandwidth,
+            axis.z[0], axis.z[1], axis.z[2] = controllers.observed(axis.z, y, u, v3, params.adrc.observer_bandwidth,
                                                             params.adrc.rate_bandwidth, h)
             axis.observed = now.t_k
     else:
         if controller == CONTROLLER_PID:
-            axis.derivative = pid.derivative(axis.derivative, e, axis.error, now.dt, params.pid.derivative_time)
+            axis.derivative = controllers.derivative(axis.derivative, e, axis.error, now.dt,
+                                                     params.pid.derivative_time)
             axis.error = e
-        K_p, K_i = pid.gains(params.pid) if controller == CONTROLLER_PID else pid.gains(params.feedforward)
-        axis.integral = pid.integrated(axis.integral, e, now.dt, K_p, K_i)
+        K_p, K_i = (controllers.pid_gains(params.pid) if controller == CONTROLLER_PID
+                    else controllers.pid_gains(params.feedforward))
+        axis.integral = controllers.integrated(axis.integral, e, now.dt, K_p, K_i)

@@ -9,7 +9,7 @@ another controller can begin there.
 from typing import TYPE_CHECKING, Annotated
 
 from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, interpolated, push
-from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.geometry.vector import AxisMotion
 from acu_tracker.servo import shaper
 from acu_tracker.servo.ends import Ends
 from pedestal_common.compiled import compiled

@@ -7,7 +7,7 @@ raw target within the limits without lag. After a jump it reaches the raw target
 """
 import math
 
-from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.geometry.vector import AxisMotion
 from acu_tracker.servo.params import ShaperParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.fhan import fhan

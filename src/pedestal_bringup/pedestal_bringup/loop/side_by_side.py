@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from acu_tracker import unit as acu_unit
+from acu_tracker import unit_law
 from acu_tracker.program.program_track import ProgramTrack
 from acu_tracker.program.tables import Tables
 from adu_drive import lanes
@@ -60,7 +61,7 @@ def _acu_law(acus: ControlUnits, i: int, stamp: Nanoseconds, step: AnyRecord) ->
     """Make the step of control unit i. step: record of STEP_DTYPE."""
     of_all, ends = acus.tables, acus.ends
     tables = Tables(_track(of_all.program, ends[0], i), _track(of_all.tle, ends[1], i), _track(of_all.sun, ends[2], i))
-    acu_unit.law(acu_unit.Memory(acus.record[i:i + 1], tables), stamp, step, step)
+    unit_law.law(unit_law.Memory(acus.record[i:i + 1], tables), stamp, step, step)
 
 
 class KeptSteps(typing.NamedTuple):

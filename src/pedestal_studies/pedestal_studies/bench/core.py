@@ -14,7 +14,7 @@ from filterpy.kalman import IMMEstimator, KalmanFilter, MerweScaledSigmaPoints, 
 from acu_tracker.estimation.filters import axis_filter, unscented
 from acu_tracker.estimation.filters.measurement import AxisMeasurement, AxisVariances, Estimate, Measurement
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
-from acu_tracker.geometry.motion import AxisMotion, Motion
+from acu_tracker.geometry.vector import AxisMotion, Motion
 from adu_drive import drive_unit, lanes
 from adu_drive import unit as adu_unit
 from adu_drive.params import AduParameters

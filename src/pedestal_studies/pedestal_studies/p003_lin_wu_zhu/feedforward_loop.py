@@ -27,7 +27,7 @@ from scipy.linalg import expm
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.filters.measurement import AxisMeasurement
 from acu_tracker.estimation.params import FilterParameters
-from acu_tracker.servo import feedforward
+from acu_tracker.servo import controllers
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
     Floats,
@@ -64,7 +64,7 @@ BATCH_RUNS, NOISE_SEED = 25, 1  # runs of one batch; seed of their noise
 def feedforward_gains(w: RadiansPerSecond, zeta: float) -> tuple[float, Seconds]:
     """Return (k_v [-], k_a [s]) of 1 / W(s) = 1 + 2 zeta s / w + s^2 / w^2.
 
-    The paper calls these gains c_1 and c_2. Its formulas are corrected here (acu_tracker/servo/feedforward.py).
+    The paper calls these gains c_1 and c_2. Its formulas are corrected here (acu_tracker/servo/controllers.py).
     """
     return 1.0, 2.0 * zeta / w
 
@@ -123,7 +123,7 @@ def _follow(target: Vectors3, known: Pairs, filters: Records, constants: Records
                 _, v, a = axis_filter.outlook(filters[0], constants[0], lead)
             if len(known) > 0:
                 v, a = known[k]
-            u = feedforward.rate(e, 0.0, feedforward.fed(v, a, K_V, K_A), K_P)
+            u = controllers.feedforward_rate(e, 0.0, controllers.fed(v, a, K_V, K_A), K_P)
             step = out[i, k]
             step.miss, step.rate, step.acceleration = target[k, 0] - theta, v, a
             axis_filter.probabilities(filters[0], constants[0], step.mu)

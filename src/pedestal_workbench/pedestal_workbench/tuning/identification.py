@@ -11,7 +11,7 @@ the ACU covers it. Least squares fit the terms f_1 to f_4 of the series
 
 The feed-forward adds k_v v + k_a a to the rate command, from rate v [rad/s] and acceleration a [rad/s2] of the
 reference. It needs k_v = f_1 [-] and k_a = f_2 [s]. Source: paper 003, eq. 14 to 18, as corrected in
-acu_tracker.servo.feedforward.
+acu_tracker.servo.controllers.
 """
 import dataclasses
 import math
@@ -19,7 +19,7 @@ from typing import Annotated
 
 import numpy as np
 
-from acu_tracker.servo import feedforward
+from acu_tracker.servo import controllers
 from adu_drive import drive_unit
 from adu_drive.params import AduParameters, WindParameters
 from pedestal_bringup.scenario.scenario import Scenario
@@ -153,7 +153,7 @@ def identify(scenario: Scenario, torque: bool = True) -> dict[str, RateLoop]:
     torques = np.zeros_like(rate)
     for i, name in enumerate(topics.AXES if torque else ()):
         known = record(getattr(acu, name).feedforward)[0]
-        torques[:, i] = [feedforward.torque(*motion, known) for motion in zip(rate[:, i], acceleration)]
+        torques[:, i] = [controllers.torque(*motion, known) for motion in zip(rate[:, i], acceleration)]
     position, _ = respond(drive, rate, torques)
     kept = slice(SETTLING_PERIODS * steps, None)
     loops = {}

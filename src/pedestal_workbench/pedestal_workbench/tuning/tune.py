@@ -29,7 +29,7 @@ from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
-from acu_tracker.unit import RANGE_TOPIC
+from acu_tracker.unit_law import RANGE_TOPIC
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.scenario import Scenario

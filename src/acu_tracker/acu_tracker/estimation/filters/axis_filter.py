@@ -23,7 +23,7 @@ from acu_tracker.estimation.filters.kalman import Gaussian, PreviousAngle, Symme
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasurement, AxisVariances
 from acu_tracker.estimation.filters.motion_models import COLUMN_NAMES
-from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.geometry.vector import AxisMotion
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
     Bit,
@@ -81,7 +81,7 @@ class Filter(Record):
     past: Annotated[Floats, (BANK_SIZE, 5)]
     weights: Annotated[Floats, (BANK_SIZE,)]    # scratch
     # variance per second [rad2/s] that each prediction adds to the variance of the angle, for the random walk of the
-    # attitude error (estimation/target.py)
+    # attitude error (estimation/receiver_error.py)
     drift_variance_rate: float
 
 

@@ -18,7 +18,7 @@ x, p    estimates (n, 3) of the models, and covariances (n, 6) as in kalman.Symm
 import math
 
 from acu_tracker.estimation.filters.kalman import Gaussian, Symmetric
-from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.geometry.vector import AxisMotion
 from pedestal_common.compiled import compiled, inlined
 from pedestal_common.quantities import Floats, Seconds
 

@@ -16,7 +16,7 @@ written out.
 import math
 from typing import NamedTuple
 
-from acu_tracker.geometry.motion import AxisMotion
+from acu_tracker.geometry.vector import AxisMotion
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Radians, Radians2, RadiansPerSecond, Seconds, Xyz
 

@@ -6,7 +6,7 @@ innovation and its variance, or its covariance for several numbers.
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from acu_tracker.geometry.motion import Motion
+from acu_tracker.geometry.vector import Motion
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_common.quantities import DecibelHertz, Meters, Radians, Radians2, RadiansPerSecond, Seconds

@@ -1,6 +1,6 @@
 """The target filter: it holds the filters of both axes and the Cartesian filter, and selects which of them is used.
 
-The filters of the axes (`axes_filter`) always run. The Cartesian filter (`unscented`) runs if the kind of the filter
+A filter of each axis (`axis_filter`) always runs. The Cartesian filter (`unscented`) runs if the kind of the filter
 is imm_ukf and the receiver measures the range:
 
 1. The Cartesian filter starts from the estimate of the axis filters, when the standard deviation of a measured range
@@ -18,11 +18,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from acu_tracker.estimation.filters import axes_filter, axis_filter, unscented
+from acu_tracker.estimation.filters import axis_filter, unscented
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, Estimate, Innovation, Measurement, with_rate
-from acu_tracker.geometry.motion import AxisMotion, Motion
-from acu_tracker.geometry.vector import Rotation
+from acu_tracker.geometry.vector import (
+    AxisMotion,
+    Motion,
+    Rotation,
+    Vector,
+    earth_angles,
+    line_of_sight,
+    rotated,
+    turned,
+)
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_common.quantities import Bit, BothAxes, Floats, Hertz, Ints, Radians, RadiansPerSecond, Records, Seconds
@@ -67,7 +75,9 @@ def constants(ukf: 'UkfParameters', axes: 'Sequence[FilterParameters]', noise_ba
 @compiled
 def start(state: Filter, constants: Constants, measurement: Measurement, rate_sigma: RadiansPerSecond) -> None:
     """Start at a measurement; rate_sigma: standard deviation of the unknown rates."""
-    axes_filter.start(state.axis, constants.axis, measurement, rate_sigma)
+    for i in range(2):
+        measured = measurement.axis[i]
+        axis_filter.start(state.axis[i], constants.axis[i], measured.angle, measured.variance, rate_sigma)
     state.running = state.used[0] = state.used[1] = 0
     state.predicted = math.nan
 
@@ -90,7 +100,8 @@ def predict(state: Filter, constants: Constants, T: Seconds) -> None:
     if state.predicted == T:
         return
     state.predicted = T
-    axes_filter.predict(state.axis, constants.axis, T)
+    for i in range(2):
+        axis_filter.predict(state.axis[i], constants.axis[i], T)
     if state.running:
         unscented.predict(state.cartesian, constants.cartesian, T)
 
@@ -107,12 +118,13 @@ def innovation(state: Filter, constants: Constants, measurement: Measurement) ->
 
     rate_chi_square is always that of the axis filter.
     """
-    axes = axes_filter.innovation(state.axis, constants.axis, measurement)
+    azimuth = axis_filter.innovation(state.axis[0], constants.axis[0], measurement.axis[0])
+    elevation = axis_filter.innovation(state.axis[1], constants.axis[1], measurement.axis[1])
     if not state.running:
-        return axes
+        return Innovation((azimuth, elevation), math.nan, math.nan)     # The filters of the axes use no range.
     cartesian = unscented.innovation(state.cartesian, measurement)
-    azimuth = _chosen_innovation(state.used[0], axes.axis[0], cartesian.axis[0])
-    elevation = _chosen_innovation(state.used[1], axes.axis[1], cartesian.axis[1])
+    azimuth = _chosen_innovation(state.used[0], azimuth, cartesian.axis[0])
+    elevation = _chosen_innovation(state.used[1], elevation, cartesian.axis[1])
     return Innovation((azimuth, elevation), cartesian.range_nu, cartesian.range_S)
 
 
@@ -128,7 +140,8 @@ def _chosen_innovation(used: Bit, own: AxisInnovation, cartesian: AxisInnovation
 @compiled
 def correct(state: Filter, constants: Constants, measurement: Measurement) -> None:
     """Correct the prediction with a measurement; `innovation` must have been called with it before."""
-    axes_filter.correct(state.axis, constants.axis, measurement)
+    for i in range(2):
+        axis_filter.correct(state.axis[i], constants.axis[i], measurement.axis[i])
     if state.running:
         unscented.correct(state.cartesian, measurement)
     state.predicted = math.nan
@@ -137,14 +150,14 @@ def correct(state: Filter, constants: Constants, measurement: Measurement) -> No
 @compiled
 def expected(state: Filter) -> Motion:
     """Return the Motion at the instant of the last `predict`; its azimuth is on the wrap of the axis filter."""
-    axes = axes_filter.expected(state.axis)
+    azimuth, elevation = axis_filter.expected_motion(state.axis[0]), axis_filter.expected_motion(state.axis[1])
     if not (state.used[0] or state.used[1]):
-        return axes
-    cartesian, azimuth = unscented.expected(state.cartesian), axes.azimuth
+        return Motion(azimuth, elevation)
+    cartesian = unscented.expected(state.cartesian)
     if state.used[0]:
         _, dA, ddA = cartesian.azimuth
         azimuth = AxisMotion(azimuth.angle + wrap(cartesian.azimuth.angle - azimuth.angle), dA, ddA)
-    return Motion(azimuth, cartesian.elevation if state.used[1] else axes.elevation)
+    return Motion(azimuth, cartesian.elevation if state.used[1] else elevation)
 
 
 @separate
@@ -156,18 +169,26 @@ def outlook(state: Filter, constants: Constants, T: Seconds) -> Motion:
     if state.predicted == T or state.used[0] or state.used[1]:
         predict(state, constants, T)
         return expected(state)
-    return axes_filter.outlook(state.axis, constants.axis, T)
+    return Motion(axis_filter.outlook(state.axis[0], constants.axis[0], T),
+                  axis_filter.outlook(state.axis[1], constants.axis[1], T))
 
 
 @compiled
 def read(state: Filter) -> Estimate:
     """Return the Estimate at the instant of the last `predict`."""
-    axes = axes_filter.read(state.axis)
+    axes = read_axes(state)
     if not (state.used[0] or state.used[1]):
         return axes
     own, (cartesian, _) = axes.variances, unscented.variances(state.cartesian)
     return Estimate(expected(state), (cartesian[0] if state.used[0] else own[0],
                                       cartesian[1] if state.used[1] else own[1]))
+
+
+@compiled
+def read_axes(state: Filter) -> Estimate:
+    """Return the Estimate of the filters of the axes alone, at the instant of their last `predict`."""
+    azimuth, elevation = axis_filter.expected(state.axis[0]), axis_filter.expected(state.axis[1])
+    return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(azimuth), axis_filter.variances(elevation)))
 
 
 @compiled
@@ -201,8 +222,8 @@ def select(state: Filter, constants: Constants, measurement: Measurement) -> Non
             state.running = 0
     elif ((constants.wanted[0] or constants.wanted[1])
           and measurement.range_variance <= constants.range_share_2 * measurement.range * measurement.range):
-        axes_filter.predict(state.axis, constants.axis, 0.0)
-        unscented.start(state.cartesian, constants.cartesian, axes_filter.read(state.axis), measurement.range,
+        predict(state, constants, 0.0)
+        unscented.start(state.cartesian, constants.cartesian, read_axes(state), measurement.range,
                         measurement.range_variance)
         state.running, state.predicted = 1, math.nan
 
@@ -213,7 +234,7 @@ def _use_cartesian(state: Filter, constants: Constants) -> None:
     if (state.used[0] or not constants.wanted[0]) and (state.used[1] or not constants.wanted[1]):
         return
     predict(state, constants, 0.0)
-    axes, (cartesian, _) = axes_filter.read(state.axis).variances, unscented.variances(state.cartesian)
+    axes, (cartesian, _) = read_axes(state).variances, unscented.variances(state.cartesian)
     for i in range(2):
         if constants.wanted[i] and cartesian[i].p22 <= 0.25 * axes[i].p22:
             state.used[i] = 1
@@ -255,8 +276,24 @@ def transfer(state: Filter, constants: Constants, running: Bit) -> None:
 
 @compiled
 def turn(state: Filter, constants: Constants, rotation: Rotation) -> None:
-    """Turn the estimate and its covariances into another frame; rotation: from the old frame into the new one."""
-    axes_filter.turn(state.axis, constants.axis, rotation)
+    """Turn the estimate and its covariances into another frame; rotation: from the old frame into the new one.
+
+    The direction of growing azimuth turns by an angle phi against the old one. Across the line of sight the variance
+    of an axis becomes cos2(phi) of its own and sin2(phi) of the variance of the other axis, because the errors of both
+    axes are independent. The variance of an azimuth is that across the line of sight over cos2(elevation).
+    """
+    azimuth, elevation = axis_filter.corrected(state.axis[0]), axis_filter.corrected(state.axis[1])
+    motion = earth_angles(turned(rotation, line_of_sight(Motion(azimuth.x, elevation.x))))
+    before, after = azimuth.x.angle, motion.azimuth.angle
+    across = rotated(rotation, Vector(math.cos(before), -math.sin(before), 0.0))
+    cos2 = (across.x * math.cos(after) - across.y * math.sin(after))**2
+    scale, per_scale = math.cos(elevation.x.angle)**2, 1.0 / math.cos(motion.elevation.angle)**2
+    own = cos2 * scale * per_scale, cos2
+    share = (1.0 - cos2) * per_scale, (1.0 - cos2) * scale
+    others = elevation.P, azimuth.P
+    for i in range(2):
+        axis_filter.move(state.axis[i], constants.axis[i], motion[i])
+        axis_filter.blend(state.axis[i], constants.axis[i], own[i], share[i], others[i])
     if state.running:
         unscented.turn(state.cartesian, rotation)
     state.predicted = math.nan

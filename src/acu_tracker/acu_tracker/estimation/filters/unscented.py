@@ -25,8 +25,16 @@ from typing import TYPE_CHECKING, Annotated
 from acu_tracker.estimation.filters import imm, motion_models
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisVariances, Estimate, Innovation, Measurement
 from acu_tracker.estimation.filters.motion_models import MotionModelRecord
-from acu_tracker.geometry.motion import Motion, line_of_sight, motion_of_position
-from acu_tracker.geometry.vector import Rotation, Vector, dot, rotated, times
+from acu_tracker.geometry.vector import (
+    Motion,
+    Rotation,
+    Vector,
+    dot,
+    line_of_sight,
+    motion_of_position,
+    rotated,
+    times,
+)
 from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry.line_of_sight import earth_angles, wrap
 from pedestal_common.quantities import (

@@ -1,4 +1,48 @@
-"""Detection of receiver errors with the wrong sign (a reversed slope) in autotrack.
+"""The monitors that detect wrong errors of the receiver: divergence, roughness, repetition, sign of the slope.
+
+Divergence
+----------
+Detection of divergence in autotrack: the estimate moves away from the target, and the antenna follows the estimate.
+
+    m = mean over the last errors of (nu_A^2 / S_A + nu_E^2 / S_E) / 2
+
+    nu, S   innovation of an angle [rad] and its variance [rad2] as the filter predicts it
+    A, E    azimuth and elevation
+    m       is 1 while the innovations are as large as the filter expects [-]
+
+An error signal with the wrong sign, with rotated axes or with a gain three times too high drives the antenna away from
+its target. Then m becomes large before the beam leaves the target, and it is still large when the signal is lost. In
+this case autotrack must not coast on the wrong estimate.
+
+The detected divergence is latched: it stays until a reset.
+
+Roughness
+---------
+Detection of receiver errors that are only noise: they change far more from one to the next than the model expects.
+
+    q = mean over the last errors of (nu_k - nu_k-1)^2 / 2R
+
+    nu_k   innovation of error k [rad]
+    R      variance of an error by the model of the receiver [rad2]
+    q      mean of both axes [-]; 1 for white noise of the variance R
+
+Slow changes cancel in the difference: a target that turns, a slope of the wrong sign, a bias. The gate of
+`receiver_error` rejects all errors while q is above it. Some noisy errors would pass the gate alone, and would mislead
+the filter.
+
+Source: von Neumann, Distribution of the ratio of the mean square successive difference to the variance, Annals of
+Mathematical Statistics 12 (1941) 367.
+
+Repetition
+----------
+Detection of a receiver that repeats its message while the beam moves.
+
+Measured errors have noise and change with the direction of the beam. Errors that stay equal while the beam moves are
+therefore repeated, and the filter must not use them.
+
+SlopeSign
+---------
+Detection of receiver errors with the wrong sign (a reversed slope) in autotrack.
 
 The direction of a real target is smooth. The test computes the direction of the target with either sign of the error,
 and compares which of the two directions is smoother:
@@ -29,11 +73,134 @@ the earth frame, because the motion of the deck has no effect there.
 import math
 from typing import Annotated, NamedTuple
 
+from acu_tracker.estimation.filters.measurement import Innovation, Measurement
+from acu_tracker.geometry.history import Pointing
 from acu_tracker.geometry.vector import Rotation, Vector, dot, rotated
 from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Floats, Pair, Radians, Radians2, Seconds
+from pedestal_common.quantities import Bit, Floats, Pair, Radians, Radians2, Seconds, Vector3
 from pedestal_common.record import Record
+
+
+class Divergence(Record):
+    """State of the detection."""
+    m: float        # the mean [-]
+    diverged: Bit   # 1 from the detection of a divergence until its reset
+
+
+DIVERGENCE_ERROR_COUNT = 100
+"""Number of errors in the mean m; they take half a second. Without a fault m stays below 1.25."""
+
+MAX_COUNTED_ERROR = 12.5
+"""Largest contribution of one error to m [-]: half the default gate.
+
+This avoids an alarm after a few errors with interference.
+"""
+
+DIVERGENCE_LIMIT = 7.0
+"""Largest m of a filter that still follows its target [-].
+
+A filter without an acceleration state reaches 6.1 on a target that reverses its motion, and keeps it in the beam.
+"""
+
+COASTING_DIVERGENCE_LIMIT = 2.0
+"""Largest m with which the filter may coast after a loss of the signal without a known cause [-]."""
+
+
+@compiled
+def restart_divergence(state: Divergence) -> None:
+    """Set m to 1 when a mode begins."""
+    state.m = 1.0
+
+
+@compiled
+def take_divergence(state: Divergence, innovation: Innovation) -> None:
+    """Add the innovation of an error to the mean m; one of NaN (nothing was predicted) is ignored."""
+    # The comparison of x with itself is False for NaN.
+    x = 0.5 * (innovation.axis[0].chi_square + innovation.axis[1].chi_square)
+    if x == x:
+        state.m += (min(x, MAX_COUNTED_ERROR) - state.m) / DIVERGENCE_ERROR_COUNT
+
+
+@compiled
+def diverges(state: Divergence, without_signal: Bit) -> bool:
+    """Return True if the filter has diverged.
+
+    without_signal: True if the filter coasts, and no known cause explains the loss of the signal.
+    """
+    return state.m > (COASTING_DIVERGENCE_LIMIT if without_signal else DIVERGENCE_LIMIT)
+
+
+@compiled
+def latch_divergence(state: Divergence) -> None:
+    """Latch the divergence until `release_divergence`."""
+    state.diverged = 1
+
+
+@compiled
+def release_divergence(state: Divergence) -> None:
+    """Reset the latched divergence."""
+    state.diverged = 0
+
+
+class Roughness(Record):
+    """State of the detection."""
+    nu: Pair    # innovations of the previous error [rad]; NaN without one
+    q: float    # the mean [-]
+
+
+ROUGHNESS_ERROR_COUNT = 10  # number of errors in the mean q
+
+MAX_COUNTED_DIFFERENCE = 100.0
+"""Largest contribution of one difference to q [-].
+
+One outlier makes two large differences. The limit keeps q below the default gate of 25 after one outlier, so that the
+gate alone decides on it.
+"""
+
+
+@compiled
+def restart_roughness(state: Roughness) -> None:
+    """Set q to 1 when the filter starts."""
+    state.nu[0] = state.nu[1] = math.nan
+    state.q = 1.0
+
+
+@compiled
+def take_roughness(state: Roughness, innovation: Innovation, measurement: Measurement) -> float:
+    """Add an innovation to the mean and return q; the measurement of the innovation holds R."""
+    x = 0.0
+    for i in range(2):
+        nu = innovation.axis[i].nu
+        d = nu - state.nu[i]
+        x += 0.25 * d * d / measurement.axis[i].variance      # d^2 / 2R, half for each axis
+        state.nu[i] = nu
+    if x == x:  # not NaN
+        state.q += (min(x, MAX_COUNTED_DIFFERENCE) - state.q) / ROUGHNESS_ERROR_COUNT
+    return state.q
+
+
+class Repetition(Record):
+    """Last message of the receiver."""
+    message: Vector3    # cross-elevation error, elevation error [rad] and C/N0 [dB-Hz]
+    at: Pair            # deck angles of the beam when these numbers came for the first time [rad]
+
+
+REPETITION_TRAVEL_RAD = 3e-3  # travel of the beam within which the message must change [rad]
+
+
+@compiled
+def take_repetition(state: Repetition, inputs: Inputs, at: Pointing) -> bool:
+    """Take an error of the receiver; return True if it is repeated.
+
+    at: direction of the beam at the error.
+    """
+    last = state.message
+    if inputs.cross_elevation != last[0] or inputs.elevation != last[1] or inputs.cn0_dbhz != last[2]:
+        last[0], last[1], last[2] = inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz
+        state.at[0], state.at[1] = at.A, at.E
+        return False
+    return max(abs(at.A - state.at[0]), abs(at.E - state.at[1])) > REPETITION_TRAVEL_RAD
 
 
 class SlopeSign(Record):
@@ -84,7 +251,7 @@ class Beam(NamedTuple):
 
 
 @compiled
-def beam(mat_ed: Rotation, A: Radians, E: Radians) -> Beam:
+def slope_beam(mat_ed: Rotation, A: Radians, E: Radians) -> Beam:
     """Return the Beam at deck angles A, E; mat_ed: deck -> earth."""
     sA, cA, sE, cE = math.sin(A), math.cos(A), math.sin(E), math.cos(E)
     return Beam(rotated(mat_ed, Vector(cE * cA, -cE * sA, sE)), rotated(mat_ed, Vector(-sA, -cA, 0.0)),
@@ -92,13 +259,13 @@ def beam(mat_ed: Rotation, A: Radians, E: Radians) -> Beam:
 
 
 @compiled
-def near(inputs: Inputs, beamwidth: Radians) -> bool:
+def shows_slope(inputs: Inputs, beamwidth: Radians) -> bool:
     """Return True if an error of the receiver is on the straight part of the error curve."""
     return math.hypot(inputs.cross_elevation, inputs.elevation) < MAX_ERROR_BEAMWIDTHS * beamwidth
 
 
 @compiled
-def restart(state: SlopeSign) -> None:
+def restart_slope(state: SlopeSign) -> None:
     """Clear the memory when a mode begins."""
     state.stamp = -math.inf
 
@@ -133,7 +300,7 @@ def _reversed(J: Pair, other: Pair) -> bool:
 
 
 @compiled
-def take(state: SlopeSign, t: Seconds, beam: Beam, error: tuple[Radians, Radians], variance: Radians2,
+def take_slope(state: SlopeSign, t: Seconds, beam: Beam, error: tuple[Radians, Radians], variance: Radians2,
          gap: Seconds) -> bool:
     """Take an error of the receiver; return True if the slope of an axis is reversed.
 

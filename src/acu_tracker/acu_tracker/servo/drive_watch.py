@@ -1,4 +1,16 @@
-"""Detection of uncommanded motion: a rate of an axis outside the envelope of its recent rate commands.
+"""Detection of a drive that does not do what it is commanded: frozen, or in uncommanded motion.
+
+A frozen drive repeats its measurements while its axes are commanded to move.
+
+    dx/dt = u    while every measurement equals that of the step before, else x = 0
+
+    u    rate command of an axis [rad/s]
+    x    travel that the commands have added up while the measurements repeat [rad]
+
+A drive that moves has noise in its currents and steps in its encoders. The measurements are therefore constant only at
+rest. If all measurements repeat while x grows, the motion is not measured, and the position loop is open.
+
+Uncommanded motion is a rate of an axis outside the envelope of its recent rate commands.
 
     h_k = max(u_k, h_k-1 + a (u_k - h_k-1)),    l_k = min(u_k, l_k-1 + a (u_k - l_k-1))
 
@@ -14,9 +26,67 @@ rate may also exceed this range by a threshold and a share of the width of the e
 import math
 from typing import Annotated
 
+from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Bit, Floats, Pair, RadiansPerSecond, Records, Seconds
 from pedestal_common.record import Record
+
+
+class Frozen(Record):
+    """State of the test."""
+    last: Annotated[Floats, (6,)]   # angles [rad], rates [rad/s] and torques [Nm] of both axes in the step before
+    since: Seconds      # last stamp at which no x was above FROZEN_TEST_TRAVEL_RAD
+    travel: Pair        # x [rad]
+    frozen: Bit         # 1 from the detection of a frozen drive until its reset
+
+
+FROZEN_TEST_TRAVEL_RAD = 3e-3
+"""Travel within which a measurement must change [rad].
+
+The travel is ten times the lash of a gear, and a sixth of a beamwidth of one degree.
+"""
+
+
+@compiled
+def _restart_frozen(state: Frozen, t: Seconds) -> None:
+    """Restart the test at t."""
+    state.since, state.travel[0], state.travel[1] = t, 0.0, 0.0
+
+
+@compiled
+def release_frozen(state: Frozen, t: Seconds) -> None:
+    """Reset the detected fault at t; the test begins again."""
+    state.frozen = 0
+    _restart_frozen(state, t)
+
+
+@compiled
+def watch_frozen(state: Frozen, inputs: Inputs, hold: Seconds, restart: bool) -> bool:
+    """Take the measurements of a step; return True if the drive is frozen.
+
+    hold     longest time until a command has an effect on the measurements
+    restart  True if no earlier command is in force
+    """
+    if restart:
+        _restart_frozen(state, inputs.stamp)
+    same = True
+    for i in range(2):
+        same &= (inputs.position[i] == state.last[i] and inputs.velocity[i] == state.last[2 + i]
+                 and inputs.torque[i] == state.last[4 + i])
+        state.last[i], state.last[2 + i], state.last[4 + i] = inputs.position[i], inputs.velocity[i], inputs.torque[i]
+    if not same:
+        _restart_frozen(state, inputs.stamp)
+    elif max(abs(state.travel[0]), abs(state.travel[1])) <= FROZEN_TEST_TRAVEL_RAD:
+        state.since = inputs.stamp
+    elif inputs.stamp - state.since > hold:
+        state.frozen = 1
+    return state.frozen != 0
+
+
+@compiled
+def command_frozen(state: Frozen, i: int, rate: RadiansPerSecond, dt: Seconds) -> None:
+    """Take the command of axis i, which is in force for dt."""
+    state.travel[i] += rate * dt
 
 
 class Envelope(Record):
@@ -53,7 +123,7 @@ def initialise(record: Records) -> None:
 
 
 @compiled
-def _restart(envelope: Envelope, t: Seconds) -> None:
+def _restart_envelope(envelope: Envelope, t: Seconds) -> None:
     """Restart the detection at t, with no command in force."""
     envelope.since, envelope.beyond = t, t
     envelope.high[:] = 0.0
@@ -61,13 +131,13 @@ def _restart(envelope: Envelope, t: Seconds) -> None:
 
 
 @compiled
-def release(envelope: Envelope) -> None:
+def release_motion(envelope: Envelope) -> None:
     """Reset the detected uncommanded motion."""
     envelope.moves = 0
 
 
 @compiled
-def watch(envelope: Envelope, t: Seconds, velocity: Pair, threshold: RadiansPerSecond, restart: bool) -> bool:
+def watch_motion(envelope: Envelope, t: Seconds, velocity: Pair, threshold: RadiansPerSecond, restart: bool) -> bool:
     """Take the measured rates of a step; return True if uncommanded motion is detected.
 
     t          stamp of the step
@@ -76,7 +146,7 @@ def watch(envelope: Envelope, t: Seconds, velocity: Pair, threshold: RadiansPerS
     restart    True if no earlier command is in force
     """
     if restart or not math.isfinite(envelope.since):
-        _restart(envelope, t)
+        _restart_envelope(envelope, t)
     outside = False
     for i in range(2):
         allowed = threshold + ENVELOPE_OVERSHOOT_SHARE * (envelope.high[i] - envelope.low[i])
@@ -92,13 +162,13 @@ def watch(envelope: Envelope, t: Seconds, velocity: Pair, threshold: RadiansPerS
 
 
 @compiled
-def beyond(envelope: Envelope, t: Seconds) -> bool:
+def motion_beyond(envelope: Envelope, t: Seconds) -> bool:
     """Return True if a rate was outside its allowed range in the step at t."""
     return envelope.beyond < t
 
 
 @compiled
-def command(envelope: Envelope, i: int, rate: RadiansPerSecond, t: Seconds, dt: Seconds, hold: Seconds) -> None:
+def command_motion(envelope: Envelope, i: int, rate: RadiansPerSecond, t: Seconds, dt: Seconds, hold: Seconds) -> None:
     """Take the rate command of axis i at t into the envelope.
 
     dt    time by which the envelope shrinks; at most a period, because a control unit that was late does not make

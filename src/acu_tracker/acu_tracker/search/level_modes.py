@@ -1,7 +1,7 @@
-"""The modes search, acquire and steptrack, which use the signal level: link from the control unit to `search`.
+"""The modes search, acquire and steptrack, which use the signal level: the C/N0 of the receiver.
 
-The signal level is the C/N0 of the receiver. The modes move the beam about the expected place of the target; the
-laws of these motions are in the package `search`.
+The modes move the beam about the expected place of the target. `acquisition` and `step_track` are the laws of these
+motions.
 
 `way` is the program, rotated to the place where the target was last tracked.
 """
@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING
 
 from acu_tracker import modes
 from acu_tracker.estimation import target
-from acu_tracker.geometry.encoders import Pointing
-from acu_tracker.geometry.motion import Motion
-from acu_tracker.geometry.vector import Vector
+from acu_tracker.geometry.vector import Motion, Vector
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.program import bridge, program_track
 from acu_tracker.search import acquisition, level, pattern, place, side_lobe, step_track
@@ -20,7 +18,6 @@ from acu_tracker.search.acquisition import Acquisition
 from acu_tracker.search.pattern import Point
 from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry import line_of_sight as pointing
 from pedestal_common.quantities import Radians, Seconds
 
 if TYPE_CHECKING:
@@ -77,13 +74,12 @@ def advance(state: Acquisition, mode: int, constants: 'Constants', inputs: Input
     """
     p, beamwidth = constants.p.acquisition, constants.p.tracker.receiver.beamwidth
     new = inputs.error_stamp > state.level.stamp and math.isfinite(inputs.cn0_dbhz)
-    off_target = (not modes.FOLLOWS_TARGET[mode]
-                  or (mode == Mode.SEARCH and acquisition.waiting(state, constants.p.search, inputs.stamp)))
+    waiting = mode == Mode.SEARCH and acquisition.waiting(state, constants.p.search, inputs.stamp)
     if inputs.error_valid:
         level.restart_noise(state.level, p)
-    elif off_target:
-        acquisition.learn(state, p, inputs.cn0_dbhz, inputs.error_stamp)
-    acquisition.take_level(state, p, inputs.cn0_dbhz, inputs.error_stamp, inputs.error_valid != 0)
+    elif new and math.isfinite(state.level.stamp) and (waiting or not modes.FOLLOWS_TARGET[mode]):
+        level.learn(state.level, p, inputs.cn0_dbhz, min(inputs.error_stamp - state.level.stamp, p.time_constant))
+    level.take(state.level, p, inputs.cn0_dbhz, inputs.error_stamp, inputs.error_valid != 0)
     if mode == Mode.SEARCH and new:
         # The receiver smooths the level, which therefore belongs to the offset one time constant ago.
         t = inputs.error_stamp - p.time_constant
@@ -93,14 +89,15 @@ def advance(state: Acquisition, mode: int, constants: 'Constants', inputs: Input
         acquisition.acquire(state, p, beamwidth, inputs.stamp, inputs.range)
     elif mode == Mode.STEPTRACK:
         present = state.level.below_loss < p.loss_time
-        x, e = step_track.step(state.step_track, constants.p.steptrack, beamwidth, p.time_constant, inputs.stamp,
-                               inputs.cn0_dbhz if new else math.nan, present)
-        acquisition.set_offset(state, x, e)
+        state.centre[0], state.centre[1] = step_track.step(
+            state.step_track, constants.p.steptrack, beamwidth, p.time_constant, inputs.stamp,
+            inputs.cn0_dbhz if new else math.nan, present)
     level_on_axis = side_lobe.expected(p.expected_dbhz, p.reference_range, p.range_exponent, inputs.range)
     judged = mode == Mode.PROGRAM or mode == Mode.AUTOTRACK
     # A level is called fair if it is not suspected to be that of a side lobe.
     fair = not judged or not inputs.error_valid or not side_lobe.suspected(inputs.cn0_dbhz, level_on_axis)
-    acquisition.note_fair_level(state, inputs.stamp, fair)
+    if fair:
+        state.fair = inputs.stamp
     return mode == Mode.ACQUIRE and state.phase == acquisition.Phase.WRONG_SLOPE
 
 
@@ -153,14 +150,4 @@ def begin(state: Acquisition, mode: int, constants: 'Constants', t: Seconds, spr
 def remember(state: Acquisition, t: Seconds, u: Vector, du: Vector) -> None:
     """Store the expected place of the target at t: an ENU unit vector u and its rate du [1/s]."""
     place.remember(state.place, t, u, du)
-    acquisition.set_offset(state, 0.0, 0.0)
-
-
-@compiled
-def check_slope(state: Acquisition, at: Pointing, motion: Motion, error: tuple[Radians, Radians]) -> None:
-    """Compare an error (cross-elevation, elevation) with the offset of the expected place from the beam.
-
-    at: the beam; motion: of the expected place in deck angles.
-    """
-    x, y, z = pointing.direction(motion.azimuth.angle, motion.elevation.angle)
-    acquisition.take_error(state, pointing.offsets(at.A, at.E, x, y, z), error)
+    state.centre[0] = state.centre[1] = 0.0
