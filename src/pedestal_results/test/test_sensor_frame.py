@@ -8,6 +8,7 @@ from scipy import ndimage
 from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_common.geometry import line_of_sight
+from pedestal_recording import recording as recordings
 from pedestal_results import results, sensor_frame, tracking
 from pedestal_results.tracking import known_rms as rms
 from pedestal_workbench.again import what_if
@@ -28,12 +29,12 @@ class Without(what_if.Overlay):
 
 def error_against_the_true_direction(bag, run):
     """Estimate minus true target (n, 2), both seen from the true beam: the error of the filter of a rigid antenna."""
-    estimate = tracking.on_grid(bag, run.t, 'acu/estimate', ('azimuth.position', 'elevation.position'))
+    estimate = recordings.at(bag, run.t, 'acu/estimate', ('azimuth.position', 'elevation.position'))
     beam, attitude = run.encoders, None
     if 'adu/truth' in bag.topics:
-        beam = tracking.on_grid(bag, run.t, 'adu/truth', ('azimuth.position', 'elevation.position'))
+        beam = recordings.at(bag, run.t, 'adu/truth', ('azimuth.position', 'elevation.position'))
     if 'ship/truth' in bag.topics:
-        attitude = tracking.on_grid(bag, run.t, 'ship/imu/data', [f'orientation.{letter}' for letter in 'xyzw'])
+        attitude = recordings.at(bag, run.t, 'ship/imu/data', [f'orientation.{letter}' for letter in 'xyzw'])
     out, matrix = np.full((run.t.size, 2), np.nan), np.empty((3, 3))
     for k in np.flatnonzero(run.tracking):
         line_of_sight.rotation(*(line_of_sight.ASHORE_ATTITUDE if attitude is None else attitude[k]), matrix)

@@ -11,6 +11,7 @@ from pedestal_common.graph import topics
 from pedestal_common.graph.topics import AXES
 from pedestal_common.text_files.files import sha256
 from pedestal_recording import bag as bags
+from pedestal_recording import recording as recordings
 from pedestal_recording.verify import Report, verify
 from pedestal_results import consistency, isolation, results, tracking, verdict
 from pedestal_results.report import (
@@ -187,7 +188,7 @@ def _gaps(bag: bags.Bag, check: Report) -> list[str]:
                                      for problem in topic.problems]
         parts.append('<h2 id="gaps">Problems of the recording</h2><ul>' + ''.join(
             f'<li>{html.escape(problem)}</li>' for problem in problems) + '</ul>')
-    absent = [topic for topic in bag.graph if topic not in bag.topics or not bag.rows(topic).size]
+    absent = [topic for topic in bag.graph if not recordings.holds(bag, topic)]
     if absent:
         parts.append(f'<p class="soft">Topics without a message in this bag: {", ".join(absent)}.</p>')
     return parts

@@ -8,6 +8,7 @@ import numpy as np
 from pedestal_common.graph import topics
 from pedestal_common.quantities import Pairs, Radians, Seconds, Table
 from pedestal_recording import bag as bags
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import consistency, known_attitude, measured_direction, tracking
 from pedestal_results.report import events
@@ -68,12 +69,11 @@ def read(bag: Recording) -> RunData:
     motors = table(bag, 'adu/motor_states')
     if motors and not {f'{motor}.effort' for motor in topics.MOTOR_NAMES} <= set(motors):
         motors = None
-    statuses = [Status((log - bag.start) / 1e9, status.name, int(status.level), status.message)
-                for _, log, _, array in bag.messages('diagnostics') for status in array.status
-                ] if table(bag, 'diagnostics') else []
+    statuses = [Status(t, status.name, int(status.level), status.message)
+                for t, status in recordings.diagnostics(bag)]
     modes = _modes(bag)
     return RunData(run, no_truth, raw, motors, table(bag, 'tracking_receiver/angle_error'), modes, statuses,
-                   events.read(bag, modes), tracking.beamwidth(bag), _filter(bag, run), _attitude(bag))
+                   events.read(bag, modes), recordings.beamwidth(bag), _filter(bag, run), _attitude(bag))
 
 
 def table(bag: Recording, topic: str) -> Table | None:
@@ -139,7 +139,7 @@ def _modes(bag: Recording) -> list[events.ModeSpan]:
     stated = table(bag, 'acu/mode')
     changes = list(zip(stated['t'].tolist(), stated['data'])) if stated else []
     joints = table(bag, 'joint_states')
-    if joints is not None and (before := str(tracking.modes(bag, joints['t'][:1])[0])):
+    if joints is not None and (before := str(recordings.modes(bag, joints['t'][:1])[0])):
         changes.insert(0, (joints['t'][0].item(), before))
     starts: list[Seconds] = []
     names: list[str] = []

@@ -10,6 +10,7 @@ from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.graph import nodes
 from pedestal_common.quantities import Seconds
+from pedestal_recording import recording as recordings
 from pedestal_recording.bag import Bag
 from pedestal_results import beam_direction
 from pedestal_results.report.run_data import RunData
@@ -77,7 +78,7 @@ def rows(bag: Bag, data: RunData) -> list[list[str]]:
     models = [['pointing model', title] for title in beam_direction.titles(bag)]
     beamwidth = [['beamwidth', f'{math.degrees(data.beamwidth):.4g} deg']] if math.isfinite(data.beamwidth) else []
     beamwidth = [*models, *beamwidth]
-    values = bag.configuration['parameters'].get('tracking_receiver', {})
+    values = recordings.parameters(bag, 'tracking_receiver')
     try:
         target = parameters.build(TargetParameters, {name.removeprefix('target.'): value for name, value in
                                                      values.items() if name.startswith('target.')})
@@ -107,11 +108,5 @@ def _sky(bag: Bag, data: RunData) -> list[list[str]]:
 
 def _begin(bag: Bag) -> str:
     """Return the text of the UTC at 0 s that the receiver states in its diagnostics, '' if it states none."""
-    if 'diagnostics' not in bag.topics or not bag.rows('diagnostics').size:
-        return ''
-    for _, _, _, array in bag.messages('diagnostics'):
-        for status in array.status:
-            for value in status.values:
-                if value.key == 'stamp_0_utc':
-                    return value.value
-    return ''
+    return next((value.value for _, status in recordings.diagnostics(bag) for value in status.values
+                 if value.key == 'stamp_0_utc'), '')
