@@ -23,9 +23,7 @@ def write(options: argparse.Namespace, printed: Iterable[str], sections: Mapping
     elif options.output:
         for node, values in sections.items():
             check_each(nodes.row(node, iq=iq).parameters_type(), values)
-        head = ''.join(f'# {line}'.rstrip() + '\n' for line in (f'made by: {" ".join(options.command.split())}',
-                                                               *printed))
-        options.output.write_text(head + parameter_file.text(sections), encoding='utf-8')
+        parameter_file.write_new(options.output, sections, [*parameter_file.origin(options.command), *printed])
         said.append(f'written: {options.output}  (pedestal run SCENARIO '
                     f'--params-file {shlex.quote(str(options.output))})')
     if options.report:

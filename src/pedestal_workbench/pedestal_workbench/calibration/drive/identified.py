@@ -215,7 +215,7 @@ def write_plan(chosen: Scenario, given: str, path: pathlib.Path) -> list[str]:
     run = shlex.join(('pedestal', 'run', given, '--params-file', str(path)))
     plan, sections = plan_parameters(chosen)
     stated = [f'motions of {motions.time_text(plan.duration)} for the antenna of {chosen.name}, within', *plan.limits]
-    path.write_text(''.join(f'# {line}\n' for line in stated) + parameter_file.text(sections), encoding='utf-8')
+    parameter_file.write_new(path, sections, stated)
     return [*stated, f'written: {path}', 'Record the motions twice:',
             f'    {run} --bag drive_1',
             f'    {run} --param adu.azimuth.bias.schedule=off --param adu.elevation.bias.schedule=off --bag drive_2']
