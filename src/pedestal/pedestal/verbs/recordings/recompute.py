@@ -46,8 +46,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="topics or topic.field not to compare, for example 'acu/reference*'; may be repeated")
     parser.add_argument('--allow-idle', action='store_true', help='accept a node that did nothing in the recording '
                         '(never locked, never in autotrack, never moved)')
-    parser.add_argument('--live', action='store_true', help='start a process of the node and send it the inputs over '
-                        'DDS, in lockstep')
     console.add_json(parser)
     console.add_explain(parser)
     parser.add_argument('--iq', type=pathlib.Path, metavar='FILE', help='.sigmf-meta file of the I/Q samples of this '
@@ -60,7 +58,7 @@ def main(options: argparse.Namespace) -> int:
     """Recompute and print the comparison. Return the exit code, 1 for a failed comparison."""
     console.check_json(options.json)
     if options.iq is not None:
-        for name in ('node', 'param', 'params_file', 'pacing', 'absolute', 'relative', 'ignore', 'allow_idle', 'live',
+        for name in ('node', 'param', 'params_file', 'pacing', 'absolute', 'relative', 'ignore', 'allow_idle',
                      'explain', 'output'):
             if getattr(options, name):
                 raise ValueError(f'{option_of(name)}: has no effect with --iq')
