@@ -210,7 +210,7 @@ def test_the_numbers_of_a_recording_and_of_a_late_estimate(runs):
     old = {name: recording.output(name) for name in OUTPUTS}
     late = difference.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])
     numbers = what_if.numbers(recording.bag, [old, {**old, ESTIMATE: late}])
-    summary = results.measured(results.of_tracking(tracking.read(recording.bag)))
+    summary = results.measured(tracking.read(recording.bag).parts)
     for name, theirs in (('noise_reduction', 'noise_reduction'), ('recorded_pointing_rms_deg', 'pointing_rms_deg')):
         assert numbers[name][0][0] == pytest.approx(summary[theirs][0], rel=1e-9)
     (before, after), unit = numbers['estimate_lag_s']
@@ -223,7 +223,7 @@ def test_a_recording_from_before_the_truth_is_read_by_its_encoders(runs, rewrite
     counts of the encoders."""
     path = rewrite(runs['leo'].bag, lambda rows: rows, without=('adu/truth',))
     assert verify(load(path)).finished
-    old, whole = (results.measured(results.of_tracking(tracking.read(bags.read(bag)))) for bag in (
+    old, whole = (results.measured(tracking.read(bags.read(bag)).parts) for bag in (
         path, runs['leo'].bag))
     assert not any(name.startswith('encoder_') for name in old)
     for name in ('pointing_rms_deg', 'pointing_max_deg', 'cross_elevation_rms_deg', 'elevation_max_deg'):

@@ -18,6 +18,7 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.parameters import build
 from pedestal_common.quantities import (
     Bools,
+    Decibels,
     Degrees,
     Floats,
     Matrix3,
@@ -32,7 +33,8 @@ from pedestal_common.quantities import (
 )
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import beam_direction, sensor_frame
+from pedestal_results import directions, sensor_frame
+from tracking_receiver_sim.monopulse import sum_pattern
 from tracking_receiver_sim.path import arrival
 from tracking_receiver_sim.path.params import PathParameters
 
@@ -43,7 +45,8 @@ ENCODER_BEAM_NOTE = ('the recording has no adu/truth, so the direction of the be
                      'between encoders and dish do not show')
 """Note on the results of an old recording, whose drive did not publish the true direction of its dish."""
 
-
+LEAST_POWER = 1e-12
+"""Smallest received power over that on the beam axis [-]. This avoids an infinite loss in a null of the pattern."""
 ERROR_MATRIX_NAMES = ('xx', 'xe'), ('ex', 'ee')
 """Names of the elements of the matrix of the receiver's errors, by row and column."""
 
@@ -114,6 +117,16 @@ def _interval_start_error(beam: Pairs, error: Pairs, out: Pairs) -> None:
         out[k, 0], out[k, 1] = line_of_sight.offsets(beam[k, 0], beam[k, 1], x, y, z)
 
 
+@compiled
+def _fill_power(error: Pairs, beamwidth: Radians, power: Floats) -> None:
+    """Fill power: received power over that on the beam axis [-]. error: pointing errors in cross-elevation and
+    elevation [rad].
+    """
+    for k in range(len(error)):
+        voltage = sum_pattern(error[k, 0] / beamwidth) * sum_pattern(error[k, 1] / beamwidth)
+        power[k] = voltage * voltage
+
+
 def interval_start_error(beam: Pairs, error: Pairs) -> Pairs:
     """Return the pointing error [rad] of an electronic beam at the beginning of the interval before each stamp.
 
@@ -165,6 +178,12 @@ class Tracking:
     boresight: Pair         # boresight offset of the receiver
     # true pointing error of an electronic beam at the beginning of the interval that ends at the stamp, else NaN
     begun: Pairs
+
+    @property
+    def parts(self) -> dict[str, object]:
+        """The parts by name for results.measured that the run provides, None for a missing part."""
+        return {'motors': None if self.electronic else self, 'encoders': self if self.has_encoders else None,
+                'tracking': self}
 
     @property
     def period(self) -> Seconds:
@@ -230,6 +249,31 @@ class Tracking:
         """
         errors = (self.true, self.begun[self.tracking]) if self.electronic else (self.true,)
         return max(measure(error[:, axis]) for error in errors) * DEG_PER_RAD
+
+    @functools.cached_property
+    def power(self) -> Floats:
+        """Received power over that on the beam axis [-], by the pattern of the beam, in the evaluated part.
+
+        The pattern is the sum pattern of tracking_receiver_sim.monopulse: the received voltage by the angle from the
+        beam axis. Empty without a beamwidth.
+        """
+        if not math.isfinite(self.beamwidth):
+            return np.zeros(0)
+        error = np.concatenate((self.true, self.begun[self.tracking])) if self.electronic else self.true
+        error = np.ascontiguousarray(error[np.isfinite(error).all(axis=1)])
+        power = np.empty(len(error))
+        _fill_power(error, self.beamwidth, power)
+        return np.maximum(power, LEAST_POWER)
+
+    @property
+    def mean_power_loss(self) -> Decibels:
+        """Loss of the mean received power by the pointing error; NaN without an evaluated part."""
+        return -10.0 * math.log10(self.power.mean()) if self.power.size else math.nan
+
+    @property
+    def max_power_loss(self) -> Decibels:
+        """Largest loss of received power by the pointing error; NaN without an evaluated part."""
+        return -10.0 * math.log10(self.power.min()) if self.power.size else math.nan
 
     @property
     def lock_time(self) -> Seconds:
@@ -319,7 +363,7 @@ def read(bag: Recording) -> Tracking:
     t = joints['t']
     at_steps = functools.partial(recordings.at, bag, t)
     encoders = np.column_stack((joints['azimuth.position'], joints['elevation.position']))
-    encoders = beam_direction.on_sky(bag, t, encoders)
+    encoders = directions.on_sky(bag, t, encoders)
     beam = at_steps('adu/truth', ('azimuth.position', 'elevation.position')) if 'adu/truth' in bag.topics else encoders
     target = at_steps('target/truth', ('position.x', 'position.y', 'position.z'))
     quaternion = ('orientation.x', 'orientation.y', 'orientation.z', 'orientation.w')
@@ -350,7 +394,7 @@ def read(bag: Recording) -> Tracking:
     mode = recordings.modes(bag, t)
     automatic = mode == 'autotrack'
     start = t[automatic][0] + HANDOVER_SETTLING_S if automatic.any() else math.inf
-    reference = beam_direction.on_sky(bag, t, at_steps('acu/reference', ('azimuth.position', 'elevation.position')))
+    reference = directions.on_sky(bag, t, at_steps('acu/reference', ('azimuth.position', 'elevation.position')))
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
     return Tracking(t=t, encoders=encoders, reference=reference, error=error, encoder_error=encoder_error,
                     measured=measured[:, :2], cn0=measured[:, 2], estimate_error=estimate_error,

@@ -12,6 +12,7 @@ import numpy as np
 from pedestal_bringup.loop.memory_recording import MemoryRecording
 from pedestal_results import results, tracking
 from pedestal_results.intervals import row
+from pedestal_results.recorded_run import RecordedRun
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
 from pedestal_studies.rigs import drawing
 from pedestal_studies.rigs.rows import Result
@@ -105,7 +106,7 @@ def extra_results(values, run):
 def measured(case):
     """Return {name: value} of one run of a Case."""
     scenario, run = case.loaded(), case.run()
-    found = results.measured(results.of_bag(MemoryRecording(scenario, run)))
+    found = results.measured(RecordedRun(MemoryRecording(scenario, run)).parts)
     values = {name: value for name, (value, _) in found.items()}
     return {**values, **extra_results(values, run)}
 

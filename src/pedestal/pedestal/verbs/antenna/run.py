@@ -82,7 +82,8 @@ def main(options: argparse.Namespace) -> int:
     # Because these modules import scipy, which takes half a second, the verb loads them after the run.
     from pedestal_recording.bag import read
     from pedestal_recording.verify import verify
-    from pedestal_results import results, tracking, verdict
+    from pedestal_results import results
+    from pedestal_results.recorded_run import RecordedRun
     if outcome.stopped:
         print(f'pedestal: stopped; the recorded part is in {bag}', file=sys.stderr)
         if not outcome.recorder.get('messages'):
@@ -90,9 +91,9 @@ def main(options: argparse.Namespace) -> int:
     recording = read(bag)
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     views = [recording.view(beam) for beam in beams]
-    runs = [tracking.read(view) for view in views]
-    verdicts = [verdict.of(view, run) for view, run in zip(views, runs)]
-    parts = [results.of_run(view, run) for view, run in zip(views, runs)]
+    runs = [RecordedRun(view) for view in views]
+    verdicts = [run.verdict for run in runs]
+    parts = [run.parts for run in runs]
     of_beams = [results.measured(part) for part in parts]
     realtime = chosen.header.pacing == 'realtime'
     # whole: results of the run, such as lost steps, in contrast to the results of each beam

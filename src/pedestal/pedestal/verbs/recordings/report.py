@@ -13,7 +13,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_beam(parser)
     parser.add_argument('--png', type=pathlib.Path, metavar='DIR', help='folder in which each figure is also '
                         'written as PNG')
-    arguments.add_vector(parser)
     parser.add_argument('--author', default='', metavar='NAME', help='name of the author on the first page; default: '
                         'none')
     parser.add_argument('--pdf', action='store_true', help='the report also as PDF, beside the HTML file; needs '
@@ -23,10 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(options: argparse.Namespace) -> int:
     """Write the report and print its path. Return exit code 0."""
     from pedestal_results.report import page
-    if options.vector and not options.png:
-        raise ValueError(f'--vector {options.vector}: needs --png DIR, the folder of the figures')
-    report = page.write(options.bag, options.output, options.png, options.beam, options.vector, options.author,
-                        options.pdf)
+    report = page.write(options.bag, options.output, options.png, options.beam, options.author, options.pdf)
     print(report)
     if options.pdf:
         print(report.with_suffix('.pdf'))

@@ -18,7 +18,7 @@ import numpy as np
 from pedestal_common.quantities import Bools, DecibelHertz, Floats, Pair, Pairs, Radians, Seconds, Times, Vectors3
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import beam_direction, mode_pointing, tracking
+from pedestal_results import directions, mode_pointing, tracking
 from pedestal_workbench.calibration import predicted
 
 CIRCLE_BEAMWIDTHS, CIRCLE_TOLERANCE_BEAMWIDTHS = 0.2, 0.03
@@ -69,7 +69,7 @@ def read(bag: Recording) -> Points:
         raise OffsetError(f'beamwidth = {beamwidth:g} rad: the recording must state a beamwidth above 0')
     joints = bag.table('joint_states')
     t = joints['t']
-    beam = beam_direction.on_sky(bag, t, np.column_stack([joints[column] for column in COLUMNS]))
+    beam = directions.on_sky(bag, t, np.column_stack([joints[column] for column in COLUMNS]))
     offsets, plain = _from_beacon(bag, t, beam)
     errors = recordings.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y', 'z'))
     found = [_point(t[first:last], offsets[first:last] / beamwidth, errors[first:last], beamwidth)
