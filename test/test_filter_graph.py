@@ -12,6 +12,7 @@ from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_common.graph import layouts, topics
 from pedestal_recording import bag as bags
 from pedestal_recording import export
+from pedestal_recording import recording as recordings
 from pedestal_recording.bag import load
 from pedestal_recording.verify import verify
 from pedestal_results import consistency, tracking
@@ -123,7 +124,7 @@ def test_a_filter_changed_while_it_tracks_makes_no_bump(runs):
     found = consistency.read(bag, tracking.read(bag))
     changed = np.flatnonzero(np.isfinite(found.probability[:, 0, topics.MOTION_MODELS.index('cv')]))[0]
     assert bag.table('acu/mode')['data'] == ['program', 'autotrack']
-    assert np.all(tracking.modes(bag, found.t)[changed - 1:] == 'autotrack')
+    assert np.all(recordings.modes(bag, found.t)[changed - 1:] == 'autotrack')
     change = np.abs(np.diff(np.column_stack([bag.table('acu/rate_command')[f'{axis}.velocity']
                                              for axis in topics.AXES]), axis=0))
     # 0.05 s: what comes later is what the new models make of the measurements

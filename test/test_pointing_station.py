@@ -9,7 +9,7 @@ import pytest
 from pedestal import cli
 from pedestal.verbs import operate
 from pedestal_recording import bag as bags
-from pedestal_results import beam_direction, tdm, tracking
+from pedestal_results import directions, tdm, tracking
 
 TERMS = {'p1': 0.1, 'p4': 0.05, 'p7': -0.1}
 """Errors of the pedestal [deg], and the model that corrects them."""
@@ -68,7 +68,7 @@ def test_a_run_refuses_a_model_of_the_future(capsys):
 
 @pytest.mark.thorough
 def test_the_recording_has_the_model(recorded):
-    found = beam_direction.reports(bags.read(recorded))
+    found = directions.reports(bags.read(recorded))
     assert [(report.file, bool(report.before or report.ends_s)) for _, report in found] == [
         ('first.yaml', True), ('first.yaml', False)]
     assert found[-1][1].terms == pytest.approx(TERMS)

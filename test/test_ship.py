@@ -175,7 +175,7 @@ def test_announced_losses_are_counted_once():
     cancelled = slew('1000.0', '1010.0', '5.0')
     said = [(10, array(('mode', 'program'))), (30, planned), (44, first), (50, first), (100, none), (890, second),
             (910, none), (985, cancelled), (986, none)]
-    bag = types.SimpleNamespace(topics={'diagnostics': ''}, start=0,
+    bag = types.SimpleNamespace(topics={'diagnostics': 'diagnostic_msgs/msg/DiagnosticArray'}, start=0,
                                 messages=lambda topic: ((topic, t * 10**9, 0, m) for t, m in said))
     assert tracking.keyholes(bag) == [(45.8, 63.1, 12.6), (900.1, 905.5, 0.4)]
     assert results.measured({'keyholes': tracking.keyholes(bag)}) == {

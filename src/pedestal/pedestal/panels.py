@@ -6,7 +6,8 @@ import typing
 from collections.abc import Callable
 
 from pedestal_common.parameters import did_you_mean
-from pedestal_results.report import run_data, run_figures
+from pedestal_results.recorded_run import RecordedRun
+from pedestal_results.report import run_figures
 
 if typing.TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -14,8 +15,8 @@ if typing.TYPE_CHECKING:
 
 class Panel(typing.NamedTuple):
     """A figure."""
-    draw: Callable[[Axes, run_data.RunData], None]
-    needs: tuple[str, ...]  # names of the required parts of RunData
+    draw: Callable[[Axes, RecordedRun], None]
+    needs: tuple[str, ...]  # names of the required parts of RecordedRun
     polar: bool = False     # True if the figure needs polar axes
 
 
@@ -33,7 +34,7 @@ PANELS: dict[str, Panel] = {
 """Figures of Run.plot, {name: Panel}."""
 
 
-def draw(name: str, axes: Axes, data: run_data.RunData) -> None:
+def draw(name: str, axes: Axes, data: RecordedRun) -> None:
     """Draw a panel of PANELS on axes. Raises KeyError, ValueError."""
     if name not in PANELS:
         raise KeyError(f'unknown figure {name!r};{did_you_mean(name, PANELS)} there are {", ".join(PANELS)}')

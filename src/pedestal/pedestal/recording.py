@@ -17,8 +17,7 @@ from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import layouts
 from pedestal_recording import bag as bags
 from pedestal_results import results, tracking
-from pedestal_results import verdict as verdicts
-from pedestal_results.report import run_data
+from pedestal_results.recorded_run import RecordedRun
 
 if typing.TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,6 +58,7 @@ class Run:
 
     def __init__(self, source: memory_recording.MemoryRecording | bags.Bag, name: str, beam: str = '') -> None:
         self._source, self.name, self.beam = source, name, beam
+        self._run = RecordedRun(source)
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -86,10 +86,10 @@ class Run:
         kind = self._source.topics[topic]
         return Table(arrays, {name: 's' if name == 't' else layouts.unit(topic, kind, name) for name in arrays})
 
-    @functools.cached_property
+    @property
     def tracking(self) -> tracking.Tracking:
         """Measured and true values at the steps of the drive, from which all results are computed."""
-        return tracking.read(self._source)
+        return self._run.tracking
 
     @property
     def pointing(self) -> Table:
@@ -111,16 +111,16 @@ class Run:
         >>> round(pedestal.run(pedestal.load('leo_pass', duration=4.0)).results['lock_time_s'], 2)
         1.08
         """
-        return {name: float(value) for name, (value, _) in results.measured(results.of_bag(self._source)).items()}
+        return {name: float(value) for name, (value, _) in results.measured(self._run.parts).items()}
 
-    @functools.cached_property
+    @property
     def verdict(self) -> str:
         """Sentence on the run as in `pedestal run`: the share that was tracked, or the reason why not.
 
         >>> pedestal.run(pedestal.load('leo_pass', {'acu.initial_mode': 'standby'}, duration=1.0)).verdict
         'no target was to be tracked: standby 100 %'
         """
-        return verdicts.of(self._source, self.tracking).text
+        return self._run.verdict.text
 
     def plot(self, figure: str, axes: Axes) -> None:
         """Draw a figure of the report on axes of the caller; panels.PANELS lists the figures.
@@ -133,11 +133,7 @@ class Run:
         >>> axes.get_ylabel()
         'error [deg]'
         """
-        draw(figure, axes, self._data)
-
-    @functools.cached_property
-    def _data(self) -> run_data.RunData:
-        return run_data.read(self._source)
+        draw(figure, axes, self._run)
 
 
 def run(scenario: Scenario, beam: str = '') -> Run:

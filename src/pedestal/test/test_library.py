@@ -18,6 +18,7 @@ from pedestal import panels
 from pedestal_common.graph import topics
 from pedestal_recording import bag
 from pedestal_results import results
+from pedestal_results.recorded_run import RecordedRun
 
 ROOT = pathlib.Path(__file__).parents[3]
 REFERENCES = ROOT / 'bags' / 'reference'
@@ -58,7 +59,7 @@ def test_a_run_has_the_arrays_of_its_recording(name, tmp_path):
             numbers = ours[column].dtype.kind == 'f'
             assert np.array_equal(ours[column], theirs[column], equal_nan=numbers), (topic, column)
     assert again.results == pytest.approx(recording.results, rel=0.0, abs=0.0, nan_ok=True)
-    told = results.measured(results.of_bag(bag.read(REFERENCES / name)))
+    told = results.measured(RecordedRun(bag.read(REFERENCES / name)).parts)
     assert recording.results == pytest.approx({key: value for key, (value, _) in told.items()}, rel=0.0, abs=0.0,
                                               nan_ok=True)
     for column in ('cross_elevation', 'elevation'):

@@ -26,7 +26,10 @@ def test_names_are_nested_or_dotted():
 
 def test_a_file_that_is_written_is_read_back(tmp_path):
     sections = {'acu': {'a.b': 1.0, 'c': '1e5', 'd': 'y'}, 'beam_2/acu': {'e': [1, 2]}}
-    (tmp_path / 'p.yaml').write_text(parameter_file.text(sections))
+    head = [*parameter_file.origin('pedestal tune\n x', '1234'), '', 'a  remark']
+    parameter_file.write_new(tmp_path / 'p.yaml', sections, head)
+    assert (tmp_path / 'p.yaml').read_text().splitlines()[:4] == [
+        '# made by: pedestal tune x', '# git 1234', '#', '# a  remark']
     assert parameter_file.read(tmp_path / 'p.yaml') == {f'/**/{node}': values for node, values in sections.items()}
 
 

@@ -23,6 +23,7 @@ from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
 from pedestal_common.wire.cdr import STAMPED_TYPES
 from pedestal_recording import columns, mcap_file
+from pedestal_recording import recording as recordings
 from pedestal_recording.mcap_file import MESSAGE_HEAD, ZSTD_MAGIC, McapFile
 from pedestal_recording.mcap_file import BagError as BagError  # its users write bag.BagError
 from pedestal_recording.readable import Readable
@@ -381,7 +382,7 @@ class Bag:
     @property
     def iq(self) -> bool:
         """True if a receiver of I/Q samples took the place of the receiver."""
-        given = self.configuration['parameters'].get('tracking_receiver', {})
+        given = recordings.parameters(self, 'tracking_receiver')
         return self.metadata.get('iq') == '1' or any(key.startswith('source.') for key in given)
 
     @property
@@ -421,7 +422,7 @@ class Bag:
             view.metadata_records['parameters'] = own(self.metadata_records['parameters'])
         for cached in ('configuration', 'foreign'):
             view.__dict__.pop(cached, None)
-        receiver = view.configuration['parameters'].get('tracking_receiver', {})
+        receiver = recordings.parameters(view, 'tracking_receiver')
         if 'antenna.beamwidth' in receiver:
             view.metadata['beamwidth'] = str(receiver['antenna.beamwidth'])
         return view

@@ -85,6 +85,15 @@ def frame(data: Data, at: int) -> tuple[int, int]:
     return opcode, at + 9 + length
 
 
+def frames(data: Data, start: int = 0, stop: int | None = None) -> Iterator[tuple[int, int, int]]:
+    """Yield (opcode, start, stop) of each record in data[start:stop]. Raises ValueError for bytes without a record."""
+    end = len(data) if stop is None else stop
+    while start < end:
+        opcode, after = frame(data, start)
+        yield opcode, start, after
+        start = after
+
+
 def parsed(opcode: int, content: bytes) -> records.McapRecord | None:
     """Return a record from its content; None for a kind not read here."""
     return _READ[opcode](ReadDataStream(io.BytesIO(content))) if opcode in _READ else None

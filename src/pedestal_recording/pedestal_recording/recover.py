@@ -29,6 +29,7 @@ from pedestal_recording.mcap_file import (
     Data,
     McapFile,
     frame,
+    frames,
     parsed,
     reason,
     unpacked,
@@ -214,11 +215,9 @@ def _summary(data: Data) -> Iterator[records.McapRecord | None]:
     at, _, crc = struct.unpack_from('<QQI', data, footer + 9)
     if not at or at > footer or crc and zlib.crc32(data[at:footer + 25]) != crc:
         return
-    while at < footer:
-        opcode, stop = frame(data, at)
+    for opcode, start, stop in frames(data, at, footer):
         if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            yield parsed(opcode, data[at + 9:stop])
-        at = stop
+            yield parsed(opcode, data[start + 9:stop])
 
 
 class _Salvage:
@@ -328,9 +327,8 @@ class _Salvage:
 
         Raises ValueError, and adds none of the messages, if a message has no known channel or an invalid head.
         """
-        at, logs = 0, []
-        while at < len(raw):
-            opcode, stop = frame(raw, at)
+        logs = []
+        for opcode, at, stop in frames(raw):
             if opcode == Opcode.MESSAGE:
                 _, channel, _, log, _ = MESSAGE_HEAD.unpack_from(raw, at)
                 if channel not in self._channels:
@@ -340,17 +338,13 @@ class _Salvage:
                 logs.append(log)
             else:
                 self._declare(parsed(opcode, raw[at + 9:stop]))
-            at = stop
         if not logs:
             return
         self._file.count(len(logs))
-        at = 0
-        while at < len(raw):
-            opcode, stop = frame(raw, at)
+        for opcode, at, stop in frames(raw):
             if opcode == Opcode.MESSAGE:
                 _, channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(raw, at)
                 self._add(self._channels[channel], sequence, log, publish, raw[at + MESSAGE_HEAD.size:stop])
-            at = stop
         first, last = min(logs), max(logs)
         for gap in self._gaps:
             gap.after = first if gap.after is None else gap.after

@@ -28,16 +28,14 @@ from typing import IO, cast
 import yaml
 from mcap import records, writer
 from mcap.data_stream import RecordBuilder
-from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.stream_reader import StreamReader, breakup_chunk
 
 from pedestal_common.graph import nodes, topics
 from pedestal_common.quantities import Json, Nanoseconds
 from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
 from pedestal_recording.bag import locate, planned_end
-from pedestal_recording.mcap_file import BagError, McapFile, parsed, reason
+from pedestal_recording.mcap_file import MESSAGE_HEAD, BagError, McapFile, frames, parsed, reason, unpacked
 
 TARGET_CHUNK_BYTES = 1_000_000
 TARGET_CHUNK_SPAN_NS = 1_000_000_000
@@ -215,8 +213,10 @@ class BagFile:
         Writer receives the content of the file again, and _Disk skips the bytes that are already written.
         """
         self._start(_Disk(self.file, self._disk.stream, self._disk.end))
-        with open(self.file, 'rb') as stream, contextlib.suppress(EndOfFile):
-            for record in StreamReader(stream, emit_chunks=True).records:
+        file = McapFile(self.file, locked=True)
+        with contextlib.suppress(EOFError):
+            for opcode, start, stop in file.pieces():
+                record = parsed(opcode, file.read(start + 9, stop))
                 if isinstance(record, records.Schema):
                     self.add_schema(record.name, record.encoding, record.data)
                 elif isinstance(record, records.Channel):
@@ -224,10 +224,11 @@ class BagFile:
                 elif isinstance(record, records.Metadata):
                     self.add_metadata(record.name, record.metadata)
                 elif isinstance(record, records.Chunk):
-                    for message in breakup_chunk(record):
-                        if isinstance(message, records.Message):
-                            self._mcap.add_message(message.channel_id, message.log_time, message.data,
-                                                   message.publish_time, message.sequence)
+                    data = unpacked(record)
+                    for kind, at, end in frames(data):
+                        if kind == Opcode.MESSAGE:
+                            _, channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(data, at)
+                            self._mcap.add_message(channel, log, data[at + MESSAGE_HEAD.size:end], publish, sequence)
                     self._mcap.flush()
         self._mcap.flush()
 

@@ -13,6 +13,7 @@ from pedestal_recording import bag
 from pedestal_recording.recover import recover
 from pedestal_recording.verify import verify
 from pedestal_results import results
+from pedestal_results.recorded_run import RecordedRun
 
 REFERENCE = pathlib.Path(__file__).parents[3] / 'bags' / 'reference' / 'leo_pass'
 BARE = {'index_types': IndexType.NONE, 'repeat_channels': False, 'repeat_schemas': False, 'use_statistics': False,
@@ -115,14 +116,14 @@ def test_split_files_without_a_number_are_read_in_the_order_of_metadata(tmp_path
 
 def test_a_recording_cut_in_time_is_a_part_of_its_run(tmp_path, capsys):
     """The mode before the first change is in the diagnostics of the control unit; the first lock is unknown."""
-    whole = results.measured(results.of_bag(bag.read(REFERENCE, '')))
+    whole = results.measured(RecordedRun(bag.read(REFERENCE, '')).parts)
     [end] = {bag.read(REFERENCE).end}
     path = copied(tmp_path / 'cut', parts=((end - 1.0, 1e9),))
     assert cli.main(['verify', str(path)]) == 1
     lines = capsys.readouterr().out
     assert f'begins at {end - 1.0:.6f} s: {round((end - 1.0) * 200)} steps before it are not in the recording' in lines
     assert 'lost' not in lines and 'must be 1' not in lines
-    cut = results.measured(results.of_bag(bag.read(path, '')))
+    cut = results.measured(RecordedRun(bag.read(path, '')).parts)
     assert whole['lock_time_s'][0] < end - 1.0 and whole['tracked_percent'][0] > 0.0
     assert str(cut['lock_time_s'][0]) == 'nan'
     assert cut['tracked_percent'][0] == 100.0 and cut['autotrack_time_s'][0] == pytest.approx(1.0, abs=0.01)
@@ -132,7 +133,7 @@ def test_a_recording_cut_in_time_is_a_part_of_its_run(tmp_path, capsys):
 def test_a_recording_without_a_mode_does_not_state_it(tmp_path, capsys):
     [end] = {bag.read(REFERENCE).end}
     path = copied(tmp_path / 'cut', parts=((end - 0.5, end - 0.1),))
-    cut = results.measured(results.of_bag(bag.read(path, '')))
+    cut = results.measured(RecordedRun(bag.read(path, '')).parts)
     assert {str(cut[name][0]) for name in ('tracked_percent', 'autotrack_time_s', 'evaluated_time_s')} == {'nan'}
     assert cli.main(['report', str(path)]) == 0
     page = (path / 'report.html').read_text()

@@ -46,6 +46,7 @@ from pedestal_common.quantities import (
     Times,
     Vectors3,
 )
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import tracking
 
@@ -130,10 +131,10 @@ def _turn_rates(angles: Pairs, turned: Pairs, rates: Pairs) -> None:
 
 def read(bag: Recording, run: tracking.Tracking) -> Consistency | None:
     """Return the Consistency of a recording whose Tracking is `run`; None without acu/filter."""
-    if 'acu/filter' not in bag.topics or not bag.rows('acu/filter').size:
+    if not recordings.holds(bag, 'acu/filter'):
         return None
     t = run.t
-    at_steps = functools.partial(tracking.on_grid, bag, t)
+    at_steps = functools.partial(recordings.at, bag, t)
     columns = at_steps('acu/filter', [f'{axis}_{name}.position' for name in FILTER_NUMBERS for axis in topics.AXES])
     numbers = dict(zip(FILTER_NUMBERS, np.split(columns, len(FILTER_NUMBERS), axis=1)))
     probability = at_steps('acu/filter', [f'{axis}_{model}.position' for axis in topics.AXES

@@ -29,6 +29,7 @@ import math
 import numpy as np
 
 from pedestal_common.quantities import Decibels, Floats, Pairs, Quaternions, Radians, Seconds, Vectors3
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import tracking
 
@@ -118,8 +119,8 @@ def read(bag: Recording, run: tracking.Tracking) -> Isolation | None:
     """
     if 'ship/truth' not in bag.topics or run.t.size < 2:
         return None
-    ship = tracking.on_grid(bag, run.t, 'ship/truth', [*(f'orientation.{letter}' for letter in 'xyzw'),
-                                                       *(f'twist.angular.{letter}' for letter in 'xyz')])
+    ship = recordings.at(bag, run.t, 'ship/truth', [*(f'orientation.{letter}' for letter in 'xyzw'),
+                                                    *(f'twist.angular.{letter}' for letter in 'xyz')])
     azimuth, elevation = run.target_earth.T
     target = np.column_stack((np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation),
                               np.sin(elevation)))

@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from pedestal_common.quantities import Bools, Floats, Pairs, Radians, Seconds, Times, Vectors3
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import tracking
 
 ATTITUDE_TOPIC, INS_STATE_TOPIC = 'ship/imu/data', 'ins/state'
 
@@ -47,12 +47,12 @@ class KnownAttitude:
 
 def read(bag: Recording) -> KnownAttitude | None:
     """Return the KnownAttitude of a recording; None for an antenna ashore."""
-    if any(topic not in bag.topics or not bag.rows(topic).size for topic in ('ship/truth', ATTITUDE_TOPIC)):
+    if not (recordings.holds(bag, 'ship/truth') and recordings.holds(bag, ATTITUDE_TOPIC)):
         return None
     table = bag.table(ATTITUDE_TOPIC)
     t = table['t']
     quaternion = [f'orientation.{letter}' for letter in 'xyzw']
-    true = tracking.on_grid(bag, t, 'ship/truth', quaternion)
+    true = recordings.at(bag, t, 'ship/truth', quaternion)
     reported = np.column_stack([table[name] for name in quaternion])
     both = np.isfinite(true + reported).all(axis=1)
     if not both.any():
@@ -68,7 +68,7 @@ def read(bag: Recording) -> KnownAttitude | None:
 def aligned_from(bag: Recording, first: Seconds) -> Seconds:
     """Return the stamp at which the INS became aligned, as KnownAttitude.aligned; first: first stamp of the
     attitude."""
-    if INS_STATE_TOPIC not in bag.topics or not bag.rows(INS_STATE_TOPIC).size:
+    if not recordings.holds(bag, INS_STATE_TOPIC):
         return float(first)
     states = bag.table(INS_STATE_TOPIC)
     times = states['t'][np.array(states['data']) == 'aligned']

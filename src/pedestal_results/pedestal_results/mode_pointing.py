@@ -24,6 +24,7 @@ from pedestal_common.graph.topics import AXES, TOPIC_BY_NAME
 from pedestal_common.parameters import ParameterError, build
 from pedestal_common.quantities import Bools, Floats, Json, Pairs
 from pedestal_common.wire import commands, messages
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import tracking
 from pedestal_results.tracking import DEG_PER_RAD, Tracking
@@ -116,7 +117,7 @@ def _of_steps(_: Recording, run: Tracking, inside: Bools) -> _Part:
 def _of_preset(bag: Recording, run: Tracking, inside: Bools) -> _Part:
     """Return the part of the mode `preset`: reference minus beam."""
     columns, window = ('azimuth.position', 'elevation.position'), _window(run)
-    beam = tracking.on_grid(bag, run.t, 'adu/truth' if 'adu/truth' in bag.topics else 'joint_states', columns)
+    beam = recordings.at(bag, run.t, 'adu/truth' if 'adu/truth' in bag.topics else 'joint_states', columns)
     error, on = run.reference - beam, np.zeros(run.t.size, bool)
     error[:, 0] *= np.cos(beam[:, 1])
     for first, last in tracking.stretches(inside):
@@ -129,11 +130,11 @@ def _of_preset(bag: Recording, run: Tracking, inside: Bools) -> _Part:
 def _of_slave(bag: Recording, run: Tracking, inside: Bools) -> _Part:
     """Return the part of the mode `slave`: the error against the commanded direction."""
     directions, air = np.full((run.t.size, 2), np.nan), None
-    known = bag.configuration['parameters'].get('acu', {})
+    known = recordings.parameters(bag, 'acu')
     if known.get('refraction.slave') != 'apparent':
         air = air_of(bag, known)
     granted = [(t, commands.values(ACU_COMMANDS, command)) for t, command, reply in
-               tracking.replies(bag, 'acu/command_result') if command.verb == 'slave' and reply.granted]
+               recordings.replies(bag, 'acu/command_result') if command.verb == 'slave' and reply.granted]
     begins = np.searchsorted(run.t, [t for t, _ in granted])
     for (t, given), first, last in zip(granted, begins, [*begins[1:], run.t.size]):
         moved = np.minimum(run.t[first:last] - t, given['moves'])
@@ -173,7 +174,7 @@ def predictor_of(bag: Recording, known: Mapping[str, Json]) -> Predictor:
 
 def _of_sun(bag: Recording, run: Tracking, inside: Bools) -> _Part:
     """Return the part of the mode `sun`: the error against the sun, NaN without recorded parameters."""
-    known = bag.configuration['parameters'].get('acu', {})
+    known = recordings.parameters(bag, 'acu')
     if not known:
         return np.full((run.t.size, 2), np.nan), inside
     try:

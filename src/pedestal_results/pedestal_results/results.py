@@ -22,13 +22,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeAlias
 
 from pedestal_common.quantities import Row
-from pedestal_recording.recording import Recording
 from pedestal_results import (
-    consistency,
-    isolation,
-    known_attitude,
     mode_pointing,
-    pointing_loss,
     sensor_frame,
     tracking,
 )
@@ -83,10 +78,10 @@ RESULTS = (
            brief=True),
     Result('pointing_max_deg', 'deg', 'tracking', lambda run: run.pointing(largest),
            'Largest true pointing error of either axis in settled autotrack.', brief=True),
-    Result('pointing_loss_mean_db', 'dB', 'tracking', pointing_loss.mean_db,
+    Result('pointing_loss_mean_db', 'dB', 'tracking', lambda run: run.mean_power_loss,
            'Loss of the mean received power by the true pointing error, from the pattern of the beam, in settled '
            'autotrack.', 'loss of the mean received power by the pointing error', brief=True),
-    Result('pointing_loss_max_db', 'dB', 'tracking', pointing_loss.max_db,
+    Result('pointing_loss_max_db', 'dB', 'tracking', lambda run: run.max_power_loss,
            'Largest loss of received power by the true pointing error, from the pattern of the beam, in settled '
            'autotrack.', 'largest loss of received power by the pointing error', brief=True),
     *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWED_DIRECTIONS)),
@@ -201,28 +196,6 @@ RESULTS = (
 """All results, in the order in which tables show them."""
 
 RESULT_BY_NAME = {result.name: result for result in RESULTS}
-
-
-def of_tracking(run: tracking.Tracking) -> dict[str, object]:
-    """Return the parts by name that a Tracking provides, None for a missing part."""
-    return {'motors': None if run.electronic else run, 'encoders': run if run.has_encoders else None, 'tracking': run}
-
-
-def of_bag(bag: Recording) -> dict[str, object]:
-    """Return the parts by name of a recording of one beam.
-
-    A missing part is absent, None or empty.
-
-    Raises ValueError if the bag has no joint_states or no target/truth.
-    """
-    return of_run(bag, tracking.read(bag))
-
-
-def of_run(bag: Recording, run: tracking.Tracking) -> dict[str, object]:
-    """Return the parts of `of_bag`, from a recording of one beam and its Tracking `run`."""
-    return {**of_tracking(run), **mode_pointing.read(bag, run), 'filter': consistency.read(bag, run),
-            'keyholes': tracking.keyholes(bag), 'isolation': isolation.read(bag, run),
-            'attitude': known_attitude.read(bag)}
 
 
 def measured(parts: Mapping[str, object], table: Sequence[Result] = RESULTS) -> Values:

@@ -12,6 +12,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.quantities import Pair, Pairs, Quaternions, Seconds, Times
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 
 SLOW_ERROR_TIME_S = 1.0
@@ -72,7 +73,7 @@ def boresight(bag: Recording) -> Pair:
 
     It is the direction in which the receiver measures no error, seen from the beam.
     """
-    of_receiver = bag.configuration['parameters'].get('tracking_receiver', {})
+    of_receiver = recordings.parameters(bag, 'tracking_receiver')
     return np.array([of_receiver.get(f'antenna.boresight_{axis}', 0.0) for axis in ('cross_elevation', 'elevation')])
 
 

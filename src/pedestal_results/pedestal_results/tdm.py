@@ -20,8 +20,9 @@ from pedestal_common.graph import nodes
 from pedestal_common.quantities import Floats, Hertz, Pairs, Stamps, Texts
 from pedestal_recording import bag as bags
 from pedestal_recording import columns
+from pedestal_recording import recording as recordings
 from pedestal_recording.export import atomic_file
-from pedestal_results import beam_direction, measured_direction, tracking
+from pedestal_results import directions
 from tracking_receiver_sim.track import instant
 
 RATE_LIMITS_HZ = 1e-3, 1000.0  # smallest and largest allowed rate of records [Hz]
@@ -72,7 +73,7 @@ def export(path: str | pathlib.Path, created: datetime.datetime, output: str | p
             raise ValueError(f'--participants {name!r:.60}: must be 1 to 80 ASCII characters')
     bag = bags.read(path)
     for file, view in _files(bag, output, overwrite).items():
-        tracks, models = _Tracks(view, rate), beam_direction.titles(view)
+        tracks, models = _Tracks(view, rate), directions.titles(view)
         file.parent.mkdir(parents=True, exist_ok=True)
         records = 0
         with atomic_file(file) as part, open(part, 'w', encoding='ascii', newline='') as stream:
@@ -128,9 +129,9 @@ class _Tracks:
             beam, error = self._at('joint_states', stamps), self._at('tracking_receiver/angle_error', stamps)
             attitude = self._at('ship/imu/data', stamps) if 'ship/imu/data' in self.rows else None
             t = (stamps - self.bag.start) / 1e9
-            beam = beam_direction.on_sky(self.bag, t, beam)
-            angles = np.degrees(measured_direction.earth_angles(beam, error[:, :2], attitude))
-            mode = tracking.modes(self.bag, t)
+            beam = directions.on_sky(self.bag, t, beam)
+            angles = np.degrees(directions.of_target(beam, error[:, :2], attitude))
+            mode = recordings.modes(self.bag, t)
             # Without lock the receiver errors, and so the angles, are NaN. A bag without acu/mode states no mode.
             exported = np.isfinite(angles).all(axis=1) & ((mode == 'autotrack') | ('acu/mode' not in self.bag.topics))
             if exported.any():
@@ -185,7 +186,7 @@ def _header(bag: bags.Bag, created: datetime.datetime) -> str:
 
 def _participants(bag: bags.Bag, names: Sequence[str]) -> tuple[str, ...]:
     """Return (name of the station, name of the target): the names that were given, else the default names."""
-    receiver = bag.configuration['parameters'].get('tracking_receiver', {})
+    receiver = recordings.parameters(bag, 'tracking_receiver')
     target = str(receiver.get('target.kind', 'TARGET')).upper()[:80]
     launch = TLE_DESIGNATOR_PATTERN.fullmatch(str(receiver.get('target.leo_pass.line_1', ''))[TLE_DESIGNATOR_COLUMNS])
     elements = receiver.get('target.leo_pass.omm', '')

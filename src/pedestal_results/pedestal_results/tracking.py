@@ -8,17 +8,17 @@ import contextlib
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from typing import Annotated, NamedTuple, overload
 
 import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
-from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import build
 from pedestal_common.quantities import (
     Bools,
+    Decibels,
     Degrees,
     Floats,
     Matrix3,
@@ -27,14 +27,14 @@ from pedestal_common.quantities import (
     Quaternions,
     Radians,
     Seconds,
-    Table,
     Texts,
     Times,
     Vectors3,
 )
-from pedestal_common.wire import commands
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import beam_direction, sensor_frame
+from pedestal_results import directions, sensor_frame
+from receiver_law.monopulse import sum_pattern
 from tracking_receiver_sim.path import arrival
 from tracking_receiver_sim.path.params import PathParameters
 
@@ -45,13 +45,10 @@ ENCODER_BEAM_NOTE = ('the recording has no adu/truth, so the direction of the be
                      'between encoders and dish do not show')
 """Note on the results of an old recording, whose drive did not publish the true direction of its dish."""
 
-
-MAX_AGE_STEPS, MAX_AGE_INTERVALS = 4.0, 2.5
-"""Largest age of a value of real equipment [steps, intervals between its messages]; the larger one counts."""
+LEAST_POWER = 1e-12
+"""Smallest received power over that on the beam axis [-]. This avoids an infinite loss in a null of the pattern."""
 ERROR_MATRIX_NAMES = ('xx', 'xe'), ('ex', 'ee')
 """Names of the elements of the matrix of the receiver's errors, by row and column."""
-MIN_ON_GRID_SHARE = 0.5
-"""Share of the messages with the stamp of a step, from which on a topic counts as one of the steps [-]."""
 
 
 @compiled
@@ -120,6 +117,16 @@ def _interval_start_error(beam: Pairs, error: Pairs, out: Pairs) -> None:
         out[k, 0], out[k, 1] = line_of_sight.offsets(beam[k, 0], beam[k, 1], x, y, z)
 
 
+@compiled
+def _fill_power(error: Pairs, beamwidth: Radians, power: Floats) -> None:
+    """Fill power: received power over that on the beam axis [-]. error: pointing errors in cross-elevation and
+    elevation [rad].
+    """
+    for k in range(len(error)):
+        voltage = sum_pattern(error[k, 0] / beamwidth) * sum_pattern(error[k, 1] / beamwidth)
+        power[k] = voltage * voltage
+
+
 def interval_start_error(beam: Pairs, error: Pairs) -> Pairs:
     """Return the pointing error [rad] of an electronic beam at the beginning of the interval before each stamp.
 
@@ -171,6 +178,12 @@ class Tracking:
     boresight: Pair         # boresight offset of the receiver
     # true pointing error of an electronic beam at the beginning of the interval that ends at the stamp, else NaN
     begun: Pairs
+
+    @property
+    def parts(self) -> dict[str, object]:
+        """The parts by name for results.measured that the run provides, None for a missing part."""
+        return {'motors': None if self.electronic else self, 'encoders': self if self.has_encoders else None,
+                'tracking': self}
 
     @property
     def period(self) -> Seconds:
@@ -237,6 +250,31 @@ class Tracking:
         errors = (self.true, self.begun[self.tracking]) if self.electronic else (self.true,)
         return max(measure(error[:, axis]) for error in errors) * DEG_PER_RAD
 
+    @functools.cached_property
+    def power(self) -> Floats:
+        """Received power over that on the beam axis [-], by the pattern of the beam, in the evaluated part.
+
+        The pattern is the sum pattern of tracking_receiver_sim.monopulse: the received voltage by the angle from the
+        beam axis. Empty without a beamwidth.
+        """
+        if not math.isfinite(self.beamwidth):
+            return np.zeros(0)
+        error = np.concatenate((self.true, self.begun[self.tracking])) if self.electronic else self.true
+        error = np.ascontiguousarray(error[np.isfinite(error).all(axis=1)])
+        power = np.empty(len(error))
+        _fill_power(error, self.beamwidth, power)
+        return np.maximum(power, LEAST_POWER)
+
+    @property
+    def mean_power_loss(self) -> Decibels:
+        """Loss of the mean received power by the pointing error; NaN without an evaluated part."""
+        return -10.0 * math.log10(self.power.mean()) if self.power.size else math.nan
+
+    @property
+    def max_power_loss(self) -> Decibels:
+        """Largest loss of received power by the pointing error; NaN without an evaluated part."""
+        return -10.0 * math.log10(self.power.min()) if self.power.size else math.nan
+
     @property
     def lock_time(self) -> Seconds:
         """Stamp of the receiver's first error; NaN without an error, and in a recording that begins during the run
@@ -276,64 +314,16 @@ class Tracking:
         return float(np.sum(self.distance[self.since] > 0.5 * self.beamwidth) * self.period)
 
 
-def beamwidth(bag: Recording) -> Radians:
-    """Return the beamwidth that a bag states, NaN if it states none."""
-    try:
-        return float(bag.metadata.get('beamwidth', 'nan'))
-    except ValueError:
-        return math.nan
-
-
 def error_matrix(bag: Recording) -> Annotated[Floats, (2, 2)]:
     """Return the matrix [-] with which the control unit multiplied the errors of the receiver."""
-    known = bag.configuration['parameters'].get('acu', {})
+    known = recordings.parameters(bag, 'acu')
     return np.array([[known.get(f'tracker.matrix.{name}', float(i == j)) for j, name in enumerate(names)]
                      for i, names in enumerate(ERROR_MATRIX_NAMES)])
 
 
-def on_grid(bag: Recording, t: Times, topic: str, columns: Sequence[str]) -> Floats:
-    """Return m columns of a topic, by their names, at n stamps, as (n, m).
-
-    The value is NaN where the topic has no message, and in a column that the recording of an older version lacks.
-    """
-    table: Table = bag.table(topic) if topic in bag.topics else {'t': ()}
-    if np.array_equal(table['t'], t) and (np.diff(t) > 1e-9).all():     # a message in every step
-        return np.column_stack([table[column] if column in table else np.full(t.size, np.nan) for column in columns])
-    out = np.full((t.size, len(columns)), np.nan)
-    if len(table['t']):
-        _, here, there = np.intersect1d(np.round(t * 1e9), np.round(table['t'] * 1e9), return_indices=True)
-        for i, column in enumerate(columns):
-            if column in table:
-                out[here, i] = table[column][there]
-    return out
-
-
-def of_equipment(bag: Recording, t: Times, topic: str, columns: Sequence[str]) -> Floats:
-    """Return m columns of a topic of the receiver or of the INS, by their names, at n stamps, as (n, m).
-
-    Simulated equipment stamps its messages with the steps; the result is that of on_grid. Real equipment has stamps
-    or an interval of its own; the result is then that of its newest message, NaN where this message is too old.
-    """
-    stamps = bag.table(topic)['t'] if topic in bag.topics else np.zeros(0)
-    if not len(stamps) or t.size < 2:
-        return on_grid(bag, t, topic, columns)
-    step, interval = np.median(np.diff(t)), np.median(np.diff(stamps)) if len(stamps) > 1 else 0.0
-    on_steps = np.isin(np.round(stamps * 1e9), np.round(t * 1e9)).mean() >= MIN_ON_GRID_SHARE
-    if on_steps and interval < 1.5 * step:
-        return on_grid(bag, t, topic, columns)
-    oldest = max(MAX_AGE_STEPS * step, MAX_AGE_INTERVALS * interval)
-    index = np.searchsorted(stamps, t + 1e-9, side='right') - 1
-    known = (index >= 0) & (t - stamps[np.maximum(index, 0)] < oldest)
-    table, out = bag.table(topic), np.full((t.size, len(columns)), np.nan)
-    for i, column in enumerate(columns):
-        if column in table:
-            out[known, i] = np.asarray(table[column])[index[known]]
-    return out
-
-
 def _lever_arm(bag: Recording, attitude: Quaternions) -> Vectors3:
     """Return the lever arm ENU [m] from base_link to the antenna at each attitude; without one, 0."""
-    parameters = bag.configuration['parameters'].get('tracking_receiver', {})
+    parameters = recordings.parameters(bag, 'tracking_receiver')
     arm = np.array([parameters.get(f'lever_arm.{axis}', 0.0) for axis in 'xyz'], float)
     enu, mat_ed = np.zeros((len(attitude), 3)), np.empty((3, 3))
     if arm.any():
@@ -350,8 +340,8 @@ def _arriving(bag: Recording, relative: Vectors3, velocity: Vectors3) -> Vectors
     relative: vector to its true position, ENU [m]; velocity: its velocity, ENU [m/s]. Refraction and
     light time of the signal, by the parameters in the bag, shift the apparent position.
     """
-    of_receiver = bag.configuration['parameters'].get('tracking_receiver', {})
-    given = {key: of_receiver[key] for key in ('path.refractivity', 'path.light_time') if key in of_receiver}
+    of_receiver = recordings.parameters(bag, 'tracking_receiver')
+    given = {key: value for key, value in of_receiver.items() if key in ('path.refractivity', 'path.light_time')}
     path = build(PathParameters, given, 'path.')
     return arrival.all_seen(path, relative, velocity) if given else relative
 
@@ -367,29 +357,26 @@ def by_encoders(bag: Recording) -> bool:
 
 def read(bag: Recording) -> Tracking:
     """Return the Tracking of a recording of one beam. Raises ValueError without joint_states or target/truth."""
-    missing = [name for name in ('joint_states', 'target/truth') if name not in bag.topics]
-    if missing:
-        raise ValueError(f'{bag.path}: no {" and no ".join(missing)} in the bag, so no comparison with the truth is '
-                         'possible')
-
+    if missing := recordings.missing(bag, 'joint_states', 'target/truth'):
+        raise ValueError(f'{bag.path}: no {missing} in the bag, so no comparison with the truth is possible')
     joints = bag.table('joint_states')
     t = joints['t']
-    at_steps = functools.partial(on_grid, bag, t)
+    at_steps = functools.partial(recordings.at, bag, t)
     encoders = np.column_stack((joints['azimuth.position'], joints['elevation.position']))
-    encoders = beam_direction.on_sky(bag, t, encoders)
+    encoders = directions.on_sky(bag, t, encoders)
     beam = at_steps('adu/truth', ('azimuth.position', 'elevation.position')) if 'adu/truth' in bag.topics else encoders
     target = at_steps('target/truth', ('position.x', 'position.y', 'position.z'))
     quaternion = ('orientation.x', 'orientation.y', 'orientation.z', 'orientation.w')
     if 'ship/truth' in bag.topics:
         ship = at_steps('ship/truth', ('position.x', 'position.y', 'position.z'))
         attitude = at_steps('ship/truth', quaternion)
-        known_attitude = of_equipment(bag, t, 'ship/imu/data', quaternion)
+        known_attitude = recordings.of_equipment(bag, t, 'ship/imu/data', quaternion)
         stamped = at_steps('ship/imu/data', quaternion)
         ship = ship + _lever_arm(bag, attitude)
     else:
         ship = np.zeros((t.size, 3))
         attitude = known_attitude = stamped = np.tile(line_of_sight.ASHORE_ATTITUDE, (t.size, 1))
-    measured = of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y', 'z'))
+    measured = recordings.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y', 'z'))
     estimate = at_steps('acu/estimate', ('azimuth.position', 'elevation.position'))
     error, encoder_error, estimate_error, beam_earth, estimate_earth = np.full((5, t.size, 2), np.nan)
     velocity = at_steps('target/truth', ('twist.linear.x', 'twist.linear.y', 'twist.linear.z'))
@@ -404,49 +391,18 @@ def read(bag: Recording) -> Tracking:
     sensor_truth = sensor_frame.truth(t, encoders, error - boresight,
                                       stamped if np.isfinite(stamped).any() else known_attitude, target_earth)
     _view_from_beam(beam, attitude, known_attitude, estimate, sensor_truth, estimate_error, beam_earth, estimate_earth)
-    mode = modes(bag, t)
+    mode = recordings.modes(bag, t)
     automatic = mode == 'autotrack'
     start = t[automatic][0] + HANDOVER_SETTLING_S if automatic.any() else math.inf
-    reference = beam_direction.on_sky(bag, t, at_steps('acu/reference', ('azimuth.position', 'elevation.position')))
+    reference = directions.on_sky(bag, t, at_steps('acu/reference', ('azimuth.position', 'elevation.position')))
     reference[(mode == 'standby') | (mode == '') | (bag.beams > 0)] = np.nan
     return Tracking(t=t, encoders=encoders, reference=reference, error=error, encoder_error=encoder_error,
                     measured=measured[:, :2], cn0=measured[:, 2], estimate_error=estimate_error,
                     beam_earth=beam_earth, target_earth=target_earth, estimate_earth=estimate_earth,
                     sensor_truth=sensor_truth, range=np.linalg.norm(relative, axis=1), mode=mode,
-                    tracking=automatic & (t >= start), since=t >= start, beamwidth=beamwidth(bag),
+                    tracking=automatic & (t >= start), since=t >= start, beamwidth=recordings.beamwidth(bag),
                     boresight=boresight,
                     begun=interval_start_error(beam, error) if bag.beams else np.full_like(error, np.nan))
-
-
-def modes(bag: Recording, t: Times) -> Texts:
-    """Return the mode of the ACU at every stamp t, '' where the recording does not state it.
-
-    acu/mode states each change. In a recording that begins during a run, the first diagnostics of the ACU state the
-    mode before the first change.
-    """
-    if 'acu/mode' not in bag.topics:
-        return np.full(t.size, '')
-    table = bag.table('acu/mode')
-    index = np.searchsorted(table['t'], t + 1e-9, side='right') - 1
-    first = _first_mode(bag, table['t'][0] if len(table['t']) else math.inf) if (index < 0).any() else ''
-    return np.array([first, *table['data']])[index + 1]
-
-
-def _first_mode(bag: Recording, change: Seconds) -> str:
-    """Return the mode in the first diagnostics of the ACU before the first change; '' without them."""
-    for _, log, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
-        for status in array.status:
-            if status.name == f'{bag.beam}acu' and (log - bag.start) / NS_PER_SECOND < change:
-                return next((value.value for value in status.values if value.key == 'mode'), '')
-    return ''
-
-
-def replies(bag: Recording, topic: str) -> Iterator[tuple[Seconds, commands.Command, commands.Reply]]:
-    """Yield (time, Command, Reply) of the replies on a topic; nothing for a topic of another type."""
-    there = bag.topics.get(topic) == 'diagnostic_msgs/msg/DiagnosticStatus'
-    for _, log, _, message in bag.messages(topic) if there else ():
-        with contextlib.suppress(ValueError):  # the message is no reply
-            yield ((log - bag.start) / NS_PER_SECOND, *commands.of_reply(message))
 
 
 def keyholes(bag: Recording) -> list[Slew]:
@@ -456,16 +412,15 @@ def keyholes(bag: Recording) -> list[Slew]:
     does not count.
     """
     slews: list[Slew] = []
-    for _, log, _, array in bag.messages('diagnostics') if 'diagnostics' in bag.topics else ():
-        for status in array.status:
-            values = {value.key: value.value for value in status.values}
-            if values.get('keyhole') == 'none' and slews and (log - bag.start) / NS_PER_SECOND < slews[-1][0]:
+    for t, status in recordings.diagnostics(bag):
+        values = {value.key: value.value for value in status.values}
+        if values.get('keyhole') == 'none' and slews and t < slews[-1].begin:
+            slews.pop()
+        with contextlib.suppress(KeyError, ValueError):  # the status is of another node or predicts no slew
+            begin, end, loss = (float(values[f'keyhole_{name}_s']) for name in ('begins', 'ends', 'loss'))
+            if slews and begin < slews[-1].end:
                 slews.pop()
-            with contextlib.suppress(KeyError, ValueError):  # the status is of another node or predicts no slew
-                begin, end, loss = (float(values[f'keyhole_{name}_s']) for name in ('begins', 'ends', 'loss'))
-                if slews and begin < slews[-1][1]:
-                    slews.pop()
-                slews.append(Slew(begin, end, loss))
+            slews.append(Slew(begin, end, loss))
     return slews
 
 

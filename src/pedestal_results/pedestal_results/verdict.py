@@ -16,8 +16,9 @@ from pedestal_common.graph import modes, nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.quantities import Bools, Floats, Json, Seconds
 from pedestal_common.wire import commands
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results.tracking import DEG_PER_RAD, Tracking, replies
+from pedestal_results.tracking import DEG_PER_RAD, Tracking
 
 TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED = 'tripped', 'refused', 'never locked', 'never tracked'
 TRACKED, ON_THE_WAY, NO_TARGET = 'tracked', 'ended on the way', 'no target'  # words of the verdicts
@@ -93,7 +94,7 @@ def _trip(bag: Recording) -> str:
 def _replies(bag: Recording) -> Iterator[tuple[Seconds, commands.Command, commands.Reply]]:
     """Yield (time, Command, Reply) of all replies in a bag."""
     for topic in REPLY_TOPICS:
-        yield from replies(bag, topic)
+        yield from recordings.replies(bag, topic)
 
 
 def _refusals(bag: Recording) -> list[str]:
@@ -121,7 +122,7 @@ def _leads_to_tracking(mode: str, handover: bool) -> bool:
 
 def _tracking(bag: Recording, run: Tracking) -> tuple[str, str]:
     """Return (word, sentence) on the tracking of a run, without its faults and refusals."""
-    acu = bag.configuration['parameters'].get('acu', {})
+    acu = recordings.parameters(bag, 'acu')
     wanted = {acu.get('initial_mode', 'standby'), *(command.verb for _, command, _ in _replies(bag)),
               *np.unique(run.mode[run.known_mode]).tolist()}
     shares = {mode: 100.0 * float(np.mean(run.mode == mode)) for mode in modes.MODES if (run.mode == mode).any()}
@@ -187,7 +188,7 @@ def _never_tracked(bag: Recording, run: Tracking, distance: Floats, near: Bools,
     distance: angle from beam to target [rad]; near: True with the target within half a beamwidth; acu: the parameters
     of the control unit.
     """
-    receiver = bag.configuration['parameters'].get('tracking_receiver', {})
+    receiver = recordings.parameters(bag, 'tracking_receiver')
     count = acu.get('tracker.lock_count', 0) * run.period
     follows = np.isin(run.mode, [row.name for row in modes.MODE_ROWS if row.follows])
     left = float(run.t[-1] - run.t[follows][0])

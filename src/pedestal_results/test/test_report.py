@@ -14,7 +14,8 @@ from pedestal_common.wire import commands, messages
 from pedestal_recording import bag as bags
 from pedestal_recording.writer import Writer
 from pedestal_results import consistency, results, tracking
-from pedestal_results.report import figures, filter_figures, print_pdf, run_data, run_figures
+from pedestal_results.recorded_run import RecordedRun
+from pedestal_results.report import elements, figures, filter_figures, run_figures
 from pedestal_results.report.page import write as write_report
 
 REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'
@@ -200,7 +201,7 @@ def test_file_needs_nothing_else(page):
 
 
 def test_numbers_are_those_of_the_summary(page, whole):
-    parts = results.of_tracking(tracking.read(bags.read(whole)))
+    parts = tracking.read(bags.read(whole)).parts
     values = {key: value for key, (value, _) in results.measured(parts).items()}
     rows = page[0].rows
 
@@ -276,7 +277,7 @@ def test_the_events_are_a_table_with_senders_reasons_and_durations(story, texts_
 
 
 def test_the_events_are_marked_on_every_curve_over_time(story):
-    recording = run_data.read(bags.read(story))
+    recording = RecordedRun(bags.read(story))
     for spec in run_figures.FIGURES:
         with figures.matplotlib.rc_context(figures.MATPLOTLIB_STYLE):
             figure = spec.draw(recording)
@@ -302,8 +303,8 @@ def test_a_fast_slew_is_no_chord_in_the_sky_plot():
 
 
 def test_the_frame_is_that_of_the_tracking_and_not_of_the_slew(whole):
-    recording = run_data.read(bags.read(whole))
-    recording.run.beam_earth[:40, 0] -= 2.0
+    recording = RecordedRun(bags.read(whole))
+    recording.tracking.beam_earth[:40, 0] -= 2.0
     recording.raw_angles[:40, 0] -= 2.0
     with figures.matplotlib.rc_context(figures.MATPLOTLIB_STYLE):
         axes = run_figures.angle(recording).axes[0]
@@ -313,7 +314,7 @@ def test_the_frame_is_that_of_the_tracking_and_not_of_the_slew(whole):
 
 
 @pytest.mark.thorough
-@pytest.mark.skipif(not any(map(shutil.which, print_pdf.BROWSERS)), reason='no browser is installed')
+@pytest.mark.skipif(not any(map(shutil.which, elements.BROWSERS)), reason='no browser is installed')
 def test_the_report_as_pdf_with_its_author(story, tmp_path, capsys):
     assert cli.main(['report', str(story), '--output', str(tmp_path / 'r.html'), '--author', 'A. <B>', '--pdf']) == 0
     assert capsys.readouterr().out.split() == [str(tmp_path / 'r.html'), str(tmp_path / 'r.pdf')]
@@ -413,7 +414,7 @@ def test_lost_steps_are_shown(texts_only, tmp_path):
 
 
 def test_labels_in_the_page_are_those_drawn(whole):
-    recording = run_data.read(bags.read(whole))
+    recording = RecordedRun(bags.read(whole))
     spec = run_figures.FIGURES[0]
     stream = io.StringIO()
     figures.render(spec, recording, stream)
@@ -431,7 +432,7 @@ def test_wall_jitter_of_realtime(texts_only, tmp_path):
 
 def test_beamwidth_lines_only_when_known(whole, tmp_path):
     def dashed(path):
-        recording = run_data.read(bags.read(path))
+        recording = RecordedRun(bags.read(path))
         with figures.matplotlib.rc_context(figures.MATPLOTLIB_STYLE):
             panels = run_figures.pointing(recording).axes
         return [line.get_ydata()[0] for axes in panels for line in axes.lines if line.get_linestyle() == '--']
@@ -479,13 +480,3 @@ def test_an_aborted_run_and_lost_steps_stand_on_the_first_page(texts_only, tmp_p
     first = page.text[:page.text.index('Results')]
     assert f'Aborted: ends at {(STEPS - 1) * T / 1e9:.6f} s, planned end 10.000000 s.' in first
     assert 'Aborted' not in page_of(make_bag(tmp_path / 'whole', planned_end_ns=(STEPS - 1) * T)).text
-
-
-def test_vector_copies_on_request(tmp_path, capsys):
-    bag = make_bag(tmp_path / 'bag', ('clock', 'acu/mode', 'diagnostics'), steps=400)
-    assert cli.main(['report', str(bag), '--png', str(tmp_path / 'figures'), '--vector', 'pdf']) == 0
-    drawn = sorted(path.stem for path in (tmp_path / 'figures').glob('*.png'))
-    assert drawn == sorted(path.stem for path in (tmp_path / 'figures').glob('*.pdf')) == ['timeline']
-    assert (tmp_path / 'figures' / 'timeline.pdf').read_bytes().startswith(b'%PDF')
-    assert cli.main(['report', str(bag), '--vector', 'svg']) == 1
-    assert '--vector svg: needs --png DIR' in capsys.readouterr().err

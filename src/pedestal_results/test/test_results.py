@@ -8,7 +8,8 @@ import pytest
 
 from pedestal import console
 from pedestal_recording import bag
-from pedestal_results import consistency, pointing_loss, results, tracking
+from pedestal_results import consistency, results, tracking
+from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.again import what_if
 
 REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'
@@ -23,7 +24,7 @@ def test_a_name_stands_once_with_a_sentence(table):
 
 def test_the_parts_of_a_recording_decide_its_rows():
     """Ashore there is neither isolation nor an INS; a row's unit and target are those of the table."""
-    ashore, ship = (results.measured(results.of_bag(bag.read(REFERENCES / name)))
+    ashore, ship = (results.measured(RecordedRun(bag.read(REFERENCES / name)).parts)
                     for name in ('leo_pass', 'ship_pass'))
     kinds = {name: results.RESULT_BY_NAME[name].part for name in ship}
     assert set(kinds.values()) == {'motors', 'encoders', 'tracking', 'filter', 'attitude'}    # no isolation: too short
@@ -72,14 +73,14 @@ def test_a_filter_that_is_off_is_marked_in_the_table(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert ['too sure' in line for line in lines if '_nis_mean' in line] == [False, True]
     assert any('beam_2: too sure' in line for line in lines)
-    leo = results.of_bag(bag.read(REFERENCES / 'leo_pass'))
+    leo = RecordedRun(bag.read(REFERENCES / 'leo_pass')).parts
     judged = leo['filter'].axes
     assert ('azimuth_nees_mean' in results.marks(leo)) == bool(
         consistency.mark(judged[0].nees, consistency.NEES_FREEDOMS, judged[0].nees_band))
 
 
 def test_the_eight_results_come_first_and_others_fill_their_places():
-    leo = results.measured(results.of_bag(bag.read(REFERENCES / 'leo_pass')))
+    leo = results.measured(RecordedRun(bag.read(REFERENCES / 'leo_pass')).parts)
     flagged = [result.name for result in results.RESULTS if result.brief]
     assert len(flagged) == results.BRIEF_COUNT
     run = {'lost_steps': (0.0, 'steps'), 'messages': (4.0, 'messages')}
@@ -110,6 +111,6 @@ def test_the_loss_at_half_a_beamwidth_is_half_of_the_power():
         for swapped in (False, True):
             first, second = (np.zeros(run.t.size), error)[::-1 if swapped else 1]
             moved = dataclasses.replace(run, error=np.column_stack((first, second)))
-            assert (pointing_loss.mean_db(moved), pointing_loss.max_db(moved)) == pytest.approx(loss, abs=0.02)
-    assert math.isnan(pointing_loss.mean_db(dataclasses.replace(run, tracking=np.zeros(run.t.size, bool))))
-    assert math.isnan(pointing_loss.max_db(dataclasses.replace(run, beamwidth=math.nan)))
+            assert (moved.mean_power_loss, moved.max_power_loss) == pytest.approx(loss, abs=0.02)
+    assert math.isnan(dataclasses.replace(run, tracking=np.zeros(run.t.size, bool)).mean_power_loss)
+    assert math.isnan(dataclasses.replace(run, beamwidth=math.nan).max_power_loss)

@@ -8,7 +8,9 @@ from scipy import ndimage
 from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_common.geometry import line_of_sight
+from pedestal_recording import recording as recordings
 from pedestal_results import results, sensor_frame, tracking
+from pedestal_results.recorded_run import RecordedRun
 from pedestal_results.tracking import known_rms as rms
 from pedestal_workbench.again import what_if
 from pedestal_workbench.tuning import antenna_from_data_sheet
@@ -28,12 +30,12 @@ class Without(what_if.Overlay):
 
 def error_against_the_true_direction(bag, run):
     """Estimate minus true target (n, 2), both seen from the true beam: the error of the filter of a rigid antenna."""
-    estimate = tracking.on_grid(bag, run.t, 'acu/estimate', ('azimuth.position', 'elevation.position'))
+    estimate = recordings.at(bag, run.t, 'acu/estimate', ('azimuth.position', 'elevation.position'))
     beam, attitude = run.encoders, None
     if 'adu/truth' in bag.topics:
-        beam = tracking.on_grid(bag, run.t, 'adu/truth', ('azimuth.position', 'elevation.position'))
+        beam = recordings.at(bag, run.t, 'adu/truth', ('azimuth.position', 'elevation.position'))
     if 'ship/truth' in bag.topics:
-        attitude = tracking.on_grid(bag, run.t, 'ship/imu/data', [f'orientation.{letter}' for letter in 'xyzw'])
+        attitude = recordings.at(bag, run.t, 'ship/imu/data', [f'orientation.{letter}' for letter in 'xyzw'])
     out, matrix = np.full((run.t.size, 2), np.nan), np.empty((3, 3))
     for k in np.flatnonzero(run.tracking):
         line_of_sight.rotation(*(line_of_sight.ASHORE_ATTITUDE if attitude is None else attitude[k]), matrix)
@@ -60,7 +62,7 @@ def test_the_bend_of_a_flexible_dish_is_no_error_of_the_filter(flexible):
     bend = ndimage.uniform_filter1d(dish - encoder, 201)
     estimate_error = (run['acu/estimate']['position'][:, 1] - (dish + error - bend))[on]
     noise = known.measured[on, 1] - error[on]
-    found = {name: value for name, (value, _) in results.measured(results.of_tracking(known)).items()}
+    found = {name: value for name, (value, _) in results.measured(known.parts).items()}
     assert found['noise_reduction_elevation'] == pytest.approx(rms(noise) / rms(estimate_error), rel=1e-3)
     # The bend is several times the error of the filter, which the error against the true direction would include.
     assert abs(bend[on].mean()) > 5.0 * rms(estimate_error)
@@ -86,7 +88,7 @@ def test_a_rigid_antenna_with_exact_sensors_has_the_error_against_the_true_direc
     bag = memory_recording.record(scenario.load(name, changes, duration=15.0))
     for recording, tolerance in ((Without(bag, 'adu/truth'), 1e-9), (bag, 2e-4)):
         run = tracking.read(recording)
-        found = results.measured(results.of_tracking(run))
+        found = results.measured(run.parts)
         error = np.degrees(error_against_the_true_direction(recording, run))
         for i, axis in enumerate(('cross_elevation', 'elevation')):
             noise = np.degrees(run.measured[run.tracking, i] - run.true[:, i])
@@ -104,8 +106,8 @@ def test_the_noise_of_the_attitude_is_counted_once():
 
 def test_a_boresight_offset_is_neither_noise_nor_an_error_of_the_filter():
     plain, offset = (
-        results.measured(results.of_tracking(tracking.read(memory_recording.record(
-            scenario.load('leo_pass', [f'tracking_receiver.antenna.boresight_elevation={angle}'], duration=15.0)))))
+        results.measured(RecordedRun(memory_recording.record(scenario.load(
+            'leo_pass', [f'tracking_receiver.antenna.boresight_elevation={angle}'], duration=15.0))).parts)
         for angle in (0.0, 1e-3))
     assert offset['elevation_rms_deg'][0] > 10.0 * plain['elevation_rms_deg'][0]
     for name in ('single_sample_noise_deg', 'noise_reduction', 'noise_reduction_elevation'):

@@ -5,6 +5,7 @@ import pytest
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_results import results, tracking, verdict
+from pedestal_results.recorded_run import RecordedRun
 
 LOW_LEVEL = 'tracking_receiver.receiver.cn0_dbhz=31'
 FAR = 'adu.azimuth.limits.rate=0.1', 'adu.azimuth.faults.overspeed=0.2', 'acu.azimuth.shaper.rate=0.1', \
@@ -53,7 +54,7 @@ def test_the_verdict_on_a_run(case):
 
 def measured(name, changes, duration):
     recording = memory_recording.record(scenario.load(name, changes, duration=duration))
-    return recording, {key: value for key, (value, _) in results.measured(results.of_bag(recording)).items()}
+    return recording, {key: value for key, (value, _) in results.measured(RecordedRun(recording).parts).items()}
 
 
 def test_the_pointing_in_program_is_the_offset_of_the_program():

@@ -52,11 +52,11 @@ def test_a_beam_that_only_leads_is_seen_at_the_beginning_of_its_intervals():
                             measured=0.5 * begun + noise, cn0=nothing, estimate_error=noise, beam_earth=beam,
                             target_earth=beam, estimate_earth=beam, sensor_truth=beam, range=nothing, mode=mode,
                             tracking=on, since=on, beamwidth=math.radians(1.0), boresight=np.zeros(2), begun=begun)
-    values = results.measured(results.of_tracking(run))
+    values = results.measured(run.parts)
     assert values['pointing_max_deg'][0] == pytest.approx(math.degrees(0.005 * math.cos(0.7)), rel=1e-4)
     assert values['cross_elevation_rms_deg'][0] == pytest.approx(values['cross_elevation_max_deg'][0], rel=1e-6)
     assert values['single_sample_noise_deg'][0] == pytest.approx(math.degrees(1e-4))
-    moving = results.measured(results.of_tracking(dataclasses.replace(run, begun=unknown)))
+    moving = results.measured(dataclasses.replace(run, begun=unknown).parts)
     assert moving['pointing_max_deg'][0] == 0.0
     assert not any('following' in name or 'encoder' in name for name in values)
     assert 'azimuth_following_rms_deg' in moving

@@ -8,6 +8,7 @@ from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag
 from pedestal_results import results
+from pedestal_results.recorded_run import RecordedRun
 from pedestal_studies.system import scenarios as study
 
 REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'
@@ -17,7 +18,7 @@ REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'
 def test_a_run_in_memory_has_the_results_of_its_recording(name):
     from_file = bag.read(REFERENCES / name)
     again = memory_recording.record(scenario.parse(name, from_file.configuration['scenario']))
-    expected, found = (results.measured(results.of_bag(run)) for run in (from_file, again))
+    expected, found = (results.measured(RecordedRun(run).parts) for run in (from_file, again))
     assert list(found) == list(expected)
     for metric, (value, unit) in found.items():
         assert found[metric][1] == unit and np.array_equal(value, expected[metric][0], equal_nan=True), metric

@@ -12,6 +12,7 @@ from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import files, scenario
 from pedestal_common.parameters import ParameterError, as_dict
 from pedestal_results import results
+from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.tuning import antenna_from_data_sheet, data_sheet_limits, loops
 from pedestal_workbench.tuning.data_sheet_format import TEMPLATE_SCENARIOS, DataSheet
 
@@ -59,7 +60,7 @@ def test_a_motor_turns_at_its_rated_speed_and_torque():
 @pytest.mark.parametrize('name', SHIPPED)
 def test_what_ships_tracks_within_a_twentieth_of_its_beam(name):
     chosen = scenario.load(name)
-    found = results.measured(results.of_bag(memory_recording.record(chosen)))
+    found = results.measured(RecordedRun(memory_recording.record(chosen)).parts)
     beamwidth = math.degrees(chosen.node_parameters('tracking_receiver').antenna.beamwidth)
     assert found['pointing_rms_deg'][0] < 0.05 * beamwidth and found['loss_s'][0] == 0.0
     assert found['evaluated_time_s'][0] > 0.9 * chosen.header.duration
@@ -208,7 +209,7 @@ STATION = ('--mirror', '4.5', '--frequency', '8.2', '--inertia-azimuth', '900', 
 def test_an_antenna_tracks_the_target_of_each_scenario(pedestal, tmp_path, like):
     assert pedestal('new', 'my.yaml', '--like', like, *STATION)[0] == 0
     chosen = scenario.load(tmp_path / 'my.yaml')
-    found = results.measured(results.of_bag(memory_recording.record(chosen)))
+    found = results.measured(RecordedRun(memory_recording.record(chosen)).parts)
     beamwidth = math.degrees(chosen.node_parameters('tracking_receiver').antenna.beamwidth)
     assert found['tracked_percent'][0] > 90.0 and found['loss_s'][0] == 0.0
     assert found['pointing_rms_deg'][0] < 0.05 * beamwidth

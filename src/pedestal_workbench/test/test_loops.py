@@ -9,6 +9,7 @@ from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import files, scenario
 from pedestal_results import results
+from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.tuning import loops
 
 SOFT = ('adu.azimuth.gear_train.stiffness=8e5', 'adu.azimuth.gear_train.damping=400')
@@ -105,7 +106,7 @@ def test_a_flexible_dish_is_tracked_also_if_inertia_and_frequency_are_wrong(pede
     def tracked(changes):
         overrides = [*tuned, *(f'{key}={value}' for key, value in changes.items())]
         chosen = scenario.load(tmp_path / 'dish.yaml', overrides, duration=60.0)
-        return results.measured(results.of_bag(memory_recording.record(chosen)))
+        return results.measured(RecordedRun(memory_recording.record(chosen)).parts)
 
     antenna = scenario.load(tmp_path / 'dish.yaml').node_parameters('tracking_receiver').antenna
     for inertia, mode in ((1.0, 1.0), (1.3, 0.8), (0.7, 0.8)):

@@ -10,7 +10,7 @@ from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan, program_message
 from pedestal_common.wire import messages
-from pedestal_results import tracking
+from pedestal_recording import recording as recordings
 from pedestal_workbench.calibration import collect, exact, pointing, predicted
 
 DURATION_S = 60.0
@@ -66,8 +66,8 @@ def test_a_receiver_with_stamps_of_its_own_gives_the_same_offsets(station):
     slow = {name: np.asarray(column)[::40] for name, column in errors.items()}
     for shift in (1.3e-3, 0.0):         # also those of a scanned feed, which may be the stamps of some steps
         real._tables['tracking_receiver/angle_error'] = {**slow, 't': slow['t'] + shift}
-        levels = tracking.of_equipment(real, record.table('joint_states')['t'], 'tracking_receiver/angle_error',
-                                       ('z',))
+        levels = recordings.of_equipment(real, record.table('joint_states')['t'], 'tracking_receiver/angle_error',
+                                         ('z',))
         assert np.isfinite(levels[-1000:]).mean() > 0.99
 
 

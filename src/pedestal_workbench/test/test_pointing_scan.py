@@ -4,7 +4,7 @@ import pytest
 
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
-from pedestal_results import tracking
+from pedestal_recording import recording as recordings
 from pedestal_studies.system import calibration
 from pedestal_workbench.calibration import collect, exact, scan
 from receiver_law import monopulse
@@ -77,6 +77,6 @@ def test_a_scan_ends_before_a_pause_and_keeps_its_last_dwell():
                 for begins in (10.0, 122.0) for k, (x, y) in enumerate(places)]
     record = recorded(f'acu.commands={"; ".join(commands)}', 'scenario.duration=136.0')
     t = record.table('joint_states')['t']
-    found = scan.scans(record, t, tracking.modes(record, t))
+    found = scan.scans(record, t, recordings.modes(record, t))
     assert [[(dwell.azimuth, dwell.elevation) for dwell in one] for one in found] == [places, places]
     assert [t[one[-1].last] - t[one[-1].first] for one in found] == pytest.approx([2.0, 2.0], abs=0.02)

@@ -20,6 +20,7 @@ from pedestal.verbs import arguments
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_results import results
+from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.trials import comparison, ensemble, monte_carlo, statistics
 from pedestal_workbench.trials.distributions import parse
 from pedestal_workbench.trials.plan import plan
@@ -238,7 +239,7 @@ def test_the_same_numbers_whoever_works_and_a_plan_that_goes_on(tmp_path):
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         with monte_carlo.Pool(scheduler=cluster.scheduler_address) as pool:
             assert make(made, tmp_path / 'dask', pool).file.read_bytes() == expected.file.read_bytes()
-    values = results.measured(results.of_bag(memory_recording.record(made.scenario(5))))
+    values = results.measured(RecordedRun(memory_recording.record(made.scenario(5))).parts)
     assert {name: expected.column(name)[5] for name in expected.measured_results} == {name: value
                                                                          for name, (value, _) in values.items()}
 

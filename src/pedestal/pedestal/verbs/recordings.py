@@ -67,7 +67,6 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
     arguments.add_beam(parser)
     parser.add_argument('--png', type=pathlib.Path, metavar='DIR', help='folder in which each figure is also '
                         'written as PNG')
-    arguments.add_vector(parser)
     parser.add_argument('--author', default='', metavar='NAME', help='name of the author on the first page; default: '
                         'none')
     parser.add_argument('--pdf', action='store_true', help='the report also as PDF, beside the HTML file; needs '
@@ -77,10 +76,7 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
 def _report(options: argparse.Namespace) -> int:
     """Write the report and print its path. Return exit code 0."""
     from pedestal_results.report import page
-    if options.vector and not options.png:
-        raise ValueError(f'--vector {options.vector}: needs --png DIR, the folder of the figures')
-    report = page.write(options.bag, options.output, options.png, options.beam, options.vector, options.author,
-                        options.pdf)
+    report = page.write(options.bag, options.output, options.png, options.beam, options.author, options.pdf)
     print(report)
     if options.pdf:
         print(report.with_suffix('.pdf'))
@@ -171,8 +167,6 @@ def _add_recompute(parser: argparse.ArgumentParser) -> None:
                         help="topics or topic.field not to compare, for example 'acu/reference*'; may be repeated")
     parser.add_argument('--allow-idle', action='store_true', help='accept a node that did nothing in the recording '
                         '(never locked, never in autotrack, never moved)')
-    parser.add_argument('--live', action='store_true', help='start a process of the node and send it the inputs over '
-                        'DDS, in lockstep')
     console.add_json(parser)
     console.add_explain(parser)
     parser.add_argument('--iq', type=pathlib.Path, metavar='FILE', help='.sigmf-meta file of the I/Q samples of this '
@@ -186,7 +180,7 @@ def _recompute(options: argparse.Namespace) -> int:
     console.check_json(options.json)
     if options.iq is not None:
         arguments.refuse_given(options, ('node', 'param', 'params_file', 'pacing', 'absolute', 'relative', 'ignore',
-                                         'allow_idle', 'live', 'explain', 'output'), 'has no effect with --iq')
+                                         'allow_idle', 'explain', 'output'), 'has no effect with --iq')
         from pedestal_workbench.again import iq
         lines, rows, well = iq.main(options.bag, options.iq)
         print('\n'.join(lines))

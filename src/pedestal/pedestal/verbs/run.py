@@ -103,12 +103,13 @@ def _run(options: argparse.Namespace) -> int:
 
 def _results(options: argparse.Namespace, chosen: 'Scenario', outcome: 'Outcome', recording: 'Bag') -> bool:
     """Print verdicts and results of a run and write --json. Return True if the verdict on a beam is a failure."""
-    from pedestal_results import results, tracking, verdict
+    from pedestal_results import results
+    from pedestal_results.recorded_run import RecordedRun
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     views = [recording.view(beam) for beam in beams]
-    runs = [tracking.read(view) for view in views]
-    verdicts = [verdict.of(view, run) for view, run in zip(views, runs)]
-    parts = [results.of_run(view, run) for view, run in zip(views, runs)]
+    runs = [RecordedRun(view) for view in views]
+    verdicts = [run.verdict for run in runs]
+    parts = [run.parts for run in runs]
     of_beams = [results.measured(part) for part in parts]
     # whole: results of the run, such as lost steps, in contrast to the results of each beam
     whole = results.measured({'run': outcome, 'supervised': outcome if chosen.header.pacing == 'realtime' else None})

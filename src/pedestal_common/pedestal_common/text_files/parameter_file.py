@@ -4,8 +4,9 @@ that all accept and refuse the same files.
 A section of a file is for one node. In the files of a graph the name of a section is /**/acu for example, which means
 the node acu in any namespace.
 """
+import pathlib
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import yaml
 
@@ -32,6 +33,21 @@ def dumped(sections: Mapping[str, Mapping[str, Json]]) -> str:
     """Return the text of a parameter file of {section: {name: value}}."""
     return plain_yaml.dump({section: {'ros__parameters': values} for section, values in sections.items()},
                            sort_keys=False)
+
+
+def origin(command: str, revision: str = '') -> list[str]:
+    """Return the lines on the origin of a file: the command that made it, and the revision of git, '' for none."""
+    return [f'made by: {" ".join(command.split())}', *([f'git {revision}'] if revision else [])]
+
+
+def comment(lines: Iterable[str]) -> str:
+    """Return the text of lines of comment, for the head of a file."""
+    return ''.join(f'# {line}'.rstrip() + '\n' for line in lines)
+
+
+def write_new(path: pathlib.Path, sections: Mapping[str, Mapping[str, Json]], head: Iterable[str]) -> None:
+    """Write a new parameter file of {node: {name: value}}; head: lines of comment, such as its `origin`."""
+    path.write_text(comment(head) + text(sections), encoding='utf-8')
 
 
 def divided(section: str) -> tuple[str, str]:

@@ -22,8 +22,8 @@ from pedestal_results.tracking import stretches
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
-    from pedestal_results.report.events import Event
-    from pedestal_results.report.run_data import RunData
+    from pedestal_results.events import Event
+    from pedestal_results.recorded_run import RecordedRun
 
 Panels: TypeAlias = NDArray[np.object_]     # (rows, columns) of Axes
 Window: TypeAlias = tuple[Seconds, Seconds]     # first and last time to draw
@@ -52,8 +52,8 @@ class Spec(typing.NamedTuple):
     key: str    # name of its file without extension
     title: str
     caption: str    # below the title
-    needs: tuple[str, ...]  # data that the figure needs: keys of run_data._NEEDS
-    draw: Callable[..., Figure]     # function of run_data.RunData or of trials_page.Trials
+    needs: tuple[str, ...]  # data that the figure needs: keys of recorded_run._NEEDS
+    draw: Callable[..., Figure]     # function of RecordedRun or of trials_page.Trials
     dpi: int = 150  # of its PNG
     timed: bool = False     # True for panels over time, which get the marks of the events
     paper: int = 0  # number of the same figure in the paper; 0: none
@@ -212,7 +212,7 @@ def render(spec: Spec, data: object, output: pathlib.Path | IO[str]) -> None:
     with matplotlib.rc_context({**MATPLOTLIB_STYLE, 'svg.hashsalt': spec.key}):
         figure = spec.draw(data)
         if spec.timed:
-            mark(figure, cast('RunData', data).events)
+            mark(figure, cast('RecordedRun', data).events)
         store(figure, output, spec.dpi)
 
 

@@ -1,6 +1,6 @@
 """Figures of a report on the target filter: its errors and stated sigma, its innovations, its motion models.
 
-Each function of FIGURES takes the run_data.RunData of a recording (`data`).
+Each function of FIGURES takes a RecordedRun (`data`).
 """
 import numpy as np
 from matplotlib.figure import Figure
@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from pedestal_common.graph import topics
 from pedestal_common.quantities import Floats, Times
 from pedestal_results.consistency import BAND_PROBABILITY, bounds
+from pedestal_results.recorded_run import RecordedRun
 from pedestal_results.report.figures import (
     FILTERED_COLOUR,
     INK_COLOUR,
@@ -19,7 +20,6 @@ from pedestal_results.report.figures import (
     new_panels,
     outside_legend,
 )
-from pedestal_results.report.run_data import RunData
 
 MODEL_COLOURS = {'cv': '#2f9e5b', 'ca': '#1f6fd1', 'singer': '#8364c8', 'current_statistical': '#b5179e',
                  'ca_2': '#0b8f8c', 'ca_3': '#7fb069', 'ca_4': '#e0b400', 'ca_5': '#e57a00', 'ca_6': '#d1495b',
@@ -28,7 +28,7 @@ MODEL_COLOURS = {'cv': '#2f9e5b', 'ca': '#1f6fd1', 'singer': '#8364c8', 'current
 NIS_SPAN_S = 1.0  # span over which the figure averages the NIS (normalised innovation squared) [s]
 
 
-def estimate(data: RunData) -> Figure:
+def estimate(data: RecordedRun) -> Figure:
     """Return the figure of estimate minus truth and of twice the stated sigma, for angle [deg] and rate [deg/s]."""
     known = existing(data.filter)
     figure, panels = new_panels(2, 2, sharex=True)
@@ -50,7 +50,7 @@ def estimate(data: RunData) -> Figure:
     return outside_legend(figure, panels[0, 0])
 
 
-def innovations(data: RunData) -> Figure:
+def innovations(data: RecordedRun) -> Figure:
     """Return the figure of the innovations [deg] and of the mean NIS over NIS_SPAN_S with its band."""
     known = existing(data.filter)
     figure, panels = new_panels(2, 2, y='innovation [deg]', sharex=True)
@@ -85,7 +85,7 @@ def _averaged(t: Times, nis: Floats, freedoms: Floats) -> tuple[Times, Floats, F
         return t[0] + NIS_SPAN_S * (np.arange(count.size) + 0.5), mean, total / count, low, high
 
 
-def probabilities(data: RunData) -> Figure:
+def probabilities(data: RecordedRun) -> Figure:
     """Return the figure of the probability of each motion model, for both axes."""
     known = existing(data.filter)
     figure, panels = new_panels(2, y='probability', sharex=True)

@@ -2,8 +2,7 @@
 import html
 import itertools
 import pathlib
-import types
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -11,19 +10,11 @@ from pedestal_common.graph import topics
 from pedestal_common.graph.topics import AXES
 from pedestal_common.text_files.files import sha256
 from pedestal_recording import bag as bags
+from pedestal_recording import recording as recordings
 from pedestal_recording.verify import Report, verify
-from pedestal_results import consistency, isolation, results, tracking, verdict
-from pedestal_results.report import (
-    attitude_figures,
-    elements,
-    events,
-    figures,
-    filter_figures,
-    print_pdf,
-    run_data,
-    run_figures,
-    subject,
-)
+from pedestal_results import consistency, events, results, tracking
+from pedestal_results.recorded_run import RecordedRun, Status
+from pedestal_results.report import elements, figures, filter_figures, run_figures, subject
 from pedestal_results.tracking import DEG_PER_RAD
 
 MAX_DIAGNOSTICS_ROWS = 200  # largest number of rows of the table of diagnostics
@@ -34,38 +25,37 @@ PAPER_SCENARIOS = ('uav_flyby',)
 
 
 def write(bag_path: str | pathlib.Path, output: str | pathlib.Path | None = None,
-          png_folder: str | pathlib.Path | None = None, beam: str = '', vector: str | None = None, author: str = '',
+          png_folder: str | pathlib.Path | None = None, beam: str = '', author: str = '',
           pdf: bool = False) -> pathlib.Path:
     """Write the report of a bag, and return the path of its file.
 
     output       file of the report, by default report.html in the bag (beside a bare .mcap)
     png_folder   folder for the figures and the overview as PNG, None for no such files
     beam         name of one of several beams, '' for the first
-    vector       'pdf' or 'svg' for a second file of each figure in that folder
     author       text on the page, '' for none
     pdf          True to print the page as PDF too, beside the HTML file
 
     Equal bags give equal bytes, except for the PDF. Raises bag.BagError if the bag cannot be read to its end, OSError
     if the report cannot be written, ValueError if no browser for the PDF is installed.
     """
-    browser = print_pdf.browser() if pdf else None
+    browser = elements.browser() if pdf else None
     whole = bags.read(bag_path)
     bag = whole.view(beam)
     output = pathlib.Path(output) if output is not None else bag.file.parent / 'report.html'
-    data = run_data.read(bag)
-    page = _page(bag, data, verify(whole), author)
+    run = RecordedRun(bag)
+    run.check_stamps()
+    page = _page(bag, run, verify(whole), author)
     output.parent.mkdir(parents=True, exist_ok=True)
     output.write_text(page, encoding='utf-8')
     if browser:
-        print_pdf.write(browser, output, output.with_suffix('.pdf'))
+        elements.print_pdf(browser, output, output.with_suffix('.pdf'))
     if png_folder is not None:
         folder = pathlib.Path(png_folder)
         folder.mkdir(parents=True, exist_ok=True)
-        for spec in (*run_figures.FIGURES, *filter_figures.FIGURES, *attitude_figures.FIGURES,
+        for spec in (*run_figures.FIGURES, *filter_figures.FIGURES, *run_figures.ATTITUDE_FIGURES,
                      run_figures.OVERVIEW_FIGURE):
-            if not data.lacks(spec.needs):
-                for kind in ('png', *([vector] if vector else ())):
-                    figures.render(spec, data, folder / f'{spec.key}.{kind}')
+            if not run.lacks(spec.needs):
+                figures.render(spec, run, folder / f'{spec.key}.png')
     return output
 
 
@@ -74,7 +64,7 @@ def _of_axes(name: str, values: Sequence[tuple[float, str]], last: str = '') -> 
     return [name, *(elements.number(*value) for value in values), last]
 
 
-def _pointing(bag: bags.Bag, data: run_data.RunData, values: results.Values) -> list[list[str]]:
+def _pointing(run: RecordedRun, values: results.Values) -> list[list[str]]:
     """Return the rows of the table of pointing errors and torques."""
     noise = values['single_sample_noise_deg'][0]
 
@@ -83,9 +73,9 @@ def _pointing(bag: bags.Bag, data: run_data.RunData, values: results.Values) -> 
 
     rms = ('cross_elevation_rms_deg', 'elevation_rms_deg', 'pointing_rms_deg')
     largest = ('cross_elevation_max_deg', 'elevation_max_deg', 'pointing_max_deg')
-    joints, run = figures.existing(run_data.table(bag, 'joint_states')), figures.existing(data.run)
+    joints = figures.existing(run.table('joint_states'))
     by_encoders = [row(f'pointing error by the encoders, {name}', *(f'encoder_{key}' for key in keys))
-                   for name, keys in (('rms', rms), ('largest', largest))] if run.has_encoders else []
+                   for name, keys in (('rms', rms), ('largest', largest))] if run.tracking.has_encoders else []
     return [row('pointing error, rms', *rms), row('pointing error, largest', *largest), *by_encoders,
             row("rms / receiver's single-sample noise", *rms, scale=noise, unit=''),
             row("largest / receiver's single-sample noise", *largest, scale=noise, unit=''),
@@ -93,14 +83,14 @@ def _pointing(bag: bags.Bag, data: run_data.RunData, values: results.Values) -> 
                 'noise_reduction', unit=''),
             _of_axes('load torque, rms of the run',
                      [(tracking.known_rms(joints.get(f'{axis}.effort', np.zeros(0))), 'Nm') for axis in AXES]),
-            *_torques(data)]
+            *_torques(run)]
 
 
-def _torques(data: run_data.RunData) -> list[list[str]]:
+def _torques(run: RecordedRun) -> list[list[str]]:
     """Return the rows of the motor torques, [] without them."""
     return [_of_axes(f'torque of motor {i}, rms of the run',
-                     [(tracking.known_rms(data.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
-            for i in (1, 2)] if data.motors else []
+                     [(tracking.known_rms(run.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
+            for i in (1, 2)] if run.motors else []
 
 
 def _labelled(parts: Mapping[str, object], *names: str) -> list[list[str]]:
@@ -113,14 +103,14 @@ def _labelled(parts: Mapping[str, object], *names: str) -> list[list[str]]:
             if results.RESULT_BY_NAME[name].label]
 
 
-def _loop(bag: bags.Bag, check: Report) -> list[list[str]]:
+def _loop(bag: bags.Bag, run: RecordedRun, check: Report) -> list[list[str]]:
     """Return rows on the control loop: its rate by the time of the drive, lost steps, and steps missing in the
     recording.
 
     In realtime they also state the rate and the jitter by the wall time.
     """
     rows = []
-    joints = run_data.table(bag, 'joint_states')
+    joints = run.table('joint_states')
     if joints is not None and joints['t'].size > 1 and joints['t'][-1] > joints['t'][0]:
         t = joints['t']
         rows.append(['loop rate achieved (time of the drive)', elements.number((t.size - 1) / (t[-1] - t[0]), 'Hz')])
@@ -154,29 +144,29 @@ def _not_evaluated(run: tracking.Tracking) -> str:
             'evaluated.')
 
 
-def _results(bag: bags.Bag, data: run_data.RunData, check: Report) -> list[str]:
+def _results(bag: bags.Bag, run: RecordedRun, check: Report) -> list[str]:
     """Return the section on the results of the run, against the truth if it was recorded, and on its control loop."""
     parts = ['<h2 id="results">Results</h2>']
     rows: list[list[str]] = []
-    if data.run is None:
-        parts.append(f'<p class="bad">No comparison with the truth: {html.escape(data.no_truth)}.</p>')
-        if data.motors:
-            parts.append(elements.table(['', 'azimuth', 'elevation', ''], _torques(data), 'n'))
+    if run.no_truth:
+        parts.append(f'<p class="bad">No comparison with the truth: {html.escape(run.no_truth)}.</p>')
+        if run.motors:
+            parts.append(elements.table(['', 'azimuth', 'elevation', ''], _torques(run), 'n'))
     else:
-        known = results.of_tracking(data.run)
+        known = run.tracking.parts
         if tracking.by_encoders(bag):
             parts.append('<p class="bad">Pointing errors are those of the encoders: '
                          f'{html.escape(tracking.ENCODER_BEAM_NOTE)}.</p>')
-        if not data.run.tracking.any():
-            parts.append(f'<p class="bad">{_not_evaluated(data.run)}</p>')
+        if not run.tracking.tracking.any():
+            parts.append(f'<p class="bad">{_not_evaluated(run.tracking)}</p>')
         parts.append(elements.table(['', 'cross-elevation (azimuth)', 'elevation', 'both axes'],
-                                    _pointing(bag, data, results.measured(known)), 'n'))
+                                    _pointing(run, results.measured(known)), 'n'))
         parts.append('<p class="soft">Pointing and noise are computed over the evaluated part: autotrack, from '
                      f'{tracking.HANDOVER_SETTLING_S:g} s after the first hand-over. "Both axes" pools the samples of '
                      'both axes.</p>')
         rows = _labelled(known, 'pointing_loss_mean_db', 'pointing_loss_max_db', 'single_sample_noise_deg',
                          'lock_time_s', 'autotrack_time_s', 'evaluated_time_s', 'loss_s')
-    return [*parts, elements.table(None, rows + _loop(bag, check), 'n')]
+    return [*parts, elements.table(None, rows + _loop(bag, run, check), 'n')]
 
 
 def _gaps(bag: bags.Bag, check: Report) -> list[str]:
@@ -187,7 +177,7 @@ def _gaps(bag: bags.Bag, check: Report) -> list[str]:
                                      for problem in topic.problems]
         parts.append('<h2 id="gaps">Problems of the recording</h2><ul>' + ''.join(
             f'<li>{html.escape(problem)}</li>' for problem in problems) + '</ul>')
-    absent = [topic for topic in bag.graph if topic not in bag.topics or not bag.rows(topic).size]
+    absent = [topic for topic in bag.graph if not recordings.holds(bag, topic)]
     if absent:
         parts.append(f'<p class="soft">Topics without a message in this bag: {", ".join(absent)}.</p>')
     return parts
@@ -198,20 +188,20 @@ def _warnings(check: Report) -> list[str]:
     return [line for line in (check.ending, check.loss, *check.foreign) if line]
 
 
-def _figures(module: types.ModuleType, data: run_data.RunData, of_paper: bool = False) -> list[str]:
-    """Return the figures of a module; of_paper: True if their titles name the figures of the paper."""
+def _figures(specs: Iterable[figures.Spec], run: RecordedRun, of_paper: bool = False) -> list[str]:
+    """Return some figures; of_paper: True if their titles name the figures of the paper."""
     return [elements.figure(spec._replace(title=f'{spec.title} (figure {spec.paper} of the paper)')
-                            if of_paper and spec.paper else spec, data, data.lacks(spec.needs))
-            for spec in module.FIGURES]
+                            if of_paper and spec.paper else spec, run, run.lacks(spec.needs))
+            for spec in specs]
 
 
-def _events(bag: bags.Bag, data: run_data.RunData) -> list[str]:
+def _events(run: RecordedRun) -> list[str]:
     """Return the section with the table of the events."""
     title = '<h2 id="events">What happened</h2>'
-    if not data.events:
+    if not run.events:
         return [title, '<p class="soft">No event in the bag.</p>']
     return [title, elements.table(['no.', 'time [s]', 'duration [s]', 'event', 'by', 'what'],
-                                  events.rows(data.events, bag.end)),
+                                  events.rows(run.events, run.bag.end)),
             '<p class="soft">The numbers mark these events on the curves below.</p>']
 
 
@@ -242,17 +232,16 @@ def _consistency_table(known: consistency.Consistency) -> str:
         'of the INS, which the target filter does not model.</p>')
 
 
-def _deck(bag: bags.Bag, data: run_data.RunData) -> list[str]:
+def _deck(run: RecordedRun) -> list[str]:
     """Return the section on the attitude of the INS and the isolation from the ship; [] for an antenna ashore."""
-    if data.attitude is None:
+    if run.attitude is None:
         return []
-    ship = isolation.read(bag, data.run) if data.run is not None else None
     return ['<h2 id="attitude">Attitude of the ship</h2>',
-            elements.table(None, _labelled({'attitude': data.attitude}) + _labelled({'isolation': ship}), 'n'),
-            *_figures(attitude_figures, data)]
+            elements.table(None, _labelled({'attitude': run.attitude}) + _labelled({'isolation': run.isolation}), 'n'),
+            *_figures(run_figures.ATTITUDE_FIGURES, run)]
 
 
-def _diagnostics(statuses: Sequence[run_data.Status]) -> list[str]:
+def _diagnostics(statuses: Sequence[Status]) -> list[str]:
     """Return the section on diagnostics other than OK. A status that a node repeats is one row."""
     title = '<h2 id="diagnostics">Diagnostics other than OK</h2>'
     rows: dict[int, list[str]] = {}
@@ -271,7 +260,7 @@ def _diagnostics(statuses: Sequence[run_data.Status]) -> list[str]:
             *([f'<p class="soft">and {hidden} more.</p>'] if hidden else [])]
 
 
-def _provenance_table(bag: bags.Bag, data: run_data.RunData, author: str) -> str:
+def _provenance_table(bag: bags.Bag, run: RecordedRun, author: str) -> str:
     """Return the table at the head of the page: author, subject, configuration, versions and file of a bag."""
     stamps = bag.index.log
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
@@ -279,7 +268,7 @@ def _provenance_table(bag: bags.Bag, data: run_data.RunData, author: str) -> str
                          if key.startswith('version.'))
     rows = [[key, value] for key, value in bag.metadata.items() if not key.startswith(('version.', 'beamwidth'))]
     rows = [*([['author', author]] if author else []), ['date of the run', subject.date(bag)],
-            *subject.rows(bag, data), *rows, ['duration', f'{duration:g} s'],
+            *subject.rows(bag, run), *rows, ['duration', f'{duration:g} s'],
             ['software versions', versions or 'not in the bag'],
             ['file', f'{", ".join(file.name for file in bag.files)}, '
              f'{sum(file.stat().st_size for file in bag.files) / 1e6:.2f} MB, {stamps.size} messages'],
@@ -296,24 +285,24 @@ def _parameters(bag: bags.Bag) -> list[str]:
     return [title, elements.table(['parameter', 'value', 'default', 'unit'], rows) if rows else '<p>None.</p>']
 
 
-def _page(bag: bags.Bag, data: run_data.RunData, check: Report, author: str) -> str:
+def _page(bag: bags.Bag, run: RecordedRun, check: Report, author: str) -> str:
     """Return the text of the page."""
     scenario = bag.metadata.get('scenario', '')
     name = (scenario or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     of_paper = scenario in PAPER_SCENARIOS
-    found = verdict.of(bag, data.run) if data.run is not None else None
+    found = None if run.no_truth else run.verdict
     paper = ('"The paper" is the one on antenna tracking with a Kalman filter and a dual-motor anti-backlash drive; '
              'its figures are from a UAV experiment. ') if of_paper else ''
     parts = [
         f'<h1>Tracking run: {html.escape(name)}</h1>',
         *([f'<p class="verdict{" bad" if found.failed else ""}">{html.escape(found.text)}</p>'] if found else []),
         *(f'<p class="bad">{html.escape(line.capitalize())}.</p>' for line in _warnings(check)),
-        _provenance_table(bag, data, author), *_parameters(bag), *_events(bag, data),
-        *_results(bag, data, check), *_gaps(bag, check),
+        _provenance_table(bag, run, author), *_parameters(bag), *_events(run),
+        *_results(bag, run, check), *_gaps(bag, check),
         f'<h2 id="figures">Figures</h2><p class="soft">{paper}Grey: measured, blue: filtered or achieved, orange: '
         'truth. Dotted vertical lines: the numbered events of the table "What happened".</p>',
-        *_figures(run_figures, data, of_paper),
+        *_figures(run_figures.FIGURES, run, of_paper),
         '<h2 id="filter">Consistency of the filter</h2>',
-        *([_consistency_table(data.filter)] if data.filter is not None else []),
-        *_figures(filter_figures, data), *_deck(bag, data), *_diagnostics(data.statuses)]
+        *([_consistency_table(run.filter)] if run.filter is not None else []),
+        *_figures(filter_figures.FIGURES, run), *_deck(run), *_diagnostics(run.statuses)]
     return elements.page(f'Tracking run: {name}', parts)

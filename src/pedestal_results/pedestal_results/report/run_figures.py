@@ -1,6 +1,6 @@
-"""Figures of a report on a run: pointing, errors, angles, torques, signal, sky plot and modes. Angles are in degrees.
+"""Figures of a report on a run: pointing, errors, angles, torques, signal, sky plot, modes and INS, in degrees.
 
-Each function of FIGURES takes the run_data.RunData of a recording (`data`). Functions named draw_ draw into given axes
+Each function of FIGURES takes a RecordedRun (`data`). Functions named draw_ draw into given axes
 of matplotlib, and are also used by the overview.
 """
 import functools
@@ -15,6 +15,7 @@ from matplotlib.projections.polar import PolarAxes
 
 from pedestal_common.graph import modes
 from pedestal_common.quantities import Bools, Floats, Ints, Pairs
+from pedestal_results.recorded_run import RecordedRun
 from pedestal_results.report.figures import (
     FIGURE_WIDTH_INCH,
     FILTERED_COLOUR,
@@ -31,7 +32,6 @@ from pedestal_results.report.figures import (
     outside_legend,
     spans,
 )
-from pedestal_results.report.run_data import RunData
 from pedestal_results.tracking import Tracking
 
 MODE_COLOURS = dict(zip(modes.MODES, itertools.cycle((
@@ -42,6 +42,7 @@ LEVEL_COLOURS = (('OK', '#a5d8b5'), ('WARN', '#f2772b'), ('ERROR', '#c81e1e'), (
 """(name, colour) of each level of the diagnostics, 0 to 3."""
 LOCKED_COLOUR = '#5f93c4'
 ZOOM_SPAN_S = 2.0  # span of a zoomed figure [s]
+MIN_DRAWN_ERROR_DEG = 1e-4  # smallest attitude error drawn on the logarithmic scale [deg]
 SKY_POINTS = 3000  # largest number of points of a path in the sky plot
 
 
@@ -113,12 +114,12 @@ AXIS_TITLES = (('cross-elevation', 'azimuth'), ('elevation', 'elevation'))
 """(name of the error, name of the angle) of each axis."""
 
 
-def draw_errors(axes: Axes, data: RunData, i: int, window: Window | None = None) -> None:
+def draw_errors(axes: Axes, data: RecordedRun, i: int, window: Window | None = None) -> None:
     """Draw the receiver error and the filtered error [deg]; i: 0 cross-elevation, 1 elevation.
 
     window: to draw, then together with the true error; None for the whole run.
     """
-    run = existing(data.run)
+    run = data.tracking
     raw, filtered = np.degrees(run.measured[:, i]), np.degrees(run.filtered[:, i])
     draw_line(axes, run.t, raw, window, color=RAW_COLOUR, linewidth=0.7, label='receiver, before the filter')
     if window is not None:
@@ -131,7 +132,7 @@ def draw_errors(axes: Axes, data: RunData, i: int, window: Window | None = None)
     axes.set_title(AXIS_TITLES[i][0])
 
 
-def error(data: RunData, window: Window | None = None) -> Figure:
+def error(data: RecordedRun, window: Window | None = None) -> Figure:
     """Return the figure of receiver error and filtered error on both axes [deg]; window: see `draw_errors`."""
     figure, panels = new_panels(2, sharex=True)
     for i in range(2):
@@ -139,17 +140,17 @@ def error(data: RunData, window: Window | None = None) -> Figure:
     return outside_legend(figure, panels[0, 0])
 
 
-def error_zoom(data: RunData) -> Figure:
+def error_zoom(data: RecordedRun) -> Figure:
     """Return the figure `error` over ZOOM_SPAN_S in the middle of the evaluated part, with the true error."""
-    return error(data, _middle(existing(data.run)))
+    return error(data, _middle(data.tracking))
 
 
-def angle(data: RunData, zoomed: bool = False) -> Figure:
+def angle(data: RecordedRun, zoomed: bool = False) -> Figure:
     """Return the figure of the measured and the filtered line of sight in earth angles [deg].
 
     zoomed: True for the ZOOM_SPAN_S in which the target moved least, with the true line of sight.
     """
-    run = existing(data.run)
+    run = data.tracking
     figure, panels = new_panels(2, y=[f'{name} [deg]' for _, name in AXIS_TITLES], sharex=True)
     # In azimuth the branch is that of the beam, as in `azimuth`.
     truth = np.column_stack((_continuous(run.target_earth[:, 0], _continuous(run.beam_earth[:, 0])),
@@ -157,7 +158,7 @@ def angle(data: RunData, zoomed: bool = False) -> Figure:
     window = _slowest(run, truth) if zoomed else None
     for i, axes in enumerate(panels[:, 0]):
         filtered = _continuous(run.estimate_earth[:, i], truth[:, i])
-        measured = _continuous(existing(data.raw_angles)[:, i], truth[:, i])
+        measured = _continuous(data.raw_angles[:, i], truth[:, i])
         draw_line(axes, run.t, measured, window, color=RAW_COLOUR, linewidth=0.8 if zoomed else 2.5,
                   label='measured, before the filter')
         if zoomed:
@@ -168,9 +169,9 @@ def angle(data: RunData, zoomed: bool = False) -> Figure:
     return outside_legend(figure, panels[0, 0])
 
 
-def draw_azimuth(axes: Axes, data: RunData) -> None:
+def draw_azimuth(axes: Axes, data: RecordedRun) -> None:
     """Draw the azimuth of antenna and target in earth angles [deg]."""
-    run = existing(data.run)
+    run = data.tracking
     beam = _continuous(run.beam_earth[:, 0])
     draw_line(axes, run.t, _continuous(run.target_earth[:, 0], beam), color=TRUTH_COLOUR, linewidth=2.5,
               label='target')
@@ -179,25 +180,25 @@ def draw_azimuth(axes: Axes, data: RunData) -> None:
     axes.set_ylabel('azimuth [deg]')
 
 
-def azimuth(data: RunData) -> Figure:
+def azimuth(data: RecordedRun) -> Figure:
     """Return the figure of the azimuth of antenna and target in earth angles [deg]."""
     figure, panels = new_panels(1, height=2.9)
     draw_azimuth(panels[0, 0], data)
     return outside_legend(figure, panels[0, 0])
 
 
-def _shade_modes(axes: Axes, data: RunData) -> None:
+def _shade_modes(axes: Axes, data: RecordedRun) -> None:
     """Shade each time by the colour of its mode, and mark the changes of the mode by dotted lines."""
     for start, stop, mode in data.modes:
         axes.axvspan(start, stop, color=MODE_COLOURS.get(mode, RAW_COLOUR), alpha=0.10, linewidth=0.0)
 
 
-def draw_pointing(axes: Axes, data: RunData, i: int) -> None:
+def draw_pointing(axes: Axes, data: RecordedRun, i: int) -> None:
     """Draw the true pointing error [deg]; i: 0 cross-elevation, 1 elevation.
 
     Dashed lines mark a tenth of the beamwidth.
     """
-    run = existing(data.run)
+    run = data.tracking
     error = np.degrees(run.error[:, i])
     draw_line(axes, run.t, error, color=TRUTH_COLOUR, linewidth=0.8)
     _scale_to(axes, [error], run.tracking)
@@ -208,12 +209,12 @@ def draw_pointing(axes: Axes, data: RunData, i: int) -> None:
     axes.set_ylabel('error [deg]')
 
 
-def pointing(data: RunData) -> Figure:
+def pointing(data: RecordedRun) -> Figure:
     """Return the figure of the true pointing error on both axes, and of the angle from the beam to the target [deg].
 
     The background shows the modes of the ACU.
     """
-    run = existing(data.run)
+    run = data.tracking
     figure, panels = new_panels(3, sharex=True)
     distance = np.degrees(run.distance)
     for i in range(2):
@@ -229,14 +230,14 @@ def pointing(data: RunData) -> Figure:
     return figure
 
 
-def _mode_legend(figure: Figure, data: RunData) -> None:
+def _mode_legend(figure: Figure, data: RecordedRun) -> None:
     names = dict.fromkeys(mode for _, _, mode in data.modes)
     if names:
         figure.legend([Patch(color=MODE_COLOURS.get(name, RAW_COLOUR), alpha=0.45, linewidth=0.0) for name in names],
                       list(names), loc='outside upper right', ncols=len(names))
 
 
-def draw_torques(axes: Axes, data: RunData, axis: str, window: Window | None = None) -> None:
+def draw_torques(axes: Axes, data: RecordedRun, axis: str, window: Window | None = None) -> None:
     """Draw the torques of both motors of an axis ('azimuth' or 'elevation'), and their bias torque [Nm].
 
     Without a window the axes show the torques of the evaluated part, if any.
@@ -248,20 +249,21 @@ def draw_torques(axes: Axes, data: RunData, axis: str, window: Window | None = N
     draw_line(axes, motors['t'], second, window, color=MOTOR_2_COLOUR, linewidth=width, label='motor 2')
     draw_line(axes, motors['t'], 0.5 * (first - second), window, color=INK_COLOUR, linewidth=0.9, linestyle='--',
               label='bias, half the difference')
-    if window is None and data.run is not None:
-        tracking = np.isin(motors['t'], data.run.t[data.run.tracking])
+    if window is None and not data.no_truth:
+        run = data.tracking
+        tracking = np.isin(motors['t'], run.t[run.tracking])
         _scale_to(axes, [first, second], tracking, ' Nm')
     axes.set_ylabel('torque [Nm]')
     axes.set_title(axis)
 
 
-def _start(data: RunData) -> Window:
+def _start(data: RecordedRun) -> Window:
     """Return the first ZOOM_SPAN_S of the motor torques."""
     start = existing(data.motors)['t'][0]
     return start, start + ZOOM_SPAN_S
 
 
-def torques(data: RunData) -> Figure:
+def torques(data: RecordedRun) -> Figure:
     """Return the figure of the torques of both motors of each axis [Nm]: whole run and first ZOOM_SPAN_S."""
     window = _start(data)
     figure, panels = new_panels(2, 2, height=4.5, sharex='col', width_ratios=(3, 2))
@@ -273,7 +275,7 @@ def torques(data: RunData) -> Figure:
     return outside_legend(figure, panels[0, 0])
 
 
-def draw_carrier(axes: Axes, data: RunData) -> None:
+def draw_carrier(axes: Axes, data: RecordedRun) -> None:
     """Draw C/N0 [dB-Hz]; shade the times with a locked receiver."""
     table = existing(data.receiver)
     draw_line(axes, table['t'], table['z'], color=RAW_COLOUR, linewidth=0.8, label='C/N0')
@@ -283,7 +285,7 @@ def draw_carrier(axes: Axes, data: RunData) -> None:
     axes.set_ylabel('C/N0 [dB-Hz]')
 
 
-def carrier(data: RunData) -> Figure:
+def carrier(data: RecordedRun) -> Figure:
     """Return the figure of C/N0 [dB-Hz] and of the lock of the receiver."""
     figure, panels = new_panels(1, height=2.7)
     draw_carrier(panels[0, 0], data)
@@ -306,9 +308,9 @@ def _along(angles: Pairs) -> Ints:
     return np.unique(np.searchsorted(both, np.linspace(0.0, both[-1], SKY_POINTS)))
 
 
-def draw_sky(axes: Axes, data: RunData) -> None:
+def draw_sky(axes: Axes, data: RecordedRun) -> None:
     """Draw target and beam over the station, north up, on polar axes."""
-    run = existing(data.run)
+    run = data.tracking
     assert isinstance(axes, PolarAxes)
     axes.set_theta_zero_location('N')
     axes.set_theta_direction(-1)
@@ -327,7 +329,7 @@ def draw_sky(axes: Axes, data: RunData) -> None:
     axes.set_thetagrids(range(0, 360, 45), ('N', 'NE', 'E', 'SE', 'S', 'SW', 'W', 'NW'))
 
 
-def sky(data: RunData) -> Figure:
+def sky(data: RecordedRun) -> Figure:
     """Return the sky plot of target and beam over the station, north up."""
     figure = Figure(figsize=(FIGURE_WIDTH_INCH, 4.2), layout='constrained')
     axes = figure.subplots(subplot_kw={'projection': 'polar'})
@@ -336,7 +338,7 @@ def sky(data: RunData) -> Figure:
     return figure
 
 
-def timeline(data: RunData) -> Figure:
+def timeline(data: RecordedRun) -> Figure:
     """Return the figure of the ACU mode, the lock of the receiver, and the reported level of each node."""
     rows = [('ACU mode', [(start, stop - start, MODE_COLOURS.get(mode, RAW_COLOUR))
                           for start, stop, mode in data.modes])] if data.modes else []
@@ -367,7 +369,7 @@ def timeline(data: RunData) -> Figure:
     return figure
 
 
-def overview(data: RunData) -> Figure:
+def overview(data: RecordedRun) -> Figure:
     """Return one wide figure of a run: sky plot, error before and after the filter, pointing error, motor torques."""
     figure = Figure(figsize=(13.0, 7.0), layout='constrained')
     grid = figure.add_gridspec(4, 3, width_ratios=(1.05, 1.0, 1.0))
@@ -404,6 +406,25 @@ def overview(data: RunData) -> Figure:
     return figure
 
 
+def attitude(data: RecordedRun) -> Figure:
+    """Return the figure of the heading and level errors of the INS [deg], and of their stated standard deviations."""
+    known = existing(data.attitude)
+    figure, panels = new_panels(2, y='error [deg]', sharex=True)
+    # known.sigma is (n, 2): level per axis, heading. Both level axes together have sqrt(2) times the sigma of one.
+    for axes, name, error, sigma in zip(panels[:, 0], ('heading', 'level, both axes'),
+                                        (np.abs(known.heading), known.level),
+                                        (known.sigma[:, 1], np.sqrt(2.0) * known.sigma[:, 0])):
+        draw_line(axes, known.t, np.maximum(np.degrees(error), MIN_DRAWN_ERROR_DEG), color=TRUTH_COLOUR, linewidth=0.8,
+                  label='error')
+        draw_line(axes, known.t, np.maximum(np.degrees(sigma), MIN_DRAWN_ERROR_DEG), color=FILTERED_COLOUR,
+                  label='1 sigma, stated by the INS')
+        if np.isfinite(known.aligned) and known.aligned > known.t[0]:
+            axes.axvline(known.aligned, color=INK_COLOUR, linewidth=0.8, linestyle='--', label='aligned')
+        axes.set_yscale('log')
+        axes.set_title(name)
+    return outside_legend(figure, panels[0, 0])
+
+
 FIGURES = (
     Spec('pointing', 'True pointing error', 'True angle from the beam axis to the target on both axes, and its size '
          'over the whole run. The background shows the mode of the ACU.', ('truth',), pointing, timed=True),
@@ -435,3 +456,7 @@ FIGURES = (
          ('modes',), timeline, timed=True),
 )
 OVERVIEW_FIGURE = Spec('overview', '', '', ('truth', 'lock', 'motors'), overview, dpi=100)
+ATTITUDE_FIGURES = (
+    Spec('attitude', 'Attitude error of the INS', 'Error of the attitude that the control unit received (orange) and '
+         'the standard deviation that the INS states (blue).', ('attitude',), attitude, timed=True),
+)

@@ -10,9 +10,10 @@ from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.graph import nodes
 from pedestal_common.quantities import Seconds
+from pedestal_recording import recording as recordings
 from pedestal_recording.bag import Bag
-from pedestal_results import beam_direction
-from pedestal_results.report.run_data import RunData
+from pedestal_results import directions
+from pedestal_results.recorded_run import RecordedRun
 from tracking_receiver_sim.params import TargetParameters
 
 TARGET_DESCRIPTIONS: dict[str, Callable[[TargetParameters], str]] = {
@@ -72,12 +73,12 @@ def place(station: StationParameters) -> str:
     return f'latitude {station.latitude_deg:g}, longitude {station.longitude_deg:g} deg, height {station.height:g} m'
 
 
-def rows(bag: Bag, data: RunData) -> list[list[str]]:
-    """Return rows [name, text] on a bag of one beam and its RunData, as far as the bag states them."""
-    models = [['pointing model', title] for title in beam_direction.titles(bag)]
-    beamwidth = [['beamwidth', f'{math.degrees(data.beamwidth):.4g} deg']] if math.isfinite(data.beamwidth) else []
+def rows(bag: Bag, run: RecordedRun) -> list[list[str]]:
+    """Return rows [name, text] on a bag of one beam and its RecordedRun, as far as the bag states them."""
+    models = [['pointing model', title] for title in directions.titles(bag)]
+    beamwidth = [['beamwidth', f'{math.degrees(run.beamwidth):.4g} deg']] if math.isfinite(run.beamwidth) else []
     beamwidth = [*models, *beamwidth]
-    values = bag.configuration['parameters'].get('tracking_receiver', {})
+    values = recordings.parameters(bag, 'tracking_receiver')
     try:
         target = parameters.build(TargetParameters, {name.removeprefix('target.'): value for name, value in
                                                      values.items() if name.startswith('target.')})
@@ -86,32 +87,26 @@ def rows(bag: Bag, data: RunData) -> list[list[str]]:
     if not values:
         return beamwidth
     station = [['station', place(target.station)]] if target.kind in STATION_TARGET_KINDS else []
-    return [['target', TARGET_DESCRIPTIONS[target.kind](target)], *_sky(bag, data), *station, *beamwidth]
+    return [['target', TARGET_DESCRIPTIONS[target.kind](target)], *_sky(bag, run), *station, *beamwidth]
 
 
-def _sky(bag: Bag, data: RunData) -> list[list[str]]:
+def _sky(bag: Bag, run: RecordedRun) -> list[list[str]]:
     """Return rows [name, text] on the UTC at 0 s and on the highest elevation; [] for a target without a date."""
     try:
         begin = orbit.instant('stamp_0_utc', _begin(bag))
     except orbit.TargetError:
         return []
     highest = []
-    if data.run is not None and np.isfinite(data.run.target_earth[:, 1]).any():
-        elevation = data.run.target_earth[:, 1]
+    if not run.no_truth and np.isfinite(run.tracking.target_earth[:, 1]).any():
+        elevation = run.tracking.target_earth[:, 1]
         top = int(np.nanargmax(elevation))
-        when = begin + datetime.timedelta(seconds=float(data.run.t[top]))
+        when = begin + datetime.timedelta(seconds=float(run.tracking.t[top]))
         highest = [['highest', f'{math.degrees(elevation[top]):.1f} deg at {when:%Y-%m-%d %H:%M:%S} UTC, '
-                    f'{data.run.t[top]:.1f} s']]
+                    f'{run.tracking.t[top]:.1f} s']]
     return [['0 s is', f'{begin:%Y-%m-%d %H:%M:%S} UTC'], *highest]
 
 
 def _begin(bag: Bag) -> str:
     """Return the text of the UTC at 0 s that the receiver states in its diagnostics, '' if it states none."""
-    if 'diagnostics' not in bag.topics or not bag.rows('diagnostics').size:
-        return ''
-    for _, _, _, array in bag.messages('diagnostics'):
-        for status in array.status:
-            for value in status.values:
-                if value.key == 'stamp_0_utc':
-                    return value.value
-    return ''
+    return next((value.value for _, status in recordings.diagnostics(bag) for value in status.values
+                 if value.key == 'stamp_0_utc'), '')

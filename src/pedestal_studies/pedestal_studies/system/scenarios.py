@@ -16,6 +16,7 @@ from pedestal_bringup.loop.memory_recording import MemoryRecording
 from pedestal_common.quantities import Floats, Row
 from pedestal_results import results, tracking
 from pedestal_results.intervals import row
+from pedestal_results.recorded_run import RecordedRun
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
 from pedestal_studies.result import Item, Result, legend
 from pedestal_workbench.trials import monte_carlo
@@ -109,7 +110,7 @@ def extra_results(values: Mapping[str, float], run: Run) -> dict[str, float]:
 def measured(case: Case) -> dict[str, float]:
     """Return {name: value} of one run of a case."""
     scenario, run = case.loaded(), case.run()
-    found = results.measured(results.of_bag(MemoryRecording(scenario, run)))
+    found = results.measured(RecordedRun(MemoryRecording(scenario, run)).parts)
     values = {name: value for name, (value, _) in found.items()}
     return {**values, **extra_results(values, run)}
 

@@ -43,14 +43,13 @@ class RecomputeOptions:
     relative: float | None  # tolerance [-]; None: the default
     ignore: list[str]       # patterns of topics and fields that are not compared
     allow_idle: bool        # True to accept a node that did nothing
-    live: bool              # True to feed a process of the node
     output: pathlib.Path | None             # new bag with the recomputed outputs
 
 
 def main(options: RecomputeOptions) -> tuple[list[str], list[Row], bool]:
     """Return (lines to print, rows of --json, True if the outputs of all nodes are as required).
 
-    Raises ValueError for an option that does not fit the bag, RunError if a live node does not answer.
+    Raises ValueError for an option that does not fit the bag.
     """
     lockstep = None if options.pacing is None else options.pacing == 'lockstep'     # None: as the bag states
     recording = recompute.FedRecording(options.bag, lockstep, options.beam)
@@ -62,8 +61,6 @@ def main(options: RecomputeOptions) -> tuple[list[str], list[Row], bool]:
         if unchanged:
             raise recompute.RecomputeError(f'--node {unchanged[0]}: has no effect, because no --param is of it')
         nodes = list(changes)
-    if changes and options.live:
-        raise recompute.RecomputeError('--live compares with the recorded outputs; it cannot be combined with --param')
     if options.output and options.output.exists():
         raise recompute.RecomputeError(f'--output {options.output} exists already; a recording is never overwritten')
     reports = [_node_report(recording, node, given, changes.get(node), options) for node in nodes]
@@ -92,15 +89,11 @@ def _node_report(recording: FedRecording, node: str, given: recompute.Values | N
         new = recompute.recompute(recording, node, recompute.parameters_of(recording, node, given, changes),
                                   {step: [command for command, _ in made] for step, made in done.requests.items()})
         report = _old_against_new(recording, done, new, tolerance, _changed(params, changes, options.params_file))
-    elif options.live:
-        from pedestal_workbench.again import live
-        report = _against_recorded(recording, live.outputs(recording, done, params), done, tolerance)
-        report.lines.insert(0, f'compared: messages that the process of {node} published, fed in lockstep')
     else:
-        report = _against_recorded(recording, done.outputs, done, tolerance)
+        report = _against_recorded(recording, done, tolerance)
     report.lines[:0] = [_title(recording, done, options.params_file), *_substitutes(recording, done),
                          *_input_problems(done), *_requests(done)]
-    if not (changes or options.live or recording.lockstep or report.well):
+    if not (changes or recording.lockstep or report.well):
         report.lines.append(f'{node}: the recording is realtime: a step differs if one of its messages was in '
                             'transit, and so do the steps after it; `pedestal verify` states the lost steps')
     part = steps_before(recording.bag) > 0
@@ -155,12 +148,11 @@ def _requests_of_step(done: Recomputed, step: int, made: Sequence[tuple[commands
             for command, granted in made]
 
 
-def _against_recorded(recording: FedRecording, outputs: Mapping[str, Output], done: Recomputed,
-                      tolerance: difference.Tolerance) -> NodeReport:
+def _against_recorded(recording: FedRecording, done: Recomputed, tolerance: difference.Tolerance) -> NodeReport:
     """Return the NodeReport that compares outputs of a node with its recorded outputs."""
-    compared = recompute.compare(recording, outputs, done.unit, tolerance)
+    compared = recompute.compare(recording, done.outputs, done.unit, tolerance)
     if not compared:
-        return _new_numbers(recording, outputs, done)
+        return _new_numbers(recording, done)
     rows = []
     for topic in compared:
         rows += [row(done.node, f'{topic.name} recorded', topic.was),
@@ -176,11 +168,11 @@ def _against_recorded(recording: FedRecording, outputs: Mapping[str, Output], do
     equal = all(topic.equal for topic in compared)
     verdict = 'identical' if all(topic.identical for topic in compared) else \
         'equal within tolerance' if equal else 'DIFFERS'
-    return NodeReport([*difference.lines(compared), f'{done.node}: {verdict}'], rows, outputs, done.unit.messages,
+    return NodeReport([*difference.lines(compared), f'{done.node}: {verdict}'], rows, done.outputs, done.unit.messages,
                       equal and not done.feed.problem)
 
 
-def _new_numbers(recording: FedRecording, outputs: Mapping[str, Output], done: Recomputed) -> NodeReport:
+def _new_numbers(recording: FedRecording, done: Recomputed) -> NodeReport:
     """Return the NodeReport of a node without recorded outputs: the numbers of messages and, for the ACU, results."""
     lines = [f'{done.node}: the recording has no output of the node, so there is no comparison']
     lines += [f'{name:34} {len(output.stamps):9} messages' for name, output in done.outputs.items()]
@@ -190,7 +182,7 @@ def _new_numbers(recording: FedRecording, outputs: Mapping[str, Output], done: R
         lines += _encoder_note(recording)
         lines += [f'{name:42} {row_text.measured(value):>12} {unit}' for name, ((value,), unit) in numbers.items()]
         rows += [row(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
-    return NodeReport(lines, rows, outputs, done.unit.messages, not done.feed.problem)
+    return NodeReport(lines, rows, done.outputs, done.unit.messages, not done.feed.problem)
 
 
 def _encoder_note(recording: FedRecording) -> list[str]:

@@ -21,6 +21,7 @@ from pedestal_operator.page.page_passes import UpcomingPasses
 from pedestal_operator.page.page_security import PAGE_ROLES
 from pedestal_operator.page.page_server import PageServer
 from pedestal_recording import bag as bags
+from pedestal_recording import recording as recordings
 from pedestal_workbench.again.replay import ReplayOptions
 
 PAGE_FRAME_PERIOD_S, SLOW_FRAME_PERIOD_S = 0.1, 1.0
@@ -58,7 +59,7 @@ class ShownRecording(page_state.PageAntenna):
         self._begin, self.length = int(joints[0]), (int(joints[-1]) - int(joints[0])) / NS_PER_SECOND
         self._decoders = {name: records.Decoder(name, records.empty(records.of(name), 1)) for name in NUMBER_TOPICS}
         self.configuration = {name: value for node in page_state.SHOWN_PARAMETERS
-                              for name, value in bag.configuration['parameters'].get(node, {}).items()}
+                              for name, value in recordings.parameters(bag, node).items()}
         self.configuration['graph.start'] = bag.start
         self.alarms: list[Message] = []
         self.path: Json = None  # program track, for the page

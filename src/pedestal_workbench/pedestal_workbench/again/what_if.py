@@ -27,6 +27,7 @@ from pedestal_common.quantities import (
     Table,
     Times,
 )
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import results, sensor_frame, tracking
 from pedestal_results.results import Result
@@ -83,7 +84,7 @@ class RecomputedAcu:
     def __init__(self, overlay: Overlay) -> None:
         self.estimate, self.command = overlay.table('acu/estimate'), overlay.table('acu/rate_command')
         t: Times = self.estimate['t']
-        mode = tracking.modes(overlay, t)
+        mode = recordings.modes(overlay, t)
         self.autotrack = t[mode == 'autotrack']     # stamps of the estimates in autotrack
         self.known = int(np.sum(mode != ''))    # number of the estimates with a known mode
         self.common = t[:0]     # stamps at which the ACU is evaluated, set by `numbers`

@@ -17,6 +17,7 @@ import numpy as np
 from acu_tracker.program.program_track import ProgramTrack
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_common.quantities import Floats, Pair, Pairs, Seconds, Times
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import tracking
 from pedestal_workbench.calibration import predicted, scan
@@ -49,9 +50,10 @@ def points(bag: Recording, tracks: Sequence[ProgramTrack], count: int = DEFAULT_
     """
     joints = bag.table('joint_states')
     t = joints['t']
-    modes = tracking.modes(bag, t)
+    modes = recordings.modes(bag, t)
     encoders = np.column_stack((joints['azimuth.position'], joints['elevation.position']))
-    errors = tracking.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y')) @ tracking.error_matrix(bag).T
+    errors = recordings.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y'))
+    errors = errors @ tracking.error_matrix(bag).T
     if not (modes == 'autotrack').any():
         raise CollectError('no autotrack')
     try:
@@ -65,7 +67,7 @@ def points(bag: Recording, tracks: Sequence[ProgramTrack], count: int = DEFAULT_
     if not places.size or t[places[-1]] - t[places[0]] < WINDOW_S:
         raise CollectError(f'no autotrack of {WINDOW_S:g} s with a predicted direction')
     found = []
-    beamwidth = tracking.beamwidth(bag)
+    beamwidth = recordings.beamwidth(bag)
     # Because the windows of two points must not overlap, a short recording gives fewer points.
     count = min(count, int((t[places[-1]] - t[places[0]]) / WINDOW_S))
     for place in np.array_split(places, count):

@@ -32,9 +32,7 @@ def write(files: ResultFiles, printed: Iterable[str], sections: Mapping[str, Map
     elif files.output:
         for node, values in sections.items():
             check_each(nodes.row(node, iq=iq).parameters_type(), values)
-        head = ''.join(f'# {line}'.rstrip() + '\n' for line in (f'made by: {" ".join(files.command.split())}',
-                                                               *printed))
-        files.output.write_text(head + parameter_file.text(sections), encoding='utf-8')
+        parameter_file.write_new(files.output, sections, [*parameter_file.origin(files.command), *printed])
         said.append(f'written: {files.output}  (pedestal run SCENARIO '
                     f'--params-file {shlex.quote(str(files.output))})')
     if files.report:

@@ -15,10 +15,11 @@ from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.parameters import ParameterError
-from pedestal_common.quantities import Json, Pairs, Quaternions, Texts, Times
+from pedestal_common.quantities import Pairs, Quaternions, Texts, Times
 from pedestal_common.wire import messages
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import known_attitude, mode_pointing, tracking
+from pedestal_results import known_attitude, mode_pointing
 
 PROGRAM_TOPIC, S_PER_NS = 'acu/program_track', 1e-9
 TABLE_MODES = tuple(row.name for row in MODE_ROWS if row.table)  # modes that follow a table
@@ -60,16 +61,11 @@ def programs(bag: Recording) -> list[ProgramTrack]:
             times = [start + point.time_from_start.sec + point.time_from_start.nanosec * S_PER_NS
                      for point in message.points]
             found.append(checked(times, [point.positions for point in message.points]))
-    known = _of_acu(bag)
+    known = recordings.parameters(bag, 'acu')
     if known.get('refraction.program') == 'apparent':
         return found
     air = mode_pointing.air_of(bag, known)
     return [air.apparent(track) for track in found]
-
-
-def _of_acu(bag: Recording) -> dict[str, Json]:
-    """Return the recorded parameters {name: value} of the control unit."""
-    return bag.configuration['parameters'].get('acu', {})
 
 
 def of_programs(tracks: Iterable[ProgramTrack], t: Times) -> Pairs:
@@ -85,7 +81,7 @@ def of_programs(tracks: Iterable[ProgramTrack], t: Times) -> Pairs:
 def _satellite(bag: Recording, predictor: Predictor, t: Times) -> Pairs:
     """Return the directions [rad] of the satellite of the mode tle, by the elements in force at each time."""
     changes = [(-np.inf, predictor)]
-    for time, command, reply in tracking.replies(bag, 'acu/command_result'):
+    for time, command, reply in recordings.replies(bag, 'acu/command_result'):
         given = command.arguments
         if command.verb in ('tle', 'elements') and reply.granted and any(given.values()):
             line_1, line_2, omm = (given.get(name, '') for name in ('line_1', 'line_2', 'omm'))
@@ -126,15 +122,15 @@ def on_deck(bag: Recording, t: Times, tracks: Sequence[ProgramTrack], modes: Tex
         out[tables == 'program'] = of_programs(tracks, t[tables == 'program'])
     if {'tle', 'sun'} & set(tables):
         try:
-            predictor = mode_pointing.predictor_of(bag, _of_acu(bag))
+            predictor = mode_pointing.predictor_of(bag, recordings.parameters(bag, 'acu'))
         except ParameterError as error:
             raise PredictionError(str(error)) from None
         for mode, angles in (('tle', lambda times: _satellite(bag, predictor, times)), ('sun', predictor.sun_angles)):
             if (tables == mode).any():
                 out[tables == mode] = angles(t[tables == mode])
     if known_attitude.ATTITUDE_TOPIC in bag.topics:
-        attitude = tracking.of_equipment(bag, t, known_attitude.ATTITUDE_TOPIC,
-                                         [f'orientation.{letter}' for letter in 'xyzw'])
+        attitude = recordings.of_equipment(bag, t, known_attitude.ATTITUDE_TOPIC,
+                                           [f'orientation.{letter}' for letter in 'xyzw'])
         out[~np.isfinite(attitude).all(1) | ~(t >= known_attitude.aligned_from(bag, t[0]))] = np.nan
         _on_deck(attitude, out)
     return out

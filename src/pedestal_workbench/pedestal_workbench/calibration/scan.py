@@ -21,8 +21,8 @@ import numpy as np
 from acu_tracker.program.program_track import ProgramTrack
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_common.quantities import Floats, Pair, Pairs, Radians, Texts, Times
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import tracking
 from pedestal_workbench.calibration import predicted
 from pedestal_workbench.calibration.predicted import PredictionError
 
@@ -86,7 +86,7 @@ def scans(bag: Recording, t: Times, modes: Texts) -> list[list[Dwell]]:
     t, modes: of the steps. A scan ends with a dwell that no command ends within MAX_DWELL_S, or with a change of the
     mode. The last dwell is at most as long as the dwell before it.
     """
-    commands = [(time, command.arguments) for time, command, reply in tracking.replies(bag, 'acu/command_result')
+    commands = [(time, command.arguments) for time, command, reply in recordings.replies(bag, 'acu/command_result')
                 if command.verb == 'offset' and reply.granted]
     found: list[list[Dwell]] = [[]]
     for (begins, given), ends in zip(commands, [*(time for time, _ in commands[1:]), math.inf]):
@@ -125,7 +125,7 @@ def points(bag: Recording, tracks: Sequence[ProgramTrack]) -> tuple[Times, Pairs
     """
     joints = bag.table('joint_states')
     t = joints['t']
-    modes = tracking.modes(bag, t)
+    modes = recordings.modes(bag, t)
     found_scans = [one for one in scans(bag, t, modes) if len(one) >= MIN_LEVELS]
     if not found_scans:
         raise ScanError(f'no scan of {MIN_LEVELS} commands `offset` in a mode that follows a table')
@@ -133,10 +133,10 @@ def points(bag: Recording, tracks: Sequence[ProgramTrack]) -> tuple[Times, Pairs
         directions = predicted.on_deck(bag, t, tracks, modes)
     except PredictionError as error:
         raise ScanError(str(error)) from None
-    level = 10.0**(0.1 * tracking.of_equipment(bag, t, 'tracking_receiver/angle_error', ('z',))[:, 0])
+    level = 10.0**(0.1 * recordings.of_equipment(bag, t, 'tracking_receiver/angle_error', ('z',))[:, 0])
     azimuth = np.array([wrap(angle) for angle in joints['azimuth.position'] - directions[:, 0]])
     off = np.column_stack((np.cos(directions[:, 1]) * azimuth, joints['elevation.position'] - directions[:, 1]))
-    beamwidth, found = tracking.beamwidth(bag), []
+    beamwidth, found = recordings.beamwidth(bag), []
     for dwells in found_scans:
         rows = [at_rest(dwell) for dwell in dwells]
         rest = [part for part in rows if np.isfinite(off[part, 0] + level[part]).all()

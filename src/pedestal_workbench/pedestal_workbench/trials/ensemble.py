@@ -15,7 +15,8 @@ import numpy as np
 from pedestal_bringup.loop import closed_loop, memory_recording, side_by_side
 from pedestal_common.quantities import Json, Records
 from pedestal_common.wire import records
-from pedestal_results import results, tracking, verdict
+from pedestal_results import results
+from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.plan import Plan
 from pedestal_workbench.trials.statistics import WHY
@@ -100,10 +101,10 @@ def _batch(plan: Plan) -> list[list[Json]]:
         for i, chosen in enumerate(scenarios):
             with _trial(plan, i):
                 recording = memory_recording.MemoryRecording(chosen, next(runs))
-                run = tracking.read(recording)
-                values = results.measured(results.of_run(recording, run))
+                run = RecordedRun(recording)
+                values = results.measured(run.parts)
                 found[i] += [values.get(name, (None,))[0] for name in TRIAL_RESULTS]
-                whys[i].append(verdict.of(recording, run).why)
+                whys[i].append(run.verdict.why)
     return [values + why for values, why in zip(found, whys)]
 
 

@@ -226,7 +226,7 @@ def text(found: Mapping[str, Mapping[str, Json]], head: Iterable[str]) -> str:
 
     Each value has its unit and meaning in a comment.
     """
-    lines = [f'# {line}'.rstrip() for line in head]
+    lines = []
     for node, values in found.items():
         fields = dict(flatten(parameters_of(node)))
         lines += [node + ':' if node == 'scenario' else f'{parameter_file.ANY_NAMESPACE}{node}:', '  ros__parameters:']
@@ -235,7 +235,7 @@ def text(found: Mapping[str, Mapping[str, Json]], head: Iterable[str]) -> str:
             unit = f'[{meta["unit"]}] ' if meta.get('unit') else ''
             written = files.override(key, value).replace('=', ': ', 1)
             lines.append(f'    {written:44}  # {unit}{meta["doc"]}')
-    return '\n'.join(lines) + '\n'
+    return parameter_file.comment(head) + '\n'.join(lines) + '\n'
 
 
 def new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
@@ -259,8 +259,8 @@ def _new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
     found = sections(sheet, title)
     tune = shlex.join(('pedestal', 'tune', f'{name}.yaml', '--loops'))
     run = shlex.join(('pedestal', 'run', f'{name}.yaml', '--params-file', f'{name}-loops.yaml'))
-    content = text(found, (f'made by: {command}', 'Values that are not in the data sheet are scaled from the antenna '
-                           'of the product: replace them by known values.',
-                           f'Next: {tune}, then {run}', *remarks))
+    content = text(found, [*parameter_file.origin(command), 'Values that are not in the data sheet are scaled from '
+                           'the antenna of the product: replace them by known values.',
+                           f'Next: {tune}, then {run}', *remarks])
     scenario.parse(name, content)
     return content, remarks

@@ -509,10 +509,10 @@ def main(options: LoopOptions, required: LoopRequirements, progress: Callable[[f
     loops.gains = {key: value for key, value in loops.gains.items() if key.split('.')[1] in axes}
     refuse_outside(loops)
     lines = [*table(rows, required), *remarks(loops, rows)]
-    made = [f'made by: {options.command}', f'git {configuration.git_revision() or "unknown"}', *lines]
+    made = parameter_file.origin(options.command, configuration.git_revision() or 'unknown')
     sections = {node: {key.removeprefix(f'{node}.'): value for key, value in loops.gains.items()
                        if key.startswith(f'{node}.')} for node in ('adu', 'acu')}
-    file.write_text(''.join(f'# {line}\n' for line in made) + parameter_file.text(sections))
+    parameter_file.write_new(file, sections, [*made, *lines])
     following = shlex.join(('pedestal', 'run', options.source, '--params-file', str(file)))
     return [*lines, '', *(f'{name:44} {value}' for name, value in loops.gains.items()),
             f'written: {file}  ({following})']

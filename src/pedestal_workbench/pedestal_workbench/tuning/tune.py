@@ -344,9 +344,8 @@ def main(options: TuneOptions, progress: Callable[[float, str], object]) -> list
     if options.duration and options.duration < whole:
         lines.append(f'tuned on the first {options.duration:g} s of the {whole:g} s of the scenario: the parameters '
                      'may be worse in the rest; without --duration the whole scenario counts')
-    made = [f'made by: {" ".join(options.command.split())}', f'git {configuration.git_revision() or "unknown"}',
-            *lines]
-    file.write_text(''.join(f'# {line}\n' for line in made) + parameter_file.text({'acu': settings}))
+    made = parameter_file.origin(options.command, configuration.git_revision() or 'unknown')
+    parameter_file.write_new(file, {'acu': settings}, [*made, *lines])
     values = [f'{name:48} {value}' for name, value in settings.items()]
     hint = f'pedestal run ... --params-file {shlex.quote(str(file))}'
     if not source.of_beams:

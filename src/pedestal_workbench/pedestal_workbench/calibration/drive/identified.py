@@ -21,6 +21,7 @@ from pedestal_common.parameters import as_dict, build, defaults
 from pedestal_common.quantities import Json, Pairs, Row
 from pedestal_common.text_files import parameter_file
 from pedestal_recording import bag as bags
+from pedestal_recording import recording as recordings
 from pedestal_results import intervals
 from pedestal_results.intervals import estimated, row
 from pedestal_workbench.calibration import output_files
@@ -214,7 +215,7 @@ def write_plan(chosen: Scenario, given: str, path: pathlib.Path) -> list[str]:
     run = shlex.join(('pedestal', 'run', given, '--params-file', str(path)))
     plan, sections = plan_parameters(chosen)
     stated = [f'motions of {motions.time_text(plan.duration)} for the antenna of {chosen.name}, within', *plan.limits]
-    path.write_text(''.join(f'# {line}\n' for line in stated) + parameter_file.text(sections), encoding='utf-8')
+    parameter_file.write_new(path, sections, stated)
     return [*stated, f'written: {path}', 'Record the motions twice:',
             f'    {run} --bag drive_1',
             f'    {run} --param adu.azimuth.bias.schedule=off --param adu.elevation.bias.schedule=off --bag drive_2']
@@ -245,7 +246,7 @@ def of_bags(paths: Iterable[pathlib.Path]) -> list[twin.DriveRecording]:
     found, first = [], None
     for path in paths:
         bag = bags.read(path, '')
-        given = bag.configuration['parameters'].get('adu', {})
+        given = recordings.parameters(bag, 'adu')
         known = {key: given[key] for key in defaults(AduParameters) if key in given}
         if not known:
             raise ValueError(f'--bag {path}: the recording does not state the parameters of the drive, adu')

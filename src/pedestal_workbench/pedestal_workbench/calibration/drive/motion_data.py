@@ -11,8 +11,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from adu_drive.params import AxisParameters
 from pedestal_common.quantities import Floats, Pairs, Times
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import tracking
 
 SMOOTHING_S = 0.012  # standard deviation of the Gaussian of the smoothing filter [s]
 MOVING_RATE_RAD_S = 2e-4  # least rate of a moving axis [rad/s]
@@ -52,13 +52,12 @@ class Motion:
 
 def read(bag: Recording, name: str, axis: AxisParameters) -> Motion:
     """Return the motion of the axis `name` in a recording. Raises MotionError."""
-    missing = [topic for topic in ('joint_states', 'adu/motor_states') if topic not in bag.topics]
-    if missing:
-        raise MotionError(f'the recording holds no {" and no ".join(missing)}')
+    if missing := recordings.missing(bag, 'joint_states', 'adu/motor_states'):
+        raise MotionError(f'the recording holds no {missing}')
     joints = bag.table('joint_states')
     t = joints['t']
     columns = [f'{name}_motor_{k}.{column}' for column in ('position', 'effort') for k in (1, 2)]
-    motors = tracking.on_grid(bag, t, 'adu/motor_states', columns)
+    motors = recordings.at(bag, t, 'adu/motor_states', columns)
     theta = joints[f'{name}.position']
     if not (np.isfinite(motors).all() and np.isfinite(theta).all()):
         at = t[~(np.isfinite(motors).all(1) & np.isfinite(theta))][0]

@@ -17,8 +17,8 @@ from adu_drive.plant import gimbal
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import as_dict, build
 from pedestal_common.quantities import Estimate, Floats, Json, KilogramMeters2, Pair, Pairs, Radians, Vectors3
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import tracking
 from pedestal_workbench.calibration.drive import estimates, mode, motion_data
 from pedestal_workbench.calibration.drive.estimates import Estimates
 from pedestal_workbench.calibration.drive.motion_data import Motion
@@ -65,7 +65,7 @@ def read(bag: Recording, drive: AduParameters) -> DriveRecording:
     joints = bag.table('joint_states')
     columns = [f'{name}.{kind}' for kind in ('velocity', 'effort') for name in AXES]
     # Before the first command of the control unit the drive holds its angles.
-    commands = np.nan_to_num(tracking.on_grid(bag, joints['t'], 'acu/rate_command', columns))
+    commands = np.nan_to_num(recordings.at(bag, joints['t'], 'acu/rate_command', columns))
     start = np.array([joints[f'{name}.position'][0] for name in AXES])
     return DriveRecording(drive, motions, commands[:, :2].copy(), commands[:, 2:].copy(), start)
 

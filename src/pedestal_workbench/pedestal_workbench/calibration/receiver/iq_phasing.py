@@ -19,6 +19,7 @@ from pedestal_common.graph import nodes
 from pedestal_common.quantities import Complexes, Floats, Json, Pair, Pairs, Radians, Row
 from pedestal_hardware.monopulse import sigmf
 from pedestal_hardware.monopulse.params import THREE_CHANNELS, MonopulseParameters
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import tracking
 from pedestal_results.intervals import estimated, row
@@ -72,9 +73,9 @@ def calibrate(bag: Recording, source: str, samples: ratios.Samples, recorded: bo
     """
     points = offsets.read(bag)
     antenna, in_force = samples.parameters.antenna, np.array(samples.parameters.calibration.matrix)
-    if abs(antenna.beamwidth / tracking.beamwidth(bag) - 1.0) > 1e-9:
+    if abs(antenna.beamwidth / recordings.beamwidth(bag) - 1.0) > 1e-9:
         raise offsets.OffsetError(f'antenna.beamwidth = {antenna.beamwidth:g} rad of the receiver: must be that of '
-                                  f'the recording, {tracking.beamwidth(bag):g} rad')
+                                  f'the recording, {recordings.beamwidth(bag):g} rad')
     measured = ratios.at_points(samples, points.spans) / antenna.slope
     if recorded:
         _check_errors(points, (measured @ in_force.T).real, samples.file.meta)

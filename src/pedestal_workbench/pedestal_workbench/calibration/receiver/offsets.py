@@ -16,8 +16,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from pedestal_common.quantities import Bools, DecibelHertz, Floats, Pair, Pairs, Radians, Seconds, Times, Vectors3
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import beam_direction, mode_pointing, tracking
+from pedestal_results import directions, mode_pointing, tracking
 from pedestal_workbench.calibration import predicted
 
 CIRCLE_BEAMWIDTHS, CIRCLE_TOLERANCE_BEAMWIDTHS = 0.2, 0.03
@@ -59,19 +60,18 @@ class Points:
 
 def read(bag: Recording) -> Points:
     """Return the points of a recording of one beam. Raises OffsetError."""
-    missing = [name for name in ('joint_states', 'tracking_receiver/angle_error') if name not in bag.topics]
-    if missing:
-        raise OffsetError(f'the recording holds no {" and no ".join(missing)}')
+    if missing := recordings.missing(bag, 'joint_states', 'tracking_receiver/angle_error'):
+        raise OffsetError(f'the recording holds no {missing}')
     if 'ship/imu/data' in bag.topics:
         raise OffsetError('the recording is of a ship; its offsets contain the attitude of the deck')
-    beamwidth = tracking.beamwidth(bag)
+    beamwidth = recordings.beamwidth(bag)
     if not beamwidth > 0.0:
         raise OffsetError(f'beamwidth = {beamwidth:g} rad: the recording must state a beamwidth above 0')
     joints = bag.table('joint_states')
     t = joints['t']
-    beam = beam_direction.on_sky(bag, t, np.column_stack([joints[column] for column in COLUMNS]))
+    beam = directions.on_sky(bag, t, np.column_stack([joints[column] for column in COLUMNS]))
     offsets, plain = _from_beacon(bag, t, beam)
-    errors = tracking.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y', 'z'))
+    errors = recordings.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y', 'z'))
     found = [_point(t[first:last], offsets[first:last] / beamwidth, errors[first:last], beamwidth)
              for first, last in _still(t, offsets, beamwidth)]
     if not found:
@@ -90,7 +90,7 @@ def _from_beacon(bag: Recording, t: Times, beam: Pairs) -> tuple[Pairs, bool]:
 
     The offsets are NaN outside the modes preset and program; beam: directions [rad].
     """
-    modes = tracking.modes(bag, t)
+    modes = recordings.modes(bag, t)
     usable = (modes == 'preset') | (modes == 'program')
     if not usable.any():
         raise OffsetError('the recording holds neither the mode preset nor the mode program')

@@ -12,6 +12,7 @@ import numpy as np
 
 from acu_tracker.params import AcuParameters
 from pedestal_common.quantities import Floats, Json, Pair, Row
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import intervals, tracking
 from pedestal_results.intervals import estimated, row
@@ -48,7 +49,7 @@ def calibrate(bag: Recording, source: str) -> Phasing:
     """Return the result for a recording of one beam. Raises OffsetError and MatrixError."""
     points = offsets.read(bag)
     slopes = matrix.fit(points.offsets[points.fitted], points.errors[points.fitted])
-    known = bag.configuration['parameters'].get('acu', {})
+    known = recordings.parameters(bag, 'acu')
     in_force = tracking.error_matrix(bag)
     circle = points.offsets[points.circle], points.errors[points.circle]
     before, after = (matrix.verify(used, slopes.null, *circle) for used in (in_force, slopes.matrix))

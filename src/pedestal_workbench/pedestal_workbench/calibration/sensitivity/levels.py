@@ -16,8 +16,8 @@ import numpy as np
 
 from pedestal_common.quantities import Degrees, Floats, Hertz, Pairs
 from pedestal_common.text_files import columns, csv_table
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import tracking
 from pedestal_workbench.calibration import scan
 
 OFFSET_RANGE_DEG, LEVEL_RANGE_DB = (-30.0, 30.0), (-300.0, 300.0)  # ranges of the offsets and of the levels in a file
@@ -78,18 +78,16 @@ def of_recording(bag: Recording, source: str) -> Levels:
     """Return the levels of a recording of one beam; source: its name. Raises LevelError."""
     if 'ship/imu/data' in bag.topics:
         raise LevelError('the recording is of a ship; its offsets contain the attitude of the deck')
-    missing = [name for name in ('joint_states', 'tracking_receiver/angle_error', 'acu/reference')
-               if name not in bag.topics]
-    if missing:
-        raise LevelError(f'the recording holds no {" and no ".join(missing)}')
+    if missing := recordings.missing(bag, 'joint_states', 'tracking_receiver/angle_error', 'acu/reference'):
+        raise LevelError(f'the recording holds no {missing}')
     joints, axes = bag.table('joint_states'), ('azimuth.position', 'elevation.position')
     t = joints['t']
     angles = np.column_stack([joints[name] for name in axes])
-    following = tracking.on_grid(bag, t, 'acu/reference', axes) - angles
-    measured = tracking.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y', 'z'))
+    following = recordings.at(bag, t, 'acu/reference', axes) - angles
+    measured = recordings.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y', 'z'))
     following[:, 0] *= np.cos(angles[:, 1])     # on the sky, in cross-elevation
-    limit, found = MAX_FOLLOWING_BEAMWIDTHS * tracking.beamwidth(bag), []
-    for dwell in itertools.chain.from_iterable(scan.scans(bag, t, tracking.modes(bag, t))):
+    limit, found = MAX_FOLLOWING_BEAMWIDTHS * recordings.beamwidth(bag), []
+    for dwell in itertools.chain.from_iterable(scan.scans(bag, t, recordings.modes(bag, t))):
         part = scan.at_rest(dwell)
         if not (np.abs(following[part]).max() < limit and np.isfinite(measured[part, 2]).any()):
             continue
@@ -103,10 +101,10 @@ def of_recording(bag: Recording, source: str) -> Levels:
         raise LevelError('no command `offset` in a mode that follows a table, with '
                          f'{scan.MIN_DWELL_S:g} s at rest after it')
     rows = np.array(found)
-    known = bag.configuration['parameters'].get('tracking_receiver', {})
+    receiver = recordings.parameters(bag, 'tracking_receiver')
     # The level of a carrier has no noise bandwidth.
-    noise = known.get('target.kind') in NOISE_KINDS
-    bandwidth = float(known.get('target.noise_source.bandwidth', math.nan)) if noise else math.nan
-    disk = math.degrees(known.get('target.noise_source.diameter', math.nan)) if noise else 0.0
+    noise = receiver.get('target.kind') in NOISE_KINDS
+    bandwidth = float(receiver.get('target.noise_source.bandwidth', math.nan)) if noise else math.nan
+    disk = math.degrees(receiver.get('target.noise_source.diameter', math.nan)) if noise else 0.0
     return Levels(rows[:, :2], rows[:, 2], True, rows[:, 3:], bandwidth,
-                  disk if 'target.kind' in known else math.nan, source)
+                  disk if 'target.kind' in receiver else math.nan, source)

@@ -12,8 +12,8 @@ from pedestal_common.quantities import Message, Seconds
 from pedestal_common.wire import commands
 from pedestal_operator import state
 from pedestal_operator.page.page_log import Log
+from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import tracking
 
 STATE_TOPICS = ('adu/state', 'adu/stow_pins', 'ins/state', 'acu/blockage')
 """Topics whose texts state the condition of the equipment."""
@@ -53,7 +53,7 @@ def _replies(bag: Recording) -> list[Event]:
     events: list[Event] = []
     log = Log()
     for node in nodes.NODES:
-        for t, command, reply in tracking.replies(bag, node.replies):
+        for t, command, reply in recordings.replies(bag, node.replies):
             with contextlib.suppress(ValueError):  # the command has a wrong argument
                 logged = log.revision
                 log.replied(t, command, reply)
