@@ -1,6 +1,6 @@
 # make demo    set up, run the main scenario as separate nodes, record it, check the recording, write the report
 # make quick   set up, lint, check types, run the tests of all laws: a minute and a half
-# make test    set up, lint, show that each part of the product works: ten minutes
+# make test    set up, lint, show that each part of the product works: five minutes
 # make test-all   make test, then make test-rest: every test
 # make test-rest  the tests that are marked thorough
 # make update-references  record bags/reference anew and print the difference that is accepted with it

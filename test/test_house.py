@@ -3,6 +3,7 @@ import ast
 import collections
 import graphlib
 import pathlib
+import re
 import tokenize
 
 import pytest
@@ -41,6 +42,8 @@ def test_few_values_have_no_type_and_each_has_a_reason():
     """The reason is a comment on the line of `Any`, or of `type: ignore`."""
     found = []
     for path in FILES.values():
+        if not re.search(r'\bAny\b|type: ignore', path.read_text()):
+            continue
         words = collections.defaultdict(list)
         with path.open('rb') as file:
             for token in tokenize.tokenize(file.readline):

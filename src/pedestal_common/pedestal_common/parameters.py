@@ -2,8 +2,6 @@
 
 node/shell.py declares these parameters in ROS and refuses wrong values. No ROS here.
 """
-from __future__ import annotations
-
 import dataclasses
 import difflib
 import functools
@@ -49,7 +47,7 @@ def text(default: str, doc: str) -> str:
     return dataclasses.field(default=default, metadata={'doc': doc})
 
 
-def group(cls: type[_P], **changes: Value) -> _P:
+def group(cls: 'type[_P]', **changes: 'Value') -> '_P':
     """Declare a nested dataclass, with some of its defaults changed."""
     return dataclasses.field(default_factory=lambda: cls(**changes), metadata={'group': True})
 
@@ -98,7 +96,7 @@ class RosParameters(Parameters):
 _ROS_PREFIX = 'qos_overrides.'  # beginning of the names of further parameters that rclpy gives every node
 
 
-def without_ros(values: Mapping[str, Value]) -> dict[str, Value]:
+def without_ros(values: 'Mapping[str, Value]') -> 'dict[str, Value]':
     """Return {dotted name: value} without the parameters of every ROS 2 node. Raises ParameterError for a value that
     rclpy would refuse."""
     own = {name: value for name, value in values.items() if name in RosParameters.__dataclass_fields__}
@@ -154,18 +152,18 @@ def _default(cls: type[_P]) -> _P:
     return cls()
 
 
-def defaults(cls: type[Parameters]) -> dict[str, Value]:
+def defaults(cls: type[Parameters]) -> 'dict[str, Value]':
     """Return {dotted name: default} of a parameter dataclass, with the changed defaults of its groups."""
     return as_dict(_default(cls))
 
 
 @_cached
-def _readers(cls: type[Parameters]) -> list[tuple[str, Callable[[Parameters], Value]]]:
+def _readers(cls: type[Parameters]) -> 'list[tuple[str, Callable[[Parameters], Value]]]':
     """Return [(dotted name, function that reads the value from an instance)] of every parameter of a dataclass."""
     return [(name, operator.attrgetter(name)) for name, _ in flatten(cls)]
 
 
-def as_dict(instance: Parameters, prefix: str = '') -> dict[str, Value]:
+def as_dict(instance: Parameters, prefix: str = '') -> 'dict[str, Value]':
     """Return {dotted name: value} of an instance."""
     return {prefix + name: read(instance) for name, read in _readers(type(instance))}
 
@@ -181,7 +179,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f' did you mean {near[0]!r}?' if near else ''
 
 
-def build(cls: type[_P], values: Mapping[str, Value], prefix: str = '') -> _P:
+def build(cls: type[_P], values: 'Mapping[str, Value]', prefix: str = '') -> _P:
     """Return an instance with values {dotted name: value}. Every name begins with `prefix`. Other fields keep their
     default.
 
@@ -191,7 +189,7 @@ def build(cls: type[_P], values: Mapping[str, Value], prefix: str = '') -> _P:
     return _replace(_default(cls), values, prefix)
 
 
-def check_each(cls: type[Parameters], values: Mapping[str, Value]) -> None:
+def check_each(cls: type[Parameters], values: 'Mapping[str, Value]') -> None:
     """Raise ParameterError for the first of {dotted name: value} that `build` would refuse whatever the others are.
 
     Each value is checked alone. `Parameters.check`, which compares fields with each other, is not called.
@@ -209,12 +207,12 @@ def _check_names(known: Mapping[str, Field], values: Iterable[str]) -> None:
             raise ParameterError(f'unknown parameter {name!r}' + (f';{hint}' if hint else ''))
 
 
-def typed(field: Field, value: Value) -> Value:
+def typed(field: Field, value: 'Value') -> 'Value':
     """Return the value of a field; a whole number for a field of type float is returned as a float."""
     return float(value) if field.type is float and type(value) is int else value
 
 
-def _replace(instance: _P, values: Mapping[str, Value], prefix: str) -> _P:
+def _replace(instance: _P, values: 'Mapping[str, Value]', prefix: str) -> _P:
     changes = {}
     for field in dataclasses.fields(instance):
         name = prefix + field.name
@@ -229,13 +227,13 @@ def _replace(instance: _P, values: Mapping[str, Value], prefix: str) -> _P:
 
 
 @_cached
-def record_type(cls: type[Parameters]) -> DType:
+def record_type(cls: type[Parameters]) -> 'DType':
     """Return the type of the numpy record of a parameter dataclass.
 
     A float becomes f8, an int or a bool i8, a choice i8 (its index among the options), and a group a nested record.
     Other texts are left out.
     """
-    fields: list[tuple[str, str | DType]] = []
+    fields: 'list[tuple[str, str | DType]]' = []
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
         if field.metadata.get('group'):
@@ -261,7 +259,7 @@ def _record_values(instance: Parameters, cls: type[Parameters]) -> tuple[object,
     return tuple(values)
 
 
-def record(instance: Parameters, cls: type[Parameters] | None = None) -> Records:
+def record(instance: Parameters, cls: type[Parameters] | None = None) -> 'Records':
     """Return an instance as a record array of shape (1,), the form in which compiled laws read parameters.
 
     cls: base class of the instance, whose fields alone are in the record; None: all fields of the instance.
