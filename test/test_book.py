@@ -33,7 +33,7 @@ def test_every_parameter_verb_and_law_is_there(pages):
     assert all(f'\n## {name}\n' in verbs and f'usage: pedestal {name}' in verbs for name in cli.VERBS)
     laws = (pages / 'reference' / 'laws.md').read_text()
     for module, test in (('acu_tracker.estimation.filters.kalman', 'test_kalman.py'),
-                         ('adu_drive.plant.friction', 'test_laws.py'),
+                         ('adu_drive.plant.mechanics', 'test_laws.py'),
                          ('ship_motion_sim.sea.motion', 'test_motion.py')):
         section = laws.partition(f'\n### {module}\n')[2].partition('\n### ')[0]
         assert '```text' in section and f'`{test}`' in section

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive.plant import structure
+from adu_drive.plant import mechanics
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag as bags
@@ -40,7 +40,7 @@ def composed(*overrides, duration):
 def stiffness():
     """Of the structure [Nm/rad]."""
     load = scenario.load('uav_flyby', SWINGS).node_parameters('adu').azimuth.load.inertia
-    return structure.spring_and_damper(SHARE * load, FREQUENCY, 0.0)[0]
+    return mechanics.spring_and_damper(SHARE * load, FREQUENCY, 0.0)[0]
 
 
 def test_a_static_twist_is_nulled_by_the_loop_and_only_the_encoders_show_it():

@@ -8,9 +8,10 @@
     timekeeper_node   node that owns the time of the drive
     params, injected, state_file    parameters; injected faults; file for the state of the plant over a restart
     lanes         many drives at once, computed by vector instructions, for trials
-    speed_loop, disturbance_observer, bias, current_loop, pi, travel, encoder, faults    laws of the controller
-    motor, thermal, brake, gear_train, friction, structure, wind                         laws of the plant
-    wind_field        one wind over both axes, which depends on their angles
+    controller    laws of the controller: loops (travel, speed, bias, disturbance observer, current), encoder, faults
+    motors        a motor and its brake: currents, speed, cogging, heat; this and the next four are in the folder plant
+    mechanics     meshes, friction of the bearing, end stops and flexible structure of an axis
+    wind          torques of the wind: those of time only, and those of one wind over both axes
     gimbal            rigid bodies that turn about two axes on a moving deck
     mount             direction of the beam from the angles of the axes
     angle_drive                   base of the units of drives that follow angles

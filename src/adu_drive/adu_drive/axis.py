@@ -6,7 +6,7 @@ symbols.
 import math
 from typing import Annotated, cast
 
-from adu_drive.controller import bias, current_loop, disturbance_observer, encoder, faults, pi, speed_loop, travel
+from adu_drive.controller import encoder, faults, loops
 from adu_drive.params import (
     SPEED_LOOP_PERIOD_S,
     AxisParameters,
@@ -15,7 +15,7 @@ from adu_drive.params import (
     MotorParameters,
     ThermalParameters,
 )
-from adu_drive.plant import brake, friction, gear_train, motor, structure, thermal
+from adu_drive.plant import mechanics, motors
 from pedestal_common.compiled import compiled, inlined
 from pedestal_common.law import Law
 from pedestal_common.quantities import (
@@ -103,7 +103,7 @@ class Constants(Record):
     l_2: float
     h_J_shaft: float
     T_b: NewtonMeters
-    out: NewtonMeters       # see bias.schedule_constants
+    out: NewtonMeters       # see loops.bias_constants
     per_fade: float
     bias_gain: float
     k: float                # [Nm/rad]
@@ -139,7 +139,7 @@ class Constants(Record):
     ramp: RadiansPerSecond      # change of the rate in a speed-loop period at the deceleration a
     lower: Radians              # ends of travel
     upper: Radians
-    K: float                    # see travel.approach_rate
+    K: float                    # see loops.approach_rate
     stop_lower: Radians         # places of the mechanical end stops
     stop_upper: Radians
     k_stop: float               # [Nm/rad]
@@ -238,7 +238,7 @@ def _motor_constants(m: MotorParameters, loop: CurrentLoopParameters, heat: Ther
     R, psi = m.resistance * (1.0 + m.drift.resistance), m.flux_linkage * (1.0 + m.drift.flux_linkage)
     return MotorConstants.of(p=m.pole_pairs, psi=psi, L=m.inductance, K_t=1.5 * m.pole_pairs * psi,
                              h_L=h / m.inductance, h_R_L=h * R / m.inductance,
-                             rise=thermal.COPPER_COEFFICIENT_PER_K * heat.rise, per_rated=1.0 / heat.rated_torque,
+                             rise=motors.COPPER_COEFFICIENT_PER_K * heat.rise, per_rated=1.0 / heat.rated_torque,
                              heat_gain=1.0 - math.exp(-period / heat.time_constant), h_brake_J=h * m.brake / m.inertia,
                              T_c=m.friction, per_v=1.0 / m.friction_speed, h_J=h / m.inertia,
                              q_B=1.0 / (1.0 + h * m.viscous / m.inertia), T_cog=m.cogging, cogs=m.cogging_per_turn,
@@ -251,7 +251,7 @@ def _motor_constants(m: MotorParameters, loop: CurrentLoopParameters, heat: Ther
 def _dish(p: AxisParameters) -> tuple[KilogramMeters2, float, float]:
     """Return inertia, stiffness [Nm/rad] and damping [Nms/rad] of the dish, the flexible part of the load."""
     J_dish = p.structure.inertia_share * p.load.inertia
-    return J_dish, *structure.spring_and_damper(J_dish, p.structure.frequency, p.structure.damping)
+    return J_dish, *mechanics.spring_and_damper(J_dish, p.structure.frequency, p.structure.damping)
 
 
 def constants(p: AxisParameters, h: Seconds, varying: bool = False,
@@ -265,11 +265,11 @@ def constants(p: AxisParameters, h: Seconds, varying: bool = False,
     motor_per_rad = 2.0 ** p.encoder.motor_bits / (2.0 * math.pi)
     g, N = p.gear_train, p.gear_train.ratio
     J_shaft = 0.5 * (p.motor_1.inertia + p.motor_2.inertia + p.speed_loop.load_inertia / N ** 2)
-    T_b, out, per_fade = bias.schedule_constants(p.bias)
+    T_b, out, per_fade = loops.bias_constants(p.bias)
     J_dish, k_dish, c_dish = _dish(p)
     J_base = p.load.inertia - J_dish
     final, emergency, buffer = p.limits.switches
-    l_1, l_2 = disturbance_observer.gains(p.speed_loop.disturbance_observer, period)
+    l_1, l_2 = loops.observer_gains(p.speed_loop.disturbance_observer, period)
     trips = faults.Limits.of(
         current_2=p.faults.overcurrent ** 2, omega=N * p.faults.overspeed, disagreement=p.faults.encoder_disagreement,
         error=N * p.faults.following_error, late_periods=math.ceil(p.faults.following_time / period - 1e-6),
@@ -321,7 +321,7 @@ def initial_state(p: AxisParameters, theta: Radians, external: NewtonMeters) -> 
     T = -0.5 * external / p.gear_train.ratio
     observed = p.speed_loop.disturbance_observer > 0.0
     total = 0.0 if observed else T
-    T_b = cast(Law, bias.scheduled).py_func(T, *bias.schedule_constants(p.bias))
+    T_b = cast(Law, loops.scheduled_bias).py_func(T, *loops.bias_constants(p.bias))
     return State.of(motor_1=_motor_at_rest(p.motor_1, p.gear_train, T + T_b, total, theta, per_rad),
                     motor_2=_motor_at_rest(p.motor_2, p.gear_train, T - T_b, total, theta, per_rad), theta=theta,
                     dish=theta + external / k_dish if k_dish else theta, external=external, bias=T_b,
@@ -346,7 +346,7 @@ def _measured_speed(motor: MotorState, constants: MotorConstants) -> RadiansPerS
 def read_motor_sensors(motor: MotorState, constants: MotorConstants) -> None:
     """Measure the speed of a motor and advance its thermal load by a speed-loop period."""
     motor.measured = _measured_speed(motor, constants)
-    motor.heat = thermal.load(motor.heat, constants.K_t * motor.i_q, constants.per_rated, constants.heat_gain)
+    motor.heat = motors.thermal_load(motor.heat, constants.K_t * motor.i_q, constants.per_rated, constants.heat_gain)
     motor.count = int(encoder.counts(motor.theta, constants.per_rad))
 
 
@@ -383,17 +383,17 @@ def _torque_control(axis: State, constants: Constants, omega: RadiansPerSecond, 
     alone = axis.faults & faults.MOTORS_LOST_BITS
     omega_1, omega_2 = (m1.measured, m2.measured) if c.independent and not alone else (omega, omega)
     error_1, error_2 = c.N * axis.rate - omega_1, c.N * axis.rate - omega_2
-    T_1 = speed_loop.torque(error_1, m1.sum, c.K_p, feed_forward)
-    T_2 = speed_loop.torque(error_2, m2.sum, c.K_p, feed_forward)
+    T_1 = loops.torque_demand(error_1, m1.sum, c.K_p, feed_forward)
+    T_2 = loops.torque_demand(error_2, m2.sum, c.K_p, feed_forward)
     if alone:
         axis.bias, total = 0.0, T_1 + T_2
         T_1, T_2 = (0.0, total) if alone & faults.Bit.MOTOR_1_LOST else (total, 0.0)
     else:
-        axis.bias += c.bias_gain * (bias.scheduled(0.5 * (T_1 + T_2), c.T_b, c.out, c.per_fade) - axis.bias)
-        T_1, T_2 = speed_loop.shared(T_1, T_2, axis.bias, m1.measured, m2.measured, c.K_d)
-    m1.torque_ref, m2.torque_ref = speed_loop.limited(T_1, k1.limit), speed_loop.limited(T_2, k2.limit)
+        axis.bias += c.bias_gain * (loops.scheduled_bias(0.5 * (T_1 + T_2), c.T_b, c.out, c.per_fade) - axis.bias)
+        T_1, T_2 = loops.shared_torques(T_1, T_2, axis.bias, m1.measured, m2.measured, c.K_d)
+    m1.torque_ref, m2.torque_ref = loops.limited_torque(T_1, k1.limit), loops.limited_torque(T_2, k2.limit)
 
-    # Anti-windup: the excess is the demanded minus the realised torque (pi.integral). With one speed loop for both
+    # Anti-windup: the excess is the demanded minus the realised torque (loops.integral). With one speed loop for both
     # motors, both integrals get the mean excess, so that they stay equal.
     limited = m1.torque_ref != T_1 or m2.torque_ref != T_2
     excess_1 = excess_2 = 0.0
@@ -401,8 +401,8 @@ def _torque_control(axis: State, constants: Constants, omega: RadiansPerSecond, 
         excess_1, excess_2 = T_1 - realised_torque(m1, k1), T_2 - realised_torque(m2, k2)
         if alone or not c.independent:
             excess_1 = excess_2 = 0.5 * (excess_1 + excess_2)
-    m1.sum = pi.integral(m1.sum, error_1, c.K_iT, excess_1)
-    m2.sum = pi.integral(m2.sum, error_2, c.K_iT, excess_2)
+    m1.sum = loops.integral(m1.sum, error_1, c.K_iT, excess_1)
+    m2.sum = loops.integral(m2.sum, error_2, c.K_iT, excess_2)
     return limited
 
 
@@ -477,7 +477,7 @@ def control_measured(axis: State, constants: Constants, made: NewtonMeters, rate
         _remove_torque(axis, omega, free)
         return
     m1.inhibited, m2.inhibited = axis.faults & faults.Bit.MOTOR_1_LOST, axis.faults & faults.Bit.MOTOR_2_LOST
-    axis.omega_hat, axis.d_hat = disturbance_observer.update(
+    axis.omega_hat, axis.d_hat = loops.updated_observer(
         axis.omega_hat, axis.d_hat, omega, made, c.l_1, c.l_2, c.h_J_shaft)
 
     feed_forward = 0.0
@@ -493,8 +493,8 @@ def control_measured(axis: State, constants: Constants, made: NewtonMeters, rate
         wanted = axis.rate - min(max(axis.rate, -c.ramp), c.ramp)
         axis.stopping = axis.ramping = 1
     position = c.rad * load_counts(axis, c)
-    axis.rate = min(max(wanted, -travel.approach_rate(position - c.lower, c.K, c.a)),
-                 travel.approach_rate(c.upper - position, c.K, c.a))
+    axis.rate = min(max(wanted, -loops.approach_rate(position - c.lower, c.K, c.a)),
+                 loops.approach_rate(c.upper - position, c.K, c.a))
     if axis.rate != wanted:
         feed_forward = 0.0
         axis.end_stop = 1
@@ -521,8 +521,8 @@ def begin_period(axis: State, constants: Constants, grip: bool) -> None:
     axis.braked = 1 if grip else 0
     if axis.brake_stuck != BRAKE_WORKING:
         axis.braked = 1 if axis.brake_stuck == BRAKE_STUCK_ON else 0
-    m1.q_R = thermal.damping(k1.h_R_L, k1.rise, m1.heat)
-    m2.q_R = thermal.damping(k2.h_R_L, k2.rise, m2.heat)
+    m1.q_R = motors.resistive_damping(k1.h_R_L, k1.rise, m1.heat)
+    m2.q_R = motors.resistive_damping(k2.h_R_L, k2.rise, m2.heat)
     axis.torque_limited = axis.voltage_limited = axis.end_stop = axis.stopping = axis.present = 0
 
 
@@ -534,7 +534,7 @@ def current_control(motor: MotorState, constants: MotorConstants) -> None:
     open terminals show the back-EMF. The model omits the diodes, which empty the inductance within a millisecond.
     """
     k = constants
-    v_d, v_q, sum_d, sum_q, limited = current_loop.voltages(
+    v_d, v_q, sum_d, sum_q, limited = loops.voltages(
         k.gain * motor.i_d, k.gain * motor.i_q + k.offset, motor.i_ref, k.p * motor.measured, motor.sum_d, motor.sum_q,
         k.K_p, k.K_iT, k.L, k.psi_hat, k.v_max)
     i_d, i_q = motor.i_d, motor.i_q
@@ -566,38 +566,38 @@ def plant_step(axis: State, constants: Constants, external: NewtonMeters) -> Non
     the phase resistance R, the viscous friction and the bristle deflection.
     """
     c, m1, m2, k1, k2 = constants, axis.motor_1, axis.motor_2, constants.motor_1, constants.motor_2
-    m1.i_d, m1.i_q = motor.currents(m1.i_d, m1.i_q, m1.v_d, m1.v_q, k1.p * m1.omega, k1.L, k1.psi, k1.h_L, m1.q_R)
-    m2.i_d, m2.i_q = motor.currents(m2.i_d, m2.i_q, m2.v_d, m2.v_q, k2.p * m2.omega, k2.L, k2.psi, k2.h_L, m2.q_R)
+    m1.i_d, m1.i_q = motors.currents(m1.i_d, m1.i_q, m1.v_d, m1.v_q, k1.p * m1.omega, k1.L, k1.psi, k1.h_L, m1.q_R)
+    m2.i_d, m2.i_q = motors.currents(m2.i_d, m2.i_q, m2.v_d, m2.v_q, k2.p * m2.omega, k2.L, k2.psi, k2.h_L, m2.q_R)
 
     delta_1, delta_2 = m1.theta * c.per_N - axis.theta, m2.theta * c.per_N - axis.theta
     if c.uneven:
-        delta_1 += gear_train.transmission_error(m1.theta * c.per_reducer, c)
-        delta_2 += gear_train.transmission_error(m2.theta * c.per_reducer + SECOND_PINION_OFFSET_RAD, c)
+        delta_1 += mechanics.transmission_error(m1.theta * c.per_reducer, c)
+        delta_2 += mechanics.transmission_error(m2.theta * c.per_reducer + SECOND_PINION_OFFSET_RAD, c)
     half_1 = half_2 = c.half_lash
     if axis.toothless:
-        half_1 += gear_train.gap(m1.theta * c.per_reducer, axis.teeth[0], c.pinion_ratio)
-        half_2 += gear_train.gap(m2.theta * c.per_reducer, axis.teeth[1], c.pinion_ratio)
-    mesh_1 = gear_train.mesh_torque(delta_1, m1.omega * c.per_N - axis.omega, c.k, c.c, half_1)
-    mesh_2 = gear_train.mesh_torque(delta_2, m2.omega * c.per_N - axis.omega, c.k, c.c, half_2)
-    bearing, axis.z = friction.lugre(
+        half_1 += mechanics.tooth_gap(m1.theta * c.per_reducer, axis.teeth[0], c.pinion_ratio)
+        half_2 += mechanics.tooth_gap(m2.theta * c.per_reducer, axis.teeth[1], c.pinion_ratio)
+    mesh_1 = mechanics.mesh_torque(delta_1, m1.omega * c.per_N - axis.omega, c.k, c.c, half_1)
+    mesh_2 = mechanics.mesh_torque(delta_2, m2.omega * c.per_N - axis.omega, c.k, c.c, half_2)
+    bearing, axis.z = mechanics.lugre(
         axis.z, axis.omega, c.T_c, c.T_sc, c.per_v2, c.sigma_0, c.h_sigma_0, c.sigma_1_h, c.h)
-    stop = travel.buffer_torque(axis.theta, axis.omega, c.stop_lower, c.stop_upper, c.k_stop, c.c_stop)
+    stop = mechanics.buffer_torque(axis.theta, axis.omega, c.stop_lower, c.stop_upper, c.k_stop, c.c_stop)
 
     if c.flexible:
         on_base = c.base_share * axis.deck
-        axis.dish, axis.omega_dish, twist = structure.swing(
+        axis.dish, axis.omega_dish, twist = mechanics.swing(
             axis.dish, axis.omega_dish, axis.theta, axis.omega, external - on_base, c.k_dish, c.c_dish, c.h,
             axis.h_J_dish)
         external = on_base + twist
 
     T_1, T_2 = k1.K_t * m1.i_q - mesh_1 * c.per_N, k2.K_t * m2.i_q - mesh_2 * c.per_N
     if c.uneven:
-        T_1 += motor.cogging(m1.theta, k1.T_cog, k1.cogs)
-        T_2 += motor.cogging(m2.theta, k2.T_cog, k2.cogs)
-    m1.omega = motor.speed(m1.omega, T_1, k1.T_c, k1.per_v, k1.h_J, k1.q_B)
-    m2.omega = motor.speed(m2.omega, T_2, k2.T_c, k2.per_v, k2.h_J, k2.q_B)
+        T_1 += motors.cogging(m1.theta, k1.T_cog, k1.cogs)
+        T_2 += motors.cogging(m2.theta, k2.T_cog, k2.cogs)
+    m1.omega = motors.speed(m1.omega, T_1, k1.T_c, k1.per_v, k1.h_J, k1.q_B)
+    m2.omega = motors.speed(m2.omega, T_2, k2.T_c, k2.per_v, k2.h_J, k2.q_B)
     if axis.braked:
-        m1.omega, m2.omega = brake.braked(m1.omega, k1.h_brake_J), brake.braked(m2.omega, k2.h_brake_J)
+        m1.omega, m2.omega = motors.braked(m1.omega, k1.h_brake_J), motors.braked(m2.omega, k2.h_brake_J)
     axis.omega = (axis.omega + axis.h_J * (mesh_1 + mesh_2 + external + stop - bearing)) * axis.q_B
 
     m1.theta += c.h * m1.omega

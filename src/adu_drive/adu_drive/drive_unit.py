@@ -9,7 +9,8 @@ from typing import Annotated
 from adu_drive import axis, drive_state, stow_pins
 from adu_drive.lanes import at, count
 from adu_drive.params import SPEED_LOOP_PERIOD_S, AduParameters, whole_speed_periods
-from adu_drive.plant import gimbal, mount, wind, wind_field
+from adu_drive.plant import gimbal, mount, wind
+from adu_drive.plant.wind import FieldConstants
 from pedestal_common.compiled import compiled, inlined, separate
 from pedestal_common.quantities import (
     Bit,
@@ -77,7 +78,7 @@ class Constants(Record):
     elevation: axis.Constants
     bodies: gimbal.Constants
     wind: wind.Constants
-    field: wind_field.Constants
+    field: FieldConstants
     mount: mount.Constants
     pins: stow_pins.Constants
     period: Seconds             # T
@@ -123,7 +124,7 @@ def constants(params: AduParameters, substeps: int = 2, speed_period: Seconds = 
     return Constants.of(
         azimuth=axis.constants(params.azimuth, h, bool(bodies['rigid']), speed_period),
         elevation=axis.constants(params.elevation, h, period=speed_period), bodies=bodies,
-        wind=wind.constants(params.wind), field=wind_field.constants(params.wind.field),
+        wind=wind.constants(params.wind), field=wind.field_constants(params.wind.field),
         mount=mount.constants(params.mount), pins=stow_pins.constants(params), period=params.period,
         speed_ticks=whole_speed_periods('period', params.period),
         delay_ticks=whole_speed_periods('transport_delay', params.transport_delay),
@@ -135,7 +136,7 @@ def constants(params: AduParameters, substeps: int = 2, speed_period: Seconds = 
 def initial_state(params: AduParameters) -> Records:
     """Return the State (1,) at rest at the initial angles, in balance with wind (t = 0) and unbalance."""
     axes, enabled = {}, params.initially_enabled and not (params.stow_pins and params.pins.initially_in)
-    of_field = wind_field.initial_torques(params.wind.field, params.initial_azimuth, params.initial_elevation)
+    of_field = wind.initial_field_torques(params.wind.field, params.initial_azimuth, params.initial_elevation)
     for name, torque, field in zip(('azimuth', 'elevation'), wind.initial_torques(params.wind), of_field):
         p, theta = getattr(params, name), getattr(params, f'initial_{name}')
         external = torque + field - p.load.unbalance * math.cos(theta)
@@ -193,7 +194,7 @@ def external_torques(state: State, constants: Constants,
     azimuth, elevation = state.azimuth.theta, state.elevation.theta
     T_azimuth, T_elevation = wind.torques(constants.wind, state.k * constants.period)
     if constants.field.blows:
-        of_field = wind_field.torques(constants.field, state.k * constants.period, azimuth, elevation)
+        of_field = wind.field_torques(constants.field, state.k * constants.period, azimuth, elevation)
         T_azimuth, T_elevation = T_azimuth + of_field[0], T_elevation + of_field[1]
     T_azimuth += state.azimuth.gust - constants.azimuth.unbalance * math.cos(azimuth)
     T_elevation += state.elevation.gust - constants.elevation.unbalance * math.cos(elevation)

@@ -338,7 +338,7 @@ class GustParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class WindFieldParameters(Parameters):
-    """A wind over the whole antenna, whose torques depend on the angles of both axes; see wind_field.py.
+    """A wind over the whole antenna, whose torques depend on the angles of both axes; see wind.py.
 
     They add to the torques of WindParameters.
     """

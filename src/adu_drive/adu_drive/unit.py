@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from adu_drive import drive_state, drive_unit, injected, lanes, state_file, stow_pins
 from adu_drive.controller import faults
 from adu_drive.params import AduNodeParameters
-from adu_drive.plant import thermal
+from adu_drive.plant.motors import WARNING_THERMAL_LOAD
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
@@ -353,7 +353,7 @@ class Adu(Simulated):
         if any(axis['end_stop'] for axis in axes.values()):
             return Diagnosis(LEVEL_WARN, 'at an end stop', values)
         hottest = max(axis['thermal_load'].max() for axis in axes.values())
-        if hottest > thermal.WARNING_THERMAL_LOAD:
+        if hottest > WARNING_THERMAL_LOAD:
             return Diagnosis(LEVEL_WARN, f'a motor is at {100.0 * hottest:.0f} % of its thermal load', values)
         return Diagnosis(LEVEL_OK, 'following', values)
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from adu_drive.controller import disturbance_observer
+from adu_drive.controller import loops
 from adu_drive.params import AduParameters
 from pedestal_common.parameters import build
 
@@ -14,12 +14,12 @@ H, J = 5e-4, 0.034
 
 def estimate(w_o, torque, disturbance):
     """d_hat of every step for a rigid shaft under both torques [Nm]."""
-    l_1, l_2 = disturbance_observer.gains(w_o, H)
+    l_1, l_2 = loops.observer_gains(w_o, H)
     omega = omega_hat = d_hat = 0.0
     path = []
     for T, d in zip(torque, disturbance, strict=True):
         omega += H / J * (T + d)
-        omega_hat, d_hat = disturbance_observer.update(omega_hat, d_hat, omega, T, l_1, l_2, H / J)
+        omega_hat, d_hat = loops.updated_observer(omega_hat, d_hat, omega, T, l_1, l_2, H / J)
         path.append(d_hat)
     return np.array(path)
 

@@ -6,7 +6,7 @@ import pytest
 
 from adu_drive import unit
 from adu_drive.params import AduNodeParameters
-from adu_drive.plant import gear_train
+from adu_drive.plant import mechanics
 from pedestal_common.parameters import ParameterError, build
 from pedestal_common.wire import records
 from pedestal_common.wire.commands import Command
@@ -104,11 +104,11 @@ def test_brakes_that_stay_off_let_an_unbalanced_load_fall():
 
 def test_the_gap_of_a_lost_tooth_is_half_a_pitch_once_a_turn_and_nowhere_else():
     turn = np.linspace(-math.pi, math.pi, 20_001)
-    gaps = np.array([gear_train.gap(phi, 17.0, 8.0) for phi in turn])
+    gaps = np.array([mechanics.tooth_gap(phi, 17.0, 8.0) for phi in turn])
     assert gaps.max() == pytest.approx(0.5 * 2.0 * math.pi / 17.0 / 8.0)
     beside = np.abs(turn) * 17.0 / math.pi
     assert (gaps[beside > 1.0] == 0.0).all() and (gaps[beside < 0.99] > 0.0).all()
-    assert gear_train.gap(0.0, 0.0, 8.0) == 0.0
+    assert mechanics.tooth_gap(0.0, 0.0, 8.0) == 0.0
 
 
 def test_a_pinion_that_lost_a_tooth_leaves_the_flank_once_a_turn():

@@ -4,30 +4,31 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive.controller import bias, encoder, pi, speed_loop, travel
+from adu_drive.controller import encoder, loops
 from adu_drive.params import BiasParameters
-from adu_drive.plant import friction, gear_train
+from adu_drive.plant import mechanics
 
 
 def test_own_exp_and_tanh_keep_their_stated_errors():
     y = np.concatenate([np.linspace(0.0, 60.0, 20001), np.logspace(-12, 3, 500)])
     x = np.concatenate([np.linspace(-20.0, 20.0, 20001), np.logspace(-12, 3, 500)])
-    assert max(abs(friction.exp_minus(v) - math.exp(-v)) for v in y) < 6e-9
-    assert max(abs(friction.tanh(v) - math.tanh(v)) for v in x) < 1.2e-8
-    assert math.isnan(friction.tanh(math.nan))
+    assert max(abs(mechanics.exp_minus(v) - math.exp(-v)) for v in y) < 6e-9
+    assert max(abs(mechanics.tanh(v) - math.tanh(v)) for v in x) < 1.2e-8
+    assert math.isnan(mechanics.tanh(math.nan))
 
 
 @pytest.mark.parametrize('schedule, expected', [
     ('off', [0.0, 0.0, 0.0, 0.0, 0.0]), ('constant', [12.0, 12.0, 12.0, 12.0, 12.0]),
     ('fade', [12.0, 12.0 * 31.0 / 45.0, 12.0 * 15.5 / 45.0, 0.0, 0.0]), ('hold_fade', [12.0, 12.0, 6.0, 0.0, 0.0])])
 def test_bias_schedules(schedule, expected):
-    line = bias.schedule_constants(BiasParameters(schedule=schedule))
+    line = loops.bias_constants(BiasParameters(schedule=schedule))
     for sign in (1.0, -1.0):
-        assert [bias.scheduled(sign * T, *line) for T in (0.0, 14.0, 29.5, 45.0, 90.0)] == pytest.approx(expected)
+        found = [loops.scheduled_bias(sign * T, *line) for T in (0.0, 14.0, 29.5, 45.0, 90.0)]
+        assert found == pytest.approx(expected)
 
 
 def test_mesh_has_a_dead_zone_and_never_pulls():
-    mesh = [gear_train.mesh_torque(d, r, 5e6, 5e3, 5e-4) for d, r in
+    mesh = [mechanics.mesh_torque(d, r, 5e6, 5e3, 5e-4) for d, r in
             ((4.9e-4, 1.0), (-4.9e-4, -1.0), (7e-4, 0.0), (-7e-4, 0.0), (7e-4, 0.1), (5.1e-4, -1.0), (-5.1e-4, 1.0))]
     assert mesh == pytest.approx([0.0, 0.0, 1000.0, -1000.0, 1500.0, 0.0, 0.0])
 
@@ -38,7 +39,7 @@ def test_lugre_settles_on_the_stribeck_curve_and_sticks_like_a_spring():
     def slide(v, seconds):
         z = 0.0
         for _ in range(round(seconds / h)):
-            force, z = friction.lugre(z, v, T_c, T_s - T_c, v_s ** -2, sigma_0, h * sigma_0, sigma_1 / h, h)
+            force, z = mechanics.lugre(z, v, T_c, T_s - T_c, v_s ** -2, sigma_0, h * sigma_0, sigma_1 / h, h)
         return force
 
     for v in (1e-4, 1e-3, 2e-3, -4e-3, 0.5):
@@ -48,14 +49,14 @@ def test_lugre_settles_on_the_stribeck_curve_and_sticks_like_a_spring():
 
 
 def test_differential_damping_and_limits_share_the_torque():
-    assert speed_loop.shared(10.0, 10.0, 5.0, 1.0, 0.0, 2.0) == (13.0, 7.0)
-    assert [speed_loop.limited(T, 90.0) for T in (-100.0, 12.0, 93.0)] == [-90.0, 12.0, 90.0]
+    assert loops.shared_torques(10.0, 10.0, 5.0, 1.0, 0.0, 2.0) == (13.0, 7.0)
+    assert [loops.limited_torque(T, 90.0) for T in (-100.0, 12.0, 93.0)] == [-90.0, 12.0, 90.0]
 
 
 def test_integral_is_held_only_into_the_limit():
-    assert pi.integral(1.0, 2.0, 0.5, 0.0) == 2.0
-    assert pi.integral(1.0, 2.0, 0.5, 3.0) == 1.0
-    assert pi.integral(1.0, -2.0, 0.5, 3.0) == 0.0
+    assert loops.integral(1.0, 2.0, 0.5, 0.0) == 2.0
+    assert loops.integral(1.0, 2.0, 0.5, 3.0) == 1.0
+    assert loops.integral(1.0, -2.0, 0.5, 3.0) == 0.0
 
 
 def test_encoder_rounds_to_the_nearest_count():
@@ -70,8 +71,8 @@ def test_approach_rate_stops_inside_the_distance():
     K, a, h = 10.0, 20.0, 1e-5
     distance, rates = 0.5, []
     while distance > 1e-6:
-        rates.append(travel.approach_rate(distance, K, a))
+        rates.append(loops.approach_rate(distance, K, a))
         distance -= h * rates[-1]
     assert np.max(-np.diff(rates)) / h < a * 1.001
     assert np.max(-np.diff(rates)) / h > a * 0.99
-    assert travel.approach_rate(-0.01, K, a) == pytest.approx(-0.1)
+    assert loops.approach_rate(-0.01, K, a) == pytest.approx(-0.1)

@@ -8,7 +8,7 @@ from scipy import linalg
 
 from adu_drive import axis, drive_unit
 from adu_drive.params import AduParameters
-from adu_drive.plant import structure
+from adu_drive.plant import mechanics
 from pedestal_common.parameters import build
 
 H, J = 50e-6, 210.0
@@ -18,11 +18,11 @@ def free(share, frequency, damping, seconds, omega_dish=1e-3):
     """Twist [rad] and energy [J] of dish and free base after a blow on the dish."""
     J_dish = share * J
     J_base = J - J_dish
-    k, c = structure.spring_and_damper(J_dish, frequency, damping)
+    k, c = mechanics.spring_and_damper(J_dish, frequency, damping)
     dish = theta = omega = 0.0
     rows = []
     for _ in range(round(seconds / H)):
-        dish, omega_dish, twist = structure.swing(dish, omega_dish, theta, omega, 0.0, k, c, H, H / J_dish)
+        dish, omega_dish, twist = mechanics.swing(dish, omega_dish, theta, omega, 0.0, k, c, H, H / J_dish)
         omega += H / J_base * twist
         theta += H * omega
         rows.append((dish - theta, 0.5 * (J_dish * omega_dish ** 2 + J_base * omega ** 2 + k * (dish - theta) ** 2),
@@ -60,7 +60,7 @@ def flexible(**values):
 
 def test_dish_hangs_in_the_wind(drive):
     """At rest the dish is twisted by T / k from the angle the encoder reads."""
-    k, _ = structure.spring_and_damper(0.4 * J, 15.0, 0.01)
+    k, _ = mechanics.spring_and_damper(0.4 * J, 15.0, 0.01)
     d = drive(flexible(**{'wind.azimuth': 800.0})).run(1.0, azimuth=0.0)
     a = d.log['azimuth']
     assert np.ptp(a['load_position']) < 1e-5
@@ -69,7 +69,7 @@ def test_dish_hangs_in_the_wind(drive):
 
 def test_deck_acceleration_acts_on_dish_and_base_alike(drive):
     """The whole inertia loads the motors, only the dish's own twists the structure."""
-    k, _ = structure.spring_and_damper(0.4 * J, 15.0, 0.01)
+    k, _ = mechanics.spring_and_damper(0.4 * J, 15.0, 0.01)
     d = drive(flexible(**{'azimuth.structure.damping': 0.3}))
     d.inputs['base_acceleration'] = 0.0, 0.0, 8.0
     a = d.run(2.0, azimuth=0.0).log['azimuth']
@@ -99,7 +99,7 @@ def test_modes_on_the_meshes(drive):
                     'azimuth.friction.stiffness': 1.0, 'azimuth.friction.damping': 0.0, 'azimuth.load.viscous': 0.0})
     log = np.zeros(2 ** 16)
     ring(drive_unit.initial_state(p), drive_unit.constants(p), log)
-    k, _ = structure.spring_and_damper(0.4 * J, 15.0, 0.0)
+    k, _ = mechanics.spring_and_damper(0.4 * J, 15.0, 0.0)
     expected = np.sqrt(linalg.eigh([[k, -k], [-k, k + 1e7]], np.diag([0.4 * J, 0.6 * J]), eigvals_only=True)) \
         / (2.0 * math.pi)
     spectrum = np.abs(np.fft.rfft((log - log.mean()) * np.hanning(len(log))))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from adu_drive.params import AduParameters
-from adu_drive.plant import gear_train, motor
+from adu_drive.plant import mechanics, motors
 from pedestal_common.parameters import build
 
 
@@ -54,12 +54,12 @@ def test_motors_make_up_for_their_cogging(drive):
 
 def test_cogging_does_no_work_over_a_turn():
     angle = np.linspace(0.0, 2.0 * math.pi, 4801)[:-1]
-    assert abs(np.mean([motor.cogging(x, 1.3, 24.0) for x in angle])) < 1e-12
-    assert max(motor.cogging(x, 1.3, 24.0) for x in angle) == pytest.approx(1.3, rel=1e-4)
+    assert abs(np.mean([motors.cogging(x, 1.3, 24.0) for x in angle])) < 1e-12
+    assert max(motors.cogging(x, 1.3, 24.0) for x in angle) == pytest.approx(1.3, rel=1e-4)
 
 
 def test_transmission_error_is_the_sum_of_its_lines():
     c = types.SimpleNamespace(runout=3e-4, tooth_error=5e-5, teeth=17.0)
     for pinion in np.linspace(-9.0, 9.0, 40):
-        assert gear_train.transmission_error.py_func(pinion, c) == pytest.approx(
+        assert mechanics.transmission_error.py_func(pinion, c) == pytest.approx(
             3e-4 * math.sin(pinion) + 5e-5 * math.sin(17.0 * pinion), abs=1e-18)

@@ -6,7 +6,7 @@ import pytest
 from scipy import integrate
 
 from adu_drive.params import AduParameters, WindFieldParameters
-from adu_drive.plant import wind, wind_field
+from adu_drive.plant import wind
 from pedestal_common.parameters import build
 
 STEADY = WindFieldParameters(speed=12.0, from_azimuth=2.0, intensity=0.0)
@@ -15,7 +15,7 @@ FULL = 0.5 * 1.225 * 12.0 ** 2 * math.pi * 3.5 ** 2 * 7.0
 
 
 def torques(p, t, A, E):
-    return np.array(wind_field.torques.py_func(wind_field.constants(p).view(np.recarray)[0], t, A, E))
+    return np.array(wind.field_torques.py_func(wind.field_constants(p).view(np.recarray)[0], t, A, E))
 
 
 @pytest.mark.parametrize('A, E', [(0.0, 0.0), (2.0, 0.4), (-1.0, 1.2), (5.3, 0.1)])
@@ -40,7 +40,7 @@ def test_a_wind_into_the_dish_turns_nothing_and_one_from_behind_most():
 
 def test_turbulence_has_its_shares_and_is_averaged_over_the_dish():
     p = WindFieldParameters(speed=12.0, intensity=0.2, length=80.0)
-    sigma = np.sqrt(np.sum(wind_field.constants(p)[0]['amplitude'] ** 2, axis=1) / 2.0)
+    sigma = np.sqrt(np.sum(wind.field_constants(p)[0]['amplitude'] ** 2, axis=1) / 2.0)
     def density(x):
         f = math.exp(x)
         side = math.sqrt(math.pi) * 3.5

@@ -27,8 +27,8 @@ from typing import Annotated, TypeAlias
 
 from adu_drive import axis, drive_state, drive_unit
 from adu_drive import unit as adu_unit
-from adu_drive.controller import encoder, faults, travel
-from adu_drive.plant import thermal
+from adu_drive.controller import encoder, faults, loops
+from adu_drive.plant import motors
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
     AnyRecord,
@@ -150,7 +150,7 @@ def _measure_motor(motor: axis.MotorState, constants: axis.MotorConstants, angle
     motor.theta, motor.measured = angle, speed
     motor.count = int(encoder.counts(angle, constants.per_rad))
     motor.i_q = torque * constants.per_K_t_hat
-    motor.heat = thermal.load(motor.heat, torque, constants.per_rated, constants.heat_gain)
+    motor.heat = motors.thermal_load(motor.heat, torque, constants.per_rated, constants.heat_gain)
 
 
 @compiled
@@ -364,8 +364,8 @@ def _keep_rate(of_axis: axis.State, constants: axis.Constants, drives: Drives, s
     """Advance the angle of an axis by a period without reports, and keep its rate, reduced before an end of travel."""
     drives.angle[number] += of_axis.rate / scales.per_period
     angle = drives.angle[number]
-    down = max(travel.approach_rate(angle - constants.lower, constants.K, constants.a), 0.0)
-    up = max(travel.approach_rate(constants.upper - angle, constants.K, constants.a), 0.0)
+    down = max(loops.approach_rate(angle - constants.lower, constants.K, constants.a), 0.0)
+    up = max(loops.approach_rate(constants.upper - angle, constants.K, constants.a), 0.0)
     of_axis.rate = min(max(of_axis.rate, -down), up)
 
 

@@ -35,8 +35,8 @@ from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import directions, sensor_frame
 from receiver_law.monopulse import sum_pattern
-from tracking_receiver_sim.path import arrival
-from tracking_receiver_sim.path.params import PathParameters
+from tracking_receiver_sim import wave_path
+from tracking_receiver_sim.params import PathParameters
 
 HANDOVER_SETTLING_S = 2.0
 """Time after the first hand-over to autotrack that every statistic leaves out [s]. After it, autotrack is settled."""
@@ -343,7 +343,7 @@ def _arriving(bag: Recording, relative: Vectors3, velocity: Vectors3) -> Vectors
     of_receiver = recordings.parameters(bag, 'tracking_receiver')
     given = {key: value for key, value in of_receiver.items() if key in ('path.refractivity', 'path.light_time')}
     path = build(PathParameters, given, 'path.')
-    return arrival.all_seen(path, relative, velocity) if given else relative
+    return wave_path.all_seen(path, relative, velocity) if given else relative
 
 
 def by_encoders(bag: Recording) -> bool:

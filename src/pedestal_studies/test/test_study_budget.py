@@ -13,8 +13,7 @@ from pedestal_results.intervals import missed
 from pedestal_studies.system import budget as study
 from pedestal_studies.system.scenarios import MemoryRecording
 from pedestal_workbench.trials import monte_carlo
-from tracking_receiver_sim import target
-from tracking_receiver_sim.path import arrival
+from tracking_receiver_sim import target, wave_path
 
 RUNS, DURATION = 3, 30.0
 
@@ -77,7 +76,8 @@ def test_zero_and_collimation_in_program_track_are_their_closed_forms(made, plac
 
 @pytest.mark.thorough
 def test_refraction_is_what_the_operator_does_not_know_of_it(made, place):
-    measured, true = (math.degrees(1.0) * np.array([arrival.refraction(N, E)[0] for E in np.radians(place.elevation)])
+    measured, true = (math.degrees(1.0) * np.array([wave_path.refraction(N, E)[0]
+                                                    for E in np.radians(place.elevation)])
                       for N in (311.0, 330.0))
     assert np.mean(made['program'].once['refraction'][:, 1] - (true - measured)) == pytest.approx(0.0, abs=5e-5)
 
@@ -117,7 +117,7 @@ def test_the_operator_knows_no_ut1_and_of_the_air_what_is_measured():
     assert np.abs(np.unwrap(at_times) - angles[:, 0]).min() > 1e-5
     refracted = Plan(scenario.load('leo_pass', ['scenario.program.refractivity=311'], duration=4.0)).tables[''][1]
     assert refracted[:, 0] == pytest.approx(angles[:, 0], abs=0.0)
-    assert refracted[:, 1] - angles[:, 1] == pytest.approx([arrival.refraction(311.0, E)[0] for E in angles[:, 1]])
+    assert refracted[:, 1] - angles[:, 1] == pytest.approx([wave_path.refraction(311.0, E)[0] for E in angles[:, 1]])
 
 
 def test_a_budget_of_two_runs_tells_nothing_random():

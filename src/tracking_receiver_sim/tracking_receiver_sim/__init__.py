@@ -5,7 +5,7 @@ unit.py holds the unit of the node. receiver.py holds the `step` of the receiver
     target.py       position of the target: a satellite, a test motion, or a file
     track_files.py  files of a target: recorded flights (folder track), predicted orbits and tables of directions
                     (folder ephemeris)
-    path            refraction, light time, multipath, scintillation, polarisation
+    wave_path.py    refraction, light time, multipath, scintillation, polarisation
     error_rate.py   rate of the error
     injected.py     effects of injected faults
     params.py       every parameter

@@ -42,10 +42,9 @@ from pedestal_common.stream import ring
 from receiver_law import detector, smoothing
 from receiver_law.detector import Voltages, hertz
 from receiver_law.monopulse import channels, disk_channels
-from tracking_receiver_sim import target
+from tracking_receiver_sim import target, wave_path
 from tracking_receiver_sim.error_rate import error_rate
 from tracking_receiver_sim.params import BEAM_HELD, BEAM_MOTIONS, ReceiverParameters, TrackingReceiverParameters
-from tracking_receiver_sim.path import arrival, multipath, polarisation, scintillation
 
 STATUS_TEXTS = dict(
     LOCKED='locked', NO_LOCK='no lock', BELOW_HORIZON='target below the horizon', NO_TARGET='target outside its track',
@@ -73,7 +72,7 @@ class Incidence(NamedTuple):
     dX: Radians                                         # error at the stamp: cross-elevation
     dE: Radians
     amplitude: float                                    # sum voltage on axis
-    image: multipath.Image
+    image: wave_path.Image
     hidden: bool
     rates: tuple[RadiansPerSecond, RadiansPerSecond]    # measured; NaN if not measured, as the range
     range: Meters
@@ -98,7 +97,7 @@ class State(Record):
     ring_range: Annotated[Floats, (RESULT_RING_SIZE,)]              # [m]
     antenna: Vector3            # position of the antenna against the station, ENU [m]
     antenna_velocity: Vector3   # velocity of the antenna, FLU [m/s]
-    scintillation: Annotated[Floats, (scintillation.NORMALS_PER_STEP,)]     # state of scintillation.wander
+    scintillation: Annotated[Floats, (wave_path.SCINTILLATION_NORMALS,)]     # state of wave_path.wander
 
 
 class Constants(Record):
@@ -113,9 +112,9 @@ class Constants(Record):
     sin_phi: float
     sign: Pair                  # 1 or -1, of each difference channel
     boresight: Pair             # null of the differences off the beam [rad]
-    path: arrival.Path
-    multipath: multipath.Multipath
-    scintillation: scintillation.Scintillation
+    path: wave_path.Path
+    multipath: wave_path.Multipath
+    scintillation: wave_path.Scintillation
     first_measured_normal: int          # index of the first normal of the measured rate and range
     first_source_normal: int            # index of the first normal of a source of noise
     first_scintillation_normal: int     # index of the first normal of the scintillation
@@ -192,8 +191,9 @@ def constants(params: TrackingReceiverParameters, period: Seconds, built: target
     c['period_ns'] = round(period * 1e9)
     c['held'] = BEAM_MOTIONS.index(receiver.beam) == BEAM_HELD
     c['boresight'] = antenna.boresight_cross_elevation, antenna.boresight_elevation
-    c['path'], c['multipath'] = arrival.constants(params.path), multipath.constants(params.path.multipath)
-    c['scintillation'] = scintillation.constants(params.path.scintillation, period)
+    c['path'] = wave_path.path_constants(params.path)
+    c['multipath'] = wave_path.multipath_constants(params.path.multipath)
+    c['scintillation'] = wave_path.scintillation_constants(params.path.scintillation, period)
     c['first_measured_normal'] = NORMALS_PER_SAMPLE * receiver.samples_per_step
     c['first_source_normal'], c['first_scintillation_normal'] = _measured_normals(receiver), _receiver_normals(params)
     c['power'] = hertz(receiver.cn0_dbhz) * tau
@@ -205,7 +205,7 @@ def constants(params: TrackingReceiverParameters, period: Seconds, built: target
         # The place of a body is an apparent one, and its noise has no polarisation.
         c['path']['light_time'] = 0
     else:
-        c['power'] *= polarisation.efficiency(params.target.polarisation, antenna.polarisation)
+        c['power'] *= wave_path.polarisation_efficiency(params.target.polarisation, antenna.polarisation)
         c['half_exponent'] = 0.5 * receiver.range_exponent
     c['horizon_mask'] = receiver.horizon_mask
     c['latency_ns'] = round(receiver.latency * 1e9)
@@ -236,7 +236,7 @@ def _receiver_normals(params: TrackingReceiverParameters) -> int:
 
 def normals_per_step(params: TrackingReceiverParameters) -> int:
     """Return the number of standard normals that `step` takes."""
-    return _receiver_normals(params) + scintillation.NORMALS_PER_STEP * params.path.scintillation.on
+    return _receiver_normals(params) + wave_path.SCINTILLATION_NORMALS * params.path.scintillation.on
 
 
 def age(params: TrackingReceiverParameters, period: Seconds) -> Seconds:
@@ -292,7 +292,7 @@ def apparent_state(state: State, constants: Constants, true: target.TargetState)
     if constants.path.refractivity == 0.0 and constants.path.light_time == 0:
         return true
     (e, n, u), antenna = true.position, state.antenna
-    r, v = arrival.seen(constants.path, (e - antenna[0], n - antenna[1], u - antenna[2]), true.velocity)
+    r, v = wave_path.seen(constants.path, (e - antenna[0], n - antenna[1], u - antenna[2]), true.velocity)
     return target.TargetState(true.valid, (antenna[0] + r[0], antenna[1] + r[1], antenna[2] + r[2]), v)
 
 
@@ -310,7 +310,7 @@ def carrier_amplitude(constants: Constants, e: Meters, n: Meters, u: Meters, hid
 
 
 @compiled
-def voltages(constants: Constants, amplitude: float, v_x: float, v_e: float, image: multipath.Image) -> Voltages:
+def voltages(constants: Constants, amplitude: float, v_x: float, v_e: float, image: wave_path.Image) -> Voltages:
     """Return the Voltages of one sample without noise.
 
     amplitude: sum voltage on axis; v_x, v_e: offsets of the target from the null of the differences, in beamwidths.
@@ -433,7 +433,7 @@ def incidence(state: State, constants: Constants, inputs: Inputs, outputs: Outpu
     """Return the Incidence of the target's true state, and set the true error in the outputs."""
     dX, dE, amplitude = 0.0, 0.0, 0.0
     rates, distance = NOT_MEASURED, math.nan
-    image = multipath.Image(0.0, 0.0, 0.0, 0.0)
+    image = wave_path.Image(0.0, 0.0, 0.0, 0.0)
     hidden = False
     if true.valid:
         place_antenna(state, constants, inputs)
@@ -449,11 +449,11 @@ def incidence(state: State, constants: Constants, inputs: Inputs, outputs: Outpu
         dX, dE = offsets(inputs.azimuth, inputs.elevation, x, y, z)
         hidden = blockage.blocked(constants.sectors, *angles(x, y, z))
         amplitude = carrier_amplitude(constants, e, n, u, hidden)
-        image = multipath.image(constants.multipath, inputs, e, n, u)
+        image = wave_path.image(constants.multipath, inputs, e, n, u)
         outputs.true_cross_elevation, outputs.true_elevation = dX, dE
         if constants.scintillation.on != 0:
             sin_E = u / math.sqrt(e * e + n * n + u * u)
-            fading, X, E = scintillation.wander(constants.scintillation, state.scintillation, sin_E, normals,
+            fading, X, E = wave_path.wander(constants.scintillation, state.scintillation, sin_E, normals,
                                                 constants.first_scintillation_normal)
             amplitude, dX, dE = fading * amplitude, dX + X, dE + E
     return Incidence(dX, dE, amplitude, image, hidden, rates, distance)

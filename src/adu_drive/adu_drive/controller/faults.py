@@ -1,7 +1,7 @@
 """Faults that a drive detects by its own measurements. A fault is latched until its reset (drive_state.request)."""
 from typing import NamedTuple
 
-from adu_drive.plant import thermal
+from adu_drive.plant.motors import WARNING_THERMAL_LOAD
 from pedestal_common.codes import bits
 from pedestal_common.compiled import inlined
 from pedestal_common.quantities import Ints, Radians, RadiansPerSecond
@@ -128,6 +128,6 @@ def measured_faults(current_2: float, omega: RadiansPerSecond, disagreement: Rad
         bits |= Bit.ENCODER_DISAGREEMENT
     if late_periods >= limits.late_periods:
         bits |= Bit.FOLLOWING_ERROR
-    if heat > (min(thermal.WARNING_THERMAL_LOAD, limits.heat) if latched & Bit.OVERTEMPERATURE else limits.heat):
+    if heat > (min(WARNING_THERMAL_LOAD, limits.heat) if latched & Bit.OVERTEMPERATURE else limits.heat):
         bits |= Bit.OVERTEMPERATURE
     return bits

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 from adu_drive import axis, drive_unit, injected
 from adu_drive import unit as adu_unit
-from adu_drive.controller import pi
+from adu_drive.controller import loops
 from adu_drive.params import SPEED_LOOP_PERIOD_S
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import schedule
@@ -167,7 +167,7 @@ def _torque(drive: Drive, omega: RadiansPerSecond) -> NewtonMeters:
     wanted = drive.K_p * (drive.rate - omega) + drive.sum + offset
     made = min(max(wanted, -drive.torque_limit), drive.torque_limit)
     if drive.mode == servo_drives.MODE_CYCLIC_VELOCITY and not _ramps(drive):
-        drive.sum = pi.integral(drive.sum, drive.rate - omega, drive.K_i * SPEED_LOOP_PERIOD_S, wanted - made)
+        drive.sum = loops.integral(drive.sum, drive.rate - omega, drive.K_i * SPEED_LOOP_PERIOD_S, wanted - made)
     if made != wanted:
         drive.limited = 1
     return made

@@ -9,7 +9,7 @@ from pedestal_common.record import Record
 from pedestal_hardware.monopulse.feed import ONE_CHANNEL_KIND, THREE_CHANNELS_KIND, reference
 from pedestal_hardware.monopulse.params import FEED_KINDS, MonopulseParameters
 from tracking_receiver_sim import receiver
-from tracking_receiver_sim.path.multipath import Image
+from tracking_receiver_sim.wave_path import Image
 
 
 class Feed(Record):

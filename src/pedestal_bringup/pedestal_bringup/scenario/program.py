@@ -12,9 +12,8 @@ from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
 from pedestal_common.quantities import Message, Nanoseconds, Pairs, Seconds, Times
 from pedestal_common.wire import messages
 from ship_motion_sim.sea import motion
-from tracking_receiver_sim import target
+from tracking_receiver_sim import target, wave_path
 from tracking_receiver_sim.params import TargetParameters
-from tracking_receiver_sim.path import arrival
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,7 +67,7 @@ class Plan:
                 left = np.maximum(known - distance / SPEED_OF_LIGHT_M_S, built.breaks[0])
                 azimuth, elevation, _ = target.look_angles(built, left)
             if program.refractivity > 0.0:
-                elevation = elevation + [arrival.refraction(program.refractivity, E)[0] for E in elevation]
+                elevation = elevation + [wave_path.refraction(program.refractivity, E)[0] for E in elevation]
             tables[prefix] = times, np.column_stack((np.unwrap(azimuth) + program.azimuth_offset,
                                                      elevation + program.elevation_offset))
         return tables
