@@ -119,7 +119,7 @@ clean:
 .venv-colcon/installed: Makefile constraints.txt $(wildcard src/*/setup.py) | .venv-colcon/bin/pip
 	@echo 'Installing into .venv-colcon ...'
 	.venv-colcon/bin/python $(PIP) setuptools
-	.venv-colcon/bin/python $(PIP) $(BUILT_HERE) $(ROS) colcon-common-extensions colcon-ros numpy numba rosbags sgp4
+	.venv-colcon/bin/python $(PIP) $(BUILT_HERE) $(ROS) colcon-common-extensions colcon-ros numpy numba rosbags sgp4 pyerfa
 	@touch $@
 
 .venv/mkdocs: .venv/tests
