@@ -233,7 +233,7 @@ def record_type(cls: type[Parameters]) -> 'DType':
     A float becomes f8, an int or a bool i8, a choice i8 (its index among the options), and a group a nested record.
     Other texts are left out.
     """
-    fields: 'list[tuple[str, str | DType]]' = []
+    fields: list[tuple[str, str | DType]] = []
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
         if field.metadata.get('group'):
