@@ -15,7 +15,7 @@ from numba.core import types as numba_types
 
 from pedestal_common import law_cache
 from pedestal_common.compiled import compiled, inlined, separate
-from pedestal_common.geometry import line_of_sight
+from pedestal_common.geometry import quaternion
 from pedestal_common.law import by_type
 
 SEQUENCE_COUNT = 200
@@ -109,7 +109,7 @@ QUATERNIONS = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 0.0, 0.0]]).T
 CALLS = [*((law, (x,)) for law in (twice, power, shared, pair, array_of, both) for x in NUMBERS),
          *((law, (x,)) for law in (checked, by_kind) for x in NUMBERS[:4]),
          *((law, (x,)) for law in (scaled, summed) for x in VECTORS), (updated, (_record,)),
-         (line_of_sight.product, (QUATERNIONS, QUATERNIONS)), (line_of_sight.product, (QUATERNIONS[:, 0].copy(),) * 2)]
+         (quaternion.product, (QUATERNIONS, QUATERNIONS)), (quaternion.product, (QUATERNIONS[:, 0].copy(),) * 2)]
 """Laws with the arguments of a call from Python; an argument that is a function makes the argument."""
 
 

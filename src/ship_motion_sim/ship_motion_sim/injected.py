@@ -2,7 +2,8 @@
 from typing import Protocol
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import product, quaternion
+from pedestal_common.geometry.line_of_sight import quaternion
+from pedestal_common.geometry.quaternion import product
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import message_faults, schedule, table
 from pedestal_common.quantities import AnyRecord, Floats, Nanoseconds, Quaternion, Radians, Records, Vector3

@@ -21,7 +21,8 @@ Navigation Integration Algorithm Design".
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import cross, product, rotation, to_earth
+from pedestal_common.geometry.line_of_sight import cross, rotation, to_earth
+from pedestal_common.geometry.quaternion import product
 from pedestal_common.quantities import (
     Matrix3,
     MetersPerSecond,

@@ -6,7 +6,7 @@ import pytest
 from scipy import integrate, linalg
 from scipy.spatial.transform import Rotation
 
-from pedestal_common.geometry.line_of_sight import product
+from pedestal_common.geometry.quaternion import product
 from ship_motion_sim import strapdown
 from ship_motion_sim.alignment import (
     adrc_scheduled,

@@ -30,7 +30,8 @@ from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
 from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, push
 from acu_tracker.geometry.vector import Motion, Rotation, Vector, angles, line_of_sight, turn
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE, product
+from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
+from pedestal_common.geometry.quaternion import product
 from pedestal_common.quantities import (
     Bit,
     Floats,

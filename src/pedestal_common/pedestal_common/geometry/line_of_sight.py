@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Direction, Matrix3, Quaternion, Radians, RadiansPerSecond, Xyz
+from pedestal_common.quantities import Direction, Matrix3, Radians, RadiansPerSecond, Xyz
 
 
 @compiled
@@ -194,17 +194,6 @@ def quaternion(roll: Radians, pitch: Radians, yaw: Radians) -> tuple[float, floa
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
     return (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
             cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
-
-
-@compiled
-def product(a: Quaternion | tuple[float, float, float, float],
-            b: Quaternion | tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    """Return the Hamilton product of the quaternions a and b (x, y, z, w), which stands for the rotation b followed by
-    the rotation a."""
-    ax, ay, az, aw = a[0], a[1], a[2], a[3]
-    bx, by, bz, bw = b[0], b[1], b[2], b[3]
-    return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
 
 
 ASHORE_ATTITUDE = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import product
+from pedestal_common.geometry.quaternion import product
 from pedestal_common.quantities import Matrix3, Quaternion, Radians, Records, Vector3, Xyz, Xyzw
 from pedestal_common.record import Record
 

@@ -25,7 +25,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import product, to_deck
+from pedestal_common.geometry.line_of_sight import to_deck
+from pedestal_common.geometry.quaternion import product
 from pedestal_common.quantities import (
     Degrees,
     Floats,

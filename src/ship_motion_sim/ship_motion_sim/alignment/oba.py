@@ -18,7 +18,8 @@ import math
 from typing import Annotated
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import cross, product
+from pedestal_common.geometry.line_of_sight import cross
+from pedestal_common.geometry.quaternion import product
 from pedestal_common.quantities import Floats, Matrix3, MetersPerSecond, Radians, Seconds, Vector3
 from pedestal_common.record import Record
 from ship_motion_sim import strapdown

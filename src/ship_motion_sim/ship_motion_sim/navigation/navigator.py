@@ -22,7 +22,8 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import product, to_earth
+from pedestal_common.geometry.line_of_sight import to_earth
+from pedestal_common.geometry.quaternion import product
 from pedestal_common.quantities import (
     AnyRecord,
     Bit,
