@@ -38,7 +38,7 @@ from acu_tracker.unit_law import (
     laws,
 )
 from pedestal_common.graph import nodes, topics
-from pedestal_common.node.unit import Diagnosis, Unit, joined
+from pedestal_common.node.unit import Diagnosis, Unit
 from pedestal_common.parameters import Parameters
 from pedestal_common.quantities import AnyRecord, Message, Nanoseconds, Records, Value
 from pedestal_common.wire import messages
@@ -58,8 +58,8 @@ def _initial(parameters: AcuParameters) -> Records:
 
     The cache saves time in successive trials with equal parameters.
     """
-    return joined(UnitRecord.dtype, state=control_unit.initial_state(parameters),
-                  constants=control_unit.constants(parameters))
+    return UnitRecord.of(state=control_unit.initial_state(parameters),
+                         constants=control_unit.constants(parameters))
 
 
 class Acu(Unit):

@@ -11,7 +11,7 @@ from adu_drive import drive_state, drive_unit
 from adu_drive import unit as adu_unit
 from adu_drive.state_file import PlantState
 from pedestal_common.graph import nodes, topics
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN, Diagnosis, Unit, joined
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN, Diagnosis, Unit
 from pedestal_common.quantities import Nanoseconds, Records, Stamps
 from pedestal_common.wire.commands import Command, Reply
 from pedestal_common.wire.records import NO_STAMP
@@ -80,8 +80,8 @@ class ServoDrives(adu_unit.Adu):
         link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
         link['period'] = round(parameters.period * 1e9)
         at_rest = dataclasses.replace(parameters, initially_enabled=False)
-        self.memory = Memory(joined(
-            servo_drives.ServoRecord.dtype, state=drive_unit.initial_state(at_rest), constants=_constants(parameters),
+        self.memory = Memory(servo_drives.ServoRecord.of(
+            state=drive_unit.initial_state(at_rest), constants=_constants(parameters),
             link=link, drives=drives, scales=_scales(parameters)))
         for i, axis in enumerate(topics.AXES):
             for gain in ('K_p', 'K_iT'):

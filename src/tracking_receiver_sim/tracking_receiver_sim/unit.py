@@ -13,7 +13,7 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import nodes
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.schedule import Simulated
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import AnyRecord, Floats, Nanoseconds, Records, Stamps, Times
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
@@ -119,8 +119,8 @@ class TrackingReceiver(Simulated):
         self._noise = nodes.noise(parameters.seed, self.NODE.name)
         self._air, = self._noise.spawn(1)
         constants = receiver.constants(parameters, parameters.period, self.target)
-        record = joined(ReceiverRecord.dtype, state=receiver.initial_state(), constants=constants,
-                        schedule=schedule.empty(), injected=injected.initial(constants))
+        record = ReceiverRecord.of(state=receiver.initial_state(), constants=constants,
+                                   schedule=schedule.empty(), injected=injected.initial(constants))
         record['fault'] = receiver.Status.LOCKED
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
         self.memory = Memory(record, self.target.breaks, self.target.coefficients,

@@ -12,7 +12,7 @@ from equipment_sim.drives import law
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.schedule import Simulated
-from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import Records, Value
 from pedestal_common.wire.commands import Command, Reply
 from pedestal_common.wire.records import NO_STAMP
@@ -44,8 +44,8 @@ class SimulatedDrives(Simulated):
         link = adu_unit.Link.zeros()
         link['truth_stamp'] = NO_STAMP
         at_rest = dataclasses.replace(parameters, initially_enabled=False)
-        self.memory = Memory(joined(
-            law.DrivesRecord.dtype, state=drive_unit.initial_state(at_rest),
+        self.memory = Memory(law.DrivesRecord.of(
+            state=drive_unit.initial_state(at_rest),
             constants=drive_unit.constants(parameters), link=link, schedule=schedule.empty(),
             injected=injected.DriveInjected.zeros()))
         self.parts['tick'], self.parts['period'] = NO_STAMP, round(parameters.period * 1e9)

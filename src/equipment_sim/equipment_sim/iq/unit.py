@@ -16,7 +16,7 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import nodes
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.schedule import Simulated
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, Diagnosis, joined
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, Diagnosis
 from pedestal_common.quantities import (
     AnyRecord,
     Complexes,
@@ -160,8 +160,8 @@ class SimulatedIq(Simulated):
         constants = receiver.constants(p, p.period, self.target)
         constants['first_scintillation_normal'] = 0
         count = receiver.normals_per_step(p) - receiver.NORMALS_PER_SAMPLE * p.receiver.samples_per_step
-        record = joined(IqRecord.dtype, state=receiver.initial_state(), constants=constants,
-                        schedule=schedule.empty(), injected=injected.initial(constants), feed=feed.record(p))
+        record = IqRecord.of(state=receiver.initial_state(), constants=constants,
+                             schedule=schedule.empty(), injected=injected.initial(constants), feed=feed.record(p))
         record['inputs']['mat_ed'] = line_of_sight.ashore_matrix()
         rows = p.block if p.feed.scanned else p.receiver.samples_per_step
         self.memory = Memory(record, self.target.breaks, self.target.coefficients, np.zeros((1, count)),

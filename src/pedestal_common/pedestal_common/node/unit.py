@@ -35,14 +35,6 @@ class Diagnosis(typing.NamedTuple):
     values: list[tuple[str, str]]   # (key, text)
 
 
-def joined(record_type: DType, **parts: Records | int) -> Records:
-    """Return a record (1,) whose fields are these parts: records (1,) or numbers."""
-    record = np.zeros(1, record_type)
-    for name, part in parts.items():
-        record[name] = part
-    return record
-
-
 class Unit(typing.Protocol):
     """Protocol of a unit. A subclass adds its memory and the compiled law of one step:
 

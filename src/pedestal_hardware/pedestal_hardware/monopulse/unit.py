@@ -8,7 +8,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, Unit, joined
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, Unit
 from pedestal_common.quantities import AnyRecord, Complexes, Floats, Hertz, Nanoseconds, Records, Seconds, Stamps
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
@@ -109,11 +109,11 @@ class MonopulseReceiver(Unit):
         p = parameters
         parts, channels = p.receiver.samples_per_step, len(p.feed.channels)
         if p.feed.scanned:
-            record = joined(ScannedRecord.dtype, state=front_end.initial_state(p), constants=scan.constants(p),
-                            window=scan.initial_window(p))
+            record = ScannedRecord.of(state=front_end.initial_state(p), constants=scan.constants(p),
+                                      window=scan.initial_window(p))
         else:
-            record = joined(ReceiverRecord.dtype, state=front_end.initial_state(p),
-                            constants=front_end.constants(p))
+            record = ReceiverRecord.of(state=front_end.initial_state(p),
+                                       constants=front_end.constants(p))
         record['outputs']['status'] = front_end.Status.WAIT
         self.memory = (ScannedMemory if p.feed.scanned else Memory)(
             record, np.zeros((p.block, channels), np.complex64), np.zeros((parts, channels), np.complex128))

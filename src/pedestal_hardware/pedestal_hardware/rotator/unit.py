@@ -12,7 +12,7 @@ from adu_drive.angle_drive import DRIVE_STATE_TOPIC, EMERGENCY_STOP_TEXT, ENABLE
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.modes import MODES
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, joined
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import AnyRecord, Bit, Degrees, Nanoseconds, Pair, Records, Seconds, Stamps
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
@@ -119,8 +119,8 @@ class Rotator(AngleDrive):
         constants['low'][0], constants['high'][0] = zip(*p.travel_rad)
         switches, device = Switches.zeros(), Device.zeros()
         switches['wanted'] = device['silent'] = 1
-        self.memory = Memory(joined(RotatorRecord.dtype, constants=constants, switches=switches, device=device,
-                                    state=set_point.initial_state()))
+        self.memory = Memory(RotatorRecord.of(constants=constants, switches=switches, device=device,
+                                              state=set_point.initial_state()))
         self.counts: dict[str, int] = {}
         self.fault = ''
         self.measured_at: Seconds | None = None     # times of the monotonic clock: of the newest measurement,
