@@ -11,10 +11,9 @@ from acu_tracker.estimation.params import FilterParameters
 from adu_drive.params import AduParameters
 from pedestal_results.intervals import missed
 from pedestal_studies.p000_ma import backlash, servo
-from pedestal_studies.p001_zhou_yang_qin import alignment
+from pedestal_studies.p001_zhou_yang_qin import alignment, methods
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop as loop
 from ship_motion_sim import earth
-from ship_motion_sim.navigation import navigator
 
 ROOT = pathlib.Path(__file__).parents[1]
 LATITUDE = math.radians(alignment.SHIP_PARAMETERS.latitude_deg)
@@ -77,9 +76,9 @@ def test_without_noise_an_alignment_reaches_the_limits_of_the_paper(monkeypatch)
     every = round(alignment.EVALUATION_PERIOD_S / alignment.IMU_PERIOD_S)
     found = {}
     for method in ('classical', 'adrc'):
-        constants = navigator.constants(alignment.INS_PARAMETERS, method, 'none', LATITUDE)
+        constants = methods.constants(alignment.INS_PARAMETERS, method, LATITUDE)
         estimates = np.zeros(len(angle) // every, alignment.AlignmentEstimate.dtype)
-        alignment.align(navigator.initial_state(constants, start), constants, angle, force, alignment.IMU_PERIOD_S,
+        alignment.align(methods.initial_state(constants, start), constants, angle, force, alignment.IMU_PERIOD_S,
                         every, estimates)
         errors = alignment.errors(estimates['quaternion'], attitude[every - 1::every])[550:] / alignment.ARCMIN_RAD
         found[method] = np.abs(errors.mean(axis=0))

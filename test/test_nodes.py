@@ -108,7 +108,8 @@ REFUSED = {
     'no recording': ('ship_motion', ['-p', 'ship.motion:=recorded', '-p', 'ship.recorded.path:=/nowhere/ship.csv'],
                      '/nowhere/ship.csv: No such file or directory'),
     'NMEA host': ('ship_motion', ['-p', 'nmea.port:=10110', '-p', 'nmea.host:=::1'], "nmea.host = '::1': must be"),
-    'never aligned': ('ins', ['-p', 'method:=oba', '-p', 'ship.latitude_deg:=89.0'], 'alignment.aligned_sigma = '),
+    'never aligned': ('ins', ['-p', 'method:=riccati_eso', '-p', 'ship.latitude_deg:=89.0'],
+                      'alignment.aligned_sigma = '),
     'pacing': ('adu', ['-p', 'graph.pacing:=sometimes'], 'must be one of lockstep, realtime'),
     'no parameter file': ('acu', ['--params-file', '/nowhere.yaml'], '--params-file /nowhere.yaml: No such file'),
 }
@@ -124,8 +125,8 @@ REFUSED_FILES = {
 def test_a_parameter_file_holds_in_any_namespace(start_node, connect, tmp_path, one_line):
     """With sections as the product writes them; a node that finds nothing for itself says so and goes on."""
     files = {name: tmp_path / f'{name}.yaml' for name in ('everywhere', 'nowhere')}
-    files['everywhere'].write_text(parameter_file.text({'ins': {'methd': 'oba'}}))
-    files['nowhere'].write_text('ins:\n  ros__parameters:\n    methd: oba\n')
+    files['everywhere'].write_text(parameter_file.text({'ins': {'methd': 'model'}}))
+    files['nowhere'].write_text('ins:\n  ros__parameters:\n    methd: model\n')
     started = {name: start_node('ins', '-r', '__ns:=/ship', '--params-file', file) for name, file in files.items()}
     refused = started['everywhere'].finish()
     assert refused.returncode == 1 and "unknown parameter 'methd'; did you mean 'method'?" in one_line(refused.stderr)

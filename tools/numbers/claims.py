@@ -106,7 +106,7 @@ PAPER_000_CLAIMS = (
           'motor', 'independent-loops', 'fight_torque_rms_nm')))
 
 PAPER_001_CLAIMS = (
-    Claim('figures 1, 2: block diagrams', 'implemented: ship_motion_sim/alignment'),
+    Claim('figures 1, 2: block diagrams', 'implemented: p001_zhou_yang_qin/adrc.py'),
     Claim('latitude 34 deg north; misalignment 3, 3 and 180 deg', 'as printed'),
     Claim('longitude 108 deg, height 450 m', 'no law of an alignment contains the longitude; gravity is that of the '
           'ellipsoid, 9.7965 m/s2, and 450 m lessen it by 0.0014 m/s2, or 0.014 % of the level limit',

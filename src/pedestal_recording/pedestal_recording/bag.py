@@ -49,6 +49,10 @@ Content = typing.TypeVar('Content')  # type of the values in a dictionary {topic
 MetadataRecords = Mapping[str, Mapping[str, str]]  # metadata records of a bag, {name: {text: text}}
 _NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')  # pattern of the file name NAME_0.mcap, NAME_1.mcap and so on of a bag
 
+RETIRED_PARAMETERS = {'ins': ('alignment.classical_bandwidth', 'alignment.adrc.observer', 'alignment.adrc.control',
+                              'alignment.adrc.start')}
+"""{node: parameters that no longer exist}; older recordings contain them, and the configuration leaves them out."""
+
 
 def read(path: str | pathlib.Path, beam: str | None = None) -> 'Bag':
     """Return the Bag in a directory or an .mcap file.
@@ -442,6 +446,8 @@ class Bag:
                 raise BagError(f'{self.file}: its record `parameters`: {plain_yaml.problem(error)}') from None
             if not isinstance(parameters[node], dict):
                 raise BagError(f'{self.file}: its record `parameters`: {node} must hold a value for each parameter')
+            for name in RETIRED_PARAMETERS.get(node, ()):
+                parameters[node].pop(name, None)
         return {'scenario': self.metadata_records.get('scenario', {}).get('yaml', ''), 'parameters': parameters}
 
     def where(self, topic: str) -> Ints:

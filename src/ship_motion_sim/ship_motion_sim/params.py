@@ -9,8 +9,8 @@ from pedestal_common.parameters import ParameterError, Parameters, choice, flag,
 
 MAX_SEED = 2 ** 31 - 1
 IMU_OUTPUTS = ('sample', 'increment')
-INS_METHODS = ('model', 'classical', 'adrc', 'adrc_scheduled', 'riccati_eso', 'oba')
-VELOCITY_AIDS = ('none', 'log', 'gnss')
+INS_METHODS = ('model', 'riccati_eso')
+VELOCITY_AIDS = ('none', 'log')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -152,18 +152,9 @@ class ShipMotionParameters(Parameters):
 
 
 @dataclasses.dataclass(frozen=True)
-class AdrcParameters(Parameters):
-    """Method adrc; the defaults reproduce figure 4 of paper 001."""
-    observer: float = parameter(0.3, 0.01, 20.0, 'rad/s', 'bandwidth of the extended state observer')
-    control: float = parameter(1.0, 0.01, 20.0, 'rad/s', 'bandwidth of the level control')
-    start: float = parameter(60.0, 1.0, 3600.0, 's', 'time from power-up after which the azimuth uses the level '
-                             'commands')
-
-
-@dataclasses.dataclass(frozen=True)
 class AlignmentParameters(Parameters):
-    """The alignment of an INS: its laws, and the sensors and sea that they assume."""
-    step: float = parameter(0.02, 0.001, 1.0, 's', 'step of the alignment laws, at least the period of the IMU')
+    """The alignment of an INS, and the sensors and sea that it assumes."""
+    step: float = parameter(0.02, 0.001, 1.0, 's', 'step of the alignment, at least the period of the IMU')
     initial_heading_deg: float = parameter(0.0, 0.0, 360.0, 'deg', 'heading assumed at power-up; it may be wrong')
     aligned_sigma: float = parameter(0.0035, 1e-5, 0.5, 'rad', '1-sigma of heading at which navigation begins')
     velocity_disturbance: float = parameter(0.05, 1e-4, 10.0, 'm/s', 'rms of the velocity of sea and aid per step and '
@@ -171,22 +162,12 @@ class AlignmentParameters(Parameters):
     gyro_noise: float = parameter(1.45e-6, 1e-9, 0.01, 'rad/sqrt(s)', 'assumed angle random walk of the gyros')
     gyro_bias: float = parameter(4.85e-8, 0.0, 0.1, 'rad/s', 'assumed 1-sigma of the bias of a level gyro')
     accelerometer_bias: float = parameter(3e-4, 0.0, 1.0, 'm/s2', 'assumed 1-sigma of the bias of an accelerometer')
-    classical_bandwidth: float = parameter(0.025, 0.005, 0.2, 'rad/s', 'bandwidth s0 of the four poles of method '
-                                           'classical')
-    adrc: AdrcParameters = group(AdrcParameters)
-
-    def check(self) -> None:
-        """Raise ParameterError if the level control of adrc would be unstable at this step."""
-        if self.adrc.control * self.step > 1.0:
-            raise ParameterError(f'adrc.control = {self.adrc.control:g} rad/s: must be at most 1 / step = '
-                                 f'{1.0 / self.step:g} rad/s, for a stable loop')
 
 
 @dataclasses.dataclass(frozen=True)
 class AidParameters(Parameters):
     """A measured velocity, with which the INS separates swell and speed from its errors."""
-    source: str = choice('none', VELOCITY_AIDS, 'source of the velocity; log: in deck axes; gnss: in ENU, before '
-                         'alignment only with method oba')
+    source: str = choice('none', VELOCITY_AIDS, 'source of the velocity; log: in deck axes')
     noise: float = parameter(0.02, 0.0, 10.0, 'm/s', 'rms white noise of the velocity, per axis and IMU sample')
 
 
@@ -194,10 +175,11 @@ class AidParameters(Parameters):
 class InsParameters(Parameters):
     """Parameters of ins_node. Method `model` is the truth with parametrised errors (roll_bias ... imu_tolerance).
 
-    The other methods integrate the IMU and align by themselves. `ship` must be that of ship_motion_node: the other
-    methods use its latitude, and the velocity that an aid measures.
+    Method `riccati_eso` integrates the IMU and aligns by itself. `ship` must be that of ship_motion_node: the method
+    uses its latitude, and the velocity that an aid measures.
     """
-    method: str = choice('model', INS_METHODS, 'model: truth with parametrised errors; otherwise the alignment method')
+    method: str = choice('model', INS_METHODS, 'model: truth with parametrised errors; '
+                         'riccati_eso: integration of the IMU, with an alignment')
     roll_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of roll')
     pitch_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of pitch')
     heading_bias: float = parameter(0.0, -0.2, 0.2, 'rad', 'constant error of heading, clockwise')
@@ -219,12 +201,8 @@ class InsParameters(Parameters):
     inject: str = text('', table.INJECT_DOC)
 
     def check(self) -> None:
-        """Raise ParameterError if the method cannot use a GNSS velocity before it knows the heading, or if `inject` is
-        not a list of faults of the INS."""
+        """Raise ParameterError if `inject` is not a list of faults of the INS."""
         table.scheduled_commands('ins', self.inject)
-        if self.aid.source == 'gnss' and self.method not in ('model', 'oba'):
-            raise ParameterError(f"aid.source = 'gnss': must be none or log with method = {self.method}, because only "
-                                 'oba uses a velocity in ENU before the heading is known')
 
     def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError if `inject` holds a fault that the pacing of the graph excludes."""

@@ -30,7 +30,7 @@ def attitude(said):
     return Rotation.from_quat(said[DATA]['orientation'])
 
 
-@pytest.mark.parametrize('method', ('model', 'oba'))
+@pytest.mark.parametrize('method', ('model', 'riccati_eso'))
 def test_after_their_faults_both_are_what_they_were(method):
     plain, mended = run(method=method), run(
         '', '0.5 bias duration=0.1; 0.6 ins_jump duration=0.1; 0.6 drop duration=0.2; 0.7 nan duration=0.1; '

@@ -45,13 +45,13 @@ from pedestal_common.record import Record
 from pedestal_results import tracking
 from pedestal_results.intervals import pseudo_values, row
 from pedestal_results.report import figures as fig
+from pedestal_studies.p001_zhou_yang_qin import methods
+from pedestal_studies.p001_zhou_yang_qin.methods import METHODS, MethodParameters
 from pedestal_studies.result import Drawings, Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 from ship_motion_sim import imu
-from ship_motion_sim.navigation import navigator
 from ship_motion_sim.params import (
-    INS_METHODS,
     AlignmentParameters,
     ImuParameters,
     PlainParameters,
@@ -93,13 +93,12 @@ MISALIGNMENT_RAD = np.radians((3.0, 3.0, 180.0))  # misalignment a_x, a_y, a_z a
 VELOCITY_NOISE_M_S, SWELL_VELOCITY_M_S, SWELL_FREQUENCY_HZ = 0.05, 0.5, 0.1
 """1 sigma of the white velocity [m/s]; velocity amplitude [m/s] and frequency [Hz] of the swell."""
 
-INS_PARAMETERS = AlignmentParameters(step=LAW_STEP_S, aligned_sigma=1e-5, velocity_disturbance=VELOCITY_NOISE_M_S,
-                                     gyro_noise=GYRO_NOISE_DENSITY, gyro_bias=GYRO_BIAS_RAD_S,
-                                     accelerometer_bias=ACCELEROMETER_BIAS_M_S2)
-"""Parameters of the INS. Its alignment never ends, so that its error can be evaluated to the end of a run."""
+INS_PARAMETERS = MethodParameters(AlignmentParameters(
+    step=LAW_STEP_S, velocity_disturbance=VELOCITY_NOISE_M_S, gyro_noise=GYRO_NOISE_DENSITY,
+    gyro_bias=GYRO_BIAS_RAD_S, accelerometer_bias=ACCELEROMETER_BIAS_M_S2))
 
-CASE_METHODS = {method.replace('_', '-'): method for method in INS_METHODS if method != 'model'}
-"""{case: method}; `model` is not among them, because it does not align."""
+CASE_METHODS = {method.replace('_', '-'): method for method in METHODS}
+"""{case: method}."""
 CASE_MEANINGS = {
     'classical': 'gyrocompass: the level error that a wrong azimuth causes corrects the azimuth',
     'adrc': 'paper 001, corrected: active disturbance rejection control (ADRC) levels, its commands give the azimuth',
@@ -114,7 +113,7 @@ SETTLED_AZIMUTH_ARCMIN = 12.0  # rms over the runs below which the azimuth count
 EVALUATION_TIMES_S = (100, 250, 300, 600)  # instants of the rows of the azimuth's rms [s]
 SWELL_EVALUATION_TIME_S = 200  # instant of the rows of the azimuth on swell [s]
 
-Method: TypeAlias = tuple[str, AlignmentParameters]     # method of alignment, and the parameters of the INS
+Method: TypeAlias = tuple[str, MethodParameters]    # method of alignment, and the parameters of the INS
 
 
 class AlignmentEstimate(Record):
@@ -269,13 +268,12 @@ def align(state: Records, constants: Records, angle: Vectors3, force: Vectors3, 
 
     After each block of `every` increments, its AlignmentEstimate is written to the next record of `estimates`.
     """
-    aid = np.zeros(3)
     for k in range(len(angle)):
-        navigator.step(state[0], constants[0], angle[k], force[k], dt, aid)
+        methods.step(state[0], constants[0], angle[k], force[k], dt)
         if (k + 1) % every == 0:
             s, out = state[0], estimates[(k + 1) // every - 1]
             q = out.quaternion
-            q[0], q[1], q[2], q[3] = navigator.attitude(s, constants[0])
+            q[0], q[1], q[2], q[3] = methods.attitude(s, constants[0])
             out.azimuth_sigma, out.level_sigma = s.azimuth_sigma, s.level_sigma
 
 
@@ -364,8 +362,8 @@ def align_batch(item: tuple[Batch, Mapping[str, Method]]) -> dict[str, Sums]:
     for i in range(batch.count):
         (angle, force, attitude), start = simulated_run(batch, batch.first + i)
         for case, (method, params) in cases.items():
-            constants = navigator.constants(params, method, 'none', latitude)
-            state, estimates = navigator.initial_state(constants, start), AlignmentEstimate.zeros(n)
+            constants = methods.constants(params, method, latitude)
+            state, estimates = methods.initial_state(constants, start), AlignmentEstimate.zeros(n)
             # This call compiles the law before the call that is timed.
             align(state.copy(), constants, angle[:2], force[:2], IMU_PERIOD_S, every, estimates)
             begun = time.perf_counter()
@@ -385,8 +383,8 @@ def limit() -> InformationLimit:
     The covariance of riccati_eso depends on the assumed noises, not on the measurements. Noise and sway could only
     enlarge the 1 sigmas, because innovations larger than expected increase them.
     """
-    constants = navigator.constants(INS_PARAMETERS, 'riccati_eso', 'none', math.radians(SHIP_PARAMETERS.latitude_deg))
-    state, n = navigator.initial_state(constants, (0.0, 0.0, 0.0, 1.0)), round(RUN_DURATION_S / IMU_PERIOD_S)
+    constants = methods.constants(INS_PARAMETERS, 'riccati_eso', math.radians(SHIP_PARAMETERS.latitude_deg))
+    state, n = methods.initial_state(constants, (0.0, 0.0, 0.0, 1.0)), round(RUN_DURATION_S / IMU_PERIOD_S)
     estimates, still = AlignmentEstimate.zeros(round(RUN_DURATION_S / EVALUATION_PERIOD_S)), np.zeros((n, 3))
     # A deck at rest turns with the earth, and its accelerometers measure the reaction to gravity.
     k = constants[0]['conditions']

@@ -30,10 +30,10 @@ from pedestal_studies.p001_zhou_yang_qin.alignment import (
     LEVEL_COLUMNS,
     Accuracy,
 )
+from pedestal_studies.p001_zhou_yang_qin.methods import MethodParameters
 from pedestal_studies.result import Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
-from ship_motion_sim.params import AlignmentParameters
 
 DEFAULT_RUNS = 100  # runs of each case
 SPEEDS = (0.5, 1.0, 2.0, 4.0)  # factors K by which the times of the method are divided [-]; 1: the default parameters
@@ -42,7 +42,7 @@ SETTLED_LEVEL_ARCMIN = 30.0
 """Rms over the runs below which the level counts as settled [arcmin], a sixth of the initial tilt of 3 deg."""
 
 
-def faster(speed: float) -> AlignmentParameters:
+def faster(speed: float) -> MethodParameters:
     """Return the parameters whose method adrc has all its times divided by `speed` [-]."""
     adrc = INS_PARAMETERS.adrc
     return dataclasses.replace(INS_PARAMETERS, adrc=dataclasses.replace(

@@ -1,4 +1,4 @@
-"""The INS of every method except `model`: integration of the IMU, alignment, navigation and estimated accuracy.
+"""The INS of method riccati_eso: integration of the IMU, alignment, navigation and estimated accuracy.
 
 This INS takes the messages of `ship/imu/data_raw` and puts out attitude and deck rate after a latency, as `ins` does.
 Its `ship` parameters serve only for the latitude and for the true velocity, which an aid measures with noise.
@@ -61,12 +61,12 @@ def constants(params: InsParameters) -> Records:
     record['earth_rate'] = earth.rate(latitude)
     record['latency_ns'] = round(params.latency * 1e9)
     record['increment'], record['aid_noise'] = params.imu_output == 'increment', params.aid.noise
-    record['navigator'] = navigator.constants(params.alignment, params.method, params.aid.source, latitude)
+    record['navigator'] = navigator.constants(params.alignment, params.aid.source, latitude)
     aligned, least = params.alignment.aligned_sigma, navigator.least_azimuth_sigma(record['navigator'][0])
     if aligned <= least:
-        raise ParameterError(f'alignment.aligned_sigma = {aligned:g} rad: must be above {least:.3g} rad, the limit of '
-                             f'method {params.method} at latitude {params.ship.latitude_deg:g} deg with '
-                             f'alignment.gyro_bias = {params.alignment.gyro_bias:g} rad/s')
+        raise ParameterError(f'alignment.aligned_sigma = {aligned:g} rad: must be above {least:.3g} rad, the limit at '
+                             f'latitude {params.ship.latitude_deg:g} deg with alignment.gyro_bias = '
+                             f'{params.alignment.gyro_bias:g} rad/s')
     yaw = math.radians(90.0 - params.alignment.initial_heading_deg)
     record['power_up'] = navigator.initial_state(record['navigator'], quaternion(0.0, 0.0, yaw))
     return record
@@ -84,8 +84,7 @@ def measure_aid(constants: Constants, state: State, stamp_ns: Nanoseconds, norma
         return
     motion.truth(constants.ship, 1e-9 * stamp_ns, state.truth)
     for i in range(3):
-        v = state.truth.velocity_deck[i] if constants.navigator.aid == navigator.AID_LOG else state.truth.velocity[i]
-        state.aid[i] = v + constants.aid_noise * normals[i]
+        state.aid[i] = state.truth.velocity_deck[i] + constants.aid_noise * normals[i]
 
 
 @compiled
@@ -116,7 +115,7 @@ def measure(constants: Constants, state: State, stamp_ns: Nanoseconds, rate: Vec
     """Put attitude and deck rate of the navigator at stamp_ns into the ring; rate, force: of the IMU message."""
     n = ring.put(state, stamp_ns)
     q, w = state.quaternion, state.angular_velocity
-    q[n, 0], q[n, 1], q[n, 2], q[n, 3] = navigator.attitude(state.navigator, constants.navigator)
+    q[n, 0], q[n, 1], q[n, 2], q[n, 3] = navigator.attitude(state.navigator)
     rotation(q[n, 0], q[n, 1], q[n, 2], q[n, 3], state.mat_ed)
     e = constants.earth_rate
     ex, ey, ez = to_deck(state.mat_ed, e[0], e[1], e[2])

@@ -20,6 +20,7 @@ import numpy as np
 
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
+    Floats,
     Meters,
     MetersPerSecond,
     Pair,
@@ -30,8 +31,8 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
-from ship_motion_sim.alignment import steady_state
-from ship_motion_sim.alignment.conditions import UNKNOWN_AZIMUTH_SIGMA_RAD, Conditions
+from pedestal_common.reproducible import solution
+from ship_motion_sim import alignment
 
 MAX_AZIMUTH_RATE_RAD_S = 0.1
 """Limit of the azimuth command [rad/s]; without it the first levelling would reach 0.2 rad/s."""
@@ -61,6 +62,17 @@ class State(Record):
     level_sigma: Radians
 
 
+def steady_covariance(A: Floats, Q: Floats) -> Floats:
+    """Return the P (n, n) that solves P = A P A^T + Q, of a stable loop x(k+1) = A x(k) + noise of covariance Q.
+
+    The equation is linear in the elements of P, stacked to a vector: (1 - kron(A, A)) P = Q. The covariance becomes a
+    constant of a law. `reproducible.solution` therefore takes the place of numpy.linalg.solve, whose last bits differ
+    between processors.
+    """
+    n = len(A)
+    return np.reshape(solution(np.eye(n * n) - np.kron(A, A), Q.ravel()), (n, n))
+
+
 def constants(conditions: Records, s0: RadiansPerSecond, h: Seconds) -> Records:
     """Return the Constants (), one record, for the bandwidth s0 and steps of h."""
     record = np.zeros((), Constants.dtype)
@@ -74,7 +86,7 @@ def constants(conditions: Records, s0: RadiansPerSecond, h: Seconds) -> Records:
     noise = h * rates[:, 0]
     Q = np.outer(noise, noise) * float(conditions['velocity_density']) / h
     Q += np.diag([0.0, 1.0, 0.0, 1.0, 0.0]) * float(conditions['gyro_noise'])**2 * h
-    P = steady_state.covariance(np.eye(5) + h * rates, Q)
+    P = steady_covariance(np.eye(5) + h * rates, Q)
     record['residual'] = math.sqrt(P[4, 4])
     record['s0'], record['K1'], record['k2'], record['K3'], record['K4'] = s0, K1, k2, K3, K4
     record['azimuth_sigma'] = math.sqrt(P[3, 3] + (float(conditions['gyro_bias']) / w_north)**2)
@@ -89,8 +101,8 @@ def envelope(x: float) -> float:
 
 
 @compiled
-def step(state: State, constants: Constants, conditions: Conditions, v_east: MetersPerSecond, v_north: MetersPerSecond,
-         h: Seconds) -> None:
+def step(state: State, constants: Constants, conditions: alignment.Conditions, v_east: MetersPerSecond,
+         v_north: MetersPerSecond, h: Seconds) -> None:
     """Execute one step h after the last; v_east, v_north: velocity error in n'."""
     state.t += h
     state.lagged += h * (v_north - constants.K4 * state.lagged)
@@ -102,7 +114,8 @@ def step(state: State, constants: Constants, conditions: Conditions, v_east: Met
                            MAX_AZIMUTH_RATE_RAD_S)
     # The loop corrects a steady az with the rate az s0 / 2, except at 180 deg, which the envelope covers.
     state.residual += h * (state.command[2] - 0.5 * constants.s0 * state.residual)
-    transient = UNKNOWN_AZIMUTH_SIGMA_RAD * envelope(constants.s0 * state.t)
+    transient = alignment.UNKNOWN_AZIMUTH_SIGMA_RAD * envelope(constants.s0 * state.t)
     moving = max(state.residual**2 - 9.0 * constants.residual**2, 0.0)      # beyond three sigma of its noise
-    state.azimuth_sigma = min(math.sqrt(constants.azimuth_sigma**2 + moving + transient**2), UNKNOWN_AZIMUTH_SIGMA_RAD)
+    state.azimuth_sigma = min(math.sqrt(constants.azimuth_sigma**2 + moving + transient**2),
+                              alignment.UNKNOWN_AZIMUTH_SIGMA_RAD)
     state.level_sigma = constants.level_sigma + transient

@@ -18,13 +18,10 @@ import math
 from typing import Annotated
 
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import cross
 from pedestal_common.geometry.quaternion import product
 from pedestal_common.quantities import Floats, Matrix3, MetersPerSecond, Radians, Seconds, Vector3
 from pedestal_common.record import Record
-from ship_motion_sim import strapdown
-from ship_motion_sim.alignment import extended_observer, riccati_eso
-from ship_motion_sim.alignment.conditions import Conditions
+from ship_motion_sim import alignment, strapdown
 
 MAX_JACOBI_SWEEPS = 12  # largest number of sweeps of Jacobi rotations; 4 to 6 are enough
 
@@ -33,11 +30,10 @@ class State(Record):
     """State of the method.
 
     The observer does not change the attitude. Its covariance is the information limit: the least that any linear
-    method can reach with these measurements (module riccati_eso).
+    method can reach with these measurements (ship_motion_sim alignment).
     """
     t: Seconds                          # since power-up
-    observer: extended_observer.State   # gives the 1 sigmas from the x, y parts of a
-    coriolis: Vector3                   # int w_ie x v dt [m/s]
+    observer: alignment.Observer        # gives the 1 sigmas from the x, y parts of a
     count: float                        # number of pairs (a, b)
     sum_a: Vector3                      # sums of a, b, a b^T
     sum_b: Vector3
@@ -49,7 +45,8 @@ class State(Record):
 
 
 @compiled
-def gravity_integral(t: Seconds, conditions: Conditions) -> tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond]:
+def gravity_integral(t: Seconds,
+                     conditions: alignment.Conditions) -> tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond]:
     """Return b in n0 after t, in closed form.
 
     b is the integral of the reaction to gravity, which turns with the earth.
@@ -63,33 +60,17 @@ def gravity_integral(t: Seconds, conditions: Conditions) -> tuple[MetersPerSecon
 
 
 @compiled
-def step(state: State, conditions: Conditions, a: tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond],
-         v: tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond], h: Seconds) -> None:
-    """Add one pair of vectors, h after the last.
-
-    a: int C_b^b0 f dt in b0; if the ship has a speed log, its velocity is subtracted. v: velocity in n by GNSS, zeros
-    without GNSS. With a speed log, the model omits the Coriolis force: at 7 m/s the level
-    then has an error of 0.1 arcmin.
-    """
+def step(state: State, conditions: alignment.Conditions, a: tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond],
+         h: Seconds) -> None:
+    """Add one pair of vectors, h after the last; a: int C_b^b0 f dt in b0."""
     state.t += h
     observer = state.observer
-    l1, l2, l3, variance = riccati_eso.advance_covariance(observer, conditions, h)
-    if v[0] == 0.0 and v[1] == 0.0:
-        # The innovations show how far the sea differs from the expected one. With a GNSS, b contains the motion of the
-        # ship, so a alone gives no innovation.
-        extended_observer.predict(observer, h)
-        extended_observer.correct(observer, a[0], a[1], l1, l2, l3, variance, h)
-    state.azimuth_sigma, state.level_sigma = extended_observer.sigmas(observer, conditions, 0.0)
-    north, up = conditions.earth_rate[1], conditions.earth_rate[2]
-    cx, cy, cz = cross(0.0, north, up, v[0], v[1], v[2])
-    state.coriolis[0] += h * cx
-    state.coriolis[1] += h * cy
-    state.coriolis[2] += h * cz
+    l1, l2, l3, variance = alignment.advance_covariance(observer, conditions, h)
+    # The innovations show how far the sea differs from the expected one.
+    alignment.predict(observer, h)
+    alignment.correct(observer, a[0], a[1], l1, l2, l3, variance, h)
+    state.azimuth_sigma, state.level_sigma = alignment.sigmas(observer, conditions, 0.0)
     bx, by, bz = gravity_integral(state.t, conditions)
-    # The rotation from n back to n0 is taken to first order, because w_ie t is small.
-    bx += v[0] + state.t * cx + state.coriolis[0]
-    by += v[1] + state.t * cy + state.coriolis[1]
-    bz += v[2] + state.t * cz + state.coriolis[2]
     state.count += 1.0
     for i in range(3):
         state.sum_a[i] += a[i]
@@ -154,7 +135,7 @@ def solve(state: State) -> tuple[float, float, float, float]:
 
 
 @compiled
-def attitude(state: State, conditions: Conditions, qx: float, qy: float, qz: float,
+def attitude(state: State, conditions: alignment.Conditions, qx: float, qy: float, qz: float,
              qw: float) -> tuple[float, float, float, float]:
     """Return the present quaternion (x, y, z, w) deck -> n; qx, qy, qz, qw: deck -> b0 from the gyros."""
     t, w = state.t, conditions.earth_rate
