@@ -134,6 +134,19 @@ def test_compensation_takes_its_share_of_the_ships_roll_away(beam):
     assert worst[0] / worst[1] == pytest.approx(1.0 / 0.15, rel=0.03)
 
 
+@pytest.mark.parametrize('delta', [(0.0, 0.85), (0.85, 0.0)])
+def test_the_compensation_of_one_axis_is_that_axis_own(beam, delta):
+    """Only elevation, or only azimuth, takes its share of the roll away; the other axis is as without it."""
+    worst = []
+    for share in ((0.0, 0.0), delta):
+        rig = beam(attitude=beam.rolling, stabilised=True, initial_mode='autotrack', at=(-0.3, 0.6),
+                   both={'beam.form': 'type_1'},
+                   **{f'{axis}.beam.rate_compensation': s for axis, s in zip(('azimuth', 'elevation'), share)})
+        rig.run(4.0)
+        worst.append(np.abs(rig.run(8.0)[:, 2:]).max(axis=0))
+    assert worst[0] / worst[1] == pytest.approx([1.0 / (1.0 - s) for s in delta], rel=0.05)
+
+
 def test_errors_that_stay_away_leave_the_papers_beam_on_its_way(beam):
     rig = beam(lambda t: (0.5 + 0.05 * t, 0.6), initial_mode='autotrack', both={'beam.form': 'type_2'})
     rig.run(10.0)

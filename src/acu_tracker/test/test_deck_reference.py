@@ -160,3 +160,15 @@ def test_the_best_elevation_is_closest_to_the_target():
                                for at in (t - h, t, t + h))
         assert got[1] == pytest.approx((after - before) / (2 * h), abs=1e-5)
         assert got[2] == pytest.approx((after - 2 * here + before) / h**2, abs=1e-3)
+
+
+def test_from_the_ins_to_the_antenna_and_back():
+    """For an arm of which R is known, against numpy; the two ways undo each other up to the square of the arm."""
+    state = lever_arm.LeverArm.zeros()
+    state['arm'] = [0.003, -0.005, 0.007]
+    u, du = np.array([0.48, 0.6, 0.64]), np.array([0.01, -0.02, 0.01125])
+    sight, rate = lever_arm.to_ins(state[0], Vector(*u), Vector(*du))
+    seen = u + state['arm'][0]
+    np.testing.assert_allclose(sight, seen / np.linalg.norm(seen), atol=1e-12)
+    back = lever_arm.to_antenna(state[0], LineOfSight(sight, rate, Vector(0.0, 0.0, 0.0)))
+    np.testing.assert_allclose(back.u, u, atol=1e-4)

@@ -97,6 +97,16 @@ def test_an_axis_of_another_kind_keeps_its_own_estimate():
     assert mixed.rate_rms()[0] < 0.5 * alone.rate_rms()[0]
 
 
+@pytest.mark.parametrize('kinds', [('imm_ukf', 'cv'), ('cv', 'imm_ukf'), ('cv', 'cv')])
+def test_the_first_range_starts_the_filter_if_one_axis_asks_for_it(kinds):
+    tracked = Pass(kinds)
+    tracked.take(5.0, ranged=False)
+    assert not tracked.filter('running')
+    tracked.take(1.0)
+    assert tracked.filter('running') == ('imm_ukf' in kinds)
+    assert tracked.filter('used').tolist() == [kind == 'imm_ukf' for kind in kinds]
+
+
 def largest_step(estimates):
     """Largest change (6,) of angles, rates, accelerations between neighbours, less what angles do by their rates."""
     steps = np.diff(estimates, axis=0)

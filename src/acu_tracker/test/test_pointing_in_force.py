@@ -335,6 +335,8 @@ def test_the_report_holds_the_residuals_of_the_fit():
     directions, residuals = np.array([[-110.4, 12.6], [300.0, 80.0]]), np.array([[0.0012, -0.0008], [-0.0105, 0.02]])
     text = pointing_report.residual_text(directions, residuals)
     assert text == '-110 13 1.2 -0.8; 300 80 -10.5 20.0'
+    assert pointing_report.residual_rows(text) == [[-110.0, 13.0, pytest.approx(0.0012), pytest.approx(-0.0008)],
+                                                   [300.0, 80.0, pytest.approx(-0.0105), pytest.approx(0.02)]]
     many = np.tile(directions, (100, 1)), np.tile(residuals, (100, 1))
     # 1000 is MAX_TEXT_CHARACTERS of a command.
     assert len(pointing_report.residual_text(many[0] - (160.0, 80.0), 1e3 * many[1])) < 1000

@@ -267,3 +267,16 @@ def test_after_a_gap_the_command_is_met_within_the_ramp(drive, gap, delay):
     assert v.max() < 0.02 and v[-1] == pytest.approx(-0.5, abs=2e-3)
     reached = np.flatnonzero(v < -0.475)[0] - round(delay / 5e-3)
     assert reached * 5e-3 >= 0.9 * 0.475 / 20.0
+
+
+def test_the_drive_is_enabled_when_the_brakes_have_let_go(drive):
+    d = made(drive)
+    assert request(d, 'DISABLE') == drive_state.REPLY_ACCEPTED
+    d.run(1.0)
+    assert d.log['phase'][-1] == drive_state.PHASE_DISABLED
+    assert request(d, 'ENABLE') == drive_state.REPLY_ACCEPTED
+    d.run(1.0)
+    releasing = d.log['phase'][-200:] == drive_state.PHASE_RELEASING_BRAKES
+    assert releasing.sum() >= d.constants['release_periods'][0] > 1
+    enabled = d.log['phase'] == drive_state.PHASE_ENABLED
+    assert enabled[-1] and not d.log['braked'][enabled].any()

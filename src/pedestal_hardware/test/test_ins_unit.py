@@ -337,3 +337,13 @@ def test_prepare_changes_nothing():
     before = unit.record.copy()
     unit.prepare()
     assert unit.record.tobytes() == before.tobytes() and not unit.published and not any(unit.drops.counts.values())
+
+
+def test_an_imu_that_declares_no_acceleration_publishes_none():
+    """REP 145: the first element of a covariance is -1 where the device does not measure that vector."""
+    unit = unit_of(source='imu')
+    for k, declared in enumerate((True, False, True), 1):
+        message = imu(k, force=(0.1, 0.2, 9.8))
+        message.linear_acceleration_covariance[0] = 0.0 if declared else -1.0
+        sample = unit.take_imu(message, NOON + k * 20_000_000)
+        assert np.isfinite(sample.force).all() == declared

@@ -267,6 +267,7 @@ def test_a_target_that_is_too_fast_is_reported():
     ({'silence': 0.5}, 'silence = 0.5 s: must be above answer_timeout = 1 s'),
     ({'protocol': 'gs232', 'azimuth.low': -180.0}, 'must be at least 0 deg'),
     ({'protocol': 'spid'}, 'must be one of'),
+    ({'duration': 0.5}, 'duration = 0.5 s: must be a multiple of the period 0.2 s'),
     ({'url': 'ttyUSB0'}, "url = 'ttyUSB0': must be"), ({'url': 'tcp://127.0.0.1:4533'}, 'tcp: must be'),
     ({'url': 'udp://127.0.0.1:4533'}, 'must be socket://HOST:PORT, or the path of a serial device'),
 ])

@@ -202,3 +202,16 @@ def test_a_server_that_ends_releases_the_control_of_a_client_that_has_left(remot
     sent = len(remote.requests)
     control.release(one_shots + 0.6)
     assert len(remote.requests) == sent
+
+
+@pytest.mark.parametrize('ship', [False, True])
+@pytest.mark.parametrize('at, asked, sent', [(350.0, 20.0, 380.0), (350.0, 340.0, 340.0), (-170.0, 170.0, -190.0),
+                                             (10.0, 350.0, -10.0), (0.0, 180.0, -180.0)])
+def test_a_set_point_lies_on_the_turn_next_to_the_antenna(remote, control, at, asked, sent, ship):
+    """Seen from where the antenna stands, no azimuth is more than half a turn away."""
+    remote.joints, remote.limits = (at, 20.0), [-8.0, 8.0, 0.0, 1.5]
+    if ship:
+        remote.fresh.add(pointing.ATTITUDE_TOPIC)
+        remote.seen.add(pointing.ATTITUDE_TOPIC)
+    assert control.pointing.on_ship == ship
+    assert control.pointing.target(asked, 40.0, 0.0) == pytest.approx((sent, 40.0))

@@ -158,3 +158,17 @@ def test_a_gyrocompass_that_dwells_at_180_deg_is_not_aligned():
         error = Rotation.from_quat(methods.attitude(state[0], constants[0])).magnitude()
         assert (state['azimuth_sigma'][0] > 3.0) == dwells
         assert error > 2.9 if dwells else error < 1e-3
+
+
+def test_the_azimuth_from_the_slope_of_a_quiet_gyro_is_as_good_as_the_velocity_allows():
+    """Exact: the slope as a linear function of the velocity at each step, by summation in place of the closed form."""
+    window, n, variance = 40.0, 4000, 0.03**2
+    constants, quiet = adrc.Constants.zeros(), K.copy()
+    constants['velocity_variance'], quiet['gyro_noise'], quiet['gyro_bias'] = variance, 0.0, 0.0
+    t = (np.arange(n) + 0.5) * window / n
+    parabola = 6.0 * t * (window - t) / window**3               # weights of the commands in the slope of the angle
+    at_ends = np.array([parabola[1] - parabola[0], parabola[-2] - parabola[-1]]) / (window / n)
+    sigma = math.sqrt(variance * np.sum(at_ends**2)) / float(K['gravity']) / float(K['earth_rate'][1])
+    observer = alignment.Observer.zeros()
+    observer['innovation_ratio'] = 1.0
+    assert adrc.azimuth_sigma(constants[0], quiet, observer[0], window) == pytest.approx(sigma, rel=1e-3)

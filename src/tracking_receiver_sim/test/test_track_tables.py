@@ -1,5 +1,6 @@
 """Tables of directions and flights as programs write them: names, units, times and separators of their own."""
 import datetime
+import re
 
 import numpy as np
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim import track_files
 from tracking_receiver_sim.params import TargetParameters, TrackFileParameters
+from tracking_receiver_sim.track import instant, times
 
 N = 20
 BEGIN = datetime.datetime(2026, 6, 1, 12)
@@ -185,3 +187,16 @@ def test_a_flight_is_read_by_names_and_units(name, tmp_path):
      "line 2: Position = '47.4000000': must be latitude,longitude")])
 def test_a_flight_that_is_refused(text, message, tmp_path):
     assert message in refused(tmp_path, text)
+
+
+@pytest.mark.parametrize('modified, low, high', [(False, 2400000.5, 2536000.0), (True, 0.0, 135999.5)])
+def test_a_julian_date_lies_between_1858_and_2231(modified, low, high):
+    """The two ends of the range are the same instants for Julian dates and for modified ones."""
+    def julian(number):
+        return times.julian('a.csv', 2, 'day', f'{number:.1f}', modified)
+    utc = datetime.timezone.utc
+    assert julian(low) == instant.of_unix_time(datetime.datetime(1858, 11, 17, tzinfo=utc).timestamp())
+    assert julian(high) == instant.of_unix_time(datetime.datetime(2231, 3, 26, 12, tzinfo=utc).timestamp())
+    for beyond in (low - 1.0, high + 1.0):
+        with pytest.raises(csv_table.TableError, match=re.escape(f'must be {low:g} to {high:g}')):
+            julian(beyond)

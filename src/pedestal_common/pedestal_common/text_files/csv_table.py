@@ -265,7 +265,6 @@ def _beginning(lines: TextIO) -> tuple[list[str], str, str]:
         elif bare and not bare.startswith(COMMENT_MARKS) and not _is_title(bare, before[i + 1:]):
             lines.seek(sum(map(len, before[:i + 1])))
             return before[:i], line, separator
-    lines.seek(0, io.SEEK_END)
     return before, '', separator
 
 
