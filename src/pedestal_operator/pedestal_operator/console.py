@@ -189,7 +189,7 @@ def _axis_lines(remote: Remote) -> list[Text]:
 
 
 def _receiver_line(remote: Remote) -> Text:
-    x, y, level = (row.value for row in state.rows(remote) if row.group == 'receiver' and isinstance(row.value, float))
+    x, y, level = state.receiver(remote)
     locked = remote.diagnostics_of('acu').get('locked') == '1'
     return Text.assemble('receiver  ', ('locked', '') if locked else ('no lock', 'yellow'),
                          f'  level {_number(level, 1)} dB-Hz  error {_number(x)} / {_number(y)} deg')

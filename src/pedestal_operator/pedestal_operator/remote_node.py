@@ -24,8 +24,9 @@ from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import Reply
 from pedestal_operator.antenna import POINTING_TOPIC, Antenna
 from pedestal_operator.requests import JOG_REPEAT_PERIOD_S, Requests
+from pedestal_operator.state import ANGLE_ERROR_TOPIC
 
-NUMBER_TOPICS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error')
+NUMBER_TOPICS = ('joint_states', 'acu/reference', ANGLE_ERROR_TOPIC)
 """Topics of numbers that every client receives."""
 
 TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole', POINTING_TOPIC)  # topics of text that every client receives

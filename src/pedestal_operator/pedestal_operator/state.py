@@ -4,16 +4,18 @@ The page, the console, `pedestal status` and its JSON show these results and der
 level is '' (normal), 'warn' or 'bad'.
 """
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from pedestal_common.graph import topics
 from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.node.unit import LEVEL_OK
-from pedestal_common.quantities import Json, Message
+from pedestal_common.quantities import DecibelHertz, Degrees, Json, Message
 
 if TYPE_CHECKING:   # it imports the compiler, which the command line does not need
     from pedestal_operator.antenna import Antenna
+
+ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
 
 BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
 """Modes with a button or a key; `stop` has a separate button, `rate` is the jog, `slave` is for programs."""
@@ -81,19 +83,19 @@ def rows(antenna: 'Antenna') -> list[Row]:
     found += [Row('encoder', axis, angle, 'deg') for axis, angle in zip(
         topics.AXES, antenna.encoder_angles('joint_states'))]
     found += [Row('rate', axis, rate, 'deg/s') for axis, rate in zip(topics.AXES, antenna.rates())]
-    found += [Row('receiver', name, value, unit) for name, value, unit in _receiver(antenna)]
+    found += [Row('receiver', *row) for row in zip(('cross_elevation_error', 'elevation_error', 'level'),
+                                                   receiver(antenna), ('deg', 'deg', 'dB-Hz'))]
     found += [Row('acu', key, acu.get(key)) for key in ACU_STATUS_KEYS]
     found.append(Row('adu', 'state', header(antenna)['drive'].text))
     return found
 
 
-def _receiver(antenna: 'Antenna') -> tuple[tuple[str, float, str], ...]:
-    values: Sequence[float] = (math.nan,) * 3
-    if antenna.present('tracking_receiver/angle_error'):
-        values = antenna.numbers['tracking_receiver/angle_error']
-    cross_elevation, elevation, level = values
-    return (('cross_elevation_error', math.degrees(cross_elevation), 'deg'),
-            ('elevation_error', math.degrees(elevation), 'deg'), ('level', float(level), 'dB-Hz'))
+def receiver(antenna: 'Antenna') -> tuple[Degrees, Degrees, DecibelHertz]:
+    """Return the last (cross-elevation error, elevation error, level), NaN if stale."""
+    if not antenna.present(ANGLE_ERROR_TOPIC):
+        return math.nan, math.nan, math.nan
+    cross_elevation, elevation, level = antenna.numbers[ANGLE_ERROR_TOPIC]
+    return math.degrees(cross_elevation), math.degrees(elevation), float(level)
 
 
 def node_reports(antenna: 'Antenna') -> list[tuple[str, str]]:

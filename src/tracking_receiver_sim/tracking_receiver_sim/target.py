@@ -78,6 +78,12 @@ class Target(NamedTuple):
     start_time: str = ''            # UTC of stamp 0 in ISO 8601, empty if the target has no date
     summary: tuple[str, ...] = ()   # lines about the file and the track of a track_file, empty for other kinds
 
+    @property
+    def values(self) -> list[tuple[str, str]]:
+        """Values of the diagnostics on the date and the file of the target."""
+        date = [('stamp_0_utc', self.start_time)] if self.start_time else []
+        return [*date, *zip(('track_log', 'track_flight'), self.summary)]
+
 
 class Course(NamedTuple):
     """What a kind of target gives for a run: its track as in Target, start time and summary as far as it has them."""

@@ -19,11 +19,10 @@ from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 from receiver_law import detector
 from tracking_receiver_sim import injected, receiver, target
+from tracking_receiver_sim.injected import ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC, RANGE_TOPIC
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
 DRIVE_TRUTH_TOPIC, SHIP_TRUTH_TOPIC, TARGET_TRUTH_TOPIC = 'adu/truth', 'ship/truth', 'target/truth'
-ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC = 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate'
-RANGE_TOPIC = 'tracking_receiver/range'
 
 FAULT_STATUSES = (receiver.Status.NO_TARGET, receiver.Status.NO_BEAM, receiver.Status.STAMP_ORDER)
 """Statuses that the receiver keeps for the next diagnosis."""
@@ -68,20 +67,26 @@ def decode(known: receiver.Inputs, stamp: Nanoseconds, beam: AnyRecord, ship: An
 
 
 @compiled
+def encode_truth(result: receiver.Outputs, stamp: Nanoseconds, truth: AnyRecord) -> None:
+    """Set the record of target/truth from the outputs of the receiver."""
+    truth.stamp = stamp
+    truth.orientation[3] = 1.0
+    for i in range(3):
+        truth.position[i], truth.twist_linear[i] = result.target_position[i], result.target_velocity[i]
+
+
+@compiled
 def encode(result: receiver.Outputs, constants: receiver.Constants, stamp: Nanoseconds, outputs: AnyRecord) -> None:
     """Set the records of the messages from the outputs of the receiver."""
     error, rate = outputs[ANGLE_ERROR_TOPIC], outputs[ANGLE_RATE_TOPIC]
-    distance, truth = outputs[RANGE_TOPIC], outputs[TARGET_TRUTH_TOPIC]
+    distance = outputs[RANGE_TOPIC]
     error.stamp = result.stamp_ns if result.due == 1 else NO_STAMP
     error.vector[0], error.vector[1], error.vector[2] = result.cross_elevation, result.elevation, result.cn0_dbhz
     rate.stamp = error.stamp if constants.rate_measured != 0 else NO_STAMP
     rate.vector[0], rate.vector[1], rate.vector[2] = result.rate[0], result.rate[1], constants.rate_sigma
     distance.stamp = error.stamp if constants.range_measured != 0 else NO_STAMP
     distance.range[0], distance.variance[0] = result.range, constants.range_variance
-    truth.stamp = stamp
-    truth.orientation[3] = 1.0
-    for i in range(3):
-        truth.position[i], truth.twist_linear[i] = result.target_position[i], result.target_velocity[i]
+    encode_truth(result, stamp, outputs[TARGET_TRUTH_TOPIC])
 
 
 @compiled
@@ -153,9 +158,7 @@ class TrackingReceiver(Simulated):
         sigma = detector.angle_noise(p.antenna, p.receiver, float(outputs['cn0_dbhz']), p.period)
         values = [('cn0_dbhz', f'{outputs["cn0_dbhz"]:.2f}'), ('locked', str(int(outputs['locked']))),
                   ('target', p.target.kind), ('angle_noise_deg', f'{math.degrees(sigma):.4g}')]
-        if self.target.start_time:
-            values.append(('stamp_0_utc', self.target.start_time))
-        values += zip(('track_log', 'track_flight'), self.target.summary)
+        values += self.target.values
         if fault in FAULT_STATUSES:
             return Diagnosis(LEVEL_ERROR, receiver.STATUS_TEXT_BY_CODE[fault], values)
         return Diagnosis(LEVEL_OK if status == receiver.Status.LOCKED else LEVEL_WARN,

@@ -17,7 +17,7 @@ from pedestal_common.node import shell, unit_node
 from pedestal_common.quantities import Message, Nanoseconds
 from pedestal_common.wire import records
 from pedestal_hardware.monopulse.params import MonopulseParameters
-from pedestal_hardware.params import START_KEY
+from pedestal_hardware.start import starts
 
 NOISE_PERIOD_S = 0.02  # time between two transmissions of noise before the first step [s]
 MAX_SPAN_S = 0.2  # longest time for which samples are made at once [s]. After a longer one the samples have a gap.
@@ -45,10 +45,8 @@ class IqNode(unit_node.UnitNode):
 
     def _take_start(self, array: Message) -> None:
         """Take time 0 from the diagnostics of the receiver, which chooses it at the first samples."""
-        for status in array.status:
-            for value in status.values if status.name == MONOPULSE_RECEIVER.name else ():
-                if value.key == START_KEY:
-                    self._epoch = int(value.value)
+        for start in starts(array.status, MONOPULSE_RECEIVER.name):
+            self._epoch = start
 
     def _send_noise(self) -> None:
         """Send noise up to now."""

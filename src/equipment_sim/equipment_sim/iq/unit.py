@@ -13,6 +13,7 @@ import numpy as np
 from equipment_sim.iq import feed
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
 from pedestal_common.graph import nodes
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.schedule import Simulated
@@ -38,7 +39,6 @@ from pedestal_hardware.monopulse.params import CONICAL_SCAN, ONE_CHANNEL, THREE_
 from tracking_receiver_sim import injected, receiver, target
 from tracking_receiver_sim import unit as receiver_unit
 
-LIGHT_SPEED_M_S = 299_792_458.0
 SIGNAL_FAULTS = {THREE_CHANNELS: ('fade', 'wrong_slope', 'phase_180'),
                  ONE_CHANNEL: ('fade', 'wrong_slope', 'phase_180'), CONICAL_SCAN: ('fade',)}
 """{kind of a feed: injected faults of the receiver that its samples can have}. A conical scan has no differences."""
@@ -108,11 +108,7 @@ def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecor
     elif elapsed_ns > 0:
         state.error_known = 0
         results.status = receiver.Status.NO_BEAM
-    truth = outputs[receiver_unit.TARGET_TRUTH_TOPIC]
-    truth.stamp = stamp
-    truth.orientation[3] = 1.0
-    for axis in range(3):
-        truth.position[axis], truth.twist_linear[axis] = results.target_position[axis], results.target_velocity[axis]
+    receiver_unit.encode_truth(results, stamp, outputs[receiver_unit.TARGET_TRUTH_TOPIC])
 
 
 @compiled
@@ -179,7 +175,7 @@ class SimulatedIq(Simulated):
     def frequency(self) -> Hertz:
         """Present frequency of the carrier in the samples; NaN without a target."""
         p, closing = self.parameters.simulated, float(self.parts['closing'])
-        return p.offset - p.carrier * closing / LIGHT_SPEED_M_S
+        return p.offset - p.carrier * closing / SPEED_OF_LIGHT_M_S
 
     def samples(self, count: int) -> Samples:
         """Return the next samples, with the voltages of the last step."""
@@ -216,10 +212,8 @@ class SimulatedIq(Simulated):
     def diagnose(self) -> Diagnosis:
         """Return the Diagnosis, with the frequency of the carrier."""
         status = int(self.parts['outputs']['status'])
-        values = [('carrier_hz', f'{self.frequency:.1f}'), ('target', self.parameters.target.kind)]
-        if self.target.start_time:
-            values.append(('stamp_0_utc', self.target.start_time))
-        values += zip(('track_log', 'track_flight'), self.target.summary)
+        values = [('carrier_hz', f'{self.frequency:.1f}'), ('target', self.parameters.target.kind),
+                  *self.target.values]
         faults = (*receiver_unit.FAULT_STATUSES, receiver.Status.HIDDEN, receiver.Status.BELOW_HORIZON)
         if status in faults:
             return Diagnosis(LEVEL_ERROR, receiver.STATUS_TEXT_BY_CODE[status], values)

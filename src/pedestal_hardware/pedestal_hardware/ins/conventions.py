@@ -5,6 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from pedestal_common.geometry import line_of_sight
 from pedestal_common.quantities import AnyRecord, Matrix3, Quaternion
 from pedestal_hardware.ins import frame_check
 from pedestal_hardware.ins.frames import BODY_MATRICES, EARTH_MATRICES
@@ -29,12 +30,13 @@ def fitting(check: AnyRecord, declared: Convention, case: Matrix3, q: Quaternion
     cross = case.T @ check['cross'] @ case
     moved, lowest = np.any(check['moved'] > 0.0), frame_check.SLOPE_RANGE[0] * check['rates'].sum()
     force = check['force'] / max(check['force_weight'], 1.0)
+    attitude = np.array(line_of_sight.rows(*q))
     sizes: list[tuple[Convention, float]] = []
     for candidate in itertools.product(EARTH_MATRICES, BODY_MATRICES, BODY_MATRICES):
         E, B, R = EARTH_MATRICES[candidate[0]], BODY_MATRICES[candidate[1]], BODY_MATRICES[candidate[2]]
         # In this candidate the attitude turns as a = body B^T w, and the rates are r = rate_body R^T w.
         size = np.sum((rate_body @ R.T @ B @ body.T) * cross)
-        upright = (E @ _matrix(q) @ B.T @ case.T)[2, 2] >= MIN_UPRIGHT
+        upright = (E @ attitude @ B.T @ case.T)[2, 2] >= MIN_UPRIGHT
         upwards = (case @ R @ rate_body.T @ case.T @ force)[2] > -frame_check.GRAVITY_M_S2
         if candidate != declared and upright and upwards and (not moved or size >= lowest):
             sizes.append((candidate, size))
@@ -42,13 +44,6 @@ def fitting(check: AnyRecord, declared: Convention, case: Matrix3, q: Quaternion
     found = [candidate for candidate, size in sizes if not moved or size >= MIN_FIT * best]
     changes = [sum(one != other for one, other in zip(candidate, declared)) for candidate in found]
     return [candidate for candidate, count in zip(found, changes) if count == min(changes)]
-
-
-def _matrix(q: Quaternion) -> Matrix3:
-    x, y, z, w = q
-    return np.array(((1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-                     (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-                     (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y))))
 
 
 def text(candidates: Sequence[Convention]) -> str:

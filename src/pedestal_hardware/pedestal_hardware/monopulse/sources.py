@@ -9,6 +9,7 @@ import numpy as np
 
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.quantities import Nanoseconds, Seconds
+from pedestal_common.stream import connection
 from pedestal_hardware.monopulse import sigmf, vita49
 from pedestal_hardware.monopulse.blocks import ArrivalClock, Chunk, StreamError
 from pedestal_hardware.monopulse.params import CHANNELS, SCANNED_CHANNELS, MonopulseParameters, SourceParameters
@@ -49,13 +50,11 @@ class VitaSource:
     def __init__(self, params: SourceParameters, channels: Sequence[str], _clock: Clock) -> None:
         self.full_scale = FULL_SCALE if params.format == 'ci16' else None
         self.format, self.joiner = params.format, vita49.Joiner(params.rate, params.streams[:len(channels)])
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         try:
-            self.socket.bind((params.host, params.port))
+            self.socket = connection.bound(params.host, params.port)
         except OSError as error:
-            self.socket.close()
             raise StreamError(f'source.address = {params.url}: {error.strerror}') from None
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
 
     def read(self, timeout: Seconds) -> Chunk | None:
         """Return the next chunk, or None."""

@@ -11,7 +11,6 @@ from pedestal_operator import state
 from pedestal_operator.antenna import Antenna
 from pedestal_operator.page import page_sky
 
-ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
 MOTOR_STATES_TOPIC = 'adu/motor_states'
 ATTITUDE_TOPIC = 'ship/imu/data'
 EXTRA_NUMBER_TOPICS = (MOTOR_STATES_TOPIC, ATTITUDE_TOPIC)
@@ -60,10 +59,7 @@ def now(antenna: PageAntenna) -> dict[str, Json]:
     `axes` are deck angles of the beam on the sky, with the encoder angles; `beam` are its earth angles.
     """
     actual, commanded = antenna.directions('joint_states'), antenna.directions('acu/reference')
-    receiver, torques = (math.nan,) * 3, []
-    if antenna.present(ANGLE_ERROR_TOPIC):
-        x, y, level = antenna.numbers[ANGLE_ERROR_TOPIC]
-        receiver = math.degrees(x), math.degrees(y), level
+    torques = []
     if antenna.present(MOTOR_STATES_TOPIC):
         torques = [round(float(torque), 3)
                    for torque in antenna.numbers[MOTOR_STATES_TOPIC][-len(topics.MOTOR_NAMES):]]
@@ -71,7 +67,7 @@ def now(antenna: PageAntenna) -> dict[str, Json]:
             'axes': [{'actual': a, 'commanded': c, 'error': c - a, 'encoder': encoder, 'rate': rate}
                      for a, c, encoder, rate in zip(actual, commanded, antenna.encoder_angles('joint_states'),
                                                     antenna.rates())],
-            'receiver': [float(value) for value in receiver], 'torques': torques,
+            'receiver': list(state.receiver(antenna)), 'torques': torques,
             'beam': _deck(antenna).seen(*actual)}
 
 

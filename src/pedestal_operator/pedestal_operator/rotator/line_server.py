@@ -10,8 +10,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeAlias, TypeVar
 
+from pedestal_common.stream.connection import listen
 from pedestal_common.stream.splitter import Overlong, Splitter
-from pedestal_operator import tcp_port
 
 MAX_UNREAD_BYTES = 65_536  # largest size of unread answers of a client [bytes]; further answers are dropped
 MAX_WAITING_LINES = 100  # largest number of waiting lines of a client; further input is left unread
@@ -113,7 +113,7 @@ class LineServer(Generic[AnyClient]):
                  make_client: Callable[[Stream, str, int], AnyClient]) -> None:
         self._most, self._longest, self._make = most, longest, make_client
         self._selector, self.clients, self.refused_count = selectors.DefaultSelector(), [], 0
-        self._server, self._device_name = tcp_port.listen(address, port, most), f'{kind} {device}'
+        self._server, self._device_name = listen(address, port, most), f'{kind} {device}'
         self._server.setblocking(False)
         self._selector.register(self._server, selectors.EVENT_READ)
         self._prefix = f'{kind} {self.port} from '
