@@ -17,8 +17,7 @@ from rich.text import Text
 from pedestal_common.graph import topics
 from pedestal_common.quantities import Seconds
 from pedestal_operator import state
-from pedestal_operator.remote_node import Remote, RemoteSession
-from pedestal_operator.requests import JOG_REPEAT_PERIOD_S
+from pedestal_operator.remote_node import JOG_REPEAT_PERIOD_S, Remote, RemoteSession
 
 KEY_HOLD_S = 0.35
 """Time after the last press of a key during which the key counts as held [s].

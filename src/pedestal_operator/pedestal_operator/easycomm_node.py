@@ -16,7 +16,7 @@ from pedestal_common.quantities import Degrees, Seconds
 from pedestal_operator.rotator import easycomm
 from pedestal_operator.rotator.controller import PendingRequest
 from pedestal_operator.rotator.line_server import Client, Stream
-from pedestal_operator.rotator.outcomes import OUTCOME_DONE, OUTCOME_REFUSED, Refused
+from pedestal_operator.rotator.pointing import OUTCOME_DONE, OUTCOME_REFUSED, Refused
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
 SERVER_VERSION = 'pedestal'  # text in the answer to VE

@@ -20,8 +20,7 @@ from pedestal_common.node import shell
 from pedestal_common.quantities import Message, Nanoseconds
 from pedestal_common.wire import messages
 from pedestal_operator.viewers import frames
-from pedestal_operator.viewers.frame_source import FrameSource
-from pedestal_operator.viewers.on_demand import OnDemand
+from pedestal_operator.viewers.on_demand import FrameSource, OnDemand
 
 POLL_PERIOD_S = 0.05  # period of the check for viewers of topics [s]
 FRAME_PERIOD_S = 1.0 / 30.0  # period of the messages of the frames [s]

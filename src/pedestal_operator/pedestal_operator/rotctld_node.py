@@ -14,17 +14,17 @@ from collections.abc import Sequence
 from pedestal_common import parameters
 from pedestal_common.node import shell
 from pedestal_common.quantities import Seconds
-from pedestal_operator.rotator import outcomes, rotctld
+from pedestal_operator.rotator import pointing, rotctld
 from pedestal_operator.rotator.controller import PendingRequest
 from pedestal_operator.rotator.line_server import Client
-from pedestal_operator.rotator.outcomes import Refused
+from pedestal_operator.rotator.pointing import Refused
 from pedestal_operator.rotator.rotctld import RESULT_INVALID, RESULT_OK, RESULT_REJECTED
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
-RESULT_BY_OUTCOME = {outcomes.OUTCOME_DONE: RESULT_OK, outcomes.OUTCOME_REFUSED: RESULT_REJECTED,
-                     outcomes.OUTCOME_OUT_OF_REACH: RESULT_INVALID, outcomes.OUTCOME_BUSY: rotctld.RESULT_BUSY,
-                     outcomes.OUTCOME_NO_REPLY: rotctld.RESULT_TIMEOUT,
-                     outcomes.OUTCOME_NO_POSITION: rotctld.RESULT_IO_ERROR}
+RESULT_BY_OUTCOME = {pointing.OUTCOME_DONE: RESULT_OK, pointing.OUTCOME_REFUSED: RESULT_REJECTED,
+                     pointing.OUTCOME_OUT_OF_REACH: RESULT_INVALID, pointing.OUTCOME_BUSY: rotctld.RESULT_BUSY,
+                     pointing.OUTCOME_NO_REPLY: rotctld.RESULT_TIMEOUT,
+                     pointing.OUTCOME_NO_POSITION: rotctld.RESULT_IO_ERROR}
 """{outcome of a request: result of the protocol}."""
 
 ANTENNA_COMMAND_BY_NAME = {'park': 'stow', 'reset': 'acu/reset_faults'}

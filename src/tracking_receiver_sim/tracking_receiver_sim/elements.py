@@ -17,8 +17,8 @@ from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import did_you_mean
 from pedestal_common.text_files import content, csv_table
 from pedestal_common.text_files.files import FilePath
-from tracking_receiver_sim.ephemeris import lines
 from tracking_receiver_sim.params import LeoPassParameters
+from tracking_receiver_sim.tracks import lines
 
 FORMAT_PROBE_BYTES = 4096  # number of bytes at the beginning of a file that decide its format
 MAX_SATELLITES = 300_000  # largest number of satellites in a file, several times the number of catalogued ones

@@ -19,7 +19,7 @@ import numpy as np
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry import blockage
-from pedestal_common.geometry.line_of_sight import angles, earth_angles, offsets, to_deck, to_earth
+from pedestal_common.geometry.line_of_sight import angles, earth_angles, offset_rates, offsets, to_deck, to_earth
 from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import (
     Bit,
@@ -43,7 +43,6 @@ from receiver_law import detector, smoothing
 from receiver_law.detector import Voltages, hertz
 from receiver_law.monopulse import channels, disk_channels
 from tracking_receiver_sim import target, wave_path
-from tracking_receiver_sim.error_rate import error_rate
 from tracking_receiver_sim.params import BEAM_HELD, BEAM_MOTIONS, ReceiverParameters, TrackingReceiverParameters
 
 STATUS_TEXTS = dict(
@@ -376,6 +375,24 @@ def measure(state: State, constants: Constants, seen: Incidence, normals: Floats
         sample = voltages_at(state, constants, seen, (k + 1.0) / samples, level)
         detector.put(state.detector, constants.detector, with_noise(sample, normals, NORMALS_PER_SAMPLE * k))
     return detector.errors(state.detector, constants.detector)
+
+
+@compiled
+def error_rate(inputs: Inputs, position: Vector3, velocity: Vector3,
+               seen: target.TargetState) -> tuple[RadiansPerSecond, RadiansPerSecond]:
+    """Return (d dX/dt, d dE/dt) of a target off the beam.
+
+    position, velocity: of the antenna, ENU [m] and FLU [m/s]. The rate is exact. In the deck frame the target is at
+    r = M^T (p - position), and its derivative is dr/dt = M^T v - velocity - w x r, with p and v of the target (ENU),
+    the rotation M deck -> earth, and the rate w of the deck (FLU).
+    """
+    (e, n, u), (v_e, v_n, v_u) = seen.position, seen.velocity
+    x, y, z = r = to_deck(inputs.mat_ed, e - position[0], n - position[1], u - position[2])
+    vx, vy, vz = to_deck(inputs.mat_ed, v_e, v_n, v_u)
+    wx, wy, wz = inputs.twist_angular[0], inputs.twist_angular[1], inputs.twist_angular[2]
+    v = (vx - velocity[0] - (wy * z - wz * y), vy - velocity[1] - (wz * x - wx * z),
+         vz - velocity[2] - (wx * y - wy * x))
+    return offset_rates((inputs.azimuth, inputs.elevation), (inputs.azimuth_rate, inputs.elevation_rate), r, v)
 
 
 @compiled

@@ -311,6 +311,6 @@ def _body(params: TargetParameters, duration: Seconds) -> Course:
 # track_file
 
 def _track_file(params: TargetParameters, duration: Seconds) -> Course:
-    from tracking_receiver_sim import track_files  # imports scipy, which only a track file needs
-    flight = track_files.lay_out(params, duration, RUN_MARGIN_S)
+    from tracking_receiver_sim.tracks import files  # imports scipy, which only a track file needs
+    flight = files.lay_out(params, duration, RUN_MARGIN_S)
     return Course(flight.breaks, flight.coefficients, flight.start_time, flight.summary)

@@ -9,7 +9,7 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnos
 from pedestal_common.quantities import Degrees, Message, Nanoseconds, Quaternion, Radians, Radians2, Records, Vector3
 from pedestal_common.stream.drops import Drops
 from pedestal_common.wire import messages
-from pedestal_hardware.ins import conventions, frame_check, frames, input_law, sentences
+from pedestal_hardware.ins import frame_check, frames, input_law, sentences
 from pedestal_hardware.ins.input_law import Outcome
 from pedestal_hardware.ins.params import InsInputParameters
 
@@ -174,8 +174,8 @@ class InsInputUnit:
                 if axes & (1 << i) and check['moved'][i] > 0.0 and not frame_check.agrees(check, i, axes))
         if self.parameters.source == 'nmea':
             return f'wrong frame: {reason}; compare the signs of heading, rate of turn, roll and pitch'
-        fitting = conventions.fitting(check, self._declared, self._case, u['q'])
-        return f'wrong frame: {reason}; {conventions.text(fitting)}'
+        fitting = frame_check.fitting_conventions(check, self._declared, self._case, u['q'])
+        return f'wrong frame: {reason}; {frame_check.text_of(fitting)}'
 
     def _drop(self, kind: str, reason: str, arrival: Nanoseconds) -> Sample | None:
         """Drop a sample. Return None, for the caller to return. Rates that settle are counted only."""

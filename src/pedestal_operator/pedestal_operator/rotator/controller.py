@@ -9,18 +9,17 @@ from collections.abc import Callable, Iterable, Sequence
 
 from pedestal_common.quantities import Degrees, RadiansPerSecond, Seconds
 from pedestal_common.wire.commands import HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL
-from pedestal_operator.remote_node import Remote
-from pedestal_operator.requests import JOG_REPEAT_PERIOD_S
+from pedestal_operator.remote_node import JOG_REPEAT_PERIOD_S, Remote
 from pedestal_operator.rotator.line_server import address_of
-from pedestal_operator.rotator.outcomes import (
+from pedestal_operator.rotator.pointing import (
     OUTCOME_BUSY,
     OUTCOME_DONE,
     OUTCOME_NO_REPLY,
     OUTCOME_OUT_OF_REACH,
     OUTCOME_REFUSED,
+    Pointing,
     Refused,
 )
-from pedestal_operator.rotator.pointing import Pointing
 
 CLIENT_REPLY_TIMEOUT_S = 1.5  # longest wait for a reply of the control unit [s]; clients of Hamlib wait for 2 s
 CONTROL_TIMEOUT_S = 10.0  # time without a command of a client after which its control is released [s]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeVar
 
 from pedestal_common.quantities import Degrees
-from pedestal_operator.rotator.numerals import number
+from pedestal_operator.rotator.rotctld import number
 
 MAX_LINE_BYTES = 256  # largest length of a line [bytes]
 QUERY_WORDS = 'AZ', 'EL', 'GS', 'GE', 'VE'  # words that are answered: azimuth, elevation, status, errors, version

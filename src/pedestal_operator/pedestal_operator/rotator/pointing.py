@@ -14,9 +14,22 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
 from pedestal_common.quantities import Degrees, Pair, Seconds
 from pedestal_operator.remote_node import Remote
-from pedestal_operator.rotator.outcomes import OUTCOME_NO_POSITION, OUTCOME_OUT_OF_REACH, Refused
 from pedestal_operator.rotator.rotctld import Limits, turn
 from pedestal_operator.rotator.set_point_filter import SetPointFilter
+
+(OUTCOME_DONE, OUTCOME_REFUSED, OUTCOME_OUT_OF_REACH, OUTCOME_BUSY, OUTCOME_NO_REPLY,
+ OUTCOME_NO_POSITION) = range(6)
+"""Outcomes of a request. OUTCOME_BUSY: another client is in control. OUTCOME_NO_POSITION: the antenna publishes no
+position, or its limits are unknown."""
+
+
+class Refused(Exception):  # noqa: N818  no error of the server
+    """A refused request. outcome: one of the outcomes above; reason: one line."""
+
+    def __init__(self, outcome: int, reason: str) -> None:
+        super().__init__(reason)
+        self.outcome, self.reason = outcome, reason
+
 
 SLAVE_DURATION_S = 3600.0
 """Time for which a `slave` direction on a ship is valid [s].
@@ -156,4 +169,3 @@ class Pointing:
         if self.on_ship:
             arguments['holds'] = SLAVE_DURATION_S
         return self._remote.request(self._mode, arguments)
-

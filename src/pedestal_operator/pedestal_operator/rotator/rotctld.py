@@ -4,12 +4,11 @@ The module is written for Hamlib 4.5.4 (rotctl -m 2, rotctld -m 1) and gpredict.
 this module reads line by line. There are three differences. A command with too few arguments is refused at once and
 does not take the next line. An unknown command is answered. Numbers must be finite.
 """
-
+import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from pedestal_common.quantities import Degrees
-from pedestal_operator.rotator.numerals import number
 
 MAX_LINE_BYTES = 256  # largest length of a line [bytes]
 
@@ -97,6 +96,13 @@ def read(line: str) -> Request | None:
     return Request(row.name, values, separator, header)
 
 
+def number(text: str) -> float:
+    """Return the number in a text, which is finite and has a decimal point or a decimal comma. Raises ValueError."""
+    if not re.fullmatch(r'[+-]?([0-9]{1,9}([.,][0-9]*)?|[.,][0-9]+)(e[+-]?[0-9]{1,2})?', text, re.IGNORECASE):
+        raise ValueError(f'{text!r} is not a number')
+    return float(text.replace(',', '.'))
+
+
 def _values(name: str, given: Sequence[str]) -> tuple[float, ...]:
     """Return the arguments of a command as numbers. Raises ValueError."""
     if name == 'move':
@@ -162,4 +168,3 @@ def turn(azimuth: Degrees, near: Degrees, limits: tuple[Degrees, Degrees]) -> De
     low, high = limits
     candidates = [azimuth + 360.0 * k for k in range(-4, 5) if low <= azimuth + 360.0 * k <= high]
     return min(candidates, key=lambda candidate: abs(candidate - near), default=None)
-

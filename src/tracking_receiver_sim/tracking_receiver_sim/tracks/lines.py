@@ -13,7 +13,7 @@ from typing import TypeAlias
 from pedestal_common.quantities import Seconds
 from pedestal_common.text_files import csv_table
 from pedestal_common.text_files.files import FilePath
-from tracking_receiver_sim.track import instant as instants
+from tracking_receiver_sim.tracks import instant as instants
 
 MAX_LINE_CHARS = 1024  # largest number of characters of a line; the CCSDS books allow 254
 

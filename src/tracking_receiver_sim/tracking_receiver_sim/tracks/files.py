@@ -9,9 +9,8 @@ from typing import Any, NamedTuple, TypeAlias
 
 from pedestal_common.quantities import Seconds
 from pedestal_common.text_files import content, csv_table
-from tracking_receiver_sim.ephemeris import course, directions, lines, oem, stk
 from tracking_receiver_sim.params import TargetParameters, TrackFileParameters
-from tracking_receiver_sim.track import fixes, flight, gpx, nmea, place, tables
+from tracking_receiver_sim.tracks import course, directions, fixes, flight, gpx, lines, nmea, oem, stk, tables
 
 FORMAT_PROBE_BYTES = 65536  # number of bytes at the beginning of a file that decide its format
 
@@ -27,7 +26,7 @@ class FileKind(NamedTuple):
 
 
 LOG_KIND = FileKind(lambda log, target, _duration, _margin: flight.lay_out(log, target.track_file, target.station),
-                    place.run_parameters)
+                    flight.run_parameters)
 ORBIT_KIND = FileKind(course.flight_of_orbit, course.run_parameters_of_orbit)
 DIRECTIONS_KIND = FileKind(course.flight_of_directions, course.run_parameters_of_directions)
 
@@ -69,7 +68,7 @@ FOREIGN_FORMATS = (
      'an SP3 file of precise orbits: convert the orbit of one satellite to a CCSDS OEM (KEYWORD = value)'))
 """(pattern of the beginning of a file, its name and remedy) of text formats that this project cannot read."""
 
-DERIVED_PARAMETERS = (*place.STATION_FIELDS, 'receiver.reference_range', 'duration')
+DERIVED_PARAMETERS = (*flight.STATION_FIELDS, 'receiver.reference_range', 'duration')
 """Parameters that a track file gives if the scenario does not: of the receiver, and the duration of the run."""
 
 

@@ -1,7 +1,7 @@
 """Conversion of orbits from other frames to the earth-fixed frame, and of the times of files to instants.
 
 An instant is the time of track files: TAI minus 37 s, in seconds since 1970. It counts leap seconds, and equals UTC
-from 2017 on (module track.instant). TAI is the international atomic time.
+from 2017 on (module instant). TAI is the international atomic time.
 
 The rotations are those of skyfield: IAU 2006 precession and IAU 2000A nutation, with UT1 - UTC and leap seconds from
 its built-in tables. They omit the polar motion (up to 0.3", 9 m on the ground). Every ITRF is taken as WGS84; the
@@ -15,7 +15,7 @@ import numpy as np
 from pedestal_common.geometry.geodesy import EARTH_RATE
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Floats, Times, Vectors3
-from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.tracks import instant
 
 EARTH_FIXED_PATTERN = re.compile(r'ITRF(?:-?\d{2}|-?\d{4})?|WGS84')
 INERTIAL_FRAMES = ('EME2000', 'GCRF', 'ICRF', 'TEME', 'TOD')

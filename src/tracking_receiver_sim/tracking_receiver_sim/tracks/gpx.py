@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from xml.parsers import expat
 
 from pedestal_common.text_files import content, csv_table
-from tracking_receiver_sim.track import instant
-from tracking_receiver_sim.track.fixes import Fix, Log
+from tracking_receiver_sim.tracks import instant
+from tracking_receiver_sim.tracks.fixes import Fix, Log
 
 PARSE_CHUNK_BYTES = 1 << 20
 """Number of bytes that are parsed at once; expat reads an incomplete token again with each piece."""

@@ -13,8 +13,7 @@ import numpy as np
 
 from pedestal_common.quantities import Floats, Ints, Seconds, Times
 from pedestal_common.text_files import columns, csv_table
-from tracking_receiver_sim.ephemeris import lines, states
-from tracking_receiver_sim.track import tables, times
+from tracking_receiver_sim.tracks import lines, states, tables, times
 
 AZIMUTH = columns.Quantity('azimuth', dict.fromkeys(('azimuth', 'azi', 'az'), 'deg'), 'deg')
 ELEVATION = columns.Quantity('elevation', dict.fromkeys(('elevation', 'elev', 'el'), 'deg'), 'deg')
@@ -34,7 +33,7 @@ class Directions(NamedTuple):
     t: Times                    # after midnight, growing
     azimuth: Floats             # [rad]
     elevation: Floats           # [rad]
-    midnight: Seconds | None    # instant (see track.instant) of t = 0, None if the file has no date
+    midnight: Seconds | None    # instant (see the module instant) of t = 0, None if the file has no date
     description: str            # format and number of rows
 
 

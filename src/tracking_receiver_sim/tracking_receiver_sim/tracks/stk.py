@@ -15,8 +15,7 @@ import numpy as np
 
 from pedestal_common.quantities import Floats, Meters, Seconds
 from pedestal_common.text_files import csv_table
-from tracking_receiver_sim.ephemeris import lines, states
-from tracking_receiver_sim.track import dates, instant
+from tracking_receiver_sim.tracks import instant, lines, states
 
 FILE_SIGNATURE_PATTERN = re.compile(r'stk\.v\.\d+', re.IGNORECASE)
 FRAME_NAMES = {'fixed': 'ITRF', 'j2000': 'EME2000', 'icrf': 'ICRF', 'temeofdate': 'TEME', 'trueofdate': 'TOD'}
@@ -117,7 +116,7 @@ def _epoch(path: str, line: int, column: int, text: str) -> tuple[Seconds, Secon
     match = EPOCH_PATTERN.fullmatch(' '.join(text.lower().split()))
     try:
         day, month, year, hours, minutes, seconds = match.groups() if match else [''] * 6
-        date = datetime.date(int(year), dates.MONTH_NAMES.index(month) + 1, int(day))
+        date = datetime.date(int(year), instant.MONTH_NAMES.index(month) + 1, int(day))
         if not lines.YEAR_LIMITS[0] <= date.year <= lines.YEAR_LIMITS[1]:
             raise ValueError
         days, second = ((date - datetime.date(1970, 1, 1)).days,

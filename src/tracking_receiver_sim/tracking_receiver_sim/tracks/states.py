@@ -2,10 +2,10 @@
 
 A segment has a frame, and the degree of the polynomials that join its states.
 """
-
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import KroghInterpolator
 
 from pedestal_common.quantities import Bools, Floats, Ints, Seconds, Times, Vectors3
 from pedestal_common.text_files import csv_table
@@ -38,7 +38,7 @@ class Segment(NamedTuple):
     r: Vectors3         # positions in `frame` [m]
     v: Vectors3 | None  # velocities in `frame` [m/s], None if the file has none; HERMITE needs them
     frame: str          # name of a frame that frames.earth_fixed supports
-    method: str         # HERMITE or LAGRANGE, see interpolation.py
+    method: str         # HERMITE or LAGRANGE, see interpolated
     degree: int         # of the polynomials
     begin: Seconds      # usable range of t
     end: Seconds
@@ -52,7 +52,7 @@ class Segment(NamedTuple):
 class Ephemeris(NamedTuple):
     """The orbit of one object."""
     path: str
-    midnight: Seconds               # instant of t = 0, in the time scale of track files (module track.instant)
+    midnight: Seconds               # instant of t = 0, in the time scale of track files (module instant)
     segments: tuple[Segment, ...]   # in order of time
     description: str                # format, number of states, frame and interpolation
 
@@ -109,3 +109,25 @@ def segment(path: str, first_line: int, table: Floats, frame: str, method: str, 
                                    f'be at least {max(2, result.nodes)} for {result.method} of degree '
                                    f'{result.degree}')
     return result
+
+
+def interpolated(segment: Segment, t: Times) -> tuple[Vectors3, Vectors3]:
+    """Return position [m] and velocity [m/s] in the frame of a segment at times t within the segment."""
+    # middles: mean time of each group of `nodes` consecutive states; first: index of the first state of the group
+    # whose middle is nearest to t.
+    nodes = segment.nodes
+    middles = np.convolve(segment.t, np.full(nodes, 1.0 / nodes), 'valid')
+    after = np.searchsorted(middles, t).clip(1, max(len(middles) - 1, 1))
+    first = np.where(t - middles[after - 1] <= middles[after.clip(0, len(middles) - 1)] - t, after - 1, after)
+    first = first.clip(0, len(middles) - 1)
+    r, v = np.empty((2, len(t), 3))
+    for i in np.unique(first):
+        covered, chosen = first == i, slice(i, i + nodes)
+        centre, half = 0.5 * (segment.t[i] + segment.t[i + nodes - 1]), 0.5 * (segment.t[i + nodes - 1] - segment.t[i])
+        u, values = (segment.t[chosen] - centre) / half, segment.r[chosen]
+        if segment.method == 'HERMITE':
+            assert segment.v is not None
+            u, values = np.repeat(u, 2), np.stack((values, half * segment.v[chosen]), axis=1).reshape(-1, 3)
+        r[covered], scaled = KroghInterpolator(u, values).derivatives((t[covered] - centre) / half, 2)
+        v[covered] = scaled / half
+    return r, v

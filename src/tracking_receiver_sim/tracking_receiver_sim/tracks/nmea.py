@@ -17,7 +17,7 @@ import pynmea2
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Degrees, Seconds
 from pedestal_common.text_files import content, csv_table
-from tracking_receiver_sim.track import fixes, instant
+from tracking_receiver_sim.tracks import fixes, instant
 
 SENTENCE_PATTERN = re.compile(r'\$[A-Z]{2}([A-Z]{3}),[^$*]*(\*[0-9A-Fa-f]{2})?', re.ASCII)
 """A sentence with its type and its checksum."""
@@ -130,7 +130,7 @@ class _Clock:
         self.first, self.days, self.leaps, self._last = first, 0, 0, None
 
     def advance(self, second: Seconds, day: int | None = None) -> Seconds:
-        """Move on to a sentence. Return its instant (see track.instant), without a date the time since midnight.
+        """Move on to a sentence. Return its instant (see the module instant), without a date the time since midnight.
 
         second: of the day; day: since 1970, if the sentence has a date. A date moves the time only forward. Raises
         ValueError for a leap second on a day that has none.

@@ -8,7 +8,7 @@ from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Seconds
 from pedestal_common.text_files import columns, csv_table
 from pedestal_common.text_files.files import FilePath
-from tracking_receiver_sim.track import dates, instant
+from tracking_receiver_sim.tracks import instant
 
 TIME = columns.Quantity('time', {
     **dict.fromkeys(('time', 'epoch', 'timestamp', 't'), 's'),
@@ -39,7 +39,7 @@ class Times:
     """The times of a table, all with a date or all without."""
     column: columns.Column      # of the time, or of the time of day
     date: str                   # name of the column of the date beside it, '' if there is none
-    dated: bool | None          # True: instants, see track.instant; False: seconds from any origin; None: no row yet
+    dated: bool | None          # True: instants; False: seconds from any origin; None: no row yet
     first: Seconds | None       # time of the first row
     last: Seconds | None        # time of the last row
 
@@ -76,8 +76,7 @@ class Times:
         if column.unit in (columns.JULIAN_DATE, columns.MODIFIED_JULIAN_DATE):
             self.dated = True
             return julian(*place, table.point(column.name, cell), column.unit == columns.MODIFIED_JULIAN_DATE)
-        dated = column.unit == columns.UTC or column.unit == 's' and bool(
-            instant.ISO_TIME_PATTERN.fullmatch(dates.iso(cell)) or instant.FINE_UNIX_TIME_PATTERN.fullmatch(cell))
+        dated = column.unit == columns.UTC or column.unit == 's' and instant.is_dated(cell)
         if self.dated not in (None, dated):
             raise csv_table.TableError(f'{table.path}: line {table.line_num}: {column.name} = {cell!r:.60}: must be '
                                        f'{"UTC as ISO 8601" if self.dated else "a number"} as in the lines above')
@@ -91,7 +90,7 @@ class Times:
         value = instant.seconds(*place, cell)
         if value < MIN_UNIX_TIME_S and ':' not in cell:
             raise csv_table.TableError(f'{table.path}: line {table.line_num}: {column.name} = {cell!r:.60}: must be '
-                                       f'UTC, for example {dates.DATE_EXAMPLES}, or at least {MIN_UNIX_TIME_S:g} s '
+                                       f'UTC, for example {instant.DATE_EXAMPLES}, or at least {MIN_UNIX_TIME_S:g} s '
                                        'since 1970; for seconds from another origin, name the column time_s')
         return value
 
@@ -126,7 +125,7 @@ def _date(names: Sequence[str], wanted: columns.Quantity) -> str:
 
 
 def julian(path: FilePath, line: int, name: str, text: str, modified: bool = False) -> Seconds:
-    """Return the instant, see track.instant, of a Julian date, or a modified one, in days. Raises TableError."""
+    """Return the instant, see the module instant, of a Julian date, or a modified one, in days. Raises TableError."""
     zero = MODIFIED_JULIAN_DATE_ZERO if modified else 0.0
     low, high = JULIAN_DATE_LIMITS
     csv_table.number(path, line, name, text, low - zero, high - zero)

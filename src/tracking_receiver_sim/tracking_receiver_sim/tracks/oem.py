@@ -8,8 +8,7 @@ import numpy as np
 
 from pedestal_common.quantities import Floats, Seconds, Times
 from pedestal_common.text_files import csv_table
-from tracking_receiver_sim.ephemeris import frames, lines, states
-from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.tracks import frames, instant, lines, states
 
 ENTRY_PATTERN = re.compile(r'([A-Z0-9_]+)( *= *)(.*)', re.ASCII)
 FILE_SIGNATURE = 'CCSDS_OEM_VERS'

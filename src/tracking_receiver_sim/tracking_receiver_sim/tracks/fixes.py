@@ -13,7 +13,7 @@ import numpy as np
 from pedestal_common.quantities import Degrees, Floats, Ints, Meters, Seconds, Times
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.params import TrackFileParameters
-from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.tracks import instant
 
 MAX_LISTED_AIRCRAFT = 12  # number of aircraft that an error lists for a file with several
 MAX_AIRCRAFT = 10_000  # largest number of aircraft in a file
@@ -27,7 +27,7 @@ class Fix(NamedTuple):
     """A fix as a reader yields it."""
     line: int                   # in the file
     names: tuple[str, ...]      # of the aircraft
-    time: Seconds               # an instant (see track.instant) if the log is dated
+    time: Seconds               # an instant (see the module instant) if the log is dated
     latitude: Degrees           # WGS84
     longitude: Degrees
     altitude: Meters            # above the ellipsoid
@@ -43,7 +43,7 @@ class Log:
     """Description of a log, which its reader fills in."""
     form: str                       # name of the format
     time_name: str                  # name of the time in the file
-    dated: bool                     # True if the time is an instant (see track.instant)
+    dated: bool                     # True if the time is an instant (see the module instant)
     remarks: list[str]              # sentences about the numbers
     passed_over: Counter[str]       # {kind of row or sentence: its number}
     nothing: str                    # reason why the file has no fix, '' if it has one
@@ -57,7 +57,7 @@ class Fixes(NamedTuple):
     """The fixes of one aircraft."""
     path: str
     line: Ints          # in the file
-    time: Times         # growing; instants (see track.instant) if `dated`
+    time: Times         # growing; instants (see the module instant) if `dated`
     latitude: Floats    # WGS84 [deg]
     longitude: Floats   # WGS84 [deg]
     altitude: Floats    # above the ellipsoid [m]

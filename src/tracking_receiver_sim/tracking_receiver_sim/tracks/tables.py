@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from pedestal_common.quantities import Meters
 from pedestal_common.text_files import columns, csv_table
-from tracking_receiver_sim.track import times
-from tracking_receiver_sim.track.fixes import Fix, Log
+from tracking_receiver_sim.tracks import times
+from tracking_receiver_sim.tracks.fixes import Fix, Log
 
 ALTITUDE_LIMITS_FT_IN_M = -3000.0 * columns.METRES_PER_FOOT, 500_000.0 * columns.METRES_PER_FOOT
 ALTITUDE_LIMITS_M = -1000.0, 150_000.0

@@ -16,10 +16,45 @@ from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Seconds, Texts
 from pedestal_common.text_files import csv_table
 from pedestal_common.text_files.files import FilePath
-from tracking_receiver_sim.track import dates
 
 if TYPE_CHECKING:   # slow to import
     from skyfield.timelib import Timescale
+
+MONTH_NAMES = 'jan feb mar apr may jun jul aug sep oct nov dec'.split()
+_FRACTION = r'(?:[.,](?P<fraction>\d{0,9}))?'
+_CLOCK = rf'(?P<hour>\d{{1,2}}):(?P<minute>\d\d)(?::(?P<second>\d\d))?{_FRACTION}'
+_BASIC_CLOCK = rf'(?P<hour>\d\d)(?P<minute>\d\d)(?P<second>\d\d){_FRACTION}'
+_MONTH = rf'(?P<month_name>{"|".join(MONTH_NAMES)})[a-z]*'
+DATE_PATTERNS = tuple(re.compile(f'{date}(?P<zone> ?(?:Z|UTC|[+-]\\d\\d:?\\d\\d))?', re.ASCII | re.IGNORECASE)
+                      for date in (rf'(?P<year>\d{{4}})-(?P<month>\d\d)-(?P<day>\d\d)(?:T| ){_CLOCK}',
+                                   rf'(?P<year>\d{{4}})(?P<month>\d\d)(?P<day>\d\d)(?:T| ){_BASIC_CLOCK}',
+                                   rf'(?P<year>\d{{4}})/(?P<month>\d\d)/(?P<day>\d\d) {_CLOCK}',
+                                   rf'(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>\d{{4}}) {_CLOCK}',
+                                   rf'(?:A\.D\. )?(?P<year>\d{{4}})-{_MONTH}-(?P<day>\d\d) {_CLOCK}',
+                                   rf'(?P<day>\d{{1,2}}) {_MONTH} (?P<year>\d{{4}}) {_CLOCK}'))
+"""Notations in this order: ISO 8601, its basic format (20180723T100000), year/month/day, day.month.year, JPL Horizons
+(2018-Jul-23), STK (23 Jul 2018)."""
+AMBIGUOUS_PATTERN = re.compile(r'\d{1,2}[/-]\d{1,2}[/-](?:\d{4}|\d\d)\b.*', re.ASCII)
+"""A date whose order of day and month differs between countries."""
+DATE_EXAMPLES = ('2018-07-23T10:00:00Z, 2018/07/23 10:00:00, 23.07.2018 10:00:00, 2018-Jul-23 10:00:00 or '
+                 '23 Jul 2018 10:00:00')
+
+
+def iso_date(text: str | None) -> str:
+    """Return a date with a time of day in ISO 8601; the zone stays as it is written, in capitals.
+
+    A text in no known notation is returned with single spaces.
+    """
+    words = ' '.join((text or '').split())
+    match = next(filter(None, (pattern.fullmatch(words) for pattern in DATE_PATTERNS)), None)
+    if not match:
+        return words
+    found = match.groupdict()
+    month = found.get('month') or 1 + MONTH_NAMES.index(found['month_name'].lower())
+    fraction, zone = found['fraction'], (found['zone'] or '').upper()
+    return (f'{found["year"]}-{int(month):02}-{int(found["day"]):02}T{int(found["hour"]):02}:{found["minute"]}:'
+            f'{found["second"] or "00"}{"." + fraction if fraction else ""}{zone}')
+
 
 UNIX_TIME_LIMITS_S = (0.0, 4102444800.0)  # range of the seconds since 1970 without leap seconds: until 2100
 TAI_OFFSET_S = 37.0  # TAI minus an instant [s]: TAI - UTC since 2017
@@ -66,13 +101,18 @@ def second_of_day(hours: int, minutes: int, seconds: Seconds) -> Seconds:
     return 3600.0 * hours + 60.0 * minutes + seconds
 
 
+def is_dated(text: str) -> bool:
+    """Return True for a date, and for milliseconds or microseconds since 1970."""
+    return bool(ISO_TIME_PATTERN.fullmatch(iso_date(text)) or FINE_UNIX_TIME_PATTERN.fullmatch(text))
+
+
 def seconds(path: FilePath, line: int, name: str, text: str | None) -> Seconds:
     """Return the instant of a text. Raises TableError.
 
     The text is a date, see `dates` (without a zone: UTC), or a number of seconds since 1970 without leap seconds. A
     number of 13 digits is in milliseconds, and one of 16 digits in microseconds.
     """
-    text = dates.iso(text)
+    text = iso_date(text)
     match = ISO_TIME_PATTERN.fullmatch(text)
     try:
         if not match:
@@ -85,9 +125,9 @@ def seconds(path: FilePath, line: int, name: str, text: str | None) -> Seconds:
     except csv_table.TableError:
         raise
     except ValueError:
-        order = 'the order of day and month is unknown: ' if dates.AMBIGUOUS_PATTERN.fullmatch(text) else ''
+        order = 'the order of day and month is unknown: ' if AMBIGUOUS_PATTERN.fullmatch(text) else ''
         raise csv_table.TableError(f'{path}: line {line}: {name} = {text!r:.60}: {order}must be UTC as ISO 8601, for '
-                                   f'example {dates.DATE_EXAMPLES}, or as seconds since 1970') from None
+                                   f'example {DATE_EXAMPLES}, or as seconds since 1970') from None
 
 
 def _of_iso(date: str, hours: str, minutes: str, second: str, fraction: str | None, sign: str | None,
