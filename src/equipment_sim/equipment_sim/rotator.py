@@ -1,9 +1,6 @@
-"""Simulated rotator on a pseudo terminal, to rehearse before the device arrives.
+"""Simulated rotator on a pseudo terminal, to rehearse before the device arrives: `pedestal simulate rotator`.
 
-    pedestal simulate rotator --protocol gs232 --rate 6
-
-It prints the path of its terminal. Both axes move to their set-point at a constant rate. The answer to a request
-comes after the delay of a real controller.
+Both axes move to their set-point at a constant rate. An answer comes after the delay of a real controller.
 """
 import os
 import pty
@@ -111,10 +108,7 @@ def run(device: Device, axes: Axes, descriptor: int, delay: Seconds) -> None:
 
 
 def serve(protocol: str, rate: float, delay: Seconds) -> None:
-    """Open a pseudo terminal, print its path, and answer as a rotator until Ctrl-C.
-
-    protocol: one of DEVICES; rate: of both axes [deg/s]; delay: time until an answer.
-    """
+    """Open a pseudo terminal, print its path, and answer as a rotator until Ctrl-C. rate: of both axes [deg/s]."""
     end, device = pty.openpty()
     tty.setraw(device)
     print(os.ttyname(device), flush=True)

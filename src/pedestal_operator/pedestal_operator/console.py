@@ -19,11 +19,7 @@ from pedestal_common.quantities import Seconds
 from pedestal_operator import state
 from pedestal_operator.remote_node import JOG_REPEAT_PERIOD_S, Remote, RemoteSession
 
-KEY_HOLD_S = 0.35
-"""Time after the last press of a key during which the key counts as held [s].
-
-A held key is repeated about 30 times a second after a pause.
-"""
+KEY_HOLD_S = 0.35  # after its last press [s]; a held key is repeated about 30 times a second after a pause
 
 JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)  # selectable jog rates [deg/s]
 
@@ -32,8 +28,7 @@ KEY_COMMANDS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow'
              'r': ('release', 'release control'), 'c': ('reset', 'reset faults')}
 """{key: (command, text on the screen)}."""
 
-ARROW_DIRECTIONS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}
-"""{escape sequence of an arrow: direction (azimuth, elevation)}."""
+ARROW_DIRECTIONS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}  # azimuth, elevation
 
 QUIT_KEYS = ('q', '\x03', '\x04')  # keys that end the console: q, Ctrl-C and Ctrl-D
 ESCAPE_SEQUENCE_CHARS = 3  # length of the escape sequence of an arrow [characters]
@@ -110,7 +105,6 @@ class Console:
                 self.last_reply = f'{verb}: {reply.text}'
 
     def _refusal(self, verb: str) -> str:
-        """Return the reason of the present refusal of a command, '' without a known reason."""
         holds_control = self._remote.diagnostics_of('acu').get('control', '') in ('', self._remote.who)
         return state.refusals(self._remote, holds_control).get(verb, '')
 
@@ -124,7 +118,6 @@ class Console:
         """Return the lines of the screen, at most `height`.
 
         Mode, first alarm, axes, reply and keys have their lines on every terminal of at least 60 x 20 characters.
-        Further alarms and reports of nodes fill the rest.
         """
         above = [*_header_lines(self._remote), *_alarm_lines(self._remote, width), *_axis_lines(self._remote),
                  _receiver_line(self._remote)]
@@ -136,7 +129,7 @@ class Console:
         return lines
 
     def _key_lines(self, width: int) -> list[Text]:
-        """Return the keys and their commands; a command that would be refused is dim."""
+        """A command that would be refused is dim."""
         cells = [Text(f'[{key}] {doc}', style='dim' if self._refusal(verb) else '')
                  for key, (verb, doc) in KEY_COMMANDS.items()]
         cells += [Text(f'[arrows] jog at {self.rate:g} deg/s', style='dim' if self._refusal('rate') else ''),
@@ -160,7 +153,6 @@ def _header_lines(remote: Remote) -> list[Text]:
 
 
 def _alarm_lines(remote: Remote, width: int) -> list[Text]:
-    """Return the alarm to look at first, and the recommended action."""
     first = state.first_alarm(remote)
     if not remote.diagnostics_of('acu'):
         return [Text('alarms unknown: the control unit is silent', style='bold red')]
@@ -173,7 +165,6 @@ def _alarm_lines(remote: Remote, width: int) -> list[Text]:
 
 
 def _axis_lines(remote: Remote) -> list[Text]:
-    """Return the table of the axes."""
     actual, commanded, rates = remote.directions('joint_states'), remote.directions('acu/reference'), remote.rates()
     rows = {'actual [deg]': actual, 'commanded [deg]': commanded,
             'error [deg]': [a - b for a, b in zip(commanded, actual)],
@@ -195,7 +186,6 @@ def _receiver_line(remote: Remote) -> Text:
 
 
 def _report_lines(remote: Remote) -> list[Text]:
-    """Return the further alarms and the reports of the nodes."""
     first = state.first_alarm(remote)
     further = [each for each in map(state.alarm, remote.alarms) if first and each['name'] != first['name']]
     return [*(Text(f'{each["priority"]} {each["name"]} ({each["state"]})', style='red') for each in further),
@@ -203,7 +193,7 @@ def _report_lines(remote: Remote) -> list[Text]:
 
 
 def _wrapped(text: str, width: int, style: str = '') -> list[Text]:
-    """Return a text in one line, or in MAX_WRAPPED_LINES lines; the last one is cut at the width."""
+    """Return at most MAX_WRAPPED_LINES lines; the last one is cut at the width."""
     lines = textwrap.wrap(text, width)
     rest = ' '.join(lines[MAX_WRAPPED_LINES - 1:])
     return [Text(line, style=style) for line in (*lines[:MAX_WRAPPED_LINES - 1], rest)][:max(len(lines), 1)]

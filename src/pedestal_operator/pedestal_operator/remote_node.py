@@ -1,7 +1,5 @@
-"""ROS node of a client, outside the graph: it receives the state of the antenna, sends commands and receives replies.
-
-The page, the console, the single commands of `pedestal` and the rotator protocols use it.
-"""
+"""ROS node of a client, outside the graph: it receives the state of the antenna, sends commands and receives
+replies."""
 import getpass
 import itertools
 import math
@@ -33,8 +31,8 @@ MAX_KEPT_REQUESTS = 1000  # largest number of requests kept, because some replie
 
 
 class Requests:
-    """Requests without a reply, and replies that have not been read. prefix: start of the numbers of the requests,
-    unique to this program."""
+    """Requests without a reply, and unread replies. prefix: start of the numbers of the requests, unique to this
+    program."""
     _pending: dict[str, Command]    # by number
     _replies: dict[str, Reply]
 
@@ -75,7 +73,6 @@ class Requests:
 
 
 NUMBER_TOPICS = ('joint_states', 'acu/reference', ANGLE_ERROR_TOPIC)
-"""Topics of numbers that every client receives."""
 
 TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole', POINTING_TOPIC)  # topics of text that every client receives
 REPLY_TIMEOUT_S = 5.0  # longest wait for the reply to a command [s]
@@ -192,7 +189,7 @@ class Query:
             self._client.call_async(self._request).add_done_callback(self._take)
 
     def _take(self, future: Future) -> None:
-        """Take a reply, which may be that of an earlier request."""
+        """The reply may be that of an earlier request."""
         self.values = self.values or [value.double_value for value in future.result().values] or None
 
 
@@ -221,8 +218,7 @@ class RemoteSession:
         self._executor.spin_once(timeout_sec=seconds)
 
     def until(self, condition: Callable[[], _R], seconds: Seconds) -> _R:
-        """Receive messages until condition() is true, for some seconds at most. Return the last value of
-        condition()."""
+        """Receive messages until condition() is true, for some seconds at most. Return its last value."""
         deadline = time.monotonic() + seconds
         while not (value := condition()) and time.monotonic() < deadline:
             self.spin(0.05)
@@ -252,11 +248,8 @@ class RemoteSession:
         return reply
 
     def hold_jog(self, verb: str, arguments: Mapping[str, object], seconds: Seconds) -> Reply:
-        """Repeat a jog for some seconds, then stop the axes. Return the last reply.
-
-        The axes are also stopped if this program is stopped. If the antenna has left the mode of the jog meanwhile,
-        its new mode stays.
-        """
+        """Repeat a jog for some seconds, then stop the axes, also if this program is stopped. Return the last reply.
+        If the antenna has left the mode of the jog meanwhile, its new mode stays."""
         end = time.monotonic() + seconds
         try:
             while (reply := self.request(verb, arguments)).granted and (left := end - time.monotonic()) > 0.0:

@@ -25,10 +25,8 @@ RESULT_BY_OUTCOME = {pointing.OUTCOME_DONE: RESULT_OK, pointing.OUTCOME_REFUSED:
                      pointing.OUTCOME_OUT_OF_REACH: RESULT_INVALID, pointing.OUTCOME_BUSY: rotctld.RESULT_BUSY,
                      pointing.OUTCOME_NO_REPLY: rotctld.RESULT_TIMEOUT,
                      pointing.OUTCOME_NO_POSITION: rotctld.RESULT_IO_ERROR}
-"""{outcome of a request: result of the protocol}."""
 
 ANTENNA_COMMAND_BY_NAME = {'park': 'stow', 'reset': 'acu/reset_faults'}
-"""{name of a command of rotctld: command or service of the control unit}."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,8 +53,8 @@ class RotctldNode(ServerNode[RotctldClient]):
         super().__init__('rotctld', RotctldParameters, rotctld.MAX_LINE_BYTES, RotctldClient)
 
     def serve(self, client: RotctldClient, now: Seconds) -> None:
-        """Answer the lines in order. A line that commands the antenna is answered after the reply of the control unit.
-        """
+        """Answer the lines in order. A line that commands the antenna is answered after the reply of the control
+        unit."""
         # A complete command without a line end counts as a line, because gpredict for Windows sends no line end.
         client.end_line(rotctld.is_complete)
         while client.pending or client.lines:
@@ -70,10 +68,7 @@ class RotctldNode(ServerNode[RotctldClient]):
                 self._begin(client, client.lines.popleft(), now)
 
     def _begin(self, client: RotctldClient, line: str | None, now: Seconds) -> None:
-        """Answer a line, or begin its request. line: None if it was longer than rotctld.MAX_LINE_BYTES.
-
-        A line for which rotctld.read returns None gets no answer.
-        """
+        """line: None if it was too long. A line for which rotctld.read returns None gets no answer."""
         request = rotctld.Request('', error=RESULT_INVALID) if line is None else rotctld.read(line)
         if request is None:
             return
@@ -94,7 +89,6 @@ class RotctldNode(ServerNode[RotctldClient]):
 
     def _answer(self, client: RotctldClient, result: int, reason: str = '',
                 lines: Sequence[tuple[str, str]] = ()) -> None:
-        """Answer the line of a client; log a refusal with its reason."""
         client.queue_answer(rotctld.answer(client.request, result, lines))
         if result == RESULT_OK:
             client.refusals.pop(client.request.name, None)
@@ -102,7 +96,6 @@ class RotctldNode(ServerNode[RotctldClient]):
             self.refuse(client, client.request.name, client.line, reason)
 
     def _move(self, client: RotctldClient, request: rotctld.Request, now: Seconds) -> None:
-        """Begin a request that moves or stops the antenna, or refuse it if the server is read only."""
         if self.parameters.read_only:
             self._answer(client, RESULT_REJECTED, 'this server is read only (parameter read_only)')
             return
@@ -121,7 +114,7 @@ class RotctldNode(ServerNode[RotctldClient]):
             client.pending = control.do(name, ANTENNA_COMMAND_BY_NAME[request.name], now)
 
     def _lines(self, request: rotctld.Request) -> Sequence[tuple[str, str]]:
-        """Return [(name, text)], the values in the answer to a request without motion. Raises Refused."""
+        """Return (name, text) of each value. Raises Refused."""
         if request.name == 'help':
             return rotctld.COMMAND_LIST_LINES
         pointing = self.controller.pointing

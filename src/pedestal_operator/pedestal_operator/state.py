@@ -1,7 +1,6 @@
 """State of the antenna for the operator, derived from the last messages: values, alarms, refused commands.
 
-The page, the console, `pedestal status` and its JSON show these results and derive nothing themselves. A
-level is '' (normal), 'warn' or 'bad'.
+The page, the console, `pedestal status` and its JSON show these results and derive nothing themselves.
 """
 import math
 from collections.abc import Mapping
@@ -22,29 +21,26 @@ BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
 
 OPERATOR_COMMANDS = (*BUTTON_MODES, 'rate', 'take', 'release', 'reset', 'fallback', 'acknowledge', 'shelve',
                      'unshelve')
-"""Commands of an operator, except `stop`, which is never refused in advance."""
+"""All except `stop`, which is never refused in advance."""
 
 FREE_COMMANDS = ('standby', 'take')
-"""Commands among OPERATOR_COMMANDS that the control unit accepts from a client without control."""
+"""The control unit accepts them from a client without control."""
 
 REFUSAL_PREFIX = 'refused '  # start of a key in the diagnostics of the control unit, before the name of a mode
 
 ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole',
                    'pointing_model')
-"""Keys in the diagnostics of the control unit that `rows` shows."""
 
 GRAPH_NODES = ('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')
-"""Nodes of an antenna whose silence the operator must see."""
+"""The operator must see their silence."""
 
 LIMIT_WARNING_S = 20.0  # time to a limit below which the axis has a warning [s]
 REST_RATE_DEG_S = 0.002  # rate below which an axis counts as stopped [deg/s]
 
 UNACKNOWLEDGED_STATES = ('unacknowledged', 'returned unacknowledged', 'latched unacknowledged')
-"""States of an alarm that waits for an acknowledgement."""
 
 ALARM_KEYS = ('state', 'priority', 'annunciated', 'first_out', 'cause', 'action', 'detail', 'shelved_reason',
               'raised_s')
-"""Keys of an alarm on acu/alarms."""
 
 
 class Row(NamedTuple):
@@ -123,8 +119,7 @@ def header(antenna: 'Antenna') -> dict[str, Shown]:
 
 
 def _drive(antenna: 'Antenna', acu: Mapping[str, str]) -> Shown:
-    """Return the state of the drive. acu: diagnostics of the control unit. Their text comes first, because the
-    control unit notices a silence of the drive first."""
+    """The diagnostics `acu` of the control unit come first, because it notices a silence of the drive first."""
     text = acu.get('drive') or (antenna.texts.get('adu/state') if antenna.present(antenna.name_of('adu')) else None)
     if not text:
         return Shown('unknown', 'bad')
@@ -137,7 +132,6 @@ def _drive(antenna: 'Antenna', acu: Mapping[str, str]) -> Shown:
 
 
 def _link(antenna: 'Antenna') -> Shown:
-    """Return the state of the link to the graph: live, or the first silent node."""
     if not antenna.present(antenna.name_of('acu')):
         return Shown('no ACU', 'bad')
     if is_drive_silent(antenna):
@@ -174,7 +168,7 @@ def _axis_state(silent: bool, limited: str, limit_s: str, rate: float) -> Shown:
 def refusals(antenna: 'Antenna', holds_control: bool, may_take: bool = False) -> dict[str, str]:
     """Return {command: reason} of the OPERATOR_COMMANDS that the control unit would refuse now.
 
-    holds_control: the client has control, or control is free; may_take: a supervisor takes control from others.
+    holds_control: also if control is free; may_take: a supervisor takes control from others.
     """
     acu = antenna.diagnostics_of('acu')
     if not acu:
@@ -199,9 +193,7 @@ def alarm(status: Message) -> dict[str, Json]:
 
 
 def first_alarm(antenna: 'Antenna') -> dict[str, Json] | None:
-    """Return the alarm that the operator must look at first, None without alarms: the first unacknowledged one.
-
-    The list on acu/alarms is in the order of priority and has the consequences of alarms after their causes.
-    """
+    """Return the alarm that the operator must look at first, the first unacknowledged one. The list on acu/alarms is
+    in the order of priority and has the consequences of alarms after their causes."""
     listed = [each for each in map(alarm, antenna.alarms) if each['state'] != 'shelved']
     return min(listed, key=lambda each: each['state'] not in UNACKNOWLEDGED_STATES, default=None)

@@ -1,13 +1,10 @@
 """Detector of the tracking receiver: from the voltages of sum and differences to angle errors, C/N0 and lock.
 
-A sample becomes an angle error by Re(d conj(s)) divided by the smoothed sum power (automatic gain control, AGC). d and
-s are the voltages of difference and sum. The error is limited to the full scale of the detector, then smoothed.
+A sample becomes an angle error by Re(d conj(s)) divided by the smoothed sum power (automatic gain control), with the
+voltages d of a difference and s of the sum. The error is limited to full scale, then smoothed.
 
 Voltages are scaled so that the noise of one channel has the power 1 in one sample. The carrier power on axis is then
 C/N0 tau, with the time tau of a sample. The noise power 1 is subtracted from the measured sum power.
-
-The simulated receiver (tracking_receiver_sim.receiver) and a receiver of I/Q samples (pedestal_hardware.monopulse)
-both call these functions.
 """
 import math
 from typing import NamedTuple, Protocol

@@ -1,7 +1,5 @@
-"""The unit of the tracking receiver: from the true beam and the truth of the ship to the measurements of the receiver.
-
-The node tracking_receiver runs this unit.
-"""
+"""The unit of the tracking receiver: from the true beam and the truth of the ship to the measurements of the
+receiver."""
 import math
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
@@ -25,7 +23,7 @@ from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 DRIVE_TRUTH_TOPIC, SHIP_TRUTH_TOPIC, TARGET_TRUTH_TOPIC = 'adu/truth', 'ship/truth', 'target/truth'
 
 FAULT_STATUSES = (receiver.Status.NO_TARGET, receiver.Status.NO_BEAM, receiver.Status.STAMP_ORDER)
-"""Statuses that the receiver keeps for the next diagnosis."""
+"""They are kept for the next diagnosis."""
 
 
 class ReceiverRecord(Record):
@@ -50,10 +48,8 @@ class Memory(NamedTuple):
 
 @compiled
 def decode(known: receiver.Inputs, stamp: Nanoseconds, beam: AnyRecord, ship: AnyRecord) -> None:
-    """Set the inputs of the receiver from the messages of a step at a stamp.
-
-    beam, ship: records of adu/truth and ship/truth. Without a new ship/truth the inputs keep the last one.
-    """
+    """Set the inputs of the receiver from adu/truth and ship/truth. Without a new ship/truth they keep the last
+    one."""
     known.stamp_ns = stamp
     known.azimuth, known.elevation = beam.position[0], beam.position[1]
     known.azimuth_rate, known.elevation_rate = beam.velocity[0], beam.velocity[1]
@@ -134,11 +130,8 @@ class TrackingReceiver(Simulated):
             self.messages[RANGE_TOPIC].field_of_view = parameters.antenna.beamwidth
 
     def block(self, steps: int) -> Memory:
-        """Return the memory with noise (steps, normals_per_step) drawn for the next steps.
-
-        The scintillation has a random generator of its own, `_air`. So the noise of the receiver is equal with and
-        without scintillation.
-        """
+        """Return the memory with noise drawn for the next steps. The scintillation has a random generator of its own,
+        so that the noise of the receiver is equal with and without it."""
         self.parts['row'] = 0
         receiver_count = int(self.parts['constants']['first_scintillation_normal'])
         total_count = self.memory.normals.shape[1]
@@ -148,10 +141,7 @@ class TrackingReceiver(Simulated):
         return self.memory._replace(normals=drawn)
 
     def diagnose(self) -> Diagnosis:
-        """Return the Diagnosis, with C/N0 and angle noise among its values.
-
-        The level is ERROR after a status of FAULT_STATUSES since the last diagnosis, and WARN while not locked.
-        """
+        """Return the Diagnosis: ERROR after a status of FAULT_STATUSES since the last one, WARN while not locked."""
         outputs, fault = self.parts['outputs'], int(self.parts['fault'])
         self.parts['fault'] = receiver.Status.LOCKED
         status, p = int(outputs['status']), self.parameters

@@ -53,7 +53,6 @@ class IqNode(unit_node.UnitNode):
         self._send(self.clock()[1])
 
     def _send(self, until: Nanoseconds) -> None:
-        """Send the samples from the last ones to a UTC."""
         rate = self.parameters.source.rate
         if self.sent is None:
             self.sent = until

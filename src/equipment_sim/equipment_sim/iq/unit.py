@@ -1,8 +1,8 @@
 """Unit of the simulated I/Q: from the true beam and the truth of the ship to the samples of all channels of a feed.
 
-Target, path, antenna and injected faults are those of the simulated receiver (tracking_receiver_sim). Their voltages
-modulate a carrier with Doppler shift. The noise power of a sample is 1 in each channel. The power of the carrier in
-one sample is C/N0 divided by the sample rate.
+Target, path, antenna and injected faults are those of the simulated receiver. Their voltages modulate a carrier with
+Doppler shift. The noise power of a sample is 1 in each channel, the power of the carrier is C/N0 divided by the sample
+rate.
 """
 import math
 import typing
@@ -58,11 +58,8 @@ class IqRecord(Record):
 
 
 class Memory(typing.NamedTuple):
-    """All data of the unit.
-
-    A row of the voltages belongs to an integral of three channels, and to a sample of a scanned feed, whose second
-    channel is its reference.
-    """
+    """All data of the unit. A row of the voltages belongs to an integral of three channels, or to a sample of a
+    scanned feed."""
     record: Records         # IqRecord (1,)
     breaks: Floats          # track of the target, see target.Target
     coefficients: Floats
@@ -120,10 +117,9 @@ def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> N
 
 @compiled
 def modulate(voltages: Complexes, scale: Complexes, turns: Pair, samples: Samples, phase: Radians) -> Radians:
-    """Add a carrier with voltages (rows, channels) to samples. Return its phase after them.
+    """Add a carrier with voltages (rows, channels) to samples, and return its phase after them.
 
-    scale: (m,) gain of the first m channels; turns: frequency at the first and after the last sample [rad/sample];
-    phase: of the first sample.
+    scale: gain of the first channels; turns: frequency at the first and after the last sample [rad/sample].
     """
     n, parts = samples.shape[0], voltages.shape[0]
     slope = (turns[1] - turns[0]) / max(n, 1)
@@ -195,8 +191,8 @@ class SimulatedIq(Simulated):
         return samples
 
     def execute(self, command: Command, arguments: Mapping[str, Value]) -> Reply:
-        """Inject a fault; see Simulated. Raises ValueError for a fault of messages, which samples do not have, and for
-        a fault of differences in a conical scan."""
+        """Inject a fault. Raises ValueError for a fault that samples do not have: of messages, of differences in a
+        conical scan."""
         kind = self.parameters.feed.kind
         if command.verb not in (*SIGNAL_FAULTS[kind], table.CLEAR_COMMAND.name):
             raise ValueError(f'{command.verb}: simulated I/Q of {kind} has the faults '

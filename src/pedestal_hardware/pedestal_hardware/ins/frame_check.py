@@ -1,4 +1,4 @@
-"""Comparison of the attitude of an INS with its rates, which finds a wrong frame.
+"""Comparison of the attitude of an INS with its rates, which finds a wrong frame; and the frames that would fit.
 
 Both give the rotation of the deck during a block of BLOCK_TIME_S: a from the attitudes at its begin and end, r from
 the rates. Sums over the last blocks, which fade with MEMORY_TIME_S, give for each axis
@@ -6,12 +6,11 @@ the rates. Sums over the last blocks, which fade with MEMORY_TIME_S, give for ea
     slope          sum a_i r_i / sum r_i^2                        1 in equal frames with equal units
     correlation    sum a_i r_i / sqrt(sum a_i^2 sum r_i^2)        1 in equal frames
 
-The slope decides for gyros, because noise of the attitude does not change its mean. The rate of turn of a compass is
-smoothed by an unknown filter; for it only the sign of the correlation decides.
+The slope decides for gyros, because noise of the attitude does not change its mean. A compass smooths its rate of turn
+by an unknown filter, so for it only the sign of the correlation decides.
 
-A body frame that differs between attitude and rates exchanges axes or signs. A frame that both share with each other,
-but not with the parameters, leaves a and r equal; the direction of the specific force, which points upwards, then
-finds it.
+A body frame that differs between attitude and rates exchanges axes or signs. A frame that both share, but not with the
+parameters, leaves a and r equal; the direction of the specific force, which points upwards, then finds it.
 """
 import itertools
 import math
@@ -104,7 +103,6 @@ def agrees(check: Check, i: int, axes: int) -> bool:
 
 @compiled
 def _close_block(check: Check, q: Quaternion, axes: int) -> None:
-    """Add a block that ends with the quaternion q to the sums, and set the verdict."""
     a = rotation_vector(check.q, q)
     size_a, size_r = math.sqrt(a[0]**2 + a[1]**2 + a[2]**2), 0.0
     for i in range(3):
@@ -138,12 +136,9 @@ def _close_block(check: Check, q: Quaternion, axes: int) -> None:
 
 @compiled
 def take(check: Check, stamp: Nanoseconds, q: Quaternion, w: Vector3, force: Vector3, axes: int) -> None:
-    """Take a sample in the frames that the parameters declare.
+    """Take a sample in the frames that the parameters declare, newer than the last.
 
-    stamp     of the sample, newer than the last
-    q, w      quaternion deck -> earth, and rates [rad/s]
-    force     specific force [m/s2], NaN for none
-    axes      ALL_AXES of gyros, TURN_AXIS of a rate of turn
+    force: NaN for none; axes: ALL_AXES of gyros, TURN_AXIS of a rate of turn.
     """
     if abs(force[0]) + abs(force[1]) + abs(force[2]) < MAX_FORCE_M_S2:      # also excludes NaN
         k = math.exp(-(stamp - check.last) * 1e-9 / MEMORY_TIME_S) if check.runs else 1.0
@@ -179,10 +174,7 @@ MIN_UPRIGHT = 0.5  # smallest cosine of the tilt of a deck; a ship is never furt
 def fitting_conventions(check: AnyRecord, declared: Convention, case: Matrix3, q: Quaternion) -> list[Convention]:
     """Return the conventions that fit, those with the fewest changes from the declared one only.
 
-    check     a Check
-    declared  of the parameters, which does not fit
-    case      rotation case -> deck
-    q         last quaternion of the device, in its own frames
+    case: rotation case -> deck; q: last quaternion of the device, in its own frames.
     """
     body, rate_body = (BODY_MATRICES[name] for name in declared[1:])
     cross = case.T @ check['cross'] @ case

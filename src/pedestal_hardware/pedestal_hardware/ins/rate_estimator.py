@@ -42,9 +42,9 @@ def restart(estimator: Estimator) -> None:
 @compiled
 def take(state: Estimator, stamp: Nanoseconds, q: Quaternion,
          bandwidth: RadiansPerSecond) -> tuple[bool, Xyz, bool]:
-    """Take a quaternion at a stamp that is newer than the last; bandwidth: of the filter.
+    """Take a quaternion with a newer stamp.
 
-    Return (True if the rate is settled, its components [rad/s], True for a sample that jumps and is not used).
+    Return (True if the rate is settled, its components, True for a sample that jumps and is not used).
     """
     if state.jumps == MAX_JUMPS:
         restart(state)

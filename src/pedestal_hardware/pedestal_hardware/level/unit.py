@@ -1,4 +1,4 @@
-"""From the lines of a receiver to levels. No ROS and no clock here: the caller gives the time of arrival."""
+"""Parameters and unit of a receiver with a level only. No ROS and no clock: the caller gives the time of arrival."""
 import dataclasses
 import math
 import typing
@@ -79,7 +79,6 @@ class LevelUnit:
         return self._newest
 
     def _drop(self, kind: str, reason: str, arrival: Nanoseconds) -> Level | None:
-        """Drop a line. Return None, for the caller to return."""
         self.drops.drop(kind, reason, arrival)
         return None
 

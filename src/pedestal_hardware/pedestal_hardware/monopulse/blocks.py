@@ -1,8 +1,8 @@
 """Blocks of samples, and their times.
 
-A source delivers chunks of any length. Each chunk has the number of its first sample, by which gaps show, and the time
-of this sample. `Blocks` makes blocks of equal length of the chunks. `TimeBase` gives the time of each sample: by the
-sample counter, from one measured time. The time of arrival of a chunk alone never is the time of its samples.
+A source delivers chunks of any length, each with the number and the time of its first sample. `TimeBase` gives the
+time of each sample by the sample counter, from one measured time. The time of arrival of a chunk alone never is the
+time of its samples.
 """
 import collections
 import contextlib
@@ -25,8 +25,8 @@ ARRIVAL_WINDOW_S = 10.0
 """Time in which the earliest arrival is searched that sets the counter of a source without times [s]."""
 
 CLOCK_TOLERANCE_S, CLOCK_TIME_S = 0.1, 0.5
-"""Largest deviation of the time of the samples from the clock [s], and the time after which a larger one is a fault
-[s]: a stall of the machine makes some blocks late."""
+"""Largest deviation of the samples from the clock [s], and time after which it is a fault [s]: a stall delays some
+blocks."""
 
 LATE_INTERVAL_S, MIN_LATE_ARRIVALS = 0.25, 5
 """Shortest time [s] and smallest number of arrivals of an interval, of which the earliest arrival counts."""
@@ -127,7 +127,7 @@ class Blocks:
         return made
 
     def _record(self, recorder: 'sigmf.Recorder', chunk: Chunk, begins: bool) -> None:
-        """Write a chunk to the recorder. An error ends the recorder, not the blocks."""
+        """An error ends the recorder, not the blocks."""
         try:
             recorder.write(chunk, begins)
         except StreamError as error:
@@ -159,12 +159,10 @@ class ClockComparison:
 
 
 class ArrivalClock:
-    """Times of the samples of a source without times, from the times at which they arrive.
+    """Times of the samples of a source without times, from the times at which they arrive. Call `lost`, then `utc`.
 
-    A sample arrives after its time by the delay of its way, which varies upwards. The earliest arrival of a window
-    therefore sets the times, with the shortest delay known. For each message call `lost`, then `utc`.
-
-    causes: {ratio of a wrong sample rate and the right one: text on its possible cause}.
+    The delay of a sample varies upwards. The earliest arrival of a window therefore sets the times, with the shortest
+    delay known. causes: {ratio of a wrong sample rate and the right one: text on its possible cause}.
     """
 
     def __init__(self, rate: Hertz, delay: Seconds, causes: Mapping[float, str] | None = None) -> None:
@@ -189,10 +187,7 @@ class ArrivalClock:
 
     def lost(self, next_sample: int, arrived: Nanoseconds) -> int:
         """Return the number of samples that were lost without a sign, 0 for none: for about 0.5 s, no arrival was as
-        early as the times of the samples demand. The caller adds them to the numbers of the samples.
-
-        next_sample: number of the sample after the last one; arrived: UTC.
-        """
+        early as the times of the samples demand. The caller adds them to the numbers of the samples."""
         offset = arrived - round(next_sample * NS_PER_SECOND / self.rate)
         if self.began is None:
             self.began, self.earliest = arrived, offset
@@ -223,8 +218,7 @@ class ArrivalClock:
         return self.offset + round(first * NS_PER_SECOND / self.rate) - self.delay_ns
 
     def check_rate(self, next_sample: int, arrived: Nanoseconds) -> None:
-        """Raise StreamError if the samples of the last RATE_WINDOW_S arrived at a wrong rate. next_sample: number of
-        the sample after the last one; arrived: UTC."""
+        """Raise StreamError if the samples of the last RATE_WINDOW_S arrived at a wrong rate."""
         window = self.arrivals
         window.append((next_sample, arrived))
         while arrived - window[1][1] > RATE_WINDOW_S * NS_PER_SECOND if len(window) > 1 else False:

@@ -27,8 +27,7 @@ DIFFERENTIATION_STEP_BEAMWIDTHS, CIRCLE_DIRECTIONS = 1e-4, 64
 """Step of the numerical derivative [beamwidths], and number of directions on the circle of a conical scan."""
 
 SPREAD_PHASES, SPREAD_POINTS = 16, 32
-"""Number of phases of the scan at the begin of a window, and points of an integral, for the spread of the reference.
-"""
+"""Phases of the scan at the begin of a window, and points of an integral, for the spread of the reference."""
 
 
 def modulation_slope(params: MonopulseParameters) -> float:
@@ -66,11 +65,11 @@ def reference_efficiency(params: MonopulseParameters) -> float:
 
 
 def effective_integration(params: MonopulseParameters) -> Seconds:
-    """Return the time for which a receiver of three channels must integrate to have the noise of one error, at equal
-    C/N0 of the received carrier.
+    """Return the time for which three channels must integrate for the noise of one error, at equal C/N0 of the
+    carrier.
 
-    A scanned feed measures the power of M integrals: var(v) = 4 / (g^2 C/N0 T) with the time T of an error, against
-    1 / (2 k_m^2 C/N0 T) of three channels.
+    A scanned feed measures the power of M integrals: var(v) = 4 / (g^2 C/N0 T) with the time T of an error, against 1
+    / (2 k_m^2 C/N0 T) of three channels.
     """
     if not params.feed.scanned:
         return params.period

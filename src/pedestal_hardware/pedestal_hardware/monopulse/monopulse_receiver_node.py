@@ -59,7 +59,6 @@ class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
         return f'samples of {source.url} ({source.kind})'
 
     def _receive(self) -> None:
-        """Receive samples and make the steps until the node ends."""
         assert self.source is not None and self.blocks is not None
         while not self.ending:
             try:
@@ -82,7 +81,6 @@ class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
                 self._look_for_faults()
 
     def _note_fault(self, text: str) -> None:
-        """Note a fault of the stream, and log a new one."""
         at, last = self.fault
         now = time.monotonic()
         if text != last or now - at > FAULT_TIME_S:
@@ -106,7 +104,6 @@ class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
             self._urgent = [unit.urgent]
 
     def _make(self, block: blocks.Block) -> None:
-        """Make the step of a block, and publish its error."""
         assert self.source is not None
         [port] = self.ports
         if block.missing:
@@ -129,8 +126,8 @@ class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
         self.after_step()
 
     def diagnosed(self) -> Diagnosis:
-        """Return the Diagnosis of the receiver, with the error that ended the recording, and with time 0 if it follows
-        the first samples."""
+        """Return the Diagnosis of the receiver, with the error that ended the recording, and time 0 if the node chose
+        it."""
         diagnosis = super().diagnosed()
         if self.blocks is not None and self.blocks.recorder_fault:
             diagnosis = diagnosis._replace(values=[*diagnosis.values,

@@ -64,8 +64,7 @@ def free_path(meta: str | pathlib.Path) -> str:
 class Recorder:
     """Writer of a recording. Raises StreamError for a path that exists or cannot be written.
 
-    channels: names of the channels; origin: `received` or `simulated`, for the description. The .sigmf-meta file
-    contains a new capture after META_PERIOD_S at the latest, and all captures after `close`.
+    origin: `received` or `simulated`. The .sigmf-meta file lists a capture after META_PERIOD_S at the latest.
     """
 
     def __init__(self, meta: str | pathlib.Path, rate: Hertz, channels: Sequence[str], origin: str) -> None:
@@ -81,8 +80,8 @@ class Recorder:
             raise StreamError(f'{meta}: {error.strerror}; a recording is never overwritten') from None
 
     def write(self, chunk: Chunk, begins: bool) -> None:
-        """Write a chunk. begins: True if a capture begins with it. Raises StreamError for a full disk, and for more
-        than MAX_CAPTURES captures."""
+        """Write a chunk. begins: True if a capture begins with it. Raises StreamError for a full disk or too many
+        captures."""
         if begins and len(self.captures) == MAX_CAPTURES:
             raise StreamError(f'{self.meta}: {MAX_CAPTURES} captures: a recording must have no more gaps and changes '
                               'of its clock')
@@ -97,7 +96,6 @@ class Recorder:
 
     @contextlib.contextmanager
     def _errors_named(self) -> Iterator[None]:
-        """Turn the OSErrors in this context into a StreamError that names the recording."""
         try:
             yield
         except OSError as error:
@@ -127,8 +125,7 @@ class Recorder:
 class Recording:
     """Recording that is read. Raises StreamError for a file that does not fit.
 
-    channels: names of the channels that the receiver needs; rate: sample rate that it needs, None for any; cut:
-    text about samples that the file lacks, or ''.
+    rate: sample rate that the receiver needs, None for any; cut: text about samples that the file lacks, or ''.
     """
 
     def __init__(self, meta: str | pathlib.Path, channels: Sequence[str], rate: Hertz | None = None) -> None:
@@ -181,7 +178,6 @@ class Recording:
         return value
 
     def _checked(self, captures: list[Json]) -> list[Capture]:
-        """Return the captures. Raises StreamError for one that does not fit."""
         found: list[Capture] = []
         for capture in captures:
             if not isinstance(capture, dict):

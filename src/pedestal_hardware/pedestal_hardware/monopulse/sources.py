@@ -33,8 +33,8 @@ class Source(Protocol):
     full_scale: float | None    # largest part of a sample, None if the samples have no limit
 
     def read(self, timeout: Seconds) -> Chunk | None:
-        """Wait at most this time, and return the next chunk, or None if none is complete. Raises StreamError for data
-        that do not fit; the next call continues."""
+        """Return the next chunk, or None if none is complete in this time. Raises StreamError for data that do not
+        fit; the next call continues."""
 
     @property
     def counts(self) -> dict[str, int]:
@@ -139,8 +139,7 @@ class ZmqSource:
         return Chunk(samples, number, self.times.utc(number, len(samples), arrived))
 
     def _without_tags(self, data: bytes) -> tuple[bytes, int | None]:
-        """Return (samples, number of the first one or None) of a message. Raises StreamError for tags, which have no
-        fixed length."""
+        """Return (samples, number of the first one). Tags are refused: they have no fixed length."""
         if len(data) < TAG_HEADER.size or len(data) % 8 != TAG_HEADER.size % 8:
             return data, None
         magic, version, first, tags = TAG_HEADER.unpack_from(data)

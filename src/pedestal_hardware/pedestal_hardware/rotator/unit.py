@@ -149,7 +149,6 @@ class Rotator(AngleDrive):
 
     @property
     def _distance_deg(self) -> Degrees:
-        """Distance of the rotator from its last set-point, of the farther axis; NaN before the first."""
         return math.degrees(np.abs(self.parts['state']['set_point'] - self.parts['device']['angle']).max())
 
     @property

@@ -1,8 +1,7 @@
 """Controller: it turns the requests of rotator programs into commands to the control unit, for all protocols.
 
-One program at a time is in control. Its set-points (directions) become one steady motion. A jog lasts until its
-program leaves or sends another command. Some programs open a connection for each set-point; such a program stays in
-control until its motion ends.
+One program at a time is in control. A jog lasts until its program leaves or sends another command. Some programs open
+a connection for each set-point; such a program stays in control until its motion ends.
 """
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -60,10 +59,7 @@ def _outcome(refusal: str) -> int:
 
 
 class Controller:
-    """Control of the antenna by the clients of a server.
-
-    In all methods client is the name of a client, and now a time of the monotonic clock.
-    """
+    """Control of the antenna by the clients of a server, of which each method gets the name."""
     _jog: Sequence[float] | None    # rates (azimuth, elevation) [deg/s]
 
     def __init__(self, remote: Remote) -> None:
@@ -134,16 +130,14 @@ class Controller:
         self._release()
 
     def _release(self) -> None:
-        """Release control, and leave the motion as it is."""
+        """Leave the motion as it is."""
         self._remote.who = self._holder
         self._holder, self._has_left = '', False
         self._remote.request('release')
 
     def _request(self, client: str, now: Seconds, send: Callable[[], str], continues: bool = True) -> PendingRequest:
-        """Return the pending request of send(), which sends a command; take control first if necessary.
-
-        continues: False for a command that ends the motion of the set-points.
-        """
+        """Return the pending request of send(); take control first if necessary. continues: False for a command that
+        ends the motion of the set-points."""
         if self._has_left and address_of(client) == address_of(self._holder):
             self._release()  # the same program on a new connection: its motion continues
         if self._holder not in ('', client):

@@ -68,11 +68,8 @@ class Client:
         self._receive_time = time.monotonic()
 
     def end_line(self, is_complete: Callable[[str], bool]) -> None:
-        """Take the bytes of a program that never sends line ends after LINE_END_TIMEOUT_S as a line, if
-        is_complete(line).
-
-        This serves gpredict for Windows.
-        """
+        """Take the bytes of a program that never sends line ends, as gpredict for Windows, as a line after
+        LINE_END_TIMEOUT_S, if is_complete(line)."""
         line = self._splitter.rest.decode('ascii', 'replace')
         if (not self.lines and time.monotonic() - self._receive_time > LINE_END_TIMEOUT_S
                 and not self._has_line_ends and not self._splitter.skips and is_complete(line)):
@@ -103,8 +100,7 @@ AnyClient = TypeVar('AnyClient', bound=Client)
 class LineServer(Generic[AnyClient]):
     """Clients of one TCP port, and of a serial device ('': none). Raises OSError.
 
-    kind: start of the names of the clients; most: largest number of clients; longest: largest length of a line
-    [bytes]; make_client(stream, name, longest) makes a client.
+    kind: start of the names of the clients; most: largest number of clients; longest: of a line [bytes].
     """
     clients: list[AnyClient]
     refused_count: int
@@ -172,7 +168,6 @@ class LineServer(Generic[AnyClient]):
         self._selector.register(stream, selectors.EVENT_READ, client)
 
     def _drop(self, client: AnyClient) -> None:
-        """Remove a client and close its connection."""
         self.clients.remove(client)
         self._selector.unregister(client.stream)
         client.stream.close()

@@ -1,9 +1,8 @@
 """Pointing of the antenna by the set-points (directions) of a rotator program, as one steady motion.
 
 Such a program knows nothing of azimuth turns, rates and ships. It sends a direction about every 0.8 s, with an azimuth
-of 0 to 360 deg. Ashore, a set-point becomes a command `preset` on the nearest turn of the azimuth. On a ship, it
-becomes a command `slave` in earth angles. Successive set-points become one motion (SetPointFilter), which ends at the
-last set-point.
+of 0 to 360 deg. Ashore, a set-point becomes a command `preset` on the nearest turn of the azimuth; on a ship, a
+command `slave` in earth angles. Successive set-points become one motion, which ends at the last one.
 """
 import math
 from collections.abc import Sequence
@@ -19,12 +18,12 @@ from pedestal_operator.rotator.set_point_filter import SetPointFilter
 
 (OUTCOME_DONE, OUTCOME_REFUSED, OUTCOME_OUT_OF_REACH, OUTCOME_BUSY, OUTCOME_NO_REPLY,
  OUTCOME_NO_POSITION) = range(6)
-"""Outcomes of a request. OUTCOME_BUSY: another client is in control. OUTCOME_NO_POSITION: the antenna publishes no
-position, or its limits are unknown."""
+"""Outcomes of a request. BUSY: another client is in control. NO_POSITION: position or limits of the antenna are
+unknown."""
 
 
 class Refused(Exception):  # noqa: N818  no error of the server
-    """A refused request. outcome: one of the outcomes above; reason: one line."""
+    """A refused request. reason: one line."""
 
     def __init__(self, outcome: int, reason: str) -> None:
         super().__init__(reason)
@@ -32,25 +31,17 @@ class Refused(Exception):  # noqa: N818  no error of the server
 
 
 SLAVE_DURATION_S = 3600.0
-"""Time for which a `slave` direction on a ship is valid [s].
+"""Time for which a `slave` direction is valid [s]: longer than a pass, because a program may send one set-point
+only."""
 
-A program may send one set-point and then none for a long time. The antenna then keeps this direction for a time that
-is longer than a pass.
-"""
-
-MAX_ANGLE_AGE_S = 0.5
-"""Age after which angles and attitude are stale [s]; they are published at each step of the drive."""
+MAX_ANGLE_AGE_S = 0.5  # of angles and attitude, which are published at each step of the drive [s]
 
 MAX_AZIMUTH_DEG, MAX_SHIP_ELEVATION_DEG = 720.0, 180.0
-"""Largest azimuth of a set-point; largest elevation of a set-point on a ship [deg], in both directions.
-
-On a ship a set-point is an earth direction, to which the limits of the axes, which are deck angles, do not apply.
-"""
+"""Largest azimuth of a set-point; largest elevation on a ship [deg], where the limits of the axes do not apply."""
 
 ATTITUDE_TOPIC = 'ship/imu/data'  # topic of the attitude, which exists on a ship only
 
 LIMIT_PARAMETERS = tuple(f'{axis}.limits.{end}' for axis in topics.AXES for end in ('low', 'high'))
-"""Parameters of the control unit with the limits of the axes."""
 
 
 def _out_of_reach(name: str, angle: Degrees, low: Degrees, high: Degrees) -> Refused:
@@ -119,10 +110,8 @@ class Pointing:
         return azimuth, elevation
 
     def target(self, azimuth: Degrees, elevation: Degrees, now: Seconds) -> tuple[Degrees, Degrees]:
-        """Return the set-point (azimuth, elevation) for a direction at the time now, on the nearest turn.
-
-        Raises Refused if it is out of reach, or if the position or the limits of the antenna are unknown.
-        """
+        """Return the set-point (azimuth, elevation) for a direction at the time now, on the nearest turn. Raises
+        Refused."""
         limits = self.limits
         low, high = (-MAX_SHIP_ELEVATION_DEG, MAX_SHIP_ELEVATION_DEG) if self.on_ship else limits.elevation
         self._check('azimuth', azimuth, -MAX_AZIMUTH_DEG, MAX_AZIMUTH_DEG)
@@ -160,10 +149,7 @@ class Pointing:
         self._filter = SetPointFilter()
 
     def _request(self, angles: Pair, rates: Sequence[float] | Pair = (0.0, 0.0), moves: Seconds = 0.0) -> str:
-        """Command angles [deg] that move at rates [deg/s] for the time `moves`. Return the number of the request.
-
-        On a ship the command is valid for SLAVE_DURATION_S.
-        """
+        """Command angles [deg] that move at rates [deg/s] for the time `moves`. Return the number of the request."""
         names = (*topics.AXES, *(f'{axis}_rate' for axis in topics.AXES))
         arguments = {**dict(zip(names, np.radians((*angles, *rates)))), 'moves': moves}
         if self.on_ship:

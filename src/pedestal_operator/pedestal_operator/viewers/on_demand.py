@@ -15,10 +15,8 @@ from pedestal_operator.viewers import frames
 
 
 class OnDemand:
-    """Subscription of a node to the topic of a link, which can be switched on and off.
-
-    take(CDR bytes, rclpy's message info) is called for each message.
-    """
+    """Subscription of a node to the topic of a link. take(CDR bytes, rclpy's message info) is called for each
+    message."""
     _subscriptions: list[Subscription]
 
     def __init__(self, node: Shell, link: Link, take: Callable[[bytes, Message], None]) -> None:
@@ -34,7 +32,6 @@ class OnDemand:
 
 
 class _Latest:
-    """Last message of a stamped topic, decoded when it is read."""
     _data: bytes | None                                     # received since the last reading
     _read: tuple[Nanoseconds, Sequence[float]] | None       # result of the last reading
 

@@ -1,16 +1,5 @@
-"""Recorded flights as targets: from a log of fixes to a trajectory in the ENU frame of the station.
+"""Files of targets: recorded flights, predicted orbits, tables of directions (docs/tracks.md).
 
-A fix is a recorded position of an aircraft with its time.
-
-    fixes.py                        fixes of one aircraft in a log
-    tables.py, gpx.py, nmea.py      readers of logs: CSV, GPX, NMEA
-    times.py, dates.py, instant.py  times of a log
-    flight.py                       spline of the fixes
-    place.py                        station for a flight
-
-Symbols
-    e, n, u     east, north, up from the station, the place of the antenna                      [m]
-    sigma       1-sigma of a fix, per axis                                                      [m]
-    q           root of the power density of the white acceleration, constant-velocity model    [m/s2/sqrt(Hz)]
-    lambda      sigma^2 / q^2, weight of the acceleration in a smoothing spline                 [s3]
+A reader (tables, gpx, nmea, oem, stk, directions) makes fixes, states or directions of a file. flight and course make
+a trajectory in the ENU frame of the station of these, and the parameters of a run that the file gives.
 """

@@ -1,8 +1,9 @@
 """Trajectory of the target from an orbit or a table of directions, and the parameters of a run that the file gives.
 
-An orbit becomes a cubic Hermite spline through interpolated positions and velocities every MAX_KNOT_SPACING_S. This
-spline is within 1 mm of the orbit. A table of directions becomes the cubic spline through its unit vectors, at the
-range target.angle.range. Because of the unit vectors, this spline is smooth at the zenith and through north.
+An orbit becomes a cubic Hermite spline through interpolated positions and velocities every MAX_KNOT_SPACING_S, within
+1 mm of the orbit. A table of directions becomes the cubic spline through its unit vectors, at the range
+target.angle.range. Because of the unit vectors it is smooth at the zenith and through north. A time t counts from
+ephemeris.midnight.
 """
 import math
 from collections.abc import Collection
@@ -29,10 +30,7 @@ SEGMENT_GAP_TOLERANCE_S = 1e-3  # largest time between two segments [s] that doe
 
 
 def enu(ephemeris: states.Ephemeris, station: StationParameters, t: Times) -> tuple[Vectors3, Vectors3]:
-    """Return position [m] and velocity relative to the earth [m/s], ENU of the station, at t.
-
-    The numbers are NaN outside all segments.
-    """
+    """Return position and velocity relative to the earth, ENU of the station, at t; NaN outside all segments."""
     r, v = np.full((2, len(t), 3), np.nan)
     for segment in reversed(ephemeris.segments):
         covered = (t >= segment.begin - SEGMENT_GAP_TOLERANCE_S) & (t <= segment.end + SEGMENT_GAP_TOLERANCE_S)
@@ -73,11 +71,9 @@ def require_covered(ephemeris: states.Ephemeris, begin: Seconds, end: Seconds) -
 
 def passage(ephemeris: states.Ephemeris, station: StationParameters,
             start: Seconds | None = None) -> tuple[Seconds, Seconds]:
-    """Return (t of the beginning, t of the end) of the first pass that climbs above MIN_CULMINATION_DEG.
+    """Return (begin, end) of the first pass that climbs above MIN_CULMINATION_DEG, as far as the file goes.
 
-    The pass lasts from rise to set, or as far as the file goes. start: t at which the run begins, which is then
-    returned as the beginning; None: the run begins with the pass. Raises csv_table.TableError if there is no such
-    pass.
+    start: begin of the run, which then is the begin; None: the run begins with the pass. Raises csv_table.TableError.
     """
     t = np.append(np.arange(ephemeris.begin, ephemeris.end, PASS_SEARCH_STEP_S), ephemeris.end)
     seen = np.full(len(t), np.nan)
@@ -99,10 +95,8 @@ def passage(ephemeris: states.Ephemeris, station: StationParameters,
 
 def _ends(ephemeris: states.Ephemeris, station: StationParameters, t: Times, seen: Floats, pass_of: tuple[int, int],
           start: Seconds | None) -> tuple[Seconds, Seconds]:
-    """Return (rise, or start if given, and set) of a pass in the search steps [i, j).
-
-    Rise and set are exact to a millisecond if the steps before and after the pass are below the horizon.
-    """
+    """Return (rise, or start if given, and set) of a pass in the search steps [i, j), exact to a millisecond if the
+    steps before and after the pass are below the horizon."""
     i, j = pass_of
     rise, down = t[i] if start is None else start, t[j - 1]
     if start is None and i and np.isfinite(seen[i - 1]):
@@ -113,7 +107,6 @@ def _ends(ephemeris: states.Ephemeris, station: StationParameters, t: Times, see
 
 
 def _crossing(ephemeris: states.Ephemeris, station: StationParameters, before: Seconds, after: Seconds) -> Seconds:
-    """Return the t between two steps at which the orbit crosses the """
     return brentq(lambda t: elevation(ephemeris, station, t)[0], before, after, xtol=1e-3)
 
 
@@ -150,10 +143,8 @@ def flight_of_orbit(ephemeris: states.Ephemeris, target: TargetParameters, durat
 
 def _check_acceleration(ephemeris: states.Ephemeris, spline: CubicHermiteSpline, zero: Seconds,
                         limit: MetersPerSecond2) -> None:
-    """Raise TableError, with the line of the state nearest to the peak, if the acceleration exceeds limit.
-
-    A wrong digit in the file causes such an acceleration. zero: t of stamp 0.
-    """
+    """Raise TableError, with the line of the nearest state, for an acceleration that a wrong digit in the file
+    causes."""
     size = np.linalg.norm(spline(spline.x, 2), axis=1)
     worst = int(np.argmax(size))
     if not size[worst] <= limit:
@@ -211,7 +202,6 @@ def run_parameters_of_directions(directions: Directions, target: TargetParameter
 
 
 def _station(target: TargetParameters) -> dict[str, float]:
-    """Return {parameter: value} of the station of the scenario, which the file does not change."""
     return {f'target.station.{name}': value for name, value in parameters.as_dict(target.station).items()}
 
 

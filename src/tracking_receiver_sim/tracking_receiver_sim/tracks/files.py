@@ -1,7 +1,6 @@
 """Track files of a target: their formats, and their kinds (recorded fixes, predicted orbit, table of directions).
 
-target.py calls `lay_out`. The first row of FILE_FORMATS that matches the beginning of a file gives its reader and its
-kind.
+The first row of FILE_FORMATS that matches the beginning of a file gives its reader and its kind.
 """
 import re
 from collections.abc import Callable, Collection, Iterator
@@ -40,12 +39,10 @@ class FileFormat(NamedTuple):
 
 
 def _read_log(rows: Callable[[str, fixes.Log], Iterator[fixes.Fix]]) -> Callable[[TrackFileParameters], fixes.Fixes]:
-    """Return the reader of a format whose function `rows` yields fixes."""
     return lambda track: fixes.read(track, rows)
 
 
 def _read_object(read: Callable[[str, str], Data]) -> Callable[[TrackFileParameters], Data]:
-    """Return the reader of a format whose function is read(path, name of the object)."""
     return lambda track: read(track.path, track.aircraft)
 
 
@@ -59,7 +56,7 @@ FILE_FORMATS = (
     FileFormat('table of azimuth and elevation', DIRECTIONS_KIND, directions.is_table,
                _read_object(directions.read_table)),
     FileFormat('CSV', LOG_KIND, lambda beginning: True, _read_log(tables.rows)))
-"""Formats in the order in which a file is compared with them; the last one takes every other file."""
+"""A file is compared with them in this order; the last one takes every other file."""
 
 FOREIGN_FORMATS = (
     (re.compile(r'A[A-Z0-9]{3}[^\n]*\n(?:[^\n]*\n){0,200}?(?:HFDTE|B\d{13}[NS]\d{8}[EW][AV])'),
@@ -87,8 +84,8 @@ def read(track: TrackFileParameters) -> tuple[FileKind, Data]:
 
 
 def lay_out(target: TargetParameters, duration: Seconds, margin: Seconds) -> flight.Flight:
-    """Return the Flight of a target for a run of `duration`, with `margin` at both ends as far as the file goes;
-    raises csv_table.TableError."""
+    """Return the Flight of a target for a run of `duration`, with `margin` at both ends as far as the file goes.
+    Raises csv_table.TableError."""
     kind, data = read(target.track_file)
     return kind.lay_out(data, target, duration, margin)
 

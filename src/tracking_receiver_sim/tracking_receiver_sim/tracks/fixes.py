@@ -1,7 +1,4 @@
-"""The fixes of one aircraft in a log: recorded positions with their times, checked for their order in time.
-
-A reader of a format (tables.rows, gpx.rows, nmea.rows) yields the fixes of all aircraft; `read` selects one aircraft.
-"""
+"""The fixes of one aircraft in a log: recorded positions with their times, checked for their order in time."""
 import array
 import pathlib
 from collections import Counter
@@ -94,10 +91,7 @@ def read(track: TrackFileParameters, rows: Callable[[str, Log], Iterator[Fix]]) 
 
 
 def _without_repetitions(table: Floats, log: Log) -> Floats:
-    """Return the rows (line, time, place) without those that repeat time and place of the row before.
-
-    The log receives the number of repetitions.
-    """
+    """Remove the rows that repeat time and place of the row before; the log receives their number."""
     repeated = np.append(False, (np.diff(table[:, 1:], axis=0) == 0.0).all(axis=1))[:len(table)]
     if repeated.any():
         log.passed_over['row that repeats time and place'] = int(repeated.sum())
@@ -105,10 +99,7 @@ def _without_repetitions(table: Floats, log: Log) -> Floats:
 
 
 def _chosen_aircraft(track: TrackFileParameters, all_aircraft: Collection[Aircraft]) -> tuple[str, int]:
-    """Return (' of' its names, its number) of the aircraft that `track` names, or of the only one.
-
-    Raises TableError if no aircraft or several match.
-    """
+    """Return (' of' its names, its number) of the aircraft that `track` names, or of the only one."""
     wanted = track.aircraft.strip().lower()
     matches = [aircraft for aircraft in all_aircraft
                if not wanted or wanted in {name.lower() for name in aircraft.names}]
@@ -124,17 +115,14 @@ def _chosen_aircraft(track: TrackFileParameters, all_aircraft: Collection[Aircra
 
 
 def _label(aircraft: Aircraft) -> str:
-    """Return the names of an aircraft in one text, '' without a name."""
     return ' '.join(sorted(name[:40] for name in aircraft.names if name)[:MAX_LISTED_AIRCRAFT])
 
 
 def _passed_over(log: Log) -> str:
-    """Return a part of the description with the rows that were passed over."""
     return ''.join(f', passed over {count} x {kind}' for kind, count in sorted(log.passed_over.items()))
 
 
 def _check_order(fixes: Fixes, track: TrackFileParameters, log: Log) -> None:
-    """Raise TableError, with the line, if the time falls, stays or jumps by more than max_gap."""
     step = np.diff(fixes.time)
     wrong = ~((step > 0.0) & (step <= track.max_gap))
     if wrong.any():

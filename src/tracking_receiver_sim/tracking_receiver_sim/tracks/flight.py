@@ -1,4 +1,5 @@
-"""A flight as a cubic spline in the ENU frame of the station, from fixes that are held, coarse and noisy.
+"""A recorded flight: cubic spline in the ENU frame of the station, from fixes that are held, coarse and noisy; station
+and duration of its run.
 
 Held positions: an ADS-B log repeats latitude and longitude until the next message comes. Such a repetition is no
 measurement and is dropped. If a position stays for max_gap or longer, or throughout the file, the target stands still,
@@ -12,6 +13,11 @@ this model, started without prior knowledge, equals the natural cubic spline f t
 
 (Wahba, J. R. Stat. Soc. B 40 (1978) 364-372; Kohn and Ansley, SIAM J. Sci. Stat. Comput. 8 (1987) 33-48). scipy solves
 it in a time proportional to the number of fixes. Without smoothing the spline runs through every fix.
+
+The station stands beside the fix in the middle of the flight (by time), to the right of the line from the first fix to
+the last, as near as possible. Every fix is at least the least range away over ground: the range at which the peak
+speed turns the azimuth by MAX_AZIMUTH_RATE_RAD_S. Because the terrain is not known, the station is lower than the
+lowest fix. This keeps a level flight above the horizon.
 """
 import dataclasses
 import math
@@ -32,8 +38,7 @@ from tracking_receiver_sim.tracks.fixes import Fixes
 
 SAMPLES_PER_PIECE = 4  # number of samples of a piece of the spline, for peak speed and range
 
-ALTITUDE_STEPS_M = (('100 ft', 30.48), ('25 ft', 7.62))
-"""Names and sizes [m] of the steps in which aircraft broadcast their altitude."""
+ALTITUDE_STEPS_M = (('100 ft', 30.48), ('25 ft', 7.62))  # in which aircraft broadcast their altitude
 ALTITUDE_TOLERANCE_M = 0.06  # largest distance from a multiple of a step [m]: logs are rounded to 0.1 m
 
 
@@ -98,17 +103,13 @@ def smoothed(time: Times, enu: Vectors3, track: TrackFileParameters) -> PPoly:
 
 
 def _samples(breaks: Times) -> Times:
-    """Return SAMPLES_PER_PIECE times of each piece of a spline, and its end."""
     return np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(SAMPLES_PER_PIECE)
                       / SAMPLES_PER_PIECE).ravel(), breaks[-1])
 
 
 def _check_limits(fixes: Fixes, spline: PPoly, track: TrackFileParameters) -> tuple[MetersPerSecond, MetersPerSecond2]:
-    """Return (peak speed, peak acceleration) of a spline.
-
-    Raises TableError, with the line of the fix nearest to the peak, if a peak is above its limit. The acceleration is
-    linear between the breaks, so its peak is at a break.
-    """
+    """Return (peak speed, peak acceleration) of a spline. Raise TableError, with the line of the fix nearest to the
+    peak, if a peak is above its limit. The acceleration is linear between the breaks, so its peak is at a break."""
     times = _samples(spline.x)
     peaks = {}
     for name, limit, unit, at, order in (('acceleration', track.max_acceleration, 'm/s2', spline.x, 2),
@@ -125,7 +126,6 @@ def _check_limits(fixes: Fixes, spline: PPoly, track: TrackFileParameters) -> tu
 
 
 def _quantisation(fixes: Fixes, speed: MetersPerSecond) -> str:
-    """Return a part of the summary that states whether times and altitudes are coarse; speed: peak."""
     whole = bool((fixes.time == np.round(fixes.time)).all())
     steps = next((name for name, step in ALTITUDE_STEPS_M if len(np.unique(fixes.altitude)) >= 3 and
                   np.abs(fixes.altitude - step * np.round(fixes.altitude / step)).max() < ALTITUDE_TOLERANCE_M), None)
@@ -134,7 +134,6 @@ def _quantisation(fixes: Fixes, speed: MetersPerSecond) -> str:
 
 
 def _residual(difference: Vectors3) -> str:
-    """Return a part of the summary with the difference [m] of the smoothed track to its fixes."""
     size = np.linalg.norm(difference, axis=1)
     return f', smoothed: off the fixes by {np.sqrt(np.mean(size**2)):.3g} m rms, {size.max():.3g} m at most'
 
@@ -146,7 +145,6 @@ MIN_STATION_HEIGHT_M, MAX_STATION_HEIGHT_M = -500.0, 3000.0  # range of the heig
 MIN_DURATION_S, MAX_DURATION_S = 0.1, 86400.0  # range of the duration of a run [s]
 
 STATION_FIELDS = {f'target.station.{field.name}': field.name for field in dataclasses.fields(StationParameters)}
-"""{parameter: field of StationParameters}."""
 
 
 def station_for(fixes: Fixes, track: TrackFileParameters) -> StationParameters:
@@ -171,10 +169,7 @@ def station_for(fixes: Fixes, track: TrackFileParameters) -> StationParameters:
 
 
 def _clear_of(along: Floats, across: Floats, least_range: Meters) -> Meters:
-    """Return the least s >= 0 at which the place (0, s) has the distance least_range or more from all points.
-
-    along, across: coordinates of the points [m].
-    """
+    """Return the least s >= 0 at which the place (0, s) has the distance least_range or more from all points."""
     near = np.abs(along) < least_range
     half = np.sqrt(least_range**2 - along[near]**2)
     s = 0.0
@@ -188,9 +183,8 @@ def _clear_of(along: Floats, across: Floats, least_range: Meters) -> Meters:
 def run_parameters(fixes: Fixes, target: TargetParameters, given: Collection[str]) -> dict[str, float]:
     """Return {parameter: value} that fixes give for a run. Raises csv_table.TableError.
 
-    given: names of the parameters that the scenario sets; only those of the station matter here. The reference range
-    is the greatest range of the flight, so the C/N0 of the parameter is the lowest of the run. The run ends at the
-    last tenth of a second before the last fix.
+    given: names of the parameters that the scenario sets. The reference range is the greatest range of the flight, so
+    the C/N0 of the parameter is the lowest of the run. The run ends at the last tenth of a second before the last fix.
     """
     derived = station_for(fixes, target.track_file)
     station = dataclasses.replace(target.station, **{

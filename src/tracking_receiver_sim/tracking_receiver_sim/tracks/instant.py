@@ -1,4 +1,4 @@
-"""Instants, the times of track files: seconds since 1970 that count leap seconds.
+"""Instants, the times of track files: seconds since 1970 that count leap seconds, from dates in many notations.
 
 Because leap seconds count, the difference of two instants is the time between them. An instant is TAI - 37 s. From
 2017 on it equals the seconds since 1970 of computers, which omit leap seconds. The table of leap seconds is that of
@@ -32,8 +32,8 @@ DATE_PATTERNS = tuple(re.compile(f'{date}(?P<zone> ?(?:Z|UTC|[+-]\\d\\d:?\\d\\d)
                                    rf'(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>\d{{4}}) {_CLOCK}',
                                    rf'(?:A\.D\. )?(?P<year>\d{{4}})-{_MONTH}-(?P<day>\d\d) {_CLOCK}',
                                    rf'(?P<day>\d{{1,2}}) {_MONTH} (?P<year>\d{{4}}) {_CLOCK}'))
-"""Notations in this order: ISO 8601, its basic format (20180723T100000), year/month/day, day.month.year, JPL Horizons
-(2018-Jul-23), STK (23 Jul 2018)."""
+"""ISO 8601, its basic format (20180723T100000), year/month/day, day.month.year, JPL Horizons (2018-Jul-23), STK, the
+Systems Tool Kit (23 Jul 2018)."""
 AMBIGUOUS_PATTERN = re.compile(r'\d{1,2}[/-]\d{1,2}[/-](?:\d{4}|\d\d)\b.*', re.ASCII)
 """A date whose order of day and month differs between countries."""
 DATE_EXAMPLES = ('2018-07-23T10:00:00Z, 2018/07/23 10:00:00, 23.07.2018 10:00:00, 2018-Jul-23 10:00:00 or '
@@ -62,7 +62,6 @@ UNIX_EPOCH_JULIAN_DATE = 2_440_587.5  # julian date of 1970-01-01T00:00 UTC
 
 ISO_TIME_PATTERN = re.compile(
     r'(\d{4}-\d\d-\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,9}))?(?: ?(?:Z|UTC|([+-])(\d\d):?(\d\d)))?', re.ASCII)
-"""Date and time of day in ISO 8601, with or without a zone."""
 
 FINE_UNIX_TIME_PATTERN = re.compile(r'[1-9](?:\d{12}|\d{15})(?:\.0*)?', re.ASCII)
 """Milliseconds or microseconds since 1970, of the years 2001 to 2286. Read as seconds, such a number is no date."""
@@ -109,8 +108,8 @@ def is_dated(text: str) -> bool:
 def seconds(path: FilePath, line: int, name: str, text: str | None) -> Seconds:
     """Return the instant of a text. Raises TableError.
 
-    The text is a date, see `dates` (without a zone: UTC), or a number of seconds since 1970 without leap seconds. A
-    number of 13 digits is in milliseconds, and one of 16 digits in microseconds.
+    The text is a date (without a zone: UTC), or a number of seconds since 1970 without leap seconds. A number of 13
+    digits is in milliseconds, and one of 16 digits in microseconds.
     """
     text = iso_date(text)
     match = ISO_TIME_PATTERN.fullmatch(text)
@@ -132,7 +131,6 @@ def seconds(path: FilePath, line: int, name: str, text: str | None) -> Seconds:
 
 def _of_iso(date: str, hours: str, minutes: str, second: str, fraction: str | None, sign: str | None,
             zone_hours: str | None, zone_minutes: str | None) -> Seconds:
-    """Return the instant of the groups of ISO_TIME_PATTERN. Raises ValueError."""
     leap = int(second) == 60
     zone = f'{sign}{zone_hours}:{zone_minutes}' if sign else '+00:00'
     utc = datetime.datetime.fromisoformat(f'{date}T{hours}:{minutes}:{59 if leap else second}{zone}').timestamp()
@@ -157,10 +155,7 @@ def iso(value: Seconds) -> str:
 
 
 def utc_texts(begin: np.datetime64, passed: NDArray[np.timedelta64]) -> Texts:
-    """Return ISO 8601 to the microsecond of times, UTC.
-
-    begin: UTC, in us; passed: times after begin, growing, in us.
-    """
+    """Return ISO 8601 to the microsecond of times, UTC: `passed`, growing, after begin."""
     times: NDArray[np.datetime64] = np.add(begin, passed)
     texts = np.datetime_as_string(times)
     first, last = (int(time.astype('M8[D]').astype(int)) for time in (begin, times[-1])) if len(times) else (0, 0)

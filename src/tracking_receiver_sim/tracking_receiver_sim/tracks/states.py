@@ -1,6 +1,10 @@
-"""Orbit of a file: states (time, position, velocity) in segments, which the readers oem and stk make.
+"""Orbit of a file: states (time, position, velocity) in segments, and the interpolation HERMITE or LAGRANGE of CCSDS
+502.0 between them.
 
-A segment has a frame, and the degree of the polynomials that join its states.
+The polynomial HERMITE of degree d runs through the positions and velocities of (d + 1) / 2 states, LAGRANGE through
+the positions of d + 1 states. These states lie about the wanted time as evenly as the ends of the segment allow. scipy
+evaluates the form of Newton with divided differences (Krogh, Math. Comp. 24 (1970) 185-190). The variable u, the time
+scaled to -1 ... 1 over the states, takes the place of t, because this reduces the rounding errors.
 """
 from typing import NamedTuple
 
@@ -10,8 +14,7 @@ from scipy.interpolate import KroghInterpolator
 from pedestal_common.quantities import Bools, Floats, Ints, Seconds, Times, Vectors3
 from pedestal_common.text_files import csv_table
 
-INTERPOLATION_METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')
-"""Methods that a file may name; LINEAR is LAGRANGE of degree 1."""
+INTERPOLATION_METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')  # LINEAR is LAGRANGE of degree 1
 DEGREE_LIMITS = 1, 19  # range of the degree of a polynomial
 DEFAULT_INTERPOLATION = 'HERMITE', 7  # method and degree of the interpolation if the file gives none
 
@@ -22,10 +25,7 @@ GAP_STEP_RATIO = 3.0  # ratio of a step in time to each of its neighbours above 
 
 
 def gaps(t: Times) -> Bools:
-    """Return a mask (n - 1,) of the steps between the times t: True for a gap.
-
-    A gap is longer than GAP_STEP_RATIO times each of its neighbours.
-    """
+    """Return True for each step between times that is longer than GAP_STEP_RATIO times each of its neighbours."""
     step = np.diff(t)
     longest = np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0))
     return (step > GAP_STEP_RATIO * longest) & (longest > 0.0)
@@ -77,8 +77,8 @@ def segment(path: str, first_line: int, table: Floats, frame: str, method: str, 
     """Return a Segment of a table (n, 8) of line, t, x, y, z [m], vx, vy, vz [m/s]; (n, 5) without velocities.
 
     first_line: line in which the segment begins; method, degree: '' and None if the file gives none; begin, end:
-    usable range of t, None: all states. Raises TableError if the time does not grow, a state is outside
-    RADIUS_LIMITS_M, or the states are too few.
+    usable range of t. Raises TableError if the time does not grow, a state is outside RADIUS_LIMITS_M, or the states
+    are too few.
     """
     if not len(table):
         raise csv_table.TableError(f'{path}: line {first_line}: the segment that begins here has no state')

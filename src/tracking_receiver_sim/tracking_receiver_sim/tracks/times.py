@@ -1,7 +1,5 @@
-"""Times in a column of a track file: UTC as a date, Julian dates, or numbers from any origin.
-
-A table may also have two columns: one of the date and one of the time of day, both UTC.
-"""
+"""Times in a column of a track file: UTC as a date, Julian dates, or numbers from any origin; or in two columns, one
+of the date and one of the time of day, both UTC."""
 from collections.abc import Sequence
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
@@ -16,23 +14,17 @@ TIME = columns.Quantity('time', {
                     columns.UTC),
     **dict.fromkeys(('jd', 'jdut', 'jdutc', 'jd ut', 'jd utc', 'julian date', 'julian day'), columns.JULIAN_DATE),
     **dict.fromkeys(('mjd', 'mjd ut', 'mjd utc'), columns.MODIFIED_JULIAN_DATE)}, 's')
-"""Names of the column of the time in a table."""
 DATE = columns.Quantity('date', dict.fromkeys(('date', 'utc date'), columns.UTC), 's')
 TIME_OF_DAY = columns.Quantity('time of day', dict.fromkeys(('time', 'utc', 'utc time'), columns.UTC), 's')
-"""Names of the columns of the date and of the time of day, in a table with a column for each."""
 MODIFIED_JULIAN_DATE_ZERO = 2_400_000.5  # julian date of the modified Julian date 0
 JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0  # range of Julian dates: from 1858, the modified Julian date 0, to 2231
 FIRST_EXPECTED_JULIAN_DATE = 2_440_000.5
-"""Julian date of 1968. `check` takes no smaller number for a date.
-
-Because this date is the modified Julian date 40,000, a short file of seconds from 0 on is not refused.
-"""
+"""Julian date of 1968, the modified Julian date 40,000; `check` takes no smaller number for a date, so that a short
+file of seconds from 0 on is not refused."""
 MIN_UNIX_TIME_S = 1e8  # least number of seconds since 1970 in a column of UTC [s]; a smaller number has another origin
 MIN_SPAN_S = 3.0
-"""Least time from the first row to the last if the times may also be days of a Julian date [s].
-
-A pass lasts less than 3 days. A column of days therefore spans less than 3.
-"""
+"""Least time from the first row to the last if the times may also be days of a Julian date [s]: a pass lasts less than
+3 days."""
 
 
 class Times:
@@ -44,10 +36,7 @@ class Times:
     last: Seconds | None        # time of the last row
 
     def __init__(self, table: csv_table.Table, wanted: columns.Quantity, unit: str = '') -> None:
-        """Find the column of the time. Raises TableError.
-
-        wanted: the time; unit: of its values; '': the unit that the name of the column states.
-        """
+        """Find the column. Raises TableError. unit: of its values; '': that which its name states."""
         self.table, self.date, self.dated = table, _date(table.fieldnames, wanted), None
         unit = columns.UTC if self.date else unit
         column = table.column(wanted, without=self.date)
@@ -60,17 +49,14 @@ class Times:
         return f'{self.date} and {self.column.name}' if self.date else self.column.name
 
     def seconds(self, row: csv_table.Cells) -> Seconds:
-        """Return the time of a row: an instant if the times are dated, otherwise seconds from any origin.
-
-        Raises TableError.
-        """
+        """Return the time of a row: an instant if the times are dated, otherwise seconds from any origin. Raises
+        TableError."""
         cell = row[self.column.name] or ''
         value = self._seconds(f'{row[self.date] or ""} {cell}' if self.date else cell)
         self.first, self.last = value if self.first is None else self.first, value
         return value
 
     def _seconds(self, cell: str) -> Seconds:
-        """Return the time of the text of a cell. Raises TableError."""
         table, column = self.table, self.column
         place = table.path, table.line_num, self.name
         if column.unit in (columns.JULIAN_DATE, columns.MODIFIED_JULIAN_DATE):
@@ -113,10 +99,7 @@ class Times:
 
 
 def _date(names: Sequence[str], wanted: columns.Quantity) -> str:
-    """Return the name of the only column of dates if the table also has one column of the time of day, else ''.
-
-    wanted: the time; its names include those of DATE if a table may have both columns.
-    """
+    """Return the name of the column of dates if the table also has one of the time of day, else ''."""
     if not DATE.names.keys() <= wanted.names.keys():
         return ''
     found, clocks = ([name for name in names if columns.unit_of(name, part) == columns.UTC]
