@@ -47,11 +47,8 @@ class Antenna(abc.ABC):
         return self._degrees(topic, 0)
 
     def directions(self, topic: str) -> tuple[Degrees, Degrees]:
-        """Return the deck angles (azimuth, elevation) of the beam on the sky, by the pointing model in force; NaN if
-        stale.
-
-        topic: joint_states, or acu/reference for the commanded direction.
-        """
+        """Return the deck angles of the beam on the sky, by the pointing model in force; NaN if stale. topic:
+        joint_states, or acu/reference for the commanded direction."""
         angles, report = self.encoder_angles(topic), self.pointing_model
         if report is None:
             return angles

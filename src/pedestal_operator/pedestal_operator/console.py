@@ -26,7 +26,6 @@ JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)  # selectable jog rates [deg/s]
 KEY_COMMANDS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow', 'stow'), 'p': ('preset', 'preset'),
              'g': ('program', 'program'), 'a': ('autotrack', 'autotrack'), 't': ('take', 'take control'),
              'r': ('release', 'release control'), 'c': ('reset', 'reset faults')}
-"""{key: (command, text on the screen)}."""
 
 ARROW_DIRECTIONS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}  # azimuth, elevation
 
@@ -115,10 +114,8 @@ class Console:
             self._pending[self._remote.request(verb, arguments)] = verb
 
     def screen(self, width: int, height: int) -> list[Text]:
-        """Return the lines of the screen, at most `height`.
-
-        Mode, first alarm, axes, reply and keys have their lines on every terminal of at least 60 x 20 characters.
-        """
+        """Return the lines of the screen, at most `height`. Mode, first alarm, axes, reply and keys have their lines
+        on every terminal of at least 60 x 20 characters."""
         above = [*_header_lines(self._remote), *_alarm_lines(self._remote, width), *_axis_lines(self._remote),
                  _receiver_line(self._remote)]
         below = [*_wrapped(self.last_reply, width, 'bold'), *self._key_lines(width)]

@@ -24,15 +24,13 @@ from pedestal_common.wire.commands import Command, Reply
 from pedestal_operator.antenna import POINTING_TOPIC, Antenna
 from pedestal_operator.state import ANGLE_ERROR_TOPIC
 
-JOG_REPEAT_PERIOD_S = 0.2
-"""Period at which a jog is repeated [s], less than half of the jog timeout of the control unit."""
+JOG_REPEAT_PERIOD_S = 0.2  # period of a jog [s], less than half of the jog timeout of the control unit
 
 MAX_KEPT_REQUESTS = 1000  # largest number of requests kept, because some replies are never read
 
 
 class Requests:
-    """Requests without a reply, and unread replies. prefix: start of the numbers of the requests, unique to this
-    program."""
+    """Requests without a reply, and unread replies. prefix: start of their numbers, unique to this program."""
     _pending: dict[str, Command]    # by number
     _replies: dict[str, Reply]
 
@@ -77,11 +75,9 @@ NUMBER_TOPICS = ('joint_states', 'acu/reference', ANGLE_ERROR_TOPIC)
 TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole', POINTING_TOPIC)  # topics of text that every client receives
 REPLY_TIMEOUT_S = 5.0  # longest wait for the reply to a command [s]
 
-DISCOVERY_MARGIN_S = 0.05
-"""Time for the discovery of this node by the commanded node [s], after its own discovery of that node."""
+DISCOVERY_MARGIN_S = 0.05  # for the discovery by the commanded node, after its own discovery [s]
 
-RETRY_PERIOD_S = 1.0
-"""Time without a reply after which a command is repeated [s], because discovery may have been incomplete."""
+RETRY_PERIOD_S = 1.0  # time until a command is repeated [s], because discovery may be incomplete
 
 _R = TypeVar('_R')
 

@@ -53,8 +53,7 @@ class RotctldNode(ServerNode[RotctldClient]):
         super().__init__('rotctld', RotctldParameters, rotctld.MAX_LINE_BYTES, RotctldClient)
 
     def serve(self, client: RotctldClient, now: Seconds) -> None:
-        """Answer the lines in order. A line that commands the antenna is answered after the reply of the control
-        unit."""
+        """Answer the lines in order; one that commands the antenna, after the reply of the control unit."""
         # A complete command without a line end counts as a line, because gpredict for Windows sends no line end.
         client.end_line(rotctld.is_complete)
         while client.pending or client.lines:

@@ -20,19 +20,16 @@ BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
 """Modes with a button or a key; `stop` has a separate button, `rate` is the jog, `slave` is for programs."""
 
 OPERATOR_COMMANDS = (*BUTTON_MODES, 'rate', 'take', 'release', 'reset', 'fallback', 'acknowledge', 'shelve',
-                     'unshelve')
-"""All except `stop`, which is never refused in advance."""
+                     'unshelve')  # all except `stop`, which is never refused in advance
 
-FREE_COMMANDS = ('standby', 'take')
-"""The control unit accepts them from a client without control."""
+FREE_COMMANDS = ('standby', 'take')  # accepted from a client without control
 
 REFUSAL_PREFIX = 'refused '  # start of a key in the diagnostics of the control unit, before the name of a mode
 
 ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole',
                    'pointing_model')
 
-GRAPH_NODES = ('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')
-"""The operator must see their silence."""
+GRAPH_NODES = ('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')  # whose silence the operator must see
 
 LIMIT_WARNING_S = 20.0  # time to a limit below which the axis has a warning [s]
 REST_RATE_DEG_S = 0.002  # rate below which an axis counts as stopped [deg/s]
@@ -101,10 +98,8 @@ def node_reports(antenna: 'Antenna') -> list[tuple[str, str]]:
 
 
 def header(antenna: 'Antenna') -> dict[str, Shown]:
-    """Return {item: text} of mode, reason, drive, control, fallback and link.
-
-    The mode of a silent control unit is unknown. The reason then states the last mode and its age.
-    """
+    """Return {item: text} of mode, reason, drive, control, fallback and link. The mode of a silent control unit is
+    unknown. The reason then states the last mode and its age."""
     acu, link = antenna.diagnostics_of('acu'), _link(antenna)
     if acu:
         reason = acu.get('reason', '') + (', coasting' if acu.get('coasting') == '1' else '')
@@ -166,10 +161,8 @@ def _axis_state(silent: bool, limited: str, limit_s: str, rate: float) -> Shown:
 
 
 def refusals(antenna: 'Antenna', holds_control: bool, may_take: bool = False) -> dict[str, str]:
-    """Return {command: reason} of the OPERATOR_COMMANDS that the control unit would refuse now.
-
-    holds_control: also if control is free; may_take: a supervisor takes control from others.
-    """
+    """Return {command: reason} of the OPERATOR_COMMANDS that the control unit would refuse now. holds_control: also if
+    control is free; may_take: a supervisor takes control from others."""
     acu = antenna.diagnostics_of('acu')
     if not acu:
         return dict.fromkeys(OPERATOR_COMMANDS, 'the control unit is silent')

@@ -16,8 +16,7 @@ from receiver_law import smoothing
 from receiver_law.monopulse import detect, thermal_noise
 from receiver_law.smoothing import SMOOTHING_KINDS
 
-MIN_POWER_OVER_NOISE = 0.01
-"""Smallest ratio of carrier power to noise power in one sample that the C/N0 estimate reports (-20 dB)."""
+MIN_POWER_OVER_NOISE = 0.01  # smallest reported carrier power over noise power of a sample (-20 dB)
 
 
 class Antenna(Protocol):
@@ -175,10 +174,8 @@ def errors(state: State, constants: Constants) -> tuple[Radians, Radians]:
 
 @compiled
 def lock(state: State, constants: Constants, power: float, elapsed_ns: Nanoseconds) -> None:
-    """Update the lock: gained after acquire_ns above the upper level, lost after lose_ns below the lower level.
-
-    power: carrier power / noise power; elapsed_ns: time since the last step.
-    """
+    """Update the lock: gained after acquire_ns above the upper level, lost after lose_ns below the lower level. power:
+    carrier power / noise power; elapsed_ns: time since the last step."""
     if state.locked != 0:
         crossed, wait = power < constants.lose_power, constants.lose_ns
     else:

@@ -16,8 +16,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Hertz, Radians, Seconds
 
-U_PER_BEAMWIDTH = 2.0 * 1.8676215105779688
-"""u = pi D / lambda sin(theta) per half-power beamwidth of the cosine taper; theta: angle off the axis."""
+U_PER_BEAMWIDTH = 2.0 * 1.8676215105779688  # u = pi D / lambda sin(theta), cosine taper
 
 DISK_DISTANCES = math.sqrt(0.5 - math.sqrt(0.15)), math.sqrt(0.5), math.sqrt(0.5 + math.sqrt(0.15))
 DISK_WEIGHTS, DISK_ANGLES = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0), 12
@@ -49,9 +48,8 @@ def difference_pattern(v: float, k_m: float) -> float:
 @compiled
 def channels(v_x: float, v_e: float, k_m: float, cos_beta: float, sin_beta: float) -> tuple[float, float, float]:
     """Return the (sum, difference X, difference E) voltages of a unit carrier, v_x and v_e beamwidths off the axis.
-
-    The cross-coupling angle beta rotates the error axes. Each difference then also contains a part of the other error.
-    """
+    The cross-coupling angle beta rotates the error axes. Each difference then also contains a part of the other
+    error."""
     S_x, S_e = sum_pattern(v_x), sum_pattern(v_e)
     x, e = difference_pattern(v_x, k_m) * S_e, S_x * difference_pattern(v_e, k_m)
     return S_x * S_e, cos_beta * x - sin_beta * e, sin_beta * x + cos_beta * e
@@ -61,11 +59,8 @@ def channels(v_x: float, v_e: float, k_m: float, cos_beta: float, sin_beta: floa
 def disk_channels(v_x: float, v_e: float, radius: float, k_m: float, cos_beta: float,
                   sin_beta: float) -> tuple[float, float, float]:
     """Return (sum, difference X, difference E) voltages of a disk of incoherent noise, as strong as a unit carrier.
-
-    radius: of the disk [beamwidths]; others: see `channels`. The square of the sum is the mean of the power pattern
-    over the disk. Its product with a difference is the mean of the product of both patterns, which a receiver
-    measures.
-    """
+    radius: [beamwidths]. The square of the sum is the mean of the power pattern over the disk. Its product with a
+    difference is the mean of the product of both patterns, which a receiver measures."""
     power = x = e = 0.0
     for share, distance in zip(DISK_WEIGHTS, DISK_DISTANCES):
         for k in range(DISK_ANGLES):

@@ -62,11 +62,9 @@ def delay(kind: str, samples: int, n: int) -> float:
 
 
 def steps_back(kind: str, samples: int, n: int) -> float:
-    """Return the mean age of the steps whose samples are in the result, in drive steps; 0 for the last step.
-
-    A beam that is held within a step has one direction in each step. For the direction of the beam the control unit
-    therefore needs the age in whole steps, and for the place of the target the age of the samples.
-    """
+    """Return the mean age of the steps whose samples are in the result, in drive steps; 0 for the last step. A beam
+    that is held within a step has one direction in each step. For the direction of the beam the control unit therefore
+    needs the age in whole steps, and for the place of the target the age of the samples."""
     if kind == 'none':
         return 0.0
     if kind == 'recursion':

@@ -21,13 +21,10 @@ from tracking_receiver_sim.tracks import lines
 
 FORMAT_PROBE_BYTES = 4096  # number of bytes at the beginning of a file that decide its format
 MAX_SATELLITES = 300_000  # largest number of satellites in a file, several times the number of catalogued ones
-MAX_COMPARED_NAMES = 40_000
-"""Largest number of names that an error compares with an unknown name: more than the catalogued satellites."""
-MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200
-"""Largest depth of nested XML elements, and the number of characters to which a value is cut."""
+MAX_COMPARED_NAMES = 40_000  # with which an error compares a name: more than catalogued satellites
+MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200  # of nested elements; length to which a value is cut
 PARSE_CHUNK_BYTES = 1 << 20  # number of bytes of XML that are parsed at once
-FIRST_SATELLITE_YEAR = 57
-"""Smallest two-digit year of a TLE that lies in the 20th century: the first satellite flew in 1957."""
+FIRST_SATELLITE_YEAR = 57  # smallest two-digit year of a TLE in the 20th century: first satellite 1957
 TLE_EPOCH_COLUMNS = slice(18, 32)  # columns of the epoch in line 1 of a TLE
 
 
@@ -59,11 +56,9 @@ class Satellite(NamedTuple):
 
 
 def read(path: FilePath, name: str = '', when: datetime.datetime | None = None) -> Elements:
-    """Return the elements of a satellite in a file. Raises TargetError.
-
-    name: name, catalogue number or international designator; it may be empty for a file of one satellite. From several
-    sets the function takes that whose epoch is nearest to `when` (UTC), or the latest one.
-    """
+    """Return the elements of a satellite in a file. Raises TargetError. name: name, catalogue number or international
+    designator; it may be empty for a file of one satellite. From several sets the function takes that whose epoch is
+    nearest to `when` (UTC), or the latest one."""
     try:
         with csv_table.stream(path) as stream:
             beginning = content.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()

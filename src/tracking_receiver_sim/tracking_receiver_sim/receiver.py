@@ -164,8 +164,7 @@ class Outputs(Record):
 
 
 def constants(params: TrackingReceiverParameters, period: Seconds, built: target.Target) -> Records:
-    """Return the Constants (1,) of a drive step `period` and a target. Raises ParameterError for a latency beyond the
-    ring."""
+    """Return the Constants (1,) of a step and a target. Raises ParameterError for a latency beyond the ring."""
     antenna, receiver = params.antenna, params.receiver
     if receiver.latency >= (RESULT_RING_SIZE - 1) * period:
         raise ParameterError(f'receiver.latency = {receiver.latency:g} s: must be below {RESULT_RING_SIZE - 1} '
@@ -228,10 +227,8 @@ def normals_per_step(params: TrackingReceiverParameters) -> int:
 
 
 def age(params: TrackingReceiverParameters, period: Seconds) -> Seconds:
-    """Return the mean age of an error at its stamp if the beam is held between two steps, otherwise 0.
-
-    With a moving beam the mean over a step differs from the error at the stamp at most by its change within the step.
-    """
+    """Return the mean age of an error at its stamp if the beam is held between two steps, otherwise 0. With a moving
+    beam the mean over a step differs from the error at the stamp at most by its change within the step."""
     receiver = params.receiver
     if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
         return 0.0
@@ -240,10 +237,8 @@ def age(params: TrackingReceiverParameters, period: Seconds) -> Seconds:
 
 
 def beam_age(params: TrackingReceiverParameters, period: Seconds) -> Seconds:
-    """Return the mean time from the stamp of the measured beam to the stamp of an error; 0 for a moving beam.
-
-    Because a held beam is published at the end of its step, only older steps in the smoothing count.
-    """
+    """Return the mean time from the stamp of the measured beam to the stamp of an error; 0 for a moving beam. Because
+    a held beam is published at the end of its step, only older steps in the smoothing count."""
     receiver = params.receiver
     if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
         return 0.0
@@ -284,8 +279,7 @@ def apparent_state(state: State, constants: Constants, true: target.TargetState)
 
 @compiled
 def carrier_amplitude(constants: Constants, e: Meters, n: Meters, u: Meters, hidden: bool) -> float:
-    """Return the sum voltage on axis from a target at a vector from the antenna; 0 below the horizon mask or if
-    hidden."""
+    """Return the sum voltage on axis from a target at (e, n, u); 0 below the horizon mask or if hidden."""
     _, elevation = earth_angles(e, n, u)
     if hidden or not elevation >= constants.horizon_mask:       # also true for an elevation of NaN
         return 0.0
@@ -330,8 +324,7 @@ def with_noise(v: Voltages, normals: Floats, first: int) -> Voltages:
 
 @compiled
 def error_at(state: State, seen: Incidence, part: float) -> tuple[Radians, Radians]:
-    """Return the true (cross-elevation, elevation) error after a part of a step, in which it moves to that of
-    `seen`."""
+    """Return the true (cross-elevation, elevation) error after a part of a step, at whose end it is that `seen`."""
     from_X, from_E = (state.cross_elevation, state.elevation) if state.error_known != 0 else (seen.dX, seen.dE)
     return from_X + part * (seen.dX - from_X), from_E + part * (seen.dE - from_E)
 
@@ -361,11 +354,9 @@ def measure(state: State, constants: Constants, seen: Incidence, normals: Floats
 @compiled
 def error_rate(inputs: Inputs, position: Vector3, velocity: Vector3,
                seen: target.TargetState) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return (d dX/dt, d dE/dt) of a target off the beam, exactly. velocity: of the antenna, FLU [m/s].
-
-    In the deck frame the target is at r = M^T (p - position). Its derivative is dr/dt = M^T v - velocity - w x r, with
-    the rotation M deck -> earth and the rate w of the deck.
-    """
+    """Return (d dX/dt, d dE/dt) of a target off the beam, exactly. velocity: of the antenna, FLU [m/s]. In the deck
+    frame the target is at r = M^T (p - position). Its derivative is dr/dt = M^T v - velocity - w x r, with the
+    rotation M deck -> earth and the rate w of the deck."""
     (e, n, u), (v_e, v_n, v_u) = seen.position, seen.velocity
     x, y, z = r = to_deck(inputs.mat_ed, e - position[0], n - position[1], u - position[2])
     vx, vy, vz = to_deck(inputs.mat_ed, v_e, v_n, v_u)

@@ -6,7 +6,7 @@ and after its last break, a trajectory has no position. It is never extrapolated
 
 leo_pass: the pieces are within 1 mm and 15 mm/s of SGP4, whose velocity differs by 10 mm/s from the derivative of its
 position. Directions are within 0.3 mdeg of skyfield if UT1 = UTC. The true UT1 - UTC (`ut1_offset`, up to 0.9 s of
-earth rotation) moves an ISS pass by up to 0.04 deg.
+earth rotation) moves an ISS pass by up to 0.04 deg. The error of SGP4 itself grows to kilometres within days.
 
 track_file: on a real helicopter flight with fixes at 1 Hz, the spline predicts left-out fixes to 9 m, the jitter of
 the fixes. In a turn of 3 m/s^2 its velocity is right to 1e-4 m/s. PCHIP or Akima pieces predict equally well with
@@ -41,8 +41,7 @@ SGP4_KNOT_SPACING_S = 1.0  # time between two SGP4 knots [s]
 BODY_KNOT_SPACING_S = 10.0  # time between two knots of the sun or the moon [s]; the pieces are within 1e-9 rad
 PASS_SEARCH_STEP_S = 20.0  # of the pass finder [s]; a pass in a low earth orbit lasts minutes
 PEAK_SEARCH_POINTS = 41  # number of points of each refinement in the search for the peak of a pass
-RUN_MARGIN_S = 5.0
-"""Time before and after the run [s] that a target covers, for a program track; a track_file only as far as it goes."""
+RUN_MARGIN_S = 5.0  # before and after the run [s], for a program track; a track_file may cover less
 
 MAX_HORIZON_POINTS = 10_000  # largest number of points at which a target is compared with the horizon
 
@@ -140,10 +139,7 @@ def _look_angles(constants: Records, breaks: Times, coefficients: Floats, times:
 
 
 def look_angles(built: Target, times: Times) -> tuple[Floats, Floats, Floats]:
-    """Return (azimuth, elevation, range) of a target from the station at times; NaN outside its track.
-
-    Azimuth clockwise from north in (-pi, pi].
-    """
+    """Return (azimuth, elevation, range) from the station at times, azimuth in (-pi, pi]; NaN outside the track."""
     times = np.ascontiguousarray(times, float)
     azimuth, elevation, distance = np.empty((3, len(times)))
     _look_angles(built.constants, built.breaks, built.coefficients, times, azimuth, elevation, distance)
@@ -257,11 +253,8 @@ def _leo_pass(params: TargetParameters, duration: Seconds) -> Course:
 
 
 def _hermite(x: Times, y: Floats, y_dot: Floats) -> Floats:
-    """Return coefficients (4, n, columns), highest power first, of cubic Hermite pieces with values y and derivatives
-    y_dot.
-
-    They equal those of CubicHermiteSpline of scipy to the last bit, whose import would take a third of a second.
-    """
+    """Return coefficients (4, n, columns), highest power first, of cubic Hermite pieces. They equal those of
+    CubicHermiteSpline of scipy to the last bit, whose import would take a third of a second."""
     h = np.diff(x)[:, None]
     slope = np.diff(y, axis=0) / h
     bend = (y_dot[:-1] + y_dot[1:] - 2.0 * slope) / h

@@ -23,7 +23,6 @@ from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 DRIVE_TRUTH_TOPIC, SHIP_TRUTH_TOPIC, TARGET_TRUTH_TOPIC = 'adu/truth', 'ship/truth', 'target/truth'
 
 FAULT_STATUSES = (receiver.Status.NO_TARGET, receiver.Status.NO_BEAM, receiver.Status.STAMP_ORDER)
-"""They are kept for the next diagnosis."""
 
 
 class ReceiverRecord(Record):
@@ -48,8 +47,7 @@ class Memory(NamedTuple):
 
 @compiled
 def decode(known: receiver.Inputs, stamp: Nanoseconds, beam: AnyRecord, ship: AnyRecord) -> None:
-    """Set the inputs of the receiver from adu/truth and ship/truth. Without a new ship/truth they keep the last
-    one."""
+    """Set the inputs of the receiver. Without a new ship/truth they keep the last one."""
     known.stamp_ns = stamp
     known.azimuth, known.elevation = beam.position[0], beam.position[1]
     known.azimuth_rate, known.elevation_rate = beam.velocity[0], beam.velocity[1]

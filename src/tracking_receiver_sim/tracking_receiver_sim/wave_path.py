@@ -64,8 +64,7 @@ from tracking_receiver_sim.params import (
 MIN_ELEVATION_RAD = math.radians(1.0)  # elevation [rad] below which the refraction stays constant
 SCINTILLATION_NORMALS = 3  # number of standard normals of a step of the scintillation: level, two axes
 
-MIN_SIN_ELEVATION = math.sin(math.radians(4.0))
-"""Sine of the elevation (4 deg, the limit of P.618) below which the scintillation stays constant."""
+MIN_SIN_ELEVATION = math.sin(math.radians(4.0))  # the limit of P.618, below which scintillation is constant
 
 
 class Path(Record):
@@ -194,8 +193,7 @@ def scintillation_constants(params: ScintillationParameters, period: Seconds) ->
 @compiled
 def wander(air: Scintillation, x: Vector3, sin_E: float, normals: Floats,
            first: int) -> tuple[float, Radians, Radians]:
-    """Return (factor of the amplitude, deflection in cross-elevation, in elevation) one step later. x: state,
-    updated."""
+    """Return (factor of the amplitude, deflection in cross-elevation, in elevation) one step later; updates x."""
     for i in range(SCINTILLATION_NORMALS):
         x[i] = air.keep * x[i] + air.draw * normals[first + i]
     s = max(sin_E, MIN_SIN_ELEVATION)

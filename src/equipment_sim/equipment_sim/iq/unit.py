@@ -58,8 +58,7 @@ class IqRecord(Record):
 
 
 class Memory(typing.NamedTuple):
-    """All data of the unit. A row of the voltages belongs to an integral of three channels, or to a sample of a
-    scanned feed."""
+    """All data of the unit. A row of the voltages belongs to an integral, or to a sample of a scanned feed."""
     record: Records         # IqRecord (1,)
     breaks: Floats          # track of the target, see target.Target
     coefficients: Floats
@@ -117,10 +116,8 @@ def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> N
 
 @compiled
 def modulate(voltages: Complexes, scale: Complexes, turns: Pair, samples: Samples, phase: Radians) -> Radians:
-    """Add a carrier with voltages (rows, channels) to samples, and return its phase after them.
-
-    scale: gain of the first channels; turns: frequency at the first and after the last sample [rad/sample].
-    """
+    """Add a carrier with voltages (rows, channels) to samples, and return its phase after them. scale: gain of the
+    first channels; turns: frequency at the first and after the last sample [rad/sample]."""
     n, parts = samples.shape[0], voltages.shape[0]
     slope = (turns[1] - turns[0]) / max(n, 1)
     for k in range(parts):
@@ -191,8 +188,7 @@ class SimulatedIq(Simulated):
         return samples
 
     def execute(self, command: Command, arguments: Mapping[str, Value]) -> Reply:
-        """Inject a fault. Raises ValueError for a fault that samples do not have: of messages, of differences in a
-        conical scan."""
+        """Inject a fault. Raises ValueError for a fault of messages, or of differences in a conical scan."""
         kind = self.parameters.feed.kind
         if command.verb not in (*SIGNAL_FAULTS[kind], table.CLEAR_COMMAND.name):
             raise ValueError(f'{command.verb}: simulated I/Q of {kind} has the faults '

@@ -30,8 +30,7 @@ MEMORY_TIME_S = 5.0  # time constant with which old blocks fade [s]
 MIN_CHECK_TIME_S = 3.0  # time with motion after which a verdict is given [s]
 MIN_RATE_RAD_S = math.radians(0.5)  # rms of the rates of an axis from which it is compared [rad/s]
 
-MIN_ATTITUDE_RATE_RAD_S = math.radians(2.0)
-"""Rms rate of change of the attitude from which an axis is compared although its rates are small [rad/s]."""
+MIN_ATTITUDE_RATE_RAD_S = math.radians(2.0)  # rms change of the attitude from which an axis is compared [rad/s]
 
 SLOPE_RANGE = 0.3, 3.0  # slopes of an axis that agrees
 MIN_TURN_CORRELATION = -0.5  # smallest correlation of a heading that agrees with a rate of turn
@@ -40,17 +39,14 @@ JUMP_RAD = math.radians(0.5)
 """Rotation [rad] of the attitude in a block that is a jump of the attitude if the rates explain less than a fifth of
 it. A correction of the heading is no wrong frame."""
 
-JUMP_REST_BLOCKS = 10
-"""Number of blocks after a jump in which no other one is a jump. Rates that are always too small are no jumps."""
+JUMP_REST_BLOCKS = 10  # number of blocks without a further jump; rates that are always too small are no jumps
 
-GRAVITY_M_S2 = 5.0
-"""Mean specific force [m/s2] from which its direction is compared; less means that gravity was removed."""
+GRAVITY_M_S2 = 5.0  # mean specific force [m/s2] from which it is compared; less: gravity was removed
 
 ALL_AXES, TURN_AXIS = 0b111, 0b100  # bit masks of the axes whose rates are known
 MAX_FORCE_M_S2 = 1000.0  # specific force [m/s2] that no ship has; more is not used
 
-FRAME_UNKNOWN, FRAME_RIGHT, FRAME_WRONG = range(3)
-"""Verdicts: not enough motion so far, all axes with motion agree, an axis disagrees."""
+FRAME_UNKNOWN, FRAME_RIGHT, FRAME_WRONG = range(3)  # not enough motion, all axes agree, an axis disagrees
 
 
 class Check(Record):
@@ -136,10 +132,8 @@ def _close_block(check: Check, q: Quaternion, axes: int) -> None:
 
 @compiled
 def take(check: Check, stamp: Nanoseconds, q: Quaternion, w: Vector3, force: Vector3, axes: int) -> None:
-    """Take a sample in the frames that the parameters declare, newer than the last.
-
-    force: NaN for none; axes: ALL_AXES of gyros, TURN_AXIS of a rate of turn.
-    """
+    """Take a sample in the frames that the parameters declare, newer than the last. force: NaN for none; axes:
+    ALL_AXES of gyros, TURN_AXIS of a rate of turn."""
     if abs(force[0]) + abs(force[1]) + abs(force[2]) < MAX_FORCE_M_S2:      # also excludes NaN
         k = math.exp(-(stamp - check.last) * 1e-9 / MEMORY_TIME_S) if check.runs else 1.0
         check.force_weight = k * check.force_weight + 1.0
@@ -165,17 +159,14 @@ def take(check: Check, stamp: Nanoseconds, q: Quaternion, w: Vector3, force: Vec
 
 Convention: TypeAlias = tuple[str, str, str]     # the parameters earth, body, rate_body
 
-MIN_FIT = 0.9
-"""Smallest slope of all axes together of a convention that fits, relative to the convention that fits best."""
+MIN_FIT = 0.9  # smallest slope of all axes together of a convention that fits, relative to the best one
 
 MIN_UPRIGHT = 0.5  # smallest cosine of the tilt of a deck; a ship is never further from the horizontal
 
 
 def fitting_conventions(check: AnyRecord, declared: Convention, case: Matrix3, q: Quaternion) -> list[Convention]:
-    """Return the conventions that fit, those with the fewest changes from the declared one only.
-
-    case: rotation case -> deck; q: last quaternion of the device, in its own frames.
-    """
+    """Return the conventions that fit, those with the fewest changes from the declared one only. case: rotation case
+    -> deck; q: last quaternion of the device, in its own frames."""
     body, rate_body = (BODY_MATRICES[name] for name in declared[1:])
     cross = case.T @ check['cross'] @ case
     moved, lowest = np.any(check['moved'] > 0.0), SLOPE_RANGE[0] * check['rates'].sum()

@@ -98,8 +98,7 @@ def _rot(data: Sequence[str]) -> Turn:
 
 
 _READERS: dict[str, Callable[[Sequence[str]], Attitude | Turn | None]] = {
-    'PASHR': _pashr, 'PRDID': _prdid, 'HDT': _hdt, 'ROT': _rot}
-"""{sentence, or its name without the talker: function of its fields behind the first, which is R or D in some}."""
+    'PASHR': _pashr, 'PRDID': _prdid, 'HDT': _hdt, 'ROT': _rot}  # the first field of PASHR is R, of PRDID D
 
 
 def _level(name: str, data: Sequence[str], i: int) -> Degrees:

@@ -21,8 +21,7 @@ OUTCOME_TEXTS = {Outcome.NO_ATTITUDE: 'the orientation must have the length 1, a
                  Outcome.NOT_NEWER: 'the stamp is not later than the last one',
                  Outcome.TOO_FAST: f'the deck would turn faster than {math.degrees(input_law.MAX_RATE_RAD_S):.0f} '
                                      'deg/s',
-                 Outcome.SETTLING: 'the rates settle'}
-"""{code of an outcome: reason}, without the outcomes of a wrong frame."""
+                 Outcome.SETTLING: 'the rates settle'}  # {code: reason}, without those of a wrong frame
 
 AXIS_NAMES = ('roll', 'pitch', 'yaw')
 

@@ -16,8 +16,7 @@ MAX_LINE_BYTES = 256  # largest length of a line; NMEA 0183 allows 82 bytes
 LINE_ENDS = b'\r\n\0'
 LINE_TIMEOUT_S = 0.5  # longest pause within a line [s]
 
-TCP_SILENCE_S = 10.0
-"""Time without bytes after which a TCP connection is opened again [s]. A device without supply never closes it."""
+TCP_SILENCE_S = 10.0  # time without bytes until TCP is opened again [s]; a device without supply never closes it
 
 
 class LineSplitter:

@@ -18,18 +18,13 @@ from pedestal_common.quantities import Hertz, Nanoseconds, Seconds
 if TYPE_CHECKING:
     from pedestal_hardware.monopulse import sigmf
 
-TIME_TOLERANCE_NS = 20_000
-"""Largest deviation of a source's time from the sample counter before the counter is set again [ns]."""
+TIME_TOLERANCE_NS = 20_000  # largest deviation of a source's time before the counter is set again [ns]
 
-ARRIVAL_WINDOW_S = 10.0
-"""Time in which the earliest arrival is searched that sets the counter of a source without times [s]."""
+ARRIVAL_WINDOW_S = 10.0  # time in which the earliest arrival sets the counter of a source without times
 
-CLOCK_TOLERANCE_S, CLOCK_TIME_S = 0.1, 0.5
-"""Largest deviation of the samples from the clock [s], and time after which it is a fault [s]: a stall delays some
-blocks."""
+CLOCK_TOLERANCE_S, CLOCK_TIME_S = 0.1, 0.5  # largest deviation, and its time until it is a fault [s]: blocks may stall
 
-LATE_INTERVAL_S, MIN_LATE_ARRIVALS = 0.25, 5
-"""Shortest time [s] and smallest number of arrivals of an interval, of which the earliest arrival counts."""
+LATE_INTERVAL_S, MIN_LATE_ARRIVALS = 0.25, 5  # of an interval, of which the earliest arrival counts: time, arrivals
 
 LATE_TOLERANCE_S = 0.004
 """Largest delay of the earliest arrivals of two intervals before samples count as lost [s]. A clock that drifts by
@@ -38,8 +33,7 @@ LATE_TOLERANCE_S = 0.004
 RATE_WINDOW_S = 2.0  # time over which the sample rate of a source without times is measured [s]
 CAUSE_TOLERANCE = 0.05  # largest relative deviation of a wrong sample rate from that of a possible cause
 
-RATE_TOLERANCE, STALL_TIME_S = 0.01, 0.1
-"""Largest relative deviation of the measured sample rate, and the delay of one arrival that is no deviation [s]."""
+RATE_TOLERANCE, STALL_TIME_S = 0.01, 0.1  # of the measured sample rate, and delay of one arrival that is none [s]
 
 
 class StreamError(ValueError):
@@ -160,10 +154,8 @@ class ClockComparison:
 
 class ArrivalClock:
     """Times of the samples of a source without times, from the times at which they arrive. Call `lost`, then `utc`.
-
     The delay of a sample varies upwards. The earliest arrival of a window therefore sets the times, with the shortest
-    delay known. causes: {ratio of a wrong sample rate and the right one: text on its possible cause}.
-    """
+    delay known. causes: {ratio of a wrong sample rate and the right one: text on its possible cause}."""
 
     def __init__(self, rate: Hertz, delay: Seconds, causes: Mapping[float, str] | None = None) -> None:
         self.rate, self.delay_ns, self.causes = rate, round(delay * NS_PER_SECOND), causes or {}

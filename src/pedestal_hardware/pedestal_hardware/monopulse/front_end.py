@@ -126,8 +126,7 @@ def finite(samples: Samples) -> bool:
 
 @compiled
 def dump(state: State, constants: Constants, samples: Samples, dumps: Complexes) -> float:
-    """Integrate each part of samples, mixed down, into `dumps`. Return the energy of the sum channel. The NCO
-    advances."""
+    """Integrate the parts of samples, mixed down, into `dumps`. Return the energy of the sum. The NCO advances."""
     cos_turn, sin_turn = math.cos(state.turn), math.sin(state.turn)
     re, im = math.cos(state.phase), -math.sin(state.phase)
     energy = 0.0
@@ -279,11 +278,9 @@ def pass_gap(state: State, search: bool) -> None:
 
 
 class Search:
-    """Search for the carrier in the samples of the sum channel, by an FFT over a window of Hann.
-
-    The carrier is the strongest bin of the Doppler window if its level over the median of the bins exceeds the
-    threshold. For white noise alone the strongest of 4096 bins is at 9.5 dB.
-    """
+    """Search for the carrier in the samples of the sum channel, by an FFT over a window of Hann. The carrier is the
+    strongest bin of the Doppler window if its level over the median of the bins exceeds the threshold. For white noise
+    alone the strongest of 4096 bins is at 9.5 dB."""
 
     def __init__(self, params: MonopulseParameters) -> None:
         self.rate, self.threshold, size = params.source.rate, params.carrier.threshold, params.carrier.bins

@@ -126,8 +126,7 @@ class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
         self.after_step()
 
     def diagnosed(self) -> Diagnosis:
-        """Return the Diagnosis of the receiver, with the error that ended the recording, and time 0 if the node chose
-        it."""
+        """Return the Diagnosis, with the error that ended the recording, and time 0 if it was chosen."""
         diagnosis = super().diagnosed()
         if self.blocks is not None and self.blocks.recorder_fault:
             diagnosis = diagnosis._replace(values=[*diagnosis.values,

@@ -7,15 +7,13 @@ from pedestal_common.parameters import ParameterError, Parameters, as_dict, choi
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
 CHANNELS = ('sum', 'cross-elevation difference', 'elevation difference')
-SCANNED_CHANNELS = ('signal', 'scan reference')
-"""Channels of a feed with three outputs and of a scanned feed, in the order in which they are interleaved."""
+SCANNED_CHANNELS = ('signal', 'scan reference')  # of a scanned feed; both in interleaved order
 
 THREE_CHANNELS, ONE_CHANNEL, CONICAL_SCAN = FEED_KINDS = 'three_channels', 'one_channel', 'conical_scan'
 
 PARAMETERS_OF_DIFFERENCES = ('antenna.cross_coupling', 'antenna.phase_error', 'simulated.x_phase', 'simulated.e_phase')
 
-MIN_INTEGRALS_PER_SCAN = 4
-"""Smallest number of coherent integrals in one scan, which separates the cosine of the scan from its sine."""
+MIN_INTEGRALS_PER_SCAN = 4  # in one scan, to separate the cosine of the scan from its sine
 
 SOURCE_KINDS = ('vita49', 'zmq_sub', 'zmq_pull', 'sigmf')
 DEFAULT_ADDRESSES = {'vita49': 'udp://127.0.0.1:4991', 'zmq_sub': 'tcp://127.0.0.1:5555',

@@ -24,12 +24,9 @@ from pedestal_hardware.monopulse.params import MonopulseParameters
 from receiver_law import detector
 from receiver_law.detector import Voltages
 
-MIN_SPREAD = 0.05
-"""Smallest variance of the averaged reference in any direction, over its power; of a complete scan 0.5 at most."""
+MIN_SPREAD = 0.05  # smallest variance of the averaged reference, over its power; of a complete scan up to 0.5
 
-MAX_NOISE_SHARE = 0.01
-"""Largest noise power of the averaged reference over its power [-]. It reduces the fitted modulation by twice this
-share."""
+MAX_NOISE_SHARE = 0.01  # of the power of the averaged reference; it reduces the modulation by twice as much
 
 MAX_RATE_SHARE, MAX_MEAN, MAX_REVERSALS = 0.2, 0.25, 0.5
 """Largest deviation of the rate of the scan over the rate of the parameters, largest mean of the reference over its
@@ -164,10 +161,8 @@ def add(window: Window, dumps: Complexes) -> None:
 
 @compiled
 def judge(window: Window, part: int, least: float) -> int:
-    """Return the status of the scan, LOCKED, NO_SCAN or WRONG_SCAN, and update the mean of the reference.
-
-    part: samples of an integral; least: smallest variance of the averaged reference in any direction.
-    """
+    """Return the status of the scan, LOCKED, NO_SCAN or WRONG_SCAN, and update the mean of the reference. part:
+    samples of an integral; least: smallest variance of the averaged reference in any direction."""
     power = window.lagged / window.parts
     noise = (window.energy - window.lagged) / window.parts
     if not (power > 0.0 and noise <= MAX_NOISE_SHARE * part * power and least >= MIN_SPREAD * power):

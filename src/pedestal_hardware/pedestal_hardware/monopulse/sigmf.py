@@ -62,10 +62,8 @@ def free_path(meta: str | pathlib.Path) -> str:
 
 
 class Recorder:
-    """Writer of a recording. Raises StreamError for a path that exists or cannot be written.
-
-    origin: `received` or `simulated`. The .sigmf-meta file lists a capture after META_PERIOD_S at the latest.
-    """
+    """Writer of a recording. Raises StreamError for a path that exists or cannot be written. origin: `received` or
+    `simulated`. The .sigmf-meta file lists a capture after META_PERIOD_S at the latest."""
 
     def __init__(self, meta: str | pathlib.Path, rate: Hertz, channels: Sequence[str], origin: str) -> None:
         self.meta, self.rate, self.channels = pathlib.Path(meta), rate, channels
@@ -80,8 +78,7 @@ class Recorder:
             raise StreamError(f'{meta}: {error.strerror}; a recording is never overwritten') from None
 
     def write(self, chunk: Chunk, begins: bool) -> None:
-        """Write a chunk. begins: True if a capture begins with it. Raises StreamError for a full disk or too many
-        captures."""
+        """Write a chunk. begins: True if a capture begins with it. Raises StreamError."""
         if begins and len(self.captures) == MAX_CAPTURES:
             raise StreamError(f'{self.meta}: {MAX_CAPTURES} captures: a recording must have no more gaps and changes '
                               'of its clock')
@@ -123,10 +120,8 @@ class Recorder:
 
 
 class Recording:
-    """Recording that is read. Raises StreamError for a file that does not fit.
-
-    rate: sample rate that the receiver needs, None for any; cut: text about samples that the file lacks, or ''.
-    """
+    """Recording that is read. Raises StreamError for a file that does not fit. rate: sample rate that the receiver
+    needs, None for any; cut: text about samples that the file lacks, or ''."""
 
     def __init__(self, meta: str | pathlib.Path, channels: Sequence[str], rate: Hertz | None = None) -> None:
         self.meta, self.channels = pathlib.Path(meta), len(channels)

@@ -21,8 +21,7 @@ ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
 
 AXIS_NAMES = 'cross_elevation', 'elevation'
 
-MAX_PASSED_GAP_S = 0.2
-"""Longest gap after which the loop continues at its frequency [s]. At 3 kHz/s the carrier moves by 600 Hz in it."""
+MAX_PASSED_GAP_S = 0.2  # longest gap after which the frequency stays [s]: 600 Hz at 3 kHz/s
 
 
 class ReceiverRecord(Record):

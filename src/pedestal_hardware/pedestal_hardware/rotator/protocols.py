@@ -159,11 +159,9 @@ class Easycomm(LineProtocol):
 
 
 class Rot2prog(RotatorProtocol):
-    """SPID Rot2Prog, frames of 13 bytes to the device and 12 bytes from it.
-
-    An angle is sent as pulses, PH (360 + angle), PH pulses for each degree, and received as digits of 0.1 deg. MD-01
-    also answers a set-point, with the same frame, and may send text between the frames.
-    """
+    """SPID Rot2Prog, frames of 13 bytes to the device and 12 bytes from it. An angle is sent as pulses, PH (360 +
+    angle), PH pulses for each degree, and received as digits of 0.1 deg. MD-01 also answers a set-point, with the same
+    frame, and may send text between the frames."""
     ASK, STOP = (b'W' + 10 * b'\0' + bytes([command]) + b' ' for command in (0x1F, 0x0F))
     BAUD_RATE, RESOLUTION = 600, 0.1
     PULSES_PER_DEG = 10

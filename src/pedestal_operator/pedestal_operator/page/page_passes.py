@@ -50,10 +50,8 @@ def pass_query(antenna: page_state.PageAntenna) -> PassQuery | None:
 
 
 def upcoming_passes(query: PassQuery) -> list[dict[str, float]]:
-    """Return the passes from the day of a query on; [] for elements that are too old, or without rise and set.
-
-    aos, los: rise and set [s], in the time of the graph; highest: elevation, from, to: azimuth at rise and set [deg].
-    """
+    """Return the passes from the day of a query on; [] for elements that are too old, or without rise and set. Times
+    are of the graph [s]; highest: elevation; from, to: azimuth at rise and set [deg]."""
     begin = datetime.datetime(1970, 1, 1) + datetime.timedelta(days=query.day * SEARCH_VALIDITY_DAYS)
     try:
         satellite = orbit.satellite(query)

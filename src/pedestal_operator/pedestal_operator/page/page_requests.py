@@ -22,11 +22,8 @@ MAX_ARGUMENTS = 20  # largest number of arguments of a command
 
 
 class PageRequests:
-    """Commands of all pages.
-
-    request(who, verb, {argument: value}) sends a command and returns its number; is_jogging() is True while the
-    antenna follows a jog.
-    """
+    """Commands of all pages. request(who, verb, {argument: value}) sends a command and returns its number;
+    is_jogging() is True while the antenna follows a jog."""
 
     def __init__(self, request: Callable[[str, str, Mapping[str, object]], str],
                  replied: Callable[[str], Reply | None], send: Callable[[Client, Mapping[str, object]], None],

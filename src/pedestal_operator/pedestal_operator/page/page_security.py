@@ -46,10 +46,8 @@ class Request(NamedTuple):
 
 
 class Access:
-    """Access to a server at an address and port, with new tokens for each role.
-
-    names: further names of the server. Raises ValueError for a name that is not the name of a host.
-    """
+    """Access to a server at an address and port, with new tokens for each role. names: further names of the server.
+    Raises ValueError for a name that is not the name of a host."""
 
     def __init__(self, address: str, port: int, names: Iterable[str] = ()) -> None:
         for name in names:
@@ -138,8 +136,7 @@ def _bracketed(name: str) -> str:
 
 
 def headers(host: str) -> list[tuple[str, str]]:
-    """Return the headers of every answer: content of this site only, a checked cache, no frames. host: `Host` of the
-    request."""
+    """Return the headers of every answer: own content only, a checked cache, no frames. host: of the request."""
     return [('content-security-policy',
              "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
              f"connect-src 'self' ws://{host} wss://{host}; "

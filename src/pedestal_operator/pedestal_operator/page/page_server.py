@@ -39,8 +39,7 @@ MAX_MESSAGE_BYTES = 4096  # largest message from a page [bytes]
 
 MAX_QUEUED_REQUESTS, MAX_QUEUED_REPLIES = 200, 50  # of all pages, to a page
 
-REQUEST_BURST_LIMIT, REQUEST_BURST_PERIOD_S = 40, 1.0
-"""Largest number of messages from a page in a period, and the period [s]; a jog needs five in 1 s."""
+REQUEST_BURST_LIMIT, REQUEST_BURST_PERIOD_S = 40, 1.0  # most messages of a page in a time; a jog needs five in 1 s
 
 SHUTDOWN_TIMEOUT_S = 1  # grace period of the pages when the server ends, in whole seconds for uvicorn [s]
 
@@ -73,8 +72,7 @@ class Client:
         return f'{self.name}@page {self.address}'
 
     def newest(self, sections: Mapping[str, tuple[int, str]]) -> str:
-        """Return the next message to the page: JSON with the changed sections and the replies. sections: {name:
-        (revision, JSON)}."""
+        """Return the next message: replies, and the changed ones of the sections {name: (revision, JSON)}."""
         self._number += 1
         self._sent[self._number] = time.monotonic()
         parts = [f'"number":{self._number}', *(f'"{name}":{text}' for name, (revision, text) in sections.items()
@@ -116,9 +114,7 @@ class Client:
 
 class PageServer:
     """A server that runs from its construction to `close`. Raises OSError if the address and port are not available.
-
-    history(): past of the charts for a new page; called in a thread of the server.
-    """
+    history(): past of the charts for a new page; called in a thread of the server."""
     requests: queue.Queue[PageMessage]      # for the node
     pages: int                              # number of open pages
     # Only the thread of the server uses _clients and _sections. Only the thread of the node uses _published.

@@ -14,8 +14,7 @@ from pedestal_common.wire import messages
 HORIZON_STEP_DEG = 5.0  # difference in azimuth between two points of a line around the horizon [deg]
 MAX_PATH_POINTS = 240  # largest number of points of a path
 
-MIN_HISTORY_STEP_DEG = 0.3
-"""Smallest distance between two points of the beam history, less than the width of a line [deg]."""
+MIN_HISTORY_STEP_DEG = 0.3  # smallest step of the beam history, less than the width of a line [deg]
 
 
 class Path(NamedTuple):
@@ -44,10 +43,9 @@ def thinned(path: Path | None) -> list[list[float]]:
 
 
 def passage(path: Path | None, loss: str) -> list[dict[str, object]]:
-    """Return a list with the pass of a path, [] if it stays below the horizon.
+    """Return a list with the pass of a path, [] if it stays below the horizon. Times are UTC [s], angles in deg.
 
-    aos, los: UTC of rise and set [s]; highest: elevation; from, to: azimuth at rise and set; travel: change of the
-    azimuth [deg]; loss: text of the predicted loss of track.
+    highest: elevation; from, to, travel: azimuth at rise and at set, and its change; loss: text of the predicted loss.
     """
     if path is None:
         return []

@@ -73,10 +73,8 @@ def history_row(frame: Mapping[str, Json]) -> list[float]:
 
 
 def status_section(antenna: PageAntenna) -> dict[str, Json]:
-    """Return the state of the antenna for the header, the axes and the buttons.
-
-    `refused` has {command: reason} for a client that has control (`holder`), for another, and for another supervisor.
-    """
+    """Return the state of the antenna for the header, the axes and the buttons. `refused` has {command: reason} for a
+    client that has control (`holder`), for another, and for another supervisor."""
     acu, header = antenna.diagnostics_of('acu'), state.header(antenna)
     texts = {name: antenna.texts.get(topic, '') if acu else '' for name, topic in TEXT_TOPIC_BY_NAME.items()}
     return {'present': bool(acu), **texts, 'mode': header['mode'].text if acu else '',
@@ -111,8 +109,7 @@ def epoch(antenna: PageAntenna) -> Seconds:
 
 
 def fixed(antenna: PageAntenna) -> dict[str, Json]:
-    """Return the constants of a run: beamwidth and limits [deg], thresholds of the level [dB-Hz], axes of the
-    charts."""
+    """Return the constants of a run: beamwidth and limits [deg], thresholds of the level [dB-Hz], axes of charts."""
     p = antenna.configuration
 
     def degrees(name: str) -> Degrees:

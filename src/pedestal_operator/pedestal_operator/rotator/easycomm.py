@@ -16,8 +16,7 @@ QUERY_WORDS = 'AZ', 'EL', 'GS', 'GE', 'VE'  # words that are answered: azimuth, 
 VERB_BY_WORD = {'SA': 'stop', 'SE': 'stop', 'RESET': 'acu/reset_faults', 'PARK': 'stow'}  # of the control unit
 
 RATE_DIRECTIONS = {'L': (0, -1), 'R': (0, 1), 'U': (1, 1), 'D': (1, -1)}
-"""{second letter of a word: (axis, sign)} of a move at the jog rate, such as ML, or of a velocity, such as VL0500
-[mdeg/s]."""
+"""{second letter of a move at the jog rate (ML), or of a velocity [mdeg/s] (VL0500): (axis, sign)}."""
 
 IGNORED_WORDS = 'UP', 'DN', 'UM', 'DM', 'UR', 'DR', 'AO', 'LO', 'OP', 'IP', 'AN', 'ST', 'CR', 'CW'
 """Words of radios, which an antenna control unit ignores; the word after one of them may be the mode of a radio."""

@@ -16,8 +16,7 @@ from pedestal_common.stream.splitter import Overlong, Splitter
 MAX_UNREAD_BYTES = 65_536  # largest size of unread answers of a client [bytes]; further answers are dropped
 MAX_WAITING_LINES = 100  # largest number of waiting lines of a client; further input is left unread
 
-LINE_END_TIMEOUT_S = 0.05
-"""Time without a byte after which a complete command of a program without line ends counts as a line [s]."""
+LINE_END_TIMEOUT_S = 0.05  # time without a byte after which a complete command counts as a line [s]
 
 LINE_ENDS = b'\r\n'
 READ_CHUNK_BYTES = 65_536  # largest size of one read [bytes]
@@ -98,10 +97,8 @@ AnyClient = TypeVar('AnyClient', bound=Client)
 
 
 class LineServer(Generic[AnyClient]):
-    """Clients of one TCP port, and of a serial device ('': none). Raises OSError.
-
-    kind: start of the names of the clients; most: largest number of clients; longest: of a line [bytes].
-    """
+    """Clients of one TCP port, and of a serial device ('': none). Raises OSError. kind: start of the names of the
+    clients; most: largest number of clients; longest: of a line [bytes]."""
     clients: list[AnyClient]
     refused_count: int
 

@@ -18,8 +18,7 @@ from pedestal_operator.rotator.set_point_filter import SetPointFilter
 
 (OUTCOME_DONE, OUTCOME_REFUSED, OUTCOME_OUT_OF_REACH, OUTCOME_BUSY, OUTCOME_NO_REPLY,
  OUTCOME_NO_POSITION) = range(6)
-"""Outcomes of a request. BUSY: another client is in control. NO_POSITION: position or limits of the antenna are
-unknown."""
+"""BUSY: another client is in control. NO_POSITION: position or limits of the antenna are unknown."""
 
 
 class Refused(Exception):  # noqa: N818  no error of the server
@@ -31,8 +30,7 @@ class Refused(Exception):  # noqa: N818  no error of the server
 
 
 SLAVE_DURATION_S = 3600.0
-"""Time for which a `slave` direction is valid [s]: longer than a pass, because a program may send one set-point
-only."""
+"""Time for which a `slave` direction is valid [s]: longer than a pass. A program may send one set-point only."""
 
 MAX_ANGLE_AGE_S = 0.5  # of angles and attitude, which are published at each step of the drive [s]
 
@@ -110,8 +108,7 @@ class Pointing:
         return azimuth, elevation
 
     def target(self, azimuth: Degrees, elevation: Degrees, now: Seconds) -> tuple[Degrees, Degrees]:
-        """Return the set-point (azimuth, elevation) for a direction at the time now, on the nearest turn. Raises
-        Refused."""
+        """Return the set-point (azimuth, elevation) for a direction, on the nearest turn. Raises Refused."""
         limits = self.limits
         low, high = (-MAX_SHIP_ELEVATION_DEG, MAX_SHIP_ELEVATION_DEG) if self.on_ship else limits.elevation
         self._check('azimuth', azimuth, -MAX_AZIMUTH_DEG, MAX_AZIMUTH_DEG)

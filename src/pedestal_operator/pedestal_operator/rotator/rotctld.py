@@ -13,8 +13,7 @@ from pedestal_common.quantities import Degrees
 MAX_LINE_BYTES = 256  # largest length of a line [bytes]
 
 (RESULT_OK, RESULT_INVALID, RESULT_NOT_IMPLEMENTED, RESULT_TIMEOUT, RESULT_IO_ERROR, RESULT_REJECTED,
- RESULT_NOT_AVAILABLE, RESULT_BUSY) = (0, -1, -4, -5, -6, -9, -11, -14)
-"""Results n of `RPRT n` (hamlib/rig.h)."""
+ RESULT_NOT_AVAILABLE, RESULT_BUSY) = (0, -1, -4, -5, -6, -9, -11, -14)  # n of `RPRT n` (hamlib/rig.h)
 
 ERROR_REASONS = {RESULT_INVALID: 'invalid arguments', RESULT_NOT_IMPLEMENTED: 'unknown command',
                  RESULT_NOT_AVAILABLE: 'an antenna control unit has no such function'}
@@ -38,8 +37,7 @@ SET_COMMANDS = tuple(row.name for row in COMMANDS if row.sets)  # commands that 
 
 UNAVAILABLE_COMMANDS = (*'wCUuXx3LlDdEeBAaVv', 'send_cmd', 'set_conf', 'set_func', 'get_func', 'set_parm', 'get_parm',
                         'dump_conf', 'lonlat2loc', 'loc2lonlat', 'dms2dec', 'dec2dms', 'dmmm2dec', 'dec2dmmm', 'qrb',
-                        'a_sp2a_lp', 'd_sp2d_lp', 'set_level', 'get_level')
-"""They have no function in an antenna control unit."""
+                        'a_sp2a_lp', 'd_sp2d_lp', 'set_level', 'get_level')  # without function here
 
 MOVE_DIRECTIONS = {2: (0, 1), 4: (0, -1), 8: (-1, 0), 16: (1, 0), 32: (-1, 1), 64: (1, 1), 128: (-1, -1), 256: (1, -1)}
 """{number: direction (azimuth, elevation)} of `move`."""

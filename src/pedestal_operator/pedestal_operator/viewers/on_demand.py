@@ -15,8 +15,7 @@ from pedestal_operator.viewers import frames
 
 
 class OnDemand:
-    """Subscription of a node to the topic of a link. take(CDR bytes, rclpy's message info) is called for each
-    message."""
+    """Subscription of a node to a topic. take(CDR bytes, rclpy's message info) is called for each message."""
     _subscriptions: list[Subscription]
 
     def __init__(self, node: Shell, link: Link, take: Callable[[bytes, Message], None]) -> None:
@@ -65,10 +64,8 @@ class FrameSource:
             latest.topic.set_active(active)
 
     def read(self) -> tuple[Nanoseconds, list[frames.Transform]]:
-        """Return (stamp of the last angles, their transforms), (0, []) before the first.
-
-        The deck is ashore before the first message of the INS. A deck without an attitude has no transform.
-        """
+        """Return (stamp of the last angles, their transforms), (0, []) before the first. The deck is ashore before the
+        first message of the INS. A deck without an attitude has no transform."""
         latest = {prefix: latest.read() for prefix, latest in self._angles.items()}
         known = {prefix: read for prefix, read in latest.items() if read}
         if not known:

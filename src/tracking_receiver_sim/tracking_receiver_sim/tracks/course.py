@@ -24,8 +24,7 @@ from tracking_receiver_sim.tracks.flight import Flight
 
 PASS_SEARCH_STEP_S = 20.0  # step of the search for a pass [s]; a shorter pass may be missed
 PASS_SEARCH_BATCH_SIZE = 500  # number of steps computed at once; the search ends with the batch of the pass
-MIN_CULMINATION_DEG = 10.0
-"""Least culmination of a chosen pass [deg]: a lower pass stays in the region of refraction and buildings."""
+MIN_CULMINATION_DEG = 10.0  # of a pass [deg]: a lower one stays in refraction and behind buildings
 SEGMENT_GAP_TOLERANCE_S = 1e-3  # largest time between two segments [s] that does not count as a gap
 
 
@@ -71,10 +70,8 @@ def require_covered(ephemeris: states.Ephemeris, begin: Seconds, end: Seconds) -
 
 def passage(ephemeris: states.Ephemeris, station: StationParameters,
             start: Seconds | None = None) -> tuple[Seconds, Seconds]:
-    """Return (begin, end) of the first pass that climbs above MIN_CULMINATION_DEG, as far as the file goes.
-
-    start: begin of the run, which then is the begin; None: the run begins with the pass. Raises csv_table.TableError.
-    """
+    """Return (begin, end) of the first pass that climbs above MIN_CULMINATION_DEG, as far as the file goes. start:
+    begin of the run, which then is the begin; None: the run begins with the pass. Raises csv_table.TableError."""
     t = np.append(np.arange(ephemeris.begin, ephemeris.end, PASS_SEARCH_STEP_S), ephemeris.end)
     seen = np.full(len(t), np.nan)
     for at in range(0, len(t), PASS_SEARCH_BATCH_SIZE):
@@ -116,8 +113,7 @@ MAX_DURATION_S = 86400.0  # largest duration of a run [s]
 
 def flight_of_orbit(ephemeris: states.Ephemeris, target: TargetParameters, duration: Seconds,
                     margin: Seconds) -> Flight:
-    """Return the Flight of an orbit for a run of `duration`, with `margin` more at both ends as far as the file goes.
-    Raises csv_table.TableError."""
+    """Return the Flight of a run, with `margin` at both ends as far as the file goes. Raises csv_table.TableError."""
     zero = ephemeris.begin + target.track_file.start
     require_covered(ephemeris, zero, zero + duration)
     begin, end = max(-margin, ephemeris.begin - zero), min(duration + margin, ephemeris.end - zero)
@@ -143,8 +139,7 @@ def flight_of_orbit(ephemeris: states.Ephemeris, target: TargetParameters, durat
 
 def _check_acceleration(ephemeris: states.Ephemeris, spline: CubicHermiteSpline, zero: Seconds,
                         limit: MetersPerSecond2) -> None:
-    """Raise TableError, with the line of the nearest state, for an acceleration that a wrong digit in the file
-    causes."""
+    """Raise TableError, with the line of the nearest state, for an acceleration due to a wrong digit."""
     size = np.linalg.norm(spline(spline.x, 2), axis=1)
     worst = int(np.argmax(size))
     if not size[worst] <= limit:
@@ -157,11 +152,9 @@ def _check_acceleration(ephemeris: states.Ephemeris, spline: CubicHermiteSpline,
 
 def run_parameters_of_orbit(ephemeris: states.Ephemeris, target: TargetParameters,
                             given: Collection[str]) -> dict[str, float]:
-    """Return {parameter: value} of a run that covers the first pass above MIN_CULMINATION_DEG.
-
-    The run begins at a whole second after the rise of the satellite and ends when it sets. given: names of the
-    parameters that the scenario sets. Raises csv_table.TableError.
-    """
+    """Return {parameter: value} of a run that covers the first pass above MIN_CULMINATION_DEG. The run begins at a
+    whole second after the rise of the satellite and ends when it sets. given: names of the parameters that the
+    scenario sets. Raises csv_table.TableError."""
     # zero: t of stamp 0. Only a start at a rise moves to a whole second; a given start and the begin of the file stay.
     start_given = 'target.track_file.start' in given
     start = ephemeris.begin + target.track_file.start if start_given else None

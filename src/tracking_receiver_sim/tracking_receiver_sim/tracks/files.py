@@ -56,7 +56,6 @@ FILE_FORMATS = (
     FileFormat('table of azimuth and elevation', DIRECTIONS_KIND, directions.is_table,
                _read_object(directions.read_table)),
     FileFormat('CSV', LOG_KIND, lambda beginning: True, _read_log(tables.rows)))
-"""A file is compared with them in this order; the last one takes every other file."""
 
 FOREIGN_FORMATS = (
     (re.compile(r'A[A-Z0-9]{3}[^\n]*\n(?:[^\n]*\n){0,200}?(?:HFDTE|B\d{13}[NS]\d{8}[EW][AV])'),
@@ -84,16 +83,13 @@ def read(track: TrackFileParameters) -> tuple[FileKind, Data]:
 
 
 def lay_out(target: TargetParameters, duration: Seconds, margin: Seconds) -> flight.Flight:
-    """Return the Flight of a target for a run of `duration`, with `margin` at both ends as far as the file goes.
-    Raises csv_table.TableError."""
+    """Return the Flight of a run, with `margin` at both ends as far as the file goes. Raises csv_table.TableError."""
     kind, data = read(target.track_file)
     return kind.lay_out(data, target, duration, margin)
 
 
 def derived_parameters(target: TargetParameters, given: Collection[str]) -> dict[str, float]:
-    """Return {name: value} of DERIVED_PARAMETERS from the file of a target. Raises csv_table.TableError.
-
-    given: names of the parameters that the scenario sets; only those of the station and the start matter here.
-    """
+    """Return {name: value} of DERIVED_PARAMETERS from the file of a target. Raises csv_table.TableError. given: names
+    of the parameters that the scenario sets; only those of the station and the start matter here."""
     kind, data = read(target.track_file)
     return kind.run_parameters(data, target, given)

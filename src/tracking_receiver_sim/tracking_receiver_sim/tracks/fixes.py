@@ -16,8 +16,7 @@ MAX_LISTED_AIRCRAFT = 12  # number of aircraft that an error lists for a file wi
 MAX_AIRCRAFT = 10_000  # largest number of aircraft in a file
 MIN_FIXES = 4  # least number of fixes of a track
 
-FIX_COLUMNS = ('line', 'aircraft', 'time', 'latitude', 'longitude', 'altitude')
-"""Numbers of a fix while a file is read; `aircraft` is Aircraft.number."""
+FIX_COLUMNS = ('line', 'aircraft', 'time', 'latitude', 'longitude', 'altitude')  # aircraft: Aircraft.number
 
 
 class Fix(NamedTuple):

@@ -1,5 +1,4 @@
-"""A recorded flight: cubic spline in the ENU frame of the station, from fixes that are held, coarse and noisy; station
-and duration of its run.
+"""A recorded flight: cubic spline in the ENU frame of the station, from fixes that are held, coarse and noisy.
 
 Held positions: an ADS-B log repeats latitude and longitude until the next message comes. Such a repetition is no
 measurement and is dropped. If a position stays for max_gap or longer, or throughout the file, the target stands still,
@@ -181,11 +180,9 @@ def _clear_of(along: Floats, across: Floats, least_range: Meters) -> Meters:
 
 
 def run_parameters(fixes: Fixes, target: TargetParameters, given: Collection[str]) -> dict[str, float]:
-    """Return {parameter: value} that fixes give for a run. Raises csv_table.TableError.
-
-    given: names of the parameters that the scenario sets. The reference range is the greatest range of the flight, so
-    the C/N0 of the parameter is the lowest of the run. The run ends at the last tenth of a second before the last fix.
-    """
+    """Return {parameter: value} that fixes give for a run. Raises csv_table.TableError. given: names of the parameters
+    that the scenario sets. The reference range is the greatest range of the flight, so the C/N0 of the parameter is
+    the lowest of the run. The run ends at the last tenth of a second before the last fix."""
     derived = station_for(fixes, target.track_file)
     station = dataclasses.replace(target.station, **{
         field: getattr(derived, field) for name, field in STATION_FIELDS.items() if name not in given})

@@ -1,5 +1,4 @@
-"""Conversion of orbits from other frames to the earth-fixed frame, and of the times of files to instants (module
-instant).
+"""Conversion of orbits from other frames to the earth-fixed frame, and of the times of files to instants.
 
 The rotations are those of skyfield: IAU 2006 precession and IAU 2000A nutation, with UT1 - UTC and leap seconds from
 its built-in tables. They omit the polar motion (up to 0.3", 9 m on the ground). Every ITRF is taken as WGS84; the
@@ -34,11 +33,8 @@ def names() -> str:
 
 
 def instants(system: str, days: Floats, seconds: Times) -> Times:
-    """Return the instants of days since 1970 and seconds of the day in a time system.
-
-    Raises ValueError(index of the row) if the seconds are 86400 or more on a day without a leap second. Only UTC has
-    leap seconds.
-    """
+    """Return the instants of days since 1970 and seconds of the day in a time system, of which UTC has leap seconds.
+    Raises ValueError(index of the row) for second 86400 of a day without one."""
     offset = TIME_SYSTEM_OFFSETS_S[system]
     if offset is None:
         late = np.flatnonzero(seconds >= SECONDS_PER_DAY)
@@ -70,7 +66,7 @@ def earth_fixed(frame: str, time: Times, r: Vectors3, v: Vectors3) -> tuple[Vect
 
 
 def _to_fixed(frame: str, time: Times) -> Floats:
-    """Return rotations (3, 3, n)."""
+    """Return the rotations (3, 3, n) from a frame."""
     from skyfield.framelib import ICRS_to_J2000, itrs, true_equator_and_equinox_of_date
     from skyfield.sgp4lib import TEME
     days = np.floor(time / SECONDS_PER_DAY)

@@ -34,17 +34,13 @@ DATE_PATTERNS = tuple(re.compile(f'{date}(?P<zone> ?(?:Z|UTC|[+-]\\d\\d:?\\d\\d)
                                    rf'(?P<day>\d{{1,2}}) {_MONTH} (?P<year>\d{{4}}) {_CLOCK}'))
 """ISO 8601, its basic format (20180723T100000), year/month/day, day.month.year, JPL Horizons (2018-Jul-23), STK, the
 Systems Tool Kit (23 Jul 2018)."""
-AMBIGUOUS_PATTERN = re.compile(r'\d{1,2}[/-]\d{1,2}[/-](?:\d{4}|\d\d)\b.*', re.ASCII)
-"""A date whose order of day and month differs between countries."""
+AMBIGUOUS_PATTERN = re.compile(r'\d{1,2}[/-]\d{1,2}[/-](?:\d{4}|\d\d)\b.*', re.ASCII)  # order differs by country
 DATE_EXAMPLES = ('2018-07-23T10:00:00Z, 2018/07/23 10:00:00, 23.07.2018 10:00:00, 2018-Jul-23 10:00:00 or '
                  '23 Jul 2018 10:00:00')
 
 
 def iso_date(text: str | None) -> str:
-    """Return a date with a time of day in ISO 8601; the zone stays as it is written, in capitals.
-
-    A text in no known notation is returned with single spaces.
-    """
+    """Return a date with a time of day in ISO 8601, with the zone as written; another text with single spaces."""
     words = ' '.join((text or '').split())
     match = next(filter(None, (pattern.fullmatch(words) for pattern in DATE_PATTERNS)), None)
     if not match:
@@ -106,11 +102,8 @@ def is_dated(text: str) -> bool:
 
 
 def seconds(path: FilePath, line: int, name: str, text: str | None) -> Seconds:
-    """Return the instant of a text. Raises TableError.
-
-    The text is a date (without a zone: UTC), or a number of seconds since 1970 without leap seconds. A number of 13
-    digits is in milliseconds, and one of 16 digits in microseconds.
-    """
+    """Return the instant of a date (without a zone: UTC), or of seconds since 1970 without leap seconds. Raises
+    TableError. A number of 13 digits is in milliseconds, one of 16 digits in microseconds."""
     text = iso_date(text)
     match = ISO_TIME_PATTERN.fullmatch(text)
     try:

@@ -72,8 +72,7 @@ def numbers(path: FilePath, line: int, text: str, limits: Limits) -> list[float]
 
 
 def instant(path: FilePath, line: int, column: int, name: str, text: str) -> tuple[int, Seconds]:
-    """Return (days since 1970, seconds of the day) of a CCSDS time, YYYY-MM-DDThh:mm:ss or YYYY-DDDThh:mm:ss, in any
-    time system. Raises TableError."""
+    """Return (days since 1970, seconds of the day) of YYYY-MM-DDThh:mm:ss or YYYY-DDDThh:mm:ss. Raises TableError."""
     match = CCSDS_TIME_PATTERN.fullmatch(text)
     try:
         date, hours, minutes, seconds, fraction = match.groups() if match else [''] * 5

@@ -27,10 +27,8 @@ MAX_LINE_CHARS = 1024  # largest number of characters of a line; the standard al
 
 
 def rows(path: str, log: fixes.Log) -> Iterator[fixes.Fix]:
-    """Yield the fixes of a log. Raises TableError.
-
-    The time is an instant if an RMC has a date, otherwise it counts from midnight. NMEA has no names of aircraft.
-    """
+    """Yield the fixes of a log. Raises TableError. The time is an instant if an RMC has a date, otherwise it counts
+    from midnight. NMEA has no names of aircraft."""
     first_day = _first_day(path)
     log.form, log.time_name, log.dated = 'NMEA', 'time', first_day is not None
     clock, without_separation = _Clock(first_day), False
@@ -118,11 +116,9 @@ class _Clock:
         self.first, self.days, self.leaps, self._last = first, 0, 0, None
 
     def advance(self, second: Seconds, day: int | None = None) -> Seconds:
-        """Move on to a sentence. Return its instant, without a date the time since midnight.
-
-        second: of the day; day: since 1970, if the sentence has a date, which moves the time only forward. Raises
-        ValueError for a leap second on a day that has none.
-        """
+        """Move on to a sentence. Return its instant, without a date the time since midnight. second: of the day; day:
+        since 1970, if the sentence has a date, which moves the time only forward. Raises ValueError for a leap second
+        on a day that has none."""
         if self._last is not None:
             midnights = round((self._last - second) / SECONDS_PER_DAY)
             # A last second of 86400 or more was a leap second.
@@ -137,10 +133,8 @@ class _Clock:
 
 
 def _first_day(path: str) -> int | None:
-    """Return the day since 1970 of the first sentence with a fix, None if no RMC has a date.
-
-    The date of an RMC belongs to the time of the same RMC, which may lie on the other side of midnight.
-    """
+    """Return the day since 1970 of the first sentence with a fix, None if no RMC has a date. The date of an RMC
+    belongs to the time of the same RMC, which may lie on the other side of midnight."""
     clock = _Clock()
     for _, sentence in _sentences(path, fixes.Log()):
         with contextlib.suppress(ValueError):

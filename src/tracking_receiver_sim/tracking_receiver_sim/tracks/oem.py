@@ -40,10 +40,8 @@ class _Block(NamedTuple):
 
 
 def read(path: str, wanted: str = '') -> states.Ephemeris:
-    """Return the Ephemeris of one object in an OEM. Raises TableError.
-
-    wanted: name or international designator of the object; it may be empty for a file of one object.
-    """
+    """Return the Ephemeris of one object in an OEM. Raises TableError. wanted: name or international designator of the
+    object; it may be empty for a file of one object."""
     objects: dict[tuple[str, str], list[_Block]] = {}
     midnight = 0.0
     for block in _blocks(path):
@@ -156,8 +154,7 @@ def _segment(path: str, block: _Block, midnight: Seconds) -> states.Segment:
 
 
 def _without_repetitions(path: str, table: Floats) -> Floats:
-    """Remove the rows that repeat time and numbers of the row above. Raise TableError for different states at one
-    time."""
+    """Remove repetitions of the row above. Raise TableError for different states at one time."""
     step = np.diff(table[:, 1:], axis=0)
     at_once = step[:, 0] == 0.0
     repeated = at_once & (step == 0.0).all(axis=1)

@@ -1,5 +1,4 @@
-"""Orbit of a file: states (time, position, velocity) in segments, and the interpolation HERMITE or LAGRANGE of CCSDS
-502.0 between them.
+"""Orbit of a file: states in segments, and the interpolation HERMITE or LAGRANGE of CCSDS 502.0 between them.
 
 The polynomial HERMITE of degree d runs through the positions and velocities of (d + 1) / 2 states, LAGRANGE through
 the positions of d + 1 states. These states lie about the wanted time as evenly as the ends of the segment allow. scipy
@@ -18,8 +17,7 @@ INTERPOLATION_METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')  # LINEAR is LAGRANGE 
 DEGREE_LIMITS = 1, 19  # range of the degree of a polynomial
 DEFAULT_INTERPOLATION = 'HERMITE', 7  # method and degree of the interpolation if the file gives none
 
-RADIUS_LIMITS_M = 6.3e6, 2e9
-"""Range of the distance from the centre of the earth [m]; a lower value points to another unit."""
+RADIUS_LIMITS_M = 6.3e6, 2e9  # from the centre of the earth [m]; a lower value points to another unit
 
 GAP_STEP_RATIO = 3.0  # ratio of a step in time to each of its neighbours above which the step is a gap
 
@@ -76,9 +74,7 @@ def segment(path: str, first_line: int, table: Floats, frame: str, method: str, 
             begin: Seconds | None = None, end: Seconds | None = None) -> Segment:
     """Return a Segment of a table (n, 8) of line, t, x, y, z [m], vx, vy, vz [m/s]; (n, 5) without velocities.
 
-    first_line: line in which the segment begins; method, degree: '' and None if the file gives none; begin, end:
-    usable range of t. Raises TableError if the time does not grow, a state is outside RADIUS_LIMITS_M, or the states
-    are too few.
+    first_line: of the segment; method, degree: '' and None if not given. Raises TableError.
     """
     if not len(table):
         raise csv_table.TableError(f'{path}: line {first_line}: the segment that begins here has no state')

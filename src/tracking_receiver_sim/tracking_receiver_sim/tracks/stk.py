@@ -18,8 +18,7 @@ from tracking_receiver_sim.tracks import instant, lines, states
 FILE_SIGNATURE_PATTERN = re.compile(r'stk\.v\.\d+', re.IGNORECASE)
 FRAME_NAMES = {'fixed': 'ITRF', 'j2000': 'EME2000', 'icrf': 'ICRF', 'temeofdate': 'TEME', 'trueofdate': 'TOD'}
 METRES_PER_UNIT = {'meters': 1.0, 'kilometers': 1000.0}  # {DistanceUnit: its length [m]}
-METHOD_NAMES = {'lagrange': 'LAGRANGE', 'hermite': 'HERMITE'}
-"""LagrangeVOP, which interpolates the difference to a Kepler orbit, is refused."""
+METHOD_NAMES = {'lagrange': 'LAGRANGE', 'hermite': 'HERMITE'}  # LagrangeVOP, relative to a Kepler orbit, is refused
 STATE_KEYWORDS = {'ephemeristimepos': False, 'ephemeristimeposvel': True, 'ephemeristimeposvelacc': True}
 """True if the states have velocities."""
 GEODETIC_MARK = 'lla'  # part of the keyword before states in latitude, longitude and height

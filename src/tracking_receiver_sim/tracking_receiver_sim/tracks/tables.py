@@ -1,5 +1,4 @@
-"""Reader of flights as CSV. The names of the columns select the layout of a file, a row of CSV_LAYOUTS
-(docs/tracks.md).
+"""Reader of flights as CSV. The names of the columns select a row of CSV_LAYOUTS (docs/tracks.md).
 
 The geometric altitude of ADS-B is above the ellipsoid. If a file has only the barometric altitude, it is taken
 instead, with a remark in the log. Rows of ADS-B logs without a position are passed over and counted.
@@ -14,8 +13,7 @@ from tracking_receiver_sim.tracks import times
 from tracking_receiver_sim.tracks.fixes import Fix, Log
 
 ALTITUDE_LIMITS_FT_IN_M = -3000.0 * columns.METRES_PER_FOOT, 500_000.0 * columns.METRES_PER_FOOT
-ALTITUDE_LIMITS_M = -1000.0, 150_000.0
-"""Ranges of the altitudes of ADS-B [m]: for files in feet, and for files in metres."""
+ALTITUDE_LIMITS_M = -1000.0, 150_000.0  # of ADS-B [m], in feet and in metres
 
 EMPTY_CELL_TEXTS = ('', 'nan', 'none', 'null')  # texts of a cell without a value, in lower case
 
@@ -24,8 +22,7 @@ LATITUDE = columns.Quantity('latitude_deg', dict.fromkeys(('latitude', 'lat'), '
 LONGITUDE = columns.Quantity('longitude_deg', dict.fromkeys(('longitude', 'lon', 'lng', 'long'), 'deg'), 'deg')
 ALTITUDE = columns.Quantity('altitude_m', dict.fromkeys(('altitude', 'alt', 'height', 'elevation', 'ele',
                                                          'geoaltitude'), ''), 'm')
-POSITION = columns.Quantity('position', {'position': 'deg'}, 'deg')
-"""An altitude must name its unit."""
+POSITION = columns.Quantity('position', {'position': 'deg'}, 'deg')  # an altitude must name its unit
 
 
 class CsvLayout(NamedTuple):
@@ -61,7 +58,6 @@ CSV_LAYOUTS = (
     CsvLayout('ADS-B', _named('time', 's'), _named('lat', 'deg'), _named('lon', 'deg'),
               (_named('geoaltitude', 'm'), _named('baroaltitude', 'm')), ALTITUDE_LIMITS_M, True, 1),
     CsvLayout('CSV', times.TIME._replace(label='time_s'), LATITUDE, LONGITUDE, (ALTITUDE,), (-1000.0, 1e8), False, 1))
-"""The last one is for every other file."""
 
 
 def rows(path: str, log: Log) -> Iterator[Fix]:

@@ -1,5 +1,7 @@
-"""Times in a column of a track file: UTC as a date, Julian dates, or numbers from any origin; or in two columns, one
-of the date and one of the time of day, both UTC."""
+"""Times in a column of a track file: UTC as a date, Julian dates, or numbers from any origin.
+
+A table may also have two columns: one of the date and one of the time of day, both UTC.
+"""
 from collections.abc import Sequence
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
@@ -23,8 +25,7 @@ FIRST_EXPECTED_JULIAN_DATE = 2_440_000.5
 file of seconds from 0 on is not refused."""
 MIN_UNIX_TIME_S = 1e8  # least number of seconds since 1970 in a column of UTC [s]; a smaller number has another origin
 MIN_SPAN_S = 3.0
-"""Least time from the first row to the last if the times may also be days of a Julian date [s]: a pass lasts less than
-3 days."""
+"""Least time from first to last row if the times may be days of a Julian date [s]: a pass lasts less than 3 days."""
 
 
 class Times:
@@ -49,8 +50,7 @@ class Times:
         return f'{self.date} and {self.column.name}' if self.date else self.column.name
 
     def seconds(self, row: csv_table.Cells) -> Seconds:
-        """Return the time of a row: an instant if the times are dated, otherwise seconds from any origin. Raises
-        TableError."""
+        """Return the time of a row: an instant if dated, otherwise seconds from any origin. Raises TableError."""
         cell = row[self.column.name] or ''
         value = self._seconds(f'{row[self.date] or ""} {cell}' if self.date else cell)
         self.first, self.last = value if self.first is None else self.first, value
