@@ -236,11 +236,10 @@ def _json(path: FilePath) -> Iterator[Satellite]:
 
 def _xml(path: FilePath) -> Iterator[Satellite]:
     """Read the segments of an OMM or NDM; expat keeps no parsed data in memory."""
-    # line: of the open segment.
     satellites: list[Satellite] = []
     open_elements: list[str] = []
     texts: dict[str, str] = {}
-    line = 1
+    line = 1        # of the open segment
 
     def doctype(*_: object) -> None:
         raise lines.wrong(path, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1,

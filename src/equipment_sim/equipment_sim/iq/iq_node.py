@@ -38,7 +38,7 @@ class IqNode(unit_node.UnitNode):
         """Open the sink, and begin to follow the trigger."""
         self.sink = sinks.opened(self.parameters)
         self.get_logger().info(f'samples to {self.parameters.source.url} ({self.parameters.source.kind})')
-        self.noise = self.every(NOISE_PERIOD_S, self._send_noise)
+        self.noise = self.every(NOISE_PERIOD_S, lambda: self._send(self.clock()[1]))
         if self.parameters.source.start_after:
             self.message_reader('diagnostics', self._take_start)
         super().begin()
@@ -47,10 +47,6 @@ class IqNode(unit_node.UnitNode):
         """Take time 0 from the diagnostics of the receiver, which chooses it at the first samples."""
         for start in starts(array.status, MONOPULSE_RECEIVER.name):
             self._epoch = start
-
-    def _send_noise(self) -> None:
-        """Send noise up to now."""
-        self._send(self.clock()[1])
 
     def _send(self, until: Nanoseconds) -> None:
         rate = self.parameters.source.rate

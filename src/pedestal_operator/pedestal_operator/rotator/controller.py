@@ -60,18 +60,14 @@ def _outcome(refusal: str) -> int:
 
 class Controller:
     """Control of the antenna by the clients of a server, of which each method gets the name."""
+    holder: str                     # client in control, '' without one; one that has left controls its motion
     _jog: Sequence[float] | None    # rates (azimuth, elevation) [deg/s]
 
     def __init__(self, remote: Remote) -> None:
         self._remote = remote
         self.pointing = Pointing(remote)
-        self._holder, self._has_left, self._last_command_time = '', False, 0.0
+        self.holder, self._has_left, self._last_command_time = '', False, 0.0
         self._jog, self._last_jog_time, self._was_jogging = None, 0.0, False
-
-    @property
-    def holder(self) -> str:
-        """Name of the client in control, '' without one. A client that has left stays in control of its motion."""
-        return self._holder
 
     def go(self, client: str, azimuth: Degrees, elevation: Degrees, now: Seconds) -> PendingRequest:
         """Point the antenna to a direction."""
@@ -100,7 +96,7 @@ class Controller:
 
     def look(self, now: Seconds) -> None:
         """Repeat a jog, end a motion without further set-points, and release control that is no longer used."""
-        self._remote.who = self._holder
+        self._remote.who = self.holder
         self.pointing.look(now)
         is_jogging = self._remote.texts.get('acu/mode') == 'rate'
         if self._was_jogging and not is_jogging:
@@ -115,14 +111,14 @@ class Controller:
 
     def leave(self, client: str) -> None:
         """Note that a client has left. Its control is released as soon as its motion has ended."""
-        if client == self._holder:
+        if client == self.holder:
             self._has_left = True
 
     def release(self, now: Seconds) -> None:
         """Stop the jog or the motion of the client in control, and release its control."""
-        if not self._holder:
+        if not self.holder:
             return
-        self._remote.who = self._holder
+        self._remote.who = self.holder
         if self._jog:
             self._remote.request('stop')
         self.pointing.settle(now)
@@ -131,22 +127,22 @@ class Controller:
 
     def _release(self) -> None:
         """Leave the motion as it is."""
-        self._remote.who = self._holder
-        self._holder, self._has_left = '', False
+        self._remote.who = self.holder
+        self.holder, self._has_left = '', False
         self._remote.request('release')
 
     def _request(self, client: str, now: Seconds, send: Callable[[], str], continues: bool = True) -> PendingRequest:
         """Return the pending request of send(); take control first if necessary. continues: False for a command that
         ends the motion of the set-points."""
-        if self._has_left and address_of(client) == address_of(self._holder):
+        if self._has_left and address_of(client) == address_of(self.holder):
             self._release()  # the same program on a new connection: its motion continues
-        if self._holder not in ('', client):
-            return PendingRequest([], now, OUTCOME_BUSY, f'{HELD_REFUSAL} {self._holder}')
+        if self.holder not in ('', client):
+            return PendingRequest([], now, OUTCOME_BUSY, f'{HELD_REFUSAL} {self.holder}')
         if not continues:
             self.pointing.reset()
         self._jog, self._remote.who = None, client
-        numbers = [] if self._holder else [self._remote.request('take')]
-        self._holder, self._last_command_time = client, now
+        numbers = [] if self.holder else [self._remote.request('take')]
+        self.holder, self._last_command_time = client, now
         return PendingRequest([*numbers, send()], now + CLIENT_REPLY_TIMEOUT_S)
 
 

@@ -14,13 +14,20 @@ from scipy.optimize import brentq
 
 from pedestal_common import parameters
 from pedestal_common.geometry.geodesy import StationParameters, station_frame
-from pedestal_common.quantities import Floats, Meters, MetersPerSecond2, Seconds, Times, Vectors3
+from pedestal_common.quantities import Floats, MetersPerSecond2, Seconds, Times, Vectors3
 from pedestal_common.reproducible import arctan2, cos, sin, turned
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.params import TargetParameters
 from tracking_receiver_sim.tracks import frames, instant, states
 from tracking_receiver_sim.tracks.directions import Directions
-from tracking_receiver_sim.tracks.flight import Flight
+from tracking_receiver_sim.tracks.flight import (
+    MAX_DURATION_S,
+    MIN_DURATION_S,
+    Flight,
+    duration_before,
+    reference_range,
+    view,
+)
 
 PASS_SEARCH_STEP_S = 20.0  # step of the search for a pass [s]; a shorter pass may be missed
 PASS_SEARCH_BATCH_SIZE = 500  # number of steps computed at once; the search ends with the batch of the pass
@@ -108,7 +115,6 @@ def _crossing(ephemeris: states.Ephemeris, station: StationParameters, before: S
 
 
 MAX_KNOT_SPACING_S = 10.0  # largest time between two knots of the spline of an orbit [s]
-MAX_DURATION_S = 86400.0  # largest duration of a run [s]
 
 
 def flight_of_orbit(ephemeris: states.Ephemeris, target: TargetParameters, duration: Seconds,
@@ -124,17 +130,11 @@ def flight_of_orbit(ephemeris: states.Ephemeris, target: TargetParameters, durat
     spline = CubicHermiteSpline(knots[finite], r[finite], v[finite])
     _check_acceleration(ephemeris, spline, zero, target.track_file.max_acceleration)
     t = np.linspace(0.0, duration, 2 + int(duration / MAX_KNOT_SPACING_S))
-    east, north, up = spline(t).T
-    distance, elevation = np.hypot(np.hypot(east, north), up), arctan2(up, np.hypot(east, north))
-    top = int(np.argmax(elevation))
+    seen, greatest_range = view(spline, t, target.station)
     start_time = instant.iso(ephemeris.midnight + zero)
-    return Flight(spline.x, spline.c, start_time, (
-        f'{ephemeris.path.rpartition("/")[2]}: {ephemeris.description}',
-        f'{duration:.10g} s from {start_time}, highest {np.degrees(elevation[top]):.1f} deg after '
-        f'{t[top]:.0f} s, {distance.min() / 1e3:.4g} to {distance.max() / 1e3:.4g} km from the station at '
-        f'latitude {target.station.latitude_deg:.5f}, longitude {target.station.longitude_deg:.5f} deg, height '
-        f'{target.station.height:.1f} m'),
-        float(np.linalg.norm(v[finite], axis=1).max()), float(distance.max()))
+    return Flight(spline.x, spline.c, start_time, (f'{ephemeris.path.rpartition("/")[2]}: {ephemeris.description}',
+                                                   f'{duration:.10g} s from {start_time}, {seen}'),
+                  float(np.linalg.norm(v[finite], axis=1).max()), greatest_range)
 
 
 def _check_acceleration(ephemeris: states.Ephemeris, spline: CubicHermiteSpline, zero: Seconds,
@@ -160,11 +160,11 @@ def run_parameters_of_orbit(ephemeris: states.Ephemeris, target: TargetParameter
     start = ephemeris.begin + target.track_file.start if start_given else None
     begin, end = passage(ephemeris, target.station, start)
     zero = begin if start_given or begin == ephemeris.begin else math.ceil(begin)
-    duration = max(0.1, min(MAX_DURATION_S, math.floor(10.0 * (end - zero)) / 10.0))
+    duration = max(MIN_DURATION_S, min(MAX_DURATION_S, math.floor(10.0 * (end - zero)) / 10.0))
     times = np.linspace(zero, zero + duration, 1 + int(duration / MAX_KNOT_SPACING_S))
     r, _ = enu(ephemeris, target.station, times)
     return {**_station(target), 'target.track_file.start': float(zero - ephemeris.begin), 'duration': duration,
-            'receiver.reference_range': _upwards(np.nanmax(np.linalg.norm(r, axis=1)))}
+            'receiver.reference_range': reference_range(np.nanmax(np.linalg.norm(r, axis=1)))}
 
 
 def flight_of_directions(directions: Directions, target: TargetParameters, _duration: Seconds,
@@ -190,14 +190,9 @@ def run_parameters_of_directions(directions: Directions, target: TargetParameter
                                  _given: Collection[str]) -> dict[str, float]:
     """Return {parameter: value} of a run from the first row, or from track_file.start, to the last row."""
     last = directions.t[-1] - directions.t[0] - target.track_file.start
-    return {**_station(target), 'duration': max(0.1, min(MAX_DURATION_S, (math.ceil(10.0 * last) - 1) / 10.0)),
+    return {**_station(target), 'duration': duration_before(last),
             'receiver.reference_range': target.angle.range}
 
 
 def _station(target: TargetParameters) -> dict[str, float]:
     return {f'target.station.{name}': value for name, value in parameters.as_dict(target.station).items()}
-
-
-def _upwards(distance: Meters) -> Meters:
-    """Return a distance rounded up to 10 m."""
-    return max(10.0, 10.0 * math.ceil(0.1 * distance))

@@ -65,17 +65,22 @@ def lay_out(fixes: Fixes, track: TrackFileParameters, station: StationParameters
     speed, acceleration = _check_limits(kept, spline, track)
     at = _samples(spline.x)
     at = at[at >= min(0.0, at[-1])]         # from stamp 0 on
+    seen, greatest_range = view(spline, at, station)
+    log = (f'{fixes.description}: {len(kept.line)} of {len(fixes.line)} fixes, {dropped} held positions dropped'
+           f'{_quantisation(fixes, speed)}{_residual(spline(time) - enu) if track.smooth else ""}')
+    path = f'{time[-1]:.10g} s, at most {speed:.4g} m/s and {acceleration:.3g} m/s2, {seen}'
+    start_time = instant.iso(fixes.time[0] + track.start) if fixes.dated else ''
+    return Flight(spline.x, spline.c, start_time, (log, path), float(speed), greatest_range)
+
+
+def view(spline: PPoly, at: Times, station: StationParameters) -> tuple[str, Meters]:
+    """Return (text on elevations and distances of a trajectory at times, the greatest distance)."""
     east, north, up = spline(at).T
     distance, elevation = np.hypot(np.hypot(east, north), up), arctan2(up, np.hypot(east, north))
     top = int(np.argmax(elevation))
-    log = (f'{fixes.description}: {len(kept.line)} of {len(fixes.line)} fixes, {dropped} held positions dropped'
-           f'{_quantisation(fixes, speed)}{_residual(spline(time) - enu) if track.smooth else ""}')
-    path = (f'{time[-1]:.10g} s, at most {speed:.4g} m/s and {acceleration:.3g} m/s2, highest '
-            f'{np.degrees(elevation[top]):.1f} deg after {at[top]:.0f} s, {distance.min() / 1e3:.4g} to '
+    return (f'highest {np.degrees(elevation[top]):.1f} deg after {at[top]:.0f} s, {distance.min() / 1e3:.4g} to '
             f'{distance.max() / 1e3:.4g} km from the station at latitude {station.latitude_deg:.5f}, longitude '
-            f'{station.longitude_deg:.5f} deg, height {station.height:.1f} m')
-    start_time = instant.iso(fixes.time[0] + track.start) if fixes.dated else ''
-    return Flight(spline.x, spline.c, start_time, (log, path), float(speed), float(distance.max()))
+            f'{station.longitude_deg:.5f} deg, height {station.height:.1f} m'), float(distance.max())
 
 
 def without_held(fixes: Fixes, max_gap: Seconds) -> tuple[Fixes, int]:
@@ -179,6 +184,16 @@ def _clear_of(along: Floats, across: Floats, least_range: Meters) -> Meters:
     return float(s)
 
 
+def reference_range(greatest: Meters) -> Meters:
+    """Return the greatest range of a run, rounded up to 10 m."""
+    return max(10.0, 10.0 * math.ceil(0.1 * greatest))
+
+
+def duration_before(end: Seconds) -> Seconds:
+    """Return the duration of a run until the last tenth of a second before an end."""
+    return max(MIN_DURATION_S, min(MAX_DURATION_S, (math.ceil(10.0 * end) - 1) / 10.0))
+
+
 def run_parameters(fixes: Fixes, target: TargetParameters, given: Collection[str]) -> dict[str, float]:
     """Return {parameter: value} that fixes give for a run. Raises csv_table.TableError. given: names of the parameters
     that the scenario sets. The reference range is the greatest range of the flight, so the C/N0 of the parameter is
@@ -187,7 +202,6 @@ def run_parameters(fixes: Fixes, target: TargetParameters, given: Collection[str
     station = dataclasses.replace(target.station, **{
         field: getattr(derived, field) for name, field in STATION_FIELDS.items() if name not in given})
     spline = lay_out(fixes, target.track_file, station)
-    reference_range = max(10.0, 10.0 * math.ceil(0.1 * spline.greatest_range))
-    duration = max(MIN_DURATION_S, min(MAX_DURATION_S, (math.ceil(10.0 * spline.breaks[-1]) - 1) / 10.0))
-    return {**dict(zip(STATION_FIELDS, dataclasses.astuple(station))), 'receiver.reference_range': reference_range,
-            'duration': duration}
+    return {**dict(zip(STATION_FIELDS, dataclasses.astuple(station))),
+            'receiver.reference_range': reference_range(spline.greatest_range),
+            'duration': duration_before(spline.breaks[-1])}
