@@ -18,7 +18,6 @@ from pedestal_hardware.rotator.protocols import Rot2prog
 PULSES_PER_DEG = Rot2prog.PULSES_PER_DEG
 MAX_REQUEST_BYTES = 512  # largest length of a request
 FRAME_BYTES = 12  # length of a frame to a Rot2Prog, without its last byte
-
 ANGLE = re.compile(rb'(AZ|EL)(-?[0-9]+(?:\.[0-9]*)?)')  # set-point of an axis in EasyComm
 
 

@@ -20,7 +20,6 @@ from pedestal_operator import state
 from pedestal_operator.remote_node import JOG_REPEAT_PERIOD_S, Remote, RemoteSession
 
 KEY_HOLD_S = 0.35  # after its last press [s]; a held key is repeated about 30 times a second after a pause
-
 JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)  # selectable jog rates [deg/s]
 
 KEY_COMMANDS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow', 'stow'), 'p': ('preset', 'preset'),
@@ -28,7 +27,6 @@ KEY_COMMANDS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow'
              'r': ('release', 'release control'), 'c': ('reset', 'reset faults')}
 
 ARROW_DIRECTIONS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}  # azimuth, elevation
-
 QUIT_KEYS = ('q', '\x03', '\x04')  # keys that end the console: q, Ctrl-C and Ctrl-D
 ESCAPE_SEQUENCE_CHARS = 3  # length of the escape sequence of an arrow [characters]
 LEVEL_STYLES = {'': '', 'warn': 'yellow', 'bad': 'bold red'}  # {level of a state.Shown: style on the terminal}

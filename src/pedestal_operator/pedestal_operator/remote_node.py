@@ -25,7 +25,6 @@ from pedestal_operator.antenna import POINTING_TOPIC, Antenna
 from pedestal_operator.state import ANGLE_ERROR_TOPIC
 
 JOG_REPEAT_PERIOD_S = 0.2  # period of a jog [s], less than half of the jog timeout of the control unit
-
 MAX_KEPT_REQUESTS = 1000  # largest number of requests kept, because some replies are never read
 
 
@@ -74,9 +73,7 @@ NUMBER_TOPICS = ('joint_states', 'acu/reference', ANGLE_ERROR_TOPIC)
 
 TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole', POINTING_TOPIC)  # topics of text that every client receives
 REPLY_TIMEOUT_S = 5.0  # longest wait for the reply to a command [s]
-
 DISCOVERY_MARGIN_S = 0.05  # for the discovery by the commanded node, after its own discovery [s]
-
 RETRY_PERIOD_S = 1.0  # time until a command is repeated [s], because discovery may be incomplete
 
 _R = TypeVar('_R')

@@ -23,14 +23,12 @@ OPERATOR_COMMANDS = (*BUTTON_MODES, 'rate', 'take', 'release', 'reset', 'fallbac
                      'unshelve')  # all except `stop`, which is never refused in advance
 
 FREE_COMMANDS = ('standby', 'take')  # accepted from a client without control
-
 REFUSAL_PREFIX = 'refused '  # start of a key in the diagnostics of the control unit, before the name of a mode
 
 ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole',
                    'pointing_model')
 
 GRAPH_NODES = ('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')  # whose silence the operator must see
-
 LIMIT_WARNING_S = 20.0  # time to a limit below which the axis has a warning [s]
 REST_RATE_DEG_S = 0.002  # rate below which an axis counts as stopped [deg/s]
 

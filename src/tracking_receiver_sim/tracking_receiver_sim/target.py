@@ -42,7 +42,6 @@ BODY_KNOT_SPACING_S = 10.0  # time between two knots of the sun or the moon [s];
 PASS_SEARCH_STEP_S = 20.0  # of the pass finder [s]; a pass in a low earth orbit lasts minutes
 PEAK_SEARCH_POINTS = 41  # number of points of each refinement in the search for the peak of a pass
 RUN_MARGIN_S = 5.0  # before and after the run [s], for a program track; a track_file may cover less
-
 MAX_HORIZON_POINTS = 10_000  # largest number of points at which a target is compared with the horizon
 
 

@@ -63,7 +63,6 @@ from tracking_receiver_sim.params import (
 
 MIN_ELEVATION_RAD = math.radians(1.0)  # elevation [rad] below which the refraction stays constant
 SCINTILLATION_NORMALS = 3  # number of standard normals of a step of the scintillation: level, two axes
-
 MIN_SIN_ELEVATION = math.sin(math.radians(4.0))  # the limit of P.618, below which scintillation is constant
 
 

@@ -29,9 +29,7 @@ BLOCK_TIME_S = 0.2  # length of a block [s]; noise of the attitude matters littl
 MEMORY_TIME_S = 5.0  # time constant with which old blocks fade [s]
 MIN_CHECK_TIME_S = 3.0  # time with motion after which a verdict is given [s]
 MIN_RATE_RAD_S = math.radians(0.5)  # rms of the rates of an axis from which it is compared [rad/s]
-
 MIN_ATTITUDE_RATE_RAD_S = math.radians(2.0)  # rms change of the attitude from which an axis is compared [rad/s]
-
 SLOPE_RANGE = 0.3, 3.0  # slopes of an axis that agrees
 MIN_TURN_CORRELATION = -0.5  # smallest correlation of a heading that agrees with a rate of turn
 
@@ -40,12 +38,9 @@ JUMP_RAD = math.radians(0.5)
 it. A correction of the heading is no wrong frame."""
 
 JUMP_REST_BLOCKS = 10  # number of blocks without a further jump; rates that are always too small are no jumps
-
-GRAVITY_M_S2 = 5.0  # mean specific force [m/s2] from which it is compared; less: gravity was removed
-
+GRAVITY_M_S2 = 5.0  # mean specific force [m/s2] whose direction is compared; less: gravity was removed
 ALL_AXES, TURN_AXIS = 0b111, 0b100  # bit masks of the axes whose rates are known
 MAX_FORCE_M_S2 = 1000.0  # specific force [m/s2] that no ship has; more is not used
-
 FRAME_UNKNOWN, FRAME_RIGHT, FRAME_WRONG = range(3)  # not enough motion, all axes agree, an axis disagrees
 
 
@@ -160,7 +155,6 @@ def take(check: Check, stamp: Nanoseconds, q: Quaternion, w: Vector3, force: Vec
 Convention: TypeAlias = tuple[str, str, str]     # the parameters earth, body, rate_body
 
 MIN_FIT = 0.9  # smallest slope of all axes together of a convention that fits, relative to the best one
-
 MIN_UPRIGHT = 0.5  # smallest cosine of the tilt of a deck; a ship is never further from the horizontal
 
 

@@ -15,7 +15,6 @@ from pedestal_hardware.lines import sources
 MAX_LINE_BYTES = 256  # largest length of a line; NMEA 0183 allows 82 bytes
 LINE_ENDS = b'\r\n\0'
 LINE_TIMEOUT_S = 0.5  # longest pause within a line [s]
-
 TCP_SILENCE_S = 10.0  # time without bytes until TCP is opened again [s]; a device without supply never closes it
 
 

@@ -9,7 +9,6 @@ from pedestal_common.stream import connection
 READ_TIMEOUT_S = 0.1  # longest wait for the next bytes [s]
 CONNECT_TIMEOUT_S = 3.0  # longest wait for a TCP connection [s]
 MAX_READ_BYTES = 65536  # largest number of bytes of one read; no datagram is longer
-
 URL_FORMS_TEXT = 'udp://HOST:PORT, socket://HOST:PORT, or the path of a serial device'  # for texts
 
 

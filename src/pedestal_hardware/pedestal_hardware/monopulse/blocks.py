@@ -19,11 +19,8 @@ if TYPE_CHECKING:
     from pedestal_hardware.monopulse import sigmf
 
 TIME_TOLERANCE_NS = 20_000  # largest deviation of a source's time before the counter is set again [ns]
-
 ARRIVAL_WINDOW_S = 10.0  # time in which the earliest arrival sets the counter of a source without times
-
 CLOCK_TOLERANCE_S, CLOCK_TIME_S = 0.1, 0.5  # largest deviation, and its time until it is a fault [s]: blocks may stall
-
 LATE_INTERVAL_S, MIN_LATE_ARRIVALS = 0.25, 5  # of an interval, of which the earliest arrival counts: time, arrivals
 
 LATE_TOLERANCE_S = 0.004
@@ -32,7 +29,6 @@ LATE_TOLERANCE_S = 0.004
 
 RATE_WINDOW_S = 2.0  # time over which the sample rate of a source without times is measured [s]
 CAUSE_TOLERANCE = 0.05  # largest relative deviation of a wrong sample rate from that of a possible cause
-
 RATE_TOLERANCE, STALL_TIME_S = 0.01, 0.1  # of the measured sample rate, and delay of one arrival that is none [s]
 
 

@@ -24,7 +24,6 @@ from receiver_law.monopulse import sum_pattern
 THREE_CHANNELS_KIND, ONE_CHANNEL_KIND = FEED_KINDS.index(THREE_CHANNELS), FEED_KINDS.index(ONE_CHANNEL)
 
 DIFFERENTIATION_STEP_BEAMWIDTHS, CIRCLE_DIRECTIONS = 1e-4, 64  # numerical derivative; conical scan
-
 SPREAD_PHASES, SPREAD_POINTS = 16, 32  # phases of the scan at the begin of a window, points of an integral
 
 

@@ -25,7 +25,6 @@ from receiver_law import detector
 from receiver_law.detector import Voltages
 
 MIN_SPREAD = 0.05  # smallest variance of the averaged reference, over its power; of a complete scan up to 0.5
-
 MAX_NOISE_SHARE = 0.01  # of the power of the averaged reference; it reduces the modulation by twice as much
 
 MAX_RATE_SHARE, MAX_MEAN, MAX_REVERSALS = 0.2, 0.25, 0.5

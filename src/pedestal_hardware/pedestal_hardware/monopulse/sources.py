@@ -17,7 +17,6 @@ from pedestal_hardware.monopulse.vita49 import INTEGER_FULL_SCALE
 
 TAG_MAGIC, TAG_VERSION = 0x5FF0, 1
 TAG_HEADER = struct.Struct('<HBQQ')  # of a sink with tags: magic number, version, first item, number of tags
-
 RECEIVE_BUFFER_BYTES = 8_000_000  # requested size of the receive buffer [bytes]; the kernel may give less
 MAX_QUEUED_MESSAGES = 1000  # largest number of ZMQ messages that wait for this node
 FULL_SCALE = (INTEGER_FULL_SCALE - 1.0) / INTEGER_FULL_SCALE  # largest real or imaginary part of a sample of integers

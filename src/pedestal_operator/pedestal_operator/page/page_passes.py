@@ -11,9 +11,7 @@ from pedestal_common.quantities import Json, Seconds
 from pedestal_operator.page import page_state
 
 MAX_PASSES = 4  # largest number of passes shown
-
 SEARCH_SPAN_DAYS, SEARCH_VALIDITY_DAYS = 2.0, 1.0  # searched ahead, and until the next search [days]
-
 MIN_UTC_S = 1e8  # smallest time that is UTC [s]; a smaller time counts from the start of a run
 
 

@@ -23,7 +23,6 @@ SUPERVISOR_REQUESTS = (('take', 'role', 'supervisor'),)  # (command, argument, v
 
 
 HOST = re.compile(r'(\[[0-9a-f:.]+\]|[^\[\]:]+)(?::(\d{1,5}))?')  # of a `Host` in small letters: name, port
-
 MAX_SHOWN_CHARACTERS = 100  # longest part of a request in a refusal [characters]
 
 

@@ -36,11 +36,8 @@ STATIC_FOLDER = pathlib.Path(__file__).parents[1] / 'static'
 MAX_UNSEEN_MESSAGES = 4  # largest number of unacknowledged messages to a page
 PAGE_TIMEOUT_S = 5.0  # time without an acknowledgement after which a page is dropped [s]
 MAX_MESSAGE_BYTES = 4096  # largest message from a page [bytes]
-
 MAX_QUEUED_REQUESTS, MAX_QUEUED_REPLIES = 200, 50  # of all pages, to a page
-
 REQUEST_BURST_LIMIT, REQUEST_BURST_PERIOD_S = 40, 1.0  # most messages of a page in a time; a jog needs five in 1 s
-
 SHUTDOWN_TIMEOUT_S = 1  # grace period of the pages when the server ends, in whole seconds for uvicorn [s]
 
 

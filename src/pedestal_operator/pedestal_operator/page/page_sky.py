@@ -13,7 +13,6 @@ from pedestal_common.wire import messages
 
 HORIZON_STEP_DEG = 5.0  # difference in azimuth between two points of a line around the horizon [deg]
 MAX_PATH_POINTS = 240  # largest number of points of a path
-
 MIN_HISTORY_STEP_DEG = 0.3  # smallest step of the beam history, less than the width of a line [deg]
 
 

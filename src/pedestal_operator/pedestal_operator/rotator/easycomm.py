@@ -12,7 +12,6 @@ from pedestal_operator.rotator.rotctld import number
 
 MAX_LINE_BYTES = 256  # largest length of a line [bytes]
 QUERY_WORDS = 'AZ', 'EL', 'GS', 'GE', 'VE'  # words that are answered: azimuth, elevation, status, errors, version
-
 VERB_BY_WORD = {'SA': 'stop', 'SE': 'stop', 'RESET': 'acu/reset_faults', 'PARK': 'stow'}  # of the control unit
 
 RATE_DIRECTIONS = {'L': (0, -1), 'R': (0, 1), 'U': (1, 1), 'D': (1, -1)}

@@ -15,7 +15,6 @@ from pedestal_common.stream.splitter import Overlong, Splitter
 
 MAX_UNREAD_BYTES = 65_536  # largest size of unread answers of a client [bytes]; further answers are dropped
 MAX_WAITING_LINES = 100  # largest number of waiting lines of a client; further input is left unread
-
 LINE_END_TIMEOUT_S = 0.05  # time without a byte after which a complete command counts as a line [s]
 
 LINE_ENDS = b'\r\n'

@@ -15,7 +15,6 @@ from tracking_receiver_sim.tracks import instant
 MAX_LISTED_AIRCRAFT = 12  # number of aircraft that an error lists for a file with several
 MAX_AIRCRAFT = 10_000  # largest number of aircraft in a file
 MIN_FIXES = 4  # least number of fixes of a track
-
 FIX_COLUMNS = ('line', 'aircraft', 'time', 'latitude', 'longitude', 'altitude')  # aircraft: Aircraft.number
 
 

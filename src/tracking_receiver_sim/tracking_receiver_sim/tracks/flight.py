@@ -36,7 +36,6 @@ from tracking_receiver_sim.tracks import instant
 from tracking_receiver_sim.tracks.fixes import Fixes
 
 SAMPLES_PER_PIECE = 4  # number of samples of a piece of the spline, for peak speed and range
-
 ALTITUDE_STEPS_M = (('100 ft', 30.48), ('25 ft', 7.62))  # in which aircraft broadcast their altitude
 ALTITUDE_TOLERANCE_M = 0.06  # largest distance from a multiple of a step [m]: logs are rounded to 0.1 m
 

@@ -13,7 +13,6 @@ from tracking_receiver_sim.tracks import instant
 from tracking_receiver_sim.tracks.fixes import Fix, Log
 
 PARSE_CHUNK_BYTES = 1 << 20  # parsed at once; expat reads an incomplete token again with each piece
-
 MAX_XML_DEPTH, MAX_TEXT_CHARS = 100, 200  # of nested elements; length to which a text is cut
 
 OEM_XML_HINT = '; an OEM must be in the notation KEYWORD = value, not XML'

@@ -16,9 +16,7 @@ from pedestal_common.text_files import csv_table
 INTERPOLATION_METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')  # LINEAR is LAGRANGE of degree 1
 DEGREE_LIMITS = 1, 19  # range of the degree of a polynomial
 DEFAULT_INTERPOLATION = 'HERMITE', 7  # method and degree of the interpolation if the file gives none
-
 RADIUS_LIMITS_M = 6.3e6, 2e9  # from the centre of the earth [m]; a lower value points to another unit
-
 GAP_STEP_RATIO = 3.0  # ratio of a step in time to each of its neighbours above which the step is a gap
 
 

@@ -14,7 +14,6 @@ from tracking_receiver_sim.tracks.fixes import Fix, Log
 
 ALTITUDE_LIMITS_FT_IN_M = -3000.0 * columns.METRES_PER_FOOT, 500_000.0 * columns.METRES_PER_FOOT
 ALTITUDE_LIMITS_M = -1000.0, 150_000.0  # of ADS-B [m], in feet and in metres
-
 EMPTY_CELL_TEXTS = ('', 'nan', 'none', 'null')  # texts of a cell without a value, in lower case
 
 IDENTITY_NAMES = ('icao24', 'callsign')
