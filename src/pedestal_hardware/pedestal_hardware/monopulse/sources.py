@@ -9,7 +9,7 @@ import numpy as np
 
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.quantities import Nanoseconds, Seconds
-from pedestal_common.stream import connection
+from pedestal_common.stream.connection import bound
 from pedestal_hardware.monopulse import sigmf, vita49
 from pedestal_hardware.monopulse.blocks import ArrivalClock, Chunk, StreamError
 from pedestal_hardware.monopulse.params import CHANNELS, SCANNED_CHANNELS, MonopulseParameters, SourceParameters
@@ -49,7 +49,7 @@ class VitaSource:
         self.full_scale = FULL_SCALE if params.format == 'ci16' else None
         self.format, self.joiner = params.format, vita49.Joiner(params.rate, params.streams[:len(channels)])
         try:
-            self.socket = connection.bound(params.host, params.port)
+            self.socket = bound(params.host, params.port)
         except OSError as error:
             raise StreamError(f'source.address = {params.url}: {error.strerror}') from None
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)

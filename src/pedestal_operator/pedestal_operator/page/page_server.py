@@ -27,7 +27,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pedestal_common.quantities import Json, Seconds
-from pedestal_common.stream import connection
+from pedestal_common.stream.connection import listen
 from pedestal_operator.page import page_security
 from pedestal_operator.page.page_security import Refused
 
@@ -122,7 +122,7 @@ class PageServer:
     def __init__(self, address: str, port: int, names: Iterable[str], most: int,
                  history: Callable[[], Iterable[object]]) -> None:
         self.pages, self.requests = 0, queue.Queue(MAX_QUEUED_REQUESTS)
-        self._socket = connection.listen(address, port)
+        self._socket = listen(address, port)
         self.access = page_security.Access(address, self._socket.getsockname()[1], names)
         self._most, self._history = most, history
         self._clients, self._sections, self._revision, self._named = set(), {}, 0, 0
