@@ -9,7 +9,7 @@ from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
-from tracking_receiver_sim import track_files
+from tracking_receiver_sim.tracks import files as track_files
 
 PATH = 'tracking_receiver.target.track_file.path'
 SMOOTH = 'tracking_receiver.target.track_file.smooth=true'

@@ -8,7 +8,7 @@ import pytest
 
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
-from pedestal_operator.rotator import outcomes
+from pedestal_operator.rotator import pointing
 from pedestal_operator.rotator.controller import Controller
 
 _SPEC = importlib.util.spec_from_file_location('rotator_passes',
@@ -45,9 +45,9 @@ def test_refusals_of_the_control_unit_are_distinguished():
         outcomes_of['refused'] = control.do('a', 'program', 0.0).look(remote, 0.0)
         return 1000
     loop.run(watch=watch)
-    assert outcomes_of == {'other': outcomes.OUTCOME_DONE, 'busy': outcomes.OUTCOME_BUSY,
-                           'limits': outcomes.OUTCOME_OUT_OF_REACH, 'range': outcomes.OUTCOME_OUT_OF_REACH,
-                           'refused': outcomes.OUTCOME_REFUSED}
+    assert outcomes_of == {'other': pointing.OUTCOME_DONE, 'busy': pointing.OUTCOME_BUSY,
+                           'limits': pointing.OUTCOME_OUT_OF_REACH, 'range': pointing.OUTCOME_OUT_OF_REACH,
+                           'refused': pointing.OUTCOME_REFUSED}
 
 
 @pytest.mark.parametrize('connects_anew', (False, True))
@@ -66,7 +66,7 @@ def test_set_points_at_a_pace_are_met_without_jerk(connects_anew):
         if step and since == 0:
             client = f'rotctld 4533 from 127.0.0.1:{5000 + number * connects_anew}'
             pending = control.go(client, (353.0 + 0.8 * number) % 360.0, 45.0, step / 200)
-            assert pending.look(remote, step / 200) == outcomes.OUTCOME_DONE
+            assert pending.look(remote, step / 200) == pointing.OUTCOME_DONE
             if connects_anew:
                 control.leave(client)
         return 10

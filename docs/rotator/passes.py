@@ -18,7 +18,7 @@ from acu_tracker import modes
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph import topics
-from pedestal_operator.requests import Requests
+from pedestal_operator.remote_node import Requests
 from pedestal_operator.rotator import rotctld
 from pedestal_operator.rotator.controller import Controller
 

@@ -61,10 +61,8 @@ def yaw_rate(truth: AnyRecord) -> RadiansPerSecond:
 
 
 def sentences(kind: str, truth: AnyRecord, stamp: Nanoseconds) -> bytes:
-    """Return the bytes of one sample: a sentence behind HDT and ROT.
-
-    kind: of pedestal_hardware.ins.sentences.KINDS; truth: a motion.Truth; stamp: UTC.
-    """
+    """Return the bytes of one sample: a sentence behind HDT and ROT. kind: of pedestal_hardware.ins.sentences.KINDS;
+    truth: a motion.Truth; stamp: UTC."""
     roll, pitch, yaw = float(truth['roll']), float(truth['pitch']), float(truth['yaw'])
     turn = nmea.turn(yaw_rate(truth))
     heading_and_attitude = nmea.attitude(stamp, roll, pitch, yaw, float(truth['position'][2]))
@@ -75,10 +73,7 @@ def sentences(kind: str, truth: AnyRecord, stamp: Nanoseconds) -> bytes:
 
 
 def run(ship: ShipParameters, sink: Sink, kind: str, rate: Hertz, start: Nanoseconds) -> None:
-    """Send samples until the process is interrupted.
-
-    kind: as in `sentences`; rate: of the samples; start: UTC at which the time of the ship is 0.
-    """
+    """Send samples until the process is interrupted. start: UTC at which the time of the ship is 0."""
     [constants], [truth] = motion.constants(ship), motion.Truth.zeros()
     motion.truth(constants, 0.0, truth)      # compiles the law before the first sample is due
     period = round(1e9 / rate)

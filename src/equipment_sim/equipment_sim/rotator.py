@@ -1,9 +1,6 @@
-"""Simulated rotator on a pseudo terminal, to rehearse before the device arrives.
+"""Simulated rotator on a pseudo terminal, to rehearse before the device arrives: `pedestal simulate rotator`.
 
-    pedestal simulate rotator --protocol gs232 --rate 6
-
-It prints the path of its terminal. Both axes move to their set-point at a constant rate. The answer to a request
-comes after the delay of a real controller.
+Both axes move to their set-point at a constant rate. An answer comes after the delay of a real controller.
 """
 import os
 import pty
@@ -12,13 +9,15 @@ import select
 import time
 import tty
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import NamedTuple
 
 from pedestal_common.quantities import Seconds
+from pedestal_common.stream.splitter import Splitter
 from pedestal_hardware.rotator.protocols import Rot2prog
 
 PULSES_PER_DEG = Rot2prog.PULSES_PER_DEG
-
+MAX_REQUEST_BYTES = 512  # largest length of a request
+FRAME_BYTES = 12  # length of a frame to a Rot2Prog, without its last byte
 ANGLE = re.compile(rb'(AZ|EL)(-?[0-9]+(?:\.[0-9]*)?)')  # set-point of an axis in EasyComm
 
 
@@ -40,64 +39,59 @@ class Axes:
         self.set_points = list(self.angles)
 
 
-def gs232(axes: Axes, buffer: bytes) -> tuple[bytes, bytes]:
-    """Return (answer, rest of the buffer) to the requests of a GS-232B."""
-    *requests, rest = buffer.split(b'\r')
-    answer = b''
-    for request in requests:
-        target = re.fullmatch(rb'W(\d{3}) (\d{3})', request.strip())
-        if request.strip() == b'C2':
-            answer += b'AZ=%03d  EL=%03d\r\n' % tuple(round(angle) for angle in axes.angles)
-        elif request.strip() == b'S':
-            axes.stop()
-        elif target:
-            axes.set_points = [float(target[1]), float(target[2])]
-        else:
-            answer += b'?>\r\n'
-    return answer, rest
+def gs232(axes: Axes, request: bytes) -> bytes:
+    """Return the answer of a GS-232B to a line."""
+    target = re.fullmatch(rb'W(\d{3}) (\d{3})', request.strip())
+    if request.strip() == b'C2':
+        return b'AZ=%03d  EL=%03d\r\n' % tuple(round(angle) for angle in axes.angles)
+    if request.strip() == b'S':
+        axes.stop()
+    elif target:
+        axes.set_points = [float(target[1]), float(target[2])]
+    else:
+        return b'?>\r\n'
+    return b''
 
 
-def easycomm(axes: Axes, buffer: bytes) -> tuple[bytes, bytes]:
-    """Return (answer, rest of the buffer) to the requests of an EasyComm device."""
-    *requests, rest = buffer.split(b'\n')
-    answer = b''
-    for request in requests:
-        words = request.split()
-        if words == [b'AZ', b'EL']:
-            answer += b'AZ%.1f EL%.1f\n' % tuple(axes.angles)
-        elif words == [b'SA', b'SE']:
-            axes.stop()
-        else:
-            for found in filter(None, map(ANGLE.fullmatch, words)):
-                axes.set_points[found[1] == b'EL'] = float(found[2])
-    return answer, rest
+def easycomm(axes: Axes, request: bytes) -> bytes:
+    """Return the answer of an EasyComm device to a line."""
+    words = request.split()
+    if words == [b'AZ', b'EL']:
+        return b'AZ%.1f EL%.1f\n' % tuple(axes.angles)
+    if words == [b'SA', b'SE']:
+        axes.stop()
+    for found in filter(None, map(ANGLE.fullmatch, words)):
+        axes.set_points[found[1] == b'EL'] = float(found[2])
+    return b''
 
 
-def rot2prog(axes: Axes, buffer: bytes) -> tuple[bytes, bytes]:
-    """Return (answer, rest of the buffer) to the frames of a Rot2Prog."""
-    answer = b''
-    while len(buffer) >= 13:
-        frame, buffer = buffer[:13], buffer[13:]
-        if frame[11] == 0x2F:
-            axes.set_points = [int(digits) / PULSES_PER_DEG - 360.0 for digits in (frame[1:5], frame[6:10])]
-        elif frame[11] == 0x0F:
-            axes.stop()
-        if frame[11] != 0x2F:
-            digits = [b'%04d' % round(10.0 * (360.0 + angle)) for angle in axes.angles]
-            azimuth, elevation = (bytes(digit - 48 for digit in number) for number in digits)
-            answer += b'W' + azimuth + bytes([PULSES_PER_DEG]) + elevation + bytes([PULSES_PER_DEG]) + b' '
-    return answer, buffer
+def rot2prog(axes: Axes, frame: bytes) -> bytes:
+    """Return the answer of a Rot2Prog to a frame, of whose bytes only the last one is a space."""
+    if len(frame) != FRAME_BYTES:
+        return b''
+    if frame[11] == 0x2F:
+        axes.set_points = [int(digits) / PULSES_PER_DEG - 360.0 for digits in (frame[1:5], frame[6:10])]
+        return b''
+    if frame[11] == 0x0F:
+        axes.stop()
+    digits = [b'%04d' % round(10.0 * (360.0 + angle)) for angle in axes.angles]
+    azimuth, elevation = (bytes(digit - 48 for digit in number) for number in digits)
+    return b'W' + azimuth + bytes([PULSES_PER_DEG]) + elevation + bytes([PULSES_PER_DEG]) + b' '
 
 
-Device: TypeAlias = Callable[[Axes, bytes], tuple[bytes, bytes]]
+class Device(NamedTuple):
+    """Simulated device of a protocol."""
+    end: bytes                                  # last byte of a request
+    answer: Callable[[Axes, bytes], bytes]      # to a request without this byte
 
-DEVICES: dict[str, Device] = {'gs232': gs232, 'easycomm': easycomm, 'rot2prog': rot2prog}
-"""Answers of the simulated devices, by the name of the protocol. Hamlib's `rotctld -m 1` is the device of rotctld."""
+
+DEVICES = {'gs232': Device(b'\r', gs232), 'easycomm': Device(b'\n', easycomm), 'rot2prog': Device(b' ', rot2prog)}
+"""{protocol: its device}. Hamlib's `rotctld -m 1` is the device of rotctld."""
 
 
 def run(device: Device, axes: Axes, descriptor: int, delay: Seconds) -> None:
     """Answer the requests on a descriptor until it closes; delay: time until an answer."""
-    buffer = b''
+    splitter = Splitter(device.end, MAX_REQUEST_BYTES)
     while True:
         select.select([descriptor], [], [], 0.1)
         axes.advance(time.monotonic())
@@ -106,17 +100,14 @@ def run(device: Device, axes: Axes, descriptor: int, delay: Seconds) -> None:
         except OSError:
             time.sleep(0.1)      # no program has the terminal open
             continue
-        answer, buffer = device(axes, buffer + received)
+        answer = b''.join(device.answer(axes, request) for request in splitter.take(received))
         if answer:
             time.sleep(delay)
             os.write(descriptor, answer)
 
 
 def serve(protocol: str, rate: float, delay: Seconds) -> None:
-    """Open a pseudo terminal, print its path, and answer as a rotator until Ctrl-C.
-
-    protocol: one of DEVICES; rate: of both axes [deg/s]; delay: time until an answer.
-    """
+    """Open a pseudo terminal, print its path, and answer as a rotator until Ctrl-C. rate: of both axes [deg/s]."""
     end, device = pty.openpty()
     tty.setraw(device)
     print(os.ttyname(device), flush=True)

@@ -6,7 +6,7 @@ import pytest
 from pedestal_bringup.graph import watch
 from pedestal_bringup.graph.processes import RunError
 from pedestal_common.graph import nodes
-from pedestal_hardware.params import START_KEY
+from pedestal_hardware.start import START_KEY
 
 PART = nodes.SIMULATED_IQ.name
 CHOOSER = nodes.SIMULATED_PARTS[PART]

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING
 from adu_drive.adu_node import AduNode
 from pedestal_common.node import shell
 from pedestal_common.node.unit import Diagnosis
-from pedestal_common.quantities import Message, Nanoseconds
+from pedestal_common.quantities import Message
 from pedestal_hardware import commissioning, errors
 from pedestal_hardware.bus import BusError
-from pedestal_hardware.params import START_KEY, ServoDriveParameters, time_0_after
+from pedestal_hardware.params import ServoDriveParameters
+from pedestal_hardware.start import StartsWithEquipment
 from pedestal_hardware.unit import DRIVE_LABELS, ServoDrives
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ LEAVE_TIME_S = 2.0  # longest wait for the end of the commissioning thread, afte
 ANSWER_POLL_S = 0.02  # time between two checks whether all drives answer [s]
 
 
-class DriveNode(AduNode):
+class DriveNode(StartsWithEquipment, AduNode):
     """Node of four servo drives."""
     parameters: ServoDriveParameters
     unit: ServoDrives
@@ -43,7 +44,6 @@ class DriveNode(AduNode):
         self.changed, self.ending = threading.Event(), False
         self.bus: CanopenBus | None = None
         self.commissioning: threading.Thread | None = None
-        self.start_time: Nanoseconds | None = None
         self.shown_errors: list[int] = []
         self.shown_problems: list[str] = []
         super().__init__('pedestal_hardware.drive_node')
@@ -94,23 +94,13 @@ class DriveNode(AduNode):
         if any(found) and all(errors.is_of_the_bus(code) for code in found if code):
             self.unit.reset_drives(list(drives))
         self.unit.bus = self.bus
-        self._choose_start()
+        if lead := self.parameters.drives.start_after:
+            self._epoch = self.choose_start(self.epoch(self.clock()[1]), lead)
         self.get_logger().info(f'drives {", ".join(map(str, self.parameters.drives.nodes))} answer')
-
-    def _choose_start(self) -> None:
-        """Let time 0 follow the answer of the drives, by whole seconds from graph.start, and publish it."""
-        lead = self.parameters.drives.start_after
-        if lead:
-            _, utc = self.clock()
-            self.start_time = self._epoch = time_0_after(self.epoch(utc), utc, lead)
-            self.diagnose_now()
 
     def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of the drives, with time 0 if it follows their answer."""
-        diagnosis = super().diagnosed()
-        if self.start_time is None:
-            return diagnosis
-        return diagnosis._replace(values=[*diagnosis.values, (START_KEY, str(self.start_time))])
+        return self.with_start(super().diagnosed())
 
     def label(self, drive: int) -> str:
         """Return the name of a drive for texts, with its node."""

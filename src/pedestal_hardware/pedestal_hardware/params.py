@@ -2,9 +2,7 @@
 import dataclasses
 
 from adu_drive.params import AduNodeParameters, SpeedLoopParameters
-from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
-from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_hardware import pdo
 
 CONTROLS = ('velocity', 'drive', 'torque')  # divisions of the control between drive_node and the drives
@@ -12,20 +10,11 @@ CONTROLS = ('velocity', 'drive', 'torque')  # divisions of the control between d
 MAX_TORQUE_PERIOD_S = 1e-3
 """Longest period with control `torque` [s]. With a longer period the axis would oscillate (docs/hardware.md)."""
 
-START_KEY = 'start'
-"""Key of the diagnostics of a node with time 0 (UTC, ns), if time 0 follows the answer of its equipment."""
-
 MAX_CAN_BITRATE = 1_000_000  # largest bit rate of a CAN bus [bit/s]
 MAX_OBJECT_VALUE = 0xFFFF  # largest value of the objects 60F9:1 and :2
 
 FRAME_BITS, STUFFED_BITS, BITS_PER_STUFF_BIT = 47, 33, 4
 """Bits of a standard CAN frame without its data, those that may be stuffed, and the bits for each stuff bit."""
-
-
-def time_0_after(start: Nanoseconds, utc: Nanoseconds, lead: Seconds) -> Nanoseconds:
-    """Return time 0: `start`, moved by whole seconds to at least a lead time after a UTC."""
-    early = (start - utc - round(lead * NS_PER_SECOND)) // NS_PER_SECOND
-    return start - early * NS_PER_SECOND
 
 
 def frame_bits(data_bytes: int) -> int:

@@ -39,7 +39,6 @@ class RotatorNode(Timekeeper):
         super().begin()
 
     def _make(self, stamp: Nanoseconds, values: Mapping[str, Decoded | None]) -> None:
-        """Make a step with the newest measurement, and send its set-point."""
         unit, line = self.unit, self.line
         assert line is not None
         unit.measure(line.newest, time.monotonic())

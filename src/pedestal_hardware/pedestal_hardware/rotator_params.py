@@ -1,10 +1,9 @@
 """Parameters of rotator_node: the rotator, its connection and its run."""
 import dataclasses
-import math
 
 from adu_drive.params import RunParameters
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
-from pedestal_common.quantities import Degrees, Nanoseconds, Radians
+from pedestal_common.quantities import Degrees, Nanoseconds
 from pedestal_hardware.lines import sources
 from pedestal_hardware.rotator.protocols import PROTOCOLS
 
@@ -77,8 +76,3 @@ class RotatorParameters(RunParameters):
     def timeout_ns(self) -> Nanoseconds:
         """Age from which a reference is stale."""
         return round(self.command_timeout * self.period * 1e9)
-
-    @property
-    def travel_rad(self) -> tuple[tuple[Radians, Radians], ...]:
-        """(lowest, highest) set-points of azimuth and elevation."""
-        return tuple((math.radians(axis.low), math.radians(axis.high)) for axis in (self.azimuth, self.elevation))

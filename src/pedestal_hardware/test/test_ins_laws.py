@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pedestal_hardware.ins import conventions, frame_check, frames, rate_estimator
+from pedestal_hardware.ins import frame_check, frames, rate_estimator
 
 RNG = np.random.default_rng(1)
 FLU_OF = {'flu': np.eye(3), 'frd': np.array(((1, 0, 0), (0, -1, 0), (0, 0, -1))),
@@ -115,7 +115,7 @@ class Checked:
 
     @property
     def fits(self):
-        return conventions.fitting(self.s, self.declared, np.eye(3), self.q)
+        return frame_check.fitting_conventions(self.s, self.declared, np.eye(3), self.q)
 
 
 @pytest.mark.parametrize('frame', ALL_FRAMES)
@@ -141,7 +141,7 @@ def test_the_frame_of_a_noisy_device_is_named():
 def test_no_frame_explains_rates_in_another_unit():
     checked = Checked(RIGHT, RIGHT, scale=10.0)
     assert checked.run(10.0) is not None and checked.fits == []
-    assert 'unit of its rates' in conventions.text(checked.fits)
+    assert 'unit of its rates' in frame_check.text_of(checked.fits)
 
 
 @pytest.mark.parametrize('true, declared', [(('ned', 'frd', 'frd'), RIGHT), (RIGHT, ('ned', 'frd', 'frd'))])

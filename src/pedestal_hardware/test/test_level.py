@@ -12,8 +12,7 @@ import pytest
 from pedestal_common.parameters import ParameterError, build
 from pedestal_common.stream import connection
 from pedestal_hardware.level.line_format import LineFormat
-from pedestal_hardware.level.params import LevelReceiverParameters
-from pedestal_hardware.level.unit import LevelUnit
+from pedestal_hardware.level.unit import LevelReceiverParameters, LevelUnit
 from pedestal_hardware.lines import reader
 from pedestal_hardware.lines.reader import LineReader, LineSplitter
 

@@ -1,7 +1,4 @@
-"""Common interface to the last messages of an antenna, for the programs of the operator.
-
-The antenna is a running graph (remote_node.Remote), or a recording (pedestal_workbench.again.replay_page).
-"""
+"""Common interface to the last messages of an antenna: a running graph (remote_node.Remote), or a recording."""
 import abc
 import math
 from collections.abc import Sequence
@@ -50,11 +47,8 @@ class Antenna(abc.ABC):
         return self._degrees(topic, 0)
 
     def directions(self, topic: str) -> tuple[Degrees, Degrees]:
-        """Return the direction of the beam on the sky, deck angles (azimuth, elevation), NaN if stale.
-
-        topic: joint_states, or acu/reference for the commanded direction. The pointing model in force converts the
-        encoder angles.
-        """
+        """Return the deck angles of the beam on the sky, by the pointing model in force; NaN if stale. topic:
+        joint_states, or acu/reference for the commanded direction."""
         angles, report = self.encoder_angles(topic), self.pointing_model
         if report is None:
             return angles
@@ -76,7 +70,6 @@ class Antenna(abc.ABC):
         return self._degrees('joint_states', 2)
 
     def _degrees(self, topic: str, first: int) -> tuple[float, float]:
-        """Return two numbers of a topic from index `first` on, in degrees, NaN if stale."""
         if not self.present(topic):
             return math.nan, math.nan
         azimuth, elevation = self.numbers[topic][first:first + 2]

@@ -17,25 +17,16 @@ from rich.text import Text
 from pedestal_common.graph import topics
 from pedestal_common.quantities import Seconds
 from pedestal_operator import state
-from pedestal_operator.remote_node import Remote, RemoteSession
-from pedestal_operator.requests import JOG_REPEAT_PERIOD_S
+from pedestal_operator.remote_node import JOG_REPEAT_PERIOD_S, Remote, RemoteSession
 
-KEY_HOLD_S = 0.35
-"""Time after the last press of a key during which the key counts as held [s].
-
-A held key is repeated about 30 times a second after a pause.
-"""
-
+KEY_HOLD_S = 0.35  # after its last press [s]; a held key is repeated about 30 times a second after a pause
 JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)  # selectable jog rates [deg/s]
 
 KEY_COMMANDS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow', 'stow'), 'p': ('preset', 'preset'),
              'g': ('program', 'program'), 'a': ('autotrack', 'autotrack'), 't': ('take', 'take control'),
              'r': ('release', 'release control'), 'c': ('reset', 'reset faults')}
-"""{key: (command, text on the screen)}."""
 
-ARROW_DIRECTIONS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}
-"""{escape sequence of an arrow: direction (azimuth, elevation)}."""
-
+ARROW_DIRECTIONS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}  # azimuth, elevation
 QUIT_KEYS = ('q', '\x03', '\x04')  # keys that end the console: q, Ctrl-C and Ctrl-D
 ESCAPE_SEQUENCE_CHARS = 3  # length of the escape sequence of an arrow [characters]
 LEVEL_STYLES = {'': '', 'warn': 'yellow', 'bad': 'bold red'}  # {level of a state.Shown: style on the terminal}
@@ -111,7 +102,6 @@ class Console:
                 self.last_reply = f'{verb}: {reply.text}'
 
     def _refusal(self, verb: str) -> str:
-        """Return the reason of the present refusal of a command, '' without a known reason."""
         holds_control = self._remote.diagnostics_of('acu').get('control', '') in ('', self._remote.who)
         return state.refusals(self._remote, holds_control).get(verb, '')
 
@@ -122,11 +112,8 @@ class Console:
             self._pending[self._remote.request(verb, arguments)] = verb
 
     def screen(self, width: int, height: int) -> list[Text]:
-        """Return the lines of the screen, at most `height`.
-
-        Mode, first alarm, axes, reply and keys have their lines on every terminal of at least 60 x 20 characters.
-        Further alarms and reports of nodes fill the rest.
-        """
+        """Return the lines of the screen, at most `height`. Mode, first alarm, axes, reply and keys have their lines
+        on every terminal of at least 60 x 20 characters."""
         above = [*_header_lines(self._remote), *_alarm_lines(self._remote, width), *_axis_lines(self._remote),
                  _receiver_line(self._remote)]
         below = [*_wrapped(self.last_reply, width, 'bold'), *self._key_lines(width)]
@@ -137,7 +124,7 @@ class Console:
         return lines
 
     def _key_lines(self, width: int) -> list[Text]:
-        """Return the keys and their commands; a command that would be refused is dim."""
+        """A command that would be refused is dim."""
         cells = [Text(f'[{key}] {doc}', style='dim' if self._refusal(verb) else '')
                  for key, (verb, doc) in KEY_COMMANDS.items()]
         cells += [Text(f'[arrows] jog at {self.rate:g} deg/s', style='dim' if self._refusal('rate') else ''),
@@ -161,7 +148,6 @@ def _header_lines(remote: Remote) -> list[Text]:
 
 
 def _alarm_lines(remote: Remote, width: int) -> list[Text]:
-    """Return the alarm to look at first, and the recommended action."""
     first = state.first_alarm(remote)
     if not remote.diagnostics_of('acu'):
         return [Text('alarms unknown: the control unit is silent', style='bold red')]
@@ -174,7 +160,6 @@ def _alarm_lines(remote: Remote, width: int) -> list[Text]:
 
 
 def _axis_lines(remote: Remote) -> list[Text]:
-    """Return the table of the axes."""
     actual, commanded, rates = remote.directions('joint_states'), remote.directions('acu/reference'), remote.rates()
     rows = {'actual [deg]': actual, 'commanded [deg]': commanded,
             'error [deg]': [a - b for a, b in zip(commanded, actual)],
@@ -189,14 +174,13 @@ def _axis_lines(remote: Remote) -> list[Text]:
 
 
 def _receiver_line(remote: Remote) -> Text:
-    x, y, level = (row.value for row in state.rows(remote) if row.group == 'receiver' and isinstance(row.value, float))
+    x, y, level = state.receiver(remote)
     locked = remote.diagnostics_of('acu').get('locked') == '1'
     return Text.assemble('receiver  ', ('locked', '') if locked else ('no lock', 'yellow'),
                          f'  level {_number(level, 1)} dB-Hz  error {_number(x)} / {_number(y)} deg')
 
 
 def _report_lines(remote: Remote) -> list[Text]:
-    """Return the further alarms and the reports of the nodes."""
     first = state.first_alarm(remote)
     further = [each for each in map(state.alarm, remote.alarms) if first and each['name'] != first['name']]
     return [*(Text(f'{each["priority"]} {each["name"]} ({each["state"]})', style='red') for each in further),
@@ -204,7 +188,7 @@ def _report_lines(remote: Remote) -> list[Text]:
 
 
 def _wrapped(text: str, width: int, style: str = '') -> list[Text]:
-    """Return a text in one line, or in MAX_WRAPPED_LINES lines; the last one is cut at the width."""
+    """Return at most MAX_WRAPPED_LINES lines; the last one is cut at the width."""
     lines = textwrap.wrap(text, width)
     rest = ' '.join(lines[MAX_WRAPPED_LINES - 1:])
     return [Text(line, style=style) for line in (*lines[:MAX_WRAPPED_LINES - 1], rest)][:max(len(lines), 1)]

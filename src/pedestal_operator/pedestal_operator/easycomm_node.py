@@ -16,7 +16,7 @@ from pedestal_common.quantities import Degrees, Seconds
 from pedestal_operator.rotator import easycomm
 from pedestal_operator.rotator.controller import PendingRequest
 from pedestal_operator.rotator.line_server import Client, Stream
-from pedestal_operator.rotator.outcomes import OUTCOME_DONE, OUTCOME_REFUSED, Refused
+from pedestal_operator.rotator.pointing import OUTCOME_DONE, OUTCOME_REFUSED, Refused
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
 SERVER_VERSION = 'pedestal'  # text in the answer to VE
@@ -67,13 +67,12 @@ class EasycommNode(ServerNode[EasycommClient]):
         self._note_outcomes(client, now)
 
     def _note_outcomes(self, client: EasycommClient, now: Seconds) -> None:
-        """Note the known outcomes of the settings, in their order."""
         while client.pending and (outcome := client.pending[0][1].look(self, now)) is not None:
             line, pending = client.pending.pop(0)
             self._note(client, line, '' if outcome == OUTCOME_DONE else pending.reason)
 
     def _note(self, client: EasycommClient, line: str | None, refusal: str) -> None:
-        """Note the outcome of a setting; refusal: its reason, '' for an accepted setting."""
+        """refusal: reason, '' for an accepted setting."""
         client.refused = bool(refusal)
         if refusal:
             client.set_point = None
@@ -98,8 +97,7 @@ class EasycommNode(ServerNode[EasycommClient]):
 
     def _point(self, client: EasycommClient, angles: tuple[Degrees | None, Degrees | None],
                now: Seconds) -> PendingRequest:
-        """Return the pending request of a set-point. angles: azimuth, elevation; an angle that is None keeps its last
-        value."""
+        """Point to angles (azimuth, elevation); an angle that is None keeps its last value."""
         try:
             last = None if client.refused else self.controller.pointing.set_point(now)
             before = client.set_point or last or self.controller.pointing.earth_angles()
@@ -111,7 +109,6 @@ class EasycommNode(ServerNode[EasycommClient]):
         return pending
 
     def _angles(self, client: EasycommClient, line: str) -> tuple[Degrees, Degrees] | None:
-        """Return the angles of the antenna, None while they are unknown."""
         try:
             angles = self.controller.pointing.earth_angles()
         except Refused as refused:
@@ -121,7 +118,6 @@ class EasycommNode(ServerNode[EasycommClient]):
         return angles
 
     def _status(self, client: EasycommClient, angles: tuple[Degrees, Degrees] | None) -> int:
-        """Return the status number in the answer to GS."""
         if client.refused or angles is None:
             return easycomm.STATUS_ERROR
         moving = any(abs(rate) > 0.01 for rate in self.rates())

@@ -15,7 +15,7 @@ from pedestal_common import parameters
 from pedestal_common.node import middleware, shell
 from pedestal_common.wire import messages
 from pedestal_operator.viewers import frames
-from pedestal_operator.viewers.frame_source import FrameSource
+from pedestal_operator.viewers.on_demand import FrameSource
 
 FRAME_PERIOD_S = 1.0 / 30.0  # period of the messages on tf [s]
 TF_QUEUE_DEPTH = 100  # queue depth of tf, equal to that of tf2 [messages]

@@ -20,14 +20,12 @@ from pedestal_common.node import shell
 from pedestal_common.quantities import Message, Nanoseconds
 from pedestal_common.wire import messages
 from pedestal_operator.viewers import frames
-from pedestal_operator.viewers.frame_source import FrameSource
-from pedestal_operator.viewers.on_demand import OnDemand
+from pedestal_operator.viewers.on_demand import FrameSource, OnDemand
 
 POLL_PERIOD_S = 0.05  # period of the check for viewers of topics [s]
 FRAME_PERIOD_S = 1.0 / 30.0  # period of the messages of the frames [s]
 
 TRANSFORMS_CHANNEL, DESCRIPTION_CHANNEL = '/transforms', '/robot_description'
-"""Channels in addition to the topics of the graph: frames, and model of the pedestal."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,8 +69,7 @@ class Outlet:
 
 
 class TopicOutlet(Outlet):
-    """Channel of a topic of the graph. The subscription lasts while the channel has a viewer, and always
-    for a latched topic."""
+    """Channel of a topic of the graph, subscribed while the channel has a viewer; a latched topic always."""
 
     def __init__(self, node: shell.Shell, link: Link) -> None:
         super().__init__(f'/{link.name}', link.type)

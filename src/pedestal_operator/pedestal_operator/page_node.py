@@ -48,7 +48,6 @@ class PageParameters(parameters.Parameters):
 class PageNode(Remote, page_state.PageAntenna):
     """Client of the graph for all pages; a command carries the name of the user of its page."""
     awaits = 'pages'
-    """What the node waits for, in the line that it logs when it is ready (Shell.awaits)."""
 
     parameters: PageParameters
     _server: PageServer
@@ -90,12 +89,10 @@ class PageNode(Remote, page_state.PageAntenna):
         return self.clock()[1] * 1e-9
 
     def _request_for(self, client: str, command: str, arguments: Mapping[str, object]) -> str:
-        """Send a command in the name of the user of a page, and return the number of the request."""
         self.who = client
         return self.request(command, arguments)
 
     def _take_reply(self, status: Message) -> None:
-        """Keep the reply to a request of a page, and log the replies to all clients."""
         super()._take_reply(status)
         with contextlib.suppress(ValueError):
             self.log.replied(self.now, *commands.of_reply(status))
@@ -117,14 +114,12 @@ class PageNode(Remote, page_state.PageAntenna):
         self.path = self.path if path is None else path
 
     def _take_commands(self) -> None:
-        """Take the commands of the pages."""
         now = time.monotonic()
         while not self._server.requests.empty():
             self._pages.take(self._server.requests.get_nowait(), now)
         self._pages.look(now)     # forwards replies, and ends the jogs of silent pages
 
     def _send_state(self) -> None:
-        """Send the newest state, if a page is open."""
         if not self._server.pages:
             return
         sections = {'now': page_state.now(self), 'status': page_state.status_section(self),
@@ -134,12 +129,10 @@ class PageNode(Remote, page_state.PageAntenna):
         self._server.publish(sections)
 
     def _add_chart_point(self) -> None:
-        """Add a point to the strip charts, for later pages."""
         if self.present('joint_states'):
             self._history.append(page_state.history_row(page_state.now(self)))
 
     def _send_slow_state(self) -> None:
-        """Send the slow part of the state: history of the beam, parameters of the nodes, sky."""
         for node, names in page_state.SHOWN_PARAMETERS.items():
             self._request_parameters(node, names)
         if self.present('joint_states'):
@@ -148,7 +141,7 @@ class PageNode(Remote, page_state.PageAntenna):
                               'sky': page_state.sky(self, self._upcoming_passes.look(self))})
 
     def _request_parameters(self, node: str, names: Sequence[str]) -> None:
-        """Request parameters of a node when it appears, and again after each time in which it was silent."""
+        """Request them when the node appears, and again after each time in which it was silent."""
         client, future = self._parameter_requests.get(node) or (None, None)
         if not self.present(node):
             self._parameter_requests[node] = client, None

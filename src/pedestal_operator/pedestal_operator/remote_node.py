@@ -1,8 +1,7 @@
-"""ROS node of a client, outside the graph: it receives the state of the antenna, sends commands and receives replies.
-
-The page, the console, the single commands of `pedestal` and the rotator protocols use it.
-"""
+"""ROS node of a client, outside the graph: it receives the state of the antenna, sends commands and receives
+replies."""
 import getpass
+import itertools
 import math
 import os
 import socket
@@ -21,21 +20,61 @@ from pedestal_common.node import middleware
 from pedestal_common.node.shell import Shell
 from pedestal_common.quantities import Message, Seconds
 from pedestal_common.wire import commands, messages, records
-from pedestal_common.wire.commands import Reply
+from pedestal_common.wire.commands import Command, Reply
 from pedestal_operator.antenna import POINTING_TOPIC, Antenna
-from pedestal_operator.requests import JOG_REPEAT_PERIOD_S, Requests
+from pedestal_operator.state import ANGLE_ERROR_TOPIC
 
-NUMBER_TOPICS = ('joint_states', 'acu/reference', 'tracking_receiver/angle_error')
-"""Topics of numbers that every client receives."""
+JOG_REPEAT_PERIOD_S = 0.2  # period of a jog [s], less than half of the jog timeout of the control unit
+MAX_KEPT_REQUESTS = 1000  # largest number of requests kept, because some replies are never read
+
+
+class Requests:
+    """Requests without a reply, and unread replies. prefix: start of their numbers, unique to this program."""
+    _pending: dict[str, Command]    # by number
+    _replies: dict[str, Reply]
+
+    def __init__(self, prefix: str) -> None:
+        self._numbers = (f'{prefix}-{count}' for count in itertools.count(1))
+        self._pending, self._replies = {}, {}
+
+    def __len__(self) -> int:
+        return len(self._pending)
+
+    def add(self, verb: str, who: str, arguments: Mapping[str, object] | None = None) -> Command:
+        """Return the command of a new request. who: name of the sender; arguments: {argument: value}."""
+        command = Command(verb, who, next(self._numbers), {
+            name: f'{value:.9g}' if isinstance(value, float) else str(value)
+            for name, value in (arguments or {}).items()})
+        self._pending[command.number] = command
+        if len(self._pending) > MAX_KEPT_REQUESTS:
+            self._remove(next(iter(self._pending)))
+        return command
+
+    def pending_command(self, number: str) -> Command:
+        """Return the command of a request without a reply. Raises KeyError for any other number."""
+        return self._pending[number]
+
+    def take(self, command: Command, reply: Reply) -> None:
+        """Keep a reply if its command is one of these requests."""
+        pending = self._pending.get(command.number)
+        if pending and pending.who == command.who:
+            self._replies[command.number] = reply
+
+    def replied(self, number: str) -> Reply | None:
+        """Return the reply to a request once, None before it arrives."""
+        return self._remove(number) if number in self._replies else None
+
+    def _remove(self, number: str) -> Reply | None:
+        del self._pending[number]
+        return self._replies.pop(number, None)
+
+
+NUMBER_TOPICS = ('joint_states', 'acu/reference', ANGLE_ERROR_TOPIC)
 
 TEXT_TOPICS = ('acu/mode', 'adu/state', 'acu/keyhole', POINTING_TOPIC)  # topics of text that every client receives
 REPLY_TIMEOUT_S = 5.0  # longest wait for the reply to a command [s]
-
-DISCOVERY_MARGIN_S = 0.05
-"""Time for the discovery of this node by the commanded node [s], after its own discovery of that node."""
-
-RETRY_PERIOD_S = 1.0
-"""Time without a reply after which a command is repeated [s], because discovery may have been incomplete."""
+DISCOVERY_MARGIN_S = 0.05  # for the discovery by the commanded node, after its own discovery [s]
+RETRY_PERIOD_S = 1.0  # time until a command is repeated [s], because discovery may be incomplete
 
 _R = TypeVar('_R')
 
@@ -143,7 +182,7 @@ class Query:
             self._client.call_async(self._request).add_done_callback(self._take)
 
     def _take(self, future: Future) -> None:
-        """Take a reply, which may be that of an earlier request."""
+        """The reply may be that of an earlier request."""
         self.values = self.values or [value.double_value for value in future.result().values] or None
 
 
@@ -172,8 +211,7 @@ class RemoteSession:
         self._executor.spin_once(timeout_sec=seconds)
 
     def until(self, condition: Callable[[], _R], seconds: Seconds) -> _R:
-        """Receive messages until condition() is true, for some seconds at most. Return the last value of
-        condition()."""
+        """Receive messages until condition() is true, for some seconds at most. Return its last value."""
         deadline = time.monotonic() + seconds
         while not (value := condition()) and time.monotonic() < deadline:
             self.spin(0.05)
@@ -203,11 +241,8 @@ class RemoteSession:
         return reply
 
     def hold_jog(self, verb: str, arguments: Mapping[str, object], seconds: Seconds) -> Reply:
-        """Repeat a jog for some seconds, then stop the axes. Return the last reply.
-
-        The axes are also stopped if this program is stopped. If the antenna has left the mode of the jog meanwhile,
-        its new mode stays.
-        """
+        """Repeat a jog for some seconds, then stop the axes, also if this program is stopped. Return the last reply.
+        If the antenna has left the mode of the jog meanwhile, its new mode stays."""
         end = time.monotonic() + seconds
         try:
             while (reply := self.request(verb, arguments)).granted and (left := end - time.monotonic()) > 0.0:

@@ -14,21 +14,19 @@ from collections.abc import Sequence
 from pedestal_common import parameters
 from pedestal_common.node import shell
 from pedestal_common.quantities import Seconds
-from pedestal_operator.rotator import outcomes, rotctld
+from pedestal_operator.rotator import pointing, rotctld
 from pedestal_operator.rotator.controller import PendingRequest
 from pedestal_operator.rotator.line_server import Client
-from pedestal_operator.rotator.outcomes import Refused
+from pedestal_operator.rotator.pointing import Refused
 from pedestal_operator.rotator.rotctld import RESULT_INVALID, RESULT_OK, RESULT_REJECTED
 from pedestal_operator.rotator.server_node import ServerNode, ServerParameters, tcp_port
 
-RESULT_BY_OUTCOME = {outcomes.OUTCOME_DONE: RESULT_OK, outcomes.OUTCOME_REFUSED: RESULT_REJECTED,
-                     outcomes.OUTCOME_OUT_OF_REACH: RESULT_INVALID, outcomes.OUTCOME_BUSY: rotctld.RESULT_BUSY,
-                     outcomes.OUTCOME_NO_REPLY: rotctld.RESULT_TIMEOUT,
-                     outcomes.OUTCOME_NO_POSITION: rotctld.RESULT_IO_ERROR}
-"""{outcome of a request: result of the protocol}."""
+RESULT_BY_OUTCOME = {pointing.OUTCOME_DONE: RESULT_OK, pointing.OUTCOME_REFUSED: RESULT_REJECTED,
+                     pointing.OUTCOME_OUT_OF_REACH: RESULT_INVALID, pointing.OUTCOME_BUSY: rotctld.RESULT_BUSY,
+                     pointing.OUTCOME_NO_REPLY: rotctld.RESULT_TIMEOUT,
+                     pointing.OUTCOME_NO_POSITION: rotctld.RESULT_IO_ERROR}
 
 ANTENNA_COMMAND_BY_NAME = {'park': 'stow', 'reset': 'acu/reset_faults'}
-"""{name of a command of rotctld: command or service of the control unit}."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,8 +53,7 @@ class RotctldNode(ServerNode[RotctldClient]):
         super().__init__('rotctld', RotctldParameters, rotctld.MAX_LINE_BYTES, RotctldClient)
 
     def serve(self, client: RotctldClient, now: Seconds) -> None:
-        """Answer the lines in order. A line that commands the antenna is answered after the reply of the control unit.
-        """
+        """Answer the lines in order; one that commands the antenna, after the reply of the control unit."""
         # A complete command without a line end counts as a line, because gpredict for Windows sends no line end.
         client.end_line(rotctld.is_complete)
         while client.pending or client.lines:
@@ -70,10 +67,7 @@ class RotctldNode(ServerNode[RotctldClient]):
                 self._begin(client, client.lines.popleft(), now)
 
     def _begin(self, client: RotctldClient, line: str | None, now: Seconds) -> None:
-        """Answer a line, or begin its request. line: None if it was longer than rotctld.MAX_LINE_BYTES.
-
-        A line for which rotctld.read returns None gets no answer.
-        """
+        """line: None if it was too long. A line for which rotctld.read returns None gets no answer."""
         request = rotctld.Request('', error=RESULT_INVALID) if line is None else rotctld.read(line)
         if request is None:
             return
@@ -94,7 +88,6 @@ class RotctldNode(ServerNode[RotctldClient]):
 
     def _answer(self, client: RotctldClient, result: int, reason: str = '',
                 lines: Sequence[tuple[str, str]] = ()) -> None:
-        """Answer the line of a client; log a refusal with its reason."""
         client.queue_answer(rotctld.answer(client.request, result, lines))
         if result == RESULT_OK:
             client.refusals.pop(client.request.name, None)
@@ -102,7 +95,6 @@ class RotctldNode(ServerNode[RotctldClient]):
             self.refuse(client, client.request.name, client.line, reason)
 
     def _move(self, client: RotctldClient, request: rotctld.Request, now: Seconds) -> None:
-        """Begin a request that moves or stops the antenna, or refuse it if the server is read only."""
         if self.parameters.read_only:
             self._answer(client, RESULT_REJECTED, 'this server is read only (parameter read_only)')
             return
@@ -121,7 +113,7 @@ class RotctldNode(ServerNode[RotctldClient]):
             client.pending = control.do(name, ANTENNA_COMMAND_BY_NAME[request.name], now)
 
     def _lines(self, request: rotctld.Request) -> Sequence[tuple[str, str]]:
-        """Return [(name, text)], the values in the answer to a request without motion. Raises Refused."""
+        """Return (name, text) of each value. Raises Refused."""
         if request.name == 'help':
             return rotctld.COMMAND_LIST_LINES
         pointing = self.controller.pointing

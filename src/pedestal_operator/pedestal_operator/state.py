@@ -1,48 +1,41 @@
 """State of the antenna for the operator, derived from the last messages: values, alarms, refused commands.
 
-The page, the console, `pedestal status` and its JSON show these results and derive nothing themselves. A
-level is '' (normal), 'warn' or 'bad'.
+The page, the console, `pedestal status` and its JSON show these results and derive nothing themselves.
 """
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from pedestal_common.graph import topics
 from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.node.unit import LEVEL_OK
-from pedestal_common.quantities import Json, Message
+from pedestal_common.quantities import DecibelHertz, Degrees, Json, Message
 
 if TYPE_CHECKING:   # it imports the compiler, which the command line does not need
     from pedestal_operator.antenna import Antenna
+
+ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
 
 BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
 """Modes with a button or a key; `stop` has a separate button, `rate` is the jog, `slave` is for programs."""
 
 OPERATOR_COMMANDS = (*BUTTON_MODES, 'rate', 'take', 'release', 'reset', 'fallback', 'acknowledge', 'shelve',
-                     'unshelve')
-"""Commands of an operator, except `stop`, which is never refused in advance."""
+                     'unshelve')  # all except `stop`, which is never refused in advance
 
-FREE_COMMANDS = ('standby', 'take')
-"""Commands among OPERATOR_COMMANDS that the control unit accepts from a client without control."""
-
+FREE_COMMANDS = ('standby', 'take')  # accepted from a client without control
 REFUSAL_PREFIX = 'refused '  # start of a key in the diagnostics of the control unit, before the name of a mode
 
 ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole',
                    'pointing_model')
-"""Keys in the diagnostics of the control unit that `rows` shows."""
 
-GRAPH_NODES = ('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')
-"""Nodes of an antenna whose silence the operator must see."""
-
+GRAPH_NODES = ('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')  # whose silence the operator must see
 LIMIT_WARNING_S = 20.0  # time to a limit below which the axis has a warning [s]
 REST_RATE_DEG_S = 0.002  # rate below which an axis counts as stopped [deg/s]
 
 UNACKNOWLEDGED_STATES = ('unacknowledged', 'returned unacknowledged', 'latched unacknowledged')
-"""States of an alarm that waits for an acknowledgement."""
 
 ALARM_KEYS = ('state', 'priority', 'annunciated', 'first_out', 'cause', 'action', 'detail', 'shelved_reason',
               'raised_s')
-"""Keys of an alarm on acu/alarms."""
 
 
 class Row(NamedTuple):
@@ -81,19 +74,19 @@ def rows(antenna: 'Antenna') -> list[Row]:
     found += [Row('encoder', axis, angle, 'deg') for axis, angle in zip(
         topics.AXES, antenna.encoder_angles('joint_states'))]
     found += [Row('rate', axis, rate, 'deg/s') for axis, rate in zip(topics.AXES, antenna.rates())]
-    found += [Row('receiver', name, value, unit) for name, value, unit in _receiver(antenna)]
+    found += [Row('receiver', *row) for row in zip(('cross_elevation_error', 'elevation_error', 'level'),
+                                                   receiver(antenna), ('deg', 'deg', 'dB-Hz'))]
     found += [Row('acu', key, acu.get(key)) for key in ACU_STATUS_KEYS]
     found.append(Row('adu', 'state', header(antenna)['drive'].text))
     return found
 
 
-def _receiver(antenna: 'Antenna') -> tuple[tuple[str, float, str], ...]:
-    values: Sequence[float] = (math.nan,) * 3
-    if antenna.present('tracking_receiver/angle_error'):
-        values = antenna.numbers['tracking_receiver/angle_error']
-    cross_elevation, elevation, level = values
-    return (('cross_elevation_error', math.degrees(cross_elevation), 'deg'),
-            ('elevation_error', math.degrees(elevation), 'deg'), ('level', float(level), 'dB-Hz'))
+def receiver(antenna: 'Antenna') -> tuple[Degrees, Degrees, DecibelHertz]:
+    """Return the last (cross-elevation error, elevation error, level), NaN if stale."""
+    if not antenna.present(ANGLE_ERROR_TOPIC):
+        return math.nan, math.nan, math.nan
+    cross_elevation, elevation, level = antenna.numbers[ANGLE_ERROR_TOPIC]
+    return math.degrees(cross_elevation), math.degrees(elevation), float(level)
 
 
 def node_reports(antenna: 'Antenna') -> list[tuple[str, str]]:
@@ -103,10 +96,8 @@ def node_reports(antenna: 'Antenna') -> list[tuple[str, str]]:
 
 
 def header(antenna: 'Antenna') -> dict[str, Shown]:
-    """Return {item: text} of mode, reason, drive, control, fallback and link.
-
-    The mode of a silent control unit is unknown. The reason then states the last mode and its age.
-    """
+    """Return {item: text} of mode, reason, drive, control, fallback and link. The mode of a silent control unit is
+    unknown. The reason then states the last mode and its age."""
     acu, link = antenna.diagnostics_of('acu'), _link(antenna)
     if acu:
         reason = acu.get('reason', '') + (', coasting' if acu.get('coasting') == '1' else '')
@@ -121,8 +112,7 @@ def header(antenna: 'Antenna') -> dict[str, Shown]:
 
 
 def _drive(antenna: 'Antenna', acu: Mapping[str, str]) -> Shown:
-    """Return the state of the drive. acu: diagnostics of the control unit. Their text comes first, because the
-    control unit notices a silence of the drive first."""
+    """The diagnostics `acu` of the control unit come first, because it notices a silence of the drive first."""
     text = acu.get('drive') or (antenna.texts.get('adu/state') if antenna.present(antenna.name_of('adu')) else None)
     if not text:
         return Shown('unknown', 'bad')
@@ -135,7 +125,6 @@ def _drive(antenna: 'Antenna', acu: Mapping[str, str]) -> Shown:
 
 
 def _link(antenna: 'Antenna') -> Shown:
-    """Return the state of the link to the graph: live, or the first silent node."""
     if not antenna.present(antenna.name_of('acu')):
         return Shown('no ACU', 'bad')
     if is_drive_silent(antenna):
@@ -170,10 +159,8 @@ def _axis_state(silent: bool, limited: str, limit_s: str, rate: float) -> Shown:
 
 
 def refusals(antenna: 'Antenna', holds_control: bool, may_take: bool = False) -> dict[str, str]:
-    """Return {command: reason} of the OPERATOR_COMMANDS that the control unit would refuse now.
-
-    holds_control: the client has control, or control is free; may_take: a supervisor takes control from others.
-    """
+    """Return {command: reason} of the OPERATOR_COMMANDS that the control unit would refuse now. holds_control: also if
+    control is free; may_take: a supervisor takes control from others."""
     acu = antenna.diagnostics_of('acu')
     if not acu:
         return dict.fromkeys(OPERATOR_COMMANDS, 'the control unit is silent')
@@ -197,9 +184,7 @@ def alarm(status: Message) -> dict[str, Json]:
 
 
 def first_alarm(antenna: 'Antenna') -> dict[str, Json] | None:
-    """Return the alarm that the operator must look at first, None without alarms: the first unacknowledged one.
-
-    The list on acu/alarms is in the order of priority and has the consequences of alarms after their causes.
-    """
+    """Return the alarm that the operator must look at first, the first unacknowledged one. The list on acu/alarms is
+    in the order of priority and has the consequences of alarms after their causes."""
     listed = [each for each in map(alarm, antenna.alarms) if each['state'] != 'shelved']
     return min(listed, key=lambda each: each['state'] not in UNACKNOWLEDGED_STATES, default=None)

@@ -9,7 +9,7 @@ from pedestal_common.wire import messages
 from pedestal_operator import console, state
 from pedestal_operator.antenna import Antenna
 from pedestal_operator.page import page_security
-from pedestal_operator.requests import Requests
+from pedestal_operator.remote_node import Requests
 
 HEALTHY = {'mode': 'rate', 'reason': 'command', 'fallback': 'coast', 'control': '', 'drive': 'enabled',
            'coasting': '0', 'azimuth limit_s': '12.4', 'elevation limit_s': 'inf'}

@@ -11,7 +11,7 @@ from pedestal_common.wire.commands import Command, Reply
 from pedestal_operator.page import page_log, page_passes, page_security, page_server, page_sky, page_state
 from pedestal_operator.page.page_requests import JOG_TIMEOUT_S, MAX_STATE_AGE_S, PAGE_REPLY_TIMEOUT_S, PageRequests
 from pedestal_operator.page.page_security import Access, Refused, Request
-from pedestal_operator.requests import Requests
+from pedestal_operator.remote_node import Requests
 
 GOOD = Request('127.0.0.1:8080', '', '', '', '/', False)
 

@@ -3,9 +3,9 @@ import math
 
 import pytest
 
-from pedestal_operator.rotator import outcomes, pointing
+from pedestal_operator.rotator import pointing
 from pedestal_operator.rotator.controller import Controller
-from pedestal_operator.rotator.outcomes import Refused
+from pedestal_operator.rotator.pointing import Refused
 
 
 class Remote:
@@ -80,8 +80,8 @@ def test_stale_and_missing_angles_are_no_position(remote, control):
         vars(remote).update(change)
         with pytest.raises(Refused, match='the position of the antenna is unknown: .*joint_states') as refused:
             control.pointing.earth_angles()
-        assert refused.value.outcome == outcomes.OUTCOME_NO_POSITION
-        assert refusal(control, 30.0, 40.0)[0] == outcomes.OUTCOME_NO_POSITION
+        assert refused.value.outcome == pointing.OUTCOME_NO_POSITION
+        assert refusal(control, 30.0, 40.0)[0] == pointing.OUTCOME_NO_POSITION
         remote.fresh = {'joint_states'}
     assert remote.requests == []
 
@@ -90,7 +90,7 @@ def test_limits_are_never_invented(remote, control):
     remote.limits = None
     with pytest.raises(Refused, match='limits of the antenna are unknown'):
         _ = control.pointing.limits
-    assert refusal(control, 30.0, 40.0)[0] == outcomes.OUTCOME_NO_POSITION and remote.requests == []
+    assert refusal(control, 30.0, 40.0)[0] == pointing.OUTCOME_NO_POSITION and remote.requests == []
 
 
 @pytest.mark.parametrize(('direction', 'reason'), (
@@ -98,12 +98,12 @@ def test_limits_are_never_invented(remote, control):
     ((721.0, 40.0), 'azimuth 721 deg: must be -720 to 720'),
     ((math.nan, 40.0), 'azimuth nan deg: must be -720 to 720')))
 def test_a_set_point_out_of_reach_takes_no_control(remote, control, direction, reason):
-    assert refusal(control, *direction) == (outcomes.OUTCOME_OUT_OF_REACH, reason) and remote.requests == []
+    assert refusal(control, *direction) == (pointing.OUTCOME_OUT_OF_REACH, reason) and remote.requests == []
 
 
 def test_an_azimuth_without_a_turn_inside_the_limits_is_out_of_reach(remote, control):
     remote.limits = [-1.0, 1.0, 0.0, 1.5]
-    assert refusal(control, 180.0, 40.0) == (outcomes.OUTCOME_OUT_OF_REACH,
+    assert refusal(control, 180.0, 40.0) == (pointing.OUTCOME_OUT_OF_REACH,
                                              'azimuth 180 deg: must be -57.2958 to 57.2958')
 
 
@@ -112,7 +112,7 @@ def test_an_antenna_on_a_ship_without_a_fresh_attitude_has_no_position(remote, c
     remote.seen.add(pointing.ATTITUDE_TOPIC)
     with pytest.raises(Refused, match=f'unknown: no {pointing.ATTITUDE_TOPIC}$'):
         control.pointing.earth_angles()
-    assert refusal(control, 30.0, 40.0)[0] == outcomes.OUTCOME_NO_POSITION
+    assert refusal(control, 30.0, 40.0)[0] == pointing.OUTCOME_NO_POSITION
     remote.fresh.add(pointing.ATTITUDE_TOPIC)
     assert control.pointing.earth_angles() == pytest.approx((100.0, 20.0))    # the deck's azimuth 0 is east
     assert refusal(control, 30.0, 100.0) == (None, '') and remote.requests == ['take', 'slave']
@@ -120,7 +120,7 @@ def test_an_antenna_on_a_ship_without_a_fresh_attitude_has_no_position(remote, c
 
 def test_no_reply_has_a_reason(remote, control):
     pending = control.go('a', 30.0, 40.0, 0.0)
-    assert pending.look(remote, 2.0) == outcomes.OUTCOME_NO_REPLY
+    assert pending.look(remote, 2.0) == pointing.OUTCOME_NO_REPLY
     assert pending.reason == 'the control unit did not reply within 1.5 s'
     assert refusal(control, 31.0, 40.0)[0] is None
     assert control.go('b', 30.0, 40.0, 0.0).reason == 'control is held by a'
@@ -159,7 +159,7 @@ def test_connections_of_one_host_in_sequence_are_one_motion(remote, control, one
 def test_another_host_is_refused_until_the_motion_has_ended(remote, control, one_shots, client):
     sent = len(remote.requests)
     refused = control.go(client, 30.0, 40.0, one_shots + 1.0)
-    assert (refused.outcome, refused.reason) == (outcomes.OUTCOME_BUSY, f'control is held by {HOST}:4')
+    assert (refused.outcome, refused.reason) == (pointing.OUTCOME_BUSY, f'control is held by {HOST}:4')
     control.look(one_shots + 2.9)
     assert len(remote.requests) == sent and control.holder == f'{HOST}:4'
     control.look(one_shots + 3.1)
@@ -169,7 +169,7 @@ def test_another_host_is_refused_until_the_motion_has_ended(remote, control, one
 
 def test_a_connected_client_in_control_is_not_replaced_by_its_own_host(control, one_shots):
     assert control.go(f'{HOST}:6', 15.0, 40.0, one_shots + 1.0).outcome is None
-    assert control.go(f'{HOST}:7', 16.0, 40.0, one_shots + 2.0).outcome == outcomes.OUTCOME_BUSY
+    assert control.go(f'{HOST}:7', 16.0, 40.0, one_shots + 2.0).outcome == pointing.OUTCOME_BUSY
     control.leave(f'{HOST}:7')
     assert control.holder == f'{HOST}:6'
 

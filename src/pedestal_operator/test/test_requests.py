@@ -1,6 +1,6 @@
 """Which reply belongs to which request."""
 from pedestal_common.wire.commands import Command, Reply
-from pedestal_operator.requests import MAX_KEPT_REQUESTS, Requests
+from pedestal_operator.remote_node import MAX_KEPT_REQUESTS, Requests
 
 GRANTED = Reply(True, 'mode is stop')
 

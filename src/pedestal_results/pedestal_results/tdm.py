@@ -23,7 +23,7 @@ from pedestal_recording import columns
 from pedestal_recording import recording as recordings
 from pedestal_recording.export import atomic_file
 from pedestal_results import directions
-from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.tracks import instant
 
 RATE_LIMITS_HZ = 1e-3, 1000.0  # smallest and largest allowed rate of records [Hz]
 SEGMENT_STEPS = 10_000  # largest number of steps in a segment of the message, all of which are in memory at once

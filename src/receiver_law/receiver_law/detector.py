@@ -1,13 +1,10 @@
 """Detector of the tracking receiver: from the voltages of sum and differences to angle errors, C/N0 and lock.
 
-A sample becomes an angle error by Re(d conj(s)) divided by the smoothed sum power (automatic gain control, AGC). d and
-s are the voltages of difference and sum. The error is limited to the full scale of the detector, then smoothed.
+A sample becomes an angle error by Re(d conj(s)) divided by the smoothed sum power (automatic gain control), with the
+voltages d of a difference and s of the sum. The error is limited to full scale, then smoothed.
 
 Voltages are scaled so that the noise of one channel has the power 1 in one sample. The carrier power on axis is then
 C/N0 tau, with the time tau of a sample. The noise power 1 is subtracted from the measured sum power.
-
-The simulated receiver (tracking_receiver_sim.receiver) and a receiver of I/Q samples (pedestal_hardware.monopulse)
-both call these functions.
 """
 import math
 from typing import NamedTuple, Protocol
@@ -19,8 +16,7 @@ from receiver_law import smoothing
 from receiver_law.monopulse import detect, thermal_noise
 from receiver_law.smoothing import SMOOTHING_KINDS
 
-MIN_POWER_OVER_NOISE = 0.01
-"""Smallest ratio of carrier power to noise power in one sample that the C/N0 estimate reports (-20 dB)."""
+MIN_POWER_OVER_NOISE = 0.01  # smallest reported carrier power over noise power of a sample (-20 dB)
 
 
 class Antenna(Protocol):
@@ -178,10 +174,8 @@ def errors(state: State, constants: Constants) -> tuple[Radians, Radians]:
 
 @compiled
 def lock(state: State, constants: Constants, power: float, elapsed_ns: Nanoseconds) -> None:
-    """Update the lock: gained after acquire_ns above the upper level, lost after lose_ns below the lower level.
-
-    power: carrier power / noise power; elapsed_ns: time since the last step.
-    """
+    """Update the lock: gained after acquire_ns above the upper level, lost after lose_ns below the lower level. power:
+    carrier power / noise power; elapsed_ns: time since the last step."""
     if state.locked != 0:
         crossed, wait = power < constants.lose_power, constants.lose_ns
     else:

@@ -16,11 +16,7 @@ import numpy as np
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Hertz, Radians, Seconds
 
-U_PER_BEAMWIDTH = 2.0 * 1.8676215105779688
-"""Value of u = pi D / lambda sin(theta) per half-power beamwidth of the cosine taper.
-
-D: diameter [m]; lambda: wavelength [m]; theta: angle off the axis [rad].
-"""
+U_PER_BEAMWIDTH = 2.0 * 1.8676215105779688  # u = pi D / lambda sin(theta), cosine taper
 
 DISK_DISTANCES = math.sqrt(0.5 - math.sqrt(0.15)), math.sqrt(0.5), math.sqrt(0.5 + math.sqrt(0.15))
 DISK_WEIGHTS, DISK_ANGLES = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0), 12
@@ -37,9 +33,7 @@ def sinc(x: float) -> float:
 @compiled
 def sum_pattern(v: float) -> float:
     """Return S at v beamwidths off the axis: cos(u) / (1 - (2u/pi)^2), written so that nothing cancels at u = pi/2.
-
-    Balanis, Antenna Theory, 3rd ed., table 12.1 (cosine distribution).
-    """
+    Balanis, Antenna Theory, 3rd ed., table 12.1 (cosine distribution)."""
     u = U_PER_BEAMWIDTH * abs(v)
     return 0.25 * math.pi**2 * sinc(u - 0.5 * math.pi) / (u + 0.5 * math.pi)
 
@@ -54,10 +48,8 @@ def difference_pattern(v: float, k_m: float) -> float:
 @compiled
 def channels(v_x: float, v_e: float, k_m: float, cos_beta: float, sin_beta: float) -> tuple[float, float, float]:
     """Return the (sum, difference X, difference E) voltages of a unit carrier, v_x and v_e beamwidths off the axis.
-
-    k_m: slope; cos_beta, sin_beta: of the cross-coupling angle beta, which rotates the error axes. Each difference
-    then also contains a part of the other error.
-    """
+    The cross-coupling angle beta rotates the error axes. Each difference then also contains a part of the other
+    error."""
     S_x, S_e = sum_pattern(v_x), sum_pattern(v_e)
     x, e = difference_pattern(v_x, k_m) * S_e, S_x * difference_pattern(v_e, k_m)
     return S_x * S_e, cos_beta * x - sin_beta * e, sin_beta * x + cos_beta * e
@@ -67,11 +59,8 @@ def channels(v_x: float, v_e: float, k_m: float, cos_beta: float, sin_beta: floa
 def disk_channels(v_x: float, v_e: float, radius: float, k_m: float, cos_beta: float,
                   sin_beta: float) -> tuple[float, float, float]:
     """Return (sum, difference X, difference E) voltages of a disk of incoherent noise, as strong as a unit carrier.
-
-    The centre of the disk is v_x, v_e beamwidths off the axis; radius: of the disk [beamwidths]; others: see
-    `channels`. The square of the sum is the mean of the power pattern over the disk. Its product with a difference is
-    the mean of the product of both patterns, which a receiver measures.
-    """
+    radius: [beamwidths]. The square of the sum is the mean of the power pattern over the disk. Its product with a
+    difference is the mean of the product of both patterns, which a receiver measures."""
     power = x = e = 0.0
     for share, distance in zip(DISK_WEIGHTS, DISK_DISTANCES):
         for k in range(DISK_ANGLES):

@@ -5,8 +5,7 @@
                     1 / ((n - 1) T) rad/s, its mean delay n - 1 samples
     moving_average  the text of the paper, not its eq. (1): the mean of the last n samples, delay (n - 1) / 2 samples
 
-y: sample of the error; x: smoothed error; n: number of samples; T: time between two samples. The argument `kind` is a
-code such as SMOOTHING_NONE in the compiled laws, and a name of SMOOTHING_KINDS elsewhere.
+y: sample of the error; x: smoothed error; T: time between two samples.
 """
 from typing import Annotated
 
@@ -45,10 +44,7 @@ def put(smoother: Smoother, y: Radians, gain: float) -> None:
 
 @compiled
 def smoothed(smoother: Smoother, kind: int, samples: int, n: int) -> Radians:
-    """Return the smoothed error at the end of a step.
-
-    samples: number of samples of a step; n: length of the moving average [samples], which is shorter at the start.
-    """
+    """Return the smoothed error at the end of a step. n: length of the moving average, shorter at the start."""
     if kind == SMOOTHING_RECURSION:
         return smoother.low_pass
     if kind == SMOOTHING_NONE:
@@ -66,12 +62,9 @@ def delay(kind: str, samples: int, n: int) -> float:
 
 
 def steps_back(kind: str, samples: int, n: int) -> float:
-    """Return the mean age of the steps whose samples are in the result, in drive steps; 0 for the last step.
-
-    samples: number of samples of a step. A beam that is held within a step has one direction in each step. For the
-    direction of the beam the control unit therefore needs the age in whole steps, and for the place of the target the
-    age of the samples.
-    """
+    """Return the mean age of the steps whose samples are in the result, in drive steps; 0 for the last step. A beam
+    that is held within a step has one direction in each step. For the direction of the beam the control unit therefore
+    needs the age in whole steps, and for the place of the target the age of the samples."""
     if kind == 'none':
         return 0.0
     if kind == 'recursion':

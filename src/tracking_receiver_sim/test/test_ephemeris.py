@@ -11,8 +11,7 @@ from skyfield.framelib import ICRS_to_J2000, itrs, true_equator_and_equinox_of_d
 from skyfield.sgp4lib import TEME
 
 from pedestal_common.text_files import csv_table
-from tracking_receiver_sim import target, track_files
-from tracking_receiver_sim.ephemeris import interpolation, oem
+from tracking_receiver_sim import target
 from tracking_receiver_sim.params import (
     AngleParameters,
     LeoPassParameters,
@@ -20,6 +19,9 @@ from tracking_receiver_sim.params import (
     TargetParameters,
     TrackFileParameters,
 )
+from tracking_receiver_sim.tracks import files as track_files
+from tracking_receiver_sim.tracks import oem
+from tracking_receiver_sim.tracks.states import interpolated
 
 SCALE = load.timescale(builtin=True)
 ISS = EarthSatellite(LeoPassParameters().line_1, LeoPassParameters().line_2, 'ISS', SCALE)
@@ -127,7 +129,7 @@ def test_lagrange_agrees_with_beyond_and_both_with_a_polynomial_orbit(tmp_path):
     segment = oem.read(str(path)).segments[0]
     theirs = ccsds.loads(path.read_text().partition('COVARIANCE_START')[0])
     times = np.array([3.3, 77.7, 400.0, 911.1, 1700.0])
-    ours, _ = interpolation.at(segment, segment.t[0] + times)
+    ours, _ = interpolated(segment, segment.t[0] + times)
     for t, r in zip(times.tolist(), ours):
         state = theirs.interpolate(theirs.start + datetime.timedelta(seconds=t))
         assert np.asarray(state.base[:3]) == pytest.approx(r, abs=0.01)
@@ -136,7 +138,7 @@ def test_lagrange_agrees_with_beyond_and_both_with_a_polynomial_orbit(tmp_path):
     made = segment._replace(t=t, r=np.column_stack([curve(t)] * 3), v=np.column_stack([curve.deriv()(t)] * 3))
     for method in ('HERMITE', 'LAGRANGE'):
         between = np.linspace(t[0], t[-1], 50)
-        r, v = interpolation.at(made._replace(method=method, degree=7), between)
+        r, v = interpolated(made._replace(method=method, degree=7), between)
         assert r[:, 0] == pytest.approx(curve(between), abs=1e-6) and v[:, 0] == pytest.approx(
             curve.deriv()(between), abs=1e-6)
 

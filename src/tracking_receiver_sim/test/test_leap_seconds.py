@@ -8,9 +8,10 @@ import pytest
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.text_files import csv_table
-from tracking_receiver_sim import target, track_files
+from tracking_receiver_sim import target
 from tracking_receiver_sim.params import TargetParameters, TrackFileParameters
-from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.tracks import files as track_files
+from tracking_receiver_sim.tracks import instant
 
 STATION = StationParameters(latitude_deg=30.0, longitude_deg=-74.0, height=0.0)
 BEGIN = datetime.datetime(2016, 12, 31, 23, 55)

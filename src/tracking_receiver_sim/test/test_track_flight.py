@@ -10,10 +10,10 @@ from skyfield.api import wgs84
 from pedestal_common.geometry import geodesy
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.text_files import csv_table
-from tracking_receiver_sim import track_files
 from tracking_receiver_sim.params import TargetParameters, TrackFileParameters
-from tracking_receiver_sim.track import fixes as logs
-from tracking_receiver_sim.track import flight, place
+from tracking_receiver_sim.tracks import files as track_files
+from tracking_receiver_sim.tracks import fixes as logs
+from tracking_receiver_sim.tracks import flight
 
 STATION = StationParameters()
 DEGREE = math.radians(1.0) * geodesy.EARTH_RADIUS_M
@@ -198,16 +198,16 @@ SHAPES = {'circle': circle(), 'line': log(np.arange(100), 60.0 * np.arange(100),
 def test_the_station_sees_the_whole_flight_and_can_follow_it(shape):
     fixes = SHAPES[shape]
     fixes = fixes._replace(longitude=(fixes.longitude + 180.0) % 360.0 - 180.0)
-    station = place.station_for(fixes, track())
+    station = flight.station_for(fixes, track())
     there = wgs84.latlon(station.latitude_deg, station.longitude_deg, station.height).itrs_xyz.m
     flown = wgs84.latlon(fixes.latitude, fixes.longitude, fixes.altitude).itrs_xyz.m.T - there
     e, n, u = (flown @ geodesy.station_frame(station)[1].T).T
     assert (u > 0.0).all()
     turned = np.abs(np.diff(np.unwrap(np.arctan2(e, n)))) / np.diff(fixes.time)
-    assert turned.max() < 1.02 * place.MAX_AZIMUTH_RATE_RAD_S
+    assert turned.max() < 1.02 * flight.MAX_AZIMUTH_RATE_RAD_S
     least = np.hypot(e, n).min()
     speed = flight.lay_out(fixes, track(), station).speed
-    assert least == pytest.approx(max(place.MIN_RANGE_M, speed / place.MAX_AZIMUTH_RATE_RAD_S), rel=0.02)
+    assert least == pytest.approx(max(flight.MIN_RANGE_M, speed / flight.MAX_AZIMUTH_RATE_RAD_S), rel=0.02)
 
 
 def test_what_is_open_follows_from_the_file(tmp_path):
@@ -219,8 +219,8 @@ def test_what_is_open_follows_from_the_file(tmp_path):
     target = TargetParameters(kind='track_file', track_file=TrackFileParameters(path=str(path), start=9.5))
     found = track_files.derived_parameters(target, set())
     assert tuple(found) == track_files.DERIVED_PARAMETERS and found['duration'] == 109.4
-    station = StationParameters(*(found[name] for name in place.STATION_FIELDS))
-    assert station == place.station_for(track_files.read(target.track_file)[1], target.track_file)
+    station = StationParameters(*(found[name] for name in flight.STATION_FIELDS))
+    assert station == flight.station_for(track_files.read(target.track_file)[1], target.track_file)
     there = wgs84.latlon(station.latitude_deg, station.longitude_deg, station.height).itrs_xyz.m
     flown = wgs84.latlon(fixes.latitude, fixes.longitude, fixes.altitude).itrs_xyz.m.T - there
     assert 0.0 <= found['receiver.reference_range'] - np.linalg.norm(flown, axis=1).max() < 10.0

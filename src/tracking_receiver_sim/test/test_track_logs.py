@@ -6,9 +6,9 @@ import pynmea2
 import pytest
 
 from pedestal_common.text_files import csv_table
-from tracking_receiver_sim import track_files
 from tracking_receiver_sim.params import TrackFileParameters
-from tracking_receiver_sim.track import fixes, instant
+from tracking_receiver_sim.tracks import files as track_files
+from tracking_receiver_sim.tracks import fixes, instant
 
 N = 8
 BEGIN = 1532340000

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pedestal_common.text_files import csv_table
-from tracking_receiver_sim import track_files
 from tracking_receiver_sim.params import TargetParameters, TrackFileParameters
-from tracking_receiver_sim.track import instant, times
+from tracking_receiver_sim.tracks import files as track_files
+from tracking_receiver_sim.tracks import instant, times
 
 N = 20
 BEGIN = datetime.datetime(2026, 6, 1, 12)

@@ -1,7 +1,6 @@
 """Reader of files of orbital elements: TLE, and CCSDS OMM (502.0-B) as KVN (KEYWORD = value), XML, JSON or CSV.
 
-`read` returns the elements of one satellite for the verbs of the command line. A file may hold many satellites. It may
-also hold a history: several sets of elements of one satellite. The content of a file decides its format.
+A file may hold many satellites, and several sets of elements of one. Its content decides its format.
 """
 import datetime
 import json
@@ -17,18 +16,15 @@ from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import did_you_mean
 from pedestal_common.text_files import content, csv_table
 from pedestal_common.text_files.files import FilePath
-from tracking_receiver_sim.ephemeris import lines
 from tracking_receiver_sim.params import LeoPassParameters
+from tracking_receiver_sim.tracks import lines
 
 FORMAT_PROBE_BYTES = 4096  # number of bytes at the beginning of a file that decide its format
 MAX_SATELLITES = 300_000  # largest number of satellites in a file, several times the number of catalogued ones
-MAX_COMPARED_NAMES = 40_000
-"""Largest number of names that an error compares with an unknown name: more than the catalogued satellites."""
-MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200
-"""Largest depth of nested XML elements, and the number of characters to which a value is cut."""
+MAX_COMPARED_NAMES = 40_000  # with which an error compares a name: more than catalogued satellites
+MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200  # of nested elements; length to which a value is cut
 PARSE_CHUNK_BYTES = 1 << 20  # number of bytes of XML that are parsed at once
-FIRST_SATELLITE_YEAR = 57
-"""Smallest two-digit year of a TLE that lies in the 20th century: the first satellite flew in 1957."""
+FIRST_SATELLITE_YEAR = 57  # smallest two-digit year of a TLE in the 20th century: first satellite 1957
 TLE_EPOCH_COLUMNS = slice(18, 32)  # columns of the epoch in line 1 of a TLE
 
 
@@ -60,12 +56,9 @@ class Satellite(NamedTuple):
 
 
 def read(path: FilePath, name: str = '', when: datetime.datetime | None = None) -> Elements:
-    """Return the elements of a satellite in a file. Raises TargetError.
-
-    name: name, catalogue number or international designator; it may be empty for a file of one satellite. when: UTC.
-    From a history the function takes the elements whose epoch is nearest to `when`, or the latest ones if `when` is
-    None.
-    """
+    """Return the elements of a satellite in a file. Raises TargetError. name: name, catalogue number or international
+    designator; it may be empty for a file of one satellite. From several sets the function takes that whose epoch is
+    nearest to `when` (UTC), or the latest one."""
     try:
         with csv_table.stream(path) as stream:
             beginning = content.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
@@ -109,7 +102,6 @@ def read(path: FilePath, name: str = '', when: datetime.datetime | None = None) 
 
 
 def _nearest(path: FilePath, history: list[Satellite], when: datetime.datetime | None) -> tuple[Satellite, str]:
-    """Return (the satellite of a history whose epoch is nearest to `when`, remark). Raises TargetError."""
     if len(history) == 1:
         return history[0], ''
     epochs = [_epoch(path, satellite) for satellite in history]
@@ -123,7 +115,6 @@ def _nearest(path: FilePath, history: list[Satellite], when: datetime.datetime |
 
 
 def _epoch(path: FilePath, satellite: Satellite) -> datetime.datetime:
-    """Return the epoch, UTC. Raises TargetError."""
     if satellite.lines:
         text = satellite.lines[0][TLE_EPOCH_COLUMNS]
         try:
@@ -141,7 +132,6 @@ def _epoch(path: FilePath, satellite: Satellite) -> datetime.datetime:
 
 
 def _reader(beginning: str) -> Callable[[FilePath], Iterator[Satellite]]:
-    """Return the reader of a file that begins with a text."""
     if beginning.startswith('<'):
         return _xml
     if beginning.startswith(('{', '[')):
@@ -156,7 +146,7 @@ def _reader(beginning: str) -> Callable[[FilePath], Iterator[Satellite]]:
 
 
 def _tles(path: FilePath) -> Iterator[Satellite]:
-    """Yield the satellites of a file of TLEs, with or without a line of the name before each."""
+    """A line of the name may stand before each TLE."""
     # first: (line number, text) of the line before; before: that of the line before `first`, which may hold a name.
     before, first = (0, ''), (0, '')
     for number, text in lines.read(path):
@@ -169,7 +159,7 @@ def _tles(path: FilePath) -> Iterator[Satellite]:
 
 
 def _number(text: str) -> str:
-    """Return the catalogue number of a text in a TLE or OMM. Its first digit may be a letter (notation Alpha-5)."""
+    """Return a catalogue number, whose first digit may be a letter (notation Alpha-5)."""
     try:
         return omm.catalogue_number(text)
     except ValueError:
@@ -177,20 +167,18 @@ def _number(text: str) -> str:
 
 
 def _designator(line: str) -> str:
-    """Return the international designator in line 1 of a TLE, such as 1998-067A."""
     year, piece = line[9:11], line[11:17].strip()
     return f'{"19" if year >= str(FIRST_SATELLITE_YEAR) else "20"}{year}-{piece}'
 
 
 def _omm(line: int, fields: dict[str, str]) -> Satellite:
-    """Return the satellite of an OMM that begins at a line; fields: {keyword: text}."""
     number = _number(fields.get('NORAD_CAT_ID', ''))
     return Satellite(line, fields.get('OBJECT_NAME') or number or fields.get('OBJECT_ID', ''), number,
                      fields.get('OBJECT_ID', '').upper(), None, fields)
 
 
 def _kvn(path: FilePath) -> Iterator[Satellite]:
-    """Yield the satellites of OMMs in sequence; each begins with its CCSDS_OMM_VERS."""
+    """Each OMM begins with its CCSDS_OMM_VERS."""
     fields: dict[str, str] = {}
     begun = 0
     for number, text in lines.read(path):
@@ -209,7 +197,6 @@ def _kvn(path: FilePath) -> Iterator[Satellite]:
 
 
 def _csv(path: FilePath) -> Iterator[Satellite]:
-    """Yield the satellites of a CSV file with a row for each OMM."""
     with csv_table.opened(path) as reader:
         csv_table.require(reader, ('EPOCH', 'NORAD_CAT_ID'))
         for row in reader:
@@ -218,12 +205,11 @@ def _csv(path: FilePath) -> Iterator[Satellite]:
 
 
 def _json(path: FilePath) -> Iterator[Satellite]:
-    """Yield the satellites of a JSON array of objects, or of one object, decoded one by one."""
+    """Decode an array of objects, or one object, one by one."""
     text = csv_table.text(path)
     decoder, between = json.JSONDecoder(parse_int=str, parse_float=str), re.compile(r'[\s,\[\]]*')
 
     def skipped(at: int) -> int:
-        """Return the index behind what lies between two objects."""
         match = between.match(text, at)
         return match.end() if match else at
 
@@ -249,20 +235,17 @@ def _json(path: FilePath) -> Iterator[Satellite]:
 
 
 def _xml(path: FilePath) -> Iterator[Satellite]:
-    """Yield the satellites of the segments of an OMM or NDM as XML; expat keeps no parsed data in memory."""
-    # line: of the open segment.
+    """Read the segments of an OMM or NDM; expat keeps no parsed data in memory."""
     satellites: list[Satellite] = []
     open_elements: list[str] = []
     texts: dict[str, str] = {}
-    line = 1
+    line = 1        # of the open segment
 
     def doctype(*_: object) -> None:
-        """Raise TableError for a document type declaration."""
         raise lines.wrong(path, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1,
                           'a document type declaration: an OMM has none')
 
     def start(name: str, _attributes: dict[str, str]) -> None:
-        """Begin an element; a segment begins a new satellite. Raises TableError if it is nested too deeply."""
         nonlocal line
         if len(open_elements) >= MAX_XML_DEPTH:
             raise csv_table.TableError(f'{path}: line {parser.CurrentLineNumber}: must be at most {MAX_XML_DEPTH} '
@@ -274,12 +257,10 @@ def _xml(path: FilePath) -> Iterator[Satellite]:
             line = parser.CurrentLineNumber
 
     def text(data: str) -> None:
-        """Add a part of the text of a keyword."""
         if open_elements and open_elements[-1] in omm.KEYWORDS:
             texts[open_elements[-1]] = (texts.get(open_elements[-1], '') + data)[:MAX_VALUE_CHARS]
 
     def end(_name: str) -> None:
-        """End an element; the end of a segment completes its satellite."""
         nonlocal line
         if open_elements.pop() == 'segment':
             satellites.append(_omm(line, {keyword: value.strip() for keyword, value in texts.items()}))
@@ -306,7 +287,6 @@ def _xml(path: FilePath) -> Iterator[Satellite]:
 
 
 def _omm_text(path: FilePath, satellite: Satellite) -> str:
-    """Return the elements of a satellite of an OMM as JSON. Raises TargetError."""
     fields = dict(satellite.fields)
     try:
         fields['EPOCH'] = lines.text(*lines.instant(path, satellite.line, 1, 'EPOCH', fields.get('EPOCH', '')))

@@ -48,7 +48,6 @@ def initial(constants: Records) -> Records:
 
 @compiled
 def _clear_faults(constants: receiver.Constants, injected: Injected) -> None:
-    """Restore the constants of the receiver, and clear the faults."""
     constants.power, constants.latency_ns = injected.power, injected.latency_ns
     constants.cos_phi, constants.sin_phi = injected.cos_phi, injected.sin_phi
     constants.sign[0] = constants.sign[1] = 1.0
@@ -59,7 +58,7 @@ def _clear_faults(constants: receiver.Constants, injected: Injected) -> None:
 
 @compiled
 def _apply_fault(constants: receiver.Constants, injected: Injected, fault: int, values: Floats) -> None:
-    """Apply a fault; values: its arguments, in the order of injection/table.py."""
+    """Apply a fault; values: in the order of injection/table.py."""
     message_faults.apply(injected.message_fault, MESSAGE_FAULT_CODES, fault, values)
     if fault == Fault.DELAY:
         constants.latency_ns += round(values[0] * NS_PER_SECOND)
@@ -80,7 +79,7 @@ def _apply_fault(constants: receiver.Constants, injected: Injected, fault: int, 
 
 @compiled
 def apply_due_faults(record: _Unit, stamp: Nanoseconds) -> None:
-    """Clear all faults, then apply the faults in force in the step of a stamp; m: record of the unit."""
+    """Clear all faults, then apply the faults in force in the step of a stamp."""
     _clear_faults(record.constants, record.injected)
     schedule.begin(record.schedule)
     for i in range(schedule.MAX_ACTIVE_FAULTS):

@@ -1,15 +1,12 @@
 """The monopulse tracking receiver: position of the target, samples of the channels, published results.
 
 The unit calls `step` once per drive step. From the previous step to this one, the true error is taken as a straight
-line. Along the line the receiver takes `samples_per_step` samples of sum and difference voltages, the last one at the
-stamp. An electronic beam is held between two steps and jumps at a step. With a held beam the line begins at the offset
-of the previous target position from the present beam.
+line, along which the receiver takes `samples_per_step` samples, the last one at the stamp. An electronic beam is held
+between two steps and jumps at a step. The line then begins at the offset of the previous target position from the
+present beam.
 
-The module `detector` makes an angle error of each sample. If the parameters select them, each result also holds the
-rate of the error at the stamp and the range, with white noise.
-
-Voltages are scaled so that the noise of one channel has the power 1 in one sample. The carrier power on axis is then
-C/N0 tau, with the time tau of a sample.
+The voltages have the scale of receiver_law.detector, which makes an angle error of each sample. If the parameters
+select them, each result also holds the rate of the error at the stamp and the range, with white noise.
 """
 import math
 from typing import Annotated, NamedTuple
@@ -19,7 +16,7 @@ import numpy as np
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry import blockage
-from pedestal_common.geometry.line_of_sight import angles, earth_angles, offsets, to_deck, to_earth
+from pedestal_common.geometry.line_of_sight import angles, earth_angles, offset_rates, offsets, to_deck, to_earth
 from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import (
     Bit,
@@ -43,7 +40,6 @@ from receiver_law import detector, smoothing
 from receiver_law.detector import Voltages, hertz
 from receiver_law.monopulse import channels, disk_channels
 from tracking_receiver_sim import target, wave_path
-from tracking_receiver_sim.error_rate import error_rate
 from tracking_receiver_sim.params import BEAM_HELD, BEAM_MOTIONS, ReceiverParameters, TrackingReceiverParameters
 
 STATUS_TEXTS = dict(
@@ -53,8 +49,7 @@ STATUS_TEXTS = dict(
 STATUS_TEXT_BY_CODE = tuple(STATUS_TEXTS.values())
 Status = codes(STATUS_TEXTS)
 
-NORMALS_PER_SAMPLE = 6
-"""Standard normals of a sample: real and imaginary noise of the sum and of the two difference channels."""
+NORMALS_PER_SAMPLE = 6  # of noise: real and imaginary of the sum and of two differences
 RESULT_RING_SIZE = 512  # largest number of results that wait for the latency to pass
 NOT_MEASURED = (math.nan, math.nan)  # pair of numbers that the receiver did not measure
 
@@ -151,10 +146,7 @@ class Inputs(Record):
 
 
 class Outputs(Record):
-    """Outputs of a step: a result, if one comes out, then values at the stamp of this step.
-
-    The numbers of the result are NaN while not locked, except C/N0. The values are NaN if not known.
-    """
+    """Outputs of a step: a result, if one comes out, then values at the stamp of this step; NaN if not known."""
     due: Bit                    # 1 if a result comes out in this step
     stamp_ns: Nanoseconds       # at which the result was measured
     cross_elevation: Radians    # error
@@ -172,10 +164,7 @@ class Outputs(Record):
 
 
 def constants(params: TrackingReceiverParameters, period: Seconds, built: target.Target) -> Records:
-    """Return the Constants (1,) of a drive step `period` and a target.
-
-    Raises ParameterError for a latency that the ring of results does not cover.
-    """
+    """Return the Constants (1,) of a step and a target. Raises ParameterError for a latency beyond the ring."""
     antenna, receiver = params.antenna, params.receiver
     if receiver.latency >= (RESULT_RING_SIZE - 1) * period:
         raise ParameterError(f'receiver.latency = {receiver.latency:g} s: must be below {RESULT_RING_SIZE - 1} '
@@ -225,12 +214,10 @@ def initial_state() -> Records:
 
 
 def _measured_normals(receiver: ReceiverParameters) -> int:
-    """Return the number of standard normals per step that the channels, rate and range take."""
     return NORMALS_PER_SAMPLE * receiver.samples_per_step + 2 * receiver.rate.measured + receiver.ranging.measured
 
 
 def _receiver_normals(params: TrackingReceiverParameters) -> int:
-    """Return _measured_normals, and those of a source of noise."""
     return _measured_normals(params.receiver) + params.receiver.samples_per_step * params.target.of_noise
 
 
@@ -240,11 +227,8 @@ def normals_per_step(params: TrackingReceiverParameters) -> int:
 
 
 def age(params: TrackingReceiverParameters, period: Seconds) -> Seconds:
-    """Return the mean age of an error at its stamp if the beam is held between two steps, otherwise 0.
-
-    A moving beam needs no age. There the mean over a step differs from the error at the stamp at most by the change of
-    the error within the step. period: drive step.
-    """
+    """Return the mean age of an error at its stamp if the beam is held between two steps, otherwise 0. With a moving
+    beam the mean over a step differs from the error at the stamp at most by its change within the step."""
     receiver = params.receiver
     if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
         return 0.0
@@ -253,11 +237,8 @@ def age(params: TrackingReceiverParameters, period: Seconds) -> Seconds:
 
 
 def beam_age(params: TrackingReceiverParameters, period: Seconds) -> Seconds:
-    """Return the mean time from the stamp of the measured beam to the stamp of an error.
-
-    Because a held beam is published at the end of its step, only older steps in the smoothing count. The result is 0
-    for a moving beam. period: drive step.
-    """
+    """Return the mean time from the stamp of the measured beam to the stamp of an error; 0 for a moving beam. Because
+    a held beam is published at the end of its step, only older steps in the smoothing count."""
     receiver = params.receiver
     if BEAM_MOTIONS.index(receiver.beam) != BEAM_HELD:
         return 0.0
@@ -298,10 +279,7 @@ def apparent_state(state: State, constants: Constants, true: target.TargetState)
 
 @compiled
 def carrier_amplitude(constants: Constants, e: Meters, n: Meters, u: Meters, hidden: bool) -> float:
-    """Return the sum voltage on axis from a target at a vector (e, n, u) from the antenna.
-
-    The voltage is 0 below the horizon mask. hidden: True if a blockage hides the target; the voltage is then 0 too.
-    """
+    """Return the sum voltage on axis from a target at (e, n, u); 0 below the horizon mask or if hidden."""
     _, elevation = earth_angles(e, n, u)
     if hidden or not elevation >= constants.horizon_mask:       # also true for an elevation of NaN
         return 0.0
@@ -311,10 +289,8 @@ def carrier_amplitude(constants: Constants, e: Meters, n: Meters, u: Meters, hid
 
 @compiled
 def voltages(constants: Constants, amplitude: float, v_x: float, v_e: float, image: wave_path.Image) -> Voltages:
-    """Return the Voltages of one sample without noise.
-
-    amplitude: sum voltage on axis; v_x, v_e: offsets of the target from the null of the differences, in beamwidths.
-    """
+    """Return the Voltages of one sample without noise. amplitude: sum voltage on axis; v_x, v_e: offsets from the null
+    of the differences [beamwidths]."""
     # S_g, D_xg, D_eg: patterns for the image of the target in the ground.
     slope, cos_beta, sin_beta = constants.slope, constants.cos_beta, constants.sin_beta
     if constants.disk_radius > 0.0:
@@ -348,10 +324,7 @@ def with_noise(v: Voltages, normals: Floats, first: int) -> Voltages:
 
 @compiled
 def error_at(state: State, seen: Incidence, part: float) -> tuple[Radians, Radians]:
-    """Return the true (cross-elevation, elevation) error when a part of a step has passed.
-
-    The error changes during the step from that of the state to that of `seen`.
-    """
+    """Return the true (cross-elevation, elevation) error after a part of a step, at whose end it is that `seen`."""
     from_X, from_E = (state.cross_elevation, state.elevation) if state.error_known != 0 else (seen.dX, seen.dE)
     return from_X + part * (seen.dX - from_X), from_E + part * (seen.dE - from_E)
 
@@ -379,12 +352,24 @@ def measure(state: State, constants: Constants, seen: Incidence, normals: Floats
 
 
 @compiled
+def error_rate(inputs: Inputs, position: Vector3, velocity: Vector3,
+               seen: target.TargetState) -> tuple[RadiansPerSecond, RadiansPerSecond]:
+    """Return (d dX/dt, d dE/dt) of a target off the beam, exactly. velocity: of the antenna, FLU [m/s]. In the deck
+    frame the target is at r = M^T (p - position). Its derivative is dr/dt = M^T v - velocity - w x r, with the
+    rotation M deck -> earth and the rate w of the deck."""
+    (e, n, u), (v_e, v_n, v_u) = seen.position, seen.velocity
+    x, y, z = r = to_deck(inputs.mat_ed, e - position[0], n - position[1], u - position[2])
+    vx, vy, vz = to_deck(inputs.mat_ed, v_e, v_n, v_u)
+    wx, wy, wz = inputs.twist_angular[0], inputs.twist_angular[1], inputs.twist_angular[2]
+    v = (vx - velocity[0] - (wy * z - wz * y), vy - velocity[1] - (wz * x - wx * z),
+         vz - velocity[2] - (wx * y - wy * x))
+    return offset_rates((inputs.azimuth, inputs.elevation), (inputs.azimuth_rate, inputs.elevation_rate), r, v)
+
+
+@compiled
 def rate_and_range(state: State, constants: Constants, inputs: Inputs, target_state: target.TargetState,
                    normals: Floats) -> tuple[tuple[RadiansPerSecond, RadiansPerSecond], Meters]:
-    """Return the measured ((cross-elevation rate, elevation rate), range) of the target.
-
-    NaN stands for a number that the receiver does not measure.
-    """
+    """Return the measured ((cross-elevation rate, elevation rate), range) of the target, NaN where not measured."""
     rates, distance = NOT_MEASURED, math.nan
     first = constants.first_measured_normal
     if constants.rate_measured != 0:
@@ -492,10 +477,7 @@ def finish(state: State, outputs: Outputs, true: target.TargetState, seen: Incid
 @separate
 def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, breaks: Times, coefficients: Floats,
          normals: Floats) -> None:
-    """Execute one drive step. Never raises: the status of the outputs names a missing input.
-
-    breaks, coefficients: of the Target; normals: (normals_per_step,).
-    """
+    """Execute one drive step. Never raises: the status of the outputs names a missing input."""
     true, elapsed_ns = begin(state, constants, inputs, outputs, breaks, coefficients)
     if elapsed_ns == 0:
         return

@@ -1,22 +1,16 @@
 """Position and velocity of the target: every kind of target in one form, which the receiver evaluates at any time.
 
-Trajectories (leo_pass, track_file, flyby) become piecewise cubics in the ENU frame of the station when they are built.
-So a step needs neither SGP4, the model of satellite orbits, nor a file. Angle targets (sine, step, ramp) are closed
-forms. Before its first break and after its last break, a trajectory has no position. It is never extrapolated.
+Trajectories become piecewise cubics in the ENU frame of the station when they are built. So a step needs neither SGP4,
+the model of satellite orbits, nor a file. Angle targets (sine, step, ramp) are closed forms. Before its first break
+and after its last break, a trajectory has no position. It is never extrapolated.
 
-leo_pass: position and velocity of SGP4 every SGP4_KNOT_SPACING_S, joined by cubic Hermite pieces. The pieces are
-within 1 mm and 15 mm/s of SGP4, whose velocity differs by 10 mm/s from the derivative of its position. Directions are
-within 0.3 mdeg of skyfield if UT1 = UTC, the default. The true UT1 - UTC (`ut1_offset`, up to 0.9 s of earth rotation)
-moves an ISS pass by up to 0.04 deg (7 mdeg on the default pass). The error of SGP4 itself grows to kilometres within
-days.
+leo_pass: the pieces are within 1 mm and 15 mm/s of SGP4, whose velocity differs by 10 mm/s from the derivative of its
+position. Directions are within 0.3 mdeg of skyfield if UT1 = UTC. The true UT1 - UTC (`ut1_offset`, up to 0.9 s of
+earth rotation) moves an ISS pass by up to 0.04 deg. The error of SGP4 itself grows to kilometres within days.
 
-sun, moon: directions in which they are seen, every BODY_KNOT_SPACING_S, joined by cubic Hermite pieces.
-
-track_file: a predicted orbit or a table of directions (folder `ephemeris`), or the fixes of a recorded flight joined
-by a cubic spline, with or without smoothing (folder `track`). On a real helicopter flight with fixes at 1 Hz, the
-spline predicts left-out fixes to 9 m, the jitter of the fixes. PCHIP or Akima pieces predict them equally well, but
-with twice the peak acceleration. In a turn of 3 m/s^2 the velocity of the spline is right to 1e-4 m/s. PCHIP flattens
-every extremum, and its velocity is wrong by 1.3 m/s.
+track_file: on a real helicopter flight with fixes at 1 Hz, the spline predicts left-out fixes to 9 m, the jitter of
+the fixes. In a turn of 3 m/s^2 its velocity is right to 1e-4 m/s. PCHIP or Akima pieces predict equally well with
+twice the peak acceleration, but PCHIP flattens every extremum, and its velocity is wrong by 1.3 m/s.
 """
 import functools
 import math
@@ -45,15 +39,9 @@ from tracking_receiver_sim.params import (
 
 SGP4_KNOT_SPACING_S = 1.0  # time between two SGP4 knots [s]
 BODY_KNOT_SPACING_S = 10.0  # time between two knots of the sun or the moon [s]; the pieces are within 1e-9 rad
-PASS_SEARCH_STEP_S = 20.0
-"""Step of the pass finder [s]; a pass of a satellite in a low earth orbit (LEO) lasts minutes."""
+PASS_SEARCH_STEP_S = 20.0  # of the pass finder [s]; a pass in a low earth orbit lasts minutes
 PEAK_SEARCH_POINTS = 41  # number of points of each refinement in the search for the peak of a pass
-RUN_MARGIN_S = 5.0
-"""Time before and after the run [s] that a target covers, for a program track.
-
-A track_file covers this time only as far as the file goes.
-"""
-
+RUN_MARGIN_S = 5.0  # before and after the run [s], for a program track; a track_file may cover less
 MAX_HORIZON_POINTS = 10_000  # largest number of points at which a target is compared with the horizon
 
 
@@ -77,6 +65,12 @@ class Target(NamedTuple):
     coefficients: Floats            # (4, n, 3), highest power first, of (t - breaks[i]), ENU [m]
     start_time: str = ''            # UTC of stamp 0 in ISO 8601, empty if the target has no date
     summary: tuple[str, ...] = ()   # lines about the file and the track of a track_file, empty for other kinds
+
+    @property
+    def values(self) -> list[tuple[str, str]]:
+        """Values of the diagnostics on the date and the file of the target."""
+        date = [('stamp_0_utc', self.start_time)] if self.start_time else []
+        return [*date, *zip(('track_log', 'track_flight'), self.summary)]
 
 
 class Course(NamedTuple):
@@ -137,7 +131,6 @@ def state(target: TargetRecord, breaks: Times, coefficients: Floats, t: Seconds)
 @compiled
 def _look_angles(constants: Records, breaks: Times, coefficients: Floats, times: Times, azimuth: Floats,
                  elevation: Floats, distance: Floats) -> None:
-    """Fill azimuth, elevation and distance at times; see `look_angles`."""
     for i in range(len(times)):
         e, n, u = state(constants[0], breaks, coefficients, times[i]).position
         azimuth[i], elevation[i] = earth_angles(e, n, u)
@@ -145,10 +138,7 @@ def _look_angles(constants: Records, breaks: Times, coefficients: Floats, times:
 
 
 def look_angles(built: Target, times: Times) -> tuple[Floats, Floats, Floats]:
-    """Return (azimuth, elevation, range) [rad, rad, m] of a target from the station at times, each (n,).
-
-    Azimuth clockwise from north in (-pi, pi]; NaN at times outside the track of the target.
-    """
+    """Return (azimuth, elevation, range) from the station at times, azimuth in (-pi, pi]; NaN outside the track."""
     times = np.ascontiguousarray(times, float)
     azimuth, elevation, distance = np.empty((3, len(times)))
     _look_angles(built.constants, built.breaks, built.coefficients, times, azimuth, elevation, distance)
@@ -156,11 +146,8 @@ def look_angles(built: Target, times: Times) -> tuple[Floats, Floats, Floats]:
 
 
 def build(params: TargetParameters, duration: Seconds, horizon_mask: Radians = 0.0) -> Target:
-    """Return a Target for a run of `duration` from stamp 0.
-
-    Raises TargetError, also if the target stays below the horizon. A horizon_mask below 0 takes the place of the
-    horizon.
-    """
+    """Return a Target for a run of `duration` from stamp 0. Raises TargetError, also if the target stays below the
+    horizon, whose place a horizon_mask below 0 takes."""
     builders: dict[str, Callable[[TargetParameters, Seconds], Course]] = {
         'leo_pass': _leo_pass, 'track_file': _track_file, 'flyby': _flyby, **dict.fromkeys(bodies.POSITIONS, _body)}
     course = builders.get(params.kind, _angles)(params, duration)
@@ -173,7 +160,6 @@ def build(params: TargetParameters, duration: Seconds, horizon_mask: Radians = 0
 
 
 def _require_above(params: TargetParameters, built: Target, duration: Seconds, limit: Radians) -> None:
-    """Raise TargetError if a target stays below an elevation `limit` throughout a run of `duration`."""
     _, elevation, _ = look_angles(built, np.linspace(0.0, duration, 2 + int(min(duration, MAX_HORIZON_POINTS))))
     highest = np.fmax.reduce(elevation)
     if highest < limit:
@@ -186,12 +172,10 @@ def _require_above(params: TargetParameters, built: Target, duration: Seconds, l
 
 
 def _angles(params: TargetParameters, duration: Seconds) -> Course:
-    """Return the time range of an angle target, and coefficients without a meaning."""
     return Course(np.array([-RUN_MARGIN_S, duration + RUN_MARGIN_S]), np.zeros((4, 1, 3)))
 
 
 def _flyby(params: TargetParameters, duration: Seconds) -> Course:
-    """Return a straight, level pass."""
     flyby = params.flyby
     east, north = math.sin(flyby.heading), math.cos(flyby.heading)
     velocity = flyby.speed * np.array([east, north, 0.0])
@@ -205,10 +189,8 @@ def _flyby(params: TargetParameters, duration: Seconds) -> Course:
 # leo_pass
 
 def culmination(params: TargetParameters, satrec: orbit.Satellite) -> Seconds:
-    """Return the time past the TLE epoch of the first culmination between the two limits of LeoPassParameters.
-
-    satrec: of orbit.satellite. Raises TargetError if there is none within search_days.
-    """
+    """Return the time past the TLE epoch of the first culmination between the two limits of LeoPassParameters. Raises
+    TargetError if there is none within search_days."""
     leo_pass, low, high = params.leo_pass, params.leo_pass.culmination_low_deg, params.leo_pass.culmination_high_deg
 
     def elevations(times: Times) -> Floats:
@@ -234,10 +216,7 @@ def culmination(params: TargetParameters, satrec: orbit.Satellite) -> Seconds:
 
 
 def _peak(elevations: Callable[[Times], Floats], begin: Seconds, end: Seconds) -> tuple[Seconds, Degrees]:
-    """Return (time, elevation) of the only peak between begin and end, to a millisecond.
-
-    The search refines the interval with PEAK_SEARCH_POINTS points again and again.
-    """
+    """Return (time, elevation) of the only peak between begin and end, to a millisecond."""
     while end - begin > 1e-3:
         times = np.linspace(begin, end, PEAK_SEARCH_POINTS)
         elevation = elevations(times)
@@ -273,12 +252,8 @@ def _leo_pass(params: TargetParameters, duration: Seconds) -> Course:
 
 
 def _hermite(x: Times, y: Floats, y_dot: Floats) -> Floats:
-    """Return coefficients (4, n, columns), highest power first, of cubic Hermite pieces.
-
-    The pieces have the values y and the derivatives y_dot, both (n + 1, columns), at x (n + 1,). The coefficients
-    equal those of CubicHermiteSpline of scipy to the last bit. This avoids the import of scipy, which takes a third of
-    a second.
-    """
+    """Return coefficients (4, n, columns), highest power first, of cubic Hermite pieces. They equal those of
+    CubicHermiteSpline of scipy to the last bit, whose import would take a third of a second."""
     h = np.diff(x)[:, None]
     slope = np.diff(y, axis=0) / h
     bend = (y_dot[:-1] + y_dot[1:] - 2.0 * slope) / h
@@ -288,7 +263,6 @@ def _hermite(x: Times, y: Floats, y_dot: Floats) -> Floats:
 # sun, moon
 
 def _body(params: TargetParameters, duration: Seconds) -> Course:
-    """Return the course of the sun or the moon."""
     if not params.leo_pass.start_time:
         raise TargetError(f"leo_pass.start_time = '': must be the UTC of the start for a target of kind {params.kind}")
     julian, fraction = orbit.julian_date(orbit.instant('start_time', params.leo_pass.start_time))
@@ -305,6 +279,6 @@ def _body(params: TargetParameters, duration: Seconds) -> Course:
 # track_file
 
 def _track_file(params: TargetParameters, duration: Seconds) -> Course:
-    from tracking_receiver_sim import track_files  # imports scipy, which only a track file needs
-    flight = track_files.lay_out(params, duration, RUN_MARGIN_S)
+    from tracking_receiver_sim.tracks import files  # imports scipy, which only a track file needs
+    flight = files.lay_out(params, duration, RUN_MARGIN_S)
     return Course(flight.breaks, flight.coefficients, flight.start_time, flight.summary)

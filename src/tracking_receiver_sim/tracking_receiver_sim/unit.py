@@ -1,7 +1,5 @@
-"""The unit of the tracking receiver: from the true beam and the truth of the ship to the measurements of the receiver.
-
-The node tracking_receiver runs this unit.
-"""
+"""The unit of the tracking receiver: from the true beam and the truth of the ship to the measurements of the
+receiver."""
 import math
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
@@ -19,14 +17,12 @@ from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 from receiver_law import detector
 from tracking_receiver_sim import injected, receiver, target
+from tracking_receiver_sim.injected import ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC, RANGE_TOPIC
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
 DRIVE_TRUTH_TOPIC, SHIP_TRUTH_TOPIC, TARGET_TRUTH_TOPIC = 'adu/truth', 'ship/truth', 'target/truth'
-ANGLE_ERROR_TOPIC, ANGLE_RATE_TOPIC = 'tracking_receiver/angle_error', 'tracking_receiver/angle_rate'
-RANGE_TOPIC = 'tracking_receiver/range'
 
 FAULT_STATUSES = (receiver.Status.NO_TARGET, receiver.Status.NO_BEAM, receiver.Status.STAMP_ORDER)
-"""Statuses that the receiver keeps for the next diagnosis."""
 
 
 class ReceiverRecord(Record):
@@ -51,10 +47,7 @@ class Memory(NamedTuple):
 
 @compiled
 def decode(known: receiver.Inputs, stamp: Nanoseconds, beam: AnyRecord, ship: AnyRecord) -> None:
-    """Set the inputs of the receiver from the messages of a step at a stamp.
-
-    beam, ship: records of adu/truth and ship/truth. Without a new ship/truth the inputs keep the last one.
-    """
+    """Set the inputs of the receiver. Without a new ship/truth they keep the last one."""
     known.stamp_ns = stamp
     known.azimuth, known.elevation = beam.position[0], beam.position[1]
     known.azimuth_rate, known.elevation_rate = beam.velocity[0], beam.velocity[1]
@@ -68,20 +61,26 @@ def decode(known: receiver.Inputs, stamp: Nanoseconds, beam: AnyRecord, ship: An
 
 
 @compiled
+def encode_truth(result: receiver.Outputs, stamp: Nanoseconds, truth: AnyRecord) -> None:
+    """Set the record of target/truth from the outputs of the receiver."""
+    truth.stamp = stamp
+    truth.orientation[3] = 1.0
+    for i in range(3):
+        truth.position[i], truth.twist_linear[i] = result.target_position[i], result.target_velocity[i]
+
+
+@compiled
 def encode(result: receiver.Outputs, constants: receiver.Constants, stamp: Nanoseconds, outputs: AnyRecord) -> None:
     """Set the records of the messages from the outputs of the receiver."""
     error, rate = outputs[ANGLE_ERROR_TOPIC], outputs[ANGLE_RATE_TOPIC]
-    distance, truth = outputs[RANGE_TOPIC], outputs[TARGET_TRUTH_TOPIC]
+    distance = outputs[RANGE_TOPIC]
     error.stamp = result.stamp_ns if result.due == 1 else NO_STAMP
     error.vector[0], error.vector[1], error.vector[2] = result.cross_elevation, result.elevation, result.cn0_dbhz
     rate.stamp = error.stamp if constants.rate_measured != 0 else NO_STAMP
     rate.vector[0], rate.vector[1], rate.vector[2] = result.rate[0], result.rate[1], constants.rate_sigma
     distance.stamp = error.stamp if constants.range_measured != 0 else NO_STAMP
     distance.range[0], distance.variance[0] = result.range, constants.range_variance
-    truth.stamp = stamp
-    truth.orientation[3] = 1.0
-    for i in range(3):
-        truth.position[i], truth.twist_linear[i] = result.target_position[i], result.target_velocity[i]
+    encode_truth(result, stamp, outputs[TARGET_TRUTH_TOPIC])
 
 
 @compiled
@@ -129,11 +128,8 @@ class TrackingReceiver(Simulated):
             self.messages[RANGE_TOPIC].field_of_view = parameters.antenna.beamwidth
 
     def block(self, steps: int) -> Memory:
-        """Return the memory with noise (steps, normals_per_step) drawn for the next steps.
-
-        The scintillation has a random generator of its own, `_air`. So the noise of the receiver is equal with and
-        without scintillation.
-        """
+        """Return the memory with noise drawn for the next steps. The scintillation has a random generator of its own,
+        so that the noise of the receiver is equal with and without it."""
         self.parts['row'] = 0
         receiver_count = int(self.parts['constants']['first_scintillation_normal'])
         total_count = self.memory.normals.shape[1]
@@ -143,19 +139,14 @@ class TrackingReceiver(Simulated):
         return self.memory._replace(normals=drawn)
 
     def diagnose(self) -> Diagnosis:
-        """Return the Diagnosis, with C/N0 and angle noise among its values.
-
-        The level is ERROR after a status of FAULT_STATUSES since the last diagnosis, and WARN while not locked.
-        """
+        """Return the Diagnosis: ERROR after a status of FAULT_STATUSES since the last one, WARN while not locked."""
         outputs, fault = self.parts['outputs'], int(self.parts['fault'])
         self.parts['fault'] = receiver.Status.LOCKED
         status, p = int(outputs['status']), self.parameters
         sigma = detector.angle_noise(p.antenna, p.receiver, float(outputs['cn0_dbhz']), p.period)
         values = [('cn0_dbhz', f'{outputs["cn0_dbhz"]:.2f}'), ('locked', str(int(outputs['locked']))),
                   ('target', p.target.kind), ('angle_noise_deg', f'{math.degrees(sigma):.4g}')]
-        if self.target.start_time:
-            values.append(('stamp_0_utc', self.target.start_time))
-        values += zip(('track_log', 'track_flight'), self.target.summary)
+        values += self.target.values
         if fault in FAULT_STATUSES:
             return Diagnosis(LEVEL_ERROR, receiver.STATUS_TEXT_BY_CODE[fault], values)
         return Diagnosis(LEVEL_OK if status == receiver.Status.LOCKED else LEVEL_WARN,

@@ -1,56 +1,36 @@
 """Path of the wave from the target to the receiver: effects of air and ground, and polarisation of both ends.
 
-By default all effects are off, and the wave comes straight from the target.
-
-    E, R        true elevation of the target [rad]; refraction: apparent minus true elevation [rad]
-    N           refractivity of the air at the ground, (n - 1) 1e6 with the refractive index n
-    Gamma       reflection of the ground, complex
-    lambda      wavelength [m]
-
-Apparent position of a target for the receiver: the place at which the wave left the target, raised by refraction.
-
-The refraction by the air is that of the VLBI Field System (file poclb/refrwn.c, for radio waves in moist air, also in
-katpoint):
+By default all effects are off, and the wave comes straight from the target. The apparent position of a target is the
+place at which the wave left it, v r / c behind its true position (velocity v, range r, speed of light c), raised by
+the refraction
 
     R = 5.7295787e-5 N (cot E - 42.5 / (E + 0.4)^2.64) - 40 / (E + 2.7)^4        R, E in deg, E the true elevation
 
-N is the refractivity of the air. The wave travels for the time r / c with the range r and the speed of light c. So the
-apparent position of a target with the velocity v is v r / c behind the true position.
+with the refractivity N of the air. Source: VLBI Field System (file poclb/refrwn.c, for radio waves in moist air, also
+in katpoint).
 
-The image of a target below the horizon: a wave that level ground reflects.
-
-A far target at the elevation E has its image at -E. The path of the reflected wave is longer by 2 h sin E. The
-reflection inverts the wave (factor -1, for both polarisations at low angles), and rough ground reduces its amplitude.
-The factor of the reflected wave is
+Multipath: level ground reflects the wave as if from an image at the elevation -E, whose path is longer by 2 h sin E.
+The reflection inverts the wave (factor -1, for both polarisations at low angles). Rough ground reduces its amplitude.
+With the amplitude factor rho of smooth ground, the height h of the antenna and the rms roughness sigma_h, the factor
+is
 
     Gamma = -rho exp(-2 (2 pi sigma_h sin E / lambda)^2) exp(-j 4 pi h sin E / lambda)
 
-    rho         amplitude factor of smooth ground [-]
-    h, sigma_h  height of the antenna over the ground, rms roughness of the ground [m]
-    lambda      wavelength [m]
+Roughness: W. S. Ament, Proceedings of the IRE 41 (1953) 142; geometry: Barton, Modern Radar System Analysis, chapter
+on multipath. The model omits diffuse scattering and the curvature of the earth.
 
-Roughness: W. S. Ament, Proceedings of the IRE 41 (1953) 142; the geometry: Barton, Modern Radar System Analysis,
-chapter on multipath. The model omits diffuse scattering and the curvature of the earth.
-
-Scintillation: turbulence of the air makes level and direction of the wave wander.
-
-The level and the two angles of the direction are first-order Gauss-Markov processes.
-
-Level [dB]: the 1-sigma at the elevation E is that at the zenith divided by sin^1.2 E (ITU-R P.618, section 2.4.1). The
-value at the zenith contains the factors of humidity, frequency and aperture.
-
-Direction: the variance is proportional to the length of the path through the turbulence, so the 1-sigma is
-proportional to 1 / sqrt(sin E). The variance of the angle of arrival is 2.91 D^(-1/3) times the integral of C_n^2
-along the path, with the diameter D of the antenna and the strength C_n^2 of the turbulence. Source: Tatarskii, The
+Scintillation: turbulence makes level and direction of the wave wander, as first-order Gauss-Markov processes. The
+1-sigma of the level [dB] grows with 1 / sin^1.2 E from that at the zenith (ITU-R P.618, section 2.4.1), which contains
+the factors of humidity, frequency and aperture. The variance of the direction is proportional to the path through the
+turbulence: 2.91 D^(-1/3) times the integral of C_n^2, with the diameter D of the antenna. Source: Tatarskii, The
 Effects of the Turbulent Atmosphere on Wave Propagation.
 
 Polarisation efficiency: the part of the power of a wave that an antenna of another polarisation receives.
 
     eta = 1/2 + (4 r_1 r_2 + (r_1^2 - 1) (r_2^2 - 1) cos(2 dtau)) / (2 (r_1^2 + 1) (r_2^2 + 1))
 
-eta is the efficiency. r_1, r_2 are the axial ratios of the ellipses of wave and antenna, negative for the left sense.
-dtau is the angle between the long axes of both ellipses. Source: Stutzman, Polarization in Electromagnetic Systems,
-chapter on antenna-wave interaction. The formula holds for circular, elliptical and linear polarisation.
+r_1, r_2: axial ratios of the ellipses of wave and antenna, negative for the left sense; dtau: angle between their long
+axes. Source: Stutzman, Polarization in Electromagnetic Systems, chapter on antenna-wave interaction.
 """
 import math
 from typing import NamedTuple, Protocol
@@ -83,9 +63,7 @@ from tracking_receiver_sim.params import (
 
 MIN_ELEVATION_RAD = math.radians(1.0)  # elevation [rad] below which the refraction stays constant
 SCINTILLATION_NORMALS = 3  # number of standard normals of a step of the scintillation: level, two axes
-
-MIN_SIN_ELEVATION = math.sin(math.radians(4.0))
-"""Sine of the elevation (4 deg, the limit of P.618) below which the scintillation stays constant."""
+MIN_SIN_ELEVATION = math.sin(math.radians(4.0))  # the limit of P.618, below which scintillation is constant
 
 
 class Path(Record):
@@ -112,7 +90,7 @@ def refraction(N: float, elevation: Radians) -> tuple[Radians, float]:
 
 @compiled
 def _bent(N: float, r: Xyz, v: Xyz) -> tuple[Xyz, Xyz]:
-    """Return a vector r and its velocity v, ENU from the antenna, turned up by the refraction for N."""
+    """Turn a vector and its velocity, ENU from the antenna, up by the refraction for N."""
     (e, n, u), (ve, vn, vu) = r, v
     # h: horizontal distance [m]; vh: its rate [m/s]; .._seen: values after the rotation by R in the vertical plane,
     # which keeps the azimuth.
@@ -214,10 +192,7 @@ def scintillation_constants(params: ScintillationParameters, period: Seconds) ->
 @compiled
 def wander(air: Scintillation, x: Vector3, sin_E: float, normals: Floats,
            first: int) -> tuple[float, Radians, Radians]:
-    """Return (factor of the amplitude, deflection of the wave in cross-elevation, in elevation) one step later.
-
-    x: state of the process, updated; sin_E: sine of the elevation; normals: used from index `first` on.
-    """
+    """Return (factor of the amplitude, deflection in cross-elevation, in elevation) one step later; updates x."""
     for i in range(SCINTILLATION_NORMALS):
         x[i] = air.keep * x[i] + air.draw * normals[first + i]
     s = max(sin_E, MIN_SIN_ELEVATION)

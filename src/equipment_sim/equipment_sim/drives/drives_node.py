@@ -19,7 +19,8 @@ from pedestal_common.quantities import Message
 from pedestal_common.wire import records
 from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware.bus import BusError
-from pedestal_hardware.params import START_KEY, ServoDriveParameters
+from pedestal_hardware.params import ServoDriveParameters
+from pedestal_hardware.start import starts
 from pedestal_hardware.unit import DRIVE_LABELS
 
 POLL_S = 0.002  # longest time between two steps of the plant [s]
@@ -71,13 +72,12 @@ class DrivesNode(unit_node.UnitNode):
 
     def _take_start(self, array: Message) -> None:
         """Take time 0 from the diagnostics of the node of the drives, which chooses it when all drives answer."""
-        for status in array.status:
-            for value in status.values if status.name == DRIVE_NODE else ():
-                if value.key == START_KEY and int(value.value) != self._epoch:
-                    with self.lock:
-                        earlier, self._epoch = (self._epoch or 0) - int(value.value), int(value.value)
-                        if self.unit.parts['tick'] != NO_STAMP:
-                            self.unit.parts['tick'] += earlier // law.TICK_NS
+        for start in starts(array.status, DRIVE_NODE):
+            if start != self._epoch:
+                with self.lock:
+                    earlier, self._epoch = (self._epoch or 0) - start, start
+                    if self.unit.parts['tick'] != NO_STAMP:
+                        self.unit.parts['tick'] += earlier // law.TICK_NS
 
     def _newest_receiver(self, name: str) -> Callable[[records.Decoded, bool], None]:
         def take(message: records.Decoded, _: bool) -> None:

@@ -36,7 +36,7 @@ def record(params: MonopulseParameters) -> Records:
 
 @compiled
 def turn(voltages: Complexes, simulated: Feed) -> None:
-    """Set the scan reference in the second channel of voltages (rows, 2), one row a sample, and turn the scan on."""
+    """Set the scan reference in the second channel of voltages (rows, 2), and turn the scan on."""
     for k in range(voltages.shape[0]):
         voltages[k, 1] = reference(simulated.kind, simulated.angle + (k + 0.5) * simulated.turn)
     simulated.angle = (simulated.angle + voltages.shape[0] * simulated.turn) % (2.0 * math.pi)
@@ -45,8 +45,7 @@ def turn(voltages: Complexes, simulated: Feed) -> None:
 @compiled
 def fill(voltages: Complexes, simulated: Feed, state: receiver.State, constants: receiver.Constants,
          seen: receiver.Incidence) -> None:
-    """Set voltages (rows, channels) of a step without noise; the second channel of a scanned feed holds
-    its reference. state, constants: of the simulated receiver."""
+    """Set voltages (rows, channels) of a step without noise. state, constants: of the simulated receiver."""
     for k in range(voltages.shape[0]):
         part = (k + 0.5) / voltages.shape[0]
         if simulated.kind == THREE_CHANNELS_KIND or simulated.kind == ONE_CHANNEL_KIND:

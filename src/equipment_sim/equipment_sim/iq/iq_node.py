@@ -17,7 +17,7 @@ from pedestal_common.node import shell, unit_node
 from pedestal_common.quantities import Message, Nanoseconds
 from pedestal_common.wire import records
 from pedestal_hardware.monopulse.params import MonopulseParameters
-from pedestal_hardware.params import START_KEY
+from pedestal_hardware.start import starts
 
 NOISE_PERIOD_S = 0.02  # time between two transmissions of noise before the first step [s]
 MAX_SPAN_S = 0.2  # longest time for which samples are made at once [s]. After a longer one the samples have a gap.
@@ -38,24 +38,17 @@ class IqNode(unit_node.UnitNode):
         """Open the sink, and begin to follow the trigger."""
         self.sink = sinks.opened(self.parameters)
         self.get_logger().info(f'samples to {self.parameters.source.url} ({self.parameters.source.kind})')
-        self.noise = self.every(NOISE_PERIOD_S, self._send_noise)
+        self.noise = self.every(NOISE_PERIOD_S, lambda: self._send(self.clock()[1]))
         if self.parameters.source.start_after:
             self.message_reader('diagnostics', self._take_start)
         super().begin()
 
     def _take_start(self, array: Message) -> None:
         """Take time 0 from the diagnostics of the receiver, which chooses it at the first samples."""
-        for status in array.status:
-            for value in status.values if status.name == MONOPULSE_RECEIVER.name else ():
-                if value.key == START_KEY:
-                    self._epoch = int(value.value)
-
-    def _send_noise(self) -> None:
-        """Send noise up to now."""
-        self._send(self.clock()[1])
+        for start in starts(array.status, MONOPULSE_RECEIVER.name):
+            self._epoch = start
 
     def _send(self, until: Nanoseconds) -> None:
-        """Send the samples from the last ones to a UTC."""
         rate = self.parameters.source.rate
         if self.sent is None:
             self.sent = until

@@ -1,8 +1,8 @@
 """Unit of the simulated I/Q: from the true beam and the truth of the ship to the samples of all channels of a feed.
 
-Target, path, antenna and injected faults are those of the simulated receiver (tracking_receiver_sim). Their voltages
-modulate a carrier with Doppler shift. The noise power of a sample is 1 in each channel. The power of the carrier in
-one sample is C/N0 divided by the sample rate.
+Target, path, antenna and injected faults are those of the simulated receiver. Their voltages modulate a carrier with
+Doppler shift. The noise power of a sample is 1 in each channel, the power of the carrier is C/N0 divided by the sample
+rate.
 """
 import math
 import typing
@@ -13,6 +13,7 @@ import numpy as np
 from equipment_sim.iq import feed
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
 from pedestal_common.graph import nodes
 from pedestal_common.injection import schedule, table
 from pedestal_common.injection.schedule import Simulated
@@ -38,7 +39,6 @@ from pedestal_hardware.monopulse.params import CONICAL_SCAN, ONE_CHANNEL, THREE_
 from tracking_receiver_sim import injected, receiver, target
 from tracking_receiver_sim import unit as receiver_unit
 
-LIGHT_SPEED_M_S = 299_792_458.0
 SIGNAL_FAULTS = {THREE_CHANNELS: ('fade', 'wrong_slope', 'phase_180'),
                  ONE_CHANNEL: ('fade', 'wrong_slope', 'phase_180'), CONICAL_SCAN: ('fade',)}
 """{kind of a feed: injected faults of the receiver that its samples can have}. A conical scan has no differences."""
@@ -58,11 +58,7 @@ class IqRecord(Record):
 
 
 class Memory(typing.NamedTuple):
-    """All data of the unit.
-
-    A row of the voltages belongs to an integral of three channels, and to a sample of a scanned feed, whose second
-    channel is its reference.
-    """
+    """All data of the unit. A row of the voltages belongs to an integral, or to a sample of a scanned feed."""
     record: Records         # IqRecord (1,)
     breaks: Floats          # track of the target, see target.Target
     coefficients: Floats
@@ -108,11 +104,7 @@ def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecor
     elif elapsed_ns > 0:
         state.error_known = 0
         results.status = receiver.Status.NO_BEAM
-    truth = outputs[receiver_unit.TARGET_TRUTH_TOPIC]
-    truth.stamp = stamp
-    truth.orientation[3] = 1.0
-    for axis in range(3):
-        truth.position[axis], truth.twist_linear[axis] = results.target_position[axis], results.target_velocity[axis]
+    receiver_unit.encode_truth(results, stamp, outputs[receiver_unit.TARGET_TRUTH_TOPIC])
 
 
 @compiled
@@ -124,11 +116,8 @@ def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> N
 
 @compiled
 def modulate(voltages: Complexes, scale: Complexes, turns: Pair, samples: Samples, phase: Radians) -> Radians:
-    """Add a carrier with voltages (rows, channels) to samples. Return its phase after them.
-
-    scale: (m,) gain of the first m channels; turns: frequency at the first and after the last sample [rad/sample];
-    phase: of the first sample.
-    """
+    """Add a carrier with voltages (rows, channels) to samples, and return its phase after them. scale: gain of the
+    first channels; turns: frequency at the first and after the last sample [rad/sample]."""
     n, parts = samples.shape[0], voltages.shape[0]
     slope = (turns[1] - turns[0]) / max(n, 1)
     for k in range(parts):
@@ -179,7 +168,7 @@ class SimulatedIq(Simulated):
     def frequency(self) -> Hertz:
         """Present frequency of the carrier in the samples; NaN without a target."""
         p, closing = self.parameters.simulated, float(self.parts['closing'])
-        return p.offset - p.carrier * closing / LIGHT_SPEED_M_S
+        return p.offset - p.carrier * closing / SPEED_OF_LIGHT_M_S
 
     def samples(self, count: int) -> Samples:
         """Return the next samples, with the voltages of the last step."""
@@ -199,8 +188,7 @@ class SimulatedIq(Simulated):
         return samples
 
     def execute(self, command: Command, arguments: Mapping[str, Value]) -> Reply:
-        """Inject a fault; see Simulated. Raises ValueError for a fault of messages, which samples do not have, and for
-        a fault of differences in a conical scan."""
+        """Inject a fault. Raises ValueError for a fault of messages, or of differences in a conical scan."""
         kind = self.parameters.feed.kind
         if command.verb not in (*SIGNAL_FAULTS[kind], table.CLEAR_COMMAND.name):
             raise ValueError(f'{command.verb}: simulated I/Q of {kind} has the faults '
@@ -216,10 +204,8 @@ class SimulatedIq(Simulated):
     def diagnose(self) -> Diagnosis:
         """Return the Diagnosis, with the frequency of the carrier."""
         status = int(self.parts['outputs']['status'])
-        values = [('carrier_hz', f'{self.frequency:.1f}'), ('target', self.parameters.target.kind)]
-        if self.target.start_time:
-            values.append(('stamp_0_utc', self.target.start_time))
-        values += zip(('track_log', 'track_flight'), self.target.summary)
+        values = [('carrier_hz', f'{self.frequency:.1f}'), ('target', self.parameters.target.kind),
+                  *self.target.values]
         faults = (*receiver_unit.FAULT_STATUSES, receiver.Status.HIDDEN, receiver.Status.BELOW_HORIZON)
         if status in faults:
             return Diagnosis(LEVEL_ERROR, receiver.STATUS_TEXT_BY_CODE[status], values)

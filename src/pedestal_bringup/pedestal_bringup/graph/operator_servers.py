@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 from pedestal_bringup.graph.processes import ServerProcess
 from pedestal_bringup.scenario.header import ScenarioParameters
-from pedestal_operator import tcp_port
+from pedestal_common.stream.connection import listen
 from pedestal_operator.page.page_security import PAGE_ROLES
 
 SERVER_ADDRESS = '127.0.0.1'
@@ -71,7 +71,7 @@ def check(ports: Mapping[str, int], header: ScenarioParameters, option: str = '-
                 raise ValueError(f"{requested} needs {library}: pip install '{SERVERS[name].extra}'")
             try:
                 if number:
-                    probes.enter_context(tcp_port.listen(SERVER_ADDRESS, number))
+                    probes.enter_context(listen(SERVER_ADDRESS, number))
             except OSError as error:
                 raise ValueError(f'{requested}: {error}: {option.format(name)}PORT selects another port') from None
 

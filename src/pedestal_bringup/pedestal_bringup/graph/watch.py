@@ -24,7 +24,7 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware
 from pedestal_common.quantities import Message, Nanoseconds, Seconds
 from pedestal_common.wire import messages
-from pedestal_hardware.params import START_KEY
+from pedestal_hardware.start import starts
 
 Changes: TypeAlias = Mapping[str, Mapping[str, object]]     # {node: {parameter: value}}
 
@@ -148,7 +148,7 @@ def chosen_start(graph: Graph, operator: Operator, spin: Callable[..., object], 
     def note(status: Message, _now: Seconds) -> None:
         if status.name == chooser:
             heard[:] = [status.message]
-            chosen.extend(int(value.value) for value in status.values if value.key == START_KEY)
+            chosen.extend(starts([status], chooser))
     operator.on_diagnostics = note
     end = time.monotonic() + limit
     while not chosen:

@@ -80,10 +80,10 @@ def derive_from_flight(name: str, receiver_values: dict[str, Value],
                             'target.kind = track_file')
     if not target.track_file.path:
         return
-    from tracking_receiver_sim import track_files  # imported late, because only a flight needs scipy
+    from tracking_receiver_sim.tracks import files  # imported late, because only a flight needs scipy
     given = {*receiver_values, *({'duration'} & set(header_values))}
-    if not given.issuperset(track_files.DERIVED_PARAMETERS):
-        for key, value in track_files.derived_parameters(target, given).items():
+    if not given.issuperset(files.DERIVED_PARAMETERS):
+        for key, value in files.derived_parameters(target, given).items():
             (header_values if key == 'duration' else receiver_values).setdefault(key, value)
 
 

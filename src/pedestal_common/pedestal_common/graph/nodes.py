@@ -168,7 +168,7 @@ DRIVE_ROWS = (ARRAY_DRIVE, SERVO_DRIVE, SIMULATED_DRIVES, ROTATOR_DRIVE)
 """Rows of the nodes that take the place of the drive in NODES, or simulate a part of it."""
 
 LEVEL_RECEIVER = Node('tracking_receiver', 'pedestal_hardware.level.level_receiver_node',
-                      'pedestal_hardware.level.params:LevelReceiverParameters',
+                      'pedestal_hardware.level.unit:LevelReceiverParameters',
                       writes=('tracking_receiver/angle_error',),
                       doc='receiver with a level only, for step track: lines by UDP, TCP or a serial line',
                       stands_for='nothing: this node reads a real receiver', of_beam=True)

@@ -1,4 +1,6 @@
-"""Connection to a device in a thread of its own, which opens it again after an error."""
+"""Connections: to a device, in a thread of its own, which opens it again after an error; and ports of this machine."""
+import errno
+import socket
 import threading
 
 from pedestal_common.quantities import Seconds
@@ -38,3 +40,28 @@ class Connection:
             except (OSError, ValueError) as error:     # SerialException is an OSError
                 self.silence = f'{self.url}: {error}'
                 self.ended.wait(RETRY_PERIOD_S)
+
+
+def listen(address: str, port: int, clients: int | None = None) -> socket.socket:
+    """Return a socket that listens on a TCP port. Raises OSError; for a port in use its text names the port.
+
+    port: 0 for a free port; clients: number of clients that may wait for their connection, None for any.
+    """
+    try:
+        return socket.create_server((address, port), family=socket.AF_INET6 if ':' in address else socket.AF_INET,
+                                    backlog=clients)
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise
+        raise OSError(f'port {port} of {address} is in use') from None
+
+
+def bound(host: str, port: int) -> socket.socket:
+    """Return a socket that receives the datagrams at a UDP port. Raises OSError."""
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        made.bind((host, port))
+    except OSError:
+        made.close()
+        raise
+    return made

@@ -59,11 +59,8 @@ def mounting_matrix(roll: Radians, pitch: Radians, yaw: Radians) -> Matrix3:
 
 def constants(earth: str, body: str, rate_body: str, mounting: tuple[Radians, Radians, Radians],
               heading_zero: Radians) -> Records:
-    """Return the Frame (1,) of a device.
-
-    earth, body, rate_body: names of frames; mounting: roll, pitch, yaw of its case; heading_zero: true heading at
-    which the device reports 0, clockwise.
-    """
+    """Return the Frame (1,) of a device. mounting: roll, pitch, yaw of its case; heading_zero: true heading at which
+    the device reports 0, clockwise."""
     case = mounting_matrix(*mounting)
     found = Frame.zeros()
     turn = mounting_matrix(0.0, 0.0, -heading_zero)
@@ -100,8 +97,7 @@ def rotation_vector(a: Quaternion | Xyzw, b: Quaternion) -> Xyz:
 
 @compiled
 def turned(q: Quaternion | Xyzw, x: Radians, y: Radians, z: Radians) -> Xyzw:
-    """Return the quaternion of a body that had the quaternion q and turned by a rotation vector in the frame of
-    the body."""
+    """Return the quaternion of a body with the quaternion q after a turn by a rotation vector in its frame."""
     angle = math.sqrt(x * x + y * y + z * z)
     k = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
     return product(q, (k * x, k * y, k * z, math.cos(0.5 * angle)))

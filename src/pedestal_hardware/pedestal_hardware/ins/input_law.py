@@ -53,14 +53,12 @@ MAX_NORM_ERROR = 0.01  # largest difference of the length of a quaternion from 1
 MAX_RATE_RAD_S = 2.0  # largest rate of a deck [rad/s]
 
 OUTCOMES = ('published', 'no_attitude', 'not_newer', 'tilted', 'too_fast', 'wrong_frame', 'settling')
-"""Outcomes of a sample, in the order of their codes."""
 
 Outcome = codes(OUTCOMES)
 
 
 @compiled
 def _is_attitude(q: Quaternion, w: Vector3, axes: int) -> bool:
-    """Return True if q has the length 1 and the known rates are finite."""
     size = math.sqrt(q[0]**2 + q[1]**2 + q[2]**2 + q[3]**2)
     return abs(size - 1.0) < MAX_NORM_ERROR and (axes == 0 or math.isfinite(w[0] + w[1] + w[2]))
 

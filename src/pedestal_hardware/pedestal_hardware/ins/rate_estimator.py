@@ -42,10 +42,8 @@ def restart(estimator: Estimator) -> None:
 @compiled
 def take(state: Estimator, stamp: Nanoseconds, q: Quaternion,
          bandwidth: RadiansPerSecond) -> tuple[bool, Xyz, bool]:
-    """Take a quaternion at a stamp that is newer than the last; bandwidth: of the filter.
-
-    Return (True if the rate is settled, its components [rad/s], True for a sample that jumps and is not used).
-    """
+    """Take a quaternion with a newer stamp. Return (True if the rate is settled, its components, True for a sample
+    that jumps and is not used)."""
     if state.jumps == MAX_JUMPS:
         restart(state)
     if state.runs == 0:

@@ -46,10 +46,7 @@ class Turn(typing.NamedTuple):
 
 
 def parse(line: bytes) -> Attitude | Turn | None:
-    """Return the Attitude or the Turn in a line; None for a sentence of another kind.
-
-    Raises SentenceError, which names what is wrong.
-    """
+    """Return what a line states; None for a sentence of another kind. Raises SentenceError."""
     import pynmea2
     try:
         sentence = pynmea2.parse(line.decode('ascii').strip(), check=True)
@@ -67,7 +64,6 @@ def parse(line: bytes) -> Attitude | Turn | None:
 
 
 def _pashr(data: Sequence[str]) -> Attitude | None:
-    """Return the Attitude of PASHR; data: its fields, of which the first is R."""
     data = data[1:]
     if data[:1] and data[0].isalpha():
         return None
@@ -83,29 +79,26 @@ def _pashr(data: Sequence[str]) -> Attitude | None:
 
 
 def _prdid(data: Sequence[str]) -> Attitude:
-    """Return the Attitude of PRDID; data: its fields, of which the first is D. Its heading may be empty."""
     data = data[1:]
     heading = _number('heading', data, 2, -360.0, 360.0) if len(data) > 2 and data[2] else math.nan
     return Attitude('prdid', heading, _level('pitch', data, 0), _level('roll', data, 1))
 
 
 def _hdt(data: Sequence[str]) -> Attitude:
-    """Return the Attitude of HDT. Raises SentenceError for a magnetic heading, and for a decimal comma."""
+    """Raise SentenceError for a magnetic heading, and for a decimal comma."""
     if len(data) < 2 or data[1] != 'T':
         raise SentenceError('unreadable', f'heading {",".join(data):.20}: must be a number and T, true')
     return Attitude('hdt', _number('heading', data, 0, -360.0, 360.0))
 
 
 def _rot(data: Sequence[str]) -> Turn:
-    """Return the Turn of ROT. Raises SentenceError for a rate that the device declares invalid."""
     if len(data) > 1 and data[1] not in ('A', ''):
         raise SentenceError('unreadable', f'status {data[1]}: must be A')
     return Turn(_number('rate of turn', data, 0, -MAX_TURN_DEG_MIN, MAX_TURN_DEG_MIN))
 
 
 _READERS: dict[str, Callable[[Sequence[str]], Attitude | Turn | None]] = {
-    'PASHR': _pashr, 'PRDID': _prdid, 'HDT': _hdt, 'ROT': _rot}
-"""{sentence, or its name without the talker: function of its fields}."""
+    'PASHR': _pashr, 'PRDID': _prdid, 'HDT': _hdt, 'ROT': _rot}  # the first field of PASHR is R, of PRDID D
 
 
 def _level(name: str, data: Sequence[str], i: int) -> Degrees:
@@ -113,7 +106,6 @@ def _level(name: str, data: Sequence[str], i: int) -> Degrees:
 
 
 def _number(name: str, data: Sequence[str], i: int, lowest: float, highest: float) -> float:
-    """Return the number in a field. Raises SentenceError for a missing number, and for one out of range."""
     text = data[i] if i < len(data) else ''
     try:
         number = float(text)

@@ -1,5 +1,4 @@
-"""From the sentences or the messages of an INS to attitudes of the graph. No ROS and no clock here: the caller gives
-the time of arrival."""
+"""Attitudes of the graph from sentences or messages of an INS. No ROS, no clock: the caller gives the arrival."""
 import math
 import typing
 
@@ -9,7 +8,7 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnos
 from pedestal_common.quantities import Degrees, Message, Nanoseconds, Quaternion, Radians, Radians2, Records, Vector3
 from pedestal_common.stream.drops import Drops
 from pedestal_common.wire import messages
-from pedestal_hardware.ins import conventions, frame_check, frames, input_law, sentences
+from pedestal_hardware.ins import frame_check, frames, input_law, sentences
 from pedestal_hardware.ins.input_law import Outcome
 from pedestal_hardware.ins.params import InsInputParameters
 
@@ -17,14 +16,12 @@ TURN_AGE_NS = 1_000_000_000  # age from which a rate of turn is not compared any
 
 DROP_KINDS = ('bad_checksum', 'unreadable', 'out_of_range', 'no_heading', 'no_time', 'no_orientation', 'stale',
               'future', *input_law.OUTCOMES[1:])
-"""Reasons to drop a sample."""
 
 OUTCOME_TEXTS = {Outcome.NO_ATTITUDE: 'the orientation must have the length 1, and the rates must be finite',
                  Outcome.NOT_NEWER: 'the stamp is not later than the last one',
                  Outcome.TOO_FAST: f'the deck would turn faster than {math.degrees(input_law.MAX_RATE_RAD_S):.0f} '
                                      'deg/s',
-                 Outcome.SETTLING: 'the rates settle'}
-"""{code of an outcome: reason}, without the outcomes of a wrong frame."""
+                 Outcome.SETTLING: 'the rates settle'}  # {code: reason}, without those of a wrong frame
 
 AXIS_NAMES = ('roll', 'pitch', 'yaw')
 
@@ -135,7 +132,6 @@ class InsInputUnit:
 
     def _sample(self, device: Nanoseconds | None, arrival: Nanoseconds, variances: tuple[Radians2, ...],
                 aligned: bool) -> Sample | None:
-        """Return the sample of the inputs of the law; None for a dropped one. device: stamp of the device, UTC."""
         p, u = self.parameters, self.record['inputs'][0]
         stamp = arrival if p.stamp == 'arrival' else device
         if stamp is None:
@@ -158,7 +154,6 @@ class InsInputUnit:
         return Sample(int(u['stamp']), outputs['q'], outputs['w'], outputs['force'], variances)
 
     def _wrong_frame(self, outcome: int) -> str:
-        """Return the text of a frame that cannot be right, with the frames that would fit."""
         check, u, o = (self.record[name][0] for name in ('state', 'inputs', 'outputs'))
         check = check['check']
         if outcome == Outcome.TILTED:
@@ -174,11 +169,10 @@ class InsInputUnit:
                 if axes & (1 << i) and check['moved'][i] > 0.0 and not frame_check.agrees(check, i, axes))
         if self.parameters.source == 'nmea':
             return f'wrong frame: {reason}; compare the signs of heading, rate of turn, roll and pitch'
-        fitting = conventions.fitting(check, self._declared, self._case, u['q'])
-        return f'wrong frame: {reason}; {conventions.text(fitting)}'
+        fitting = frame_check.fitting_conventions(check, self._declared, self._case, u['q'])
+        return f'wrong frame: {reason}; {frame_check.text_of(fitting)}'
 
     def _drop(self, kind: str, reason: str, arrival: Nanoseconds) -> Sample | None:
-        """Drop a sample. Return None, for the caller to return. Rates that settle are counted only."""
         if kind == 'settling':
             self.drops.counts[kind] += 1
         else:

@@ -13,8 +13,7 @@ from collections.abc import Sequence
 from pedestal_common.node import shell
 from pedestal_common.node.unit import Diagnosis
 from pedestal_common.wire import messages
-from pedestal_hardware.level.params import LevelReceiverParameters
-from pedestal_hardware.level.unit import LevelUnit
+from pedestal_hardware.level.unit import LevelReceiverParameters, LevelUnit
 from pedestal_hardware.lines.line_node import LineNode
 
 ERROR_TOPIC = 'tracking_receiver/angle_error'

@@ -1,7 +1,5 @@
 """The level in a line of text, by a format string such as `{level} dBm` or `$SIG,{skip},{level:x}`.
 
-Fields:
-
     {level}      a decimal number
     {level:x}    a hexadecimal number with a sign
     {skip}       any text without comma, semicolon and space, also none
@@ -15,7 +13,6 @@ from pedestal_common.parameters import ParameterError
 
 FIELD_PATTERNS = {('level', ''): r'(?P<level>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?|[+-]?(?:nan|inf\w*))',
                   ('level', 'x'): r'(?P<level>[+-]?[0-9a-fA-F]{1,15})', ('skip', ''): r'[^,;\s]*'}
-"""{(name, form) of a field: its regular expression}."""
 
 FIELDS_TEXT = '{level}, {level:x} or {skip}'  # the fields, for texts
 SEPARATORS = ',; '  # characters of which one follows {skip}. The match is therefore never ambiguous and never slow.
@@ -53,8 +50,7 @@ class LineFormat:
         return ParameterError(f"format = '{self.text}': {reason}")
 
     def level(self, line: bytes) -> float:
-        """Return the number in a line; it may be NaN or infinite. Raises ValueError for a line of another
-        form."""
+        """Return the number in a line, also NaN or infinite. Raises ValueError for a line of another form."""
         match = self._pattern.fullmatch(line.decode('ascii', 'replace').strip())
         if match is None:
             raise ValueError(f'{line[:40]!r} is not of the form {self.text}')

@@ -12,8 +12,7 @@ from pedestal_hardware.lines.reader import LineReader
 
 
 class LineNode(shell.Shell):
-    """Node of a device that sends lines. Its parameters have the field `silence`, the longest time between two
-    published messages that is no error [s]."""
+    """Node of a device that sends lines. `silence` of its parameters: longest time between two published messages."""
 
     def __init__(self, module: str) -> None:
         row = nodes.of_executable(module)
@@ -41,13 +40,12 @@ class LineNode(shell.Shell):
             self.take_line(line)
 
     def published(self, stamp: Nanoseconds) -> None:
-        """Note that a message with a stamp is about to be published."""
+        """Note that a message is about to be published."""
         self.begin_step(stamp)
         self._published = self.clock()[0]
 
     def diagnose(self) -> Diagnosis:
-        """Return the Diagnosis: ERROR while the device is silent, else that of the subclass with the counts of the
-        reader."""
+        """Return the Diagnosis: ERROR while the device is silent, else that of the subclass."""
         with self.lock:
             diagnosis = self.diagnosed()
         reader = self.line_reader

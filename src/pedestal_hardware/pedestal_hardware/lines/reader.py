@@ -1,8 +1,7 @@
-"""Lines of a device, in a thread of its own.
+"""Lines of a device, in a thread of its own. A line ends with CR, LF or NUL, or with its datagram.
 
-A line ends with CR, LF or NUL, or with its datagram. The splitter discards what it cannot read as a whole line: the
-rest of a line that began before the connection, a line that stopped for LINE_TIMEOUT_S, and a line that is too long.
-Half a level or half an angle would otherwise be a wrong number.
+The splitter discards what it cannot read as a whole line: the rest of a line that began before the connection, a line
+that stopped, a line that is too long. Half a level or half an angle would otherwise be a wrong number.
 """
 import contextlib
 import time
@@ -16,10 +15,7 @@ from pedestal_hardware.lines import sources
 MAX_LINE_BYTES = 256  # largest length of a line; NMEA 0183 allows 82 bytes
 LINE_ENDS = b'\r\n\0'
 LINE_TIMEOUT_S = 0.5  # longest pause within a line [s]
-
-TCP_SILENCE_S = 10.0
-"""Time without bytes after which a TCP connection is opened again [s]. A device that lost its supply never closes
-it."""
+TCP_SILENCE_S = 10.0  # time without bytes until TCP is opened again [s]; a device without supply never closes it
 
 
 class LineSplitter:
@@ -35,8 +31,7 @@ class LineSplitter:
         self._splitter.restart(skips=not whole)
 
     def take(self, received: bytes, now: Seconds) -> list[bytes]:
-        """Return the lines that are complete with bytes that were received now; b'' to look only for a line that has
-        stopped."""
+        """Return the lines that bytes complete which were received now; b'' to look only for a line that stopped."""
         if self._splitter.rest and now - self._since > LINE_TIMEOUT_S:
             self.begin(whole=False)
         if not received:

@@ -4,13 +4,12 @@ import urllib.parse
 from typing import Protocol
 
 from pedestal_common.parameters import ParameterError
+from pedestal_common.stream.connection import bound
 
 READ_TIMEOUT_S = 0.1  # longest wait for the next bytes [s]
 CONNECT_TIMEOUT_S = 3.0  # longest wait for a TCP connection [s]
 MAX_READ_BYTES = 65536  # largest number of bytes of one read; no datagram is longer
-
-URL_FORMS_TEXT = 'udp://HOST:PORT, socket://HOST:PORT, or the path of a serial device'
-"""Forms of the url of a device, for texts."""
+URL_FORMS_TEXT = 'udp://HOST:PORT, socket://HOST:PORT, or the path of a serial device'  # for texts
 
 
 class Source(Protocol):
@@ -18,8 +17,7 @@ class Source(Protocol):
     WHOLE: bool     # True if each `read` returns whole lines, as that of a datagram does
 
     def read(self) -> bytes:
-        """Wait at most READ_TIMEOUT_S, and return the received bytes, b'' for none. Raises OSError if the device has
-        vanished."""
+        """Return the bytes received in READ_TIMEOUT_S, b'' for none. Raises OSError if the device has vanished."""
 
     def close(self) -> None:
         """End the connection."""
@@ -30,12 +28,7 @@ class UdpSource:
     WHOLE = True
 
     def __init__(self, host: str, port: int) -> None:
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self.socket.bind((host, port))
-        except OSError:
-            self.socket.close()
-            raise
+        self.socket = bound(host, port)
         self.socket.settimeout(READ_TIMEOUT_S)
 
     def read(self) -> bytes:
@@ -95,10 +88,7 @@ class SerialSource:
 
 
 def place(url: str, name: str = 'url') -> tuple[str, str, int]:
-    """Return (scheme, host, port) of a url; ('', path, 0) for a serial device.
-
-    Raises ParameterError, which begins with the name of the parameter and names the part that is wrong.
-    """
+    """Return (scheme, host, port) of a url; ('', path, 0) for a serial device. Raises ParameterError."""
     if '://' not in url:
         if not url.startswith('/'):
             raise ParameterError(f"{name} = '{url}': must be {URL_FORMS_TEXT}")

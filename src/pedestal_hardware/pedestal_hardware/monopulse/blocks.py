@@ -1,8 +1,8 @@
 """Blocks of samples, and their times.
 
-A source delivers chunks of any length. Each chunk has the number of its first sample, by which gaps show, and the time
-of this sample. `Blocks` makes blocks of equal length of the chunks. `TimeBase` gives the time of each sample: by the
-sample counter, from one measured time. The time of arrival of a chunk alone never is the time of its samples.
+A source delivers chunks of any length, each with the number and the time of its first sample. `TimeBase` gives the
+time of each sample by the sample counter, from one measured time. The time of arrival of a chunk alone never is the
+time of its samples.
 """
 import collections
 import contextlib
@@ -18,18 +18,10 @@ from pedestal_common.quantities import Hertz, Nanoseconds, Seconds
 if TYPE_CHECKING:
     from pedestal_hardware.monopulse import sigmf
 
-TIME_TOLERANCE_NS = 20_000
-"""Largest deviation of a source's time from the sample counter before the counter is set again [ns]."""
-
-ARRIVAL_WINDOW_S = 10.0
-"""Time in which the earliest arrival is searched that sets the counter of a source without times [s]."""
-
-CLOCK_TOLERANCE_S, CLOCK_TIME_S = 0.1, 0.5
-"""Largest deviation of the time of the samples from the clock [s], and the time after which a larger one is a fault
-[s]: a stall of the machine makes some blocks late."""
-
-LATE_INTERVAL_S, MIN_LATE_ARRIVALS = 0.25, 5
-"""Shortest time [s] and smallest number of arrivals of an interval, of which the earliest arrival counts."""
+TIME_TOLERANCE_NS = 20_000  # largest deviation of a source's time before the counter is set again [ns]
+ARRIVAL_WINDOW_S = 10.0  # time in which the earliest arrival sets the counter of a source without times
+CLOCK_TOLERANCE_S, CLOCK_TIME_S = 0.1, 0.5  # largest deviation, and its time until it is a fault [s]: blocks may stall
+LATE_INTERVAL_S, MIN_LATE_ARRIVALS = 0.25, 5  # of an interval, of which the earliest arrival counts: time, arrivals
 
 LATE_TOLERANCE_S = 0.004
 """Largest delay of the earliest arrivals of two intervals before samples count as lost [s]. A clock that drifts by
@@ -37,9 +29,7 @@ LATE_TOLERANCE_S = 0.004
 
 RATE_WINDOW_S = 2.0  # time over which the sample rate of a source without times is measured [s]
 CAUSE_TOLERANCE = 0.05  # largest relative deviation of a wrong sample rate from that of a possible cause
-
-RATE_TOLERANCE, STALL_TIME_S = 0.01, 0.1
-"""Largest relative deviation of the measured sample rate, and the delay of one arrival that is no deviation [s]."""
+RATE_TOLERANCE, STALL_TIME_S = 0.01, 0.1  # of the measured sample rate, and delay of one arrival that is none [s]
 
 
 class StreamError(ValueError):
@@ -127,7 +117,7 @@ class Blocks:
         return made
 
     def _record(self, recorder: 'sigmf.Recorder', chunk: Chunk, begins: bool) -> None:
-        """Write a chunk to the recorder. An error ends the recorder, not the blocks."""
+        """An error ends the recorder, not the blocks."""
         try:
             recorder.write(chunk, begins)
         except StreamError as error:
@@ -159,13 +149,9 @@ class ClockComparison:
 
 
 class ArrivalClock:
-    """Times of the samples of a source without times, from the times at which they arrive.
-
-    A sample arrives after its time by the delay of its way, which varies upwards. The earliest arrival of a window
-    therefore sets the times, with the shortest delay known. For each message call `lost`, then `utc`.
-
-    causes: {ratio of a wrong sample rate and the right one: text on its possible cause}.
-    """
+    """Times of the samples of a source without times, from the times at which they arrive. Call `lost`, then `utc`.
+    The delay of a sample varies upwards. The earliest arrival of a window therefore sets the times, with the shortest
+    delay known. causes: {ratio of a wrong sample rate and the right one: text on its possible cause}."""
 
     def __init__(self, rate: Hertz, delay: Seconds, causes: Mapping[float, str] | None = None) -> None:
         self.rate, self.delay_ns, self.causes = rate, round(delay * NS_PER_SECOND), causes or {}
@@ -189,10 +175,7 @@ class ArrivalClock:
 
     def lost(self, next_sample: int, arrived: Nanoseconds) -> int:
         """Return the number of samples that were lost without a sign, 0 for none: for about 0.5 s, no arrival was as
-        early as the times of the samples demand. The caller adds them to the numbers of the samples.
-
-        next_sample: number of the sample after the last one; arrived: UTC.
-        """
+        early as the times of the samples demand. The caller adds them to the numbers of the samples."""
         offset = arrived - round(next_sample * NS_PER_SECOND / self.rate)
         if self.began is None:
             self.began, self.earliest = arrived, offset
@@ -223,8 +206,7 @@ class ArrivalClock:
         return self.offset + round(first * NS_PER_SECOND / self.rate) - self.delay_ns
 
     def check_rate(self, next_sample: int, arrived: Nanoseconds) -> None:
-        """Raise StreamError if the samples of the last RATE_WINDOW_S arrived at a wrong rate. next_sample: number of
-        the sample after the last one; arrived: UTC."""
+        """Raise StreamError if the samples of the last RATE_WINDOW_S arrived at a wrong rate."""
         window = self.arrivals
         window.append((next_sample, arrived))
         while arrived - window[1][1] > RATE_WINDOW_S * NS_PER_SECOND if len(window) > 1 else False:

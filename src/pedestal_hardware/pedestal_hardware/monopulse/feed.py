@@ -23,12 +23,8 @@ from receiver_law.monopulse import sum_pattern
 
 THREE_CHANNELS_KIND, ONE_CHANNEL_KIND = FEED_KINDS.index(THREE_CHANNELS), FEED_KINDS.index(ONE_CHANNEL)
 
-DIFFERENTIATION_STEP_BEAMWIDTHS, CIRCLE_DIRECTIONS = 1e-4, 64
-"""Step of the numerical derivative [beamwidths], and number of directions on the circle of a conical scan."""
-
-SPREAD_PHASES, SPREAD_POINTS = 16, 32
-"""Number of phases of the scan at the begin of a window, and points of an integral, for the spread of the reference.
-"""
+DIFFERENTIATION_STEP_BEAMWIDTHS, CIRCLE_DIRECTIONS = 1e-4, 64  # numerical derivative; conical scan
+SPREAD_PHASES, SPREAD_POINTS = 16, 32  # phases of the scan at the begin of a window, points of an integral
 
 
 def modulation_slope(params: MonopulseParameters) -> float:
@@ -48,11 +44,9 @@ def modulation_slope(params: MonopulseParameters) -> float:
 
 
 def reference_efficiency(params: MonopulseParameters) -> float:
-    """Return the share of the modulation that the averaged reference keeps [-].
-
-    The average over an integral shortens the reference, and a window of no whole number of scans covers the directions
-    unequally. The share is the variance of a fit with two perfect components, 2 / M, over that with this reference.
-    """
+    """Return the share of the modulation that the averaged reference keeps [-]. The average over an integral shortens
+    the reference, and a window of no whole number of scans covers the directions unequally. The share is the variance
+    of a fit with two perfect components, 2 / M, over that with this reference."""
     count, kind = params.steps_per_error * params.receiver.samples_per_step, FEED_KINDS.index(params.feed.kind)
     points = np.arange(count * SPREAD_POINTS) + 0.5
     turns = params.feed.scan_rate * params.period / params.receiver.samples_per_step * points
@@ -66,12 +60,9 @@ def reference_efficiency(params: MonopulseParameters) -> float:
 
 
 def effective_integration(params: MonopulseParameters) -> Seconds:
-    """Return the time for which a receiver of three channels must integrate to have the noise of one error, at equal
-    C/N0 of the received carrier.
-
-    A scanned feed measures the power of M integrals: var(v) = 4 / (g^2 C/N0 T) with the time T of an error, against
-    1 / (2 k_m^2 C/N0 T) of three channels.
-    """
+    """Return the time for which three channels must integrate for the noise of one error, at equal C/N0. A scanned
+    feed measures the power of M integrals: var(v) = 4 / (g^2 C/N0 T) with the time T of an error, against 1 / (2 k_m^2
+    C/N0 T) of three channels."""
     if not params.feed.scanned:
         return params.period
     ratio = modulation_slope(params) / params.antenna.slope

@@ -1,17 +1,14 @@
 """Law of a receiver of I/Q samples: from the samples of three channels to angle errors.
 
-A block of samples is mixed down by a numerically controlled oscillator (NCO) and integrated over the parts of a step
-(integrate and dump). Each integral is divided by the square root of its noise power. These are the voltages of
-receiver_law.detector, whose functions make errors, C/N0 and lock of them.
+A block of samples is mixed down by a numerically controlled oscillator (NCO) and integrated over the parts of a step.
+Each integral (dump), divided by the square root of its noise power, is a voltage of receiver_law.detector, whose
+functions make errors, C/N0 and lock.
 
-The noise power is the power of the sum channel that is orthogonal to its integrals. A frequency-locked loop (FLL) of
-second order keeps the NCO on the carrier. Its frequency error is the phase between two integrals. A constant Doppler
-rate causes no lasting error. There is no phase lock, because each difference is measured against the sum of the same
-integral. The differences are multiplied by a complex matrix, which contains phases, slopes and cross-coupling.
+The noise power is the power of the sum channel that is orthogonal to its integrals. A frequency-locked loop of second
+order keeps the NCO on the carrier, by the phase between two integrals. A constant Doppler rate causes no lasting
+error. There is no phase lock, because each difference is measured against the sum of the same integral.
 
-The module `scan` has the law of a feed with one output, which calls the functions of carrier, noise and lock here.
-
-Samples have the shape (n, channels), dumps, the integrals, the shape (parts, channels).
+Samples have the shape (n, channels), dumps the shape (parts, channels).
 """
 import math
 from typing import Annotated, TypeAlias
@@ -66,8 +63,7 @@ class State(detector.State):
 
 
 class Constants(detector.Constants):
-    """Constants, with those of the detector. A gain is the share of the way to its input that a filter moves in a
-    block."""
+    """Constants. A gain is the share of the way to its input that a filter moves in a block."""
     part: int                   # samples of an integral
     block_ns: Nanoseconds       # time of a block
     loop_gain: float
@@ -130,8 +126,7 @@ def finite(samples: Samples) -> bool:
 
 @compiled
 def dump(state: State, constants: Constants, samples: Samples, dumps: Complexes) -> float:
-    """Mix samples down, integrate each part into `dumps`, and return the energy of the sum channel. The phase of the
-    NCO advances."""
+    """Integrate the parts of samples, mixed down, into `dumps`. Return the energy of the sum. The NCO advances."""
     cos_turn, sin_turn = math.cos(state.turn), math.sin(state.turn)
     re, im = math.cos(state.phase), -math.sin(state.phase)
     energy = 0.0
@@ -283,11 +278,9 @@ def pass_gap(state: State, search: bool) -> None:
 
 
 class Search:
-    """Search for the carrier in the samples of the sum channel, by an FFT over a window of Hann.
-
-    The carrier is the strongest bin of the Doppler window if its level over the floor, the median of the bins, exceeds
-    the threshold. For white noise alone the strongest of 4096 bins is at 9.5 dB.
-    """
+    """Search for the carrier in the samples of the sum channel, by an FFT over a window of Hann. The carrier is the
+    strongest bin of the Doppler window if its level over the median of the bins exceeds the threshold. For white noise
+    alone the strongest of 4096 bins is at 9.5 dB."""
 
     def __init__(self, params: MonopulseParameters) -> None:
         self.rate, self.threshold, size = params.source.rate, params.carrier.threshold, params.carrier.bins

@@ -13,18 +13,18 @@ from collections.abc import Sequence
 
 from pedestal_common.node import shell, unit_node
 from pedestal_common.node.unit import Diagnosis
-from pedestal_common.quantities import Nanoseconds, Seconds
+from pedestal_common.quantities import Seconds
 from pedestal_hardware.monopulse import blocks, sigmf, sources
 from pedestal_hardware.monopulse.params import MonopulseParameters
 from pedestal_hardware.monopulse.unit import MonopulseReceiver
-from pedestal_hardware.params import START_KEY, time_0_after
+from pedestal_hardware.start import StartsWithEquipment
 
 READ_TIMEOUT_S = 0.1  # longest wait for samples before the node looks whether it ends [s]
 MAX_SATURATED_SHARE = 0.01  # largest share of the samples of a block at full scale [-]
 FAULT_TIME_S = 2.0  # time for which a fault of the stream is reported after its last occurrence [s]
 
 
-class MonopulseReceiverNode(unit_node.UnitNode):
+class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
     """Node of a receiver of I/Q samples."""
     parameters: MonopulseParameters
     unit: MonopulseReceiver
@@ -36,7 +36,6 @@ class MonopulseReceiverNode(unit_node.UnitNode):
         self.ending = False
         self.heard: Seconds | None = None       # time of the monotonic clock of the last samples
         self.fault = -FAULT_TIME_S, ''          # time and text of the last fault
-        self.start: Nanoseconds | None = None   # time 0
         super().__init__('pedestal_hardware.monopulse.monopulse_receiver_node')
 
     def begin(self) -> None:
@@ -50,8 +49,6 @@ class MonopulseReceiverNode(unit_node.UnitNode):
             self.get_logger().info(f'samples are recorded to {path}')
         self.blocks = blocks.Blocks(p.source.rate, p.block, recorder)
         self.comparison, self.begun = blocks.ClockComparison(), time.monotonic()
-        if not p.source.start_after:
-            self.start = self.graph.start
         self.receiving = threading.Thread(target=self._guarded(self._receive), daemon=True)
         self.receiving.start()
 
@@ -62,7 +59,6 @@ class MonopulseReceiverNode(unit_node.UnitNode):
         return f'samples of {source.url} ({source.kind})'
 
     def _receive(self) -> None:
-        """Receive samples and make the steps until the node ends."""
         assert self.source is not None and self.blocks is not None
         while not self.ending:
             try:
@@ -85,7 +81,6 @@ class MonopulseReceiverNode(unit_node.UnitNode):
                 self._look_for_faults()
 
     def _note_fault(self, text: str) -> None:
-        """Note a fault of the stream, and log a new one."""
         at, last = self.fault
         now = time.monotonic()
         if text != last or now - at > FAULT_TIME_S:
@@ -109,7 +104,6 @@ class MonopulseReceiverNode(unit_node.UnitNode):
             self._urgent = [unit.urgent]
 
     def _make(self, block: blocks.Block) -> None:
-        """Make the step of a block, and publish its error."""
         assert self.source is not None
         [port] = self.ports
         if block.missing:
@@ -122,28 +116,22 @@ class MonopulseReceiverNode(unit_node.UnitNode):
             self._note_fault(self.comparison.fault)
         self.unit.take(block)
         port.step(block.middle, {})
-        start = self._choose_start() if self.start is None else self.start
+        start, lead = self.start_time or self.graph.start, self.parameters.source.start_after
+        if lead and self.start_time is None:
+            start = self.choose_start(start, lead)
         if block.middle - self.unit.age_ns < start:   # before time 0 of a run the graph publishes no measurements
             return
         self.begin_step(block.middle)
         port.publish()
         self.after_step()
 
-    def _choose_start(self) -> Nanoseconds:
-        """Let time 0 follow the first samples, by whole seconds from graph.start. Publish it and return it."""
-        self.start = time_0_after(self.graph.start, self.clock()[1], self.parameters.source.start_after)
-        self.diagnose_now()
-        return self.start
-
     def diagnosed(self) -> Diagnosis:
-        """Return the Diagnosis of the receiver, with the error that ended the recording, and with time 0 if it follows
-        the first samples."""
-        diagnosis, values = super().diagnosed(), []
+        """Return the Diagnosis, with the error that ended the recording, and time 0 if it was chosen."""
+        diagnosis = super().diagnosed()
         if self.blocks is not None and self.blocks.recorder_fault:
-            values.append(('recording_fault', self.blocks.recorder_fault))
-        if self.parameters.source.start_after and self.start is not None:
-            values.append((START_KEY, str(self.start)))
-        return diagnosis._replace(values=[*diagnosis.values, *values])
+            diagnosis = diagnosis._replace(values=[*diagnosis.values,
+                                                   ('recording_fault', self.blocks.recorder_fault)])
+        return self.with_start(diagnosis)
 
     def close(self) -> None:
         """Close the source and the recording, and end."""

@@ -7,23 +7,17 @@ from pedestal_common.parameters import ParameterError, Parameters, as_dict, choi
 from tracking_receiver_sim.params import TrackingReceiverNodeParameters
 
 CHANNELS = ('sum', 'cross-elevation difference', 'elevation difference')
-SCANNED_CHANNELS = ('signal', 'scan reference')
-"""Names of the channels of a feed with three outputs and of a scanned feed, in the order in which they are
-interleaved."""
+SCANNED_CHANNELS = ('signal', 'scan reference')  # of a scanned feed; both in interleaved order
 
 THREE_CHANNELS, ONE_CHANNEL, CONICAL_SCAN = FEED_KINDS = 'three_channels', 'one_channel', 'conical_scan'
-"""Kinds of feeds (FeedParameters.kind)."""
 
 PARAMETERS_OF_DIFFERENCES = ('antenna.cross_coupling', 'antenna.phase_error', 'simulated.x_phase', 'simulated.e_phase')
-"""Parameters that only a feed with differences has."""
 
-MIN_INTEGRALS_PER_SCAN = 4
-"""Smallest number of coherent integrals in one scan, which separates the cosine of the scan from its sine."""
+MIN_INTEGRALS_PER_SCAN = 4  # in one scan, to separate the cosine of the scan from its sine
 
 SOURCE_KINDS = ('vita49', 'zmq_sub', 'zmq_pull', 'sigmf')
 DEFAULT_ADDRESSES = {'vita49': 'udp://127.0.0.1:4991', 'zmq_sub': 'tcp://127.0.0.1:5555',
-                     'zmq_pull': 'tcp://127.0.0.1:5555'}
-"""{kind of a source: address without another one}."""
+                     'zmq_pull': 'tcp://127.0.0.1:5555'}  # by kind of source
 
 MAX_BLOCK_SAMPLES = 1_000_000  # largest number of samples of a channel in one step
 
@@ -179,8 +173,7 @@ class MonopulseParameters(TrackingReceiverNodeParameters):
     simulated: SimulatedIqParameters = group(SimulatedIqParameters)
 
     def check(self) -> None:
-        """Raise ParameterError for a step without a whole number of samples, or a measurement that I/Q does not give.
-        """
+        """Raise ParameterError for a step without whole samples, or a measurement that I/Q does not give."""
         super().check()
         parts, samples = self.receiver.samples_per_step, self.source.rate * self.period
         if not (abs(samples - round(samples)) < 1e-6 and round(samples) % parts == 0 and round(samples) >= 2 * parts
@@ -195,7 +188,6 @@ class MonopulseParameters(TrackingReceiverNodeParameters):
                 raise ParameterError(f'receiver.{name}.measured = true: must be false for a receiver of I/Q samples')
 
     def _check_scan(self) -> None:
-        """Raise ParameterError for a scan that is too fast, and for parameters that a scanned feed does not have."""
         parts, rate = self.receiver.samples_per_step, self.feed.scan_rate
         most = parts / (MIN_INTEGRALS_PER_SCAN * self.period)
         if rate > most:

@@ -5,15 +5,12 @@ power of an integral, less that of its noise, is linear in the averaged referenc
 
     power = a + b_x Re r + b_e Im r
 
-Least squares over the parts of a window, which holds one scan at least, give a and b. This is a synchronous
-demodulation. It needs no whole number of scans, and its integrals may straddle a change of the reference. Because
-power is averaged, noise causes no bias.
+Least squares over the parts of a window, which holds one scan at least, give a and b. This synchronous demodulation
+needs no whole number of scans. Because power is averaged, noise causes no bias. Fading at the rate of the scan causes
+an error.
 
-The product of difference and sum becomes b k_m / g, and the sum power becomes a. The functions of
-receiver_law.detector make an error of both. Fading at the rate of the scan causes an error.
-
-Samples have the shape (n, 2): signal, reference. Dumps have the shape (parts, 2): integral of the signal, mean of the
-reference.
+The product of difference and sum becomes b k_m / g, and the sum power becomes a. Samples have the shape (n, 2):
+signal, reference. Dumps have the shape (parts, 2): integral of the signal, mean of the reference.
 """
 import math
 
@@ -27,13 +24,8 @@ from pedestal_hardware.monopulse.params import MonopulseParameters
 from receiver_law import detector
 from receiver_law.detector import Voltages
 
-MIN_SPREAD = 0.05
-"""Smallest variance of the averaged reference in any direction, over its power [-]. A complete scan has 0.5, and less
-by its averages."""
-
-MAX_NOISE_SHARE = 0.01
-"""Largest noise power of the averaged reference, over its power [-]. Its noise makes the fitted modulation too small
-by twice this share."""
+MIN_SPREAD = 0.05  # smallest variance of the averaged reference, over its power; of a complete scan up to 0.5
+MAX_NOISE_SHARE = 0.01  # of the power of the averaged reference; it reduces the modulation by twice as much
 
 MAX_RATE_SHARE, MAX_MEAN, MAX_REVERSALS = 0.2, 0.25, 0.5
 """Largest deviation of the rate of the scan over the rate of the parameters, largest mean of the reference over its
@@ -91,8 +83,7 @@ def constants(params: MonopulseParameters) -> Records:
 
 @compiled
 def dump(state: State, constants: Constants, window: Window, samples: Samples, dumps: Complexes) -> float:
-    """Mix samples down, integrate each part into `dumps`, and return the energy of the signal. The phase of the NCO
-    advances."""
+    """Integrate each part of samples, mixed down, into `dumps`. Return the energy of the signal. The NCO advances."""
     cos_turn, sin_turn = math.cos(state.turn), math.sin(state.turn)
     re, im = math.cos(state.phase), -math.sin(state.phase)
     energy = 0.0
@@ -169,10 +160,8 @@ def add(window: Window, dumps: Complexes) -> None:
 
 @compiled
 def judge(window: Window, part: int, least: float) -> int:
-    """Return the status of the scan, LOCKED, NO_SCAN or WRONG_SCAN, and update the mean of the reference.
-
-    part: samples of an integral; least: smallest variance of the averaged reference in any direction.
-    """
+    """Return the status of the scan, LOCKED, NO_SCAN or WRONG_SCAN, and update the mean of the reference. part:
+    samples of an integral; least: smallest variance of the averaged reference in any direction."""
     power = window.lagged / window.parts
     noise = (window.energy - window.lagged) / window.parts
     if not (power > 0.0 and noise <= MAX_NOISE_SHARE * part * power and least >= MIN_SPREAD * power):
@@ -188,10 +177,7 @@ def judge(window: Window, part: int, least: float) -> int:
 
 @compiled
 def fit(window: Window, part: int) -> tuple[float, float, float]:
-    """Return (a, b_x, b_e) of the window in powers of integrals, and set `scan`. b is 0 without a good reference.
-
-    part: samples of an integral.
-    """
+    """Return (a, b_x, b_e) of the window in powers of integrals, and set `scan`. b is 0 without a good reference."""
     n = window.parts
     x, e, power = window.sum[0] / n, window.sum[1] / n, window.sum[2] / n
     xx, xe, ee = window.square[0] / n - x * x, window.square[1] / n - x * e, window.square[2] / n - e * e
@@ -230,7 +216,7 @@ def take(state: State, constants: Constants, window: Window) -> None:
 @compiled
 def step(state: State, constants: Constants, window: Window, samples: Samples, dumps: Complexes,
          outputs: Outputs) -> bool:
-    """Take the samples of one block, and return True if an error is to be published: the block completes a window, or
+    """Take the samples of one block. Return True if an error is to be published: the block completes a window, or
     holds a number that is not finite. Such a block begins a new window."""
     good = front_end.finite(samples)
     window.idle += 1

@@ -62,11 +62,8 @@ def free_path(meta: str | pathlib.Path) -> str:
 
 
 class Recorder:
-    """Writer of a recording. Raises StreamError for a path that exists or cannot be written.
-
-    channels: names of the channels; origin: `received` or `simulated`, for the description. The .sigmf-meta file
-    contains a new capture after META_PERIOD_S at the latest, and all captures after `close`.
-    """
+    """Writer of a recording. Raises StreamError for a path that exists or cannot be written. origin: `received` or
+    `simulated`. The .sigmf-meta file lists a capture after META_PERIOD_S at the latest."""
 
     def __init__(self, meta: str | pathlib.Path, rate: Hertz, channels: Sequence[str], origin: str) -> None:
         self.meta, self.rate, self.channels = pathlib.Path(meta), rate, channels
@@ -81,8 +78,7 @@ class Recorder:
             raise StreamError(f'{meta}: {error.strerror}; a recording is never overwritten') from None
 
     def write(self, chunk: Chunk, begins: bool) -> None:
-        """Write a chunk. begins: True if a capture begins with it. Raises StreamError for a full disk, and for more
-        than MAX_CAPTURES captures."""
+        """Write a chunk. begins: True if a capture begins with it. Raises StreamError."""
         if begins and len(self.captures) == MAX_CAPTURES:
             raise StreamError(f'{self.meta}: {MAX_CAPTURES} captures: a recording must have no more gaps and changes '
                               'of its clock')
@@ -97,7 +93,6 @@ class Recorder:
 
     @contextlib.contextmanager
     def _errors_named(self) -> Iterator[None]:
-        """Turn the OSErrors in this context into a StreamError that names the recording."""
         try:
             yield
         except OSError as error:
@@ -125,11 +120,8 @@ class Recorder:
 
 
 class Recording:
-    """Recording that is read. Raises StreamError for a file that does not fit.
-
-    channels: names of the channels that the receiver needs; rate: sample rate that it needs, None for any; cut:
-    text about samples that the file lacks, or ''.
-    """
+    """Recording that is read. Raises StreamError for a file that does not fit. rate: sample rate that the receiver
+    needs, None for any; cut: text about samples that the file lacks, or ''."""
 
     def __init__(self, meta: str | pathlib.Path, channels: Sequence[str], rate: Hertz | None = None) -> None:
         self.meta, self.channels = pathlib.Path(meta), len(channels)
@@ -181,7 +173,6 @@ class Recording:
         return value
 
     def _checked(self, captures: list[Json]) -> list[Capture]:
-        """Return the captures. Raises StreamError for one that does not fit."""
         found: list[Capture] = []
         for capture in captures:
             if not isinstance(capture, dict):

@@ -9,15 +9,14 @@ import numpy as np
 
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.quantities import Nanoseconds, Seconds
+from pedestal_common.stream.connection import bound
 from pedestal_hardware.monopulse import sigmf, vita49
 from pedestal_hardware.monopulse.blocks import ArrivalClock, Chunk, StreamError
 from pedestal_hardware.monopulse.params import CHANNELS, SCANNED_CHANNELS, MonopulseParameters, SourceParameters
 from pedestal_hardware.monopulse.vita49 import INTEGER_FULL_SCALE
 
 TAG_MAGIC, TAG_VERSION = 0x5FF0, 1
-TAG_HEADER = struct.Struct('<HBQQ')
-"""Header of a ZMQ sink of GNU Radio with tags: magic number, version, number of the first item, number of tags."""
-
+TAG_HEADER = struct.Struct('<HBQQ')  # of a sink with tags: magic number, version, first item, number of tags
 RECEIVE_BUFFER_BYTES = 8_000_000  # requested size of the receive buffer [bytes]; the kernel may give less
 MAX_QUEUED_MESSAGES = 1000  # largest number of ZMQ messages that wait for this node
 FULL_SCALE = (INTEGER_FULL_SCALE - 1.0) / INTEGER_FULL_SCALE  # largest real or imaginary part of a sample of integers
@@ -32,8 +31,8 @@ class Source(Protocol):
     full_scale: float | None    # largest part of a sample, None if the samples have no limit
 
     def read(self, timeout: Seconds) -> Chunk | None:
-        """Wait at most this time, and return the next chunk, or None if none is complete. Raises StreamError for data
-        that do not fit; the next call continues."""
+        """Return the next chunk, or None if none is complete in this time. Raises StreamError for data that do not
+        fit; the next call continues."""
 
     @property
     def counts(self) -> dict[str, int]:
@@ -49,13 +48,11 @@ class VitaSource:
     def __init__(self, params: SourceParameters, channels: Sequence[str], _clock: Clock) -> None:
         self.full_scale = FULL_SCALE if params.format == 'ci16' else None
         self.format, self.joiner = params.format, vita49.Joiner(params.rate, params.streams[:len(channels)])
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         try:
-            self.socket.bind((params.host, params.port))
+            self.socket = bound(params.host, params.port)
         except OSError as error:
-            self.socket.close()
             raise StreamError(f'source.address = {params.url}: {error.strerror}') from None
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
 
     def read(self, timeout: Seconds) -> Chunk | None:
         """Return the next chunk, or None."""
@@ -140,8 +137,7 @@ class ZmqSource:
         return Chunk(samples, number, self.times.utc(number, len(samples), arrived))
 
     def _without_tags(self, data: bytes) -> tuple[bytes, int | None]:
-        """Return (samples, number of the first one or None) of a message. Raises StreamError for tags, which have no
-        fixed length."""
+        """Return (samples, number of the first one). Tags are refused: they have no fixed length."""
         if len(data) < TAG_HEADER.size or len(data) % 8 != TAG_HEADER.size % 8:
             return data, None
         magic, version, first, tags = TAG_HEADER.unpack_from(data)

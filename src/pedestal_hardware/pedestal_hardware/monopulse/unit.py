@@ -21,8 +21,7 @@ ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
 
 AXIS_NAMES = 'cross_elevation', 'elevation'
 
-MAX_PASSED_GAP_S = 0.2
-"""Longest gap after which the loop continues at its frequency [s]. At 3 kHz/s the carrier moves by 600 Hz in it."""
+MAX_PASSED_GAP_S = 0.2  # longest gap after which the frequency stays [s]: 600 Hz at 3 kHz/s
 
 
 class ReceiverRecord(Record):
@@ -75,8 +74,7 @@ def laws(memory: Memory, stamps: Stamps, inputs: Records, outputs: Records) -> N
 
 @compiled
 def scanned_law(memory: ScannedMemory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
-    """Execute the step of a block of a scanned feed. stamp: middle of the block. The stamp of an error is the
-    middle of its window."""
+    """Execute the step of a block of a scanned feed. The stamp of an error is the middle of its window."""
     record = memory.record[0]
     if scan.step(record.state, record.constants, record.window, memory.samples, memory.dumps, record.outputs):
         publish(outputs[ANGLE_ERROR_TOPIC], stamp - record.window.age_ns, record.outputs)
@@ -92,10 +90,7 @@ def scanned_laws(memory: ScannedMemory, stamps: Stamps, inputs: Records, outputs
 
 
 class MonopulseReceiver(Unit):
-    """A receiver of the samples of three channels or of a scanned feed.
-
-    Before each step `take` takes the block of the step.
-    """
+    """A receiver of three channels or of a scanned feed. Before each step `take` takes the block of the step."""
     parameters: MonopulseParameters
     memory: Memory | ScannedMemory
     integration: Seconds        # effective time of an error, see feed.effective_integration
@@ -152,10 +147,7 @@ class MonopulseReceiver(Unit):
         return int(self.parts['outputs']['locked']), bool(self.source_fault)
 
     def diagnose(self) -> Diagnosis:
-        """Return the Diagnosis: carrier, C/N0, the ratios of difference and sum or the scan, events of the stream.
-
-        The level is ERROR for a fault of the stream or of its samples, or of the scan, WARN without lock.
-        """
+        """Return the Diagnosis: ERROR for a fault of the stream, of its samples or of the scan, WARN without lock."""
         p, state, outputs = self.parameters, self.parts['state'], self.parts['outputs']
         hertz = p.source.rate / (2.0 * math.pi)
         sigma = (detector.angle_noise(p.antenna, p.receiver, float(outputs['cn0_dbhz']), p.period)
@@ -180,7 +172,6 @@ class MonopulseReceiver(Unit):
         return Diagnosis(LEVEL_OK if status == front_end.Status.LOCKED else LEVEL_WARN, text, values)
 
     def _of_ratios(self) -> list[tuple[str, str]]:
-        """Return the values of the Diagnosis on the differences of three channels."""
         state, values = self.parts['state'], []
         for name, real, imag, skew in zip(AXIS_NAMES, state['ratio_real'], state['ratio_imag'], state['skew']):
             ratio = complex(real, imag)
@@ -190,7 +181,6 @@ class MonopulseReceiver(Unit):
         return values
 
     def _of_scan(self) -> list[tuple[str, str]]:
-        """Return the values of the Diagnosis on a scanned feed: its rate and its modulation."""
         window = self.parts['window']
         return [('scan_hz', f'{self._scan_hz:.2f}'), ('scan_mean', f'{abs(window["mean"]):.3f}'),
                 ('scan_reversals', f'{window["reversals"]:.2f}'),
@@ -204,7 +194,6 @@ class MonopulseReceiver(Unit):
 
     @property
     def _wrong_scan(self) -> str:
-        """Text that names the value of a wrong scan reference, and what it must be."""
         window, rate = self.parts['window'], self.parameters.feed.scan_rate
         if window['reversals'] > scan.MAX_REVERSALS:
             return f': it turns by more than 110 deg {window["reversals"]:.1f} times in a scan, must be 0'

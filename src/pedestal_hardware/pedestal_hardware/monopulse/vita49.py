@@ -95,8 +95,7 @@ class Joiner:
         self.last = None
 
     def put(self, packet: Packet) -> Chunk | None:
-        """Take a packet and return the chunk that it completes, or None. Raises StreamError for an unknown stream, a
-        time that goes back, channels of different lengths, or a wrong sample rate."""
+        """Take a packet and return the chunk that it completes, or None. Raises StreamError."""
         if packet.stream not in self.streams:
             raise StreamError(f'VITA 49 stream {packet.stream}: must be one of {", ".join(map(str, self.streams))} '
                               '(source.stream_sum, ...)')
@@ -123,7 +122,6 @@ class Joiner:
         return Chunk(np.stack(columns, axis=1), self._number(parts[self.streams[0]]), packet.utc)
 
     def _number(self, packet: Packet) -> int:
-        """Return the number of the first sample of a chunk whose sum channel is `packet`."""
         count = len(packet.samples)
         if self.last is None:
             self.last = packet.counter, packet.utc, count, count

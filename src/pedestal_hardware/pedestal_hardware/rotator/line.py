@@ -1,7 +1,6 @@
 """Connection to a rotator, by TCP or a serial line, in a thread of its own.
 
-The thread asks for the position once in `poll_period`, and sends the newest set-point between two polls. Because a
-rotator needs up to 0.6 s for an answer, no step of the node may wait for one.
+Because a rotator needs up to 0.6 s for an answer, no step of the node may wait for one.
 """
 import threading
 import time
@@ -25,12 +24,8 @@ class Measurement(typing.NamedTuple):
 
 
 class Line(Connection):
-    """Connection to one rotator.
-
-    url         `socket://host:port` for TCP, or the path of a serial device, as pyserial takes it
-    timeout     longest wait for an answer
-    baud_rate   of a serial device; 0: that of the protocol
-    """
+    """Connection to one rotator. url: as pyserial takes it; poll_period: between two requests for the position;
+    timeout: longest wait for an answer; baud_rate: 0 for that of the protocol."""
     newest: Measurement | None  # None before the first
     refusal: str                # of the device for the last set-point or stop, '' after an accepted one
     counts: dict[str, int]      # positions, set-points, refusals and missing answers
@@ -90,7 +85,6 @@ class Line(Connection):
             self._wake.wait(max(self.poll_period - (time.monotonic() - begun), 0.0))
 
     def _send_request(self, device: serial.Serial) -> None:
-        """Send the newest set-point or stop, if there is one, and await its answer where the protocol has one."""
         request = self._request
         if not request:
             return
@@ -114,11 +108,9 @@ class Line(Connection):
             self.silence = f'{self.url}: {reason}'
 
     def _await(self, device: serial.Serial, awaited: type[Answer]) -> None:
-        """Read until an answer of the awaited type arrives, or a refusal of a set-point.
-
-        Raise OSError after a time-out. The connection is then opened again, because a late answer would be taken for
-        the answer to the next request.
-        """
+        """Read until an answer of the awaited type arrives, or a refusal of a set-point. Raise OSError after a
+        time-out: the connection is then opened again, because a late answer would be taken for that to the next
+        request."""
         end = time.monotonic() + self.timeout
         while time.monotonic() < end:
             received = device.read(max(1, min(device.in_waiting, MAX_READ_BYTES)))

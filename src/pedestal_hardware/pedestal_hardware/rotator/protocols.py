@@ -1,8 +1,7 @@
-"""Protocols of rotators: the bytes of a request, and the answers in the bytes of the device.
+"""Protocols of rotators: the bytes of a request, and the answers in the bytes of the device. Angles are in degrees.
 
 Sources: Hamlib 4.6 (rotators/gs232a, gs232b, easycomm, spid, and tests/rotctl_parse.c), the EasyComm standard, and the
-manual of the SPID Rot2Prog. All angles are in degrees. A protocol object keeps what a device has sent of an unfinished
-answer, so each connection needs its own object.
+manual of the SPID Rot2Prog. A protocol keeps an unfinished answer, so each connection needs its own object.
 """
 import re
 from collections.abc import Iterator
@@ -72,8 +71,7 @@ class LineProtocol(RotatorProtocol):
 
 
 def checked(azimuth: bytes, elevation: bytes) -> Position | Refusal:
-    """Return the Position of the texts of two numbers, or the Refusal of other texts and of angles that no device has.
-    """
+    """Return the Position of the texts of two numbers, or the Refusal of other texts and impossible angles."""
     try:
         position = Position(float(azimuth), float(elevation))
     except ValueError:
@@ -161,11 +159,9 @@ class Easycomm(LineProtocol):
 
 
 class Rot2prog(RotatorProtocol):
-    """SPID Rot2Prog, frames of 13 bytes to the device and 12 bytes from it.
-
-    An angle is sent as pulses, PH (360 + angle), PH pulses for each degree, and received as digits of 0.1 deg. MD-01
-    also answers a set-point, with the same frame, and may send text between the frames.
-    """
+    """SPID Rot2Prog, frames of 13 bytes to the device and 12 bytes from it. An angle is sent as pulses, PH (360 +
+    angle), PH pulses for each degree, and received as digits of 0.1 deg. MD-01 also answers a set-point, with the same
+    frame, and may send text between the frames."""
     ASK, STOP = (b'W' + 10 * b'\0' + bytes([command]) + b' ' for command in (0x1F, 0x0F))
     BAUD_RATE, RESOLUTION = 600, 0.1
     PULSES_PER_DEG = 10
@@ -208,4 +204,3 @@ PROTOCOLS: dict[str, type[RotatorProtocol]] = {
     'easycomm': Easycomm,
     'rot2prog': Rot2prog,
 }
-"""Protocols by name."""

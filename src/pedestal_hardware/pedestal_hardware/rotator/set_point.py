@@ -17,9 +17,7 @@ MAX_REFERENCE_RAD = 1e3  # largest valid angle of a reference [rad]; a reference
 
 MAX_START_DISTANCE_RAD = 0.05
 """Largest distance of the measured angles from the reference at which a mode with commanded rates may begin [rad].
-
-After a stop the control unit still holds the reference of the mode before, to which the rotator must not move.
-"""
+After a stop the control unit still holds the reference of the mode before, to which the rotator must not move."""
 
 
 class Constants(Record):

@@ -116,7 +116,8 @@ class Rotator(AngleDrive):
         constants = set_point.Constants.zeros()
         constants['timeout_ns'] = p.timeout_ns
         constants['dead_band'], constants['resolution'] = math.radians(p.dead_band), math.radians(p.step_deg)
-        constants['low'][0], constants['high'][0] = zip(*p.travel_rad)
+        for i, axis in enumerate((p.azimuth, p.elevation)):
+            constants['low'][0, i], constants['high'][0, i] = math.radians(axis.low), math.radians(axis.high)
         switches, device = Switches.zeros(), Device.zeros()
         switches['wanted'] = device['silent'] = 1
         self.memory = Memory(RotatorRecord.of(constants=constants, switches=switches, device=device,
@@ -149,7 +150,6 @@ class Rotator(AngleDrive):
 
     @property
     def _distance_deg(self) -> Degrees:
-        """Distance of the rotator from its last set-point, of the farther axis; NaN before the first."""
         return math.degrees(np.abs(self.parts['state']['set_point'] - self.parts['device']['angle']).max())
 
     @property

@@ -7,9 +7,7 @@ from pedestal_common.quantities import Json, Seconds
 from pedestal_common.wire.commands import Command, Reply
 
 MAX_LOG_LINES = 200  # largest number of lines, and of names whose last jog is kept
-
-JOG_VERB, NEW_JOG_PAUSE_S = 'rate', 2.0
-"""Command of a jog, which is repeated, and the pause after which a jog is a new line [s]."""
+JOG_VERB, NEW_JOG_PAUSE_S = 'rate', 2.0  # command of a jog, and pause after which it is a new line [s]
 
 
 class Line(TypedDict):

@@ -1,7 +1,5 @@
-"""Search for the next passes of the satellite that the antenna follows, for the sky plot of the page. No ROS here.
-
-A separate thread finds the passes, so the page does not wait for them.
-"""
+"""Search for the next passes of the satellite that the antenna follows, in a thread of its own: the page does not
+wait."""
 import datetime
 from concurrent import futures
 from typing import NamedTuple
@@ -13,10 +11,7 @@ from pedestal_common.quantities import Json, Seconds
 from pedestal_operator.page import page_state
 
 MAX_PASSES = 4  # largest number of passes shown
-
-SEARCH_SPAN_DAYS, SEARCH_VALIDITY_DAYS = 2.0, 1.0
-"""Time searched ahead, and the time after which the search is repeated [days]."""
-
+SEARCH_SPAN_DAYS, SEARCH_VALIDITY_DAYS = 2.0, 1.0  # searched ahead, and until the next search [days]
 MIN_UTC_S = 1e8  # smallest time that is UTC [s]; a smaller time counts from the start of a run
 
 
@@ -32,10 +27,8 @@ class PassQuery(NamedTuple):
 
 
 def pass_query(antenna: page_state.PageAntenna) -> PassQuery | None:
-    """Return the query of an antenna, None without elements, station or UTC.
-
-    The elements are those of mode tle, else those of a simulated satellite on the day of its scenario.
-    """
+    """Return the query of an antenna, None without elements, station or UTC. The elements are those of mode tle, else
+    those of a simulated satellite on the day of its scenario."""
     p, acu = antenna.configuration, antenna.diagnostics_of('acu')
     target = p if p.get('target.kind') == 'leo_pass' else {}
     simulated = [target.get(f'target.leo_pass.{name}', '') for name in page_state.ELEMENT_PARAMETERS]
@@ -55,11 +48,8 @@ def pass_query(antenna: page_state.PageAntenna) -> PassQuery | None:
 
 
 def upcoming_passes(query: PassQuery) -> list[dict[str, float]]:
-    """Return the passes from the day of a query on.
-
-    aos, los: rise and set [s], in the time of the graph; highest: elevation, from, to: azimuth at rise and set [deg].
-    The list is empty if the elements are too old for the day, or if the satellite does not rise and set.
-    """
+    """Return the passes from the day of a query on; [] for elements that are too old, or without rise and set. Times
+    are of the graph [s]; highest: elevation; from, to: azimuth at rise and set [deg]."""
     begin = datetime.datetime(1970, 1, 1) + datetime.timedelta(days=query.day * SEARCH_VALIDITY_DAYS)
     try:
         satellite = orbit.satellite(query)
@@ -73,7 +63,6 @@ def upcoming_passes(query: PassQuery) -> list[dict[str, float]]:
 
 
 def _seconds(utc: datetime.datetime) -> Seconds:
-    """Return the time since 1970 of a datetime in UTC."""
     return (utc - datetime.datetime(1970, 1, 1)).total_seconds()
 
 

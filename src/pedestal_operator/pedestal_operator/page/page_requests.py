@@ -1,9 +1,8 @@
 """Commands from the open pages to the control unit, and the replies; roles and timeouts are checked. No ROS here.
 
-A jog is a command of axis rates while a button of the page is held. The page repeats the jog, and three timeouts end
-it. Each repetition is forwarded once, if the last state that the page received is at most MAX_STATE_AGE_S old. If a
-page that jogs is silent for JOG_TIMEOUT_S or has left, this module stops the axes. The control unit itself stops the
-axes 0.5 s after the last jog.
+A jog is a command of axis rates that the page repeats while a button is held. Three timeouts end it. Each repetition
+is forwarded once, if the last state of the page is at most MAX_STATE_AGE_S old. This module stops the axes if a page
+that jogs is silent for JOG_TIMEOUT_S or has left. The control unit itself stops the axes 0.5 s after the last jog.
 """
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -23,13 +22,8 @@ MAX_ARGUMENTS = 20  # largest number of arguments of a command
 
 
 class PageRequests:
-    """Commands of all pages. The arguments are functions:
-
-    request(who, verb, {argument: value})   send a command to the control unit, return the number of the request
-    replied(number)                         return the Reply to a request, or None
-    send(client, message)                   send a message to a page
-    is_jogging()                            return True while the antenna follows a jog
-    """
+    """Commands of all pages. request(who, verb, {argument: value}) sends a command and returns its number;
+    is_jogging() is True while the antenna follows a jog."""
 
     def __init__(self, request: Callable[[str, str, Mapping[str, object]], str],
                  replied: Callable[[str], Reply | None], send: Callable[[Client, Mapping[str, object]], None],
@@ -52,7 +46,6 @@ class PageRequests:
             self._send(client, {'error': 'unknown message: must have jog or ask'})
 
     def _forward(self, client: Client, message: Mapping[str, Json], now: Seconds) -> None:
-        """Check a command of a page, and forward it to the control unit."""
         verb, given, number = message['ask'], message.get('arguments') or {}, message.get('id')
         if not (isinstance(given, dict) and len(given) <= MAX_ARGUMENTS and _is_allowed(verb) and all(
                 _is_allowed(name) and isinstance(value, (str, int, float)) and _is_allowed(str(value))
@@ -67,8 +60,7 @@ class PageRequests:
         self._waiting[self._request(str(client), verb, given)] = client, number, verb, now
 
     def _jog(self, client: Client, rates: Json, now: Seconds, age: Seconds) -> None:
-        """Check a jog of a page, and forward it. rates: (azimuth, elevation) [deg/s], both 0 at its end; age: age of
-        the last state on the page."""
+        """rates: [deg/s], both 0 at the end of the jog; age: of the last state on the page."""
         refusal = page_security.refusal_reason(client.role, 'rate', {})
         if refusal:
             self._send(client, {'verb': 'rate', 'granted': False, 'reply': refusal})
@@ -91,7 +83,6 @@ class PageRequests:
         self._waiting[number] = client, None, 'rate', now
 
     def _end_jog(self, client: Client, now: Seconds) -> None:
-        """Stop the axes if the page jogs and the antenna still follows a jog."""
         if self._jogs.pop(client, None) is not None and self._is_jogging():
             self._rate(client, (0.0, 0.0), now)
 
@@ -108,7 +99,7 @@ class PageRequests:
                 self._forward_reply(client, page_number, verb, reply, now)
 
     def _forward_reply(self, client: Client, page_number: Json, verb: str, reply: Reply, now: Seconds) -> None:
-        """Send a reply to the page that sent the command; the reply to an accepted jog is left out."""
+        """The reply to an accepted jog is left out."""
         if verb == 'stop' and not reply.granted:  # standby is the fallback if the control unit cannot hold the axes
             self._waiting[self._request(str(client), 'standby', {})] = client, page_number, 'standby', now
         if verb != 'rate' or not reply.granted:
@@ -116,5 +107,4 @@ class PageRequests:
 
 
 def _is_allowed(text: str) -> bool:
-    """Return True if a text may be part of a command."""
     return len(text) <= commands.MAX_TEXT_CHARACTERS and text.isprintable()

@@ -1,12 +1,9 @@
 """Access control of the web server of the page: it checks token, `Host` and `Origin` of a request. No ROS, no server.
 
-A token stands for a role. It arrives once in the address of the page, then in a cookie. No script can read the
-cookie, and the browser sends it to this site only. `Host` must be a name of this server. This avoids that a foreign
-site lets its own name point here (DNS rebinding). `Origin` must be this page for every request that can command the
-antenna.
-
-A browser may reach the server through a proxy or an ssh tunnel. Then the port and the scheme in the browser differ
-from those of the server, so `Host` may have any port, and `Origin` may be http or https.
+A token stands for a role. It arrives once in the address of the page, then in a cookie, which no script can read and
+which the browser sends to this site only. `Host` must be a name of this server. This avoids that a foreign site lets
+its own name point here (DNS rebinding). `Origin` must be this page for every request that can command the antenna.
+Because a proxy or an ssh tunnel changes port and scheme, `Host` may have any port, and `Origin` may be http or https.
 """
 import hmac
 import ipaddress
@@ -19,15 +16,13 @@ from typing import NamedTuple
 from pedestal_operator import state
 
 PAGE_ROLES = ('operator', 'monitor', 'supervisor')
-"""Roles: an operator sends commands; a monitor may send `stop` only; a supervisor may take control from others."""
+"""An operator sends commands; a monitor may send `stop` only; a supervisor may take control from others."""
 
 UNRESTRICTED_VERBS = ('stop',)  # commands that every role may send
 SUPERVISOR_REQUESTS = (('take', 'role', 'supervisor'),)  # (command, argument, value) for supervisors only
 
 
-HOST = re.compile(r'(\[[0-9a-f:.]+\]|[^\[\]:]+)(?::(\d{1,5}))?')
-"""Pattern of a `Host` in small letters: group 1 is the name, group 2 the port."""
-
+HOST = re.compile(r'(\[[0-9a-f:.]+\]|[^\[\]:]+)(?::(\d{1,5}))?')  # of a `Host` in small letters: name, port
 MAX_SHOWN_CHARACTERS = 100  # longest part of a request in a refusal [characters]
 
 
@@ -50,11 +45,8 @@ class Request(NamedTuple):
 
 
 class Access:
-    """Access to a server at an address and port, with new tokens for each role.
-
-    names: further names of the server, without scheme and port. Raises ValueError for a name that is not the name of a
-    host.
-    """
+    """Access to a server at an address and port, with new tokens for each role. names: further names of the server.
+    Raises ValueError for a name that is not the name of a host."""
 
     def __init__(self, address: str, port: int, names: Iterable[str] = ()) -> None:
         for name in names:
@@ -143,8 +135,7 @@ def _bracketed(name: str) -> str:
 
 
 def headers(host: str) -> list[tuple[str, str]]:
-    """Return the headers (name, value) of every answer. They allow content of this site only, require the browser to
-    check its cache, and forbid frames. host: `Host` of the request."""
+    """Return the headers of every answer: own content only, a checked cache, no frames. host: of the request."""
     return [('content-security-policy',
              "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
              f"connect-src 'self' ws://{host} wss://{host}; "

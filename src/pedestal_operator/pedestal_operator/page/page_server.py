@@ -1,12 +1,9 @@
 """Web server of the page of the operator: the files of the page, and a web socket for each open page. No ROS here.
 
-The server runs in its own thread. A section is a named part of the state that a page shows, as JSON. The revision of a
-section is the number of its last change. A message to a page has the sections whose revision the page does not have
-yet. Messages are numbered, and a page acknowledges the number of the last message.
-
-A page with MAX_UNSEEN_MESSAGES unacknowledged messages receives no further message. After its next acknowledgement it
-receives the newest sections. Therefore no queue grows, except the short queue of replies to the page. A page without
-an acknowledgement for PAGE_TIMEOUT_S is dropped.
+The server runs in its own thread. A section is a named part of the state, as JSON, with the number of its last change.
+A message to a page has the sections that changed since its last message, and a number that the page acknowledges. A
+page with MAX_UNSEEN_MESSAGES unacknowledged messages receives no further message, then the newest sections. Therefore
+no queue grows, except the short queue of replies. A page without an acknowledgement for PAGE_TIMEOUT_S is dropped.
 """
 import asyncio
 import collections
@@ -30,7 +27,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pedestal_common.quantities import Json, Seconds
-from pedestal_operator import tcp_port
+from pedestal_common.stream.connection import listen
 from pedestal_operator.page import page_security
 from pedestal_operator.page.page_security import Refused
 
@@ -39,13 +36,8 @@ STATIC_FOLDER = pathlib.Path(__file__).parents[1] / 'static'
 MAX_UNSEEN_MESSAGES = 4  # largest number of unacknowledged messages to a page
 PAGE_TIMEOUT_S = 5.0  # time without an acknowledgement after which a page is dropped [s]
 MAX_MESSAGE_BYTES = 4096  # largest message from a page [bytes]
-
-MAX_QUEUED_REQUESTS, MAX_QUEUED_REPLIES = 200, 50
-"""Largest number of waiting commands of all pages, and of waiting replies to a page."""
-
-REQUEST_BURST_LIMIT, REQUEST_BURST_PERIOD_S = 40, 1.0
-"""Largest number of messages from a page in a period, and the period [s]; a jog needs five in 1 s."""
-
+MAX_QUEUED_REQUESTS, MAX_QUEUED_REPLIES = 200, 50  # of all pages, to a page
+REQUEST_BURST_LIMIT, REQUEST_BURST_PERIOD_S = 40, 1.0  # most messages of a page in a time; a jog needs five in 1 s
 SHUTDOWN_TIMEOUT_S = 1  # grace period of the pages when the server ends, in whole seconds for uvicorn [s]
 
 
@@ -77,10 +69,7 @@ class Client:
         return f'{self.name}@page {self.address}'
 
     def newest(self, sections: Mapping[str, tuple[int, str]]) -> str:
-        """Return the next message to the page: JSON with the changed sections and the replies.
-
-        sections: {name: (revision, JSON)}.
-        """
+        """Return the next message: replies, and the changed ones of the sections {name: (revision, JSON)}."""
         self._number += 1
         self._sent[self._number] = time.monotonic()
         parts = [f'"number":{self._number}', *(f'"{name}":{text}' for name, (revision, text) in sections.items()
@@ -122,11 +111,7 @@ class Client:
 
 class PageServer:
     """A server that runs from its construction to `close`. Raises OSError if the address and port are not available.
-
-    names       further names of the server, see page_security.Access
-    most        largest number of open pages
-    history()   return the past of the charts for a new page; called in a thread of the server
-    """
+    history(): past of the charts for a new page; called in a thread of the server."""
     requests: queue.Queue[PageMessage]      # for the node
     pages: int                              # number of open pages
     # Only the thread of the server uses _clients and _sections. Only the thread of the node uses _published.
@@ -137,7 +122,7 @@ class PageServer:
     def __init__(self, address: str, port: int, names: Iterable[str], most: int,
                  history: Callable[[], Iterable[object]]) -> None:
         self.pages, self.requests = 0, queue.Queue(MAX_QUEUED_REQUESTS)
-        self._socket = tcp_port.listen(address, port)
+        self._socket = listen(address, port)
         self.access = page_security.Access(address, self._socket.getsockname()[1], names)
         self._most, self._history = most, history
         self._clients, self._sections, self._revision, self._named = set(), {}, 0, 0
@@ -190,8 +175,7 @@ class PageServer:
         self._thread.join(3.0 * SHUTDOWN_TIMEOUT_S)
 
     def _guarded(self, app: ASGIApp) -> ASGIApp:
-        """Return an ASGI app that checks each request by page_security before `app` answers, and adds headers to each
-        answer."""
+        """Return an ASGI app that checks each request before `app` answers, and adds headers to each answer."""
         async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
             request = _request(scope)
             try:
@@ -204,7 +188,7 @@ class PageServer:
         return guarded
 
     async def _index(self, request: Request) -> Response:
-        """Answer with the page. An address with a token only sets the cookie; the token stays out of the history."""
+        """An address with a token only sets the cookie; the token stays out of the history."""
         if 'token' not in request.query_params:
             return await StaticFiles(directory=STATIC_FOLDER).get_response('index.html', request.scope)
         answer = RedirectResponse('/', 303)
@@ -213,11 +197,9 @@ class PageServer:
         return answer
 
     async def _history_answer(self, _: Request) -> Response:
-        """Answer with the past of the charts."""
         return Response(await asyncio.to_thread(lambda: encoded(list(self._history()))), media_type='application/json')
 
     async def _serve_page(self, websocket: WebSocket) -> None:
-        """Serve a page until it leaves."""
         if len(self._clients) >= self._most:
             await websocket.send_denial_response(PlainTextResponse(
                 f'too many pages: must be at most {self._most}\n', 503))
@@ -266,7 +248,7 @@ class PageServer:
                         'error': f'too many waiting commands: must be at most {MAX_QUEUED_REQUESTS}'}))
 
     def _put(self, message: PageMessage) -> bool:
-        """Queue a message for the node. Return True if the queue had room."""
+        """Return True if the queue had room."""
         try:
             self.requests.put_nowait(message)
         except queue.Full:
@@ -288,7 +270,6 @@ def _plain(value: object) -> object:
 
 
 def _request(scope: Scope) -> page_security.Request:
-    """Return the page_security.Request of an ASGI scope."""
     given: dict[str, str] = {}
     for key, value in scope['headers']:
         given.setdefault(key.decode('latin-1'), value.decode('latin-1'))
@@ -299,7 +280,6 @@ def _request(scope: Scope) -> page_security.Request:
 
 
 def _adding(send: Send, host: str) -> Send:
-    """Return a `send` that adds page_security.headers to the start of an answer."""
     extra = [(name.encode(), value.encode('latin-1')) for name, value in page_security.headers(host)]
 
     async def adding(message: MutableMapping[str, Json]) -> None:
@@ -310,12 +290,10 @@ def _adding(send: Send, host: str) -> Send:
 
 
 def _name(text: str) -> str:
-    """Return the name of a user without characters that are not allowed in a name."""
     return ''.join(letter for letter in text if letter.isalnum() or letter in '.-_')[:32]
 
 
 def _parsed(message: Mapping[str, Json]) -> dict[str, Json] | None:
-    """Return the dict in a message of a web socket, None without a dict. Raises WebSocketDisconnect at its end."""
     if message['type'] == 'websocket.disconnect':
         raise WebSocketDisconnect(message.get('code', 1005))
     try:

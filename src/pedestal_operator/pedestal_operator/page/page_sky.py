@@ -13,9 +13,7 @@ from pedestal_common.wire import messages
 
 HORIZON_STEP_DEG = 5.0  # difference in azimuth between two points of a line around the horizon [deg]
 MAX_PATH_POINTS = 240  # largest number of points of a path
-
-MIN_HISTORY_STEP_DEG = 0.3
-"""Smallest distance between two points of the beam history, less than the width of a line [deg]."""
+MIN_HISTORY_STEP_DEG = 0.3  # smallest step of the beam history, less than the width of a line [deg]
 
 
 class Path(NamedTuple):
@@ -25,8 +23,7 @@ class Path(NamedTuple):
 
 
 def path(message: Message, midnight: Seconds) -> Path | None:
-    """Return the path of a message of acu/program_track, None for a preset. midnight: UTC for which a stamp 0 stands.
-    """
+    """Return the path of a message of acu/program_track, None for a preset. midnight: UTC of a stamp 0."""
     if len(message.points) < 2 or not set(topics.AXES) <= set(message.joint_names):
         return None
     start = messages.nanoseconds(message.header.stamp) * 1e-9 or midnight
@@ -45,13 +42,9 @@ def thinned(path: Path | None) -> list[list[float]]:
 
 
 def passage(path: Path | None, loss: str) -> list[dict[str, object]]:
-    """Return a list with the pass of a path, [] if the path stays below the horizon.
+    """Return a list with the pass of a path, [] if it stays below the horizon. Times are UTC [s], angles in deg.
 
-    aos, los    UTC of rise and set [s]
-    highest     highest elevation [deg]
-    from, to    azimuth at rise and at set [deg]
-    travel      change of the azimuth from rise to set [deg]
-    loss        text of the predicted loss of track [s], '' for none
+    highest: elevation; from, to, travel: azimuth at rise and at set, and its change; loss: text of the predicted loss.
     """
     if path is None:
         return []
@@ -108,10 +101,7 @@ class Deck:
         return [round(math.degrees(angle), 3) for angle in earth]
 
     def line(self, points: Sequence[Sequence[Degrees]]) -> list[list[Degrees]]:
-        """Return a line in earth angles [[azimuth, elevation], ...], with a point every HORIZON_STEP_DEG.
-
-        points: corners of the line in deck angles.
-        """
+        """Return a line in earth angles, with a point every HORIZON_STEP_DEG; points: its corners in deck angles."""
         found: list[list[Degrees]] = []
         for (A, E), (B, F) in zip(points, points[1:]):     # azimuth and elevation of two neighbours
             count = max(int(abs(B - A) / HORIZON_STEP_DEG), 1)

@@ -1,5 +1,4 @@
-"""Content of the page of the operator: the sections of the state, of a running antenna or of a recording. No ROS here.
-"""
+"""Content of the page of the operator: the sections of the state, of an antenna or of a recording. No ROS here."""
 import abc
 import math
 from collections.abc import Iterable, Mapping
@@ -11,17 +10,14 @@ from pedestal_operator import state
 from pedestal_operator.antenna import Antenna
 from pedestal_operator.page import page_sky
 
-ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
 MOTOR_STATES_TOPIC = 'adu/motor_states'
 ATTITUDE_TOPIC = 'ship/imu/data'
 EXTRA_NUMBER_TOPICS = (MOTOR_STATES_TOPIC, ATTITUDE_TOPIC)
-"""Topics of numbers that the page receives in addition to those of every client."""
 
 TEXT_TOPIC_BY_NAME = {'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}  # {name on the page: topic of the text}
 
 STATION_PARAMETERS, ELEMENT_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height'), (
     'line_1', 'line_2', 'omm')
-"""Names of the parameters of a station, and of the elements of a satellite."""
 
 SHOWN_PARAMETERS = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blockage', 'floor', 'prediction.start_time',
                             *(f'prediction.station.{name}' for name in STATION_PARAMETERS),
@@ -29,13 +25,11 @@ SHOWN_PARAMETERS = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blocka
                             *(f'{axis}.stow' for axis in topics.AXES)),
                     'tracking_receiver': ('receiver.acquire_level_dbhz', 'receiver.lose_level_dbhz', 'target.kind',
                                           *(f'target.leo_pass.{name}' for name in ELEMENT_PARAMETERS))}
-"""{node: parameters that the page reads}."""
 
 CHART_SPAN_S, CHART_PERIOD_S = 600.0, 0.5  # time span of the strip charts, and time between two points [s]
 
 HISTORY_COLUMNS = ('t', 'cross_elevation', 'elevation', 'azimuth_error', 'elevation_error', 'azimuth_rate',
                    'elevation_rate', *topics.MOTOR_NAMES, 'level')
-"""Columns of the strip charts."""
 
 
 class PageAntenna(Antenna):
@@ -50,20 +44,14 @@ class PageAntenna(Antenna):
 
 
 def _deck(antenna: PageAntenna) -> page_sky.Deck:
-    """Return the deck at the last attitude; without an attitude, the deck ashore."""
     return page_sky.Deck(antenna.numbers[ATTITUDE_TOPIC][:4] if antenna.present(ATTITUDE_TOPIC) else None)
 
 
 def now(antenna: PageAntenna) -> dict[str, Json]:
     """Return the present numbers: angles and errors [deg], rates [deg/s], level [dB-Hz], torques of the motors [Nm].
-
-    `axes` are deck angles of the beam on the sky, with the encoder angles; `beam` are its earth angles.
-    """
+    `axes` are deck angles of the beam on the sky, with the encoder angles; `beam` are its earth angles."""
     actual, commanded = antenna.directions('joint_states'), antenna.directions('acu/reference')
-    receiver, torques = (math.nan,) * 3, []
-    if antenna.present(ANGLE_ERROR_TOPIC):
-        x, y, level = antenna.numbers[ANGLE_ERROR_TOPIC]
-        receiver = math.degrees(x), math.degrees(y), level
+    torques = []
     if antenna.present(MOTOR_STATES_TOPIC):
         torques = [round(float(torque), 3)
                    for torque in antenna.numbers[MOTOR_STATES_TOPIC][-len(topics.MOTOR_NAMES):]]
@@ -71,7 +59,7 @@ def now(antenna: PageAntenna) -> dict[str, Json]:
             'axes': [{'actual': a, 'commanded': c, 'error': c - a, 'encoder': encoder, 'rate': rate}
                      for a, c, encoder, rate in zip(actual, commanded, antenna.encoder_angles('joint_states'),
                                                     antenna.rates())],
-            'receiver': [float(value) for value in receiver], 'torques': torques,
+            'receiver': list(state.receiver(antenna)), 'torques': torques,
             'beam': _deck(antenna).seen(*actual)}
 
 
@@ -85,11 +73,8 @@ def history_row(frame: Mapping[str, Json]) -> list[float]:
 
 
 def status_section(antenna: PageAntenna) -> dict[str, Json]:
-    """Return the state of the antenna for the header, the axes and the buttons: see the module `state`.
-
-    The item `refused` has {command: reason} for three kinds of client: `holder` has control, `other` has no control,
-    `supervisor` is a supervisor without control.
-    """
+    """Return the state of the antenna for the header, the axes and the buttons. `refused` has {command: reason} for a
+    client that has control (`holder`), for another, and for another supervisor."""
     acu, header = antenna.diagnostics_of('acu'), state.header(antenna)
     texts = {name: antenna.texts.get(topic, '') if acu else '' for name, topic in TEXT_TOPIC_BY_NAME.items()}
     return {'present': bool(acu), **texts, 'mode': header['mode'].text if acu else '',
@@ -124,8 +109,7 @@ def epoch(antenna: PageAntenna) -> Seconds:
 
 
 def fixed(antenna: PageAntenna) -> dict[str, Json]:
-    """Return the constants of a run: beamwidth and limits [deg], thresholds of the level [dB-Hz], axes of the charts.
-    """
+    """Return the constants of a run: beamwidth and limits [deg], thresholds of the level [dB-Hz], axes of charts."""
     p = antenna.configuration
 
     def degrees(name: str) -> Degrees:
@@ -140,9 +124,9 @@ def fixed(antenna: PageAntenna) -> dict[str, Json]:
 def sky(antenna: PageAntenna, coming: Iterable[Mapping[str, float]]) -> dict[str, Json]:
     """Return the content of the sky plot in earth angles [deg]: path, hidden sectors, lines, sun and passes.
 
-    `floor` and `top` are the lines of the lowest and the highest elevation that the antenna can reach; `hole` is the
-    time of the keyhole, UTC [s]. `residuals` are those of the pointing model in force [deg]: azimuth and elevation on
-    the deck, cross-elevation, elevation. coming: passes after the program track, from page_passes.UpcomingPasses.
+    `floor`, `top`: lines of the lowest and highest elevation in reach; `hole`: time of the keyhole, UTC [s];
+    `residuals`: of the pointing model, azimuth and elevation on the deck, cross-elevation, elevation [deg]. coming:
+    passes after the track.
     """
     deck, p, acu = _deck(antenna), antenna.configuration, antenna.diagnostics_of('acu')
     begin = epoch(antenna)

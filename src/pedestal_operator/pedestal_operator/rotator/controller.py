@@ -1,26 +1,24 @@
 """Controller: it turns the requests of rotator programs into commands to the control unit, for all protocols.
 
-One program at a time is in control. Its set-points (directions) become one steady motion. A jog lasts until its
-program leaves or sends another command. Some programs open a connection for each set-point; such a program stays in
-control until its motion ends.
+One program at a time is in control. A jog lasts until its program leaves or sends another command. Some programs open
+a connection for each set-point; such a program stays in control until its motion ends.
 """
 import math
 from collections.abc import Callable, Iterable, Sequence
 
 from pedestal_common.quantities import Degrees, RadiansPerSecond, Seconds
 from pedestal_common.wire.commands import HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL
-from pedestal_operator.remote_node import Remote
-from pedestal_operator.requests import JOG_REPEAT_PERIOD_S
+from pedestal_operator.remote_node import JOG_REPEAT_PERIOD_S, Remote
 from pedestal_operator.rotator.line_server import address_of
-from pedestal_operator.rotator.outcomes import (
+from pedestal_operator.rotator.pointing import (
     OUTCOME_BUSY,
     OUTCOME_DONE,
     OUTCOME_NO_REPLY,
     OUTCOME_OUT_OF_REACH,
     OUTCOME_REFUSED,
+    Pointing,
     Refused,
 )
-from pedestal_operator.rotator.pointing import Pointing
 
 CLIENT_REPLY_TIMEOUT_S = 1.5  # longest wait for a reply of the control unit [s]; clients of Hamlib wait for 2 s
 CONTROL_TIMEOUT_S = 10.0  # time without a command of a client after which its control is released [s]
@@ -61,22 +59,15 @@ def _outcome(refusal: str) -> int:
 
 
 class Controller:
-    """Control of the antenna by the clients of a server.
-
-    In all methods client is the name of a client, and now a time of the monotonic clock.
-    """
+    """Control of the antenna by the clients of a server, of which each method gets the name."""
+    holder: str                     # client in control, '' without one; one that has left controls its motion
     _jog: Sequence[float] | None    # rates (azimuth, elevation) [deg/s]
 
     def __init__(self, remote: Remote) -> None:
         self._remote = remote
         self.pointing = Pointing(remote)
-        self._holder, self._has_left, self._last_command_time = '', False, 0.0
+        self.holder, self._has_left, self._last_command_time = '', False, 0.0
         self._jog, self._last_jog_time, self._was_jogging = None, 0.0, False
-
-    @property
-    def holder(self) -> str:
-        """Name of the client in control, '' without one. A client that has left stays in control of its motion."""
-        return self._holder
 
     def go(self, client: str, azimuth: Degrees, elevation: Degrees, now: Seconds) -> PendingRequest:
         """Point the antenna to a direction."""
@@ -105,7 +96,7 @@ class Controller:
 
     def look(self, now: Seconds) -> None:
         """Repeat a jog, end a motion without further set-points, and release control that is no longer used."""
-        self._remote.who = self._holder
+        self._remote.who = self.holder
         self.pointing.look(now)
         is_jogging = self._remote.texts.get('acu/mode') == 'rate'
         if self._was_jogging and not is_jogging:
@@ -120,14 +111,14 @@ class Controller:
 
     def leave(self, client: str) -> None:
         """Note that a client has left. Its control is released as soon as its motion has ended."""
-        if client == self._holder:
+        if client == self.holder:
             self._has_left = True
 
     def release(self, now: Seconds) -> None:
         """Stop the jog or the motion of the client in control, and release its control."""
-        if not self._holder:
+        if not self.holder:
             return
-        self._remote.who = self._holder
+        self._remote.who = self.holder
         if self._jog:
             self._remote.request('stop')
         self.pointing.settle(now)
@@ -135,25 +126,23 @@ class Controller:
         self._release()
 
     def _release(self) -> None:
-        """Release control, and leave the motion as it is."""
-        self._remote.who = self._holder
-        self._holder, self._has_left = '', False
+        """Leave the motion as it is."""
+        self._remote.who = self.holder
+        self.holder, self._has_left = '', False
         self._remote.request('release')
 
     def _request(self, client: str, now: Seconds, send: Callable[[], str], continues: bool = True) -> PendingRequest:
-        """Return the pending request of send(), which sends a command; take control first if necessary.
-
-        continues: False for a command that ends the motion of the set-points.
-        """
-        if self._has_left and address_of(client) == address_of(self._holder):
+        """Return the pending request of send(); take control first if necessary. continues: False for a command that
+        ends the motion of the set-points."""
+        if self._has_left and address_of(client) == address_of(self.holder):
             self._release()  # the same program on a new connection: its motion continues
-        if self._holder not in ('', client):
-            return PendingRequest([], now, OUTCOME_BUSY, f'{HELD_REFUSAL} {self._holder}')
+        if self.holder not in ('', client):
+            return PendingRequest([], now, OUTCOME_BUSY, f'{HELD_REFUSAL} {self.holder}')
         if not continues:
             self.pointing.reset()
         self._jog, self._remote.who = None, client
-        numbers = [] if self._holder else [self._remote.request('take')]
-        self._holder, self._last_command_time = client, now
+        numbers = [] if self.holder else [self._remote.request('take')]
+        self.holder, self._last_command_time = client, now
         return PendingRequest([*numbers, send()], now + CLIENT_REPLY_TIMEOUT_S)
 
 

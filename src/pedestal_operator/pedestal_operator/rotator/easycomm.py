@@ -1,31 +1,24 @@
 """Requests and answers of the rotator protocols EasyComm I, II and III. No sockets, no ROS here.
 
-A line has words, separated by spaces. A word is mostly two letters and a value, such as AZ123.4. A query, such as AZ,
-is answered with the same letters and the value (azimuth 0 to 360 deg). All other words are settings, which are not
-answered (hamlib/rotators/easycomm, easycomm.txt). A line with a word that cannot be read is refused as a whole.
+A word of a line is mostly two letters and a value, such as AZ123.4. A query, such as AZ, is answered with the same
+letters and the value. All other words are settings, which are not answered (hamlib/rotators/easycomm, easycomm.txt).
 """
 import re
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeVar
 
 from pedestal_common.quantities import Degrees
-from pedestal_operator.rotator.numerals import number
+from pedestal_operator.rotator.rotctld import number
 
 MAX_LINE_BYTES = 256  # largest length of a line [bytes]
 QUERY_WORDS = 'AZ', 'EL', 'GS', 'GE', 'VE'  # words that are answered: azimuth, elevation, status, errors, version
-
-VERB_BY_WORD = {'SA': 'stop', 'SE': 'stop', 'RESET': 'acu/reset_faults', 'PARK': 'stow'}
-"""{word: command of the control unit}."""
+VERB_BY_WORD = {'SA': 'stop', 'SE': 'stop', 'RESET': 'acu/reset_faults', 'PARK': 'stow'}  # of the control unit
 
 RATE_DIRECTIONS = {'L': (0, -1), 'R': (0, 1), 'U': (1, 1), 'D': (1, -1)}
-"""{second letter of a word: (axis, sign)}. The word is a move at the jog rate, such as ML, or a velocity, such as
-VL0500 [mdeg/s]. axis: 0 azimuth, 1 elevation."""
+"""{second letter of a move at the jog rate (ML), or of a velocity [mdeg/s] (VL0500): (axis, sign)}."""
 
 IGNORED_WORDS = 'UP', 'DN', 'UM', 'DM', 'UR', 'DR', 'AO', 'LO', 'OP', 'IP', 'AN', 'ST', 'CR', 'CW'
-"""Words of frequencies, modes, signals, ports, the time and the configuration, which an antenna control unit ignores.
-
-The word after one of them may be the mode of a radio.
-"""
+"""Words of radios, which an antenna control unit ignores; the word after one of them may be the mode of a radio."""
 
 RADIO_MODE_PATTERN = '[A-Z]{1,6}(-[A-Z]{1,3})?'  # pattern of the mode of a radio: FM, USB, FM-N, or XXX from Hamlib
 STATUS_IDLE, STATUS_MOVING, STATUS_POINTING, STATUS_ERROR = 1, 2, 4, 8  # status numbers in the answer to GS
@@ -78,7 +71,7 @@ def read(line: str) -> LineRequest:
 
 def _put(values: dict[_K, float], key: _K, word: str, convert: Callable[[str], float],
          sign: int = 1) -> None:
-    """Put the value of a word under a key. Raises ValueError for a wrong value, and for a second value."""
+    """Raise ValueError for a wrong value, and for a second value of an axis."""
     if key in values:
         raise ValueError(f'{word!r} is the second value of its axis')
     try:
@@ -88,18 +81,14 @@ def _put(values: dict[_K, float], key: _K, word: str, convert: Callable[[str], f
 
 
 def _speed(text: str) -> float:
-    """Return the value of a velocity [deg/s]."""
     if not re.fullmatch('[0-9]{1,6}', text):
         raise ValueError(f'{text!r} is not a whole number of mdeg/s')
     return int(text) / 1000.0
 
 
 def answer(request: LineRequest, angles: Sequence[Degrees] | None, status: int, errors: int, version: str) -> bytes:
-    """Return the answer to a line.
-
-    angles: (azimuth, elevation), or None if unknown: then AZ and EL are not answered. status, errors, version:
-    values in the answers to GS, GE and VE.
-    """
+    """Return the answer to a line. angles: None if unknown, then AZ and EL are not answered; status, errors, version:
+    for GS, GE and VE."""
     values = {'GS': f'GS{status}', 'GE': f'GE{errors}', 'VE': f'VE{version}'}
     if angles is not None:
         values |= {'AZ': f'AZ{round(angles[0] % 360.0, 1) % 360.0:.1f}', 'EL': f'EL{angles[1]:.1f}'}

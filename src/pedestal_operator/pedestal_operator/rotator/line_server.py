@@ -10,14 +10,12 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeAlias, TypeVar
 
+from pedestal_common.stream.connection import listen
 from pedestal_common.stream.splitter import Overlong, Splitter
-from pedestal_operator import tcp_port
 
 MAX_UNREAD_BYTES = 65_536  # largest size of unread answers of a client [bytes]; further answers are dropped
 MAX_WAITING_LINES = 100  # largest number of waiting lines of a client; further input is left unread
-
-LINE_END_TIMEOUT_S = 0.05
-"""Time without a byte after which a complete command of a program without line ends counts as a line [s]."""
+LINE_END_TIMEOUT_S = 0.05  # time without a byte after which a complete command counts as a line [s]
 
 LINE_ENDS = b'\r\n'
 READ_CHUNK_BYTES = 65_536  # largest size of one read [bytes]
@@ -68,11 +66,8 @@ class Client:
         self._receive_time = time.monotonic()
 
     def end_line(self, is_complete: Callable[[str], bool]) -> None:
-        """Take the bytes of a program that never sends line ends after LINE_END_TIMEOUT_S as a line, if
-        is_complete(line).
-
-        This serves gpredict for Windows.
-        """
+        """Take the bytes of a program that never sends line ends, as gpredict for Windows, as a line after
+        LINE_END_TIMEOUT_S, if is_complete(line)."""
         line = self._splitter.rest.decode('ascii', 'replace')
         if (not self.lines and time.monotonic() - self._receive_time > LINE_END_TIMEOUT_S
                 and not self._has_line_ends and not self._splitter.skips and is_complete(line)):
@@ -101,11 +96,8 @@ AnyClient = TypeVar('AnyClient', bound=Client)
 
 
 class LineServer(Generic[AnyClient]):
-    """Clients of one TCP port, and of a serial device ('': none). Raises OSError.
-
-    kind: start of the names of the clients; most: largest number of clients; longest: largest length of a line
-    [bytes]; make_client(stream, name, longest) makes a client.
-    """
+    """Clients of one TCP port, and of a serial device ('': none). Raises OSError. kind: start of the names of the
+    clients; most: largest number of clients; longest: of a line [bytes]."""
     clients: list[AnyClient]
     refused_count: int
 
@@ -113,7 +105,7 @@ class LineServer(Generic[AnyClient]):
                  make_client: Callable[[Stream, str, int], AnyClient]) -> None:
         self._most, self._longest, self._make = most, longest, make_client
         self._selector, self.clients, self.refused_count = selectors.DefaultSelector(), [], 0
-        self._server, self._device_name = tcp_port.listen(address, port, most), f'{kind} {device}'
+        self._server, self._device_name = listen(address, port, most), f'{kind} {device}'
         self._server.setblocking(False)
         self._selector.register(self._server, selectors.EVENT_READ)
         self._prefix = f'{kind} {self.port} from '
@@ -172,7 +164,6 @@ class LineServer(Generic[AnyClient]):
         self._selector.register(stream, selectors.EVENT_READ, client)
 
     def _drop(self, client: AnyClient) -> None:
-        """Remove a client and close its connection."""
         self.clients.remove(client)
         self._selector.unregister(client.stream)
         client.stream.close()

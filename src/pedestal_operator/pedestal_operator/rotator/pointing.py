@@ -1,9 +1,8 @@
 """Pointing of the antenna by the set-points (directions) of a rotator program, as one steady motion.
 
 Such a program knows nothing of azimuth turns, rates and ships. It sends a direction about every 0.8 s, with an azimuth
-of 0 to 360 deg. Ashore, a set-point becomes a command `preset` on the nearest turn of the azimuth. On a ship, it
-becomes a command `slave` in earth angles. Successive set-points become one motion (SetPointFilter), which ends at the
-last set-point.
+of 0 to 360 deg. Ashore, a set-point becomes a command `preset` on the nearest turn of the azimuth; on a ship, a
+command `slave` in earth angles. Successive set-points become one motion, which ends at the last one.
 """
 import math
 from collections.abc import Sequence
@@ -14,30 +13,33 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
 from pedestal_common.quantities import Degrees, Pair, Seconds
 from pedestal_operator.remote_node import Remote
-from pedestal_operator.rotator.outcomes import OUTCOME_NO_POSITION, OUTCOME_OUT_OF_REACH, Refused
 from pedestal_operator.rotator.rotctld import Limits, turn
 from pedestal_operator.rotator.set_point_filter import SetPointFilter
 
+(OUTCOME_DONE, OUTCOME_REFUSED, OUTCOME_OUT_OF_REACH, OUTCOME_BUSY, OUTCOME_NO_REPLY,
+ OUTCOME_NO_POSITION) = range(6)
+"""BUSY: another client is in control. NO_POSITION: position or limits of the antenna are unknown."""
+
+
+class Refused(Exception):  # noqa: N818  no error of the server
+    """A refused request. reason: one line."""
+
+    def __init__(self, outcome: int, reason: str) -> None:
+        super().__init__(reason)
+        self.outcome, self.reason = outcome, reason
+
+
 SLAVE_DURATION_S = 3600.0
-"""Time for which a `slave` direction on a ship is valid [s].
+"""Time for which a `slave` direction is valid [s]: longer than a pass. A program may send one set-point only."""
 
-A program may send one set-point and then none for a long time. The antenna then keeps this direction for a time that
-is longer than a pass.
-"""
-
-MAX_ANGLE_AGE_S = 0.5
-"""Age after which angles and attitude are stale [s]; they are published at each step of the drive."""
+MAX_ANGLE_AGE_S = 0.5  # of angles and attitude, which are published at each step of the drive [s]
 
 MAX_AZIMUTH_DEG, MAX_SHIP_ELEVATION_DEG = 720.0, 180.0
-"""Largest azimuth of a set-point; largest elevation of a set-point on a ship [deg], in both directions.
-
-On a ship a set-point is an earth direction, to which the limits of the axes, which are deck angles, do not apply.
-"""
+"""Largest azimuth of a set-point; largest elevation on a ship [deg], where the limits of the axes do not apply."""
 
 ATTITUDE_TOPIC = 'ship/imu/data'  # topic of the attitude, which exists on a ship only
 
 LIMIT_PARAMETERS = tuple(f'{axis}.limits.{end}' for axis in topics.AXES for end in ('low', 'high'))
-"""Parameters of the control unit with the limits of the axes."""
 
 
 def _out_of_reach(name: str, angle: Degrees, low: Degrees, high: Degrees) -> Refused:
@@ -106,10 +108,7 @@ class Pointing:
         return azimuth, elevation
 
     def target(self, azimuth: Degrees, elevation: Degrees, now: Seconds) -> tuple[Degrees, Degrees]:
-        """Return the set-point (azimuth, elevation) for a direction at the time now, on the nearest turn.
-
-        Raises Refused if it is out of reach, or if the position or the limits of the antenna are unknown.
-        """
+        """Return the set-point (azimuth, elevation) for a direction, on the nearest turn. Raises Refused."""
         limits = self.limits
         low, high = (-MAX_SHIP_ELEVATION_DEG, MAX_SHIP_ELEVATION_DEG) if self.on_ship else limits.elevation
         self._check('azimuth', azimuth, -MAX_AZIMUTH_DEG, MAX_AZIMUTH_DEG)
@@ -147,13 +146,9 @@ class Pointing:
         self._filter = SetPointFilter()
 
     def _request(self, angles: Pair, rates: Sequence[float] | Pair = (0.0, 0.0), moves: Seconds = 0.0) -> str:
-        """Command angles [deg] that move at rates [deg/s] for the time `moves`. Return the number of the request.
-
-        On a ship the command is valid for SLAVE_DURATION_S.
-        """
+        """Command angles [deg] that move at rates [deg/s] for the time `moves`. Return the number of the request."""
         names = (*topics.AXES, *(f'{axis}_rate' for axis in topics.AXES))
         arguments = {**dict(zip(names, np.radians((*angles, *rates)))), 'moves': moves}
         if self.on_ship:
             arguments['holds'] = SLAVE_DURATION_S
         return self._remote.request(self._mode, arguments)
-

@@ -1,25 +1,22 @@
 """Requests and answers of the network protocol of rotctld, the rotator server of Hamlib. No sockets, no ROS here.
 
-The module is written for Hamlib 4.5.4 (rotctl -m 2, rotctld -m 1) and gpredict. rotctld itself reads word by word,
-this module reads line by line. There are three differences. A command with too few arguments is refused at once and
-does not take the next line. An unknown command is answered. Numbers must be finite.
+The module is written for Hamlib 4.5.4 and gpredict. rotctld itself reads word by word, this module reads line by line.
+A command with too few arguments is refused at once and does not take the next line. An unknown command is answered.
+Numbers must be finite.
 """
-
+import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from pedestal_common.quantities import Degrees
-from pedestal_operator.rotator.numerals import number
 
 MAX_LINE_BYTES = 256  # largest length of a line [bytes]
 
 (RESULT_OK, RESULT_INVALID, RESULT_NOT_IMPLEMENTED, RESULT_TIMEOUT, RESULT_IO_ERROR, RESULT_REJECTED,
- RESULT_NOT_AVAILABLE, RESULT_BUSY) = (0, -1, -4, -5, -6, -9, -11, -14)
-"""Results n of `RPRT n` (hamlib/rig.h)."""
+ RESULT_NOT_AVAILABLE, RESULT_BUSY) = (0, -1, -4, -5, -6, -9, -11, -14)  # n of `RPRT n` (hamlib/rig.h)
 
 ERROR_REASONS = {RESULT_INVALID: 'invalid arguments', RESULT_NOT_IMPLEMENTED: 'unknown command',
                  RESULT_NOT_AVAILABLE: 'an antenna control unit has no such function'}
-"""{result of a refused line: its reason in the log}."""
 
 
 class Row(NamedTuple):
@@ -35,14 +32,12 @@ COMMANDS = (Row('p', 'get_pos'), Row('P', 'set_pos', 2, True), Row('S', 'stop', 
             Row('1', 'dump_caps'), Row('', 'dump_state'), Row('q', 'quit'), Row('Q', 'quit'))
 
 COMMAND_LIST_LINES = tuple(('', f'{row.letter}: {row.name}' if row.letter else f'\\{row.name}') for row in COMMANDS)
-"""Lines of the answer to `?`: the commands."""
 
 SET_COMMANDS = tuple(row.name for row in COMMANDS if row.sets)  # commands that are answered by RPRT only
 
 UNAVAILABLE_COMMANDS = (*'wCUuXx3LlDdEeBAaVv', 'send_cmd', 'set_conf', 'set_func', 'get_func', 'set_parm', 'get_parm',
                         'dump_conf', 'lonlat2loc', 'loc2lonlat', 'dms2dec', 'dec2dms', 'dmmm2dec', 'dec2dmmm', 'qrb',
-                        'a_sp2a_lp', 'd_sp2d_lp', 'set_level', 'get_level')
-"""Commands of Hamlib's rotctld that have no function in an antenna control unit."""
+                        'a_sp2a_lp', 'd_sp2d_lp', 'set_level', 'get_level')  # without function here
 
 MOVE_DIRECTIONS = {2: (0, 1), 4: (0, -1), 8: (-1, 0), 16: (1, 0), 32: (-1, 1), 64: (1, 1), 128: (-1, -1), 256: (1, -1)}
 """{number: direction (azimuth, elevation)} of `move`."""
@@ -97,8 +92,14 @@ def read(line: str) -> Request | None:
     return Request(row.name, values, separator, header)
 
 
+def number(text: str) -> float:
+    """Return the number in a text, which is finite and has a decimal point or a decimal comma. Raises ValueError."""
+    if not re.fullmatch(r'[+-]?([0-9]{1,9}([.,][0-9]*)?|[.,][0-9]+)(e[+-]?[0-9]{1,2})?', text, re.IGNORECASE):
+        raise ValueError(f'{text!r} is not a number')
+    return float(text.replace(',', '.'))
+
+
 def _values(name: str, given: Sequence[str]) -> tuple[float, ...]:
-    """Return the arguments of a command as numbers. Raises ValueError."""
     if name == 'move':
         direction = _DIRECTION_NUMBERS.get(given[0].upper()) or int(given[0])
         speed = int(given[1])
@@ -162,4 +163,3 @@ def turn(azimuth: Degrees, near: Degrees, limits: tuple[Degrees, Degrees]) -> De
     low, high = limits
     candidates = [azimuth + 360.0 * k for k in range(-4, 5) if low <= azimuth + 360.0 * k <= high]
     return min(candidates, key=lambda candidate: abs(candidate - near), default=None)
-

@@ -27,12 +27,8 @@ class ServerParameters(parameters.Parameters):
 
 
 class ServerNode(Remote, Generic[AnyClient]):
-    """Node that serves its clients from a timer.
-
-    longest: largest length of a line [bytes]; make_client: see line_server.LineServer.
-    """
+    """Node that serves its clients from a timer. longest, make_client: see line_server.LineServer."""
     awaits = 'clients'
-    """What the node waits for, in the line that it logs when it is ready (Shell.awaits)."""
 
     parameters: ServerParameters
     _checked_arrival: Seconds | None
@@ -70,10 +66,7 @@ class ServerNode(Remote, Generic[AnyClient]):
                 self.get_logger().warning(f'{client.name}: {", ".join(filter(None, (client.gone, dropped)))}')
 
     def _release_lost_control(self) -> None:
-        """Release control that the control unit holds for a client of an earlier process of this server.
-
-        Each arrival of the diagnostics is checked once.
-        """
+        """Release control of a client of an earlier process. Each arrival of the diagnostics is checked once."""
         arrival = self.arrivals.get('acu')
         if arrival == self._checked_arrival:
             return
@@ -83,11 +76,8 @@ class ServerNode(Remote, Generic[AnyClient]):
             self.request('release')
 
     def refuse(self, client: AnyClient, command: str, line: str | None, reason: str) -> None:
-        """Log the refusal of a line of a client. line: its text, None for a line that was too long.
-
-        A reason that repeats is logged once. It is logged again after the next success of the command: the subclass
-        then deletes the reason from client.refusals.
-        """
+        """Log the refusal of a line of a client. line: None if it was too long. A reason that repeats is logged once,
+        and again after the next success of the command: the subclass then deletes the reason from client.refusals."""
         if client.refusals.get(command) != reason:
             client.refusals[command] = reason
             refused = 'refused a line' if line is None else f'refused {line!r}'

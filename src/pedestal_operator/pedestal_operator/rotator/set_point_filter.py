@@ -1,12 +1,7 @@
 """Filter that turns the set-points of a rotator program into one steady motion. No ROS here.
 
-    P, C    set-point, and point that is commanded to the antenna: (azimuth, elevation) [deg]
-    r       estimated rate of the set-points [deg/s]
-    T       time from one set-point to the next [s]
-    g, h    gains G and H of the filter
-
-Set-points at a regular pace are the measurements of a g-h filter
-(E. Brookner, Tracking and Kalman Filtering Made Easy, 1998, section 1.2):
+Set-points P at a regular pace T are the measurements of a g-h filter (E. Brookner, Tracking and Kalman Filtering Made
+Easy, 1998, section 1.2) with the rate r and the commanded point C, all [deg]:
 
     r = r + h ((P - P_before) / T - r)
     rate of C = r + g (P - C) / T

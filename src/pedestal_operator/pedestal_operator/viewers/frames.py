@@ -1,15 +1,8 @@
-"""Coordinate frames of the pedestal for viewers, from the earth to the beam. No ROS here.
+"""Coordinate frames of the pedestal for viewers, from the earth to the beam (x along it). No ROS here.
 
-The frames are right-handed, with z up and x ahead (REP 103, REP 105):
-
-    earth -> base_link       attitude of the deck; ashore the bow points north
-    base_link -> azimuth     turned by the azimuth
-    azimuth -> elevation     turned by the elevation
-    elevation -> beam        x along the beam
-
-All frames except the first are joints of `viewers/files/pedestal.urdf`, with the names of joint_states. The axis of a
-joint gives the direction of its angle. The azimuth turns about -z, clockwise from above. The elevation turns about -y,
-upwards.
+The frames are right-handed, with z up and x ahead (REP 103, REP 105); ashore the bow points north. All except the
+first are joints of `viewers/files/pedestal.urdf`, with the names of joint_states. The azimuth turns about -z,
+clockwise from above. The elevation turns about -y, upwards.
 """
 import importlib.resources
 import math
@@ -22,11 +15,9 @@ from pedestal_common.graph import topics
 from pedestal_common.quantities import Message, Nanoseconds, Radians, Xyz, Xyzw
 from pedestal_common.wire import messages
 
-VIEWER_FOLDER = importlib.resources.files('pedestal_operator.viewers') / 'files'
-"""Folder of the files that viewers open: layouts and the model of the pedestal."""
+VIEWER_FOLDER = importlib.resources.files('pedestal_operator.viewers') / 'files'  # for viewers
 
 PEDESTAL_URDF = (VIEWER_FOLDER / 'pedestal.urdf').read_text()
-"""Model of the pedestal, the text of the topic robot_description."""
 
 
 class Transform(NamedTuple):
@@ -66,7 +57,7 @@ PEDESTAL_JOINTS = joints()
 
 
 def _rotation(axis: Xyz, angle: Radians) -> Xyzw:
-    """Return the quaternion of a turn about a unit vector by an angle."""
+    """Return the quaternion of a turn about a unit vector."""
     sine = math.sin(0.5 * angle)
     return sine * axis[0], sine * axis[1], sine * axis[2], math.cos(0.5 * angle)
 
@@ -78,11 +69,7 @@ def of_deck(attitude: Sequence[float] = ASHORE_ATTITUDE) -> Transform:
 
 
 def of_pedestal(angles: Sequence[Radians], prefix: str = '') -> list[Transform]:
-    """Return the transforms from the deck to the beam.
-
-    angles: azimuth and elevation of joint_states; prefix: prefix of one of several beams, as in the frame
-    beam_2/azimuth.
-    """
+    """Return the transforms from the deck to the beam. prefix: of one of several beams, such as beam_2/."""
     turned = dict(zip(topics.AXES, angles))
     return [Transform(joint.parent if joint.parent == 'base_link' else prefix + joint.parent, prefix + joint.child,
                       joint.origin, _rotation(joint.axis or (0.0, 0.0, 0.0), turned.get(joint.name, 0.0)))

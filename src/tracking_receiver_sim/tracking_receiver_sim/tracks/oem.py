@@ -8,24 +8,19 @@ import numpy as np
 
 from pedestal_common.quantities import Floats, Seconds, Times
 from pedestal_common.text_files import csv_table
-from tracking_receiver_sim.ephemeris import frames, lines, states
-from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.tracks import frames, instant, lines, states
 
 ENTRY_PATTERN = re.compile(r'([A-Z0-9_]+)( *= *)(.*)', re.ASCII)
 FILE_SIGNATURE = 'CCSDS_OEM_VERS'
-STATE_LIMITS = {**dict.fromkeys('xyz', (-2e6, 2e6)), **dict.fromkeys(('vx', 'vy', 'vz'), (-100.0, 100.0))}
-"""{number in a line of data: (lowest, highest)} [km], [km/s]."""
+STATE_LIMITS = {**dict.fromkeys('xyz', (-2e6, 2e6)), **dict.fromkeys(('vx', 'vy', 'vz'), (-100.0, 100.0))}  # km, km/s
 LINE_COLUMN, DAY_COLUMN, SECOND_COLUMN, FIRST_NUMBER_COLUMN = range(4)
-"""Columns of a row: line in the file, days since 1970, seconds of the day, first number of STATE_LIMITS."""
 COLUMN_COUNT = FIRST_NUMBER_COLUMN + len(STATE_LIMITS)
-REPEATED_STATE = 'state that repeats the one above'
-"""Name, in the description of a file, of the states that repeat epoch and numbers of the state above."""
+REPEATED_STATE = 'state that repeats the one above'  # same epoch and numbers
 MAX_SEGMENTS = 1000  # largest number of segments of a file
 REQUIRED_KEYWORDS = ('OBJECT_NAME', 'OBJECT_ID', 'CENTER_NAME', 'REF_FRAME', 'TIME_SYSTEM')
 
 
 class _Entry(str):
-    """The value of a keyword."""
     line: int       # its place in the file
     column: int
 
@@ -39,17 +34,14 @@ _Entries: TypeAlias = dict[str, _Entry]     # {keyword: value}
 
 
 class _Block(NamedTuple):
-    """A segment of the file."""
     line: int       # at which the metadata end
     meta: _Entries
     rows: Floats    # (n, COLUMN_COUNT)
 
 
 def read(path: str, wanted: str = '') -> states.Ephemeris:
-    """Return the Ephemeris of one object in an OEM. Raises TableError.
-
-    wanted: name or international designator of the object; it may be empty for a file of one object.
-    """
+    """Return the Ephemeris of one object in an OEM. Raises TableError. wanted: name or international designator of the
+    object; it may be empty for a file of one object."""
     objects: dict[tuple[str, str], list[_Block]] = {}
     midnight = 0.0
     for block in _blocks(path):
@@ -116,12 +108,10 @@ def _blocks(path: str) -> Iterator[_Block]:
 
 
 def _table(rows: 'array.array[float]') -> Floats:
-    """Return the flat numbers of rows as an array (n, COLUMN_COUNT)."""
     return np.array(rows).reshape(-1, COLUMN_COUNT)
 
 
 def _row(path: str, line: int, text: str) -> tuple[float, ...]:
-    """Return the numbers of a line of data, in the columns of COLUMN_COUNT. Raises TableError."""
     # rest: the line with blanks in place of the epoch, so that errors name the right column.
     epoch = text.split(None, 1)[0]
     at = text.index(epoch)
@@ -130,10 +120,6 @@ def _row(path: str, line: int, text: str) -> tuple[float, ...]:
 
 
 def _segment(path: str, block: _Block, midnight: Seconds) -> states.Segment:
-    """Return the states of a block. Raises TableError.
-
-    midnight: instant of t = 0, see states.Ephemeris.
-    """
     meta, rows = block.meta, block.rows
     _one_of(path, meta, 'CENTER_NAME', ('EARTH',))
     frame, system = meta['REF_FRAME'].upper(), meta['TIME_SYSTEM'].upper()
@@ -147,7 +133,6 @@ def _segment(path: str, block: _Block, midnight: Seconds) -> states.Segment:
     _one_of(path, meta, 'TIME_SYSTEM', tuple(frames.TIME_SYSTEM_OFFSETS_S))
 
     def seconds(line: Floats, column: int, days: Floats, of_day: Floats) -> Times:
-        """Return the times t of days since 1970 and seconds of the day in lines of the file."""
         try:
             return frames.instants(system, days, of_day) - midnight
         except ValueError as error:
@@ -156,7 +141,6 @@ def _segment(path: str, block: _Block, midnight: Seconds) -> states.Segment:
                               'end of this minute') from None
 
     def bound(name: str) -> Seconds:
-        """Return the time t of a keyword."""
         entry = meta[name]
         day, second = lines.instant(path, entry.line, entry.column, name, entry)
         return float(seconds(np.array([entry.line]), entry.column, np.array([day]), np.array([second]))[0])
@@ -170,8 +154,7 @@ def _segment(path: str, block: _Block, midnight: Seconds) -> states.Segment:
 
 
 def _without_repetitions(path: str, table: Floats) -> Floats:
-    """Return the rows (line, time, numbers) without those that repeat time and numbers of the row above. Raises
-    TableError for different states at one time."""
+    """Remove repetitions of the row above. Raise TableError for different states at one time."""
     step = np.diff(table[:, 1:], axis=0)
     at_once = step[:, 0] == 0.0
     repeated = at_once & (step == 0.0).all(axis=1)
@@ -184,7 +167,6 @@ def _without_repetitions(path: str, table: Floats) -> Floats:
 
 
 def _interpolation(path: str, meta: _Entries) -> tuple[str, int | None]:
-    """Return (method, degree); '' and None if the file gives none."""
     if 'INTERPOLATION' not in meta:
         return '', None
     method = _one_of(path, meta, 'INTERPOLATION', states.INTERPOLATION_METHODS)
@@ -201,7 +183,6 @@ def _interpolation(path: str, meta: _Entries) -> tuple[str, int | None]:
 
 
 def _one_of(path: str, meta: _Entries, name: str, allowed: Sequence[str]) -> str:
-    """Return the value of a keyword in capitals. Raises TableError unless it is one of the allowed values."""
     entry = meta[name]
     if entry.upper() not in allowed:
         raise lines.wrong(path, entry.line, entry.column, f'{name} = {entry!s:.40}: must be {" or ".join(allowed)}')

@@ -1,9 +1,7 @@
-"""Reader of STK ephemeris files (.e) for orbits about the earth.
+"""Reader of STK ephemeris files (.e) for orbits about the earth. The case of keywords does not matter, as in STK.
 
-The states are EphemerisTimePosVel, EphemerisTimePosVelAcc or EphemerisTimePos. The case of keywords does not matter,
-as in STK. If two consecutive states have the same time, the first one ends a segment and the second one begins the
-next segment. Blocks inside the ephemeris (for example SegmentBoundaryTimes) and the covariance after the states are
-passed over.
+If two consecutive states have the same time, the first one ends a segment and the second one begins the next segment.
+Blocks inside the ephemeris and the covariance after the states are passed over.
 """
 import array
 import datetime
@@ -15,18 +13,14 @@ import numpy as np
 
 from pedestal_common.quantities import Floats, Meters, Seconds
 from pedestal_common.text_files import csv_table
-from tracking_receiver_sim.ephemeris import lines, states
-from tracking_receiver_sim.track import dates, instant
+from tracking_receiver_sim.tracks import instant, lines, states
 
 FILE_SIGNATURE_PATTERN = re.compile(r'stk\.v\.\d+', re.IGNORECASE)
 FRAME_NAMES = {'fixed': 'ITRF', 'j2000': 'EME2000', 'icrf': 'ICRF', 'temeofdate': 'TEME', 'trueofdate': 'TOD'}
-"""{CoordinateSystem: frame of frames.earth_fixed}."""
 METRES_PER_UNIT = {'meters': 1.0, 'kilometers': 1000.0}  # {DistanceUnit: its length [m]}
-METHOD_NAMES = {'lagrange': 'LAGRANGE', 'hermite': 'HERMITE'}
-"""{InterpolationMethod: method of states.Segment}; LagrangeVOP, which interpolates the difference to a Kepler orbit,
-is refused."""
+METHOD_NAMES = {'lagrange': 'LAGRANGE', 'hermite': 'HERMITE'}  # LagrangeVOP, relative to a Kepler orbit, is refused
 STATE_KEYWORDS = {'ephemeristimepos': False, 'ephemeristimeposvel': True, 'ephemeristimeposvelacc': True}
-"""{keyword before the states: True if the states have velocities}."""
+"""True if the states have velocities."""
 GEODETIC_MARK = 'lla'  # part of the keyword before states in latitude, longitude and height
 READ_KEYWORDS = ('numberofephemerispoints', 'scenarioepoch', 'interpolationmethod', 'interpolationsamplesm1',
                  'interpolationorder', 'centralbody', 'coordinatesystem', 'distanceunit')
@@ -79,7 +73,6 @@ def read(path: str, _wanted: str = '') -> states.Ephemeris:
 
 
 def _limits(path: str, head: _Head, with_velocity: bool) -> tuple[Meters, dict[str, tuple[float, float]]]:
-    """Return (unit, limits of the numbers in a line)."""
     unit = _choice(path, head, 'distanceunit', METRES_PER_UNIT, 'meters')
     limits = {'time': (-1e9, 1e9), **dict.fromkeys('xyz', (-2e9 / unit, 2e9 / unit))}
     if with_velocity:
@@ -88,8 +81,6 @@ def _limits(path: str, head: _Head, with_velocity: bool) -> tuple[Meters, dict[s
 
 
 def _ephemeris(path: str, head: _Head, table: Floats) -> states.Ephemeris:
-    """Return the Ephemeris from the keywords and a table. The table has the columns of states.segment, and its times
-    count from ScenarioEpoch. Raises TableError."""
     if 'scenarioepoch' not in head:
         raise csv_table.TableError(f'{path}: ScenarioEpoch is missing')
     begin, second = _epoch(path, *head['scenarioepoch'])
@@ -113,11 +104,11 @@ def _ephemeris(path: str, head: _Head, table: Floats) -> states.Ephemeris:
 
 
 def _epoch(path: str, line: int, column: int, text: str) -> tuple[Seconds, Seconds]:
-    """Return (instant of midnight, seconds of the day) of a UTC in the form of STK, as 1 Jun 2026 12:00:00.0."""
+    """Return (instant of midnight, seconds of the day) of a UTC such as 1 Jun 2026 12:00:00.0."""
     match = EPOCH_PATTERN.fullmatch(' '.join(text.lower().split()))
     try:
         day, month, year, hours, minutes, seconds = match.groups() if match else [''] * 6
-        date = datetime.date(int(year), dates.MONTH_NAMES.index(month) + 1, int(day))
+        date = datetime.date(int(year), instant.MONTH_NAMES.index(month) + 1, int(day))
         if not lines.YEAR_LIMITS[0] <= date.year <= lines.YEAR_LIMITS[1]:
             raise ValueError
         days, second = ((date - datetime.date(1970, 1, 1)).days,
@@ -130,7 +121,6 @@ def _epoch(path: str, line: int, column: int, text: str) -> tuple[Seconds, Secon
 
 
 def _choice(path: str, head: _Head, name: str, choices: Mapping[str, _R], default: str) -> _R:
-    """Return choices[value] of a keyword. Raises TableError for a value that is no key of choices {text: result}."""
     line, column, text = head.get(name, (0, 0, default))
     if text.lower() not in choices:
         raise lines.wrong(path, line, column, f'{name} = {text!r:.40}: must be {" or ".join(choices)}')
@@ -138,10 +128,7 @@ def _choice(path: str, head: _Head, name: str, choices: Mapping[str, _R], defaul
 
 
 def _degree(path: str, head: _Head, method: str) -> int | None:
-    """Return the degree of the polynomials, None if the file gives none. Raises TableError.
-
-    InterpolationSamplesM1 is the number of states of a polynomial minus 1.
-    """
+    """InterpolationSamplesM1 is the number of states of a polynomial minus 1."""
     name = next((name for name in ('interpolationsamplesm1', 'interpolationorder') if name in head), '')
     if not name:
         return None

@@ -1,31 +1,27 @@
-"""Orbit of a file: states (time, position, velocity) in segments, which the readers oem and stk make.
+"""Orbit of a file: states in segments, and the interpolation HERMITE or LAGRANGE of CCSDS 502.0 between them.
 
-A segment has a frame, and the degree of the polynomials that join its states.
+The polynomial HERMITE of degree d runs through the positions and velocities of (d + 1) / 2 states, LAGRANGE through
+the positions of d + 1 states. These states lie about the wanted time as evenly as the ends of the segment allow. scipy
+evaluates the form of Newton with divided differences (Krogh, Math. Comp. 24 (1970) 185-190). The variable u, the time
+scaled to -1 ... 1 over the states, takes the place of t, because this reduces the rounding errors.
 """
-
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import KroghInterpolator
 
 from pedestal_common.quantities import Bools, Floats, Ints, Seconds, Times, Vectors3
 from pedestal_common.text_files import csv_table
 
-INTERPOLATION_METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')
-"""Methods that a file may name; LINEAR is LAGRANGE of degree 1."""
+INTERPOLATION_METHODS = ('HERMITE', 'LAGRANGE', 'LINEAR')  # LINEAR is LAGRANGE of degree 1
 DEGREE_LIMITS = 1, 19  # range of the degree of a polynomial
 DEFAULT_INTERPOLATION = 'HERMITE', 7  # method and degree of the interpolation if the file gives none
-
-RADIUS_LIMITS_M = 6.3e6, 2e9
-"""Range of the distance from the centre of the earth [m]; a lower value points to another unit."""
-
+RADIUS_LIMITS_M = 6.3e6, 2e9  # from the centre of the earth [m]; a lower value points to another unit
 GAP_STEP_RATIO = 3.0  # ratio of a step in time to each of its neighbours above which the step is a gap
 
 
 def gaps(t: Times) -> Bools:
-    """Return a mask (n - 1,) of the steps between the times t: True for a gap.
-
-    A gap is longer than GAP_STEP_RATIO times each of its neighbours.
-    """
+    """Return True for each step between times that is longer than GAP_STEP_RATIO times each of its neighbours."""
     step = np.diff(t)
     longest = np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0))
     return (step > GAP_STEP_RATIO * longest) & (longest > 0.0)
@@ -38,7 +34,7 @@ class Segment(NamedTuple):
     r: Vectors3         # positions in `frame` [m]
     v: Vectors3 | None  # velocities in `frame` [m/s], None if the file has none; HERMITE needs them
     frame: str          # name of a frame that frames.earth_fixed supports
-    method: str         # HERMITE or LAGRANGE, see interpolation.py
+    method: str         # HERMITE or LAGRANGE, see interpolated
     degree: int         # of the polynomials
     begin: Seconds      # usable range of t
     end: Seconds
@@ -52,7 +48,7 @@ class Segment(NamedTuple):
 class Ephemeris(NamedTuple):
     """The orbit of one object."""
     path: str
-    midnight: Seconds               # instant of t = 0, in the time scale of track files (module track.instant)
+    midnight: Seconds               # instant of t = 0, in the time scale of track files (module instant)
     segments: tuple[Segment, ...]   # in order of time
     description: str                # format, number of states, frame and interpolation
 
@@ -76,9 +72,7 @@ def segment(path: str, first_line: int, table: Floats, frame: str, method: str, 
             begin: Seconds | None = None, end: Seconds | None = None) -> Segment:
     """Return a Segment of a table (n, 8) of line, t, x, y, z [m], vx, vy, vz [m/s]; (n, 5) without velocities.
 
-    first_line: line in which the segment begins; method, degree: '' and None if the file gives none; begin, end:
-    usable range of t, None: all states. Raises TableError if the time does not grow, a state is outside
-    RADIUS_LIMITS_M, or the states are too few.
+    first_line: of the segment; method, degree: '' and None if not given. Raises TableError.
     """
     if not len(table):
         raise csv_table.TableError(f'{path}: line {first_line}: the segment that begins here has no state')
@@ -109,3 +103,25 @@ def segment(path: str, first_line: int, table: Floats, frame: str, method: str, 
                                    f'be at least {max(2, result.nodes)} for {result.method} of degree '
                                    f'{result.degree}')
     return result
+
+
+def interpolated(segment: Segment, t: Times) -> tuple[Vectors3, Vectors3]:
+    """Return position [m] and velocity [m/s] in the frame of a segment at times t within the segment."""
+    # middles: mean time of each group of `nodes` consecutive states; first: index of the first state of the group
+    # whose middle is nearest to t.
+    nodes = segment.nodes
+    middles = np.convolve(segment.t, np.full(nodes, 1.0 / nodes), 'valid')
+    after = np.searchsorted(middles, t).clip(1, max(len(middles) - 1, 1))
+    first = np.where(t - middles[after - 1] <= middles[after.clip(0, len(middles) - 1)] - t, after - 1, after)
+    first = first.clip(0, len(middles) - 1)
+    r, v = np.empty((2, len(t), 3))
+    for i in np.unique(first):
+        covered, chosen = first == i, slice(i, i + nodes)
+        centre, half = 0.5 * (segment.t[i] + segment.t[i + nodes - 1]), 0.5 * (segment.t[i + nodes - 1] - segment.t[i])
+        u, values = (segment.t[chosen] - centre) / half, segment.r[chosen]
+        if segment.method == 'HERMITE':
+            assert segment.v is not None
+            u, values = np.repeat(u, 2), np.stack((values, half * segment.v[chosen]), axis=1).reshape(-1, 3)
+        r[covered], scaled = KroghInterpolator(u, values).derivatives((t[covered] - centre) / half, 2)
+        v[covered] = scaled / half
+    return r, v

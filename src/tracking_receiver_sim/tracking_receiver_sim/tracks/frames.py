@@ -1,11 +1,8 @@
 """Conversion of orbits from other frames to the earth-fixed frame, and of the times of files to instants.
 
-An instant is the time of track files: TAI minus 37 s, in seconds since 1970. It counts leap seconds, and equals UTC
-from 2017 on (module track.instant). TAI is the international atomic time.
-
 The rotations are those of skyfield: IAU 2006 precession and IAU 2000A nutation, with UT1 - UTC and leap seconds from
 its built-in tables. They omit the polar motion (up to 0.3", 9 m on the ground). Every ITRF is taken as WGS84; the
-difference is some centimetres. For dates after the end of the tables of UT1, an orbit may be wrong by some metres.
+difference is some centimetres. After the end of the tables of UT1, an orbit may be wrong by some metres.
 """
 import re
 from collections.abc import Callable
@@ -15,13 +12,12 @@ import numpy as np
 from pedestal_common.geometry.geodesy import EARTH_RATE
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Floats, Times, Vectors3
-from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.tracks import instant
 
 EARTH_FIXED_PATTERN = re.compile(r'ITRF(?:-?\d{2}|-?\d{4})?|WGS84')
 INERTIAL_FRAMES = ('EME2000', 'GCRF', 'ICRF', 'TEME', 'TOD')
 TIME_SYSTEM_OFFSETS_S = {'UTC': None, 'TAI': 0.0, 'TT': 32.184, 'TDB': 32.184, 'GPS': -19.0}
-"""{time system: time system minus TAI [s]}; None for UTC, whose offset varies.
-TDB differs from TT by up to 2 ms, see instants."""
+"""{time system: time system minus TAI [s]}; None for UTC, whose offset varies. TDB differs from TT by up to 2 ms."""
 
 NUTATION_BATCH_SIZE = 2000  # number of instants whose nutation is computed at once: each takes 30 kB
 
@@ -37,11 +33,8 @@ def names() -> str:
 
 
 def instants(system: str, days: Floats, seconds: Times) -> Times:
-    """Return the instants of days since 1970 and seconds of the day in a time system.
-
-    system: key of TIME_SYSTEM_OFFSETS_S. Raises ValueError(index of the row) if the seconds of the day are 86400 or
-    more on a day without a leap second. Only UTC has leap seconds.
-    """
+    """Return the instants of days since 1970 and seconds of the day in a time system, of which UTC has leap seconds.
+    Raises ValueError(index of the row) for second 86400 of a day without one."""
     offset = TIME_SYSTEM_OFFSETS_S[system]
     if offset is None:
         late = np.flatnonzero(seconds >= SECONDS_PER_DAY)
@@ -60,10 +53,7 @@ def instants(system: str, days: Floats, seconds: Times) -> Times:
 
 
 def earth_fixed(frame: str, time: Times, r: Vectors3, v: Vectors3) -> tuple[Vectors3, Vectors3]:
-    """Return earth-fixed positions [m] and velocities relative to the rotating earth [m/s].
-
-    r, v: positions and velocities in a supported frame; time: instants.
-    """
+    """Return earth-fixed positions [m] and velocities relative to the rotating earth [m/s] at instants."""
     if EARTH_FIXED_PATTERN.fullmatch(frame):
         return r, v
     positions, velocities = np.empty_like(r), np.empty_like(v)
@@ -76,7 +66,7 @@ def earth_fixed(frame: str, time: Times, r: Vectors3, v: Vectors3) -> tuple[Vect
 
 
 def _to_fixed(frame: str, time: Times) -> Floats:
-    """Return the rotations (3, 3, n) from a frame to the earth-fixed frame at instants."""
+    """Return the rotations (3, 3, n) from a frame."""
     from skyfield.framelib import ICRS_to_J2000, itrs, true_equator_and_equinox_of_date
     from skyfield.sgp4lib import TEME
     days = np.floor(time / SECONDS_PER_DAY)

@@ -1,4 +1,4 @@
-"""Instants, the times of track files: seconds since 1970 that count leap seconds.
+"""Instants, the times of track files: seconds since 1970 that count leap seconds, from dates in many notations.
 
 Because leap seconds count, the difference of two instants is the time between them. An instant is TAI - 37 s. From
 2017 on it equals the seconds since 1970 of computers, which omit leap seconds. The table of leap seconds is that of
@@ -16,10 +16,41 @@ from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Seconds, Texts
 from pedestal_common.text_files import csv_table
 from pedestal_common.text_files.files import FilePath
-from tracking_receiver_sim.track import dates
 
 if TYPE_CHECKING:   # slow to import
     from skyfield.timelib import Timescale
+
+MONTH_NAMES = 'jan feb mar apr may jun jul aug sep oct nov dec'.split()
+_FRACTION = r'(?:[.,](?P<fraction>\d{0,9}))?'
+_CLOCK = rf'(?P<hour>\d{{1,2}}):(?P<minute>\d\d)(?::(?P<second>\d\d))?{_FRACTION}'
+_BASIC_CLOCK = rf'(?P<hour>\d\d)(?P<minute>\d\d)(?P<second>\d\d){_FRACTION}'
+_MONTH = rf'(?P<month_name>{"|".join(MONTH_NAMES)})[a-z]*'
+DATE_PATTERNS = tuple(re.compile(f'{date}(?P<zone> ?(?:Z|UTC|[+-]\\d\\d:?\\d\\d))?', re.ASCII | re.IGNORECASE)
+                      for date in (rf'(?P<year>\d{{4}})-(?P<month>\d\d)-(?P<day>\d\d)(?:T| ){_CLOCK}',
+                                   rf'(?P<year>\d{{4}})(?P<month>\d\d)(?P<day>\d\d)(?:T| ){_BASIC_CLOCK}',
+                                   rf'(?P<year>\d{{4}})/(?P<month>\d\d)/(?P<day>\d\d) {_CLOCK}',
+                                   rf'(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>\d{{4}}) {_CLOCK}',
+                                   rf'(?:A\.D\. )?(?P<year>\d{{4}})-{_MONTH}-(?P<day>\d\d) {_CLOCK}',
+                                   rf'(?P<day>\d{{1,2}}) {_MONTH} (?P<year>\d{{4}}) {_CLOCK}'))
+"""ISO 8601, its basic format (20180723T100000), year/month/day, day.month.year, JPL Horizons (2018-Jul-23), STK, the
+Systems Tool Kit (23 Jul 2018)."""
+AMBIGUOUS_PATTERN = re.compile(r'\d{1,2}[/-]\d{1,2}[/-](?:\d{4}|\d\d)\b.*', re.ASCII)  # order differs by country
+DATE_EXAMPLES = ('2018-07-23T10:00:00Z, 2018/07/23 10:00:00, 23.07.2018 10:00:00, 2018-Jul-23 10:00:00 or '
+                 '23 Jul 2018 10:00:00')
+
+
+def iso_date(text: str | None) -> str:
+    """Return a date with a time of day in ISO 8601, with the zone as written; another text with single spaces."""
+    words = ' '.join((text or '').split())
+    match = next(filter(None, (pattern.fullmatch(words) for pattern in DATE_PATTERNS)), None)
+    if not match:
+        return words
+    found = match.groupdict()
+    month = found.get('month') or 1 + MONTH_NAMES.index(found['month_name'].lower())
+    fraction, zone = found['fraction'], (found['zone'] or '').upper()
+    return (f'{found["year"]}-{int(month):02}-{int(found["day"]):02}T{int(found["hour"]):02}:{found["minute"]}:'
+            f'{found["second"] or "00"}{"." + fraction if fraction else ""}{zone}')
+
 
 UNIX_TIME_LIMITS_S = (0.0, 4102444800.0)  # range of the seconds since 1970 without leap seconds: until 2100
 TAI_OFFSET_S = 37.0  # TAI minus an instant [s]: TAI - UTC since 2017
@@ -27,7 +58,6 @@ UNIX_EPOCH_JULIAN_DATE = 2_440_587.5  # julian date of 1970-01-01T00:00 UTC
 
 ISO_TIME_PATTERN = re.compile(
     r'(\d{4}-\d\d-\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,9}))?(?: ?(?:Z|UTC|([+-])(\d\d):?(\d\d)))?', re.ASCII)
-"""Date and time of day in ISO 8601, with or without a zone."""
 
 FINE_UNIX_TIME_PATTERN = re.compile(r'[1-9](?:\d{12}|\d{15})(?:\.0*)?', re.ASCII)
 """Milliseconds or microseconds since 1970, of the years 2001 to 2286. Read as seconds, such a number is no date."""
@@ -66,13 +96,15 @@ def second_of_day(hours: int, minutes: int, seconds: Seconds) -> Seconds:
     return 3600.0 * hours + 60.0 * minutes + seconds
 
 
-def seconds(path: FilePath, line: int, name: str, text: str | None) -> Seconds:
-    """Return the instant of a text. Raises TableError.
+def is_dated(text: str) -> bool:
+    """Return True for a date, and for milliseconds or microseconds since 1970."""
+    return bool(ISO_TIME_PATTERN.fullmatch(iso_date(text)) or FINE_UNIX_TIME_PATTERN.fullmatch(text))
 
-    The text is a date, see `dates` (without a zone: UTC), or a number of seconds since 1970 without leap seconds. A
-    number of 13 digits is in milliseconds, and one of 16 digits in microseconds.
-    """
-    text = dates.iso(text)
+
+def seconds(path: FilePath, line: int, name: str, text: str | None) -> Seconds:
+    """Return the instant of a date (without a zone: UTC), or of seconds since 1970 without leap seconds. Raises
+    TableError. A number of 13 digits is in milliseconds, one of 16 digits in microseconds."""
+    text = iso_date(text)
     match = ISO_TIME_PATTERN.fullmatch(text)
     try:
         if not match:
@@ -85,14 +117,13 @@ def seconds(path: FilePath, line: int, name: str, text: str | None) -> Seconds:
     except csv_table.TableError:
         raise
     except ValueError:
-        order = 'the order of day and month is unknown: ' if dates.AMBIGUOUS_PATTERN.fullmatch(text) else ''
+        order = 'the order of day and month is unknown: ' if AMBIGUOUS_PATTERN.fullmatch(text) else ''
         raise csv_table.TableError(f'{path}: line {line}: {name} = {text!r:.60}: {order}must be UTC as ISO 8601, for '
-                                   f'example {dates.DATE_EXAMPLES}, or as seconds since 1970') from None
+                                   f'example {DATE_EXAMPLES}, or as seconds since 1970') from None
 
 
 def _of_iso(date: str, hours: str, minutes: str, second: str, fraction: str | None, sign: str | None,
             zone_hours: str | None, zone_minutes: str | None) -> Seconds:
-    """Return the instant of the groups of ISO_TIME_PATTERN. Raises ValueError."""
     leap = int(second) == 60
     zone = f'{sign}{zone_hours}:{zone_minutes}' if sign else '+00:00'
     utc = datetime.datetime.fromisoformat(f'{date}T{hours}:{minutes}:{59 if leap else second}{zone}').timestamp()
@@ -117,10 +148,7 @@ def iso(value: Seconds) -> str:
 
 
 def utc_texts(begin: np.datetime64, passed: NDArray[np.timedelta64]) -> Texts:
-    """Return ISO 8601 to the microsecond of times, UTC.
-
-    begin: UTC, in us; passed: times after begin, growing, in us.
-    """
+    """Return ISO 8601 to the microsecond of times, UTC: `passed`, growing, after begin."""
     times: NDArray[np.datetime64] = np.add(begin, passed)
     texts = np.datetime_as_string(times)
     first, last = (int(time.astype('M8[D]').astype(int)) for time in (begin, times[-1])) if len(times) else (0, 0)

@@ -1,9 +1,8 @@
 """Reader of logs of NMEA 0183: fixes from the sentences GGA (time of day, position, height), the date from RMC.
 
-The reader passes over other sentences. The height above the ellipsoid is altitude + geoidal separation. Text before
-the $ of a line and behind the checksum is passed over: the time of a logger, a tag block, `NMEA,` and the time of
-Android. Cut sentences, sentences with a wrong checksum, and GGA without fix, time or altitude (2D) are passed over and
-counted.
+The height above the ellipsoid is altitude + geoidal separation. Text before the $ of a line and behind the checksum is
+passed over, such as the time of a logger. Cut sentences, sentences with a wrong checksum, and GGA without fix, time or
+altitude (2D) are passed over and counted.
 """
 import contextlib
 import datetime
@@ -17,12 +16,10 @@ import pynmea2
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Degrees, Seconds
 from pedestal_common.text_files import content, csv_table
-from tracking_receiver_sim.track import fixes, instant
+from tracking_receiver_sim.tracks import fixes, instant
 
 SENTENCE_PATTERN = re.compile(r'\$[A-Z]{2}([A-Z]{3}),[^$*]*(\*[0-9A-Fa-f]{2})?', re.ASCII)
-"""A sentence with its type and its checksum."""
 CUT_SENTENCE_PATTERN = re.compile(r'[^$!]*,[^$!]*\*[0-9A-Fa-f]{2}', re.ASCII)
-"""The end of a sentence whose beginning is missing."""
 TIME_PATTERN = re.compile(r'(\d\d)(\d\d)(\d\d(?:\.\d*)?)', re.ASCII)
 MIN_GGA_FIELDS = 11  # least number of fields of a GGA: up to the geoidal separation
 MAX_LISTED_TYPES = 8  # number of types of sentences that an error lists
@@ -30,11 +27,8 @@ MAX_LINE_CHARS = 1024  # largest number of characters of a line; the standard al
 
 
 def rows(path: str, log: fixes.Log) -> Iterator[fixes.Fix]:
-    """Yield the fixes of a log.
-
-    The log receives the description of the file. The time is an instant if an RMC has a date, otherwise it counts from
-    midnight. The names of the aircraft are (), because NMEA has none. Raises TableError.
-    """
+    """Yield the fixes of a log. Raises TableError. The time is an instant if an RMC has a date, otherwise it counts
+    from midnight. NMEA has no names of aircraft."""
     first_day = _first_day(path)
     log.form, log.time_name, log.dated = 'NMEA', 'time', first_day is not None
     clock, without_separation = _Clock(first_day), False
@@ -64,10 +58,6 @@ def is_log(beginning: str) -> bool:
 
 
 def _sentences(path: str, log: fixes.Log) -> Iterator[tuple[int, pynmea2.NMEASentence]]:
-    """Yield (line, sentence) of each RMC and GGA with a fix; a GGA also has time and altitude.
-
-    The counts of damaged sentences and of other GGA go into the log.
-    """
     types: Counter[str] = Counter()
     with_checksum = False
     for line, text in _lines(path):
@@ -98,13 +88,12 @@ def _sentences(path: str, log: fixes.Log) -> Iterator[tuple[int, pynmea2.NMEASen
 
 
 def _missing(gga: pynmea2.NMEASentence) -> str:
-    """Return the part that a GGA lacks, '' if it has all."""
     parts = {'a fix': gga.gps_qual and gga.lat and gga.lon, 'time': gga.data[0], 'altitude': gga.altitude is not None}
     return next((name for name, value in parts.items() if not value), '')
 
 
 def _lines(path: str) -> Iterator[tuple[int, str]]:
-    """Yield (number, text) of each line; noise between the sentences becomes replacement characters."""
+    """Noise between the sentences becomes replacement characters."""
     with csv_table.stream(path) as stream:
         encoding = content.marked_encoding(stream.read(content.MAX_MARK_BYTES)) or 'ascii'
         stream.seek(0)
@@ -117,10 +106,7 @@ def _lines(path: str) -> Iterator[tuple[int, str]]:
 
 
 class _Clock:
-    """Time of consecutive sentences, which hold only the time of day.
-
-    Where the time of day jumps by more than half a day, midnight lies between two sentences.
-    """
+    """Time of consecutive sentences, which hold only the time of day. A jump by more than half a day is midnight."""
     first: int | None       # day since 1970 of the first sentence, None if it is unknown
     days: int               # midnights since the first sentence
     leaps: int              # leap seconds (235960) since the first sentence, for a log without a date
@@ -130,11 +116,9 @@ class _Clock:
         self.first, self.days, self.leaps, self._last = first, 0, 0, None
 
     def advance(self, second: Seconds, day: int | None = None) -> Seconds:
-        """Move on to a sentence. Return its instant (see track.instant), without a date the time since midnight.
-
-        second: of the day; day: since 1970, if the sentence has a date. A date moves the time only forward. Raises
-        ValueError for a leap second on a day that has none.
-        """
+        """Move on to a sentence. Return its instant, without a date the time since midnight. second: of the day; day:
+        since 1970, if the sentence has a date, which moves the time only forward. Raises ValueError for a leap second
+        on a day that has none."""
         if self._last is not None:
             midnights = round((self._last - second) / SECONDS_PER_DAY)
             # A last second of 86400 or more was a leap second.
@@ -149,10 +133,8 @@ class _Clock:
 
 
 def _first_day(path: str) -> int | None:
-    """Return the day since 1970 of the first sentence with a fix, None if no RMC has a date.
-
-    The date of an RMC belongs to the time of the same RMC, which may lie on the other side of midnight.
-    """
+    """Return the day since 1970 of the first sentence with a fix, None if no RMC has a date. The date of an RMC
+    belongs to the time of the same RMC, which may lie on the other side of midnight."""
     clock = _Clock()
     for _, sentence in _sentences(path, fixes.Log()):
         with contextlib.suppress(ValueError):
@@ -163,13 +145,11 @@ def _first_day(path: str) -> int | None:
 
 
 def _day(sentence: pynmea2.NMEASentence) -> int | None:
-    """Return the day since 1970 of an RMC, None without a valid date."""
     date = sentence.datestamp
     return (date - datetime.date(1970, 1, 1)).days if isinstance(date, datetime.date) else None
 
 
 def _second_of_day(sentence: pynmea2.NMEASentence) -> Seconds:
-    """Return the seconds since midnight of a sentence. Raises ValueError."""
     match = TIME_PATTERN.fullmatch(sentence.data[0])
     if not match:
         raise ValueError(sentence.data[0])
@@ -177,10 +157,7 @@ def _second_of_day(sentence: pynmea2.NMEASentence) -> Seconds:
 
 
 def _angle(path: str, line: int, name: str, text: str, side: str, sides: str, limit: Degrees) -> Degrees:
-    """Return the angle of a text ddmm.mm (degrees and minutes) and its side. Raises TableError.
-
-    sides: letters of the positive and of the negative side, such as NS; limit: largest angle.
-    """
+    """Return the angle of a text ddmm.mm (degrees and minutes); sides: letters of + and -, such as NS."""
     value = csv_table.number(path, line, name, text, 0.0, 100.0 * limit)
     degrees, minutes = divmod(value, 100.0)
     if minutes >= 60.0 or side not in tuple(sides):

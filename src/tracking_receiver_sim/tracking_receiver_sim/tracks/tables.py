@@ -1,9 +1,4 @@
-"""Reader of flights as CSV. The names of the columns select the layout of a file, a row of CSV_LAYOUTS.
-
-    Flightradar24               Timestamp, Position ("latitude,longitude"), Altitude: in feet
-    traffic (ADS-B)             timestamp, latitude, longitude, geoaltitude or altitude: in feet
-    OpenSky state vectors       time, lat, lon, geoaltitude or baroaltitude: in metres
-    CSV                         time, latitude, longitude, altitude: the unit in the name, as in altitude_m
+"""Reader of flights as CSV. The names of the columns select a row of CSV_LAYOUTS (docs/tracks.md).
 
 The geometric altitude of ADS-B is above the ellipsoid. If a file has only the barometric altitude, it is taken
 instead, with a remark in the log. Rows of ADS-B logs without a position are passed over and counted.
@@ -14,13 +9,11 @@ from typing import NamedTuple
 
 from pedestal_common.quantities import Meters
 from pedestal_common.text_files import columns, csv_table
-from tracking_receiver_sim.track import times
-from tracking_receiver_sim.track.fixes import Fix, Log
+from tracking_receiver_sim.tracks import times
+from tracking_receiver_sim.tracks.fixes import Fix, Log
 
 ALTITUDE_LIMITS_FT_IN_M = -3000.0 * columns.METRES_PER_FOOT, 500_000.0 * columns.METRES_PER_FOOT
-ALTITUDE_LIMITS_M = -1000.0, 150_000.0
-"""Ranges of the altitudes of ADS-B [m]: for files in feet, and for files in metres."""
-
+ALTITUDE_LIMITS_M = -1000.0, 150_000.0  # of ADS-B [m], in feet and in metres
 EMPTY_CELL_TEXTS = ('', 'nan', 'none', 'null')  # texts of a cell without a value, in lower case
 
 IDENTITY_NAMES = ('icao24', 'callsign')
@@ -28,8 +21,7 @@ LATITUDE = columns.Quantity('latitude_deg', dict.fromkeys(('latitude', 'lat'), '
 LONGITUDE = columns.Quantity('longitude_deg', dict.fromkeys(('longitude', 'lon', 'lng', 'long'), 'deg'), 'deg')
 ALTITUDE = columns.Quantity('altitude_m', dict.fromkeys(('altitude', 'alt', 'height', 'elevation', 'ele',
                                                          'geoaltitude'), ''), 'm')
-POSITION = columns.Quantity('position', {'position': 'deg'}, 'deg')
-"""Quantities of a flight; an altitude must name its unit."""
+POSITION = columns.Quantity('position', {'position': 'deg'}, 'deg')  # an altitude must name its unit
 
 
 class CsvLayout(NamedTuple):
@@ -53,10 +45,7 @@ class CsvLayout(NamedTuple):
 
 
 def _named(name: str, default: str, unit: str = '') -> columns.Quantity:
-    """Return the Quantity of a column of one name.
-
-    default: unit of the values if the name states none; unit: unit in which the reader takes them, '': `default`.
-    """
+    """unit: in which the reader takes the values, '': `default`, the unit if the name states none."""
     return columns.Quantity(name, {name: default}, unit or default)
 
 
@@ -68,14 +57,10 @@ CSV_LAYOUTS = (
     CsvLayout('ADS-B', _named('time', 's'), _named('lat', 'deg'), _named('lon', 'deg'),
               (_named('geoaltitude', 'm'), _named('baroaltitude', 'm')), ALTITUDE_LIMITS_M, True, 1),
     CsvLayout('CSV', times.TIME._replace(label='time_s'), LATITUDE, LONGITUDE, (ALTITUDE,), (-1000.0, 1e8), False, 1))
-"""Known layouts; the last one is for every other file."""
 
 
 def rows(path: str, log: Log) -> Iterator[Fix]:
-    """Yield the fixes of a CSV file; the names of an aircraft are icao24 and callsign.
-
-    The log receives the description of the file. Raises TableError.
-    """
+    """Yield the fixes of a CSV file; the names of an aircraft are icao24 and callsign. Raises TableError."""
     with csv_table.opened(path) as table:
         layout = _layout(table)
         clock = times.Times(table, layout.time, columns.UTC if layout.adsb else '')
@@ -104,17 +89,14 @@ def rows(path: str, log: Log) -> Iterator[Fix]:
 
 
 def _layout(table: csv_table.Table) -> CsvLayout:
-    """Return the layout of a table: the first that matches, else the ADS-B layout whose time column the table has.
-
-    The error about a missing column then names the columns of that layout.
-    """
+    """Return the first layout that matches, else the ADS-B layout whose time column the table has. The error about a
+    missing column then names the columns of that layout."""
     names = [name.lower() for name in table.fieldnames]
     return next((layout for layout in CSV_LAYOUTS if layout.matches(table)), None) or next(
         (layout for layout in CSV_LAYOUTS[1:] if layout.adsb and layout.time.label in names), CSV_LAYOUTS[-1])
 
 
 def _position(table: csv_table.Table, row: csv_table.Cells, column: columns.Column) -> list[str]:
-    """Return the texts of latitude and longitude in a cell of both. Raises TableError."""
     cell = row[column.name] or ''
     parts = [part.strip() for part in cell.split(',')]
     if len(parts) != 2:

@@ -1,23 +1,19 @@
 """Reader of tracks as GPX: each point (trkpt) with a time and an elevation (ele) is a fix.
 
-The XML parser expat reads the file from the stream. expat gives the line of a point and keeps no parsed data in
-memory. The reader stops at a document type declaration. This avoids the expansion of entities and access to other
-files. ele is above mean sea level. The height above the ellipsoid is ele + geoidheight. Without geoidheight ele takes
-its place, with a remark in the log. The byte order mark or the XML declaration states the encoding.
+expat gives the line of a point and keeps no parsed data in memory. The reader stops at a document type declaration.
+This avoids the expansion of entities and access to other files. ele is above mean sea level. The height above the
+ellipsoid is ele + geoidheight; without geoidheight ele takes its place, with a remark in the log.
 """
 from collections import Counter
 from collections.abc import Iterator
 from xml.parsers import expat
 
 from pedestal_common.text_files import content, csv_table
-from tracking_receiver_sim.track import instant
-from tracking_receiver_sim.track.fixes import Fix, Log
+from tracking_receiver_sim.tracks import instant
+from tracking_receiver_sim.tracks.fixes import Fix, Log
 
-PARSE_CHUNK_BYTES = 1 << 20
-"""Number of bytes that are parsed at once; expat reads an incomplete token again with each piece."""
-
-MAX_XML_DEPTH, MAX_TEXT_CHARS = 100, 200
-"""Largest depth of nested elements, and the number of characters to which a text is cut."""
+PARSE_CHUNK_BYTES = 1 << 20  # parsed at once; expat reads an incomplete token again with each piece
+MAX_XML_DEPTH, MAX_TEXT_CHARS = 100, 200  # of nested elements; length to which a text is cut
 
 OEM_XML_HINT = '; an OEM must be in the notation KEYWORD = value, not XML'
 
@@ -26,10 +22,7 @@ TEXT_ELEMENTS = ('ele', 'time', 'geoidheight', 'name')  # elements whose text th
 
 
 def rows(path: str, log: Log) -> Iterator[Fix]:
-    """Yield the fixes of a GPX file; the name of an aircraft is that of its track.
-
-    The log receives the description of the file. Raises TableError.
-    """
+    """Yield the fixes of a GPX file; the name of an aircraft is that of its track. Raises TableError."""
     log.form, log.time_name, log.dated = 'GPX', 'time', True
     points = _Points(path, log)
     try:
@@ -55,7 +48,6 @@ def rows(path: str, log: Log) -> Iterator[Fix]:
 
 
 class _Points:
-    """Handlers of expat."""
     path_of_elements: list[str]     # names of the open elements, the outermost first
     texts: dict[str, str]           # {name: text} of the elements of the open point
     fixes: list[Fix]                # since the last `taken_fixes`

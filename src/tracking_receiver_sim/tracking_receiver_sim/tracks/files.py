@@ -1,7 +1,6 @@
 """Track files of a target: their formats, and their kinds (recorded fixes, predicted orbit, table of directions).
 
-target.py calls `lay_out`. The first row of FILE_FORMATS that matches the beginning of a file gives its reader and its
-kind.
+The first row of FILE_FORMATS that matches the beginning of a file gives its reader and its kind.
 """
 import re
 from collections.abc import Callable, Collection, Iterator
@@ -9,9 +8,8 @@ from typing import Any, NamedTuple, TypeAlias
 
 from pedestal_common.quantities import Seconds
 from pedestal_common.text_files import content, csv_table
-from tracking_receiver_sim.ephemeris import course, directions, lines, oem, stk
 from tracking_receiver_sim.params import TargetParameters, TrackFileParameters
-from tracking_receiver_sim.track import fixes, flight, gpx, nmea, place, tables
+from tracking_receiver_sim.tracks import course, directions, fixes, flight, gpx, lines, nmea, oem, stk, tables
 
 FORMAT_PROBE_BYTES = 65536  # number of bytes at the beginning of a file that decide its format
 
@@ -27,7 +25,7 @@ class FileKind(NamedTuple):
 
 
 LOG_KIND = FileKind(lambda log, target, _duration, _margin: flight.lay_out(log, target.track_file, target.station),
-                    place.run_parameters)
+                    flight.run_parameters)
 ORBIT_KIND = FileKind(course.flight_of_orbit, course.run_parameters_of_orbit)
 DIRECTIONS_KIND = FileKind(course.flight_of_directions, course.run_parameters_of_directions)
 
@@ -41,12 +39,10 @@ class FileFormat(NamedTuple):
 
 
 def _read_log(rows: Callable[[str, fixes.Log], Iterator[fixes.Fix]]) -> Callable[[TrackFileParameters], fixes.Fixes]:
-    """Return the reader of a format whose function `rows` yields fixes."""
     return lambda track: fixes.read(track, rows)
 
 
 def _read_object(read: Callable[[str, str], Data]) -> Callable[[TrackFileParameters], Data]:
-    """Return the reader of a format whose function is read(path, name of the object)."""
     return lambda track: read(track.path, track.aircraft)
 
 
@@ -60,7 +56,6 @@ FILE_FORMATS = (
     FileFormat('table of azimuth and elevation', DIRECTIONS_KIND, directions.is_table,
                _read_object(directions.read_table)),
     FileFormat('CSV', LOG_KIND, lambda beginning: True, _read_log(tables.rows)))
-"""Formats in the order in which a file is compared with them; the last one takes every other file."""
 
 FOREIGN_FORMATS = (
     (re.compile(r'A[A-Z0-9]{3}[^\n]*\n(?:[^\n]*\n){0,200}?(?:HFDTE|B\d{13}[NS]\d{8}[EW][AV])'),
@@ -69,7 +64,7 @@ FOREIGN_FORMATS = (
      'an SP3 file of precise orbits: convert the orbit of one satellite to a CCSDS OEM (KEYWORD = value)'))
 """(pattern of the beginning of a file, its name and remedy) of text formats that this project cannot read."""
 
-DERIVED_PARAMETERS = (*place.STATION_FIELDS, 'receiver.reference_range', 'duration')
+DERIVED_PARAMETERS = (*flight.STATION_FIELDS, 'receiver.reference_range', 'duration')
 """Parameters that a track file gives if the scenario does not: of the receiver, and the duration of the run."""
 
 
@@ -88,16 +83,13 @@ def read(track: TrackFileParameters) -> tuple[FileKind, Data]:
 
 
 def lay_out(target: TargetParameters, duration: Seconds, margin: Seconds) -> flight.Flight:
-    """Return the Flight of a target for a run of `duration`, with `margin` at both ends as far as the file goes;
-    raises csv_table.TableError."""
+    """Return the Flight of a run, with `margin` at both ends as far as the file goes. Raises csv_table.TableError."""
     kind, data = read(target.track_file)
     return kind.lay_out(data, target, duration, margin)
 
 
 def derived_parameters(target: TargetParameters, given: Collection[str]) -> dict[str, float]:
-    """Return {name: value} of DERIVED_PARAMETERS from the file of a target. Raises csv_table.TableError.
-
-    given: names of the parameters that the scenario sets; only those of the station and the start matter here.
-    """
+    """Return {name: value} of DERIVED_PARAMETERS from the file of a target. Raises csv_table.TableError. given: names
+    of the parameters that the scenario sets; only those of the station and the start matter here."""
     kind, data = read(target.track_file)
     return kind.run_parameters(data, target, given)

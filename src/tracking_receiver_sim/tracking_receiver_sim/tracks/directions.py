@@ -1,9 +1,7 @@
 """Reader of tables of directions: program.txt of sat-nms, and CSV of time, azimuth and elevation.
 
-program.txt has lines of Julian date, azimuth and elevation [deg]; further words are passed over. The reader finds the
-columns of a CSV by their whole names with their units. If the first line consists of numbers, the file has exactly
-three columns: time, azimuth, elevation [deg]. All times are UTC, or all are numbers from any origin. A row that
-repeats the row before is passed over and counted.
+program.txt has lines of Julian date, azimuth and elevation [deg]. If the first line of a CSV consists of numbers, the
+file has exactly three columns: time, azimuth, elevation [deg]. All times are UTC, or all count from any origin.
 """
 import array
 from collections.abc import Sequence
@@ -13,13 +11,11 @@ import numpy as np
 
 from pedestal_common.quantities import Floats, Ints, Seconds, Times
 from pedestal_common.text_files import columns, csv_table
-from tracking_receiver_sim.ephemeris import lines, states
-from tracking_receiver_sim.track import tables, times
+from tracking_receiver_sim.tracks import lines, states, tables, times
 
 AZIMUTH = columns.Quantity('azimuth', dict.fromkeys(('azimuth', 'azi', 'az'), 'deg'), 'deg')
 ELEVATION = columns.Quantity('elevation', dict.fromkeys(('elevation', 'elev', 'el'), 'deg'), 'deg')
 ELEVATION_LENGTH = columns.Quantity('elevation', {'elevation': ''}, 'm')
-"""Columns of a direction, and of an elevation that is a height."""
 BARE_NAMES = 'time', 'azimuth', 'elevation'  # names of the columns of a table without names
 ANGLE_LIMITS_DEG = {'azimuth': (-720.0, 720.0), 'elevation': (-90.0, 90.0)}  # {angle: (lowest, highest)} [deg]
 NUMBERS_PER_ROW = 4  # numbers that a reader collects from a row: line, time, azimuth, elevation
@@ -34,7 +30,7 @@ class Directions(NamedTuple):
     t: Times                    # after midnight, growing
     azimuth: Floats             # [rad]
     elevation: Floats           # [rad]
-    midnight: Seconds | None    # instant (see track.instant) of t = 0, None if the file has no date
+    midnight: Seconds | None    # instant (see the module instant) of t = 0, None if the file has no date
     description: str            # format and number of rows
 
 
@@ -58,7 +54,6 @@ def is_table(beginning: str) -> bool:
 
 
 def _is_flight(names: Sequence[str]) -> bool:
-    """Return True for latitude and longitude without an elevation, or with one that is a height in a length unit."""
     if not (columns.named(names, tables.LATITUDE) and columns.named(names, tables.LONGITUDE)):
         return False
     if not columns.named(names, ELEVATION):
@@ -103,7 +98,6 @@ def read_table(path: str, _wanted: str = '') -> Directions:
 
 
 def _directions(path: str, rows: 'array.array[float]', dated: bool, form: str) -> Directions:
-    """Return the Directions of rows, flat: line, time [s], azimuth and elevation [deg] of each. Raises TableError."""
     table = np.array(rows).reshape(-1, NUMBERS_PER_ROW)
     # fresh: False for a row that repeats time, azimuth and elevation of the row before.
     fresh = np.append(True, (np.diff(table[:, 1:], axis=0) != 0.0).any(axis=1))[:len(table)]

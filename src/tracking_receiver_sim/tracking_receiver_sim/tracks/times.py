@@ -8,7 +8,7 @@ from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Seconds
 from pedestal_common.text_files import columns, csv_table
 from pedestal_common.text_files.files import FilePath
-from tracking_receiver_sim.track import dates, instant
+from tracking_receiver_sim.tracks import instant
 
 TIME = columns.Quantity('time', {
     **dict.fromkeys(('time', 'epoch', 'timestamp', 't'), 's'),
@@ -16,38 +16,28 @@ TIME = columns.Quantity('time', {
                     columns.UTC),
     **dict.fromkeys(('jd', 'jdut', 'jdutc', 'jd ut', 'jd utc', 'julian date', 'julian day'), columns.JULIAN_DATE),
     **dict.fromkeys(('mjd', 'mjd ut', 'mjd utc'), columns.MODIFIED_JULIAN_DATE)}, 's')
-"""Names of the column of the time in a table."""
 DATE = columns.Quantity('date', dict.fromkeys(('date', 'utc date'), columns.UTC), 's')
 TIME_OF_DAY = columns.Quantity('time of day', dict.fromkeys(('time', 'utc', 'utc time'), columns.UTC), 's')
-"""Names of the columns of the date and of the time of day, in a table with a column for each."""
 MODIFIED_JULIAN_DATE_ZERO = 2_400_000.5  # julian date of the modified Julian date 0
 JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0  # range of Julian dates: from 1858, the modified Julian date 0, to 2231
 FIRST_EXPECTED_JULIAN_DATE = 2_440_000.5
-"""Julian date of 1968. `check` takes no smaller number for a date.
-
-Because this date is the modified Julian date 40,000, a short file of seconds from 0 on is not refused.
-"""
+"""Julian date of 1968, the modified Julian date 40,000; `check` takes no smaller number for a date, so that a short
+file of seconds from 0 on is not refused."""
 MIN_UNIX_TIME_S = 1e8  # least number of seconds since 1970 in a column of UTC [s]; a smaller number has another origin
 MIN_SPAN_S = 3.0
-"""Least time from the first row to the last if the times may also be days of a Julian date [s].
-
-A pass lasts less than 3 days. A column of days therefore spans less than 3.
-"""
+"""Least time from first to last row if the times may be days of a Julian date [s]: a pass lasts less than 3 days."""
 
 
 class Times:
     """The times of a table, all with a date or all without."""
     column: columns.Column      # of the time, or of the time of day
     date: str                   # name of the column of the date beside it, '' if there is none
-    dated: bool | None          # True: instants, see track.instant; False: seconds from any origin; None: no row yet
+    dated: bool | None          # True: instants; False: seconds from any origin; None: no row yet
     first: Seconds | None       # time of the first row
     last: Seconds | None        # time of the last row
 
     def __init__(self, table: csv_table.Table, wanted: columns.Quantity, unit: str = '') -> None:
-        """Find the column of the time. Raises TableError.
-
-        wanted: the time; unit: of its values; '': the unit that the name of the column states.
-        """
+        """Find the column. Raises TableError. unit: of its values; '': that which its name states."""
         self.table, self.date, self.dated = table, _date(table.fieldnames, wanted), None
         unit = columns.UTC if self.date else unit
         column = table.column(wanted, without=self.date)
@@ -60,24 +50,19 @@ class Times:
         return f'{self.date} and {self.column.name}' if self.date else self.column.name
 
     def seconds(self, row: csv_table.Cells) -> Seconds:
-        """Return the time of a row: an instant if the times are dated, otherwise seconds from any origin.
-
-        Raises TableError.
-        """
+        """Return the time of a row: an instant if dated, otherwise seconds from any origin. Raises TableError."""
         cell = row[self.column.name] or ''
         value = self._seconds(f'{row[self.date] or ""} {cell}' if self.date else cell)
         self.first, self.last = value if self.first is None else self.first, value
         return value
 
     def _seconds(self, cell: str) -> Seconds:
-        """Return the time of the text of a cell. Raises TableError."""
         table, column = self.table, self.column
         place = table.path, table.line_num, self.name
         if column.unit in (columns.JULIAN_DATE, columns.MODIFIED_JULIAN_DATE):
             self.dated = True
             return julian(*place, table.point(column.name, cell), column.unit == columns.MODIFIED_JULIAN_DATE)
-        dated = column.unit == columns.UTC or column.unit == 's' and bool(
-            instant.ISO_TIME_PATTERN.fullmatch(dates.iso(cell)) or instant.FINE_UNIX_TIME_PATTERN.fullmatch(cell))
+        dated = column.unit == columns.UTC or column.unit == 's' and instant.is_dated(cell)
         if self.dated not in (None, dated):
             raise csv_table.TableError(f'{table.path}: line {table.line_num}: {column.name} = {cell!r:.60}: must be '
                                        f'{"UTC as ISO 8601" if self.dated else "a number"} as in the lines above')
@@ -91,7 +76,7 @@ class Times:
         value = instant.seconds(*place, cell)
         if value < MIN_UNIX_TIME_S and ':' not in cell:
             raise csv_table.TableError(f'{table.path}: line {table.line_num}: {column.name} = {cell!r:.60}: must be '
-                                       f'UTC, for example {dates.DATE_EXAMPLES}, or at least {MIN_UNIX_TIME_S:g} s '
+                                       f'UTC, for example {instant.DATE_EXAMPLES}, or at least {MIN_UNIX_TIME_S:g} s '
                                        'since 1970; for seconds from another origin, name the column time_s')
         return value
 
@@ -114,10 +99,7 @@ class Times:
 
 
 def _date(names: Sequence[str], wanted: columns.Quantity) -> str:
-    """Return the name of the only column of dates if the table also has one column of the time of day, else ''.
-
-    wanted: the time; its names include those of DATE if a table may have both columns.
-    """
+    """Return the name of the column of dates if the table also has one of the time of day, else ''."""
     if not DATE.names.keys() <= wanted.names.keys():
         return ''
     found, clocks = ([name for name in names if columns.unit_of(name, part) == columns.UTC]
@@ -126,7 +108,7 @@ def _date(names: Sequence[str], wanted: columns.Quantity) -> str:
 
 
 def julian(path: FilePath, line: int, name: str, text: str, modified: bool = False) -> Seconds:
-    """Return the instant, see track.instant, of a Julian date, or a modified one, in days. Raises TableError."""
+    """Return the instant, see the module instant, of a Julian date, or a modified one, in days. Raises TableError."""
     zero = MODIFIED_JULIAN_DATE_ZERO if modified else 0.0
     low, high = JULIAN_DATE_LIMITS
     csv_table.number(path, line, name, text, low - zero, high - zero)

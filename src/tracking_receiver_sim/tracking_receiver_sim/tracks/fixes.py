@@ -1,7 +1,4 @@
-"""The fixes of one aircraft in a log: recorded positions with their times, checked for their order in time.
-
-A reader of a format (tables.rows, gpx.rows, nmea.rows) yields the fixes of all aircraft; `read` selects one aircraft.
-"""
+"""The fixes of one aircraft in a log: recorded positions with their times, checked for their order in time."""
 import array
 import pathlib
 from collections import Counter
@@ -13,21 +10,19 @@ import numpy as np
 from pedestal_common.quantities import Degrees, Floats, Ints, Meters, Seconds, Times
 from pedestal_common.text_files import csv_table
 from tracking_receiver_sim.params import TrackFileParameters
-from tracking_receiver_sim.track import instant
+from tracking_receiver_sim.tracks import instant
 
 MAX_LISTED_AIRCRAFT = 12  # number of aircraft that an error lists for a file with several
 MAX_AIRCRAFT = 10_000  # largest number of aircraft in a file
 MIN_FIXES = 4  # least number of fixes of a track
-
-FIX_COLUMNS = ('line', 'aircraft', 'time', 'latitude', 'longitude', 'altitude')
-"""Numbers of a fix while a file is read; `aircraft` is Aircraft.number."""
+FIX_COLUMNS = ('line', 'aircraft', 'time', 'latitude', 'longitude', 'altitude')  # aircraft: Aircraft.number
 
 
 class Fix(NamedTuple):
     """A fix as a reader yields it."""
     line: int                   # in the file
     names: tuple[str, ...]      # of the aircraft
-    time: Seconds               # an instant (see track.instant) if the log is dated
+    time: Seconds               # an instant (see the module instant) if the log is dated
     latitude: Degrees           # WGS84
     longitude: Degrees
     altitude: Meters            # above the ellipsoid
@@ -43,7 +38,7 @@ class Log:
     """Description of a log, which its reader fills in."""
     form: str                       # name of the format
     time_name: str                  # name of the time in the file
-    dated: bool                     # True if the time is an instant (see track.instant)
+    dated: bool                     # True if the time is an instant (see the module instant)
     remarks: list[str]              # sentences about the numbers
     passed_over: Counter[str]       # {kind of row or sentence: its number}
     nothing: str                    # reason why the file has no fix, '' if it has one
@@ -57,7 +52,7 @@ class Fixes(NamedTuple):
     """The fixes of one aircraft."""
     path: str
     line: Ints          # in the file
-    time: Times         # growing; instants (see track.instant) if `dated`
+    time: Times         # growing; instants (see the module instant) if `dated`
     latitude: Floats    # WGS84 [deg]
     longitude: Floats   # WGS84 [deg]
     altitude: Floats    # above the ellipsoid [m]
@@ -94,10 +89,7 @@ def read(track: TrackFileParameters, rows: Callable[[str, Log], Iterator[Fix]]) 
 
 
 def _without_repetitions(table: Floats, log: Log) -> Floats:
-    """Return the rows (line, time, place) without those that repeat time and place of the row before.
-
-    The log receives the number of repetitions.
-    """
+    """Remove the rows that repeat time and place of the row before; the log receives their number."""
     repeated = np.append(False, (np.diff(table[:, 1:], axis=0) == 0.0).all(axis=1))[:len(table)]
     if repeated.any():
         log.passed_over['row that repeats time and place'] = int(repeated.sum())
@@ -105,10 +97,7 @@ def _without_repetitions(table: Floats, log: Log) -> Floats:
 
 
 def _chosen_aircraft(track: TrackFileParameters, all_aircraft: Collection[Aircraft]) -> tuple[str, int]:
-    """Return (' of' its names, its number) of the aircraft that `track` names, or of the only one.
-
-    Raises TableError if no aircraft or several match.
-    """
+    """Return (' of' its names, its number) of the aircraft that `track` names, or of the only one."""
     wanted = track.aircraft.strip().lower()
     matches = [aircraft for aircraft in all_aircraft
                if not wanted or wanted in {name.lower() for name in aircraft.names}]
@@ -124,17 +113,14 @@ def _chosen_aircraft(track: TrackFileParameters, all_aircraft: Collection[Aircra
 
 
 def _label(aircraft: Aircraft) -> str:
-    """Return the names of an aircraft in one text, '' without a name."""
     return ' '.join(sorted(name[:40] for name in aircraft.names if name)[:MAX_LISTED_AIRCRAFT])
 
 
 def _passed_over(log: Log) -> str:
-    """Return a part of the description with the rows that were passed over."""
     return ''.join(f', passed over {count} x {kind}' for kind, count in sorted(log.passed_over.items()))
 
 
 def _check_order(fixes: Fixes, track: TrackFileParameters, log: Log) -> None:
-    """Raise TableError, with the line, if the time falls, stays or jumps by more than max_gap."""
     step = np.diff(fixes.time)
     wrong = ~((step > 0.0) & (step <= track.max_gap))
     if wrong.any():

@@ -1,7 +1,5 @@
-"""Lines of a text file with their line numbers, and the numbers and times in them, for the readers of track files.
-
-Limits on length and count keep every file from blocking the process or filling its memory.
-"""
+"""Lines of a text file with their line numbers, and the numbers and times in them. Limits on length and count keep
+every file from blocking the process or filling its memory."""
 import contextlib
 import datetime
 import functools
@@ -13,7 +11,7 @@ from typing import TypeAlias
 from pedestal_common.quantities import Seconds
 from pedestal_common.text_files import csv_table
 from pedestal_common.text_files.files import FilePath
-from tracking_receiver_sim.track import instant as instants
+from tracking_receiver_sim.tracks import instant as instants
 
 MAX_LINE_CHARS = 1024  # largest number of characters of a line; the CCSDS books allow 254
 
@@ -38,8 +36,7 @@ def wrong(path: FilePath, line: int, column: int, problem: str) -> csv_table.Tab
 
 
 def read(path: FilePath) -> Iterator[tuple[int, str]]:
-    """Yield (number, text) of each line of a text file that is not empty, see csv_table.text. Raises TableError, also
-    for a line that is too long."""
+    """Yield (number, text) of each line that is not empty. Raises TableError, also for a line that is too long."""
     stream = io.StringIO(csv_table.text(path), newline=None)
     number = 0
     while line := stream.readline(MAX_LINE_CHARS + 1):
@@ -53,10 +50,7 @@ def read(path: FilePath) -> Iterator[tuple[int, str]]:
 
 
 def numbers(path: FilePath, line: int, text: str, limits: Limits) -> list[float]:
-    """Return the numbers in the text of a line. Raises TableError.
-
-    The function passes over further words.
-    """
+    """Return the numbers in the text of a line, without further words. Raises TableError."""
     if '_' not in text:
         with contextlib.suppress(ValueError):
             values = [float(word) for word in text.split()[:len(limits)]]
@@ -78,8 +72,7 @@ def numbers(path: FilePath, line: int, text: str, limits: Limits) -> list[float]
 
 
 def instant(path: FilePath, line: int, column: int, name: str, text: str) -> tuple[int, Seconds]:
-    """Return (days since 1970, seconds of the day) of a CCSDS time, YYYY-MM-DDThh:mm:ss or YYYY-DDDThh:mm:ss, in any
-    time system. Raises TableError."""
+    """Return (days since 1970, seconds of the day) of YYYY-MM-DDThh:mm:ss or YYYY-DDDThh:mm:ss. Raises TableError."""
     match = CCSDS_TIME_PATTERN.fullmatch(text)
     try:
         date, hours, minutes, seconds, fraction = match.groups() if match else [''] * 5
@@ -93,7 +86,6 @@ def instant(path: FilePath, line: int, column: int, name: str, text: str) -> tup
 
 @functools.lru_cache(64)
 def _days(text: str) -> int:
-    """Return the days since 1970 of YYYY-MM-DD or YYYY-DDD. Raises ValueError."""
     year, *rest = map(int, text.split('-'))
     date = (datetime.date(year, *rest) if len(rest) == 2 else
             datetime.date(year, 1, 1) + datetime.timedelta(days=rest[0] - 1))
