@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from acu_tracker import modes
 from acu_tracker.geometry import direction
 from acu_tracker.guidance import manual
-from acu_tracker.mode import mode_change
 from acu_tracker.operating.command_table import Arguments, points
 from pedestal_common.graph.modes import MODES
 from pedestal_common.graph.topics import AXES
@@ -102,7 +102,7 @@ def _take_elements(unit: 'Acu', _: Command, arguments: Arguments) -> Reply:
 
 
 def _choose_fallback(unit: 'Acu', _: Command, arguments: Arguments) -> Reply:
-    mode_change.choose(unit.parts['state']['mode'], arguments['mode'])
+    modes.choose(unit.parts['state']['mode'], arguments['mode'])
     return Reply(True, f'fallback is {arguments["mode"]}')
 
 
