@@ -1,8 +1,4 @@
-"""Conditions of the alarms in a step: which rows of the table of alarms have their condition.
-
-The conditions come from the detectors of both axes, from the state of the drive, and from facts of the control unit.
-The result is a number with one bit for each alarm (table.Bit), which the annunciator takes.
-"""
+"""Conditions of the alarms in a step: a number with one bit for each alarm (table.Bit), for the annunciator."""
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -41,17 +37,15 @@ class Supervision(Record):
     alarms: annunciator.AlarmList
 
 
+# Flags of refused inputs, except the attitude, which has the alarm `INS lost`.
 INVALID_INPUT_FLAGS = Flag.ENCODER | Flag.ERROR | Flag.ERROR_STAMP | Flag.PROGRAM | Flag.PRESET | Flag.ATTITUDE_ERROR
-"""Flags of refused inputs, except the attitude, which has the alarm `INS lost`."""
 
+# Time within which the brakes must hold after the drive has ceased to follow commands [s]. The time is longer than the
+# longest stop of the drive.
 BRAKE_GRIP_DEADLINE_S = 2.5
-"""Time within which the brakes must hold after the drive has ceased to follow commands [s].
-
-The time is longer than the longest stop of the drive.
-"""
+DRIVE_SILENCE_GAP_S = 0.3  # gap between two steps above which the drive was silent [s]
 
 JUDGED_ALWAYS, JUDGED_WITH_MOTORS, JUDGED_MOVING, JUDGED_FOLLOWING = table.JUDGED_ALARM_BITS
-"""Bits of the alarms of each of table.JUDGED_CASES."""
 
 
 class Facts(NamedTuple):
@@ -67,9 +61,6 @@ class Facts(NamedTuple):
     beamwidth: Radians      # of the receiver
 
 
-DRIVE_SILENCE_GAP_S = 0.3  # gap between two steps above which the drive was silent [s]
-
-
 def initialise(supervision: Records) -> None:
     """Begin without a condition."""
     supervision['least'], supervision['ready'] = np.inf, -np.inf
@@ -80,15 +71,12 @@ def initialise(supervision: Records) -> None:
 @compiled
 def _of_motors(axis: detectors.AxisDetectors, i: int, inputs: Inputs, envelope: drive_watch.Envelope,
                params: 'AxisParameters', facts: Facts) -> int:
-    """Return the bits of the alarms of axis i that follow from its encoder, its motors and its commands.
-
-    The bit of an azimuth alarm, shifted left by i, is the bit of axis i.
-    """
+    """Return the bits of the alarms of axis i that follow from its encoder, its motors and its commands."""
     # surge: acceleration that the axis may have had in lost steps [rad/s2].
     y, dy, high, low = inputs.position[i], inputs.velocity[i], envelope.high[i], envelope.low[i]
     bits, surge = 0, detectors.MAX_ACCELERATION_RATIO * params.limits.acceleration if facts.lost else 0.0
     x = detectors.encoder_motor_mismatch(axis, y, dy, facts.dt, surge)
-    if detectors.encoder_jump(x):
+    if abs(x) > detectors.MAX_STEP_MISMATCH_RAD:
         bits |= table.Bit.AZIMUTH_ENCODER_JUMP
     if detectors.encoder_stuck(axis, y, dy, facts.dt):
         bits |= table.Bit.AZIMUTH_ENCODER_STUCK
@@ -105,11 +93,8 @@ def _of_motors(axis: detectors.AxisDetectors, i: int, inputs: Inputs, envelope: 
 
 @compiled
 def _of_loop(axis: detectors.AxisDetectors, i: int, e: Radians, outputs: Outputs, facts: Facts) -> int:
-    """Return the bits of the alarms of axis i that follow from its following error e and its limits.
-
-    The following error does not count while the command is limited in rate or
-    acceleration.
-    """
+    """Return the bits of the alarms of axis i that follow from its following error e and its limits."""
+    # The following error does not count while the command is limited in rate or acceleration.
     bits, limited = 0, outputs.rate_limited[i] or outputs.acceleration_limited[i]
     if outputs.angle_limited[i]:
         bits |= table.Bit.AZIMUTH_AT_LIMIT
@@ -149,7 +134,7 @@ def _of_drive(supervision: Supervision, inputs: Inputs) -> int:
         # before the drive has published its state.
         supervision.ready, supervision.lost = inputs.stamp, max(inputs.drive, 0)
     # The bit of the elevation alarm follows that of the azimuth alarm. The product therefore sets the bits of exactly
-    # the axes in s.lost.
+    # these axes.
     bits = supervision.lost * table.Bit.AZIMUTH_MOTOR_LOST
     if inputs.drive == signals.DRIVE_EMERGENCY_STOP:
         bits |= table.Bit.EMERGENCY_STOP
@@ -177,7 +162,6 @@ def _repeated(supervision: Supervision, inputs: Inputs) -> bool:
 
 @compiled
 def _of_unit(supervision: Supervision, inputs: Inputs, outputs: Outputs, facts: Facts) -> int:
-    """Return the bits of the alarms that follow from the inputs and from the Facts."""
     bits = facts.latched
     if 0.0 < facts.gap < math.inf:
         bits |= table.Bit.TIME_JUMP | (table.Bit.DRIVE_SILENT if facts.gap > DRIVE_SILENCE_GAP_S else 0)
@@ -198,7 +182,6 @@ def _of_unit(supervision: Supervision, inputs: Inputs, outputs: Outputs, facts: 
 
 @compiled
 def _of_program(inputs: Inputs, outputs: Outputs) -> int:
-    """Return the bits of the alarms of the program track: a refused segment, or the reason why it is not followed."""
     bits = table.Bit.PROGRAM_TURNAROUND if inputs.turnaround else 0
     if outputs.reason == Reason.BEFORE_PROGRAM:
         return bits | table.Bit.PROGRAM_TOO_EARLY
@@ -219,10 +202,7 @@ def _judged(mode: int, constants: BothAxes['AxisConstants']) -> int:
 @compiled
 def take(supervision: Supervision, mode: int, inputs: Inputs, outputs: Outputs, constants: BothAxes['AxisConstants'],
          envelope: drive_watch.Envelope, facts: Facts) -> None:
-    """Determine the conditions of all alarms in a step, and update the alarms.
-
-    mode: standby while the mode commands no motion.
-    """
+    """Determine the conditions of all alarms, and update the alarms. mode: standby while it commands no motion."""
     bits = _of_drive(supervision, inputs) | _of_unit(supervision, inputs, outputs, facts)
     bits |= _of_axes(supervision, mode, inputs, outputs, constants, envelope, facts)
     if facts.gap > 0.0:
