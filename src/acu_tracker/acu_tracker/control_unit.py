@@ -212,7 +212,6 @@ def _observe(state: State, constants: Constants, inputs: Inputs, outputs: Output
 
 @compiled
 def _take_attitude(state: State, constants: Constants, inputs: Inputs) -> int:
-    """Take the attitude of this step; also add it to the levelled deck. Return the flags of invalid values."""
     if tracking.take_place(state.tracking, inputs):
         planner.clear_plan(state.guidance.lookahead)
     flags, new = measurements.take_attitude(state.tracking.attitude, constants.p, inputs)
@@ -225,7 +224,6 @@ def _take_attitude(state: State, constants: Constants, inputs: Inputs) -> int:
 
 @compiled
 def _take_receiver(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, way: bridge.Way) -> int:
-    """Take the error of the receiver of this step. Return flags if it is not accepted, else 0."""
     mode = state.mode.now
     offset = guidance.pointing_offset(state.guidance, inputs.error_stamp - constants.p.tracker.receiver.age)
     flags, used, at = receiver_error.used_error(state.tracking, constants, inputs, modes.USES_SIGNAL_LEVEL[mode],
@@ -319,7 +317,6 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
 
 @compiled
 def _wait(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) -> None:
-    """Advance the stow pins. When the drive is ready again, resume the mode that the drive interrupted."""
     if constants.p.stow_pins and stow.step(state.stow, constants, inputs, state.mode.now):
         modes.mark_stowed(state.mode)
     ended = state.mode.now == Mode.STANDBY and state.mode.reason == Reason.DRIVE_NOT_READY
@@ -340,7 +337,6 @@ def _start_from_actual(state: State, constants: Constants, inputs: Inputs, reste
 @compiled
 def _move(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, program: ProgramTrack,
           no_signal: interruptions.Outage, rested: bool, dt: Seconds) -> None:
-    """Move the axes, or let the axes rest; dt: duration of the motion."""
     mode, t = state.mode.now, state.stamp
     actual = axes.now(state.axis)
     order = guidance.Order(mode, state.mode.begins or rested, actual.azimuth.angle, t)
