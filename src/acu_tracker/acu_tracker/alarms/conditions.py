@@ -1,4 +1,7 @@
-"""Conditions of the alarms in a step: a number with one bit for each alarm (table.Bit), for the annunciator."""
+"""Conditions of the alarms in a step: a number with one bit for each alarm (table.Bit), for the annunciator.
+
+The product of a bit and a condition is the bit if the condition holds, else 0.
+"""
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -74,20 +77,15 @@ def _of_motors(axis: detectors.AxisDetectors, i: int, inputs: Inputs, envelope: 
     """Return the bits of the alarms of axis i that follow from its encoder, its motors and its commands."""
     # surge: acceleration that the axis may have had in lost steps [rad/s2].
     y, dy, high, low = inputs.position[i], inputs.velocity[i], envelope.high[i], envelope.low[i]
-    bits, surge = 0, detectors.MAX_ACCELERATION_RATIO * params.limits.acceleration if facts.lost else 0.0
+    surge = detectors.MAX_ACCELERATION_RATIO * params.limits.acceleration if facts.lost else 0.0
     x = detectors.encoder_motor_mismatch(axis, y, dy, facts.dt, surge)
-    if abs(x) > detectors.MAX_STEP_MISMATCH_RAD:
-        bits |= table.Bit.AZIMUTH_ENCODER_JUMP
-    if detectors.encoder_stuck(axis, y, dy, facts.dt):
-        bits |= table.Bit.AZIMUTH_ENCODER_STUCK
-    if detectors.disagreement(axis, x, facts.dt):
-        bits |= table.Bit.AZIMUTH_ENCODER_DISAGREEMENT
-    if detectors.brake_not_released(axis, inputs.torque[i], dy, high, low, params.feedforward, facts.dt):
-        bits |= table.Bit.AZIMUTH_BRAKE_NOT_RELEASED
-    if detectors.immobile(axis, dy, high, low):
-        bits |= table.Bit.AZIMUTH_IMMOBILE
-    if detectors.opposes_command(dy, high, low, facts.unasked_rate):
-        bits |= table.Bit.AZIMUTH_RUNAWAY
+    resisted = detectors.brake_not_released(axis, inputs.torque[i], dy, high, low, params.feedforward, facts.dt)
+    bits = table.Bit.AZIMUTH_ENCODER_JUMP * (abs(x) > detectors.MAX_STEP_MISMATCH_RAD)
+    bits |= table.Bit.AZIMUTH_ENCODER_STUCK * detectors.encoder_stuck(axis, y, dy, facts.dt)
+    bits |= table.Bit.AZIMUTH_ENCODER_DISAGREEMENT * detectors.disagreement(axis, x, facts.dt)
+    bits |= table.Bit.AZIMUTH_BRAKE_NOT_RELEASED * resisted
+    bits |= table.Bit.AZIMUTH_IMMOBILE * detectors.immobile(axis, dy, high, low)
+    bits |= table.Bit.AZIMUTH_RUNAWAY * detectors.opposes_command(dy, high, low, facts.unasked_rate)
     return bits << i
 
 
@@ -95,13 +93,10 @@ def _of_motors(axis: detectors.AxisDetectors, i: int, inputs: Inputs, envelope: 
 def _of_loop(axis: detectors.AxisDetectors, i: int, e: Radians, outputs: Outputs, facts: Facts) -> int:
     """Return the bits of the alarms of axis i that follow from its following error e and its limits."""
     # The following error does not count while the command is limited in rate or acceleration.
-    bits, limited = 0, outputs.rate_limited[i] or outputs.acceleration_limited[i]
-    if outputs.angle_limited[i]:
-        bits |= table.Bit.AZIMUTH_AT_LIMIT
-    if detectors.following_error(axis, 0.0 if limited else e, facts.beamwidth):
-        bits |= table.Bit.AZIMUTH_FOLLOWING_ERROR
-    if detectors.oscillation(axis, e, facts.dt):
-        bits |= table.Bit.AZIMUTH_OSCILLATION
+    limited = outputs.rate_limited[i] or outputs.acceleration_limited[i]
+    bits = table.Bit.AZIMUTH_AT_LIMIT * (outputs.angle_limited[i] != 0)
+    bits |= table.Bit.AZIMUTH_FOLLOWING_ERROR * detectors.following_error(axis, 0.0 if limited else e, facts.beamwidth)
+    bits |= table.Bit.AZIMUTH_OSCILLATION * detectors.oscillation(axis, e, facts.dt)
     return bits << i
 
 
@@ -118,8 +113,7 @@ def _of_axes(supervision: Supervision, mode: int, inputs: Inputs, outputs: Outpu
             detectors.initialise(axis, y, dy)
         if math.isfinite(y + dy):
             bits |= _of_motors(axis, i, inputs, envelope, params, facts)
-            if detectors.moves(axis, dy) and off:
-                bits |= table.Bit.AZIMUTH_BRAKE_NOT_GRIPPING << i
+            bits |= table.Bit.AZIMUTH_BRAKE_NOT_GRIPPING * (detectors.moves(axis, dy) and off) << i
             if mode != Mode.STANDBY:
                 bits |= _of_loop(axis, i, outputs.reference[i, 0] - y, outputs, facts)
         axis.y, axis.dy = y, dy
@@ -135,12 +129,9 @@ def _of_drive(supervision: Supervision, inputs: Inputs) -> int:
         supervision.ready, supervision.lost = inputs.stamp, max(inputs.drive, 0)
     # The bit of the elevation alarm follows that of the azimuth alarm. The product therefore sets the bits of exactly
     # these axes.
-    bits = supervision.lost * table.Bit.AZIMUTH_MOTOR_LOST
-    if inputs.drive == signals.DRIVE_EMERGENCY_STOP:
-        bits |= table.Bit.EMERGENCY_STOP
-    elif inputs.drive >= signals.FIRST_DRIVE_FAULT:
-        bits |= table.Bit.DRIVE_FAULT
-    return bits
+    bits = table.Bit.AZIMUTH_MOTOR_LOST * supervision.lost
+    bits |= table.Bit.EMERGENCY_STOP * (inputs.drive == signals.DRIVE_EMERGENCY_STOP)
+    return bits | table.Bit.DRIVE_FAULT * (inputs.drive >= signals.FIRST_DRIVE_FAULT)
 
 
 @compiled
@@ -162,32 +153,19 @@ def _repeated(supervision: Supervision, inputs: Inputs) -> bool:
 
 @compiled
 def _of_unit(supervision: Supervision, inputs: Inputs, outputs: Outputs, facts: Facts) -> int:
-    bits = facts.latched
-    if 0.0 < facts.gap < math.inf:
-        bits |= table.Bit.TIME_JUMP | (table.Bit.DRIVE_SILENT if facts.gap > DRIVE_SILENCE_GAP_S else 0)
-    if not inputs.error_came or _repeated(supervision, inputs):
-        bits |= table.Bit.RECEIVER_SILENT
-    if facts.attitude_lost:
-        bits |= table.Bit.INS_LOST
-    if facts.attitude_jumped:
-        bits |= table.Bit.INS_JUMP
-    if facts.signal_lost:
-        bits |= table.Bit.SIGNAL_LOST
-    if outputs.invalid_input & Flag.ERROR_NOISY:
-        bits |= table.Bit.RECEIVER_NOISY
-    if outputs.invalid_input & INVALID_INPUT_FLAGS:
-        bits |= table.Bit.INVALID_INPUT
-    return bits | outputs.pins_wrong * table.Bit.AZIMUTH_STOW_PIN | _of_program(inputs, outputs)
-
-
-@compiled
-def _of_program(inputs: Inputs, outputs: Outputs) -> int:
-    bits = table.Bit.PROGRAM_TURNAROUND if inputs.turnaround else 0
-    if outputs.reason == Reason.BEFORE_PROGRAM:
-        return bits | table.Bit.PROGRAM_TOO_EARLY
-    if outputs.reason == Reason.PROGRAM_GAP:
-        return bits | table.Bit.PROGRAM_GAP
-    return bits | (table.Bit.PROGRAM_ENDED if outputs.reason == Reason.AFTER_PROGRAM else 0)
+    bits = facts.latched | table.Bit.AZIMUTH_STOW_PIN * outputs.pins_wrong
+    bits |= table.Bit.TIME_JUMP * (0.0 < facts.gap < math.inf)
+    bits |= table.Bit.DRIVE_SILENT * (DRIVE_SILENCE_GAP_S < facts.gap < math.inf)
+    bits |= table.Bit.RECEIVER_SILENT * (inputs.error_came == 0 or _repeated(supervision, inputs))
+    bits |= table.Bit.RECEIVER_NOISY * (outputs.invalid_input & Flag.ERROR_NOISY != 0)
+    bits |= table.Bit.INVALID_INPUT * (outputs.invalid_input & INVALID_INPUT_FLAGS != 0)
+    bits |= table.Bit.INS_LOST * (facts.attitude_lost != 0)
+    bits |= table.Bit.INS_JUMP * (facts.attitude_jumped != 0)
+    bits |= table.Bit.SIGNAL_LOST * (facts.signal_lost != 0)
+    bits |= table.Bit.PROGRAM_TURNAROUND * (inputs.turnaround != 0)
+    bits |= table.Bit.PROGRAM_TOO_EARLY * (outputs.reason == Reason.BEFORE_PROGRAM)
+    bits |= table.Bit.PROGRAM_GAP * (outputs.reason == Reason.PROGRAM_GAP)
+    return bits | table.Bit.PROGRAM_ENDED * (outputs.reason == Reason.AFTER_PROGRAM)
 
 
 @compiled
@@ -195,8 +173,8 @@ def _judged(mode: int, constants: BothAxes['AxisConstants']) -> int:
     """Return the bits of the alarms that have a meaning in a mode; the others are suppressed."""
     motors = (int(constants[0].p.controller) != position_loop.CONTROLLER_BEAM
               or int(constants[1].p.controller) != position_loop.CONTROLLER_BEAM)
-    return (JUDGED_ALWAYS | (JUDGED_WITH_MOTORS if motors else 0) | (JUDGED_MOVING if mode != Mode.STANDBY else 0)
-            | (JUDGED_FOLLOWING if modes.FOLLOWS_TARGET[mode] else 0))
+    return (JUDGED_ALWAYS | JUDGED_WITH_MOTORS * motors | JUDGED_MOVING * (mode != Mode.STANDBY)
+            | JUDGED_FOLLOWING * modes.FOLLOWS_TARGET[mode])
 
 
 @compiled
