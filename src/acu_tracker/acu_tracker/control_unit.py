@@ -267,7 +267,6 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
     if mode != before:
         if modes.USES_SIGNAL_LEVEL[mode]:
             if before == Mode.AUTOTRACK and not no_signal.coasting:
-                # The rotated program begins where the target was last tracked. This avoids a jump of the antenna.
                 guidance.bridge_to(state.guidance, state.tracking, constants,
                                    tables.of_mode(all_tables, state.mode.table), state.stamp)
             guidance.begin_by_level(state.guidance, state.tracking, constants, before, mode, state.stamp)
@@ -293,6 +292,7 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
     possible = state.mode.fallback != Mode.AUTOTRACK or state.tracking.target.running
     chosen = state.mode.fallback if possible else Mode.PROGRAM
     falls_back = mode == Mode.SEARCH or (mode == Mode.AUTOTRACK and track != Reason.NONE)
+    # Modes whose table can matter in this step.
     wanted = request, mode, state.mode.table if falls_back else mode, chosen if falls_back else mode
     program, tle, sun, flags = Reason.NONE, Reason.NONE, Reason.NONE, 0
     if unstable == Reason.NONE:
@@ -356,7 +356,6 @@ def _move(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, 
         limited = outputs.angle_limited[0] != 0 or outputs.angle_limited[1] != 0
         guidance.watch_beam(state.guidance, constants, mode, axes.now(state.axis), limited, now.t_m)
         if _note_outage_reason(state, constants) and mode == Mode.AUTOTRACK and not no_signal.coasting:
-            # The rotated program begins where the target was last tracked. This avoids a jump of the antenna.
             guidance.bridge_to(state.guidance, state.tracking, constants, program, t)
         outputs.blocked, outputs.coasting = state.outage.blocked, mode == Mode.AUTOTRACK and no_signal.coasting
     for i in range(2):

@@ -223,7 +223,7 @@ def held(guidance: Guidance, constants: 'Constants', t: Seconds) -> bool:
 @compiled
 def bridge_to(guidance: Guidance, tracking: Tracking, constants: 'Constants', program: ProgramTrack,
               t: Seconds) -> None:
-    """Rotate the program so that it passes through the estimate of the target at t."""
+    """Rotate the program so that it passes through the estimate at t. This avoids a jump of the antenna."""
     bridge.begin(guidance.bridge, program, t, target_tracking.sight(tracking, constants, t).u)
 
 
