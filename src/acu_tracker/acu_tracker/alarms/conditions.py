@@ -9,12 +9,12 @@ import numpy as np
 
 from acu_tracker import modes, signals
 from acu_tracker.alarms import annunciator, detectors, table
+from acu_tracker.alarms.table import Bit
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.servo import drive_watch, position_loop
 from acu_tracker.signals import Flag, Inputs, Outputs
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
-    Bit,
     BothAxes,
     DecibelHertz,
     Radians,
@@ -57,9 +57,9 @@ class Facts(NamedTuple):
     gap: Seconds            # length of a gap before this step; 0: no gap, inf: first step
     lost: bool              # True if steps are missing between the previous step and this one
     latched: int            # bits of the latched faults that wait for a reset
-    attitude_lost: Bit      # 1 if the attitude of a ship is not known
-    attitude_jumped: Bit    # 1 if a jump of the attitude is being corrected
-    signal_lost: Bit        # 1 if autotrack has lost its signal without an explanation
+    attitude_lost: bool      # True if the attitude of a ship is not known
+    attitude_jumped: bool    # True if a jump of the attitude is being corrected
+    signal_lost: bool        # True if autotrack has lost its signal without an explanation
     unasked_rate: RadiansPerSecond      # excess over the commanded rates that counts as uncommanded motion
     beamwidth: Radians      # of the receiver
 
@@ -80,12 +80,12 @@ def _of_motors(axis: detectors.AxisDetectors, i: int, inputs: Inputs, envelope: 
     surge = detectors.MAX_ACCELERATION_RATIO * params.limits.acceleration if facts.lost else 0.0
     x = detectors.encoder_motor_mismatch(axis, y, dy, facts.dt, surge)
     resisted = detectors.brake_not_released(axis, inputs.torque[i], dy, high, low, params.feedforward, facts.dt)
-    bits = table.Bit.AZIMUTH_ENCODER_JUMP * (abs(x) > detectors.MAX_STEP_MISMATCH_RAD)
-    bits |= table.Bit.AZIMUTH_ENCODER_STUCK * detectors.encoder_stuck(axis, y, dy, facts.dt)
-    bits |= table.Bit.AZIMUTH_ENCODER_DISAGREEMENT * detectors.disagreement(axis, x, facts.dt)
-    bits |= table.Bit.AZIMUTH_BRAKE_NOT_RELEASED * resisted
-    bits |= table.Bit.AZIMUTH_IMMOBILE * detectors.immobile(axis, dy, high, low)
-    bits |= table.Bit.AZIMUTH_RUNAWAY * detectors.opposes_command(dy, high, low, facts.unasked_rate)
+    bits = Bit.AZIMUTH_ENCODER_JUMP * (abs(x) > detectors.MAX_STEP_MISMATCH_RAD)
+    bits |= Bit.AZIMUTH_ENCODER_STUCK * detectors.encoder_stuck(axis, y, dy, facts.dt)
+    bits |= Bit.AZIMUTH_ENCODER_DISAGREEMENT * detectors.disagreement(axis, x, facts.dt)
+    bits |= Bit.AZIMUTH_BRAKE_NOT_RELEASED * resisted
+    bits |= Bit.AZIMUTH_IMMOBILE * detectors.immobile(axis, dy, high, low)
+    bits |= Bit.AZIMUTH_RUNAWAY * detectors.opposes_command(dy, high, low, facts.unasked_rate)
     return bits << i
 
 
@@ -94,9 +94,9 @@ def _of_loop(axis: detectors.AxisDetectors, i: int, e: Radians, outputs: Outputs
     """Return the bits of the alarms of axis i that follow from its following error e and its limits."""
     # The following error does not count while the command is limited in rate or acceleration.
     limited = outputs.rate_limited[i] or outputs.acceleration_limited[i]
-    bits = table.Bit.AZIMUTH_AT_LIMIT * (outputs.angle_limited[i] != 0)
-    bits |= table.Bit.AZIMUTH_FOLLOWING_ERROR * detectors.following_error(axis, 0.0 if limited else e, facts.beamwidth)
-    bits |= table.Bit.AZIMUTH_OSCILLATION * detectors.oscillation(axis, e, facts.dt)
+    bits = Bit.AZIMUTH_AT_LIMIT * (outputs.angle_limited[i] != 0)
+    bits |= Bit.AZIMUTH_FOLLOWING_ERROR * detectors.following_error(axis, 0.0 if limited else e, facts.beamwidth)
+    bits |= Bit.AZIMUTH_OSCILLATION * detectors.oscillation(axis, e, facts.dt)
     return bits << i
 
 
@@ -113,7 +113,7 @@ def _of_axes(supervision: Supervision, mode: int, inputs: Inputs, outputs: Outpu
             detectors.initialise(axis, y, dy)
         if math.isfinite(y + dy):
             bits |= _of_motors(axis, i, inputs, envelope, params, facts)
-            bits |= table.Bit.AZIMUTH_BRAKE_NOT_GRIPPING * (detectors.moves(axis, dy) and off) << i
+            bits |= Bit.AZIMUTH_BRAKE_NOT_GRIPPING * (detectors.moves(axis, dy) and off) << i
             if mode != Mode.STANDBY:
                 bits |= _of_loop(axis, i, outputs.reference[i, 0] - y, outputs, facts)
         axis.y, axis.dy = y, dy
@@ -129,9 +129,9 @@ def _of_drive(supervision: Supervision, inputs: Inputs) -> int:
         supervision.ready, supervision.lost = inputs.stamp, max(inputs.drive, 0)
     # The bit of the elevation alarm follows that of the azimuth alarm. The product therefore sets the bits of exactly
     # these axes.
-    bits = table.Bit.AZIMUTH_MOTOR_LOST * supervision.lost
-    bits |= table.Bit.EMERGENCY_STOP * (inputs.drive == signals.DRIVE_EMERGENCY_STOP)
-    return bits | table.Bit.DRIVE_FAULT * (inputs.drive >= signals.FIRST_DRIVE_FAULT)
+    bits = Bit.AZIMUTH_MOTOR_LOST * supervision.lost
+    bits |= Bit.EMERGENCY_STOP * (inputs.drive == signals.DRIVE_EMERGENCY_STOP)
+    return bits | Bit.DRIVE_FAULT * (inputs.drive >= signals.FIRST_DRIVE_FAULT)
 
 
 @compiled
@@ -153,19 +153,19 @@ def _repeated(supervision: Supervision, inputs: Inputs) -> bool:
 
 @compiled
 def _of_unit(supervision: Supervision, inputs: Inputs, outputs: Outputs, facts: Facts) -> int:
-    bits = facts.latched | table.Bit.AZIMUTH_STOW_PIN * outputs.pins_wrong
-    bits |= table.Bit.TIME_JUMP * (0.0 < facts.gap < math.inf)
-    bits |= table.Bit.DRIVE_SILENT * (DRIVE_SILENCE_GAP_S < facts.gap < math.inf)
-    bits |= table.Bit.RECEIVER_SILENT * (inputs.error_came == 0 or _repeated(supervision, inputs))
-    bits |= table.Bit.RECEIVER_NOISY * (outputs.invalid_input & Flag.ERROR_NOISY != 0)
-    bits |= table.Bit.INVALID_INPUT * (outputs.invalid_input & INVALID_INPUT_FLAGS != 0)
-    bits |= table.Bit.INS_LOST * (facts.attitude_lost != 0)
-    bits |= table.Bit.INS_JUMP * (facts.attitude_jumped != 0)
-    bits |= table.Bit.SIGNAL_LOST * (facts.signal_lost != 0)
-    bits |= table.Bit.PROGRAM_TURNAROUND * (inputs.turnaround != 0)
-    bits |= table.Bit.PROGRAM_TOO_EARLY * (outputs.reason == Reason.BEFORE_PROGRAM)
-    bits |= table.Bit.PROGRAM_GAP * (outputs.reason == Reason.PROGRAM_GAP)
-    return bits | table.Bit.PROGRAM_ENDED * (outputs.reason == Reason.AFTER_PROGRAM)
+    bits = facts.latched | Bit.AZIMUTH_STOW_PIN * outputs.pins_wrong
+    bits |= Bit.TIME_JUMP * (0.0 < facts.gap < math.inf)
+    bits |= Bit.DRIVE_SILENT * (DRIVE_SILENCE_GAP_S < facts.gap < math.inf)
+    bits |= Bit.RECEIVER_SILENT * (inputs.error_came == 0 or _repeated(supervision, inputs))
+    bits |= Bit.RECEIVER_NOISY * (outputs.invalid_input & Flag.ERROR_NOISY != 0)
+    bits |= Bit.INVALID_INPUT * (outputs.invalid_input & INVALID_INPUT_FLAGS != 0)
+    bits |= Bit.INS_LOST * facts.attitude_lost
+    bits |= Bit.INS_JUMP * facts.attitude_jumped
+    bits |= Bit.SIGNAL_LOST * facts.signal_lost
+    bits |= Bit.PROGRAM_TURNAROUND * (inputs.turnaround != 0)
+    bits |= Bit.PROGRAM_TOO_EARLY * (outputs.reason == Reason.BEFORE_PROGRAM)
+    bits |= Bit.PROGRAM_GAP * (outputs.reason == Reason.PROGRAM_GAP)
+    return bits | Bit.PROGRAM_ENDED * (outputs.reason == Reason.AFTER_PROGRAM)
 
 
 @compiled
