@@ -1,8 +1,7 @@
-"""Executable of the ROS node `acu`, the antenna control unit.
+"""Executable of the ROS node `acu`: `unit_node.UnitNode` runs the unit `acu_tracker.unit.Acu`.
 
-This file only starts the node. `unit_node.UnitNode` runs the unit `acu_tracker.unit.Acu`, whose law is
-`control_unit.step`; change the behaviour there. `entry` is imported first, so that a signal of the operating system
-during the other imports ends the process without a message.
+`entry` is imported first, so that a signal of the operating system during the other imports ends the process without a
+message.
 """
 import pedestal_common.entry  # noqa: F401
 

@@ -1,8 +1,7 @@
 """The law of the antenna control unit: `step` runs once per drive step and computes the rate command of both axes.
 
-Inputs are the encoder angles, the error of the receiver and the attitude of the deck. docs/architecture.md explains
-the order of a step. Each part of the state is written by its own module; this module connects the parts. `unit` calls
-`step`, and between two steps `request`, `refusals` and `reset`.
+docs/architecture.md explains the order of a step. Each part of the state is written by its own module; this module
+connects the parts. `unit` calls `step`, and between two steps `request`, `refusals` and `reset`.
 """
 import math
 from typing import Annotated
@@ -16,7 +15,7 @@ from acu_tracker.estimation.filters import target_filter
 from acu_tracker.geometry import attitude, direction, history
 from acu_tracker.guidance import guidance
 from acu_tracker.lookahead import levelled_deck, planner
-from acu_tracker.mode import interruptions, mode_change, reachability, stow
+from acu_tracker.mode import interruptions, reachability, stow
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.params import AcuParameters, AxisParameters, SharedParameters
 from acu_tracker.pointing import model
@@ -34,9 +33,9 @@ from pedestal_common.record import Record
 
 
 class State(Record):
-    """State of the control unit. Each part is written by its own module."""
+    """State of the control unit."""
     stamp: Seconds  # t_k of the last step
-    mode: mode_change.ModeState
+    mode: modes.ModeState
     resumption: interruptions.Resumption
     stow: stow.Stow
     tracking: tracking.Tracking
@@ -60,15 +59,14 @@ class Constants(Record):
     """Constants of the control unit, and of each axis."""
     p: SharedParameters
     axis: BothAxes[AxisConstants]
-    # t_m - t_k; t_m: middle of the interval in which the command of the step at t_k is in force
-    lead: Seconds
+    lead: Seconds       # t_m - t_k; t_m: middle of the interval in which the command of the step at t_k is in force
     target: target.Constants
     lookahead: planner.Constants
     floor: floor.Floor
 
 
 def axis_constants(params: AxisParameters, period: Seconds, reaction: Seconds) -> Records:
-    """Return the constants (1,) of an axis; period: of the steps; reaction: AcuParameters.reaction."""
+    """Return the constants (1,) of an axis."""
     made, notch = AxisConstants.zeros(), params.notch
     made['p'] = record(params, AxisParameters)
     made['notch'] = controllers.notch_coefficients(notch.frequency, notch.width, notch.depth, period)
@@ -77,7 +75,7 @@ def axis_constants(params: AxisParameters, period: Seconds, reaction: Seconds) -
 
 
 def constants(params: AcuParameters) -> Records:
-    """Return the constants (1,) of AcuParameters."""
+    """Return the constants (1,)."""
     made, axes = Constants.zeros(), (params.azimuth, params.elevation)
     made['p'] = record(params, SharedParameters)
     made['lead'] = params.command_delay + 0.5 * params.period
@@ -90,17 +88,13 @@ def constants(params: AcuParameters) -> Records:
 
 
 def initial_state(params: AcuParameters) -> Records:
-    """Return the state (1,) of AcuParameters before the first step.
-
-    The mode is standby, and the initial mode is pending.
-    """
+    """Return the state (1,) before the first step."""
     state = State.zeros()
     state['stamp'] = -math.inf
-    mode_change.initialise(state['mode'], params)
+    modes.initialise(state['mode'], params)
     guidance.initialise(state['guidance'], (params.azimuth.preset, params.elevation.preset))
     tracking.initialise(state['tracking'], params.pointing)
-    interruptions.initialise_resumption(state['resumption'])
-    interruptions.initialise_outage(state['outage'])
+    interruptions.initialise(state['outage'], state['resumption'])
     stow.initialise(state['stow'])
     drive_watch.initialise(state['unasked'])
     conditions.initialise(state['supervision'])
@@ -110,7 +104,9 @@ def initial_state(params: AcuParameters) -> Records:
 @compiled
 def latched(state: State) -> int:
     """Return the bits of the alarms of the latched faults, which wait for a reset."""
-    return interruptions.latched(state.unasked.moves, state.frozen.frozen, state.tracking.divergence.diverged)
+    return (state.unasked.moves << interruptions.UNCOMMANDED_MOTION_ALARM
+            | state.frozen.frozen << interruptions.FROZEN_DRIVE_ALARM
+            | state.tracking.divergence.diverged << interruptions.DIVERGENCE_ALARM)
 
 
 @compiled
@@ -118,8 +114,7 @@ def request(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
             mode: int) -> bool:
     """Request a mode (its code) between two steps; return True if the request is accepted.
 
-    The decision uses the inputs of the last step. A change of mode acts on the command of the next step. The outputs
-    mode and reason are set at once.
+    A change of mode acts on the command of the next step. The outputs mode and reason are set at once.
     """
     result, _ = _change(state, constants, inputs, outputs, all_tables, mode, _outage(state, constants))
     outputs.mode, outputs.reason = state.mode.now, state.mode.reason
@@ -138,8 +133,8 @@ def refusals(state: State, constants: Constants, inputs: Inputs, all_tables: tab
 def reset(state: State) -> int:
     """Reset the latched faults and alarms between two steps.
 
-    Return annunciator.NO_ALARM, or the index of an alarm whose cause is still present. In the second case nothing is
-    changed. A reset also discards a mode that waits to be entered, so that nothing moves until a mode is commanded.
+    Return annunciator.NO_ALARM, or the index of an alarm whose cause is still present; the state then stays unchanged.
+    A reset also discards a mode that waits to be entered, so that nothing moves until a mode is commanded.
     """
     alarms, t, fault = state.supervision.alarms, state.stamp, latched(state) != 0
     if state.unasked.moves and drive_watch.motion_beyond(state.unasked, t):
@@ -151,7 +146,7 @@ def reset(state: State) -> int:
     drive_watch.release_frozen(state.frozen, t)
     monitors.release_divergence(state.tracking.divergence)
     if interruptions.reset_latched(alarms, t) or fault:
-        mode_change.set_pending(state.mode, modes.NO_REQUEST)
+        modes.set_pending(state.mode, modes.NO_REQUEST)
         interruptions.cancel_resumption(state.resumption)
     return annunciator.NO_ALARM
 
@@ -172,12 +167,13 @@ def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, a
     silence = constants.p.step_gap < dt < math.inf
     if silence and state.mode.now != Mode.STANDBY:
         # The axes have stopped. After a short silence the mode continues from their actual angles.
-        mode_change.continue_in(state.mode, interruptions.mode_after(state.resumption, state.mode.now, state.stamp,
-                                                                  inputs.stamp, constants.p.resume_time))
+        modes.continue_in(state.mode, interruptions.mode_after(state.resumption, state.mode.now, state.stamp,
+                                                               inputs.stamp, constants.p.resume_time))
     state.stamp = inputs.stamp
     flags = _observe(state, constants, inputs, outputs, tables.of_mode(all_tables, state.mode.table), silence)
     # The axes have rested if they had no motion command before this step, or after a gap between the steps.
-    no_signal, rested = _outage(state, constants), _rests(state, constants, inputs) or dt > constants.p.step_gap
+    rested = stow.commands_no_motion(state.stow, constants, inputs, state.mode.now) or dt > constants.p.step_gap
+    no_signal = _outage(state, constants)
     waiting = state.mode.pending if state.mode.now == Mode.STANDBY else modes.NO_REQUEST
     _, of_tables = _change(state, constants, inputs, outputs, all_tables, waiting, no_signal)
     _wait(state, constants, inputs, outputs)
@@ -189,17 +185,14 @@ def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, a
           constants.p.period if dt > constants.p.step_gap else dt)
     _write_outputs(state, constants, inputs, outputs, flags | of_tables)
     if guidance.look_ahead(state.guidance, state.tracking, constants, state.mode.now, program, no_signal, state.stamp):
-        mode_change.restart(state.mode)
+        modes.restart(state.mode)
     _supervise(state, constants, inputs, outputs, dt)
 
 
 @compiled
 def _observe(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, program: ProgramTrack,
              silence: bool) -> int:
-    """Take the inputs of the step (encoders, attitude, receiver, preset), and run the monitors on them.
-
-    Return the bits of signals.INVALID_INPUTS.
-    """
+    """Take the inputs of the step, and run the monitors on them. Return the bits of signals.INVALID_INPUTS."""
     way = bridge.way(state.guidance.bridge, program)
     model.step(state.tracking.pointing, state.stamp)
     estimate = state.tracking.target
@@ -219,7 +212,6 @@ def _observe(state: State, constants: Constants, inputs: Inputs, outputs: Output
 
 @compiled
 def _take_attitude(state: State, constants: Constants, inputs: Inputs) -> int:
-    """Take the attitude of this step; also add it to the levelled deck. Return the flags of invalid values."""
     if tracking.take_place(state.tracking, inputs):
         planner.clear_plan(state.guidance.lookahead)
     flags, new = measurements.take_attitude(state.tracking.attitude, constants.p, inputs)
@@ -232,7 +224,6 @@ def _take_attitude(state: State, constants: Constants, inputs: Inputs) -> int:
 
 @compiled
 def _take_receiver(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, way: bridge.Way) -> int:
-    """Take the error of the receiver of this step. Return flags if it is not accepted, else 0."""
     mode = state.mode.now
     offset = guidance.pointing_offset(state.guidance, inputs.error_stamp - constants.p.tracker.receiver.age)
     flags, used, at = receiver_error.used_error(state.tracking, constants, inputs, modes.USES_SIGNAL_LEVEL[mode],
@@ -244,20 +235,13 @@ def _take_receiver(state: State, constants: Constants, inputs: Inputs, outputs: 
     restart_gap = math.inf if _outage(state, constants).permitted else constants.p.tracker.restart_gap
     judged = not guidance.held(state.guidance, constants, state.stamp)
     return receiver_error.take_error(state.tracking, constants, inputs, outputs, at, restart_gap,
-                               mode == Mode.AUTOTRACK and judged,
-                               interruptions.axes_follow_commands(state.supervision) and judged)
+                                     mode == Mode.AUTOTRACK and judged,
+                                     interruptions.axes_follow_commands(state.supervision) and judged)
 
 
 @compiled
 def _outage(state: State, constants: Constants) -> interruptions.Outage:
-    """Return the outage of the receiver at the stamp of the step."""
     return interruptions.outage_now(state.outage, state.tracking.target.stamp, state.stamp, constants.p)
-
-
-@compiled
-def _rests(state: State, constants: Constants, inputs: Inputs) -> bool:
-    """Return True if the mode commands no motion."""
-    return stow.commands_no_motion(state.stow, constants.p.stow_pins, inputs.pins, state.mode.now)
 
 
 @separate
@@ -273,7 +257,7 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
     if now.conditions.slope != Reason.NONE:
         monitors.latch_divergence(state.tracking.divergence)
     outputs.locked = now.conditions.lock == Reason.NONE
-    result = mode_change.change(state.mode, now, request)
+    result = modes.change(state.mode, now, request)
     mode = state.mode.now
     if result == modes.REQUEST_ACCEPTED and modes.FOLLOWS_TABLE[mode]:
         # After this, autotrack needs lock_count new measurements to begin.
@@ -283,7 +267,6 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
     if mode != before:
         if modes.USES_SIGNAL_LEVEL[mode]:
             if before == Mode.AUTOTRACK and not no_signal.coasting:
-                # The rotated program begins where the target was last tracked. This avoids a jump of the antenna.
                 guidance.bridge_to(state.guidance, state.tracking, constants,
                                    tables.of_mode(all_tables, state.mode.table), state.stamp)
             guidance.begin_by_level(state.guidance, state.tracking, constants, before, mode, state.stamp)
@@ -296,14 +279,10 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
 @separate
 def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: tables.Tables, request: int,
                no_signal: interruptions.Outage) -> tuple[modes.Situation, int]:
-    """Return (Situation at the stamp of the step, flags of bad tables).
-
-    To save time, a table is evaluated only if its mode can matter in this step. `wanted` holds these modes: the
-    request, the running mode, the mode whose table was followed last, and the fallback of the running mode.
-    """
-    mode, azimuth, t = state.mode.now, state.guidance.azimuth, state.stamp
+    """Return (Situation at the stamp of the step, flags of bad tables)."""
+    mode, t = state.mode.now, state.stamp
     unstable = tracking.unstable(state.tracking, constants, inputs, t)
-    pins = stow.obstacle(state.stow, constants.p.stow_pins, inputs.pins)
+    pins = stow.obstacle(state.stow, constants, inputs)
     closed = mode == Mode.AUTOTRACK and interruptions.axes_follow_commands(state.supervision)
     lock, slope, track = tracking.conditions(state.tracking, constants, t, no_signal, closed)
     if track == Reason.NONE and level_modes.in_side_lobe(state.guidance.acquisition, constants, t):
@@ -313,19 +292,12 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
     possible = state.mode.fallback != Mode.AUTOTRACK or state.tracking.target.running
     chosen = state.mode.fallback if possible else Mode.PROGRAM
     falls_back = mode == Mode.SEARCH or (mode == Mode.AUTOTRACK and track != Reason.NONE)
+    # Modes whose table can matter in this step.
     wanted = request, mode, state.mode.table if falls_back else mode, chosen if falls_back else mode
-    program = tle = sun = Reason.NONE
-    flags = flag = 0
+    program, tle, sun, flags = Reason.NONE, Reason.NONE, Reason.NONE, 0
     if unstable == Reason.NONE:
-        if Mode.PROGRAM in wanted:
-            program, flags = reachability.judge_table(state.tracking, constants, inputs, Mode.PROGRAM, all_tables, t,
-                                                      azimuth)
-        if Mode.TLE in wanted:
-            tle, flag = reachability.judge_table(state.tracking, constants, inputs, Mode.TLE, all_tables, t, azimuth)
-            flags |= flag
-        if Mode.SUN in wanted:
-            sun, flag = reachability.judge_table(state.tracking, constants, inputs, Mode.SUN, all_tables, t, azimuth)
-            flags |= flag
+        program, tle, sun, flags = reachability.judge_tables(state.tracking, constants, inputs, wanted, all_tables, t,
+                                                             state.guidance.azimuth)
     why = modes.Conditions(
         nothing=Reason.NONE, stow=reachability.outside(constants, constants.axis[0].p.stow, constants.axis[1].p.stow),
         pin=Reason.PINS_OUT if pins == Reason.NONE else Reason.NONE,
@@ -345,13 +317,11 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
 
 @compiled
 def _wait(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) -> None:
-    """Advance the stow pins. When the drive is ready again, resume the mode that the drive interrupted."""
     if constants.p.stow_pins and stow.step(state.stow, constants, inputs, state.mode.now):
-        mode_change.mark_stowed(state.mode)
-    if interruptions.resumption_pending(state.resumption):
-        ended = state.mode.now == Mode.STANDBY and state.mode.reason == Reason.DRIVE_NOT_READY
-        mode_change.set_pending(state.mode, interruptions.pending_mode(state.resumption, state.stamp, ended,
-                                                                       outputs.locked, state.mode.pending))
+        modes.mark_stowed(state.mode)
+    ended = state.mode.now == Mode.STANDBY and state.mode.reason == Reason.DRIVE_NOT_READY
+    modes.set_pending(state.mode, interruptions.pending_mode(state.resumption, state.stamp, ended, outputs.locked,
+                                                             state.mode.pending))
 
 
 @compiled
@@ -367,13 +337,12 @@ def _start_from_actual(state: State, constants: Constants, inputs: Inputs, reste
 @compiled
 def _move(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, program: ProgramTrack,
           no_signal: interruptions.Outage, rested: bool, dt: Seconds) -> None:
-    """Move the axes, or let the axes rest; dt: duration of the motion."""
     mode, t = state.mode.now, state.stamp
     actual = axes.now(state.axis)
     order = guidance.Order(mode, state.mode.begins or rested, actual.azimuth.angle, t)
     by_hand = floor.by_hand(constants, inputs, state.guidance.manual.angle[0])
     guidance.move_by_hand(state.guidance, constants, order, by_hand, actual, dt)
-    if _rests(state, constants, inputs):
+    if stow.commands_no_motion(state.stow, constants, inputs, mode):
         axes.rest(state.axis, constants, outputs, dt)
     else:
         now = Instants(t, t + constants.lead, dt)
@@ -383,11 +352,10 @@ def _move(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, 
         deck_rates = tracking.deck_rates(state.tracking, constants, t, actual.azimuth.angle, actual.elevation.angle)
         beam = axes.BeamInputs(state.tracking.error, deck_rates, mode == Mode.AUTOTRACK)
         axes.follow(state.axis, constants, inputs, outputs, motion, now, beam)
-        mode_change.mark_started(state.mode)
+        modes.mark_started(state.mode)
         limited = outputs.angle_limited[0] != 0 or outputs.angle_limited[1] != 0
         guidance.watch_beam(state.guidance, constants, mode, axes.now(state.axis), limited, now.t_m)
         if _note_outage_reason(state, constants) and mode == Mode.AUTOTRACK and not no_signal.coasting:
-            # The rotated program begins where the target was last tracked. This avoids a jump of the antenna.
             guidance.bridge_to(state.guidance, state.tracking, constants, program, t)
         outputs.blocked, outputs.coasting = state.outage.blocked, mode == Mode.AUTOTRACK and no_signal.coasting
     for i in range(2):
@@ -407,13 +375,12 @@ def _note_outage_reason(state: State, constants: Constants) -> bool:
     turning = state.guidance.turn.under_way and interruptions.axes_follow_commands(state.supervision)
     slewing = follows and planner.slewing(state.guidance.lookahead, state.stamp)
     reason = interruptions.explain_outage(state.outage, hidden, slewing, follows and turning, state.stamp)
-    mode_change.set_outage_reason(state.mode, reason)
+    modes.set_outage_reason(state.mode, reason)
     return reason != Reason.NONE
 
 
 @compiled
 def _write_outputs(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, flags: int) -> None:
-    """Write mode, flags, pins, times to the limits, and the estimate to the outputs."""
     of_axes = floor.ends(constants, inputs, inputs.position[0])
     for i in range(2):
         outputs.time_to_limit[i] = ends.time_to(inputs.position[i], inputs.velocity[i], of_axes[i])
@@ -425,19 +392,19 @@ def _write_outputs(state: State, constants: Constants, inputs: Inputs, outputs: 
 
 @compiled
 def _supervise(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, dt: Seconds) -> None:
-    """Update the alarms; dt: time since the previous step."""
     params, deck = constants.p, state.tracking.attitude
     jumped = dt > params.step_gap
-    ship = deck.stabilised and deck.history.count > 0
+    ship = deck.stabilised != 0 and deck.history.count > 0
     # signal_lost: autotrack has no signal, and no hidden sector, keyhole or turn explains this.
-    unexplained = outputs.coasting and not _outage(state, constants).permitted
+    unexplained = outputs.coasting != 0 and not _outage(state, constants).permitted
     signal_lost = state.mode.reason == Reason.SIGNAL_LOST or unexplained
     attitude_known, _ = attitude.at(deck, params, state.stamp + constants.lead)
     facts = conditions.Facts(
         dt=0.0 if jumped else dt, gap=dt if jumped else 0.0, lost=dt > 1.5 * params.period, latched=latched(state),
-        attitude_lost=ship and not attitude_known, attitude_jumped=ship and deck.jump.apart, signal_lost=signal_lost,
-        unasked_rate=params.unasked_rate, beamwidth=params.tracker.receiver.beamwidth)
-    mode = Mode.STANDBY if _rests(state, constants, inputs) else state.mode.now
+        attitude_lost=ship and not attitude_known, attitude_jumped=ship and deck.jump.apart != 0,
+        signal_lost=signal_lost, unasked_rate=params.unasked_rate, beamwidth=params.tracker.receiver.beamwidth)
+    rests = stow.commands_no_motion(state.stow, constants, inputs, state.mode.now)
+    mode = Mode.STANDBY if rests else state.mode.now
     conditions.take(state.supervision, mode, inputs, outputs, constants.axis, state.unasked, facts)
     # A new revision makes the unit publish the list of alarms.
     outputs.alarms = state.supervision.alarms.revision

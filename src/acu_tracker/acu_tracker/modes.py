@@ -1,24 +1,29 @@
 """The mode machine: it decides in each step in which mode the control unit is, and why.
 
 A row of pedestal_common.graph.modes.MODE_ROWS describes each mode. `next_mode` is a pure function of the present mode,
-of a request and of the Situation. `mode.mode_change` calls it and keeps the result; control_unit makes the Situation.
+of a request and of the Situation, which control_unit makes. Only this module writes the ModeState.
 """
-
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.modes import MODE_ROWS as MODE_ROWS
 from pedestal_common.graph.modes import MODES as MODES
+from pedestal_common.quantities import Bit, Records
+from pedestal_common.record import Record
+
+if TYPE_CHECKING:
+    from acu_tracker.params import AcuParameters
 
 Mode = codes(MODES)  # codes of the modes. Each tuple below holds one value for each mode, from its row of MODE_ROWS.
 FOLLOWS_TARGET = tuple(row.follows for row in MODE_ROWS)
 USES_SIGNAL_LEVEL = tuple(row.by_level for row in MODE_ROWS)
 FOLLOWS_TABLE = tuple(row.table for row in MODE_ROWS)
 _ALLOWED_WHEN_PINNED = tuple(row.pinned for row in MODE_ROWS)
-NO_HANDOVER = -1  # code in _HANDOVER of a mode that does not hand over to another mode by itself
+NO_HANDOVER = -1
+# Mode after the end of each mode, and mode to which it hands over by itself, or NO_HANDOVER.
 _FALLBACK = tuple(MODES.index(row.fallback) if row.fallback else Mode.STANDBY for row in MODE_ROWS)
-"""Mode after the end of each mode."""
+_HANDOVER = tuple(MODES.index(row.handover) if row.handover else NO_HANDOVER for row in MODE_ROWS)
 
 FALLBACK_MODES = {'coast': Mode.AUTOTRACK, 'memory': Mode.STOP, 'program': Mode.PROGRAM, 'tle': Mode.TLE,
                   'search': Mode.SEARCH, 'preset': Mode.PRESET, 'standby': Mode.STANDBY}
@@ -30,10 +35,7 @@ returns to the table that was followed last.
 
 FALLBACK_NAMES = {mode: name for name, mode in FALLBACK_MODES.items()}  # {mode: name of the fallback}
 
-_HANDOVER = tuple(MODES.index(row.handover) if row.handover else NO_HANDOVER for row in MODE_ROWS)
-"""Mode to which each mode hands over by itself, or NO_HANDOVER."""
-
-REASON_TEXTS = dict(
+REASON_TEXTS = dict(    # {name of a reason: its text in replies and diagnostics}
     NONE='none', REQUESTED='requested', LOCKED='locked', SIGNAL_LOST='signal lost',
     ENCODER_INVALID='encoder invalid', ATTITUDE_INVALID='attitude invalid', NO_PROGRAM='no program track',
     BEFORE_PROGRAM='before program track', AFTER_PROGRAM='after program track', NOT_LOCKED='receiver not locked',
@@ -45,13 +47,11 @@ REASON_TEXTS = dict(
     NO_ELEMENTS='no elements', TOO_OLD='elements too old', BELOW_HORIZON='below the horizon',
     PROGRAM_GAP='gap in the program track', NO_UTC='UTC unknown', DRIVE_FROZEN='drive frozen',
     TURN='azimuth turn')
-"""{name of a reason: its text in replies and diagnostics}."""
+REASONS = tuple(REASON_TEXTS.values())  # in the order of their codes
+Reason = codes(REASON_TEXTS)
 
-REASONS = tuple(REASON_TEXTS.values())  # texts of the reasons, in the order of their codes
-Reason = codes(REASON_TEXTS)  # codes of the reasons
-
+# Results of a request. NO_REQUEST is also the value of `request` in a step without a request.
 NO_REQUEST, REQUEST_REFUSED, REQUEST_ACCEPTED = -1, 0, 1
-"""Results of a request. NO_REQUEST is also the value of `request` in a step without a request."""
 
 
 class Conditions(NamedTuple):
@@ -113,16 +113,6 @@ def obstacle(request: int, now: Situation) -> int:
 
 
 @compiled
-def _end(mode: int, now: Situation) -> int:
-    """Return the reason why a running mode ends in a Situation `now`, or Reason.NONE.
-
-    A mode cannot begin on a table that is outside the limits at present, but a running mode continues on it.
-    """
-    why = now.conditions[_ENDS[mode]]
-    return Reason.NONE if FOLLOWS_TABLE[mode] and why == Reason.OUTSIDE_LIMITS else why
-
-
-@compiled
 def next_mode(mode: int, request: int, now: Situation) -> Decision:
     """Return the Decision of one step in a Situation `now`; mode: the present mode; request: a mode or NO_REQUEST."""
     why, result = Reason.NONE, NO_REQUEST
@@ -142,7 +132,10 @@ def next_mode(mode: int, request: int, now: Situation) -> Decision:
         return Decision(Mode.STANDBY, now.drive, result)
     if FOLLOWS_TARGET[mode] and now.attitude != Reason.NONE:
         return Decision(Mode.STANDBY, now.attitude, result)
-    handover, end = _HANDOVER[mode], _end(mode, now)
+    handover, end = _HANDOVER[mode], now.conditions[_ENDS[mode]]
+    if FOLLOWS_TABLE[mode] and end == Reason.OUTSIDE_LIMITS:
+        # A mode cannot begin on a table that is outside the limits at present, but a running mode continues on it.
+        end = Reason.NONE
     if now.handover and handover != NO_HANDOVER and now.conditions[_NEEDS[handover]] == Reason.NONE:
         return Decision(handover, Reason.LOCKED if handover == Mode.AUTOTRACK else Reason.FOUND, result)
     if end == Reason.NONE:
@@ -155,3 +148,83 @@ def next_mode(mode: int, request: int, now: Situation) -> Decision:
     if fallback == Mode.PROGRAM:
         fallback = now.table
     return Decision(fallback if now.conditions[_NEEDS[fallback]] == Reason.NONE else Mode.STANDBY, end, result)
+
+
+class ModeState(Record):
+    """State of the mode machine."""
+    now: int        # code of the present mode
+    reason: int     # why the mode was entered, a request was refused, or the receiver has no signal
+    pending: int    # mode that is entered as soon as its conditions hold, or NO_REQUEST
+    begins: Bit     # 1 until the mode sends its first command to the axes
+    table: int      # mode whose table was followed last: program, tle or sun
+    fallback: int   # mode chosen for the loss of the track
+
+
+def initialise(state: Records, params: 'AcuParameters') -> None:
+    """Begin in standby with the initial mode of the parameters pending."""
+    state['pending'] = MODES.index(params.initial_mode)
+    state['table'] = Mode.PROGRAM
+    choose(state, params.fallback)
+
+
+def choose(state: Records, name: str) -> None:
+    """Choose the mode after the loss of the track, by its name in FALLBACK_MODES."""
+    state['fallback'] = FALLBACK_MODES[name]
+
+
+@compiled
+def change(state: ModeState, now: Situation, request: int) -> int:
+    """Run the mode machine in a Situation `now`; request: a mode or NO_REQUEST. Return the result of the request."""
+    mode, reason, result = next_mode(state.now, request, now)
+    if result == REQUEST_ACCEPTED:
+        state.pending = NO_REQUEST
+    if FOLLOWS_TABLE[mode]:
+        state.table = mode
+    if reason != Reason.NONE:
+        state.reason = reason
+    if mode != state.now:
+        state.now, state.begins = mode, 1
+    return result
+
+
+@compiled
+def restart(state: ModeState) -> None:
+    """Let the present mode begin again."""
+    state.begins = 1
+
+
+@compiled
+def mark_started(state: ModeState) -> None:
+    """Note that the mode has commanded the axes."""
+    state.begins = 0
+
+
+@compiled
+def set_pending(state: ModeState, request: int) -> None:
+    """Set the pending mode; request: a mode or NO_REQUEST."""
+    state.pending = request
+
+
+@compiled
+def continue_in(state: ModeState, mode: int) -> None:
+    """Continue after a silence (a time without steps) in a mode: the mode before the silence, or STANDBY."""
+    if mode != state.now:
+        state.now, state.reason = mode, Reason.SILENCE
+
+
+@compiled
+def set_outage_reason(state: ModeState, reason: int) -> None:
+    """Set the reason of an outage of the receiver, or NONE without an outage.
+
+    NONE replaces only a reason that this function has set.
+    """
+    if (reason != Reason.NONE or state.reason == Reason.BLOCKED or state.reason == Reason.KEYHOLE
+            or state.reason == Reason.TURN):
+        state.reason = reason
+
+
+@compiled
+def mark_stowed(state: ModeState) -> None:
+    """Replace the reason `requested` of the mode stow by `stow pins in`: the pins have gone in."""
+    if state.reason == Reason.REQUESTED:
+        state.reason = Reason.PINS_IN

@@ -1,15 +1,12 @@
-"""Parameters of the antenna control unit: of each axis, and shared by both axes. The groups come from the packages.
-
-Each parameter has a default, a range, a unit and a help text. The checks refuse values that do not go together.
-"""
+"""Parameters of the antenna control unit: of each axis, and shared by both axes. The groups come from the packages."""
 import dataclasses
 import math
 
+from acu_tracker.command_table import ACU_COMMANDS, POINTS_DOC, points
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters
 from acu_tracker.geometry.history import MAX_DELAY_STEPS
 from acu_tracker.lookahead.params import KeyholeParameters
 from acu_tracker.modes import FALLBACK_MODES
-from acu_tracker.operating.command_table import ACU_COMMANDS, POINTS_DOC, points
 from acu_tracker.pointing.params import PointingParameters
 from acu_tracker.program.air import RefractionParameters
 from acu_tracker.program.prediction import PredictionParameters
@@ -123,11 +120,7 @@ class AcuParameters(SharedParameters):
     elevation: ElevationParameters = group(ElevationParameters)
 
     def check_graph(self, beams: int, lockstep: bool) -> None:
-        """Raise ParameterError if the controllers do not suit the drive.
-
-        beams: number of electronic beams of the drive, 0 for a drive with motors. An array (beams > 0) needs the
-        controller `beam` on both axes; motors need another one.
-        """
+        """Raise ParameterError if the controllers do not suit the drive; beams: 0 for a drive with motors."""
         array = beams > 0
         for axis in ('azimuth', 'elevation'):
             controller = getattr(self, axis).controller
@@ -140,19 +133,15 @@ class AcuParameters(SharedParameters):
 
     @property
     def reaction(self) -> Seconds:
-        """Reaction time of an axis in front of a limit [s]: e tau.
+        """Reaction time of an axis in front of a limit: e tau.
 
-        e is Euler's number. tau is the delay of a command plus two periods: one until the effect of the command is
-        measured, one until the next command is in force. Let x be the distance of the axis from its limit, and f the
-        rate towards it, so that dx/dt = -f(x(t - tau)). With f <= x / (e tau) the axis does not overshoot.
+        tau is the delay of a command plus two periods: one until the effect of the command is measured, one until the
+        next command is in force. Let x be the distance of the axis from its limit, and f the rate towards it, so that
+        dx/dt = -f(x(t - tau)). With f <= x / (e tau) the axis does not overshoot.
         """
         return math.e * (self.command_delay + 2.0 * self.period)
 
     def _check_travel(self) -> None:
-        """Raise ParameterError if an axis needs more than half its travel to brake from its full rate.
-
-        Raise it also if the stow angles or the preset angles are below the floor.
-        """
         for name in ('azimuth', 'elevation'):
             axis = getattr(self, name)
             a = axis.limits.deceleration
@@ -169,11 +158,7 @@ class AcuParameters(SharedParameters):
                                      f'azimuth.{name} = {A:g} rad')
 
     def check(self) -> None:
-        """Raise ParameterError for parameters that do not go together.
-
-        Each delay must fit into the histories of past steps. A notch must be below half the step rate. An attitude
-        must be used before it times out. `step_gap` must be longer than a step.
-        """
+        """Raise ParameterError for parameters that do not go together."""
         self.pointing.check_antenna(self.antenna)
         sectors(self.blockage)
         schedule('commands', self.commands, ACU_COMMANDS)

@@ -1,7 +1,4 @@
-"""Inputs and outputs of the control unit in one step: the records that the law reads and writes.
-
-`unit` converts messages to the inputs, and the outputs to messages. Pairs of numbers are (azimuth, elevation).
-"""
+"""Inputs and outputs of the control unit in one step: the records that the law reads and writes."""
 import math
 from typing import Annotated
 
@@ -25,32 +22,25 @@ from pedestal_common.quantities import (
 )
 from pedestal_common.record import Record
 
-INVALID_INPUTS = ('stamp', 'encoder', 'error', 'error_stamp', 'error_gated', 'attitude', 'program', 'preset',
-                  'step_gap', 'error_noisy', 'attitude_error')
-"""Names of the bits of outputs.invalid_input: bit i stands for INVALID_INPUTS[i].
-
-stamp           the stamp of the step does not advance, or is not finite
-encoder         the encoder angles are missing or not finite
-error           a number of the receiver is not finite
-error_stamp     an error is not newer than the last one, or its time is outside the history of the encoders
-error_gated     an error is outside the gate of the filter
-attitude        the attitude is missing or not valid
-program         a table contains an angle that is not finite
-preset          a preset is not finite
-step_gap        the previous step is more than the parameter step_gap ago
-error_noisy     the errors of the receiver are only noise
-attitude_error  the INS has published statistics of its error that are out of range
-"""
+INVALID_INPUTS = (
+    'stamp',            # the stamp of the step does not advance, or is not finite
+    'encoder',          # the encoder angles are missing or not finite
+    'error',            # a number of the receiver is not finite
+    'error_stamp',      # an error is not newer than the last one, or its time is outside the history of the encoders
+    'error_gated',      # an error is outside the gate of the filter
+    'attitude',         # the attitude is missing or not valid
+    'program',          # a table contains an angle that is not finite
+    'preset',           # a preset is not finite
+    'step_gap',         # the previous step is more than the parameter step_gap ago
+    'error_noisy',      # the errors of the receiver are only noise
+    'attitude_error')   # the INS has published statistics of its error that are out of range
 Flag = bits(INVALID_INPUTS)  # bits of outputs.invalid_input, by name
 
+# Codes of adu/state. The drive follows commands if its code is at most DRIVE_READY. A code from FIRST_DRIVE_FAULT on
+# is a fault. A drive that has published no state has the code topics.NO_TEXT_CODE and counts as ready.
 DRIVE_STATES = topics.TOPIC_BY_NAME['adu/state'].texts
 DRIVE_READY = len(topics.ENABLED_STATES) - 1
 DRIVE_EMERGENCY_STOP, FIRST_DRIVE_FAULT = DRIVE_STATES.index('emergency stop'), len(DRIVE_STATES)
-"""Codes of adu/state.
-
-The drive follows commands if its code is at most DRIVE_READY. A code from FIRST_DRIVE_FAULT on is a fault. A drive
-that has published no state has the code topics.NO_TEXT_CODE and counts as ready.
-"""
 
 INPUT_TOPICS = nodes.row('acu').reads  # topics that the control unit reads
 

@@ -1,7 +1,7 @@
 """The unit of the antenna control unit: its compiled law with the parts that act between two steps.
 
-The node `acu`, the closed loop and the recomputation run this unit (pedestal_common.node.unit). `unit_law` makes a
-step. Between the steps the unit hands each message, command and request to the part that it concerns.
+`unit_law` makes a step. Between the steps the unit hands each message, command and request to the part that it
+concerns.
 """
 import datetime
 import functools
@@ -12,12 +12,9 @@ import numpy as np
 
 from acu_tracker import control_unit, modes, signals
 from acu_tracker.alarms import annunciator, report, table
+from acu_tracker.command_table import ACU_COMMANDS
 from acu_tracker.modes import Mode, Reason
-from acu_tracker.operating import announcement, diagnosis, refusals
-from acu_tracker.operating.alarm_desk import AlarmDesk
-from acu_tracker.operating.authority import Authority
-from acu_tracker.operating.command_table import ACU_COMMANDS
-from acu_tracker.operating.commands import EXECUTORS
+from acu_tracker.operating import announcement, commands, diagnosis
 from acu_tracker.params import AcuParameters
 from acu_tracker.pointing.in_force import ModelInForce
 from acu_tracker.program import segments, tables
@@ -40,24 +37,21 @@ from acu_tracker.unit_law import (
 from pedestal_common.graph import nodes, topics
 from pedestal_common.node.unit import Diagnosis, Unit
 from pedestal_common.parameters import Parameters
-from pedestal_common.quantities import AnyRecord, Message, Nanoseconds, Records, Value
+from pedestal_common.quantities import AnyRecord, Message, Nanoseconds, Records, Seconds, Value
 from pedestal_common.wire import messages
 from pedestal_common.wire.commands import Command, Reply, schedule
 
+# Time after a reset by an operator during which the reset of the drive is requested [s].
 RESET_REQUEST_DURATION_S = 0.2
-"""Time after a reset by an operator during which the reset of the drive is requested [s]."""
 
+# Indices of the alarms for the silence of the drive, and of those whose report contains the text of adu/state.
 DRIVE_SILENT_ALARM, DRIVE_FAULT_ALARM = table.ALARM_INDEX['drive silent'], table.ALARM_INDEX['drive fault']
 MOTOR_LOST_ALARMS = tuple(table.ALARM_INDEX[f'{axis} motor lost'] for axis in topics.AXES)
-"""Indices of the alarms for the silence of the drive, and of those whose report contains the text of adu/state."""
 
 
 @functools.lru_cache(1)
 def _initial(parameters: AcuParameters) -> Records:
-    """Return the UnitRecord (1,) of a control unit before its first step.
-
-    The cache saves time in successive trials with equal parameters.
-    """
+    # The cache saves time in successive trials with equal parameters.
     return UnitRecord.of(state=control_unit.initial_state(parameters),
                          constants=control_unit.constants(parameters))
 
@@ -73,11 +67,12 @@ class Acu(Unit):
 
     parameters: AcuParameters
     memory: Memory
-    authority: Authority        # client in control
-    desk: AlarmDesk             # commands to the alarms
-    followed: Followed          # tables and directions that the modes follow
-    model: ModelInForce         # pointing model
-    drive_state: str            # state of the drive as the drive published it
+    authority: commands.Authority   # client in control
+    desk: commands.AlarmDesk        # commands to the alarms
+    followed: Followed              # tables and directions that the modes follow
+    model: ModelInForce             # pointing model
+    drive_state: str                # state of the drive as the drive published it
+    reset_stamp: Seconds            # stamp of the last request to reset the drive
 
     def __init__(self, parameters: AcuParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
@@ -86,11 +81,11 @@ class Acu(Unit):
         self.parts['outputs']['mode'], self.parts['outputs']['pins'] = Mode.STANDBY, topics.NO_TEXT_CODE
         signals.clear(self.parts['outputs'])
         self.drive_state = 'unknown'
-        self.authority = Authority()
+        self.authority = commands.Authority()
         self.followed = Followed(parameters)
         self.model = ModelInForce(parameters)
-        self.desk = AlarmDesk()
-        self._silent, self._reset_stamp = False, -math.inf
+        self.desk = commands.AlarmDesk()
+        self._silent, self.reset_stamp = False, -math.inf
 
     @property
     def silent(self) -> bool:
@@ -108,7 +103,7 @@ class Acu(Unit):
     def prepare_requests(self) -> None:
         """Compile the functions behind the requests and the alarm commands, and those of the diagnosis."""
         super().prepare_requests()
-        self.reset()
+        commands.reset(self)
         self.desk.prepare(self.parts['state'])
         self.encode(ALARMS_TOPIC, 0)
         annunciator.set_condition(self.alarms, DRIVE_SILENT_ALARM, True, 0.0)
@@ -116,7 +111,7 @@ class Acu(Unit):
         self.followed.air.raised(np.zeros(2), np.zeros((2, 2)))
 
     def configure(self, parameters: Parameters) -> None:
-        """Put new values of the LIVE parameters into the constants; the state stays as it is.
+        """Put new values of the LIVE parameters into the constants.
 
         A state without a step, as after a reset, begins with the pointing model that was in force, at its last terms.
         """
@@ -130,8 +125,8 @@ class Acu(Unit):
     def decode(self, topic: str, message: Message) -> None:
         """Take a message on acu/program_track, or a reading of the weather station.
 
-        A bad message on acu/program_track raises ValueError; Air counts the readings that it drops. Two or more points
-        are a segment of the program track in earth angles. One point is a preset in deck angles.
+        A bad message on acu/program_track raises ValueError. Two or more points are a segment of the program track in
+        earth angles. One point is a preset in deck angles.
         """
         if topic in WEATHER_QUANTITIES:
             stamp = messages.nanoseconds(message.header.stamp)
@@ -152,10 +147,7 @@ class Acu(Unit):
         return min(super().next_due, self.followed.due)
 
     def execute_due(self, stamp: Nanoseconds) -> None:
-        """Execute the scheduled commands that are due before the step of a stamp.
-
-        The tables of the law are brought to this stamp before.
-        """
+        """Bring the tables of the law to a stamp, and execute the scheduled commands that are due before its step."""
         if self.epoch != self.followed.predictor.epoch:
             self.followed.predict_by(self.followed.predictor.with_epoch(self.epoch))
             self.model.check_date(self.parts['state']['tracking']['pointing'], self.utc)
@@ -181,7 +173,7 @@ class Acu(Unit):
         self.memory = self.memory._replace(tables=self.followed.tables)
 
     def take_text(self, topic: str, text: str) -> None:
-        """Take the text of a text topic; the text of adu/state is also kept for the diagnosis."""
+        """Take the text of a text topic, and keep that of adu/state for the diagnosis."""
         super().take_text(topic, text)
         if topic == DRIVE_STATE_TOPIC:
             self.drive_state = text
@@ -205,52 +197,16 @@ class Acu(Unit):
         return schedule('commands', self.parameters.commands, ACU_COMMANDS)
 
     def execute(self, command: Command, arguments: Mapping[str, Value]) -> Reply:
-        """Return the Reply to a command of VERBS; a refusal states the reason and changes nothing."""
-        return EXECUTORS[command.verb](self, command, arguments)
+        """Return the Reply to a command of VERBS."""
+        return commands.EXECUTORS[command.verb](self, command, arguments)
 
     def admit(self, command: Command) -> None:
         """Raise ValueError for a command of a client, if another client holds control."""
         self.authority.admit(command)
 
     def request(self, name: str) -> Reply:
-        """Return the Reply to a request of a service: acu/MODE, acu/acknowledge or acu/reset_faults.
-
-        A refusal states the reason.
-        """
-        mode = name.removeprefix('acu/')
-        parts, outputs = self.parts, self.parts['outputs']
-        if mode == 'reset_faults':
-            return self.reset()
-        if mode == 'acknowledge':
-            return self.desk.acknowledge(self.parts['state'])
-        if self.silent and mode != 'standby':
-            return Reply(False, f'refused: {refusals.SILENCE_REFUSAL}; mode is {modes.MODES[outputs["mode"]]}')
-        parts['inputs']['drive_ready'] = self.inputs[0][DRIVE_STATE_TOPIC] <= signals.DRIVE_READY
-        code = modes.MODES.index(mode)
-        granted = control_unit.request(parts['state'], parts['constants'], parts['inputs'], outputs,
-                                       self.memory.tables, code)
-        refusal = '' if granted else f'refused: {refusals.of_mode(self, code, outputs["reason"])}; '
-        return Reply(bool(granted), f'{refusal}mode is {modes.MODES[outputs["mode"]]}')
-
-    def reset(self) -> Reply:
-        """Return the Reply to a reset of the latched alarms and faults; also request the reset of a drive in fault.
-
-        The reset is refused while the cause of one of them is present. The control unit does not reset an emergency
-        stop of the drive: only an operator does, at adu/reset_faults.
-        """
-        cause = control_unit.reset(self.parts['state'])
-        if self.drive_state.startswith('fault'):
-            self._reset_stamp = float(self.parts['state']['stamp'])
-        if cause != annunciator.NO_ALARM:
-            return Reply(False, f'refused: the cause of {table.ALARM_NAMES[cause]} is still there')
-        drive = f'; the drive reports {self.drive_state}'
-        return Reply(True, 'cleared' + (drive if self.drive_state.startswith(('fault', 'emergency stop')) else ''))
-
-    def refusals(self) -> list[int]:
-        """Return for each mode Reason.NONE, or the reason why it would be refused now."""
-        parts, why = self.parts, np.zeros(len(modes.MODES), np.int64)
-        control_unit.refusals(parts['state'], parts['constants'], parts['inputs'], self.memory.tables, why)
-        return why.tolist()
+        """Return the Reply to a request of a service: acu/MODE, acu/acknowledge or acu/reset_faults."""
+        return commands.request(self, name.removeprefix('acu/'))
 
     @property
     def drive_status(self) -> str:
@@ -262,26 +218,18 @@ class Acu(Unit):
         return [f'acu/{text}'] if topic == MODE_TOPIC and text in modes.MODES else []
 
     def diagnose(self) -> Diagnosis:
-        """Return the Diagnosis and clear the bits of the invalid inputs.
-
-        The level is ERROR for a latched fault or invalid inputs since the last diagnosis. The level is WARN for gated
-        errors, a turn of the azimuth, a limit that holds the beam, an end of travel ahead, or coasting.
-        """
+        """Return the Diagnosis and clear the bits of the invalid inputs."""
         result = diagnosis.of(self)
         self.parts['invalid'] = 0
         return result
 
     @property
     def calls(self) -> tuple[str, ...]:
-        """Services of the drive that the unit calls now.
-
-        The unit calls the emergency stop during uncommanded motion, and the reset for a short time after a reset by an
-        operator.
-        """
+        """Services of the drive that the unit calls now; its reset after a reset by an operator."""
         stop, reset = self.CALLS
         if self.parts['state']['unasked']['moves']:
             return (stop,)
-        return (reset,) if 0.0 < self.parts['state']['stamp'] - self._reset_stamp < RESET_REQUEST_DURATION_S else ()
+        return (reset,) if 0.0 < self.parts['state']['stamp'] - self.reset_stamp < RESET_REQUEST_DURATION_S else ()
 
     @property
     def alarms(self) -> AnyRecord:
@@ -296,20 +244,14 @@ class Acu(Unit):
 
     @property
     def urgent(self) -> tuple[object, ...]:
-        """Values whose change is published at once in the diagnostics.
-
-        The values are faults, mode, silence, lock, state of the drive, pins and alignment.
-        """
+        """Values whose change is published at once in the diagnostics."""
         outputs, inputs = self.parts['outputs'], self.parts['inputs']
         return (control_unit.latched(self.parts['state']), outputs['mode'], outputs['reason'] == Reason.SILENCE,
                 outputs['locked'], inputs['drive'], inputs['pins'], inputs['aligning'])
 
     @staticmethod
     def idle(numbers: Mapping[str, Message]) -> str:
-        """Return the reason why a recording does not exercise the unit, or ''; numbers: recorded numbers by topic.
-
-        The reasons are a receiver that never locked, and a control unit that was never in autotrack.
-        """
+        """Return the reason why a recording does not exercise the unit, or ''."""
         if not np.isfinite(numbers[ANGLE_ERROR_TOPIC][:, 0]).any():
             return 'the receiver never locked'
         return '' if 'autotrack' in numbers[MODE_TOPIC] else 'the ACU was never in autotrack'

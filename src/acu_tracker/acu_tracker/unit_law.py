@@ -1,7 +1,4 @@
-"""The law of the unit: it decodes the messages of a step, runs `control_unit.step`, and encodes the outputs.
-
-`unit.Acu` owns the Memory of this law.
-"""
+"""The law of the unit: it decodes the messages of a step, runs `control_unit.step`, and encodes the outputs."""
 import math
 from typing import NamedTuple
 
@@ -23,15 +20,15 @@ MODE_TOPIC, KEYHOLE_TOPIC, BLOCKAGE_TOPIC, ALARMS_TOPIC = 'acu/mode', 'acu/keyho
 DRIVE_STATE_TOPIC, INS_STATE_TOPIC, STOW_PINS_TOPIC = 'adu/state', 'ins/state', 'acu/stow_pins'
 POINTING_TOPIC = 'acu/pointing'
 
+# Number of the values of an axis on acu/filter; the last MODEL_COUNT are the probabilities of the motion models.
 FILTER_COLUMN_COUNT, MODEL_COUNT = len(topics.FILTER_UNITS), len(topics.MOTION_MODELS)
-"""Number of the values of an axis on acu/filter; the last MODEL_COUNT are the probabilities of the motion models."""
 
+# Code of the state `aligning`; an INS that has published no state, topics.NO_TEXT_CODE, counts as aligned.
 INS_ALIGNING = topics.TOPIC_BY_NAME[INS_STATE_TOPIC].texts.index('aligning')
-"""Code of the state `aligning`; an INS that has published no state, topics.NO_TEXT_CODE, counts as aligned."""
 
 
 class UnitRecord(Record):
-    """Memory of the control unit: the records of its law."""
+    """Records of the law."""
     state: control_unit.State
     constants: control_unit.Constants
     inputs: signals.Inputs
@@ -50,7 +47,7 @@ _take = taking(signals.INPUT_TOPICS)
 
 @compiled
 def decode(inputs: signals.Inputs, stamp: Nanoseconds, received: AnyRecord) -> None:
-    """Convert the messages of a step, received on the input topics, into the inputs of the control unit.
+    """Convert the messages of a step into the inputs of the control unit.
 
     An attitude stays until the next one comes. A rate or a range is used only if an error has the same stamp.
     """
@@ -70,10 +67,7 @@ def decode(inputs: signals.Inputs, stamp: Nanoseconds, received: AnyRecord) -> N
 
 @compiled
 def encode(outputs: signals.Outputs, state: control_unit.State, stamp: Nanoseconds, sent: AnyRecord) -> None:
-    """Convert the outputs of the control unit and the counts of its reports into the records of its messages.
-
-    sent: record of the output topics.
-    """
+    """Convert the outputs of the control unit and the counts of its reports into its messages."""
     command, estimate, reference = sent[RATE_COMMAND_TOPIC], sent[ESTIMATE_TOPIC], sent[REFERENCE_TOPIC]
     command.stamp = estimate.stamp = reference.stamp = sent[FILTER_TOPIC].stamp = stamp
     for i in range(2):
@@ -98,7 +92,7 @@ def encode(outputs: signals.Outputs, state: control_unit.State, stamp: Nanosecon
 
 @compiled
 def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
-    """Run one step; the arguments are those of the law of a unit (pedestal_common.node.unit.Unit)."""
+    """Run one step, as the law of a pedestal_common.node.unit.Unit."""
     record = memory.record[0]
     decode(record.inputs, stamp, inputs)
     receiver_error.correct_error(record.constants.p.tracker.matrix, record.inputs)

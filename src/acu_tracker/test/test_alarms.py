@@ -29,7 +29,7 @@ def encoders(d, y, dy):
     detectors.initialise(d, y[0], dy[0])
     for angle, rate in zip(y[1:], dy[1:]):
         x = detectors.encoder_motor_mismatch(d, angle, rate, T, 0.0)
-        found.append((detectors.encoder_jump(x), detectors.encoder_stuck(d, angle, rate, T)))
+        found.append((abs(x) > detectors.MAX_STEP_MISMATCH_RAD, detectors.encoder_stuck(d, angle, rate, T)))
         d['y'], d['dy'] = angle, rate
     return np.array(found).T
 
@@ -61,9 +61,9 @@ def test_steps_that_are_lost_while_the_axis_is_at_its_acceleration_are_no_jump(l
     for angle, rate in zip(y[left_out::left_out + 1], dy[left_out::left_out + 1]):
         worst = max(worst, abs(detectors.encoder_motor_mismatch(d, angle, rate, dt, 0.0)))
         x = detectors.encoder_motor_mismatch(d, angle, rate, dt, 40.0)
-        assert not detectors.encoder_jump(x) and not detectors.disagreement(d, x, dt)
+        assert abs(x) <= detectors.MAX_STEP_MISMATCH_RAD and not detectors.disagreement(d, x, dt)
         x = detectors.encoder_motor_mismatch(d, angle + 40.0 * dt * dt + 0.004, rate, dt, 40.0)
-        assert detectors.encoder_jump(x)                                   # what no acceleration explains is seen
+        assert abs(x) > detectors.MAX_STEP_MISMATCH_RAD                        # what no acceleration explains is seen
         d['y'], d['dy'] = angle, rate
     assert worst > 1e-4                                                    # which the trapezoid does not know
 

@@ -6,7 +6,7 @@ import pytest
 from acu_tracker import modes
 from acu_tracker.alarms.table import ALARM_NAMES
 from acu_tracker.guidance import manual
-from acu_tracker.operating.authority import Authority
+from acu_tracker.operating.commands import Authority
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit import Acu
 from pedestal_common.graph import nodes

@@ -15,7 +15,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from acu_tracker.operating.command_table import ACU_COMMANDS
+from acu_tracker.command_table import ACU_COMMANDS
 from acu_tracker.program.air import WEATHER_QUANTITIES, Air, RefractionParameters
 from acu_tracker.program.prediction import PredictionParameters, Predictor
 from pedestal_common.compiled import compiled

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from acu_tracker.command_table import ACU_COMMANDS
 from acu_tracker.modes import REASON_TEXTS
-from acu_tracker.operating.command_table import ACU_COMMANDS
 from pedestal_common.graph import modes, nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.quantities import Bools, Floats, Json, Seconds

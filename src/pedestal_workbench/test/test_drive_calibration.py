@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from acu_tracker.operating.command_table import ACU_COMMANDS
+from acu_tracker.command_table import ACU_COMMANDS
 from pedestal import cli
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import files, scenario

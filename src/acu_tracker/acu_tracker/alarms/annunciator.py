@@ -5,9 +5,7 @@ often shows the cause of the burst.
 
 By the table an alarm may be the consequence of another alarm, its parent. The alarm stands under its parent in two
 cases: the condition of the parent is present, or both were raised within CAUSE_WINDOW_S. Only an alarm without a
-parent is annunciated (`report`).
-
-i is the index of an alarm in table.ALARMS, t is the stamp of the step.
+parent is annunciated (`report`). i: index of an alarm in table.ALARMS.
 """
 from collections.abc import Sequence
 from typing import Annotated
@@ -43,14 +41,13 @@ class AlarmList(Record):
 NO_ALARM = -1  # index that stands for no alarm
 FIRST_OUT_WINDOW_S = 1.0  # time after the first alarm of a burst within which other alarms belong to the burst [s]
 
+# Longest time between two alarms, in either order, in which the one counts as the consequence of the other [s].
 CAUSE_WINDOW_S = 5.0
-"""Longest time between two alarms, in either order, in which the one counts as the consequence of the other [s]."""
-
 MAX_SHELVING_TIME_S = 86400.0  # longest time for which an alarm may be shelved [s]: a day
 
 
 def initialise(alarms: Records) -> None:
-    """Begin with every alarm in the state normal and no list published."""
+    """Begin with every alarm in the state normal."""
     alarms['alarm']['state'] = machine.State.NORMAL
     alarms['alarm']['parent'] = NO_ALARM
     alarms['alarm']['since'] = alarms['alarm']['raised'] = alarms['burst'] = -np.inf
@@ -66,11 +63,7 @@ def restart(alarms: AlarmList, t: Seconds) -> None:
 
 @compiled
 def _parent(alarms: AlarmList, i: int, t: Seconds) -> int:
-    """Return the index of the parent of alarm i, or NO_ALARM.
-
-    The parent is the first possible cause in the table that is listed, not shelved, and present or raised within
-    CAUSE_WINDOW_S.
-    """
+    # The parent is the first possible cause in the table that is listed, not shelved, and present or recent.
     for j in range(i):
         cause = alarms.alarm[j]
         if table.CAUSE_BITS[i] >> j & 1 and machine.IS_ANNUNCIATED[cause.state] and (
@@ -81,10 +74,7 @@ def _parent(alarms: AlarmList, i: int, t: Seconds) -> int:
 
 @compiled
 def _raised(alarms: AlarmList, i: int, t: Seconds) -> None:
-    """Note that alarm i has been raised: set its first-out mark and its parent.
-
-    Alarm i also becomes the parent of its recent consequences, if these have no parent yet.
-    """
+    """Set the first-out mark and the parent of alarm i, and make alarm i the parent of its recent consequences."""
     alarm = alarms.alarm[i]
     alarm.first = t - alarms.burst > FIRST_OUT_WINDOW_S
     if alarm.first:
@@ -99,7 +89,6 @@ def _raised(alarms: AlarmList, i: int, t: Seconds) -> None:
 
 @compiled
 def _enter(alarms: AlarmList, i: int, state: int, t: Seconds) -> None:
-    """Put alarm i into another state of machine.ALARM_STATES."""
     alarm = alarms.alarm[i]
     if machine.IS_LISTED[alarm.state] or machine.IS_LISTED[state]:
         alarms.revision += 1
@@ -110,21 +99,12 @@ def _enter(alarms: AlarmList, i: int, state: int, t: Seconds) -> None:
 
 @compiled
 def apply_event(alarms: AlarmList, i: int, event: int, t: Seconds) -> bool:
-    """Apply an event of machine.ALARM_EVENTS to alarm i at t. Return True if its state accepts the event."""
+    """Apply an event of machine.ALARM_EVENTS to an alarm. Return True if its state accepts the event."""
     before = alarms.alarm[i].state
     after = machine.next_state(before, event, table.LATCHED_FLAGS[i])
     if after != before and after != machine.EVENT_REFUSED:
         _enter(alarms, i, after, t)
     return after != machine.EVENT_REFUSED
-
-
-@compiled
-def _delayed(alarm: Alarm, on: bool, t: Seconds, delay: Seconds) -> None:
-    """Set `active` to `on` (the condition is present or not at t) after it has been so for a delay."""
-    if on == alarm.active:
-        alarm.since = t
-    elif t - alarm.since >= delay:
-        alarm.active, alarm.since = on, t
 
 
 @compiled
@@ -142,7 +122,10 @@ def update(alarms: AlarmList, t: Seconds, conditions: int, judged: int) -> None:
             # This avoids the work below in the usual case, in which nothing would change.
             alarm.since = t
             continue
-        _delayed(alarm, on, t, table.ON_DELAYS_S[i] if on else table.OFF_DELAYS_S[i])
+        if on == alarm.active:
+            alarm.since = t
+        elif t - alarm.since >= (table.ON_DELAYS_S[i] if on else table.OFF_DELAYS_S[i]):
+            alarm.active, alarm.since = on, t
         if alarm.state == machine.State.SHELVED and t >= alarm.until:
             apply_event(alarms, i, machine.Event.UNSHELVE, t)
         apply_event(alarms, i, machine.Event.RELEASE if is_judged else machine.Event.SUPPRESS, t)
@@ -151,7 +134,7 @@ def update(alarms: AlarmList, t: Seconds, conditions: int, judged: int) -> None:
 
 @compiled
 def active_parent(alarms: AlarmList, i: int) -> int:
-    """Return the index of the parent of alarm i, if the parent is listed and not shelved, else NO_ALARM."""
+    """Return the index of the parent, if the parent is listed and not shelved, else NO_ALARM."""
     parent = alarms.alarm[i].parent
     if parent != NO_ALARM and machine.IS_ANNUNCIATED[alarms.alarm[parent].state]:
         return parent
@@ -160,7 +143,7 @@ def active_parent(alarms: AlarmList, i: int) -> int:
 
 @compiled
 def acknowledge(alarms: AlarmList, i: int, t: Seconds) -> bool:
-    """Acknowledge alarm i and all alarms that stand under it. Return True if one of them waited for it."""
+    """Acknowledge an alarm and all alarms that stand under it. Return True if one of them waited for it."""
     done = apply_event(alarms, i, machine.Event.ACKNOWLEDGE, t)
     for k in range(i + 1, ALARM_COUNT):
         top = k
@@ -173,7 +156,7 @@ def acknowledge(alarms: AlarmList, i: int, t: Seconds) -> bool:
 
 @compiled
 def shelve(alarms: AlarmList, i: int, t: Seconds, seconds: Seconds) -> None:
-    """Shelve alarm i, in any state, for some seconds from t on."""
+    """Shelve an alarm, in any state, for some seconds from t on."""
     alarms.alarm[i].until = t + seconds
     alarms.revision += 1
     apply_event(alarms, i, machine.Event.SHELVE, t)
@@ -181,9 +164,7 @@ def shelve(alarms: AlarmList, i: int, t: Seconds, seconds: Seconds) -> None:
 
 @compiled
 def persisting_alarm(alarms: AlarmList, without: int) -> int:
-    """Return the index of a latching alarm whose condition is still present, or NO_ALARM.
-
-    without: bits of the alarms that are not considered.
+    """Return a latching alarm whose condition is still present, or NO_ALARM; without: bits of alarms that are ignored.
     """
     for i in range(ALARM_COUNT):
         alarm = alarms.alarm[i]
@@ -194,7 +175,7 @@ def persisting_alarm(alarms: AlarmList, without: int) -> int:
 
 @compiled
 def set_condition(alarms: AlarmList, i: int, there: bool, t: Seconds) -> None:
-    """Set the condition of alarm i at t without its delays; there: True if the condition is present."""
+    """Set the condition of an alarm at t without its delays; there: True if the condition is present."""
     alarms.alarm[i].active = there
     apply_event(alarms, i, machine.Event.RAISE if there else machine.Event.CLEAR, t)
 

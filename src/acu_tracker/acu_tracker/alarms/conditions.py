@@ -1,7 +1,6 @@
-"""Conditions of the alarms in a step: which rows of the table of alarms have their condition.
+"""Conditions of the alarms in a step: a number with one bit for each alarm (table.Bit), for the annunciator.
 
-The conditions come from the detectors of both axes, from the state of the drive, and from facts of the control unit.
-The result is a number with one bit for each alarm (table.Bit), which the annunciator takes.
+The product of a bit and a condition is the bit if the condition holds, else 0.
 """
 import math
 from typing import TYPE_CHECKING, NamedTuple
@@ -10,12 +9,12 @@ import numpy as np
 
 from acu_tracker import modes, signals
 from acu_tracker.alarms import annunciator, detectors, table
+from acu_tracker.alarms.table import Bit
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.servo import drive_watch, position_loop
 from acu_tracker.signals import Flag, Inputs, Outputs
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
-    Bit,
     BothAxes,
     DecibelHertz,
     Radians,
@@ -41,17 +40,15 @@ class Supervision(Record):
     alarms: annunciator.AlarmList
 
 
+# Flags of refused inputs, except the attitude, which has the alarm `INS lost`.
 INVALID_INPUT_FLAGS = Flag.ENCODER | Flag.ERROR | Flag.ERROR_STAMP | Flag.PROGRAM | Flag.PRESET | Flag.ATTITUDE_ERROR
-"""Flags of refused inputs, except the attitude, which has the alarm `INS lost`."""
 
+# Time within which the brakes must hold after the drive has ceased to follow commands [s]. The time is longer than the
+# longest stop of the drive.
 BRAKE_GRIP_DEADLINE_S = 2.5
-"""Time within which the brakes must hold after the drive has ceased to follow commands [s].
-
-The time is longer than the longest stop of the drive.
-"""
+DRIVE_SILENCE_GAP_S = 0.3  # gap between two steps above which the drive was silent [s]
 
 JUDGED_ALWAYS, JUDGED_WITH_MOTORS, JUDGED_MOVING, JUDGED_FOLLOWING = table.JUDGED_ALARM_BITS
-"""Bits of the alarms of each of table.JUDGED_CASES."""
 
 
 class Facts(NamedTuple):
@@ -60,14 +57,11 @@ class Facts(NamedTuple):
     gap: Seconds            # length of a gap before this step; 0: no gap, inf: first step
     lost: bool              # True if steps are missing between the previous step and this one
     latched: int            # bits of the latched faults that wait for a reset
-    attitude_lost: Bit      # 1 if the attitude of a ship is not known
-    attitude_jumped: Bit    # 1 if a jump of the attitude is being corrected
-    signal_lost: Bit        # 1 if autotrack has lost its signal without an explanation
+    attitude_lost: bool      # True if the attitude of a ship is not known
+    attitude_jumped: bool    # True if a jump of the attitude is being corrected
+    signal_lost: bool        # True if autotrack has lost its signal without an explanation
     unasked_rate: RadiansPerSecond      # excess over the commanded rates that counts as uncommanded motion
     beamwidth: Radians      # of the receiver
-
-
-DRIVE_SILENCE_GAP_S = 0.3  # gap between two steps above which the drive was silent [s]
 
 
 def initialise(supervision: Records) -> None:
@@ -80,43 +74,29 @@ def initialise(supervision: Records) -> None:
 @compiled
 def _of_motors(axis: detectors.AxisDetectors, i: int, inputs: Inputs, envelope: drive_watch.Envelope,
                params: 'AxisParameters', facts: Facts) -> int:
-    """Return the bits of the alarms of axis i that follow from its encoder, its motors and its commands.
-
-    The bit of an azimuth alarm, shifted left by i, is the bit of axis i.
-    """
+    """Return the bits of the alarms of axis i that follow from its encoder, its motors and its commands."""
     # surge: acceleration that the axis may have had in lost steps [rad/s2].
     y, dy, high, low = inputs.position[i], inputs.velocity[i], envelope.high[i], envelope.low[i]
-    bits, surge = 0, detectors.MAX_ACCELERATION_RATIO * params.limits.acceleration if facts.lost else 0.0
+    surge = detectors.MAX_ACCELERATION_RATIO * params.limits.acceleration if facts.lost else 0.0
     x = detectors.encoder_motor_mismatch(axis, y, dy, facts.dt, surge)
-    if detectors.encoder_jump(x):
-        bits |= table.Bit.AZIMUTH_ENCODER_JUMP
-    if detectors.encoder_stuck(axis, y, dy, facts.dt):
-        bits |= table.Bit.AZIMUTH_ENCODER_STUCK
-    if detectors.disagreement(axis, x, facts.dt):
-        bits |= table.Bit.AZIMUTH_ENCODER_DISAGREEMENT
-    if detectors.brake_not_released(axis, inputs.torque[i], dy, high, low, params.feedforward, facts.dt):
-        bits |= table.Bit.AZIMUTH_BRAKE_NOT_RELEASED
-    if detectors.immobile(axis, dy, high, low):
-        bits |= table.Bit.AZIMUTH_IMMOBILE
-    if detectors.opposes_command(dy, high, low, facts.unasked_rate):
-        bits |= table.Bit.AZIMUTH_RUNAWAY
+    resisted = detectors.brake_not_released(axis, inputs.torque[i], dy, high, low, params.feedforward, facts.dt)
+    bits = Bit.AZIMUTH_ENCODER_JUMP * (abs(x) > detectors.MAX_STEP_MISMATCH_RAD)
+    bits |= Bit.AZIMUTH_ENCODER_STUCK * detectors.encoder_stuck(axis, y, dy, facts.dt)
+    bits |= Bit.AZIMUTH_ENCODER_DISAGREEMENT * detectors.disagreement(axis, x, facts.dt)
+    bits |= Bit.AZIMUTH_BRAKE_NOT_RELEASED * resisted
+    bits |= Bit.AZIMUTH_IMMOBILE * detectors.immobile(axis, dy, high, low)
+    bits |= Bit.AZIMUTH_RUNAWAY * detectors.opposes_command(dy, high, low, facts.unasked_rate)
     return bits << i
 
 
 @compiled
 def _of_loop(axis: detectors.AxisDetectors, i: int, e: Radians, outputs: Outputs, facts: Facts) -> int:
-    """Return the bits of the alarms of axis i that follow from its following error e and its limits.
-
-    The following error does not count while the command is limited in rate or
-    acceleration.
-    """
-    bits, limited = 0, outputs.rate_limited[i] or outputs.acceleration_limited[i]
-    if outputs.angle_limited[i]:
-        bits |= table.Bit.AZIMUTH_AT_LIMIT
-    if detectors.following_error(axis, 0.0 if limited else e, facts.beamwidth):
-        bits |= table.Bit.AZIMUTH_FOLLOWING_ERROR
-    if detectors.oscillation(axis, e, facts.dt):
-        bits |= table.Bit.AZIMUTH_OSCILLATION
+    """Return the bits of the alarms of axis i that follow from its following error e and its limits."""
+    # The following error does not count while the command is limited in rate or acceleration.
+    limited = outputs.rate_limited[i] or outputs.acceleration_limited[i]
+    bits = Bit.AZIMUTH_AT_LIMIT * (outputs.angle_limited[i] != 0)
+    bits |= Bit.AZIMUTH_FOLLOWING_ERROR * detectors.following_error(axis, 0.0 if limited else e, facts.beamwidth)
+    bits |= Bit.AZIMUTH_OSCILLATION * detectors.oscillation(axis, e, facts.dt)
     return bits << i
 
 
@@ -133,8 +113,7 @@ def _of_axes(supervision: Supervision, mode: int, inputs: Inputs, outputs: Outpu
             detectors.initialise(axis, y, dy)
         if math.isfinite(y + dy):
             bits |= _of_motors(axis, i, inputs, envelope, params, facts)
-            if detectors.moves(axis, dy) and off:
-                bits |= table.Bit.AZIMUTH_BRAKE_NOT_GRIPPING << i
+            bits |= Bit.AZIMUTH_BRAKE_NOT_GRIPPING * (detectors.moves(axis, dy) and off) << i
             if mode != Mode.STANDBY:
                 bits |= _of_loop(axis, i, outputs.reference[i, 0] - y, outputs, facts)
         axis.y, axis.dy = y, dy
@@ -149,13 +128,10 @@ def _of_drive(supervision: Supervision, inputs: Inputs) -> int:
         # before the drive has published its state.
         supervision.ready, supervision.lost = inputs.stamp, max(inputs.drive, 0)
     # The bit of the elevation alarm follows that of the azimuth alarm. The product therefore sets the bits of exactly
-    # the axes in s.lost.
-    bits = supervision.lost * table.Bit.AZIMUTH_MOTOR_LOST
-    if inputs.drive == signals.DRIVE_EMERGENCY_STOP:
-        bits |= table.Bit.EMERGENCY_STOP
-    elif inputs.drive >= signals.FIRST_DRIVE_FAULT:
-        bits |= table.Bit.DRIVE_FAULT
-    return bits
+    # these axes.
+    bits = Bit.AZIMUTH_MOTOR_LOST * supervision.lost
+    bits |= Bit.EMERGENCY_STOP * (inputs.drive == signals.DRIVE_EMERGENCY_STOP)
+    return bits | Bit.DRIVE_FAULT * (inputs.drive >= signals.FIRST_DRIVE_FAULT)
 
 
 @compiled
@@ -177,34 +153,19 @@ def _repeated(supervision: Supervision, inputs: Inputs) -> bool:
 
 @compiled
 def _of_unit(supervision: Supervision, inputs: Inputs, outputs: Outputs, facts: Facts) -> int:
-    """Return the bits of the alarms that follow from the inputs and from the Facts."""
-    bits = facts.latched
-    if 0.0 < facts.gap < math.inf:
-        bits |= table.Bit.TIME_JUMP | (table.Bit.DRIVE_SILENT if facts.gap > DRIVE_SILENCE_GAP_S else 0)
-    if not inputs.error_came or _repeated(supervision, inputs):
-        bits |= table.Bit.RECEIVER_SILENT
-    if facts.attitude_lost:
-        bits |= table.Bit.INS_LOST
-    if facts.attitude_jumped:
-        bits |= table.Bit.INS_JUMP
-    if facts.signal_lost:
-        bits |= table.Bit.SIGNAL_LOST
-    if outputs.invalid_input & Flag.ERROR_NOISY:
-        bits |= table.Bit.RECEIVER_NOISY
-    if outputs.invalid_input & INVALID_INPUT_FLAGS:
-        bits |= table.Bit.INVALID_INPUT
-    return bits | outputs.pins_wrong * table.Bit.AZIMUTH_STOW_PIN | _of_program(inputs, outputs)
-
-
-@compiled
-def _of_program(inputs: Inputs, outputs: Outputs) -> int:
-    """Return the bits of the alarms of the program track: a refused segment, or the reason why it is not followed."""
-    bits = table.Bit.PROGRAM_TURNAROUND if inputs.turnaround else 0
-    if outputs.reason == Reason.BEFORE_PROGRAM:
-        return bits | table.Bit.PROGRAM_TOO_EARLY
-    if outputs.reason == Reason.PROGRAM_GAP:
-        return bits | table.Bit.PROGRAM_GAP
-    return bits | (table.Bit.PROGRAM_ENDED if outputs.reason == Reason.AFTER_PROGRAM else 0)
+    bits = facts.latched | Bit.AZIMUTH_STOW_PIN * outputs.pins_wrong
+    bits |= Bit.TIME_JUMP * (0.0 < facts.gap < math.inf)
+    bits |= Bit.DRIVE_SILENT * (DRIVE_SILENCE_GAP_S < facts.gap < math.inf)
+    bits |= Bit.RECEIVER_SILENT * (inputs.error_came == 0 or _repeated(supervision, inputs))
+    bits |= Bit.RECEIVER_NOISY * (outputs.invalid_input & Flag.ERROR_NOISY != 0)
+    bits |= Bit.INVALID_INPUT * (outputs.invalid_input & INVALID_INPUT_FLAGS != 0)
+    bits |= Bit.INS_LOST * facts.attitude_lost
+    bits |= Bit.INS_JUMP * facts.attitude_jumped
+    bits |= Bit.SIGNAL_LOST * facts.signal_lost
+    bits |= Bit.PROGRAM_TURNAROUND * (inputs.turnaround != 0)
+    bits |= Bit.PROGRAM_TOO_EARLY * (outputs.reason == Reason.BEFORE_PROGRAM)
+    bits |= Bit.PROGRAM_GAP * (outputs.reason == Reason.PROGRAM_GAP)
+    return bits | Bit.PROGRAM_ENDED * (outputs.reason == Reason.AFTER_PROGRAM)
 
 
 @compiled
@@ -212,17 +173,14 @@ def _judged(mode: int, constants: BothAxes['AxisConstants']) -> int:
     """Return the bits of the alarms that have a meaning in a mode; the others are suppressed."""
     motors = (int(constants[0].p.controller) != position_loop.CONTROLLER_BEAM
               or int(constants[1].p.controller) != position_loop.CONTROLLER_BEAM)
-    return (JUDGED_ALWAYS | (JUDGED_WITH_MOTORS if motors else 0) | (JUDGED_MOVING if mode != Mode.STANDBY else 0)
-            | (JUDGED_FOLLOWING if modes.FOLLOWS_TARGET[mode] else 0))
+    return (JUDGED_ALWAYS | JUDGED_WITH_MOTORS * motors | JUDGED_MOVING * (mode != Mode.STANDBY)
+            | JUDGED_FOLLOWING * modes.FOLLOWS_TARGET[mode])
 
 
 @compiled
 def take(supervision: Supervision, mode: int, inputs: Inputs, outputs: Outputs, constants: BothAxes['AxisConstants'],
          envelope: drive_watch.Envelope, facts: Facts) -> None:
-    """Determine the conditions of all alarms in a step, and update the alarms.
-
-    mode: standby while the mode commands no motion.
-    """
+    """Determine the conditions of all alarms, and update the alarms. mode: standby while it commands no motion."""
     bits = _of_drive(supervision, inputs) | _of_unit(supervision, inputs, outputs, facts)
     bits |= _of_axes(supervision, mode, inputs, outputs, constants, envelope, facts)
     if facts.gap > 0.0:

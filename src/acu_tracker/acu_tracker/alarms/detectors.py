@@ -3,11 +3,9 @@
 `conditions` calls them in each step and makes alarms of their results. Each condition begins above a first level and
 ends below a second level, which is half of the first unless stated otherwise.
 
-y          angle of the load encoder
-dy         rate of the axis by the encoders of the motors
+y, dy      angle of the load encoder, rate of the axis by the encoders of the motors
 T          torque of the motors on the load
 high, low  envelope of the recent rate commands, from servo.drive_watch
-dt         time since the previous step
 """
 import math
 
@@ -48,88 +46,60 @@ class AxisDetectors(Record):
     oscillates: Bit
 
 
+# Largest difference between the motions of encoder and motors in one step [rad]. Wind-up and lash of a gear cause less
+# than 1 mrad.
 MAX_STEP_MISMATCH_RAD = 3e-3
-"""Largest difference between the motions of encoder and motors in one step [rad].
 
-Wind-up and lash of a gear cause less than 1 mrad.
-"""
-
-STUCK_TEST_TRAVEL_RAD = 3e-3  # travel of the motors in which the encoder must move as well [rad]; longer than the lash
-
+# Travel of the motors in which the encoder must move as well [rad], longer than the lash; shares of this travel below
+# which the encoder is stuck, and above which a stuck encoder moves again.
+STUCK_TEST_TRAVEL_RAD = 3e-3
 STUCK_TRAVEL_SHARE, FREE_TRAVEL_SHARE = 0.1, 0.5
-"""Shares of STUCK_TEST_TRAVEL_RAD below which the encoder is stuck, and above which a stuck encoder moves again."""
 
-MIN_COMMANDED_RATE_RAD_S = 5e-3  # rate command above which an axis must move [rad/s]
-IMMOBILE_RATE_SHARE = 0.1  # share of the commanded rate below which an axis is immobile
-
-EXCESS_TORQUE_RATIO = 50.0
-"""Ratio of torque to Coulomb friction above which the torque is excessive [-].
-
-No free axis needs such a torque for long without a gust. The torque is half of what the brakes hold, and twice the
-torque of a strong wind.
-"""
-
-DRAG_TORQUE_RATIO = 80.0
-"""Ratio of torque to Coulomb friction above which the brakes drag on an axis that its motors move [-].
-
-The torque is five sixths of what the brakes hold. Below this torque dragging brakes cannot be distinguished from a
-head wind, because both take work from the motors.
-"""
-
-MIN_DRAG_RATE_RAD_S = 2e-4  # rate above which the motors of an axis move it [rad/s]: twice the resolution of the rate
-
-MIN_RESISTED_TIME_S = 0.2
-"""Time for which a brake must have resisted the motors with excess torque before it is reported [s]."""
-
-WIND_TORQUE_SHARE = 0.5
-"""Share of the excess torque above which the work of the load on the motors counts as the work of a gust [-]."""
-
-MIN_GIVE_RAD = 1e-4
-"""Motion against the excess torque that shows a gust [rad].
-
-The motion is 200 times the resolution of the motor encoders over a step, and a tenth of that under a gust of 3000 Nm.
-"""
-
-INERTIA_UNCERTAINTY = 2.0
-"""Largest factor between the inertia of an axis and `feedforward.inertia`, in either direction [-]."""
-
-TORQUE_TIME_CONSTANT_S = 0.1
-"""Time constant of the mean of the absolute torque [s].
-
-The mean is that of the absolute value, because the torque of an axis with dragging brakes stays large when the axis
-changes its direction.
-"""
-
-MAX_ACCELERATION_RATIO = 2.0  # ratio of the largest acceleration of an axis to the largest commanded acceleration [-]
-
+# Largest sum of the differences between encoder and motors [rad]: five times lash and wind-up of a gear. The sum
+# decays with the time constant.
 MAX_MISMATCH_RAD = 1e-2
-"""Largest sum of the differences between encoder and motors [rad]: five times lash and wind-up of a gear."""
-
 MISMATCH_TIME_CONSTANT_S = 2.0
-"""Time constant with which the sum of the differences between encoder and motors decays [s]."""
 
-STANDSTILL_RATE_RAD_S = 2e-3  # rate above which an axis moves [rad/s]
-FOLLOWING_ERROR_BEAMWIDTHS = 0.25  # following error that is too large [beamwidths]
+STANDSTILL_RATE_RAD_S = 2e-3        # rate above which an axis moves [rad/s]
+MIN_COMMANDED_RATE_RAD_S = 5e-3     # rate command above which an axis must move [rad/s]
+IMMOBILE_RATE_SHARE = 0.1           # share of the commanded rate below which an axis is immobile
+MAX_ACCELERATION_RATIO = 2.0        # ratio of the largest acceleration of an axis to the largest commanded one [-]
+FOLLOWING_ERROR_BEAMWIDTHS = 0.25   # following error that is too large [beamwidths]
 
+# Ratio of torque to Coulomb friction above which the torque is excessive [-]. No free axis needs such a torque for
+# long without a gust. The torque is half of what the brakes hold, and twice the torque of a strong wind.
+EXCESS_TORQUE_RATIO = 50.0
+
+# Ratio of torque to Coulomb friction above which the brakes drag on an axis that its motors move [-]. The torque is
+# five sixths of what the brakes hold. Below this torque dragging brakes cannot be distinguished from a head wind,
+# because both take work from the motors.
+DRAG_TORQUE_RATIO = 80.0
+MIN_DRAG_RATE_RAD_S = 2e-4  # rate above which the motors of an axis move it [rad/s]: twice the resolution of the rate
+MIN_RESISTED_TIME_S = 0.2   # resistance of a brake with excess torque before it is reported [s]
+
+# Share of the excess torque above which the work of the load on the motors counts as the work of a gust [-], and
+# motion against the excess torque that shows a gust [rad]. The motion is 200 times the resolution of the motor
+# encoders over a step, and a tenth of the motion under a gust of 3000 Nm.
+WIND_TORQUE_SHARE = 0.5
+MIN_GIVE_RAD = 1e-4
+INERTIA_UNCERTAINTY = 2.0   # largest factor between the inertia of an axis and `feedforward.inertia`, either way [-]
+
+# Time constant of the mean of the absolute torque [s]. The mean is that of the absolute value, because the torque of
+# an axis with dragging brakes stays large when the axis changes its direction.
+TORQUE_TIME_CONSTANT_S = 0.1
+
+# Smallest area of a half wave of the following error that counts [rad s]: 2 a / w for an amplitude a of 1 mrad and a
+# frequency w / (2 pi) of 3 Hz. The error oscillates above this count of half waves [-], a frequency above 1 Hz; the
+# count decays with the time constant of the window.
 MIN_HALF_WAVE_AREA = 1e-4
-"""Smallest area of a half wave of the following error that counts [rad s].
-
-The area is 2 a / w for an amplitude a of 1 mrad and a frequency w / (2 pi) of 3 Hz.
-"""
-
-OSCILLATION_WINDOW_S = 5.0  # time constant with which the count of half waves decays [s]
-
 OSCILLATION_HALF_WAVES = 10.0
-"""Count of half waves within OSCILLATION_WINDOW_S above which the error oscillates [-]: a frequency above 1 Hz."""
+OSCILLATION_WINDOW_S = 5.0
 
 
 @compiled
-def beyond(was: int, x: float, on: float, off: float) -> bool:
-    """Return True if x is above a level with hysteresis; NaN is not above.
-
-    was: True if x was above it before; on, off: levels at which the condition begins and ends.
-    """
-    return x > (off if was else on)
+def beyond(was: int, x: float, level: float) -> bool:
+    """Return True if x is above a level, or above half of it if x was beyond before; NaN is not above."""
+    return x > (0.5 * level if was else level)
 
 
 @compiled
@@ -142,22 +112,15 @@ def initialise(state: AxisDetectors, y: Radians, dy: RadiansPerSecond) -> None:
 @compiled
 def encoder_motor_mismatch(state: AxisDetectors, y: Radians, dy: RadiansPerSecond, dt: Seconds,
                            acceleration: RadiansPerSecond2) -> Radians:
-    """Return x, the difference between the motions of encoder and motors in this step [rad].
+    """Return x, the difference between the motions of encoder and motors in this step.
 
         x = y - y' - (dy + dy') dt / 2;    y', dy': values of the previous step
 
-    acceleration: 0, or the possible acceleration of the axis [rad/s2] if steps are missing before this one. The motors
-    may then have moved by acceleration dt^2 / 4 more than the formula gives. The function subtracts this uncertainty
-    from |x|.
+    acceleration: 0, or the possible acceleration of the axis if steps are missing before this one. The motors may then
+    have moved by acceleration dt^2 / 4 more than the formula gives. The function subtracts this from |x|.
     """
     x = y - state.y - 0.5 * (dy + state.dy) * dt
     return math.copysign(max(abs(x) - 0.25 * acceleration * dt * dt, 0.0), x)
-
-
-@compiled
-def encoder_jump(x: Radians) -> bool:
-    """Return True if the load encoder has jumped: |x| of encoder_motor_mismatch is above MAX_STEP_MISMATCH_RAD."""
-    return abs(x) > MAX_STEP_MISMATCH_RAD
 
 
 @compiled
@@ -179,11 +142,10 @@ def encoder_stuck(state: AxisDetectors, y: Radians, dy: RadiansPerSecond, dt: Se
 def disagreement(state: AxisDetectors, x: Radians, dt: Seconds) -> bool:
     """Return True if encoder and motors have recently moved by different angles.
 
-    x: result of encoder_motor_mismatch. The sum X of the differences x follows X' = x / dt - X /
-    MISMATCH_TIME_CONSTANT_S. The condition begins when |X| is above MAX_MISMATCH_RAD.
+    The sum X of the results x of encoder_motor_mismatch follows X' = x / dt - X / MISMATCH_TIME_CONSTANT_S.
     """
     state.mismatch += x - state.mismatch * dt / MISMATCH_TIME_CONSTANT_S
-    state.disagrees = beyond(state.disagrees, abs(state.mismatch), MAX_MISMATCH_RAD, 0.5 * MAX_MISMATCH_RAD)
+    state.disagrees = beyond(state.disagrees, abs(state.mismatch), MAX_MISMATCH_RAD)
     return state.disagrees != 0
 
 
@@ -193,8 +155,7 @@ def immobile(state: AxisDetectors, dy: RadiansPerSecond, high: RadiansPerSecond,
 
     The recent commands must have one sign and be above MIN_COMMANDED_RATE_RAD_S. The axis becomes immobile when its
     rate is below IMMOBILE_RATE_SHARE of the smallest of these commands. The axis stays immobile up to three times this
-    share, and until the commands fall below half of MIN_COMMANDED_RATE_RAD_S. A fast motion against the commands does
-    not count as immobile.
+    share, and until the commands fall below half of the minimum. A fast motion against the commands does not count.
     """
     threshold = 0.5 * MIN_COMMANDED_RATE_RAD_S if state.immobile else MIN_COMMANDED_RATE_RAD_S
     # u: recent command of the smallest magnitude, if all recent commands have one sign.
@@ -207,15 +168,6 @@ def immobile(state: AxisDetectors, dy: RadiansPerSecond, high: RadiansPerSecond,
 
 
 @compiled
-def excess_torque(state: AxisDetectors, T: NewtonMeters, limit: NewtonMeters, dt: Seconds) -> bool:
-    """Return True if the mean of the absolute torque is above a limit."""
-    if math.isfinite(T):
-        state.mean_torque += (abs(T) - state.mean_torque) * min(dt / TORQUE_TIME_CONSTANT_S, 1.0)
-    state.overloaded = beyond(state.overloaded, state.mean_torque, limit, 0.5 * limit)
-    return state.overloaded != 0
-
-
-@compiled
 def pushed_by_wind(state: AxisDetectors, T: NewtonMeters, dy: RadiansPerSecond, inertia: KilogramMeters2,
                    limit: NewtonMeters, dt: Seconds) -> bool:
     """Return True if the load has moved the axis against the torque T of its motors, as only a gust does.
@@ -224,10 +176,8 @@ def pushed_by_wind(state: AxisDetectors, T: NewtonMeters, dy: RadiansPerSecond, 
 
         W_k = max(W_k-1 - T dy dt + f (E_k - E_k-1), 0),    E = J dy^2 / 2
 
-    E     kinetic energy of the axis [J]; J: `inertia` [kg m2]
-    f     INERTIA_UNCERTAINTY while the axis slows down, its inverse while the axis accelerates. Therefore an inertia
-          that differs from J by this factor does not look like a gust
-    limit  excess torque
+    J: inertia; f: INERTIA_UNCERTAINTY while the axis slows down, its inverse while the axis accelerates. Therefore an
+    inertia that differs from J by this factor does not look like a gust. limit: excess torque.
 
     W counts while the torque has one sign and is above WIND_TORQUE_SHARE of the limit. The result stays True as long.
     """
@@ -251,10 +201,7 @@ def resists(T: NewtonMeters, dy: RadiansPerSecond, high: RadiansPerSecond, low: 
     """Return True if an axis with excess torque stands in spite of its commands, or moves with an even larger torque.
 
     The axis stands if its rate is below IMMOBILE_RATE_SHARE of the smallest recent command. Commands and torque must
-    have one sign, and the commands must be above STANDSTILL_RATE_RAD_S. The axis moves if its motors move it at more
-    than MIN_DRAG_RATE_RAD_S; the torque must then be above DRAG_TORQUE_RATIO.
-
-    friction: Coulomb friction.
+    have one sign, and the commands must be above STANDSTILL_RATE_RAD_S. friction: Coulomb friction.
     """
     if abs(dy) > MIN_DRAG_RATE_RAD_S and abs(T) > DRAG_TORQUE_RATIO * friction:
         return T * dy > 0.0
@@ -267,11 +214,14 @@ def brake_not_released(state: AxisDetectors, T: NewtonMeters, dy: RadiansPerSeco
                        low: RadiansPerSecond, params: FeedforwardParameters, dt: Seconds) -> bool:
     """Return True if a brake resists the motors of an axis with excess torque, and no gust explains the torque.
 
-    The result stays True as long as the excess torque.
+    The result stays True as long as the mean of the absolute torque is excessive.
     """
     limit = EXCESS_TORQUE_RATIO * params.friction
     pushed = pushed_by_wind(state, T, dy, params.inertia, limit, dt)
-    if not excess_torque(state, T, limit, dt):
+    if math.isfinite(T):
+        state.mean_torque += (abs(T) - state.mean_torque) * min(dt / TORQUE_TIME_CONSTANT_S, 1.0)
+    state.overloaded = beyond(state.overloaded, state.mean_torque, limit)
+    if not state.overloaded:
         state.resisted = 0.0
     elif not pushed and resists(T, dy, high, low, params.friction):
         state.resisted += dt
@@ -281,17 +231,14 @@ def brake_not_released(state: AxisDetectors, T: NewtonMeters, dy: RadiansPerSeco
 @compiled
 def moves(state: AxisDetectors, dy: RadiansPerSecond) -> bool:
     """Return True if an axis moves."""
-    state.moves = beyond(state.moves, abs(dy), STANDSTILL_RATE_RAD_S, 0.5 * STANDSTILL_RATE_RAD_S)
+    state.moves = beyond(state.moves, abs(dy), STANDSTILL_RATE_RAD_S)
     return state.moves != 0
 
 
 @compiled
 def opposes_command(dy: RadiansPerSecond, high: RadiansPerSecond, low: RadiansPerSecond,
                     threshold: RadiansPerSecond) -> bool:
-    """Return True if the axis moves against its recent commands, which all had one sign.
-
-    threshold: rate above which a motion against the commands counts.
-    """
+    """Return True if the axis moves against its recent commands, which all had one sign, above a threshold."""
     return (dy > threshold and high <= 0.0 and low < -STANDSTILL_RATE_RAD_S
             or dy < -threshold and low >= 0.0 and high > STANDSTILL_RATE_RAD_S)
 
@@ -299,8 +246,7 @@ def opposes_command(dy: RadiansPerSecond, high: RadiansPerSecond, low: RadiansPe
 @compiled
 def following_error(state: AxisDetectors, e: Radians, beamwidth: Radians) -> bool:
     """Return True if the following error e is above FOLLOWING_ERROR_BEAMWIDTHS."""
-    level = FOLLOWING_ERROR_BEAMWIDTHS * beamwidth
-    state.behind = beyond(state.behind, abs(e), level, 0.5 * FOLLOWING_ERROR_BEAMWIDTHS * beamwidth)
+    state.behind = beyond(state.behind, abs(e), FOLLOWING_ERROR_BEAMWIDTHS * beamwidth)
     return state.behind != 0
 
 
@@ -308,9 +254,8 @@ def following_error(state: AxisDetectors, e: Radians, beamwidth: Radians) -> boo
 def oscillation(state: AxisDetectors, e: Radians, dt: Seconds) -> bool:
     """Return True if the following error e oscillates.
 
-    The law counts half waves with an area (time integral) above MIN_HALF_WAVE_AREA. The count decays with the time
-    constant OSCILLATION_WINDOW_S. The error oscillates if the count is above OSCILLATION_HALF_WAVES (T. Haegglund, A
-    control-loop performance monitor, Control Engineering Practice 3, 1995).
+    The law counts half waves with an area (time integral) above MIN_HALF_WAVE_AREA (T. Haegglund, A control-loop
+    performance monitor, Control Engineering Practice 3, 1995).
     """
     state.half_waves *= math.exp(-dt / OSCILLATION_WINDOW_S)
     if e * state.e < 0.0:
@@ -320,5 +265,5 @@ def oscillation(state: AxisDetectors, e: Radians, dt: Seconds) -> bool:
     if e != 0.0:
         state.e = e
     state.area += abs(e) * dt
-    state.oscillates = beyond(state.oscillates, state.half_waves, OSCILLATION_HALF_WAVES, 0.5 * OSCILLATION_HALF_WAVES)
+    state.oscillates = beyond(state.oscillates, state.half_waves, OSCILLATION_HALF_WAVES)
     return state.oscillates != 0

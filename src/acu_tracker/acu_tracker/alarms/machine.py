@@ -14,18 +14,17 @@ State = codes(ALARM_STATES)
 
 ALARM_EVENTS = ('raise', 'clear', 'acknowledge', 'reset', 'shelve', 'unshelve', 'suppress', 'release')
 Event = codes(ALARM_EVENTS)
-"""Events of an alarm.
-
-raise, clear       the condition is present, or absent, in this step
-suppress, release  the alarm has no meaning in this mode, or has a meaning again
-others             commands of the operator
-"""
+"""Events: the condition is present (raise) or absent (clear) in this step; the alarm has no meaning in this mode
+(suppress), or has one again (release); the others are commands of the operator."""
 
 EVENT_REFUSED = -1  # code in the place of the next state, for an event that a state does not accept
 
 # The states in the order of ALARM_STATES, and x for an event that is refused.
 _N, _U, _A, _R, _LU, _LA, _SH, _SU, _x = (*range(len(ALARM_STATES)), EVENT_REFUSED)
 
+# Next state of an alarm that does not latch: STATE_TRANSITIONS[state, event]. An active alarm is not suppressed at
+# once: its condition counts as absent, the alarm returns to normal when it has been acknowledged, and is suppressed
+# then.
 STATE_TRANSITIONS = np.array((
     # raise, clear, acknowledge, reset, shelve, unshelve, suppress, release
     (_U, _N, _x, _x, _SH, _x, _SU, _N),        # normal
@@ -37,29 +36,16 @@ STATE_TRANSITIONS = np.array((
     (_SH, _SH, _x, _x, _SH, _N, _SH, _SH),     # shelved
     (_SU, _SU, _x, _x, _SH, _x, _SU, _N),      # suppressed by design
 ))
-"""Next state of an alarm that does not latch: STATE_TRANSITIONS[state, event].
 
-An active alarm is not suppressed at once. Its condition counts as absent. The alarm returns to normal when it has been
-acknowledged, and is suppressed then.
-"""
-
-IS_ANNUNCIATED = (False, True, True, True, True, True, False, False)
-"""States in which an alarm is in the published list and is not shelved."""
-
-IS_LISTED = (False, True, True, True, True, True, True, False)  # states in which an alarm is in the published list
-
+IS_LISTED = (False, True, True, True, True, True, True, False)          # in the published list
+IS_ANNUNCIATED = (False, True, True, True, True, True, False, False)    # in the published list, and not shelved
 AWAITS_ACKNOWLEDGEMENT = (False, True, False, True, True, False, False, False)
-"""States in which an alarm waits for an acknowledgement."""
-
-IS_LATCHED = (False, False, False, False, True, True, False, False)  # states that end only by a reset
+IS_LATCHED = (False, False, False, False, True, True, False, False)     # the state ends only by a reset
 
 
 @compiled
 def next_state(state: int, event: int, latched: int) -> int:
-    """Return the state after an event, or EVENT_REFUSED if the state does not accept the event.
-
-    latched: 1 for an alarm that latches by its row of the table.
-    """
+    """Return the state after an event, or EVENT_REFUSED; latched: 1 for an alarm that latches by its row."""
     if latched and event == Event.CLEAR:
         if state == State.UNACKNOWLEDGED:
             return State.LATCHED_UNACKNOWLEDGED

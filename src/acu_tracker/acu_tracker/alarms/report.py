@@ -1,9 +1,7 @@
 """The published list of alarms: which alarms are in it, their order, and the message on acu/alarms.
 
 An alarm is listed in every state except normal and suppressed. Annunciated alarms, at most MAX_ANNUNCIATED_ALARMS,
-come first; their consequences and the shelved alarms follow.
-
-`alarms` is a view of annunciator.AlarmList, i the index of an alarm in table.ALARMS.
+come first; their consequences and the shelved alarms follow. `alarms` is an annunciator.AlarmList.
 """
 from collections.abc import Mapping
 
@@ -12,11 +10,8 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN
 from pedestal_common.quantities import AnyRecord, Message
 from pedestal_common.wire import messages
 
-MAX_ANNUNCIATED_ALARMS = 10
-"""Largest number of annunciated alarms: those of the highest priority, among equals the earliest."""
-
+MAX_ANNUNCIATED_ALARMS = 10  # those of the highest priority, among equals the earliest
 DIAGNOSTIC_LEVELS = {'critical': LEVEL_ERROR, 'high': LEVEL_ERROR, 'medium': LEVEL_WARN, 'low': LEVEL_WARN}
-"""{priority of an alarm: level of its DiagnosticStatus}."""
 
 
 def order(alarms: AnyRecord) -> list[int]:
@@ -27,10 +22,7 @@ def order(alarms: AnyRecord) -> list[int]:
 
 
 def annunciated(alarms: AnyRecord) -> list[int]:
-    """Return the indices of the annunciated alarms, which call for the attention of an operator.
-
-    The annunciated alarms are the first MAX_ANNUNCIATED_ALARMS alarms that are no consequence of another one.
-    """
+    """Return the indices of the annunciated alarms: the first that are no consequence of another one."""
     causes = [i for i in order(alarms) if annunciator.active_parent(alarms, i) == annunciator.NO_ALARM]
     return causes[:MAX_ANNUNCIATED_ALARMS]
 
@@ -43,10 +35,7 @@ def listed(alarms: AnyRecord) -> list[int]:
 
 
 def status(alarms: AnyRecord, i: int, detail: str = '', reason: str = '') -> Message:
-    """Return the DiagnosticStatus of alarm i.
-
-    detail: text with details of the fault; reason: text why the alarm is shelved; '' for none.
-    """
+    """Return the DiagnosticStatus of an alarm; reason: text why the alarm is shelved."""
     alarm, row, above = alarms['alarm'][i], table.ALARMS[i], annunciator.active_parent(alarms, i)
     shelved = alarm['state'] == machine.State.SHELVED
     values = {'state': machine.ALARM_STATES[alarm['state']], 'priority': row.priority,
@@ -64,9 +53,6 @@ def status(alarms: AnyRecord, i: int, detail: str = '', reason: str = '') -> Mes
 
 
 def message(alarms: AnyRecord, details: Mapping[int, str], reasons: Mapping[int, str]) -> Message:
-    """Return the DiagnosticArray of the list.
-
-    details, reasons: {index of an alarm: text}, for the arguments detail and reason of `status`.
-    """
+    """Return the DiagnosticArray of the list; details, reasons: by index of an alarm, as in `status`."""
     return messages.DiagnosticArray(header=messages.header(''), status=[
         status(alarms, i, details.get(i, ''), reasons.get(i, '')) for i in listed(alarms)])

@@ -1,7 +1,8 @@
 """The table of alarms: one row for each alarm of the control unit.
 
 In the table every cause stands before its consequences. The annunciator needs this order, because it searches the
-parent of an alarm only among the rows before it.
+parent of an alarm only among the rows before it. A row whose name holds '*' is an alarm of each axis, and '*' stands
+for this axis. In the causes of another row '*' stands for both axes.
 """
 from typing import NamedTuple
 
@@ -11,18 +12,15 @@ from pedestal_common.quantities import Seconds
 
 ALARM_PRIORITIES = ('critical', 'high', 'medium', 'low')
 
-JUDGED_CASES = ('always', 'motors', 'moving', 'following')
-"""Cases in which an alarm has a meaning and is judged; in the other cases it is suppressed by design.
-
-always     in every step
-motors     if the axes have motors
-moving     if the axes have motors and the mode is not standby
-following  in a mode that follows a target
-"""
+# Cases in which an alarm has a meaning and is judged; in the other cases it is suppressed by design.
+JUDGED_CASES = ('always',       # in every step
+                'motors',       # if the axes have motors
+                'moving',       # if the axes have motors and the mode is not standby
+                'following')    # in a mode that follows a target
 
 
 class Alarm(NamedTuple):
-    """Row of ALARMS."""
+    """Row of the table."""
     name: str               # in messages and commands
     priority: str           # of ALARM_PRIORITIES
     on_delay: Seconds       # time for which the condition must last before the alarm is raised
@@ -34,19 +32,7 @@ class Alarm(NamedTuple):
     judged: str = 'always'  # one of JUDGED_CASES
 
 
-def _of_axes(name: str, priority: str, on_delay: Seconds, off_delay: Seconds, latched: bool, meaning: str, action: str,
-             cause: tuple[str, ...] = (), judged: str = 'motors') -> tuple[Alarm, ...]:
-    """Return an Alarm for each axis; in the names of `cause`, '*' stands for the axis."""
-    return tuple(Alarm(f'{axis} {name}', priority, on_delay, off_delay, latched,
-                       tuple(other.replace('*', axis) for other in cause), meaning, action, judged) for axis in AXES)
-
-
-def _both(*names: str) -> tuple[str, ...]:
-    """Return the full names of alarms of both axes; names: without the axis."""
-    return tuple(f'{axis} {name}' for name in names for axis in AXES)
-
-
-ALARMS = (
+ALARM_ROWS = (
     Alarm('emergency stop', 'high', 0.0, 0.0, False, (),
           'an emergency stop is latched in the drive',
           'find the cause of the stop; once it is gone, call `adu/reset_faults`, then command a mode'),
@@ -73,79 +59,79 @@ ALARMS = (
           'a motion of more than 3 mrad was commanded, and the drive repeats the same angles, rates and torques. The '
           'ACU enters standby',
           'make sure that the antenna is at rest; inspect the encoders, their interface and the drive; then reset'),
-    *_of_axes('motor lost', 'medium', 0.0, 1.0, False,
-              'one motor of the pair makes no torque; the remaining motor drives the axis with half the torque and '
-              'without bias torque', 'finish the pass if wind and rates allow it; inspect amplifier and motor'),
-    *_of_axes('stow pin', 'high', 0.0, 1.0, False,
-              'the stow pin has failed, or the pins have not reached their commanded position within `stow_timeout`',
-              'keep clear; inspect pin, hole and switches; `adu/reset_faults` retries the motion of the pin'),
-    *_of_axes('encoder jump', 'high', 0.0, 1.0, True,
-              'the load encoder moved 3 mrad in one step without the motors',
-              'compare with the motor encoders; inspect encoder, coupling and cable; then reset',
-              cause=('time jump',)),
-    *_of_axes('encoder stuck', 'high', 0.0, 1.0, True,
-              'the load encoder stands still while the motors turn by 3 mrad',
-              'stop the antenna: its true angle may differ from the display; check encoder and coupling, then reset'),
-    *_of_axes('encoder disagreement', 'high', 0.0, 1.0, True,
-              'load encoder and motors have moved by angles that differ by 10 mrad; a difference decays with a time '
-              'constant of 2 s',
-              'compare the encoders; inspect gear, couplings and cables; then reset',
-              cause=('time jump', '* encoder jump', '* encoder stuck')),
-    *_of_axes('brake not released', 'high', 0.3, 1.0, False,
-              'the mean of the absolute torque is above 50 times the Coulomb friction (`feedforward.friction`), and '
-              'for half a second the axis has stood in spite of its command, or has moved at 80 times the friction. '
-              'A gust that pushes the axis back does not count',
-              'go to standby; inspect the brakes; check for an obstacle that blocks the axis', judged='moving'),
-    *_of_axes('immobile', 'high', 0.3, 1.0, False,
-              'the motors of the axis turn at less than a tenth of the commanded rate',
-              'go to standby; check drive, motors and end stops',
-              cause=('drive silent', 'drive frozen', '* brake not released', '* motor lost'), judged='moving'),
-    *_of_axes('brake not gripping', 'critical', 0.05, 1.0, False,
-              'the drive has been off for 2.5 s and the axis still moves',
-              'keep clear of the antenna; secure it by hand or by a pin; inspect the brakes'),
-    *_of_axes('runaway', 'critical', 0.005, 1.0, True,
-              'the axis turns opposite to its rate command',
-              'keep the antenna stopped; inspect the wiring of motors and encoders; then reset',
-              cause=('* brake not gripping', '* encoder stuck', '* motor lost')),
+    Alarm('* motor lost', 'medium', 0.0, 1.0, False, (),
+          'one motor of the pair makes no torque; the remaining motor drives the axis with half the torque and '
+          'without bias torque',
+          'finish the pass if wind and rates allow it; inspect amplifier and motor', 'motors'),
+    Alarm('* stow pin', 'high', 0.0, 1.0, False, (),
+          'the stow pin has failed, or the pins have not reached their commanded position within `stow_timeout`',
+          'keep clear; inspect pin, hole and switches; `adu/reset_faults` retries the motion of the pin', 'motors'),
+    Alarm('* encoder jump', 'high', 0.0, 1.0, True, ('time jump',),
+          'the load encoder moved 3 mrad in one step without the motors',
+          'compare with the motor encoders; inspect encoder, coupling and cable; then reset', 'motors'),
+    Alarm('* encoder stuck', 'high', 0.0, 1.0, True, (),
+          'the load encoder stands still while the motors turn by 3 mrad',
+          'stop the antenna: its true angle may differ from the display; check encoder and coupling, then reset',
+          'motors'),
+    Alarm('* encoder disagreement', 'high', 0.0, 1.0, True,
+          ('time jump', '* encoder jump', '* encoder stuck'),
+          'load encoder and motors have moved by angles that differ by 10 mrad; a difference decays with a time '
+          'constant of 2 s',
+          'compare the encoders; inspect gear, couplings and cables; then reset', 'motors'),
+    Alarm('* brake not released', 'high', 0.3, 1.0, False, (),
+          'the mean of the absolute torque is above 50 times the Coulomb friction (`feedforward.friction`), and '
+          'for half a second the axis has stood in spite of its command, or has moved at 80 times the friction. '
+          'A gust that pushes the axis back does not count',
+          'go to standby; inspect the brakes; check for an obstacle that blocks the axis', 'moving'),
+    Alarm('* immobile', 'high', 0.3, 1.0, False,
+          ('drive silent', 'drive frozen', '* brake not released', '* motor lost'),
+          'the motors of the axis turn at less than a tenth of the commanded rate',
+          'go to standby; check drive, motors and end stops', 'moving'),
+    Alarm('* brake not gripping', 'critical', 0.05, 1.0, False, (),
+          'the drive has been off for 2.5 s and the axis still moves',
+          'keep clear of the antenna; secure it by hand or by a pin; inspect the brakes', 'motors'),
+    Alarm('* runaway', 'critical', 0.005, 1.0, True,
+          ('* brake not gripping', '* encoder stuck', '* motor lost'),
+          'the axis turns opposite to its rate command',
+          'keep the antenna stopped; inspect the wiring of motors and encoders; then reset', 'motors'),
     Alarm('uncommanded motion', 'critical', 0.0, 1.0, True,
-          ('drive frozen', *_both('runaway', 'brake not gripping', 'encoder stuck', 'motor lost')),
+          ('drive frozen', '* runaway', '* brake not gripping', '* encoder stuck', '* motor lost'),
           'for 14 ms the rate of an axis has been outside the range of 0 and its recent rate commands, by more than '
           '`unasked_rate` plus a quarter of this range; also active in standby. The ACU enters standby and calls '
           '`adu/emergency_stop`',
           'keep the antenna stopped until the cause is known; then reset'),
-    *_of_axes('oscillation', 'medium', 0.0, 5.0, False,
-              'the following error oscillates faster than 1 Hz, with half waves of more than 0.1 mrad s (1 mrad at 3 '
-              'Hz)',
-              'choose another controller or lower its bandwidth; check backlash, bias torque and the notch filter',
-              cause=('* motor lost', '* encoder stuck'), judged='moving'),
-    *_of_axes('following error', 'medium', 1.0, 1.0, False,
-              'the axis is more than a quarter of a beamwidth off its reference, and its command is not limited',
-              'check wind, motors and friction; choose a slower motion',
-              cause=('drive silent', 'time jump', 'drive frozen', '* motor lost', '* encoder jump', '* encoder stuck',
-                     '* encoder disagreement', '* brake not released', '* immobile', '* runaway',
-                     '* oscillation'), judged='moving'),
-    *_of_axes('at limit', 'low', 1.0, 1.0, False,
-              'the reference is beyond the limits of the axis or below the floor; the axis holds at the limit',
-              'choose another target or another azimuth wrap; beyond a limit, every mode moves the axis back inside',
-              judged='moving'),
+    Alarm('* oscillation', 'medium', 0.0, 5.0, False, ('* motor lost', '* encoder stuck'),
+          'the following error oscillates faster than 1 Hz, with half waves of more than 0.1 mrad s (1 mrad at 3 '
+          'Hz)',
+          'choose another controller or lower its bandwidth; check backlash, bias torque and the notch filter',
+          'moving'),
+    Alarm('* following error', 'medium', 1.0, 1.0, False,
+          ('drive silent', 'time jump', 'drive frozen', '* motor lost', '* encoder jump', '* encoder stuck',
+           '* encoder disagreement', '* brake not released', '* immobile', '* runaway', '* oscillation'),
+          'the axis is more than a quarter of a beamwidth off its reference, and its command is not limited',
+          'check wind, motors and friction; choose a slower motion', 'moving'),
+    Alarm('* at limit', 'low', 1.0, 1.0, False, (),
+          'the reference is beyond the limits of the axis or below the floor; the axis holds at the limit',
+          'choose another target or another azimuth wrap; beyond a limit, every mode moves the axis back inside',
+          'moving'),
     Alarm('drive fault', 'high', 0.0, 0.0, False,
-          ('emergency stop', *_both('motor lost', 'stow pin', 'encoder jump', 'encoder stuck', 'encoder disagreement',
-                                    'brake not released', 'immobile', 'brake not gripping', 'runaway', 'oscillation',
-                                    'following error'), 'uncommanded motion'),
+          ('emergency stop', '* motor lost', '* stow pin', '* encoder jump', '* encoder stuck',
+           '* encoder disagreement', '* brake not released', '* immobile', '* brake not gripping', '* runaway',
+           '* oscillation', '* following error', 'uncommanded motion'),
           'the drive has tripped on the fault that `adu/state` states, and holds the axes with the brakes',
           'remove the cause of the fault; call `adu/reset_faults`, then command a mode'),
     Alarm('diverged', 'medium', 0.0, 1.0, True,
-          ('INS lost', *_both('encoder jump', 'encoder stuck', 'encoder disagreement', 'immobile',
-                              'following error')),
+          ('INS lost', '* encoder jump', '* encoder stuck', '* encoder disagreement', '* immobile',
+           '* following error'),
           'in autotrack the mean of the last 100 squared innovations, divided by their variance, exceeds 7 (2 at a '
           'loss of signal), or the receiver error of an axis moves with the beam as with a reversed slope. The ACU '
           'enters `program`, or `standby` without a program, and refuses autotrack until a reset',
           "check slope, phase and sign of the receiver's error signals; then reset"),
     Alarm('signal lost', 'medium', 0.5, 1.0, False,
           ('emergency stop', 'drive silent', 'time jump', 'receiver silent', 'INS lost', 'INS jump', 'receiver noisy',
-           'drive frozen',
-           *_both('motor lost', 'encoder jump', 'encoder stuck', 'brake not released', 'immobile', 'runaway',
-                  'oscillation', 'following error', 'at limit'), 'uncommanded motion', 'drive fault', 'diverged'),
+           'drive frozen', '* motor lost', '* encoder jump', '* encoder stuck', '* brake not released', '* immobile',
+           '* runaway', '* oscillation', '* following error', '* at limit', 'uncommanded motion', 'drive fault',
+           'diverged'),
           'autotrack coasts or has ended without a signal, and no predicted blockage or keyhole explains the loss',
           'compare with the prediction; search, or choose another target'),
     Alarm('program too early', 'low', 0.0, 1.0, False, (),
@@ -165,6 +151,14 @@ ALARMS = (
           'check the publisher of the input'),
 )
 
+
+def _alarm(row: Alarm, axes: tuple[str, ...]) -> Alarm:
+    """Return a row with these axes in the place of '*' in its names."""
+    cause = [name.replace('*', axis) for name in row.cause for axis in axes]
+    return row._replace(name=row.name.replace('*', axes[0]), cause=tuple(dict.fromkeys(cause)))
+
+
+ALARMS = tuple(_alarm(row, axes) for row in ALARM_ROWS for axes in (zip(AXES) if '*' in row.name else (AXES,)))
 ALARM_NAMES = tuple(alarm.name for alarm in ALARMS)
 ALARM_INDEX = {name: i for i, name in enumerate(ALARM_NAMES)}
 
@@ -172,11 +166,8 @@ ON_DELAYS_S = tuple(alarm.on_delay for alarm in ALARMS)
 OFF_DELAYS_S = tuple(alarm.off_delay for alarm in ALARMS)
 LATCHED_FLAGS = tuple(int(alarm.latched) for alarm in ALARMS)
 CAUSE_BITS = tuple(sum(1 << ALARM_INDEX[name] for name in alarm.cause) for alarm in ALARMS)
-"""Bits of the causes of each alarm."""
-
 JUDGED_ALARM_BITS = tuple(sum(1 << i for i, alarm in enumerate(ALARMS) if alarm.judged == case)
                           for case in JUDGED_CASES)
-"""Bits of the alarms of each of JUDGED_CASES."""
 
+# Bit of each alarm. The bit of an azimuth alarm, shifted left by one, is the bit of the same alarm in elevation.
 Bit = bits(ALARM_NAMES)
-"""Bit of each alarm. The bit of an azimuth alarm, shifted left by one, is the bit of the same alarm in elevation."""

@@ -2,10 +2,8 @@
 
 The target is converted to deck angles, the pointing model converts these to encoder angles, and the azimuth is put on
 an azimuth wrap inside the limits. Near a keyhole the reference is a planned slew of the look-ahead instead.
-`control_unit` calls this module in each step.
 
-`way` is the program, rotated to the place where the target was last tracked. `gap` is the time without a signal of
-the receiver.
+`way` is the program, rotated to the place where the target was last tracked. `gap` is the outage of the receiver.
 """
 import math
 from typing import TYPE_CHECKING, NamedTuple
@@ -87,11 +85,8 @@ def start_from(guidance: Guidance, azimuth: Radians) -> None:
 @compiled
 def move_by_hand(guidance: Guidance, constants: 'Constants', order: Order, ends: BothAxes[Ends], actual: Motion,
                  dt: Seconds) -> None:
-    """Advance the point that an operator moves by hand, by dt.
-
-    ends: where the point stops; actual: motion of the axes, where the point begins.
-    """
-    valid = order.mode == Mode.RATE and manual.request_valid(guidance.manual, order.stamp)
+    """Advance the point that an operator moves by hand, from the actual motion of the axes up to the ends."""
+    valid = order.mode == Mode.RATE and order.stamp <= guidance.manual.until
     for i in range(2):
         if order.begins:
             manual.begin(guidance.manual, i, actual[i])
@@ -117,8 +112,7 @@ def _reference(guidance: Guidance, tracking: Tracking, constants: 'Constants', o
                gap: Outage, t: Seconds) -> Motion:
     """Return the reference of the encoders at t: the target of the mode, or a slew through a keyhole.
 
-    The angles of the modes stow, stop and rate are encoder angles. A direction of another mode goes through the
-    pointing model.
+    The angles of the modes stow, stop and rate are encoder angles. Another direction goes through the pointing model.
     """
     mode, guidance.unreachable = order.mode, 0
     if not modes.FOLLOWS_TARGET[mode]:
@@ -150,7 +144,7 @@ def _reference(guidance: Guidance, tracking: Tracking, constants: 'Constants', o
 
 @compiled
 def _on_encoders(guidance: Guidance, tracking: Tracking, on_sky: Motion) -> Motion:
-    """Return the motion of the encoders for a direction in deck angles, and note whether the beam reaches it."""
+    # Also note whether the beam reaches the direction.
     motion, reachable = model.to_encoders(tracking.pointing.model, on_sky)
     guidance.unreachable = 0 if reachable else 1
     return motion
@@ -159,10 +153,7 @@ def _on_encoders(guidance: Guidance, tracking: Tracking, on_sky: Motion) -> Moti
 @compiled
 def _source(guidance: Guidance, tracking: Tracking, constants: 'Constants', mode: int, way: bridge.Way, gap: Outage,
             t: Seconds) -> target.Source:
-    """Return the target.Source of the mode at t.
-
-    In autotrack the rotated program takes the place of the estimate during an explained outage of the receiver.
-    """
+    # In autotrack the rotated program takes the place of the estimate during an explained outage of the receiver.
     if mode == Mode.SLAVE:
         return target.Source(0, direction.motion_at(guidance.slave, t))
     if modes.FOLLOWS_TABLE[mode]:
@@ -177,7 +168,7 @@ def _source(guidance: Guidance, tracking: Tracking, constants: 'Constants', mode
 @compiled
 def _wrapped(guidance: Guidance, params: 'AxisParameters', order: Order, program: ProgramTrack, t: Seconds,
              azimuth: AxisMotion) -> AxisMotion:
-    """Return the motion of the azimuth at t on an azimuth wrap inside the limits; azimuth: of the target on any wrap.
+    """Return the motion of the azimuth on an azimuth wrap inside the limits; azimuth: of the target on any wrap.
 
     When a program begins, the function chooses a wrap that holds the whole program. A later change of the wrap is a
     turn of the axis. An electronic beam changes the wrap at once and makes no turn.
@@ -203,7 +194,7 @@ def watch_beam(guidance: Guidance, constants: 'Constants', mode: int, references
                t: Seconds) -> None:
     """Note whether a turn of the azimuth is over, and whether a limit holds the beam off the target.
 
-    references: shaped references of the axes at t; limited: True if an axis is held at a limit.
+    references: shaped, at t; limited: True if an axis is held at a limit.
     """
     beamwidth, elevation = constants.p.tracker.receiver.beamwidth, guidance.target_angles[1]
     azimuth_wrap.watch_turn(guidance.turn, references.azimuth.angle, (guidance.azimuth, elevation), beamwidth, t)
@@ -215,10 +206,7 @@ def watch_beam(guidance: Guidance, constants: 'Constants', mode: int, references
 
 @compiled
 def pointing_offset(guidance: Guidance, t: Seconds) -> Radians:
-    """Return the intended angle between beam and target for an error of the receiver that was measured at t.
-
-    During a turn of the azimuth the angle is inf, so that no error is used.
-    """
+    """Return the intended angle between beam and target at t; during a turn inf, so that no error is used."""
     return math.inf if azimuth_wrap.turn_covers(guidance.turn, t) else guidance.pointing_offset
 
 
@@ -235,7 +223,7 @@ def held(guidance: Guidance, constants: 'Constants', t: Seconds) -> bool:
 @compiled
 def bridge_to(guidance: Guidance, tracking: Tracking, constants: 'Constants', program: ProgramTrack,
               t: Seconds) -> None:
-    """Rotate the program so that it passes through the estimate of the target at t."""
+    """Rotate the program so that it passes through the estimate at t. This avoids a jump of the antenna."""
     bridge.begin(guidance.bridge, program, t, target_tracking.sight(tracking, constants, t).u)
 
 
@@ -261,10 +249,7 @@ def begin_by_level(guidance: Guidance, tracking: Tracking, constants: 'Constants
 @compiled
 def check_slope(guidance: Guidance, tracking: Tracking, constants: 'Constants', inputs: Inputs, at: Pointing,
                 way: bridge.Way) -> None:
-    """Compare an error of the receiver with the expected place of the target, to find a slope of the wrong sign.
-
-    at: the beam when the error was measured.
-    """
+    """Compare an error of the receiver, measured with the beam `at`, with the expected place of the target."""
     t = inputs.error_stamp - constants.p.tracker.receiver.age
     expected = level_modes.expected(guidance.acquisition, way, t)
     motion = attitude.on_deck(tracking.attitude, constants.p, t, expected)
@@ -276,7 +261,7 @@ def check_slope(guidance: Guidance, tracking: Tracking, constants: 'Constants', 
 @separate
 def look_ahead(guidance: Guidance, tracking: Tracking, constants: 'Constants', mode: int, program: ProgramTrack,
                gap: Outage, t: Seconds) -> bool:
-    """Plan for the keyholes and hidden sectors on the path of the target, once in planner.LOOK_AHEAD_PERIOD_S.
+    """Plan for keyholes and hidden sectors once in planner.LOOK_AHEAD_PERIOD_S.
 
     Return True if the program has been replaced; the mode must then restart.
     """
@@ -301,7 +286,6 @@ def look_ahead(guidance: Guidance, tracking: Tracking, constants: 'Constants', m
 @compiled
 def _plan(guidance: Guidance, tracking: Tracking, constants: 'Constants', mode: int, program: ProgramTrack,
           gap: Outage, t: Seconds) -> None:
-    """Plan from t on along the program, or along the great circle of the target."""
     terms, lookahead, azimuth = tracking.pointing.model, guidance.lookahead, guidance.azimuth
     if modes.FOLLOWS_TABLE[mode]:
         bridge.clear(guidance.bridge)

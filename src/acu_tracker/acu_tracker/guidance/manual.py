@@ -3,8 +3,6 @@
 The point stops when no new command arrives in time. The mode stop uses the point as well, and brakes it to rest. On
 each axis the rate of the point is ramped towards the commanded rate with a constant acceleration. The angle of the
 point is the integral of its rate.
-
-i: axis, 0 azimuth, 1 elevation. Angles are deck angles.
 """
 import math
 from collections.abc import Sequence
@@ -16,14 +14,12 @@ from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Pair, RadiansPerSecond, Records, Seconds
 from pedestal_common.record import Record
 
+# Time for which a command of rates is valid [s]; a client repeats the command while the axes shall move.
 RATE_REQUEST_TIMEOUT_S = 0.5
-"""Time for which a command of rates is valid [s]; a client repeats the command while the axes shall move."""
 
+# Share of the shaper's acceleration that the ramp of the rate uses [-]. Because the share is below 1, the shaper
+# follows the point without lag.
 ACCELERATION_SHARE = 0.5
-"""Share of the shaper's acceleration that the ramp of the rate uses [-].
-
-Because the share is below 1, the shaper follows the point without lag.
-"""
 
 
 class Manual(Record):
@@ -46,23 +42,14 @@ def request_rates(manual: Records, rates: Sequence[RadiansPerSecond], stamp: Sec
 
 
 @compiled
-def request_valid(manual: Manual, t: Seconds) -> bool:
-    """Return True if the commanded rates are valid at t."""
-    return t <= manual.until
-
-
-@compiled
 def begin(manual: Manual, i: int, motion: AxisMotion) -> None:
-    """Put the commanded point of axis i on the motion of this axis."""
+    """Put the commanded point of axis i on its motion."""
     manual.angle[i], manual.rate[i], manual.acceleration[i] = motion.angle, motion.rate, 0.0
 
 
 @compiled
 def step(manual: Manual, i: int, shaper: ShaperParameters, ends: Ends, valid: bool, dt: Seconds) -> None:
-    """Advance the commanded point of axis i by dt.
-
-    ends   limits of the axis, or the floor (the lowest elevation at the present azimuth)
-    valid  True if the commanded rates are valid; otherwise the point brakes to rest
+    """Advance the commanded point of axis i by dt; unless the commanded rates are valid, it brakes to rest.
 
     The point stops at the ends. A command in the opposite direction moves it back from there at once.
     """

@@ -1,4 +1,1 @@
-"""Modes of the control unit: facts that decide on a change of mode, effects of the change, laws of single modes.
-
-The transition function itself is in acu_tracker/modes.py.
-"""
+"""Modes of the control unit: facts that decide on a change of mode (see modes.py), and laws of single modes."""

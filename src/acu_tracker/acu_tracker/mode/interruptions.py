@@ -3,9 +3,6 @@
 Outage: the time without an accepted error of the receiver. A keyhole, a turn of the azimuth or a hidden sector
 explains an outage: autotrack then coasts on.
 
-Latched faults stay until a reset: uncommanded motion of an axis, a drive that repeats its angles (frozen), and
-divergence of the filter.
-
 Resumption: a silence is a time without steps, because the drive or the control unit did not run. After a short silence
 the mode continues. If the drive was restarted during the silence, the mode ends because the drive is not ready. This
 module keeps the mode, and the control unit requests it again when the drive is ready.
@@ -41,18 +38,30 @@ class Outage(NamedTuple):
     permitted: bool
 
 
-def initialise_outage(state: Records) -> None:
-    """Begin without an explained outage."""
-    state['stamp'] = -math.inf
+class Resumption(Record):
+    """Mode that a silence interrupted."""
+    mode: int       # code of the mode before the silence
+    until: Seconds  # last stamp at which it is resumed; -inf if no mode is kept
+
+
+# Shortest silence in which the drive may have been restarted [s]; only after such a silence a mode is kept.
+DRIVE_RESTART_GAP_S = 0.3
+
+# Indices and bits of the alarms of the latched faults, which stay until a reset: uncommanded motion of an axis, a
+# drive that repeats its angles, and divergence of the filter.
+UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM = (
+    table.ALARM_INDEX[name] for name in ('uncommanded motion', 'drive frozen', 'diverged'))
+LATCHED_FAULT_BITS = 1 << UNCOMMANDED_MOTION_ALARM | 1 << FROZEN_DRIVE_ALARM | 1 << DIVERGENCE_ALARM
+
+
+def initialise(outage: Records, resumption: Records) -> None:
+    """Begin without an explained outage and without an interrupted mode."""
+    outage['stamp'] = resumption['until'] = -math.inf
 
 
 @compiled
 def outage_now(state: OutageRecord, accepted: Seconds, t: Seconds, params: 'SharedParameters') -> Outage:
-    """Return the Outage at t; accepted: stamp of the last accepted error.
-
-    Autotrack coasts after coast_after without an accepted error, and ends after coast_time. An explanation stays valid
-    for coast_time after its last stamp.
-    """
+    """Return the Outage at t; accepted: stamp of the last accepted error."""
     since = t - accepted - params.receiver_latency - params.tracker.receiver.age
     return Outage(since, since > params.tracker.coast_after, t - state.stamp <= params.tracker.coast_time)
 
@@ -61,28 +70,13 @@ def outage_now(state: OutageRecord, accepted: Seconds, t: Seconds, params: 'Shar
 def explain_outage(state: OutageRecord, hidden: bool, slewing: bool, turning: Bit, t: Seconds) -> int:
     """Return the reason why the receiver may be without signal at t, or NONE.
 
-    hidden   True if a hidden sector hides the target
-    slewing  True if the beam slews through the keyhole
-    turning  True if the azimuth goes round to another wrap at a limit of its travel
+    hidden: by a sector; slewing: through the keyhole; turning: of the azimuth to another wrap, at a limit of its
+    travel.
     """
     state.blocked = hidden
     if hidden or slewing or turning:
         state.stamp = t
     return Reason.BLOCKED if hidden else Reason.KEYHOLE if slewing else Reason.TURN if turning else Reason.NONE
-
-
-UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM = (
-    table.ALARM_INDEX[name] for name in ('uncommanded motion', 'drive frozen', 'diverged'))
-"""Indices of the alarms of the latched faults."""
-
-LATCHED_FAULT_BITS = 1 << UNCOMMANDED_MOTION_ALARM | 1 << FROZEN_DRIVE_ALARM | 1 << DIVERGENCE_ALARM
-"""Bits of the alarms of the latched faults; bit i belongs to the alarm of index i."""
-
-
-@compiled
-def latched(uncommanded: int, frozen: int, diverged: int) -> int:
-    """Return the bits of the alarms whose fault waits for a reset; each argument: 1 while its fault waits."""
-    return (uncommanded << UNCOMMANDED_MOTION_ALARM) | (frozen << FROZEN_DRIVE_ALARM) | (diverged << DIVERGENCE_ALARM)
 
 
 @compiled
@@ -96,11 +90,7 @@ def axes_follow_commands(supervision: Supervision) -> bool:
 
 @compiled
 def drive_refusal(ready: Bit, uncommanded: Bit, frozen: Bit) -> int:
-    """Return the reason why no mode except standby may move the axes, or NONE.
-
-    ready: True if the drive follows commands; uncommanded, frozen: True if uncommanded motion, or a frozen drive, is
-    latched.
-    """
+    """Return the reason why no mode except standby may move the axes, or NONE."""
     if uncommanded:
         return Reason.UNCOMMANDED_MOTION
     if frozen:
@@ -110,36 +100,17 @@ def drive_refusal(ready: Bit, uncommanded: Bit, frozen: Bit) -> int:
 
 @compiled
 def reset_latched(alarms: AlarmList, t: Seconds) -> bool:
-    """Clear the conditions of LATCHED_FAULT_BITS and reset the latched alarms at t.
-
-    Return True if an alarm was latched.
-    """
+    """Clear the conditions of LATCHED_FAULT_BITS and reset the latched alarms. Return True if there was one."""
     for i in (UNCOMMANDED_MOTION_ALARM, FROZEN_DRIVE_ALARM, DIVERGENCE_ALARM):
         annunciator.set_condition(alarms, i, False, t)
     return annunciator.reset(alarms, t)
-
-
-class Resumption(Record):
-    """Mode that a silence interrupted."""
-    mode: int       # code of the mode before the silence
-    until: Seconds  # last stamp at which it is resumed; -inf if no mode is kept
-
-
-DRIVE_RESTART_GAP_S = 0.3
-"""Shortest silence in which the drive may have been restarted [s]; only after such a silence a mode is kept."""
-
-
-def initialise_resumption(state: Records) -> None:
-    """Begin with no interrupted mode."""
-    state['until'] = -math.inf
 
 
 @compiled
 def mode_after(state: Resumption, mode: int, last: Seconds, stamp: Seconds, resume_time: Seconds) -> int:
     """Return the mode after a silence: `mode`, or STANDBY if the silence was longer than resume_time.
 
-    If the drive may have been restarted in the silence, keep the mode. last, stamp: stamps of the steps
-    before and after the silence.
+    Keep the mode if the drive may have been restarted. last, stamp: of the steps before and after the silence.
     """
     if stamp > last + resume_time:
         return Mode.STANDBY
@@ -149,22 +120,17 @@ def mode_after(state: Resumption, mode: int, last: Seconds, stamp: Seconds, resu
 
 
 @compiled
-def resumption_pending(state: Resumption) -> bool:
-    """Return True if a mode is kept."""
-    return math.isfinite(state.until)
-
-
-@compiled
 def pending_mode(state: Resumption, stamp: Seconds, ended: bool, locked: Bit, request_before: int) -> int:
-    """Return the request that is pending at `stamp`. The caller calls this function only while `is_pending`.
+    """Return the request that is pending at `stamp`: a kept mode, or the request that was pending before.
 
-    ended           True if the mode is standby because the drive was not ready
-    locked          True if autotrack can begin
-    request_before  request that was pending before this step
+    ended   True if the mode is standby because the drive was not ready
+    locked  True if autotrack can begin
 
     A kept mode whose time is over is discarded. If autotrack cannot begin, `program` is requested, because `program`
     hands over to autotrack.
     """
+    if not math.isfinite(state.until):
+        return request_before
     if stamp > state.until:
         state.until = -math.inf
         return modes.NO_REQUEST

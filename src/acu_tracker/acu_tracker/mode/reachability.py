@@ -1,7 +1,6 @@
 """Reachable directions: whether fixed angles, or the table that a mode follows, are inside the limits of the axes.
 
-The floor, the lowest elevation of each azimuth, is one of the limits. A table is the program track, or a predicted
-track of a satellite or the sun.
+The floor, the lowest elevation of each azimuth, is one of the limits.
 """
 import math
 from typing import TYPE_CHECKING
@@ -26,11 +25,7 @@ if TYPE_CHECKING:
 
 @compiled
 def outside(constants: 'Constants', A: Radians, E: Radians) -> int:
-    """Return OUTSIDE_LIMITS if the encoder angles A (azimuth) and E (elevation) cannot be reached, else NONE.
-
-    They can be reached if both angles are inside the limits of their axes, and the floor at the azimuth A is
-    not above the elevation E. NaN counts as outside.
-    """
+    """Return OUTSIDE_LIMITS if the encoder angles A and E cannot be reached, else NONE. NaN counts as outside."""
     a, e = constants.axis[0].p.limits, constants.axis[1].p.limits
     inside = a.low <= A <= a.high and e.low <= E <= e.high
     return Reason.NONE if inside and not floor.above(constants.floor, A, E) else Reason.OUTSIDE_LIMITS
@@ -47,10 +42,9 @@ def judge_direction(pointing: pointing_model.PointingModel, constants: 'Constant
 @compiled
 def _judge_track(tracking: Tracking, constants: 'Constants', track: ProgramTrack, t: Seconds,
                  azimuth: Radians) -> tuple[int, int]:
-    """Return (NONE or the reason why a table cannot be followed, signals.Flag.PROGRAM or 0).
+    """Return the result of _judge_table for a table.
 
-    t, azimuth and the flag: as in judge_table. The table must cover t. The direction is judged at t + lead, the
-    instant at which the next command is in force.
+    The table must cover t. The direction is judged at t + lead, the instant at which the next command is in force.
     """
     obstacle = program_track.status(track, t)
     if obstacle != Reason.NONE:
@@ -66,11 +60,9 @@ def _judge_track(tracking: Tracking, constants: 'Constants', track: ProgramTrack
 
 
 @compiled
-def judge_table(tracking: Tracking, constants: 'Constants', inputs: Inputs, mode: int, all_tables: tables.Tables,
-                t: Seconds, azimuth: Radians) -> tuple[int, int]:
+def _judge_table(tracking: Tracking, constants: 'Constants', inputs: Inputs, mode: int, all_tables: tables.Tables,
+                 t: Seconds, azimuth: Radians) -> tuple[int, int]:
     """Return (NONE or the reason why the table of a mode cannot be followed at t, signals.Flag.PROGRAM or 0).
-
-    azimuth: azimuth of the last reference as it was before the shaper limited it; the azimuth wrap is chosen near it.
 
     The flag marks a table with an angle that is not finite.
     """
@@ -87,3 +79,24 @@ def judge_table(tracking: Tracking, constants: 'Constants', inputs: Inputs, mode
     if mode == Mode.PROGRAM and inputs.gap and obstacle == Reason.BEFORE_PROGRAM:
         return Reason.PROGRAM_GAP, flag
     return obstacle, flag
+
+
+@compiled
+def judge_tables(tracking: Tracking, constants: 'Constants', inputs: Inputs, wanted: tuple[int, int, int, int],
+                 all_tables: tables.Tables, t: Seconds, azimuth: Radians) -> tuple[int, int, int, int]:
+    """Return (program, tle, sun of modes.Conditions at t, flags of bad tables).
+
+    wanted   modes whose table is evaluated; another table counts as good, to save time
+    azimuth  of the last reference, before the shaper; the azimuth wrap is chosen near it
+    """
+    program = tle = sun = Reason.NONE
+    flags = flag = 0
+    if Mode.PROGRAM in wanted:
+        program, flags = _judge_table(tracking, constants, inputs, Mode.PROGRAM, all_tables, t, azimuth)
+    if Mode.TLE in wanted:
+        tle, flag = _judge_table(tracking, constants, inputs, Mode.TLE, all_tables, t, azimuth)
+        flags |= flag
+    if Mode.SUN in wanted:
+        sun, flag = _judge_table(tracking, constants, inputs, Mode.SUN, all_tables, t, azimuth)
+        flags |= flag
+    return program, tle, sun, flags

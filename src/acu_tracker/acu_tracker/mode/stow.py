@@ -2,8 +2,6 @@
 
 A stow pin is a bolt that locks its axis. The axes get a command only while both pins are out and no pin is commanded
 in. The last request to the pins, in or out, stays in force when the mode changes.
-
-`code` is a code of adu/stow_pins, the states of both pins.
 """
 import math
 from typing import TYPE_CHECKING
@@ -26,24 +24,18 @@ class Stow(Record):
     not_stowed: Seconds     # last stamp at which the axes were not at rest at the stow angles
 
 
+# Codes of acu/stow_pins, on which the control unit requests the position of both pins.
 _REQUEST_TEXTS = topics.TOPIC_BY_NAME['acu/stow_pins'].texts
 REQUEST_PINS_OUT, REQUEST_PINS_IN = _REQUEST_TEXTS.index('out'), _REQUEST_TEXTS.index('in')
-"""Codes of acu/stow_pins, on which the control unit requests the position of both pins."""
 
+# Codes of adu/stow_pins, on which the drive reports the states of both pins. Such a code is _PIN_STATE_COUNT times the
+# state of the azimuth pin, plus the state of the elevation pin.
 _PIN_OUT, _PIN_IN, _PIN_FAILED = (topics.PIN_STATE_TEXTS.index(state) for state in ('out', 'in', 'failed'))
-"""Codes of the states of one pin."""
-
 _PIN_STATE_COUNT = len(topics.PIN_STATE_TEXTS)
-"""Number of states of a pin. A code of adu/stow_pins is _PIN_STATE_COUNT times the state of the azimuth pin, plus the
-state of the elevation pin."""
-
 BOTH_PINS_OUT, BOTH_PINS_IN = _PIN_OUT * _PIN_STATE_COUNT + _PIN_OUT, _PIN_IN * _PIN_STATE_COUNT + _PIN_IN
-"""Codes of adu/stow_pins, on which the drive reports the states of both pins."""
 
 MAX_REST_RATE_RAD_S = 1e-3  # rate below which an axis is at rest [rad/s]
-
-MIN_REST_TIME_S = 0.5
-"""Time for which both axes must be at rest at the stow angles before the pins are commanded in [s]."""
+MIN_REST_TIME_S = 0.5       # rest of both axes at the stow angles before the pins are commanded in [s]
 
 
 def initialise(stow: Records) -> None:
@@ -53,31 +45,31 @@ def initialise(stow: Records) -> None:
 
 @compiled
 def failed(code: int, i: int) -> bool:
-    """Return True if the pin of axis i has failed; a code below 0 means that the drive has reported no state yet."""
+    """Return True if the pin of axis i has failed. code: of adu/stow_pins; below 0: not yet reported."""
     state = code // _PIN_STATE_COUNT if i == 0 else code % _PIN_STATE_COUNT
     return code >= 0 and state == _PIN_FAILED
 
 
 @compiled
-def obstacle(stow: Stow, fitted: int, code: int) -> int:
-    """Return the reason why the axes must not move, or NONE. fitted: 1 if the antenna has stow pins."""
-    if not fitted:
+def obstacle(stow: Stow, constants: 'Constants', inputs: Inputs) -> int:
+    """Return the reason why the stow pins forbid motion, or NONE."""
+    if not constants.p.stow_pins:
         return Reason.NONE
-    if failed(code, 0) or failed(code, 1):
+    if failed(inputs.pins, 0) or failed(inputs.pins, 1):
         return Reason.PIN_FAILED
-    return Reason.NONE if code == BOTH_PINS_OUT and stow.requested != REQUEST_PINS_IN else Reason.PINNED
+    return Reason.NONE if inputs.pins == BOTH_PINS_OUT and stow.requested != REQUEST_PINS_IN else Reason.PINNED
 
 
 @compiled
-def commands_no_motion(stow: Stow, fitted: int, code: int, mode: int) -> bool:
-    """Return True if the mode commands no motion; fitted: 1 if the antenna has stow pins."""
+def commands_no_motion(stow: Stow, constants: 'Constants', inputs: Inputs, mode: int) -> bool:
+    """Return True if the mode commands no motion."""
     return (mode == Mode.STANDBY or mode == Mode.UNSTOW
-            or (mode == Mode.STOW and obstacle(stow, fitted, code) != Reason.NONE))
+            or (mode == Mode.STOW and obstacle(stow, constants, inputs) != Reason.NONE))
 
 
 @compiled
 def _request_pins(stow: Stow, place: int, t: Seconds) -> None:
-    """Request a position of the pins at t: `out` or `in`. A repeated request keeps its first stamp."""
+    # A repeated request keeps its first stamp.
     if stow.requested != place:
         stow.requested, stow.since = place, t
 

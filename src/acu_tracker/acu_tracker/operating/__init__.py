@@ -1,4 +1,1 @@
-"""Operation of the antenna: commands of clients, control by one client, and texts and diagnosis for the operator.
-
-`unit.Acu` uses these modules outside the compiled law.
-"""
+"""Operation of the antenna outside the law: commands and control of clients, texts and diagnosis for the operator."""

@@ -1,5 +1,4 @@
-"""Texts for the operator on keyholes, hidden sectors and the end of the azimuth's travel; numbers for the diagnostics.
-"""
+"""Texts and numbers for the operator on keyholes, hidden sectors and the end of the azimuth's travel."""
 import math
 from typing import TYPE_CHECKING
 
@@ -8,7 +7,7 @@ import numpy as np
 from acu_tracker import modes
 from acu_tracker.lookahead import planner
 from acu_tracker.program import tables
-from pedestal_common.quantities import AnyRecord, Degrees, Floats, Radians
+from pedestal_common.quantities import AnyRecord, Degrees, Radians
 
 if TYPE_CHECKING:
     from acu_tracker.params import AcuParameters, AxisParameters
@@ -38,10 +37,7 @@ def keyhole(lookahead: AnyRecord, parameters: 'AcuParameters') -> str:
 
 
 def _at_the_end(axis: 'AxisParameters', when: str) -> str:
-    """Return the text that describes the motion of the azimuth at the end of its travel.
-
-    axis: the azimuth; when: text of the time, with a blank at its end; '' without a time.
-    """
+    # when: text of the time, with a blank at its end; '' without a time.
     if axis.limits.high - axis.limits.low < 2.0 * math.pi:
         return f'{when}the azimuth stops at the end of its travel until the target is inside the travel again'
     duration = 2.0 * math.pi / axis.shaper.rate + axis.shaper.rate / axis.shaper.acceleration
@@ -64,15 +60,15 @@ def overtravel(unit: 'Acu') -> str:
         if beyond.size and beyond[0] > 0:
             row, times = beyond[0], np.concatenate(([now], track.times[ahead]))
             end = limits.low if azimuth[row] < limits.low else limits.high
-            when = f'at {np.interp(end, *_increasing(azimuth[row - 1:row + 1], times[row - 1:row + 1])):.1f} s '
+            rows = row - 1 + np.argsort(azimuth[row - 1:row + 1])   # np.interp needs increasing azimuths
+            when = f'at {np.interp(end, azimuth[rows], times[rows]):.1f} s '
     return f'no azimuth wrap holds the whole program track: {_at_the_end(unit.parameters.azimuth, when)}'
 
 
 def reaches_end(unit: 'Acu') -> bool:
     """Return True if the azimuth will reach the end of its travel within keyhole.notice at its present rate.
 
-    The function serves modes that follow a target without a table. Where a program track covers the present time, the
-    result is False, because `overtravel` reports the end of travel.
+    Where the mode follows a table, or a program track covers the present time, `overtravel` reports the end of travel.
     """
     outputs, state, program = unit.parts['outputs'], unit.parts['state'], unit.memory.tables.program.times
     mode, covered = outputs['mode'], len(program) > 0 and program[0] <= state['stamp'] <= program[-1]
@@ -84,12 +80,6 @@ def end_of_travel(unit: 'Acu') -> str:
     """Return the text for an azimuth that will soon reach the end of its travel."""
     left = unit.parts['outputs']['time_to_limit'][0]
     return _at_the_end(unit.parameters.azimuth, f'at the present rate, in {left:.1f} s ')
-
-
-def _increasing(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Return two points in increasing order of x."""
-    order = np.argsort(x)
-    return x[order], y[order]
 
 
 def turn(unit: 'Acu') -> str:
@@ -105,10 +95,7 @@ def hidden(lookahead: AnyRecord) -> str:
 
 
 def numbers(lookahead: AnyRecord) -> list[tuple[str, str]]:
-    """Return the values (key, text) of the forecast for the diagnostics.
-
-    The keys of a slew or of a hidden sector appear only if there is one.
-    """
+    """Return the values (key, text) of the forecast for the diagnostics."""
     values = [('keyhole', planner.FORECAST_TEXTS[lookahead['forecast']])]
     if lookahead['forecast'] == planner.FORECAST_KEYHOLE:
         slew = lookahead['slew']

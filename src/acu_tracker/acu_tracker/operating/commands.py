@@ -1,25 +1,134 @@
-"""Execution of the commands on acu/command: EXECUTORS has a function for each verb of command_table.ACU_COMMANDS.
+"""Execution of the requests of services and of the commands on acu/command: for each verb a function in EXECUTORS.
 
-A refusal changes nothing. A function raises ValueError for wrong arguments.
+A refusal states the reason and changes nothing. A function raises ValueError for wrong arguments.
 """
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from acu_tracker import control_unit, modes, signals
+from acu_tracker.alarms import annunciator, machine, table
+from acu_tracker.command_table import Arguments, points
 from acu_tracker.geometry import direction
 from acu_tracker.guidance import manual
-from acu_tracker.mode import mode_change
-from acu_tracker.operating.command_table import Arguments, points
+from acu_tracker.operating import refusals
+from acu_tracker.unit_law import DRIVE_STATE_TOPIC
 from pedestal_common.graph.modes import MODES
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Radians, RadiansPerSecond
-from pedestal_common.wire.commands import Command, Reply
+from pedestal_common.parameters import did_you_mean
+from pedestal_common.quantities import AnyRecord, Radians, RadiansPerSecond, Seconds
+from pedestal_common.wire.commands import HELD_REFUSAL, Command, Reply
 
 if TYPE_CHECKING:
     from acu_tracker.unit import Acu
 
-Executor: TypeAlias = Callable[['Acu', Command, Arguments], Reply]
+# Commands and services that are open to every client at any time.
+UNRESTRICTED_COMMANDS = ('standby', 'stop', 'acu/standby', 'acu/stop')
+
+
+class Authority:
+    """Control of the antenna: it belongs to at most one client.
+
+    While a client holds control, the control unit refuses the commands of other clients, except those that stop the
+    antenna. While control is free, every client may send any command.
+    """
+    holder = ''     # name of the client that holds control; '' while control is free
+
+    def admit(self, command: Command) -> None:
+        """Raise ValueError for a Command from a client that does not hold control."""
+        if self.holder and command.who != self.holder and command.verb not in (*UNRESTRICTED_COMMANDS, 'take'):
+            raise ValueError(f'{HELD_REFUSAL} {self.holder}')
+
+    def take(self, who: str, role: str) -> Reply:
+        """Give control to the client `who`; raise ValueError if another one holds it and `role` is not supervisor."""
+        if not who:
+            raise ValueError('a client that takes control must have a name')
+        if self.holder not in ('', who) and role != 'supervisor':
+            raise ValueError(f'{HELD_REFUSAL} {self.holder}')
+        before, self.holder = self.holder, who
+        return Reply(True, f'control is with {who}' + (f', taken from {before}' if before not in ('', who) else ''))
+
+    def release(self) -> Reply:
+        """Release control."""
+        before, self.holder = self.holder, ''
+        return Reply(True, f'control released by {before}' if before else 'control was already free')
+
+
+class AlarmDesk:
+    """Commands of an operator to single alarms; each method has the name of its command.
+
+    The argument `state` is the control_unit.State. An unknown alarm raises ValueError.
+    """
+    def __init__(self) -> None:
+        self.reasons: dict[int, str] = {}   # {index of a shelved alarm: reason for shelving}
+
+    def prepare(self, state: AnyRecord) -> None:
+        """Compile the functions behind the commands. The state changes; the caller restores it."""
+        self.acknowledge(state)
+        self.shelve(state, table.ALARM_NAMES[0], 1.0, 'none')
+        self.unshelve(state, table.ALARM_NAMES[0])
+        self.reasons.clear()
+
+    def acknowledge(self, state: AnyRecord, name: str = '') -> Reply:
+        """Acknowledge an alarm and its consequences; name '': every alarm."""
+        chosen = [_index(name)] if name else range(annunciator.ALARM_COUNT)
+        done = sum([annunciator.acknowledge(state['supervision']['alarms'], i, state['stamp']) for i in chosen])
+        return Reply(done > 0, 'acknowledged' if done else 'refused: no alarm waits for an acknowledgement')
+
+    def shelve(self, state: AnyRecord, name: str, seconds: Seconds, reason: str) -> Reply:
+        """Shelve an alarm for some seconds, for a reason."""
+        i = _index(name)
+        self.reasons[i] = reason
+        annunciator.shelve(state['supervision']['alarms'], i, state['stamp'], seconds)
+        return Reply(True, f'{table.ALARM_NAMES[i]} is shelved for {seconds:g} s: {reason}')
+
+    def unshelve(self, state: AnyRecord, name: str) -> Reply:
+        """End the shelving of an alarm."""
+        i = _index(name)
+        if annunciator.apply_event(state['supervision']['alarms'], i, machine.Event.UNSHELVE, state['stamp']):
+            return Reply(True, f'{table.ALARM_NAMES[i]} is no longer shelved')
+        return Reply(False, f'refused: {table.ALARM_NAMES[i]} is not shelved')
+
+
+def _index(name: str) -> int:
+    name = name.replace('_', ' ')
+    if name not in table.ALARM_INDEX:
+        raise ValueError(f'alarm = {name!r}:{did_you_mean(name, table.ALARM_NAMES)} must be one of '
+                         f'{", ".join(table.ALARM_NAMES)}')
+    return table.ALARM_INDEX[name]
+
+
+def request(unit: 'Acu', name: str) -> Reply:
+    """Return the Reply to a request of a service: the name of a mode, acknowledge or reset_faults."""
+    if name == 'reset_faults':
+        return reset(unit)
+    if name == 'acknowledge':
+        return unit.desk.acknowledge(unit.parts['state'])
+    parts, outputs = unit.parts, unit.parts['outputs']
+    if unit.silent and name != 'standby':
+        return Reply(False, f'refused: {refusals.SILENCE_REFUSAL}; mode is {MODES[outputs["mode"]]}')
+    parts['inputs']['drive_ready'] = unit.inputs[0][DRIVE_STATE_TOPIC] <= signals.DRIVE_READY
+    code = MODES.index(name)
+    granted = control_unit.request(parts['state'], parts['constants'], parts['inputs'], outputs, unit.memory.tables,
+                                   code)
+    refusal = '' if granted else f'refused: {refusals.of_mode(unit, code, outputs["reason"])}; '
+    return Reply(bool(granted), f'{refusal}mode is {MODES[outputs["mode"]]}')
+
+
+def reset(unit: 'Acu') -> Reply:
+    """Reset the latched alarms and faults, and request the reset of a drive in fault; return the Reply.
+
+    The reset is refused while the cause of one of them is present. The control unit does not reset an emergency stop
+    of the drive: only an operator does, at adu/reset_faults.
+    """
+    cause = control_unit.reset(unit.parts['state'])
+    if unit.drive_state.startswith('fault'):
+        unit.reset_stamp = float(unit.parts['state']['stamp'])
+    if cause != annunciator.NO_ALARM:
+        return Reply(False, f'refused: the cause of {table.ALARM_NAMES[cause]} is still there')
+    drive = f'; the drive reports {unit.drive_state}'
+    return Reply(True, 'cleared' + (drive if unit.drive_state.startswith(('fault', 'emergency stop')) else ''))
 
 
 def _rates(arguments: Arguments) -> list[RadiansPerSecond]:
@@ -27,10 +136,6 @@ def _rates(arguments: Arguments) -> list[RadiansPerSecond]:
 
 
 def _take_preset(unit: 'Acu', arguments: Arguments) -> None:
-    """Set the direction of the mode preset: angles or a named point, and rates.
-
-    Raise ValueError for an unknown point.
-    """
     angles: Sequence[Radians] = [arguments[axis] for axis in AXES]
     if arguments['point']:
         named = points(unit.parameters.points)
@@ -44,13 +149,11 @@ def _take_preset(unit: 'Acu', arguments: Arguments) -> None:
 
 
 def _take_rate(unit: 'Acu', arguments: Arguments) -> None:
-    """Set the rates of the mode rate."""
     state = unit.parts['state']
     manual.request_rates(state['guidance']['manual'], [arguments[axis] for axis in AXES], state['stamp'])
 
 
 def _take_slave(unit: 'Acu', arguments: Arguments) -> None:
-    """Set the direction of the mode slave. The refraction is added to a true elevation."""
     state = unit.parts['state']
     slave = state['guidance']['slave']
     direction.set_moving(slave, state['stamp'], [arguments[axis] for axis in AXES], _rates(arguments),
@@ -59,33 +162,30 @@ def _take_slave(unit: 'Acu', arguments: Arguments) -> None:
 
 
 def _take_tle(unit: 'Acu', arguments: Arguments) -> None:
-    """Take the elements of the mode tle, if the command has any; raise ValueError for invalid elements."""
     if any(arguments.values()):
         _predict_by(unit, *arguments.values())
 
 
 def _predict_by(unit: 'Acu', line_1: str, line_2: str, omm: str) -> None:
-    """Predict the satellite from other elements; raise ValueError for invalid elements.
-
-    line_1, line_2: TLE, in which _ stands for a blank; omm: OMM in JSON.
-    """
+    # In the lines of a TLE _ stands for a blank.
     followed = unit.followed
     followed.predict_by(followed.predictor.with_elements(line_1.replace('_', ' '), line_2.replace('_', ' '), omm))
     unit.update_tables()
 
 
+# {mode: function that takes the arguments of its command}
 ARGUMENT_SETTERS = {'preset': _take_preset, 'rate': _take_rate, 'slave': _take_slave, 'tle': _take_tle}
-"""{mode: function (unit.Acu, arguments) that takes the arguments of its command}; each raises ValueError."""
 
 
 def _enter_mode(unit: 'Acu', command: Command, arguments: Arguments) -> Reply:
-    """Take the arguments of a mode and request it; a refusal restores what they have changed."""
+    # The request needs the new arguments, because it judges the direction to which the mode would point. A refusal
+    # restores them.
     guidance, followed = unit.parts['state']['guidance'], unit.followed
     predictor, slave = followed.predictor, followed.slave
     before = {name: guidance[name].copy() for name in ('preset', 'manual', 'slave')}
     if command.verb in ARGUMENT_SETTERS:
         ARGUMENT_SETTERS[command.verb](unit, arguments)
-    reply = unit.request(f'acu/{command.verb}')
+    reply = request(unit, command.verb)
     if not reply.granted:
         for name, value in before.items():
             guidance[name] = value
@@ -102,7 +202,7 @@ def _take_elements(unit: 'Acu', _: Command, arguments: Arguments) -> Reply:
 
 
 def _choose_fallback(unit: 'Acu', _: Command, arguments: Arguments) -> Reply:
-    mode_change.choose(unit.parts['state']['mode'], arguments['mode'])
+    modes.choose(unit.parts['state']['mode'], arguments['mode'])
     return Reply(True, f'fallback is {arguments["mode"]}')
 
 
@@ -120,11 +220,12 @@ def _replace_model(unit: 'Acu', command: Command, arguments: Arguments) -> Reply
 
 
 def _command_alarm(unit: 'Acu', command: Command, arguments: Arguments) -> Reply:
-    """Call the method of the AlarmDesk that has the name of the command."""
     return getattr(unit.desk, command.verb)(unit.parts['state'], *arguments.values())
 
 
-EXECUTORS: dict[str, Executor] = {
+Executor: TypeAlias = Callable[['Acu', Command, Arguments], Reply]
+
+EXECUTORS: dict[str, Executor] = {      # by verb of command_table.ACU_COMMANDS
     **dict.fromkeys(MODES, _enter_mode),
     'elements': _take_elements,
     'fallback': _choose_fallback,
@@ -133,6 +234,5 @@ EXECUTORS: dict[str, Executor] = {
     'take': lambda unit, command, arguments: unit.authority.take(command.who, arguments['role']),
     'release': lambda unit, command, arguments: unit.authority.release(),
     **dict.fromkeys(('acknowledge', 'shelve', 'unshelve'), _command_alarm),
-    'reset': lambda unit, command, arguments: unit.reset(),
+    'reset': lambda unit, command, arguments: reset(unit),
 }
-"""{verb: function (unit.Acu, Command, its arguments by name) that returns the Reply}."""

@@ -6,7 +6,6 @@ from acu_tracker import modes, signals
 from acu_tracker.operating import announcement, refusals
 from pedestal_common.graph import topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
-from pedestal_common.quantities import AnyRecord
 
 if TYPE_CHECKING:
     from acu_tracker.unit import Acu
@@ -19,65 +18,66 @@ FAULT_TEXTS = {
                 'slope, phase and sign of the errors are right'}
 """Text of each latched fault of mode.interruptions, the gravest first."""
 
+# {names in signals.INVALID_INPUTS: text of the diagnosis if exactly these inputs are invalid}
 GATED_ERROR_TEXTS = {('error_gated',): 'an error of the receiver was outside the gate and was not used',
                      ('error_noisy',): 'the errors of the receiver are noise and are not used',
                      ('error_gated', 'error_noisy'): 'the errors of the receiver are noise and are not used'}
-"""{names in signals.INVALID_INPUTS: text of the diagnosis}; the text is used if exactly these inputs are invalid."""
 
+# Codes of the modes that point to a direction on the sky.
 DIRECTED_MODES = tuple(i for i, row in enumerate(modes.MODE_ROWS) if row.follows or row.name == 'preset')
-"""Codes of the modes that point to a direction on the sky."""
 
 
 def of(unit: 'Acu') -> Diagnosis:
-    """Return the Diagnosis of the unit; its text reports the gravest finding."""
-    state, outputs = unit.parts['state'], unit.parts['outputs']
+    """Return the Diagnosis of the unit."""
     invalid = tuple(name for i, name in enumerate(signals.INVALID_INPUTS) if unit.parts['invalid'] >> i & 1)
-    faults = unit.faults
-    values = _values(unit, faults, invalid)
+    values = _values(unit, invalid)
+    return Diagnosis(*_gravest(unit, invalid), values)
+
+
+def _gravest(unit: 'Acu', invalid: tuple[str, ...]) -> tuple[int, str]:
+    """Return (level, text) of the gravest finding."""
+    state, outputs, faults = unit.parts['state'], unit.parts['outputs'], unit.faults
     if faults:
-        text = FAULT_TEXTS[faults[0]].format(motion=_uncommanded_motion(state['unasked']))
-        return Diagnosis(LEVEL_ERROR, text, values)
+        motion = ', '.join('{} {:.3g} deg/s, commanded {:.3g} to {:.3g}'.format(axis, *map(math.degrees, rates))
+                           for axis, rates in zip(topics.AXES, state['unasked']['measured']))
+        return LEVEL_ERROR, FAULT_TEXTS[faults[0]].format(motion=motion)
     if unit.model.refused:
-        return Diagnosis(LEVEL_ERROR, f'pointing model refused, the pedestal counts as ideal: {unit.model.refused}',
-                         values)
+        return LEVEL_ERROR, f'pointing model refused, the pedestal counts as ideal: {unit.model.refused}'
     if invalid in GATED_ERROR_TEXTS:
-        return Diagnosis(LEVEL_WARN, GATED_ERROR_TEXTS[invalid], values)
+        return LEVEL_WARN, GATED_ERROR_TEXTS[invalid]
     if invalid:
         why = [text for name in invalid if (text := refusals.missing(unit, name))]
-        return Diagnosis(LEVEL_ERROR, '; '.join((f'invalid input: {" ".join(invalid)}', *why)), values)
-    mode, reason = modes.MODES[outputs['mode']], modes.REASONS[outputs['reason']]
+        return LEVEL_ERROR, '; '.join((f'invalid input: {" ".join(invalid)}', *why))
+    mode = f'{modes.MODES[outputs["mode"]]} ({modes.REASONS[outputs["reason"]]})'
     if state['guidance']['turn']['under_way']:
-        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {announcement.turn(unit)}', values)
+        return LEVEL_WARN, f'{mode}: {announcement.turn(unit)}'
     if outputs['mode'] in DIRECTED_MODES and state['guidance']['unreachable']:
-        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): the direction is in the cone about the zenith that the axes '
-                         'cannot reach (P3, P4); the beam points to the nearest direction', values)
+        return LEVEL_WARN, (f'{mode}: the direction is in the cone about the zenith that the axes cannot reach '
+                            '(P3, P4); the beam points to the nearest direction')
     # held: last instant at which a limit held the beam off the target [s]; the instant of a command is not before the
     # stamp of its step.
     if state['guidance']['held'] >= state['stamp']:
-        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): an axis is held at a limit, and the beam is off the target',
-                         values)
+        return LEVEL_WARN, f'{mode}: an axis is held at a limit, and the beam is off the target'
     if state['guidance']['overtravel']:
-        return Diagnosis(LEVEL_WARN, announcement.overtravel(unit), values)
+        return LEVEL_WARN, announcement.overtravel(unit)
     if announcement.reaches_end(unit):
-        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {announcement.end_of_travel(unit)}', values)
+        return LEVEL_WARN, f'{mode}: {announcement.end_of_travel(unit)}'
     now = unit.now * 1e-9
     if inaccurate := [*unit.followed.predictor.problems(now), *unit.followed.air.problems(now)]:
-        return Diagnosis(LEVEL_WARN, f'{mode} ({reason}): {"; ".join(inaccurate)}', values)
-    return Diagnosis(LEVEL_WARN if outputs['coasting'] else LEVEL_OK, f'{mode} ({reason})', values)
+        return LEVEL_WARN, f'{mode}: {"; ".join(inaccurate)}'
+    return LEVEL_WARN if outputs['coasting'] else LEVEL_OK, mode
 
 
-def _values(unit: 'Acu', faults: tuple[str, ...], invalid: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Return the values (key, text) of the diagnosis.
-
-    faults: names of the latched faults; invalid: names of the invalid inputs.
-    """
+def _values(unit: 'Acu', invalid: tuple[str, ...]) -> list[tuple[str, str]]:
     state, outputs = unit.parts['state'], unit.parts['outputs']
     values = [('mode', modes.MODES[outputs['mode']]), ('reason', modes.REASONS[outputs['reason']]),
               ('fallback', modes.FALLBACK_NAMES[int(state['mode']['fallback'])]), ('control', unit.authority.holder),
-              ('faults', ', '.join(faults)), ('locked', str(int(outputs['locked']))),
+              ('faults', ', '.join(unit.faults)), ('locked', str(int(outputs['locked']))),
               ('coasting', str(int(outputs['coasting']))), ('drive', unit.drive_status)]
     if unit.parameters.stow_pins:
-        values.append(('stow_pins', _pins(int(unit.parts['inputs']['pins']))))
+        pins = int(unit.parts['inputs']['pins'])
+        known = pins != topics.NO_TEXT_CODE
+        values.append(('stow_pins', topics.TOPIC_BY_NAME['adu/stow_pins'].texts[pins] if known else 'unknown'))
     values += [('invalid_input', ' '.join(invalid)), ('errors gated', str(int(outputs['gated']))),
                ('rates gated', str(int(outputs['rates_gated']))),
                ('ranges gated', str(int(outputs['ranges_gated'])))]
@@ -93,14 +93,3 @@ def _values(unit: 'Acu', faults: tuple[str, ...], invalid: tuple[str, ...]) -> l
             *unit.followed.predictor.diagnostic_values(unit.now * 1e-9),
             *unit.followed.air.diagnostic_values(unit.now * 1e-9),
             *((f'refused {mode}', why) for mode, why in refusals.now(unit).items())]
-
-
-def _uncommanded_motion(movement: AnyRecord) -> str:
-    """Return the text of the measured and commanded rates; movement: uncommanded_motion.Envelope."""
-    return ', '.join('{} {:.3g} deg/s, commanded {:.3g} to {:.3g}'.format(axis, *map(math.degrees, rates))
-                     for axis, rates in zip(topics.AXES, movement['measured']))
-
-
-def _pins(code: int) -> str:
-    """Return the text of the state of the stow pins, as the drive reports it."""
-    return topics.TOPIC_BY_NAME['adu/stow_pins'].texts[code] if code != topics.NO_TEXT_CODE else 'unknown'

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from acu_tracker import modes
+from acu_tracker import control_unit, modes
 from acu_tracker.modes import Mode, Reason
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
@@ -15,23 +15,24 @@ if TYPE_CHECKING:
     from acu_tracker.params import AcuParameters
     from acu_tracker.unit import Acu
 
-SILENCE_REFUSAL = 'no joint_states, the drive is silent'
-"""Text with which every mode except standby is refused while the drive is silent."""
+SILENCE_REFUSAL = 'no joint_states, the drive is silent'  # refusal of every mode except standby
 
+# {name in signals.INVALID_INPUTS: (topic, fields of its message that the control unit needs)}
 NEEDED_FIELDS = {'encoder': ('joint_states', ('position', 'velocity')),
                  'attitude': ('ship/imu/data', ('orientation', 'angular_velocity')),
                  'attitude_error': ('ins/error', ('position', 'velocity'))}
-"""{name in signals.INVALID_INPUTS: (topic, fields of its message that the control unit needs)}."""
 
+# {reason of a refused mode: name in NEEDED_FIELDS of the input that is invalid}
 INPUTS_OF_REASONS = {Reason.ENCODER_INVALID: 'encoder', Reason.ATTITUDE_INVALID: 'attitude'}
-"""{reason of a refused mode: name in NEEDED_FIELDS of the input that is invalid}."""
 
 
 def now(unit: 'Acu') -> dict[str, str]:
     """Return {name of a mode: text of the reason} for the modes that would be refused now."""
     if unit.silent:
         return dict.fromkeys((mode for mode in modes.MODES if mode != 'standby'), SILENCE_REFUSAL)
-    why = unit.refusals()
+    parts, reasons = unit.parts, np.zeros(len(modes.MODES), np.int64)
+    control_unit.refusals(parts['state'], parts['constants'], parts['inputs'], unit.memory.tables, reasons)
+    why = reasons.tolist()
     words = {code: modes.REASONS[code] for code in set(why) - {Reason.NONE}}
     if Reason.DRIVE_NOT_READY in words:
         words[Reason.DRIVE_NOT_READY] += f': {unit.drive_status}'
@@ -55,8 +56,7 @@ def of_mode(unit: 'Acu', mode: int, reason: int) -> str:
 def missing(unit: 'Acu', name: str) -> str:
     """Return the text that names the numbers which the last message of an input lacks; '' if it lacks none.
 
-    name: name of the input in NEEDED_FIELDS. In a decoded message a number is NaN if the message does not contain it
-    or marks it as no data.
+    name: in NEEDED_FIELDS. A decoded number is NaN if the message does not contain it or marks it as no data.
     """
     topic, needed = NEEDED_FIELDS.get(name, ('', ()))
     if topic not in unit.reads and topic != unit.trigger:
@@ -86,10 +86,7 @@ def _beyond_limits(unit: 'Acu', mode: str) -> str:
 
 
 def _unreachable(parameters: 'AcuParameters', angles: tuple[Radians, Radians]) -> str:
-    """Return the reason why encoder angles cannot be reached: the axes outside their limits, or else the floor.
-
-    The floor is the lowest elevation that is allowed at an azimuth.
-    """
+    """Return the reason why encoder angles cannot be reached: the axes outside their limits, or else the floor."""
     outside = [f'{axis} {math.degrees(angle):.2f} deg: must be {math.degrees(limits.low):.2f} to '
                f'{math.degrees(limits.high):.2f} deg'
                for axis, angle in zip(topics.AXES, angles)

@@ -1,7 +1,4 @@
-"""The table of the commands that the control unit accepts on acu/command: modes with arguments, and other commands.
-
-`commands` executes them.
-"""
+"""The table of the commands that the control unit accepts on acu/command: modes with arguments, and other commands."""
 import math
 from collections.abc import Mapping
 from typing import TypeAlias
@@ -9,7 +6,6 @@ from typing import TypeAlias
 from acu_tracker.alarms.annunciator import MAX_SHELVING_TIME_S
 from acu_tracker.guidance import manual
 from acu_tracker.modes import FALLBACK_MODES
-from acu_tracker.operating.authority import CONTROL_ROLES
 from acu_tracker.pointing.params import PointingParameters
 from pedestal_common.graph.modes import MODE_ROWS, MODES
 from pedestal_common.graph.topics import AXES
@@ -19,10 +15,11 @@ from pedestal_common.wire.commands import Argument, CommandDefinition
 
 Arguments: TypeAlias = Mapping[str, Value]  # of a command, by name
 
+CONTROL_ROLES = ('operator', 'supervisor')  # roles of a client; a supervisor may take control from another client
+
 
 def _of_axes(doc: str, low: float, high: float, unit: str, default: float | None = None,
              suffix: str = '') -> tuple[Argument, ...]:
-    """Return an Argument for each axis; suffix: end of its name after the name of the axis."""
     return tuple(Argument(f'{axis}{suffix}', doc, low, high, unit, default=default) for axis in AXES)
 
 
@@ -38,7 +35,7 @@ _MODEL_ARGUMENTS = tuple(
              field.metadata.get('unit', ''), default=_MODEL_DEFAULTS[name])
     for name, field in flatten(PointingParameters))
 
-MODE_ARGUMENTS = {
+MODE_ARGUMENTS = {      # {mode: its Arguments}
     'preset': (*_of_axes('deck angle; default: unchanged', -20.0, 20.0, 'rad', math.nan), *_MOTION_ARGUMENTS,
                Argument('point', 'name of a point of the parameter `points`, instead of angles', default='')),
     'rate': _of_axes(f'rate of the axis, valid for {manual.RATE_REQUEST_TIMEOUT_S:g} s', -10.0, 10.0, 'rad/s', 0.0),
@@ -46,7 +43,6 @@ MODE_ARGUMENTS = {
               Argument('holds', 'time for which the direction is valid', 0.01, 86400.0, 's', default=1.0)),
     'tle': tuple(argument._replace(doc=f'{argument.doc}; default: unchanged') for argument in _ELEMENT_ARGUMENTS),
 }
-"""{mode: its Arguments}."""
 
 _ALARM_ARGUMENT = Argument('alarm', 'name of the alarm, with _ or blanks')
 
@@ -82,7 +78,7 @@ POINTS_DOC = "named points for `preset`: 'NAME azimuth elevation; ...' [rad], de
 
 
 def points(text: str) -> dict[str, tuple[Radians, Radians]]:
-    """Return (azimuth, elevation) by name of a text as in POINTS_DOC; raise ParameterError for a wrong text."""
+    """Return the points of a text as in POINTS_DOC by name; raise ParameterError for a wrong text."""
     named: dict[str, tuple[Radians, Radians]] = {}
     for part in filter(None, map(str.strip, text.split(';'))):
         name, *angles = part.split()
