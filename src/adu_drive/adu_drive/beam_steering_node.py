@@ -9,7 +9,7 @@ import pedestal_common.entry  # noqa: F401
 # isort: split
 import sys
 
-from adu_drive.timekeeper_node import Timekeeper, unit_of
+from drive_law.timekeeper_node import Timekeeper, unit_of
 from pedestal_common.node import shell
 from pedestal_common.node.unit import Diagnosis
 

@@ -2,6 +2,7 @@
 from typing import Protocol
 
 from adu_drive import axis, drive_unit
+from drive_law.rate_drive import JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import message_faults, schedule, table
@@ -28,9 +29,6 @@ class FaultyDrive(Protocol):
     constants: drive_unit.Constants
     schedule: schedule.Schedule
     injected: DriveInjected
-
-
-JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC = 'joint_states', 'adu/motor_states'
 
 
 @compiled

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from adu_drive.controller import loops
 from adu_drive.plant import motors
+from drive_law import loops
 
 R, L, P, PSI, V = 0.868, 10.0995e-3, 4.0, 0.4219, 310.0
 W, T, H = 2.0 * math.pi * 300.0, 1e-4, 50e-6

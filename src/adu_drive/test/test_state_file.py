@@ -3,8 +3,9 @@ import math
 
 import pytest
 
-from adu_drive import state_file, unit
-from adu_drive.params import AduNodeParameters
+from adu_drive import unit
+from drive_law import state_file
+from drive_law.params import AduNodeParameters
 from pedestal_common.parameters import ParameterError
 
 LEFT = state_file.PlantState(1.25, 0.75, True)

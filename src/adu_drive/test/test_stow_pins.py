@@ -4,10 +4,9 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive import drive_state, state_file, stow_pins
-from adu_drive.controller import faults
-from adu_drive.params import AduNodeParameters, AduParameters
 from adu_drive.unit import Adu
+from drive_law import drive_state, faults, state_file, stow_pins
+from drive_law.params import AduNodeParameters, AduParameters
 from pedestal_common.graph import topics
 from pedestal_common.parameters import ParameterError, build
 

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from adu_drive.adu_node import AduNode
+from drive_law.rate_drive_node import RateDriveNode
 from pedestal_common.node import shell
 from pedestal_common.node.unit import Diagnosis
 from pedestal_common.quantities import Message, Nanoseconds
@@ -33,7 +33,7 @@ LEAVE_TIME_S = 2.0  # longest wait for the end of the commissioning thread, afte
 ANSWER_POLL_S = 0.02  # time between two checks whether all drives answer [s]
 
 
-class DriveNode(AduNode):
+class DriveNode(RateDriveNode):
     """Node of four servo drives."""
     parameters: ServoDriveParameters
     unit: ServoDrives

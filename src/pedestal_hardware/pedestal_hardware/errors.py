@@ -3,7 +3,7 @@
 The codes are those of CiA 301, CiA 402 and the firmware specification of EPOS4. A code that has no name here belongs
 to a class, which its first digit states.
 """
-from adu_drive.controller import faults
+from drive_law import faults
 from pedestal_common.compiled import compiled
 
 ERROR_HEARTBEAT_LOST = 0x8130

@@ -1,7 +1,8 @@
 """Parameters of `drive_node` and of the simulated drives: those of the drive unit, the bus, and the drives on it."""
 import dataclasses
 
-from adu_drive.params import AduNodeParameters, SpeedLoopParameters
+from drive_law.axis_params import SpeedLoopParameters
+from drive_law.params import AduNodeParameters
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 from pedestal_common.quantities import Nanoseconds, Seconds

@@ -2,7 +2,7 @@
 import dataclasses
 import math
 
-from adu_drive.params import RunParameters
+from drive_law.params import RunParameters
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
 from pedestal_common.quantities import Degrees, Nanoseconds, Radians
 from pedestal_hardware.lines import sources

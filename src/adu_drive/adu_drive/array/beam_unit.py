@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from adu_drive.angle_drive import DRIVE_STATE_TOPIC, EMERGENCY_STOP_TEXT, ENABLED_TEXT, REFERENCE_TOPIC, AngleDrive
 from adu_drive.array import electronic_beam
-from adu_drive.params import BeamParameters
+from adu_drive.array.params import BeamParameters
+from drive_law.angle_drive import DRIVE_STATE_TOPIC, EMERGENCY_STOP_TEXT, ENABLED_TEXT, REFERENCE_TOPIC, AngleDrive
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis

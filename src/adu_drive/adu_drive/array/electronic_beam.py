@@ -6,7 +6,7 @@ models the closed-loop period of that paper.
 """
 from typing import Annotated
 
-from adu_drive.params import BEAM_RING_SIZE, check_delay
+from adu_drive.array.params import BEAM_RING_SIZE, check_delay
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Bit, Floats, Ints, Nanoseconds, Pair, Radians, Records, Seconds
 from pedestal_common.record import Record

@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import cross
 from pedestal_common.quantities import (

@@ -1,4 +1,4 @@
-"""A motor and the brake on its shaft: currents, speed, cogging and heat.
+"""A motor and the brake on its shaft: currents, speed, cogging and resistance.
 
 Permanent-magnet synchronous motor with equal inductances, in rotor coordinates (amplitude invariant):
 
@@ -13,13 +13,11 @@ omega_e = p omega is the electrical speed, p the number of pole pairs, omega the
     J_m, T_c, v, B      inertia [kg m2], Coulomb friction [Nm] and its rate [rad/s], viscous friction [Nms/rad]
     h                   sub-step [s]; per_v = 1 / v
 
-Heating by the torque, as in the I2t protection of a drive, and the resulting resistance:
+Resistance at the thermal load x (drive_law.faults): R = R_20 (1 + alpha dT x)
 
-    tau dx/dt = (T / T_rated)^2 - x        x = 1: steady state at rated torque; torque and current are proportional
-    R = R_20 (1 + alpha dT x)              copper: alpha = 0.00393 / K, dT the rise at rated torque
+    R_20, alpha, dT     resistance at 20 degrees C [ohm], 0.00393 / K of copper, rise at rated torque [K]
 
-T: torque of the motor [Nm]; tau: time constant of the winding [s]; R_20: resistance at 20 degrees C [ohm]. Because x
-follows the true torque of the motor, a trip by x represents a sensor in the winding.
+Because x follows the true torque of the motor, a trip by x represents a sensor in the winding.
 
 The brake is applied by springs. Its Coulomb friction acts in exact steps, so that it holds without creep.
 """
@@ -28,11 +26,35 @@ import math
 from adu_drive.plant.mechanics import tanh
 from pedestal_common.compiled import inlined
 from pedestal_common.quantities import Amperes, NewtonMeters, Radians, RadiansPerSecond, Volts
+from pedestal_common.record import Record
 
 COPPER_COEFFICIENT_PER_K = 0.00393  # temperature coefficient of copper at 20 degrees C [1/K] (IEC 60028)
 
-WARNING_THERMAL_LOAD = 0.8
-"""Thermal load of a motor above which the drive reports a warning, and below which overtemperature ends."""
+
+class Constants(Record):
+    """A motor and its brake, with true values."""
+    p: float                # pole pairs
+    psi: float              # [Wb]
+    L: float                # [H]
+    K_t: float              # [Nm/A]
+    h_L: float
+    h_R_L: float            # at 20 degrees C
+    rise: float             # alpha dT: relative rise of the resistance at thermal load 1
+    h_brake_J: RadiansPerSecond     # h T / J of the brake
+    T_c: NewtonMeters
+    per_v: float
+    h_J: float
+    q_B: float
+    T_cog: NewtonMeters     # amplitude of the cogging
+    cogs: float             # its periods in a turn
+
+
+class State(Record):
+    """A motor; its currents and its angle, which are also measured, are in drive_law.axis_control.MotorState."""
+    v_d: Volts
+    v_q: Volts
+    omega: RadiansPerSecond
+    q_R: float              # 1 / (1 + h R / L) of the warm winding
 
 
 @inlined
@@ -61,16 +83,6 @@ def cogging(theta: Radians, T_cog: NewtonMeters, per_turn: float) -> NewtonMeter
     per_turn: least common multiple of slots and poles.
     """
     return T_cog * math.sin(per_turn * theta)
-
-
-@inlined
-def thermal_load(x: float, torque: NewtonMeters, per_rated: float, gain: float) -> float:
-    """Return the thermal load one period h later, from the thermal load x, under a torque.
-
-    per_rated = 1 / T_rated; gain = 1 - exp(-h / tau).
-    """
-    relative = torque * per_rated
-    return x + gain * (relative * relative - x)
 
 
 @inlined

@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from adu_drive.params import MountParameters
+from drive_law.params import MountParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import angles, wrap
 from pedestal_common.quantities import Bit, Matrix3, Radians, RadiansPerSecond, Records

@@ -31,7 +31,7 @@ from typing import Annotated, cast
 
 import numpy as np
 
-from adu_drive.params import GustParameters, WindFieldParameters, WindParameters
+from drive_law.params import GustParameters, WindFieldParameters, WindParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import cross, direction
 from pedestal_common.law import Law

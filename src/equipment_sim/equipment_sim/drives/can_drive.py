@@ -9,7 +9,7 @@ import numpy as np
 from canopen import objectdictionary
 from canopen.sdo.base import SdoVariable
 
-from adu_drive.params import SPEED_LOOP_PERIOD_S
+from drive_law.axis_params import SPEED_LOOP_PERIOD_S
 from equipment_sim.drives import law, objects
 from equipment_sim.drives.socketcand_server import SocketcandServer
 from equipment_sim.drives.unit import SimulatedDrives

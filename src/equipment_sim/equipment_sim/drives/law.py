@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 from adu_drive import axis, drive_unit, injected
 from adu_drive import unit as adu_unit
-from adu_drive.controller import loops
-from adu_drive.params import SPEED_LOOP_PERIOD_S
+from drive_law import loops, rate_drive
+from drive_law.axis_params import SPEED_LOOP_PERIOD_S
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import schedule
 from pedestal_common.quantities import AnyRecord, Bit, Nanoseconds, NewtonMeters, RadiansPerSecond, Records, Stamps
@@ -76,7 +76,7 @@ class DrivesRecord(Record):
     constants: drive_unit.Constants
     inputs: drive_unit.Inputs
     outputs: drive_unit.Outputs
-    link: adu_unit.Link
+    link: rate_drive.Link
     schedule: schedule.Schedule
     injected: injected.DriveInjected
 
@@ -301,12 +301,12 @@ def law(memory: 'Memory', stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRec
     unit = memory.record[0]
     if schedule.pending(unit.schedule, stamp):
         injected.apply_due_faults(unit, stamp)
-    ship = inputs[adu_unit.SHIP_TRUTH_TOPIC]
+    ship = inputs[rate_drive.SHIP_TRUTH_TOPIC]
     if ship.stamp != NO_STAMP:
         adu_unit.deck_acceleration(unit.inputs, unit.link, ship)
     _advance(unit, stamp)
     drive_unit.read(unit.state, unit.constants, unit.outputs)
-    adu_unit.encode_truth(unit.outputs, stamp // unit.period * unit.period, outputs[adu_unit.DRIVE_TRUTH_TOPIC])
+    adu_unit.encode_truth(unit.outputs, stamp // unit.period * unit.period, outputs[rate_drive.DRIVE_TRUTH_TOPIC])
 
 
 @compiled

@@ -9,8 +9,8 @@ Argument `axis` is 0 for azimuth, 1 for elevation.
 import math
 from typing import Annotated
 
-from adu_drive.controller import faults
-from adu_drive.params import AduParameters
+from drive_law import faults
+from drive_law.params import AduParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
 from pedestal_common.quantities import Bit, Ints, Pair, Radians, Records

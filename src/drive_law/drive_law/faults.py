@@ -1,10 +1,9 @@
 """Faults that a drive detects by its own measurements. A fault is latched until its reset (drive_state.request)."""
 from typing import NamedTuple
 
-from adu_drive.plant.motors import WARNING_THERMAL_LOAD
 from pedestal_common.codes import bits
 from pedestal_common.compiled import inlined
-from pedestal_common.quantities import Ints, Radians, RadiansPerSecond
+from pedestal_common.quantities import Ints, NewtonMeters, Radians, RadiansPerSecond
 from pedestal_common.record import Record
 
 
@@ -41,6 +40,9 @@ AXIS_FAULTS = (
 )
 """Faults of an axis; bit i of a fault word is AXIS_FAULTS[i]."""
 
+WARNING_THERMAL_LOAD = 0.8
+"""Thermal load of a motor above which the drive reports a warning, and below which overtemperature ends."""
+
 Bit = bits([fault.name for fault in AXIS_FAULTS])
 MOTORS_LOST_BITS = Bit.MOTOR_1_LOST | Bit.MOTOR_2_LOST
 ALL_FAULT_BITS = (1 << len(AXIS_FAULTS)) - 1
@@ -69,6 +71,18 @@ def names(bits: int) -> tuple[str, ...]:
 
 
 MIN_OUTWARD_RATE_RAD_S = 1e-3  # smallest rate of an axis that counts as outward motion beyond its end [rad/s]
+
+
+@inlined
+def thermal_load(x: float, torque: NewtonMeters, per_rated: float, gain: float) -> float:
+    """Return the thermal load one period h later, from the thermal load x, under a torque, as in the I2t protection:
+
+        tau dx/dt = (T / T_rated)^2 - x        x = 1: steady state at rated torque; torque and current are proportional
+
+    per_rated = 1 / T_rated; gain = 1 - exp(-h / tau).
+    """
+    relative = torque * per_rated
+    return x + gain * (relative * relative - x)
 
 
 @inlined

@@ -9,7 +9,7 @@ from typing import Protocol, cast
 
 from rclpy.executors import Executor
 
-from adu_drive.params import RunParameters
+from drive_law.params import RunParameters
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import unit_node
 from pedestal_common.node.unit import Diagnosis, Unit

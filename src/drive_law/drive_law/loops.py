@@ -38,7 +38,7 @@ Current control of one motor in rotor coordinates: i_d = 0, decoupled, inside th
 """
 import math
 
-from adu_drive.params import BiasParameters
+from drive_law.axis_params import BiasParameters
 from pedestal_common.compiled import inlined
 from pedestal_common.quantities import (
     Amperes,
