@@ -1,8 +1,6 @@
-"""ROS node of the antenna drive unit: owns the time, publishes the encoders, executes rate commands.
+"""ROS node of the simulated drive, whose law is `drive_unit.step`.
 
-The node runs the unit `adu_drive.unit.Adu`, whose law is `drive_unit.step`; change the drive there. The clock and the
-steps are in drive_law.timekeeper_node, the state file is in drive_law.rate_drive_node. `entry` is imported first, so
-that a signal during the other imports ends the process without a message.
+`entry` is imported first, so that a signal during the other imports ends the process without a message.
 """
 import pedestal_common.entry  # noqa: F401
 
@@ -14,7 +12,7 @@ from pedestal_common.node import shell
 
 
 class AduNode(RateDriveNode):
-    """Node of the simulated drive."""
+    """Node of the unit `adu_drive.unit.Adu`."""
 
     def __init__(self) -> None:
         super().__init__('adu_drive.adu_node')

@@ -1,7 +1,6 @@
 """One axis: encoders, current loops, two motors, gear train and load, around the speed loop of drive_law.axis_control.
 
-drive_unit.step calls `speed_control`, `current_control` and `plant_step` at their own periods. The package defines the
-symbols.
+drive_unit.step calls `speed_control`, `current_control` and `plant_step` at their own periods.
 """
 import math
 from typing import cast
@@ -60,10 +59,9 @@ class MotorConstants(axis_control.MotorConstants, motors.Constants):
 
 
 class Constants(axis_control.Constants):
-    """An axis with its plant. The docstrings of the laws define their constants. The names follow the rules of
-    axis_control.Constants, and these:
+    """An axis with its plant. The names follow the rules of axis_control.Constants, and these:
 
-    h_X, h_R_L       h / X, h R / L; h_sigma_0 = h sigma_0; sigma_1_h = sigma_1 / h
+    h_X, h_R_L       h / X, h R / L; h_sigma_0 = h sigma_0; sigma_1_h = sigma_1 / h; h: sub-step of the plant
     q_B              factor of an implicit step with viscous friction: 1 / (1 + h B / J)
     """
     motor_1: MotorConstants
@@ -114,7 +112,7 @@ class State(axis_control.State):
     motor_1: MotorState
     motor_2: MotorState
     omega: RadiansPerSecond
-    z: Radians
+    z: Radians                  # LuGre bristle deflection
     h_J: float                  # of the base, constant over a control period, as q_B and h_J_dish
     q_B: float
     h_J_dish: float
@@ -146,7 +144,6 @@ class Outputs(axis_control.Outputs, Truth):
 
 
 def _motor_constants(m: MotorParameters, p: AxisParameters, h: Seconds, period: Seconds) -> Records:
-    """h: sub-step of the plant; period: of the speed loop."""
     w = 2.0 * math.pi * p.current_loop.bandwidth
     R, psi = m.resistance * (1.0 + m.drift.resistance), m.flux_linkage * (1.0 + m.drift.flux_linkage)
     control = axis_control.motor_constants(m, p.thermal, p.encoder.motor_bits, period)
@@ -161,17 +158,16 @@ def _motor_constants(m: MotorParameters, p: AxisParameters, h: Seconds, period: 
 
 
 def _dish(p: AxisParameters) -> tuple[KilogramMeters2, float, float]:
-    """Return inertia, stiffness [Nm/rad] and damping [Nms/rad] of the dish, the flexible part of the load."""
+    """Return inertia, stiffness [Nm/rad] and damping [Nms/rad] of the dish."""
     J_dish = p.structure.inertia_share * p.load.inertia
     return J_dish, *mechanics.spring_and_damper(J_dish, p.structure.frequency, p.structure.damping)
 
 
 def constants(p: AxisParameters, h: Seconds, varying: bool = False,
               period: Seconds = SPEED_LOOP_PERIOD_S) -> Records:
-    """Return the Constants (1,) of an axis for a plant sub-step h, computed once.
+    """Return the Constants (1,) of an axis for a plant sub-step h. period: of the speed loop.
 
-    varying: True if the inertia of the load varies; `change_inertia` then sets it before each control period. period:
-    of the speed loop.
+    varying: True if the inertia of the load varies; `change_inertia` then sets it before each control period.
     """
     g, error = p.gear_train, p.encoder.error
     J_dish, k_dish, c_dish = _dish(p)
@@ -230,10 +226,8 @@ def initial_state(p: AxisParameters, theta: Radians, external: NewtonMeters) -> 
 
 @inlined
 def _encoder_angle(theta: Radians, errors: EncoderErrors) -> Radians:
-    """Return the angle that a load encoder with these errors measures on an axis at theta.
-
-    The disc is mounted off the centre (error once per turn), the signal is interpolated between two lines of the disc,
-    and the zeros of encoder and axis differ.
+    """Return the angle that a load encoder measures: its disc is mounted off the centre (error once per turn), and its
+    signal is interpolated between two lines of the disc.
     """
     if errors.exact:
         return theta
@@ -243,7 +237,6 @@ def _encoder_angle(theta: Radians, errors: EncoderErrors) -> Radians:
 
 @inlined
 def _load_counts(axis: State, constants: Constants) -> float:
-    """Return the reading of the load encoder [counts]."""
     if axis.stuck:
         return axis.reading
     return axis_control.counts(_encoder_angle(axis.theta, constants.encoder), constants.per_rad) + axis.jump
@@ -257,7 +250,7 @@ def _measured_speed(motor: MotorState, constants: MotorConstants) -> RadiansPerS
 
 @inlined
 def read_motor_sensors(motor: MotorState, constants: MotorConstants) -> None:
-    """Measure the speed of a motor and advance its thermal load by a speed-loop period."""
+    """Measure speed, count and thermal load of a motor, in a period of the speed loop."""
     motor.measured = _measured_speed(motor, constants)
     motor.heat = faults.thermal_load(motor.heat, constants.K_t * motor.i_q, constants.per_rated, constants.heat_gain)
     motor.count = int(axis_control.counts(motor.theta, constants.per_rad))
@@ -268,7 +261,7 @@ def speed_control(axis: State, constants: Constants, rate: RadiansPerSecond, tor
                   powered: bool, free: bool) -> None:
     """Run one speed-loop period: compute the current references of both motors from a command.
 
-    The arguments from `rate` on are those of axis_control.control.
+    The arguments are those of axis_control.control.
     """
     m1, m2, k1, k2 = axis.motor_1, axis.motor_2, constants.motor_1, constants.motor_2
     read_motor_sensors(m1, k1)
@@ -318,10 +311,7 @@ def current_control(motor: MotorState, constants: MotorConstants) -> None:
 
 @compiled
 def change_inertia(axis: State, constants: Constants, J: KilogramMeters2) -> None:
-    """Set the inertia J of a varying load, base and dish.
-
-    The share of the base in the inertia and the spring of the dish stay constant.
-    """
+    """Set the inertia J of a varying load. The share of the base in it and the spring of the dish stay constant."""
     J_base = constants.base_share * J
     axis.h_J, axis.q_B = constants.h / J_base, 1.0 / (1.0 + constants.h * constants.B / J_base)
     if constants.flexible:
@@ -377,7 +367,7 @@ def plant_step(axis: State, constants: Constants, external: NewtonMeters) -> Non
 
 @compiled
 def read(axis: State, constants: Constants, outputs: Outputs) -> None:
-    """Write the present outputs of the axis: values of its sensors and controllers, and the true load."""
+    """Write the present outputs of the axis."""
     m1, m2, k1, k2 = axis.motor_1, axis.motor_2, constants.motor_1, constants.motor_2
     axis_control.read(axis, constants, _load_counts(axis, constants), _measured_speed(m1, k1), _measured_speed(m2, k2),
                       outputs)

@@ -1,8 +1,7 @@
-"""ROS node of an electronically steered array.
+"""ROS node of an electronically steered array: it runs a unit for each beam, whose law is
+`array.electronic_beam.step`.
 
-The node sets the time of the graph, publishes the beams that are active, and points each beam to its references. For
-each beam the node runs the unit `array.beam_unit.Beam`, whose law is `array.electronic_beam.step`; change the beam
-there. `entry` is imported first, so that a signal during the other imports ends the process without a message.
+`entry` is imported first, so that a signal during the other imports ends the process without a message.
 """
 import pedestal_common.entry  # noqa: F401
 

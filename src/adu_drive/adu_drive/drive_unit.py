@@ -1,7 +1,6 @@
 """Antenna drive unit: two axes over one control period T, from commands at t_k to encoders at t_k+1.
 
-The sub-steps run in one compiled call: speed loop 0.5 ms, current loops 100 us, plant 50 us. The unit of the node
-`adu` (adu_drive.unit) calls `step`.
+The sub-steps run in one compiled call: speed loop 0.5 ms, current loops 100 us, plant 50 us.
 """
 import math
 
@@ -89,8 +88,6 @@ def inertial_torques(azimuth: Radians, J_azimuth: KilogramMeters2, J_elevation: 
                      y: RadiansPerSecond2, z: RadiansPerSecond2) -> tuple[NewtonMeters, NewtonMeters]:
     """Return the torques on azimuth and elevation for a deck acceleration (x, y, z) about its FLU axes.
 
-    azimuth: angle A of the axis; J_azimuth, J_elevation: inertia of the loads.
-
     Relative to the deck, the inertia of a load makes the torque -J (n . acceleration). n is the unit vector about
     which the angle of the axis grows by the right-hand rule. Azimuth grows clockwise: n = (0, 0, -1). Elevation lifts
     the beam (cos A, -sin A, 0) towards +z: n = (-sin A, -cos A, 0).
@@ -101,9 +98,8 @@ def inertial_torques(azimuth: Radians, J_azimuth: KilogramMeters2, J_elevation: 
 @compiled
 def _apply_rigid_body_torques(state: State, constants: Constants, w: Vector3,
                               w_dot: tuple[RadiansPerSecond2, RadiansPerSecond2, RadiansPerSecond2]) -> None:
-    """Set the inertia of azimuth and the torques of the turning bodies on both axes, constant over the period.
+    """Set the inertia of azimuth and the torques of the turning bodies on both axes. w: rate of the deck, FLU.
 
-    w, w_dot: rate [rad/s] and angular acceleration of the deck, FLU. Other symbols: see gimbal.py.
     The coupling of an axis uses the acceleration of the other axis in the previous period. The loop of both couplings
     is stable, because M_AE^2 < M_AA M_EE.
     """
@@ -120,7 +116,7 @@ def _apply_rigid_body_torques(state: State, constants: Constants, w: Vector3,
 @compiled
 def external_torques(state: State, constants: Constants,
                      inputs: Inputs) -> tuple[NewtonMeters, NewtonMeters, bool]:
-    """Return the external torques on both loads, constant over the period, and True for valid inputs."""
+    """Return the torques on both loads over the period, and True for valid inputs."""
     x, y, z = inputs.base_acceleration[0], inputs.base_acceleration[1], inputs.base_acceleration[2]
     azimuth, elevation = state.azimuth.theta, state.elevation.theta
     T_azimuth, T_elevation = wind.torques(constants.wind, state.k * constants.period)
@@ -142,7 +138,6 @@ def external_torques(state: State, constants: Constants,
 
 @compiled
 def _beam_from_axes(constants: Constants, azimuth: axis.Outputs, elevation: axis.Outputs) -> None:
-    """Replace the angles and rates of the axes by those of the beam, in the outputs of both."""
     angles, rates = mount.beam(constants.mount, azimuth.load_position, elevation.load_position, azimuth.load_velocity,
                                elevation.load_velocity)
     azimuth.load_position, elevation.load_position = angles
@@ -151,7 +146,7 @@ def _beam_from_axes(constants: Constants, azimuth: axis.Outputs, elevation: axis
 
 @compiled
 def read(state: State, constants: Constants, outputs: Outputs) -> None:
-    """Write the present outputs without integration, for t_0 before the first step."""
+    """Write the present outputs, without a step."""
     axis.read(state.azimuth, constants.azimuth, outputs.azimuth)
     axis.read(state.elevation, constants.elevation, outputs.elevation)
     if not constants.mount.true:
@@ -161,7 +156,6 @@ def read(state: State, constants: Constants, outputs: Outputs) -> None:
 
 @compiled
 def _begin_period(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) -> None:
-    """Begin a period: external torques, command, brakes and windings."""
     state.azimuth.external, state.elevation.external, valid = external_torques(state, constants, inputs)
     outputs.invalid_command = 0 if drive_state.receive_command(state, inputs, valid) else 1
     state.braked = drive_state.advance(state, constants, inputs.pins, True)
@@ -179,10 +173,7 @@ def _speed_control(state: State, of_axis: axis.State, constants: axis.Constants)
 
 @compiled
 def between_speed_periods(state: axis.State, constants: axis.Constants, substeps: int) -> None:
-    """Run current loops and plant of one axis, or of lanes of axes, from one speed-loop period to the next.
-
-    substeps: plant sub-steps per current-loop period.
-    """
+    """Run current loops and plant of one axis, or of lanes of axes, for one speed-loop period."""
     axes = range(count(state))
     for _ in range(axis.CURRENT_LOOP_STEP_COUNT):
         for i in axes:
@@ -195,7 +186,7 @@ def between_speed_periods(state: axis.State, constants: axis.Constants, substeps
 
 @separate
 def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) -> None:
-    """Advance one control period from t_k to t_k+1; state and outputs are written.
+    """Advance one control period from t_k to t_k+1.
 
     Each record may also be the lanes.Lanes of many drives. All lanes have the period and the number of sub-steps of
     the first lane.

@@ -40,11 +40,8 @@ def _clear_faults(axis_state: axis.State) -> None:
 
 @compiled
 def _apply_fault(drive: FaultyDrive, fault: int, values: Floats) -> None:
-    """Apply a fault to the drive.
-
-    values: the arguments of the fault in the order of its row of table.INJECTED_FAULTS. The first argument is the
-    axis, except for faults of the whole drive, such as `delay`.
-    """
+    """Apply a fault. values: its arguments in the order of its row of table.INJECTED_FAULTS, the axis first, except
+    for a fault of the whole drive."""
     i = int(values[0])
     state, constants = drive.state, drive.constants
     s, c = (state.azimuth, constants.azimuth) if i == 0 else (state.elevation, constants.elevation)
@@ -87,7 +84,7 @@ def apply_due_faults(drive: FaultyDrive, stamp: Nanoseconds) -> None:
 
 @compiled
 def corrupt_messages(faults: DriveInjected, stamp: Nanoseconds, outputs: AnyRecord) -> None:
-    """Apply the active message faults to the messages of a step at a stamp.
+    """Apply the active message faults to the messages of a step.
 
     A frozen drive repeats 18 stored numbers. The last argument of message_faults.numbers is the index of the first
     one.

@@ -1,7 +1,4 @@
-"""Unit of the drive: its step between the messages of the graph, without ROS. `adu_node` runs it.
-
-Inputs are rate commands and the motion of the ship. Outputs are encoders, motor states, and the state with its faults.
-"""
+"""Unit of the drive: its step between the messages of the graph, without ROS."""
 import dataclasses
 import functools
 import math
@@ -58,10 +55,9 @@ def deck_acceleration(drive_inputs: drive_unit.Inputs, link: rate_drive.Link, sh
 @compiled
 def decode(drive_inputs: drive_unit.Inputs, link: rate_drive.Link, dropped: Bit, command: AnyRecord,
            ship: AnyRecord) -> None:
-    """Write the messages of the last step into the inputs of the drive.
+    """Write the messages of the last step into the inputs of the drive; one without a message has the stamp NO_STAMP.
 
-    dropped: 1 if an injected fault removes the command; command, ship: records of acu/rate_command and ship/truth,
-    with stamp NO_STAMP if the step had no such message.
+    dropped: 1 if an injected fault removes the command.
     """
     if dropped == 0:
         rate_drive.take_command(drive_inputs, link, command)
@@ -73,7 +69,7 @@ def decode(drive_inputs: drive_unit.Inputs, link: rate_drive.Link, dropped: Bit,
 
 @compiled
 def record_invalid_topic(drive_inputs: drive_unit.Inputs, link: rate_drive.Link) -> None:
-    """Store the topic of an invalid input: ship/truth if the deck acceleration is invalid, else the command."""
+    """Store the topic of an invalid input."""
     deck = drive_inputs.base_acceleration
     valid = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_state.MAX_PLAUSIBLE_INPUT
     link.invalid = rate_drive.INVALID_COMMAND if valid else rate_drive.INVALID_TRUTH
@@ -81,7 +77,7 @@ def record_invalid_topic(drive_inputs: drive_unit.Inputs, link: rate_drive.Link)
 
 @compiled
 def encode_truth(drive_outputs: drive_unit.Outputs, stamp: Nanoseconds, truth: AnyRecord) -> None:
-    """Write the true angles and rates of the beam into the record of adu/truth, with a stamp."""
+    """Write the true angles and rates of the beam into the record of adu/truth."""
     truth.stamp = stamp
     for i in range(2):
         axis = drive_outputs.azimuth if i == 0 else drive_outputs.elevation
@@ -90,7 +86,7 @@ def encode_truth(drive_outputs: drive_unit.Outputs, stamp: Nanoseconds, truth: A
 
 @compiled
 def receive(drive: DriveRecord, stamp: Nanoseconds, inputs: AnyRecord) -> bool:
-    """Take the messages of step k - 1. Return False in the first step, which has none. stamp: t_k."""
+    """Take the messages of step k - 1. Return False in the first step, which has none."""
     if drive.link.stamp == NO_STAMP:
         drive.state.k = stamp // drive.link.period
         return False
@@ -161,10 +157,7 @@ DRIVE_LANES = lanes.view(DriveRecord.dtype, LANE_FLAGS)
 
 @compiled
 def law_of_lanes(drives: DriveRecord, stamp: Nanoseconds, inputs: Records, outputs: Records) -> None:
-    """Apply `law` to the first len(inputs) drives of DRIVE_LANES.
-
-    Each drive fits lanes (Adu.fits_lanes), and all drives are at the same step.
-    """
+    """Apply `law` to the first len(inputs) drives of DRIVE_LANES, which fit lanes and are all at the same step."""
     moved = False
     for i in range(len(inputs)):
         drive = lanes.at(drives, i)
@@ -178,7 +171,7 @@ def law_of_lanes(drives: DriveRecord, stamp: Nanoseconds, inputs: Records, outpu
 
 @functools.lru_cache(1)
 def _initial(parameters: AduNodeParameters) -> Records:
-    """Return the DriveRecord (1,) of a drive before its first step, cached for trials with the same drive."""
+    """Return the DriveRecord (1,) before the first step, cached for trials with the same drive."""
     record = DriveRecord.of(state=drive_unit.initial_state(parameters), constants=drive_unit.constants(parameters),
                             link=rate_drive.initial_link(parameters), schedule=schedule.empty())
     drive_unit.read(*(record[0][name] for name in ('state', 'constants', 'outputs')))
@@ -186,7 +179,7 @@ def _initial(parameters: AduNodeParameters) -> Records:
 
 
 class Adu(rate_drive.RateDrive, Simulated):
-    """Unit of the drive, from AduNodeParameters."""
+    """Unit of the drive."""
     NODE, LAWS = nodes.row(nodes.DRIVE_NODE), {Memory: (law, laws)}
     VERBS = table.INJECT_COMMANDS[NODE.name]
     parameters: AduNodeParameters
@@ -198,7 +191,7 @@ class Adu(rate_drive.RateDrive, Simulated):
 
     @property
     def fits_lanes(self) -> bool:
-        """True if the drive can run on lanes: it has the flags of LANE_FLAGS and no injected fault."""
+        """True if the drive has the flags of LANE_FLAGS and no injected fault."""
         axes = [self.parts[part][axis] for part in ('state', 'constants') for axis in topics.AXES]
         flags = [flags[name] == value for name, value in LANE_FLAGS.items()
                  for flags in (*axes, *(c['encoder'] for c in axes[2:])) if name in flags.dtype.names]

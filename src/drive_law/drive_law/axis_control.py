@@ -1,7 +1,6 @@
 """Control of one axis with two motors on one load: speed loop, bias torque, observer, and the faults it detects.
 
-Real and simulated drives run this module once per period of the speed loop. A simulated drive writes the values of its
-sensors into the state, a real drive those of its reports.
+A simulated drive writes the values of its sensors into the state, a real drive those of its reports.
 """
 import math
 from typing import Annotated
@@ -38,7 +37,7 @@ class MotorConstants(Record):
 
 
 class Constants(Record):
-    """An axis. The docstrings of the laws define their constants. The names follow these rules:
+    """An axis. The names follow these rules:
 
     per_X            1 / X; per_2N = 1 / (2 N)
     K_iT             integral gain times the period of its loop
@@ -48,7 +47,7 @@ class Constants(Record):
     """
     motor_1: MotorConstants
     motor_2: MotorConstants
-    N: float
+    N: float                # ratio motor : load
     per_N: float
     per_2N: float
     per_rad: float          # of the load encoder
@@ -56,12 +55,12 @@ class Constants(Record):
     zero_hat: Radians       # zero of the load encoder minus zero of the motor encoders
     K_p: float              # of the speed loop
     K_iT: float
-    K_d: float
+    K_d: float              # damping between the motors [Nms/rad]
     independent: Bit        # 1: a speed loop for each motor
-    l_1: float
+    l_1: float              # see loops.observer_gains
     l_2: float
     h_J_shaft: float        # h: period of the speed loop
-    T_b: NewtonMeters
+    T_b: NewtonMeters       # bias torque that keeps the two pinions on opposite flanks
     out: NewtonMeters       # see loops.bias_constants
     per_fade: float
     bias_gain: float
@@ -98,7 +97,7 @@ class State(Record):
     commanded_torque: NewtonMeters
     bias: NewtonMeters
     rate: RadiansPerSecond      # reference of the speed loop: the commanded rate within ramp and travel
-    omega_hat: RadiansPerSecond
+    omega_hat: RadiansPerSecond         # estimates of the observer: mean motor speed, disturbance per motor
     d_hat: NewtonMeters
     torque_limited: Bit         # 1 if it was so in this control period; voltage_limited and end_stop too
     voltage_limited: Bit
@@ -129,8 +128,7 @@ class Outputs(Record):
 
 
 def motor_constants(m: MotorParameters, heat: ThermalParameters, motor_bits: int, period: Seconds) -> dict[str, float]:
-    """Return the values of MotorConstants. motor_bits: resolution of the motor encoder per turn; period: of the speed
-    loop."""
+    """Return the values of MotorConstants. period: of the speed loop."""
     per_rad = counts_per_rad(motor_bits)
     return {'per_rated': 1.0 / heat.rated_torque, 'heat_gain': 1.0 - math.exp(-period / heat.time_constant),
             'K_t_hat': m.torque_constant, 'per_K_t_hat': 1.0 / m.torque_constant,
@@ -161,25 +159,24 @@ def constants(p: AxisParameters, period: Seconds) -> dict[str, float | Records]:
 
 
 def counts_per_rad(bits: int) -> float:
-    """Return the counts per rad of an encoder with a resolution per turn."""
+    """Return the counts per rad of an encoder. bits: its resolution per turn."""
     return 2.0 ** bits / (2.0 * math.pi)
 
 
 @inlined
 def counts(angle: Radians, per_rad: float) -> float:
-    """Return the nearest whole count of an angle of an encoder."""
+    """Return the nearest whole count."""
     return math.floor(angle * per_rad + 0.5)
 
 
 @compiled
 def begin_period(axis: State) -> None:
-    """Begin a control period: clear the flags of the period."""
+    """Clear the flags of the last control period."""
     axis.torque_limited = axis.voltage_limited = axis.end_stop = axis.stopping = axis.present = 0
 
 
 @inlined
 def _measured_torque(motor: MotorState, constants: MotorConstants) -> NewtonMeters:
-    """Return the torque from the current sensor and the torque constant in the controller."""
     return constants.K_t_hat * (constants.gain * motor.i_q + constants.offset)
 
 
@@ -203,8 +200,7 @@ def mean_motor_speed(axis: State, omega_1: RadiansPerSecond, omega_2: RadiansPer
 def _torque_control(axis: State, constants: Constants, omega: RadiansPerSecond, feed_forward: NewtonMeters) -> bool:
     """Set the torque references of both motors for the rate axis.rate. Return True if a motor is at its limit.
 
-    omega: mean motor speed; feed_forward: torque added to the demand of each motor. A single working motor makes the
-    torque of both, up to its limit.
+    omega: mean motor speed. A single working motor makes the torque of both, up to its limit.
     """
     c, m1, m2, k1, k2 = constants, axis.motor_1, axis.motor_2, constants.motor_1, constants.motor_2
     alone = axis.faults & faults.MOTORS_LOST_BITS
@@ -235,17 +231,13 @@ def _torque_control(axis: State, constants: Constants, omega: RadiansPerSecond, 
 
 @inlined
 def _squared_current(motor: MotorState, constants: MotorConstants) -> float:
-    """Return the square of the measured current [A2]."""
     i_d, i_q = constants.gain * motor.i_d, constants.gain * motor.i_q + constants.offset
     return i_d * i_d + i_q * i_q
 
 
 @inlined
 def _supervise(axis: State, constants: Constants, reading: float, omega: RadiansPerSecond, free: bool) -> None:
-    """Set the faults that the drive measures.
-
-    omega: mean motor speed; free: True if the motors may turn. Only a free motor can have a following error.
-    """
+    """Set the faults that the drive measures. Only a motor that is free to turn can have a following error."""
     c, m1, m2, k1, k2 = constants, axis.motor_1, axis.motor_2, constants.motor_1, constants.motor_2
     axis.late = faults.late(axis.late, c.N * axis.rate - omega, c.faults.error) if free else 0
     axis.present |= faults.measured_faults(
@@ -260,11 +252,8 @@ def _supervise(axis: State, constants: Constants, reading: float, omega: Radians
 
 @inlined
 def _remove_torque(axis: State, omega: RadiansPerSecond, free: bool) -> None:
-    """Remove the torque of both motors.
-
-    free: True while no brake holds the motors; the integrals are then cleared. Behind closed brakes the integrals
-    stay, because the motors need them when the brakes open. omega: mean motor speed.
-    """
+    """Remove the torque of both motors. The integrals of free motors are cleared. Behind closed brakes they stay,
+    because the motors need them when the brakes open."""
     m1, m2 = axis.motor_1, axis.motor_2
     m1.torque_ref = m2.torque_ref = 0.0
     m1.inhibited = m2.inhibited = axis.stopping = axis.ramping = 1
@@ -277,8 +266,6 @@ def _remove_torque(axis: State, omega: RadiansPerSecond, free: bool) -> None:
 def control(axis: State, constants: Constants, reading: float, made: NewtonMeters, rate: RadiansPerSecond,
             torque: NewtonMeters, enable: Bit, powered: bool, free: bool) -> None:
     """Run one speed-loop period: compute the torque references of both motors from a command.
-
-    The state contains the speeds, counts, currents and thermal loads of the motors.
 
     reading        counts of the load encoder
     made           mean torque that the motors have made since the last period
@@ -326,7 +313,7 @@ def control(axis: State, constants: Constants, reading: float, made: NewtonMeter
 @compiled
 def read(axis: State, constants: Constants, reading: float, omega_1: RadiansPerSecond, omega_2: RadiansPerSecond,
          outputs: Outputs) -> None:
-    """Write the outputs of the axis. reading: counts of the load encoder; omega_1, omega_2: measured motor speeds."""
+    """Write the outputs of the axis. omega_1, omega_2: measured motor speeds."""
     c, m1, m2, k1, k2 = constants, axis.motor_1, axis.motor_2, constants.motor_1, constants.motor_2
     axis.reading = reading
     outputs.position = c.rad * reading

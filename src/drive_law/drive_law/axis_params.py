@@ -18,8 +18,7 @@ DEFAULT_BUFFER_MARGIN_RAD = math.radians(2.0)  # default distance from the emerg
 def mesh_inertia(motor: KilogramMeters2, ratio: float, load: KilogramMeters2) -> KilogramMeters2:
     """Return the inertia that swings on the stiffness of one mesh, referred to the load axis.
 
-    motor: inertia of the motor on its shaft; ratio: turns of the motor per turn of the axis; load: inertia of the load
-    on the gears. The mesh lies between one motor and half of the load, because the axis has two motors.
+    The mesh lies between one motor (on its shaft) and half of the load, because the axis has two motors.
     """
     return 1.0 / (1.0 / (motor * ratio**2) + 2.0 / load)
 
@@ -58,7 +57,7 @@ class MotorParameters(Parameters):
         return 1.5 * self.pole_pairs * self.flux_linkage
 
     def reachable_rate(self, ratio: float) -> RadiansPerSecond:
-        """Return the rate of the axis that the motor reaches at its voltage; ratio: turns per turn of the axis."""
+        """Return the rate of the axis that the motor reaches at its voltage."""
         return 0.98 * self.voltage / (self.pole_pairs * self.flux_linkage * ratio)
 
 
@@ -248,8 +247,8 @@ class AxisParameters(Parameters):
     faults: FaultParameters = group(FaultParameters)
 
     def check(self) -> None:
-        """Raise ParameterError for a rate that the motors cannot reach at their voltage, or for a mesh that the
-        simulation cannot follow."""
+        """Raise ParameterError for a rate that the motors cannot reach, or a mesh that the simulation cannot follow.
+        """
         for motor in (self.motor_1, self.motor_2):
             top = motor.reachable_rate(self.gear_train.ratio)
             if self.limits.rate > top:
@@ -258,10 +257,8 @@ class AxisParameters(Parameters):
             self._check_mesh(motor)
 
     def _check_mesh(self, motor: MotorParameters) -> None:
-        """Raise ParameterError if a mesh is unstable in the semi-implicit Euler steps of the plant.
-
-        A mesh is unstable for 2 h c + h^2 k > 4 M with h = PLANT_PERIOD_S, damping c, stiffness k, M of mesh_inertia.
-        """
+        """A mesh is unstable in the semi-implicit Euler steps of the plant for 2 h c + h^2 k > 4 M with h =
+        PLANT_PERIOD_S, damping c, stiffness k, M of mesh_inertia."""
         g, h = self.gear_train, PLANT_PERIOD_S
         inertia = 4.0 * mesh_inertia(motor.inertia, g.ratio, (1.0 - self.structure.inertia_share) * self.load.inertia)
         for name, part, other, unit in (('damping', 2.0 * h, 0.0, 'Nms/rad'),

@@ -1,7 +1,5 @@
 """Drive of two axes: its records, its commands, and one state machine for enable, brakes and faults of both axes.
 
-The state machine advances once per control period:
-
     enabled -> stopping -> engaging brakes -> disabled -> releasing brakes -> enabled
 
 A request enables the drive if no fault and no emergency stop is latched and the stow pins are out. To become disabled,
@@ -221,7 +219,7 @@ def _next(state: State, constants: Constants, ready: bool) -> int:
 
 @compiled
 def _advance_pins(state: State, constants: Constants, wanted: int) -> None:
-    """Advance the stow pins by a period. They move while the drive is disabled. wanted: code of acu/stow_pins."""
+    """Advance the stow pins by a period. They move while the drive is disabled."""
     az, el, c = state.azimuth, state.elevation, constants
     stow_pins.command_pins(state.pins, c.pins, wanted,
                            math.nan if is_moving(az, c.azimuth) else c.azimuth.rad * az.reading,
@@ -252,8 +250,8 @@ def advance(state: State, constants: Constants, pins: int, ready: bool) -> bool:
 def request(state: State, constants: Constants, what: int) -> int:
     """Execute a request between two periods. Return REPLY_ACCEPTED or the code of a refusal.
 
-    what: a code of REQUEST_CODES. The request takes effect in the next period. Faults and emergency stop can be reset
-    while both axes stand and no cause is present. A reset enables the drive again if it was enabled before.
+    The request takes effect in the next period. Faults and emergency stop can be reset while both axes stand and no
+    cause is present. A reset enables the drive again if it was enabled before.
     """
     if what == REQUEST_DISABLE:
         state.wanted = 0
@@ -277,13 +275,13 @@ def request(state: State, constants: Constants, what: int) -> int:
 
 @compiled
 def plausible(x: float) -> bool:
-    """Return True if an input x is valid, as MAX_PLAUSIBLE_INPUT states; NaN is invalid."""
+    """Return True if an input is valid, as MAX_PLAUSIBLE_INPUT states; NaN is invalid."""
     return abs(x) <= MAX_PLAUSIBLE_INPUT
 
 
 @compiled
 def receive_command(state: State, inputs: Inputs, disturbance_valid: bool) -> bool:
-    """Put the command of step k into the ring. Return True if the command and the disturbance are valid."""
+    """Put the command of step k into the ring. Return True if command and disturbance are valid."""
     slot = state.k % COMMAND_RING_SIZE
     valid = (disturbance_valid and plausible(inputs.azimuth.rate) and plausible(inputs.azimuth.torque)
              and plausible(inputs.elevation.rate) and plausible(inputs.elevation.torque))
@@ -296,7 +294,7 @@ def receive_command(state: State, inputs: Inputs, disturbance_valid: bool) -> bo
 
 @compiled
 def apply_command(state: State, constants: Constants, inputs: Inputs, j: int) -> None:
-    """Take the command of speed-loop period j out of the ring. state.following is then 1 if it enables the drive."""
+    """Take the command of speed-loop period j out of the ring, and set state.following."""
     # While an injected delay begins, `max` repeats the last command. Before the first command, a slot has rate 0.
     state.tick = max(state.tick, state.k * constants.speed_ticks + j - constants.delay_ticks - state.late_ticks)
     slot = (state.tick // constants.speed_ticks) % COMMAND_RING_SIZE

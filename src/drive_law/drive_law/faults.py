@@ -52,7 +52,7 @@ _STOP_BITS = sum(1 << i for i, fault in enumerate(AXIS_FAULTS) if fault.stops)
 
 
 class Limits(Record):
-    """Trip levels and places of the switches of an axis, from params.FaultParameters and params.LimitParameters."""
+    """Trip levels and places of the switches of an axis."""
     current_2: float                # square of the overcurrent [A2]
     omega: RadiansPerSecond         # overspeed of a motor
     disagreement: Radians
@@ -75,9 +75,9 @@ MIN_OUTWARD_RATE_RAD_S = 1e-3  # smallest rate of an axis that counts as outward
 
 @inlined
 def thermal_load(x: float, torque: NewtonMeters, per_rated: float, gain: float) -> float:
-    """Return the thermal load one period h later, from the thermal load x, under a torque, as in the I2t protection:
+    """Return the thermal load one period h later, as in the I2t protection; torque and current are proportional:
 
-        tau dx/dt = (T / T_rated)^2 - x        x = 1: steady state at rated torque; torque and current are proportional
+        tau dx/dt = (T / T_rated)^2 - x        x = 1: steady state at rated torque
 
     per_rated = 1 / T_rated; gain = 1 - exp(-h / tau).
     """
@@ -99,7 +99,7 @@ def removes_torque(bits: int) -> bool:
 
 @inlined
 def late(periods: int, error: RadiansPerSecond, limit: RadiansPerSecond) -> int:
-    """Return the number of successive periods with a rate error beyond its limit; periods: number before."""
+    """Return the number of successive periods with a rate error beyond its limit."""
     return periods + 1 if abs(error) > limit else 0
 
 
@@ -111,7 +111,7 @@ def lost_motor_faults(motors: Ints) -> int:
 
 @inlined
 def end_switch_faults(theta: Radians, omega: RadiansPerSecond, limits: Limits) -> int:
-    """Return the fault word of the switches beyond the ends of travel for a load at theta with the rate omega."""
+    """Return the fault word of the switches beyond the ends of travel."""
     bits = 0
     if (theta > limits.final_high and omega > MIN_OUTWARD_RATE_RAD_S
             or theta < limits.final_low and omega < -MIN_OUTWARD_RATE_RAD_S):

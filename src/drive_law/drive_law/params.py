@@ -26,7 +26,7 @@ MAX_TRANSPORT_DELAY_S = 0.1  # longest transport delay [s]
 
 
 def whole_speed_periods(name: str, value: Seconds) -> int:
-    """Return the number of speed-loop periods in `value`. Raises ParameterError unless it is a whole number."""
+    """Return the number of speed-loop periods in a time. Raises ParameterError unless it is whole."""
     periods = round(value / SPEED_LOOP_PERIOD_S)
     if abs(value / SPEED_LOOP_PERIOD_S - periods) > 1e-6:
         raise ParameterError(f'{name} = {value:g} s: must be a multiple of {SPEED_LOOP_PERIOD_S:g} s (the speed loop)')
@@ -59,10 +59,8 @@ class StowPinParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class GustParameters(Parameters):
-    """Gusts: step and sine add a torque to the mean torque; davenport and von_karman are spectra of the wind speed.
-
-    A spectrum multiplies the mean torque by (1 + v / V)^2. v: turbulence; V: speed of the mean wind [m/s].
-    """
+    """Gusts: step and sine add a torque to the mean torque; davenport and von_karman are spectra of the wind speed,
+    see wind.py."""
     kind: str = choice('none', ('none', 'step', 'sine', 'davenport', 'von_karman'), 'gust in addition to '
                        'the mean torque')
     azimuth: float = parameter(0.0, -1e9, 1e9, 'Nm', 'step, sine: amplitude on azimuth')
@@ -77,10 +75,7 @@ class GustParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class WindFieldParameters(Parameters):
-    """A wind over the whole antenna, whose torques depend on the angles of both axes; see wind.py.
-
-    They add to the torques of WindParameters.
-    """
+    """A wind over the whole antenna; see wind.py. Its torques add to those of WindParameters."""
     speed: float = parameter(0.0, 0.0, 60.0, 'm/s', 'speed V of the mean wind; 0: off')
     from_azimuth: float = parameter(0.0, -2.0 * math.pi, 2.0 * math.pi, 'rad', 'deck azimuth of the wind source')
     intensity: float = parameter(0.2, 0.0, 0.5, '', 'turbulence intensity sigma_u / V along the wind')
@@ -171,7 +166,6 @@ class AduParameters(Parameters):
                 self._check_pin(name, angle, limits)
 
     def _check_pin(self, name: str, angle: Radians, limits: LimitParameters) -> None:
-        """Raise ParameterError for a hole outside the travel, or for pins that are in away from their holes."""
         hole = getattr(self.pins, name)
         if not limits.lower <= hole <= limits.upper:
             raise ParameterError(f'pins.{name} = {hole:g} rad: must be {limits.lower:g} to {limits.upper:g}, the '
@@ -181,7 +175,6 @@ class AduParameters(Parameters):
                                  'because of pins.initially_in')
 
     def _check_bodies(self) -> None:
-        """Raise ParameterError for an inertia that no body can have."""
         e = self.elevating
         I_x, I_y, I_z = e.about_beam, self.elevation.load.inertia, e.about_lift
         if not 0.0 < I_z < self.azimuth.load.inertia:

@@ -1,7 +1,4 @@
-"""Base of the units of drives that follow rates: link to the control unit, requests, state and diagnosis.
-
-angle_drive is the base of the units of drives that follow angles.
-"""
+"""Base of the units of drives that follow rates: link to the control unit, requests, state and diagnosis."""
 from collections.abc import Mapping
 
 from drive_law import drive_state, faults, state_file, stow_pins
@@ -51,9 +48,10 @@ def supervise(drive_inputs: drive_state.Inputs, link: Link) -> None:
 
 @compiled
 def take_command(drive_inputs: drive_state.Inputs, link: Link, command: AnyRecord) -> None:
-    """Write a command into the inputs of the drive, and stop the axes if the newest command is stale.
+    """Write a record of acu/rate_command into the inputs of the drive, and stop the axes if the newest command is
+    stale.
 
-    command: record of acu/rate_command, with stamp NO_STAMP if the step had no command.
+    The record has the stamp NO_STAMP if the step had no command.
     """
     if command.stamp != NO_STAMP:
         link.command_stamp = command.stamp
@@ -64,7 +62,7 @@ def take_command(drive_inputs: drive_state.Inputs, link: Link, command: AnyRecor
 
 @compiled
 def encode_measured(drive_outputs: drive_state.Outputs, stamp: Nanoseconds, outputs: AnyRecord) -> None:
-    """Write the measured outputs of the drive into the records of its messages, with a stamp."""
+    """Write the measured outputs of the drive into the records of its messages."""
     joints, motors = outputs[JOINT_STATES_TOPIC], outputs[MOTOR_STATES_TOPIC]
     joints.stamp = motors.stamp = outputs[CLOCK_TOPIC].stamp = stamp
     for i in range(2):
@@ -78,7 +76,7 @@ def encode_measured(drive_outputs: drive_state.Outputs, stamp: Nanoseconds, outp
 
 
 class RateDrive(Unit):
-    """Unit of a drive. Its record has the parts state, constants and outputs of drive_state, and a Link."""
+    """Unit of a drive. Its record has the parts of drive_state and a Link."""
     COMMAND, REQUESTS = RATE_COMMAND_TOPIC, tuple(drive_state.REQUEST_CODES)
     parameters: AduNodeParameters
 
@@ -141,7 +139,7 @@ class RateDrive(Unit):
         return [service for service, due in wanted.items() if due]
 
     def diagnose(self) -> Diagnosis:
-        """Return the Diagnosis with limits, faults and thermal load of both axes; an invalid input appears once."""
+        """Return the Diagnosis; an invalid input appears once."""
         outputs, link = self.parts['outputs'], self.parts['link']
         invalid, link['invalid'] = INVALID_INPUT_TOPICS[link['invalid']], 0
         axes = {axis: outputs[axis] for axis in topics.AXES}
@@ -174,7 +172,7 @@ class RateDrive(Unit):
 
     @property
     def urgent(self) -> tuple[object, ...]:
-        """Values whose change is published at once: emergency stop, stale or invalid inputs, faults."""
+        """Values whose change is published at once."""
         outputs, link = self.parts['outputs'], self.parts['link']
         return (outputs['emergency'], link['stale'], link['invalid'], outputs['azimuth']['faults'],
                 outputs['elevation']['faults'])

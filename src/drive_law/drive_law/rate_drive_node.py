@@ -1,7 +1,5 @@
-"""Base of the nodes of drives that follow rates, simulated and real: a Timekeeper with a state file.
-
-The state file keeps the state of the plant over a restart.
-"""
+"""Base of the nodes of drives that follow rates: a Timekeeper with a file that keeps the state of the plant over a
+restart."""
 from drive_law import state_file
 from drive_law.params import AduNodeParameters
 from drive_law.rate_drive import RateDrive

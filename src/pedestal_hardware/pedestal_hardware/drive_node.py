@@ -1,8 +1,7 @@
-"""ROS node of an antenna with four CiA 402 servo drives: owns the time, and takes the place of `adu_node`.
+"""ROS node of an antenna with four CiA 402 servo drives, in place of `adu_node`.
 
-The node runs the unit `pedestal_hardware.unit.ServoDrives`, whose law is in `servo_drives`. A thread of the node
-commissions drives that have not been used yet or that return to the bus. `entry` is imported first, so that a signal
-during the other imports ends the process without a message.
+A thread of the node commissions drives that have not been used yet or that return to the bus. `entry` is imported
+first, so that a signal during the other imports ends the process without a message.
 """
 import pedestal_common.entry  # noqa: F401
 
@@ -71,8 +70,7 @@ class DriveNode(RateDriveNode):
         return answer if drives.start_after else f'{answer}, then {super().awaits}'
 
     def make_due_step(self) -> None:
-        """Make the due step as soon as all drives have answered. Raises BusError if a drive does not answer in time.
-        """
+        """Make the due step as soon as all drives have answered. Raises BusError if one does not answer in time."""
         unit = self.unit
         if unit.bus is None:
             missing = [i for i in range(len(DRIVE_LABELS)) if not unit.parts['drives']['ready'][i]]
@@ -86,7 +84,6 @@ class DriveNode(RateDriveNode):
         super().make_due_step()
 
     def _use_bus(self) -> None:
-        """Begin to exchange data with the drives, which all answer."""
         drives = range(len(DRIVE_LABELS))
         assert self.bus is not None
         found = [self.bus.read(drive, 0x603F, 0, 'H') for drive in drives]
@@ -106,14 +103,14 @@ class DriveNode(RateDriveNode):
             self.diagnose_now()
 
     def diagnosed(self) -> Diagnosis:
-        """Return the Diagnosis of the drives, with time 0 if it follows their answer."""
+        """Return the Diagnosis, with time 0 if it follows the answer of the drives."""
         diagnosis = super().diagnosed()
         if self.start_time is None:
             return diagnosis
         return diagnosis._replace(values=[*diagnosis.values, (START_KEY, str(self.start_time))])
 
     def label(self, drive: int) -> str:
-        """Return the name of a drive for texts, with its node."""
+        """Return the name of a drive for texts, with its CANopen node."""
         return f'{DRIVE_LABELS[drive]} (node {self.parameters.drives.nodes[drive]})'
 
     def commission(self, drive: int) -> bool:
@@ -140,8 +137,7 @@ class DriveNode(RateDriveNode):
             self.changed.clear()
 
     def _service(self, name: str) -> Callable[[Message, Message], Message]:
-        """Return the callback of a service. A reset also commissions the faulty drives again, because some drives
-        accept the reset only then."""
+        """Let a reset also commission the faulty drives again, because some drives accept the reset only then."""
         serve = super()._service(name)
 
         def call(request: Message, response: Message) -> Message:

@@ -5,22 +5,17 @@ axes (drive_law), calls the functions of that package, and turns their torques i
 
     offset = T - K_p (N rate - omega)
 
-T is the torque of a motor that the speed loop demands. A drive with the proportional gain K_p adds
-K_p (N rate - omega_i) itself. In the mean of both motors, the sum is this torque; the difference of both
-speeds is damped by K_p / 2 in addition. Integral, bias, feed-forward and disturbance observer stay here.
+T is the torque of a motor that the speed loop demands. A drive with the proportional gain K_p adds K_p (N rate -
+omega_i) itself. In the mean of both motors, the sum is this torque; the difference of both speeds is damped by K_p / 2
+in addition. Integral, bias, feed-forward and disturbance observer stay here.
 
 This is the control `velocity`. With the control `drive`, motor 1 has its whole speed loop in its drive, and motor 2
-follows the measured torque of motor 1, smoothed:
+follows the measured torque of motor 1, smoothed: T_2 = T_1 - 2 T_b. Without the smoothing the axis would oscillate,
+because the torque of motor 2 comes one period late and motor 2 has no damping of its own. The gains in the constants
+are then 0; limits of rate and travel, bias schedule and faults stay here. With the control `torque` each drive makes
+the torque T.
 
-    T_2 = T_1 - 2 T_b
-
-Without the smoothing the axis would oscillate, because the torque of motor 2 comes one period late and motor 2 has no
-damping of its own.
-
-The gains in the constants are then 0; limits of rate and travel, bias schedule and faults stay here. With
-the control `torque` each drive makes the torque T.
-
-An axis has the number 0 (azimuth) or 1 (elevation), its drives and motors have those of the package.
+An axis has the number 0 (azimuth) or 1 (elevation).
 """
 import math
 from typing import Annotated, TypeAlias
@@ -136,14 +131,12 @@ class ServoRecord(Record):
 
 @compiled
 def _lost_bit(motor: int) -> int:
-    """Return the fault bit of a lost motor of an axis (0 or 1)."""
     return faults.Bit.MOTOR_1_LOST if motor == 0 else faults.Bit.MOTOR_2_LOST
 
 
 @compiled
 def _measure_motor(motor: axis_control.MotorState, constants: axis_control.MotorConstants, angle: Radians,
                    speed: RadiansPerSecond, torque: NewtonMeters) -> None:
-    """Write the measured motion and torque of a motor into its state."""
     motor.theta, motor.measured = angle, speed
     motor.count = int(axis_control.counts(angle, constants.per_rad))
     motor.i_q = torque * constants.per_K_t_hat
@@ -158,7 +151,6 @@ def _copy_motor(motor: axis_control.MotorState, other: axis_control.MotorState) 
 
 @compiled
 def _note_reports(drives: Drives) -> None:
-    """Note age and state of each drive, and the interlock."""
     drives.interlock = 0
     for drive in range(N_DRIVES):
         drives.age[drive] = 0 if drives.reported[drive] and drives.ready[drive] else drives.age[drive] + 1
@@ -212,7 +204,7 @@ def _measure_axis(of_axis: axis_control.State, constants: axis_control.Constants
 
 @compiled
 def read(records: Records) -> None:
-    """Write the present outputs. records: as of `control`."""
+    """Write the present outputs."""
     record = records[0]
     state, constants, outputs = record.state, record.constants, record.outputs
     for number in range(2):
@@ -227,7 +219,7 @@ def read(records: Records) -> None:
 
 @compiled
 def measure(records: Records, stamp: Nanoseconds, messages: AnyRecord) -> None:
-    """Take the reports of the drives and write the messages of the step with a stamp. records: as of `control`."""
+    """Take the reports of the drives and write the messages of the step."""
     record = records[0]
     state, constants, outputs = record.state, record.constants, record.outputs
     drives, scales = record.drives, record.scales
@@ -243,13 +235,11 @@ def measure(records: Records, stamp: Nanoseconds, messages: AnyRecord) -> None:
 
 @compiled
 def _moves_out(commanded: RadiansPerSecond, measured: RadiansPerSecond) -> bool:
-    """Return True if an axis on a limit switch moves outwards, by its commanded or measured outward rate."""
     return commanded > faults.MIN_OUTWARD_RATE_RAD_S or measured > MAX_RATE_OF_LASH_RAD_S
 
 
 @compiled
 def _note_faults(of_axis: axis_control.State, drives: Drives, scales: Scales, number: int, phase: int) -> None:
-    """Set the faults of an axis that its drives report."""
     for motor in range(2):
         drive = 2 * number + motor
         drives.reset_left[drive] = max(drives.reset_left[drive] - 1, 0)
@@ -296,7 +286,6 @@ def _is_up(of_axis: axis_control.State, drives: Drives, number: int, periods: in
 
 @compiled
 def _goal(state: drive_state.State, of_axis: axis_control.State, drives: Drives, scales: Scales, drive: int) -> int:
-    """Return the goal of a drive in the present phase, one of cia402.GOALS."""
     if of_axis.faults & _lost_bit(drive % 2) or faults.removes_torque(of_axis.faults):
         return cia402.GOAL_OFF
     if state.phase == drive_state.PHASE_DISABLED:
@@ -315,8 +304,6 @@ def _goal(state: drive_state.State, of_axis: axis_control.State, drives: Drives,
 @compiled
 def _demanded_torque(state: drive_state.State, of_axis: axis_control.State, constants: axis_control.Constants,
                      drives: Drives, scales: Scales, drive: int) -> NewtonMeters:
-    """Return the torque in the command of a drive: torque offset, or target torque in a drive in the mode of torque.
-    """
     number, motor = drive // 2, drive % 2
     demanded = of_axis.motor_1.torque_ref if motor == 0 else of_axis.motor_2.torque_ref
     if scales.control == CONTROL_TORQUE:
@@ -333,8 +320,6 @@ def _demanded_torque(state: drive_state.State, of_axis: axis_control.State, cons
 
 @compiled
 def _controlword(state: drive_state.State, drives: Drives, drive: int, goal: int) -> int:
-    """Return the controlword that leads a drive to its goal: it resets a fault, or holds the motor where no law
-    controls it."""
     if drives.reset_left[drive] and drives.state[drive] == cia402.State.FAULT:
         # The rising edge resets the fault.
         word = cia402.CONTROL_RESET if drives.controlword[drive] & cia402.CONTROL_RESET == 0 else 0
@@ -348,11 +333,8 @@ def _controlword(state: drive_state.State, drives: Drives, drive: int, goal: int
 @compiled
 def _command_drive(state: drive_state.State, of_axis: axis_control.State, constants: axis_control.Constants,
                    drives: Drives, scales: Scales, drive: int, alive: bool, kept: bool) -> None:
-    """Write the command of a drive: controlword, target velocity, torque.
-
-    alive: True if the axis is under control; kept: True if the torque keeps its last value. Otherwise the command is
-    0.
-    """
+    """Write the command of a drive. alive: True if the axis is under control; kept: True if the torque keeps its last
+    value. Otherwise the command is 0."""
     goal = _goal(state, of_axis, drives, scales, drive)
     drives.controlword[drive] = _controlword(state, drives, drive, goal)
     if goal != cia402.GOAL_ENABLED or not (alive or kept):
@@ -377,14 +359,12 @@ def _keep_rate(of_axis: axis_control.State, constants: axis_control.Constants, d
 
 @compiled
 def _whole(x: float, largest: float) -> int:
-    """Return the nearest whole number within +-largest."""
     return int(math.floor(min(max(x, -largest), largest) + 0.5))
 
 
 @compiled
 def _control_axis(state: drive_state.State, of_axis: axis_control.State, constants: axis_control.Constants,
                   drives: Drives, scales: Scales, number: int) -> None:
-    """Compute the commands of both drives of an axis with the speed loop of axis_control."""
     motor_1, motor_2 = of_axis.motor_1, of_axis.motor_2
     first, second = 2 * number, 2 * number + 1
     _note_faults(of_axis, drives, scales, number, state.phase)
@@ -426,8 +406,8 @@ def _control_axis(state: drive_state.State, of_axis: axis_control.State, constan
 def control(records: Records, stamp: Nanoseconds, messages: AnyRecord) -> None:
     """Compute the commands of the drives from their last reports and the messages of the step before.
 
-    records: ServoRecords (1,). A record itself as argument would cost 90 us, because numba would examine all its
-    fields in each call. stamp: time of the coming exchange.
+    A record itself as argument would cost 90 us, because numba would examine all its fields in each call. stamp: time
+    of the coming exchange.
     """
     record = records[0]
     state, constants, inputs, outputs = record.state, record.constants, record.inputs, record.outputs

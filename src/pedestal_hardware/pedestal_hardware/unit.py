@@ -1,5 +1,4 @@
-"""Unit of `drive_node`. A step computes the commands, exchanges them for the reports of the drives, and fills the
-messages of the graph."""
+"""Unit of `drive_node`. A step: commands, their exchange for the reports of the drives, messages of the graph."""
 import dataclasses
 import math
 import typing
@@ -44,8 +43,7 @@ def _scales(params: ServoDriveParameters) -> Records:
 
 
 def _constants(params: ServoDriveParameters) -> Records:
-    """Return the drive_state.Constants (1,) at the period of the node. Their sensors are exact, because the drives
-    themselves measure."""
+    """Return the drive_state.Constants (1,). Their sensors are exact, because the drives themselves measure."""
     axes = {}
     for name in topics.AXES:
         p = getattr(params, name)
@@ -61,7 +59,6 @@ def _constants(params: ServoDriveParameters) -> Records:
 
 
 def _initial_state(params: ServoDriveParameters) -> Records:
-    """Return the drive_state.State (1,) with the brakes on at the initial angles."""
     axes = {}
     for name in topics.AXES:
         p, theta = getattr(params, name), getattr(params, f'initial_{name}')
@@ -114,7 +111,6 @@ class ServoDrives(rate_drive.RateDrive):
             servo_drives.measure(self.memory.record, stamp, outputs[k])
 
     def _exchange(self) -> None:
-        """Exchange the commands for the reports of the drives."""
         d = self.parts['drives']
         d['reported'] = 0
         if self.bus is None:
@@ -126,7 +122,7 @@ class ServoDrives(rate_drive.RateDrive):
             value[...] = report
 
     def use_drive(self, drive: int, scale: Scale) -> None:
-        """Begin to use a drive whose settings are verified. scale: the units of the drive."""
+        """Begin to use a drive whose settings are verified."""
         d, k = self.parts['drives'], self.parts['scales']
         axis = getattr(self.parameters.drives, topics.AXES[drive // 2])
         sign = -1.0 if getattr(axis, f'reversed_{drive % 2 + 1}') else 1.0
@@ -181,7 +177,7 @@ class ServoDrives(rate_drive.RateDrive):
         self.parts['state']['wanted'] = state.enabled
 
     def plant_state(self) -> PlantState:
-        """Return the state_file.PlantState for `resume`; an unknown angle is 0."""
+        """Return the PlantState for `resume`; an unknown angle is 0."""
         state = super().plant_state()
         return state._replace(azimuth=float(np.nan_to_num(state.azimuth)),
                               elevation=float(np.nan_to_num(state.elevation)))
@@ -213,5 +209,5 @@ class ServoDrives(rate_drive.RateDrive):
 
     @property
     def last_prepared(self) -> tuple[Callable[..., object], tuple[object, ...]]:
-        """(law that reads the drives, its arguments): `prepare` calls it last."""
+        """Law that reads the drives, with its arguments: `prepare` calls it last."""
         return servo_drives.measure, (self.memory.record, np.int64(0), self.outputs[0])

@@ -1,7 +1,4 @@
-"""Unit of one electronic beam: command, active beam, enable and emergency stop.
-
-`beam_steering_node` runs one unit for each beam of an array. The law of the beam is in electronic_beam.
-"""
+"""Unit of one beam of an array. `beam_steering_node` runs one for each beam."""
 import math
 import typing
 from collections.abc import Iterable, Mapping
@@ -57,7 +54,7 @@ def condition(switches: Switches) -> int:
 
 @compiled
 def decode(beam_inputs: electronic_beam.Inputs, switches: Switches, command: AnyRecord) -> None:
-    """Write a command into the inputs of the beam, at the stamp of the last step. command: record of its message."""
+    """Write a command into the inputs of the beam, at the stamp of the last step."""
     beam_inputs.stamp_ns = switches.stamp
     beam_inputs.due = 1 if command.stamp != NO_STAMP and condition(switches) == STATE_CODE_ENABLED else 0
     if beam_inputs.due == 1:
@@ -67,7 +64,7 @@ def decode(beam_inputs: electronic_beam.Inputs, switches: Switches, command: Any
 
 @compiled
 def encode(beam_outputs: electronic_beam.Outputs, switches: Switches, stamp: Nanoseconds, outputs: AnyRecord) -> None:
-    """Write the outputs of the beam into the records of its messages, with a stamp.
+    """Write the outputs of the beam into the records of its messages.
 
     A beam has no rate and no torque, and its reported angles are the true ones.
     """

@@ -93,7 +93,6 @@ class DrivesNode(unit_node.UnitNode):
         return locked
 
     def _serve(self) -> None:
-        """Serve the bus and advance the plant until the node ends."""
         while not self.ending:
             self.drives.poll(POLL_S)
             with self.lock:
@@ -106,7 +105,6 @@ class DrivesNode(unit_node.UnitNode):
                     self.get_logger().warning(f'{DRIVE_LABELS[drive.number]}: {drive.notes.pop(0)}')
 
     def _on_sync(self) -> None:
-        """Advance the unit to now, and publish the truth of the step."""
         [port] = self.ports
         with self.lock:
             _, utc = self.clock()

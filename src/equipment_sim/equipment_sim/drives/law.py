@@ -83,7 +83,6 @@ class DrivesRecord(Record):
 
 @compiled
 def _switch_off(drive: Drive, state: int) -> None:
-    """Remove the torque at once, close the brake, and enter a state."""
     drive.power = drive.entering = 0
     drive.leaving, drive.rate, drive.sum, drive.state = STAY, 0.0, 0.0, state
     _move_brake(drive, 0)
@@ -91,7 +90,6 @@ def _switch_off(drive: Drive, state: int) -> None:
 
 @compiled
 def _move_brake(drive: Drive, open_: Bit) -> None:
-    """Command the brake of a drive."""
     if drive.brake_open != open_:
         drive.brake_open, drive.brake_ticks = open_, 0
 
@@ -142,7 +140,6 @@ def obey(drive: Drive, control: int) -> None:
 
 @compiled
 def _ramps(drive: Drive) -> bool:
-    """Return True if a drive ramps to standstill by itself."""
     return (drive.state != State.OPERATION_ENABLED or drive.leaving != STAY
             or drive.control & cia402.CONTROL_HALT != 0 or not (
                 drive.mode == servo_drives.MODE_CYCLIC_VELOCITY or drive.mode == servo_drives.MODE_CYCLIC_TORQUE))
@@ -150,7 +147,6 @@ def _ramps(drive: Drive) -> bool:
 
 @compiled
 def _torque(drive: Drive, omega: RadiansPerSecond) -> NewtonMeters:
-    """Return the torque of a drive for one period of its speed loop. omega: speed of the motor."""
     if not drive.power:
         return 0.0
     offset = 0.0
@@ -175,7 +171,6 @@ def _torque(drive: Drive, omega: RadiansPerSecond) -> NewtonMeters:
 
 @compiled
 def _advance_state(drive: Drive, omega: RadiansPerSecond, engage_ticks: int, release_ticks: int) -> None:
-    """Advance brake and automatic transitions of a drive by a period. omega: speed of the motor."""
     drive.brake_ticks += 1
     if drive.entering and drive.brake_ticks >= release_ticks:
         drive.entering, drive.state = 0, State.OPERATION_ENABLED
@@ -198,7 +193,6 @@ def _advance_state(drive: Drive, omega: RadiansPerSecond, engage_ticks: int, rel
 
 @compiled
 def _grips(first: Drive, second: Drive, engage_ticks: int, release_ticks: int) -> bool:
-    """Return True if the brakes of an axis grip, from its two drives."""
     for_first = first.brake_open and first.brake_ticks >= release_ticks or (
         not first.brake_open and first.brake_ticks < engage_ticks)
     for_second = second.brake_open and second.brake_ticks >= release_ticks or (
@@ -209,7 +203,6 @@ def _grips(first: Drive, second: Drive, engage_ticks: int, release_ticks: int) -
 @compiled
 def _drive_motor(drive: Drive, motor: axis.MotorState, constants: axis.MotorConstants, lost: Bit, engage_ticks: int,
                  release_ticks: int) -> None:
-    """Run one period of a drive with its motor. lost: 1 for the fault `motor_loss`."""
     axis.read_motor_sensors(motor, constants)
     if motor.limited:
         drive.limited = 1
@@ -223,7 +216,6 @@ def _drive_motor(drive: Drive, motor: axis.MotorState, constants: axis.MotorCons
 
 @compiled
 def _drive_axis(unit: DrivesRecord, of_axis: axis.State, constants: axis.Constants, number: int) -> None:
-    """Run one period of the drives and of the plant of an axis."""
     first, second = unit.drive[2 * number], unit.drive[2 * number + 1]
     engage = unit.constants.engage_periods * unit.constants.speed_ticks
     release = unit.constants.release_periods * unit.constants.speed_ticks
@@ -235,7 +227,7 @@ def _drive_axis(unit: DrivesRecord, of_axis: axis.State, constants: axis.Constan
 
 @compiled
 def advance(records: Records, now: Nanoseconds) -> None:
-    """Advance drives and plant to a time, at most by MAX_CATCH_UP_TICKS. records: DrivesRecords (1,)."""
+    """Advance drives and plant to a time, at most by MAX_CATCH_UP_TICKS. records: DrivesRecord (1,)."""
     _advance(records[0], now)
 
 
@@ -270,14 +262,13 @@ def status(drive: Drive) -> int:
 
 @compiled
 def _steps(x: float, bits: int) -> int:
-    """Return the nearest whole number of an object with this number of bits."""
     largest = 2.0 ** (bits - 1)
     return int(math.floor(min(max(x, -largest), largest - 1.0) + 0.5))
 
 
 @compiled
 def report(records: Records, reports: Records) -> None:
-    """Write the reports of the drives (4,), with the fields of pdo.REPORT_DTYPE. records: as of `advance`."""
+    """Write the reports of the drives (4,), with the fields of pdo.REPORT_DTYPE."""
     unit = records[0]
     state, constants, outputs = unit.state, unit.constants, unit.outputs
     drive_unit.read(state, constants, outputs)
