@@ -165,10 +165,8 @@ def _dish(p: AxisParameters) -> tuple[KilogramMeters2, float, float]:
 
 def constants(p: AxisParameters, h: Seconds, varying: bool = False,
               period: Seconds = SPEED_LOOP_PERIOD_S) -> Records:
-    """Return the Constants (1,) of an axis for a plant sub-step h. period: of the speed loop.
-
-    varying: True if the inertia of the load varies; `change_inertia` then sets it before each control period.
-    """
+    """Return the Constants (1,) of an axis for a plant sub-step h. period: of the speed loop. varying: True if the
+    inertia of the load varies; `change_inertia` then sets it before each control period."""
     g, error = p.gear_train, p.encoder.error
     J_dish, k_dish, c_dish = _dish(p)
     J_base = p.load.inertia - J_dish
@@ -196,9 +194,7 @@ def constants(p: AxisParameters, h: Seconds, varying: bool = False,
 def _motor_at_rest(m: MotorParameters, p: AxisParameters, T: NewtonMeters, total: NewtonMeters,
                    theta: Radians) -> Records:
     """Return the MotorState (1,) of a motor that makes T at standstill with its pinion on the flank, load at theta.
-
-    total: part of T from the integral of the speed loop.
-    """
+    total: part of T from the integral of the speed loop."""
     g, per_rad = p.gear_train, axis_control.counts_per_rad(p.encoder.motor_bits)
     i_ref = T / m.torque_constant
     i_q = (i_ref - m.drift.current_offset) / (1.0 + m.drift.current_gain)
@@ -227,8 +223,7 @@ def initial_state(p: AxisParameters, theta: Radians, external: NewtonMeters) -> 
 @inlined
 def _encoder_angle(theta: Radians, errors: EncoderErrors) -> Radians:
     """Return the angle that a load encoder measures: its disc is mounted off the centre (error once per turn), and its
-    signal is interpolated between two lines of the disc.
-    """
+    signal is interpolated between two lines of the disc."""
     if errors.exact:
         return theta
     return (theta + errors.zero + errors.sin * math.sin(theta) + errors.cos * math.cos(theta)
@@ -259,10 +254,8 @@ def read_motor_sensors(motor: MotorState, constants: MotorConstants) -> None:
 @inlined
 def speed_control(axis: State, constants: Constants, rate: RadiansPerSecond, torque: NewtonMeters, enable: Bit,
                   powered: bool, free: bool) -> None:
-    """Run one speed-loop period: compute the current references of both motors from a command.
-
-    The arguments are those of axis_control.control.
-    """
+    """Run one speed-loop period: compute the current references of both motors from a command. The arguments are those
+    of axis_control.control."""
     m1, m2, k1, k2 = axis.motor_1, axis.motor_2, constants.motor_1, constants.motor_2
     read_motor_sensors(m1, k1)
     read_motor_sensors(m2, k2)
@@ -274,10 +267,8 @@ def speed_control(axis: State, constants: Constants, rate: RadiansPerSecond, tor
 
 @compiled
 def begin_period(axis: State, constants: Constants, grip: bool) -> None:
-    """Begin a control period: brakes, winding temperatures, constant inertia, and cleared flags.
-
-    grip: True if the brakes grip by their command; a stuck brake ignores it.
-    """
+    """Begin a control period: brakes, winding temperatures, constant inertia, and cleared flags. grip: True if the
+    brakes grip by their command; a stuck brake ignores it."""
     c, m1, m2, k1, k2 = constants, axis.motor_1, axis.motor_2, constants.motor_1, constants.motor_2
     if not c.varying:
         axis.h_J, axis.q_B, axis.h_J_dish = c.h_J, c.q_B, c.h_J_dish

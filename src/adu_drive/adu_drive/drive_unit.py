@@ -186,11 +186,8 @@ def between_speed_periods(state: axis.State, constants: axis.Constants, substeps
 
 @separate
 def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) -> None:
-    """Advance one control period from t_k to t_k+1.
-
-    Each record may also be the lanes.Lanes of many drives. All lanes have the period and the number of sub-steps of
-    the first lane.
-    """
+    """Advance one control period from t_k to t_k+1. Each record may also be the lanes.Lanes of many drives. All lanes
+    have the period and the number of sub-steps of the first lane."""
     drives = range(count(state))
     for i in drives:
         _begin_period(at(state, i), at(constants, i), at(inputs, i), at(outputs, i))

@@ -84,11 +84,8 @@ def apply_due_faults(drive: FaultyDrive, stamp: Nanoseconds) -> None:
 
 @compiled
 def corrupt_messages(faults: DriveInjected, stamp: Nanoseconds, outputs: AnyRecord) -> None:
-    """Apply the active message faults to the messages of a step.
-
-    A frozen drive repeats 18 stored numbers. The last argument of message_faults.numbers is the index of the first
-    one.
-    """
+    """Apply the active message faults to the messages of a step. A frozen drive repeats 18 stored numbers. The last
+    argument of message_faults.numbers is the index of the first one."""
     joints, motors = outputs[JOINT_STATES_TOPIC], outputs[MOTOR_STATES_TOPIC]
     for i in range(2):
         joints.velocity[i] += faults.bias[i]

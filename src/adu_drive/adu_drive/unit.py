@@ -38,10 +38,8 @@ class Memory(typing.NamedTuple):
 
 @compiled
 def deck_acceleration(drive_inputs: drive_unit.Inputs, link: rate_drive.Link, ship: AnyRecord) -> None:
-    """Set rate and angular acceleration of the deck in the inputs of the drive.
-
-    The acceleration is the difference of two successive messages of ship/truth, divided by that of their stamps.
-    """
+    """Set rate and angular acceleration of the deck in the inputs of the drive. The acceleration is the difference of
+    two successive messages of ship/truth, divided by that of their stamps."""
     w, last = ship.twist_angular, link.truth_stamp
     if last != NO_STAMP and ship.stamp > last:
         for i in range(3):
@@ -56,9 +54,7 @@ def deck_acceleration(drive_inputs: drive_unit.Inputs, link: rate_drive.Link, sh
 def decode(drive_inputs: drive_unit.Inputs, link: rate_drive.Link, dropped: Bit, command: AnyRecord,
            ship: AnyRecord) -> None:
     """Write the messages of the last step into the inputs of the drive; one without a message has the stamp NO_STAMP.
-
-    dropped: 1 if an injected fault removes the command.
-    """
+    dropped: 1 if an injected fault removes the command."""
     if dropped == 0:
         rate_drive.take_command(drive_inputs, link, command)
     else:
@@ -109,10 +105,8 @@ def report(drive: DriveRecord, stamp: Nanoseconds, moved: bool, outputs: AnyReco
 
 @compiled
 def advance_missed_steps(drive: DriveRecord, stamp: Nanoseconds) -> None:
-    """Make the steps that a late node in realtime missed before a stamp, at most those of MAX_CATCH_UP_NS.
-
-    Because a real antenna moves on while its simulation is late, these steps use the last command until it is stale.
-    """
+    """Make the steps that a late node in realtime missed before a stamp, at most those of MAX_CATCH_UP_NS. Because a
+    real antenna moves on while its simulation is late, these steps use the last command until it is stale."""
     missed = 0
     if drive.link.stamp != NO_STAMP:
         missed = min(stamp - drive.link.stamp, MAX_CATCH_UP_NS) // drive.link.period - 1

@@ -198,10 +198,8 @@ def mean_motor_speed(axis: State, omega_1: RadiansPerSecond, omega_2: RadiansPer
 
 @inlined
 def _torque_control(axis: State, constants: Constants, omega: RadiansPerSecond, feed_forward: NewtonMeters) -> bool:
-    """Set the torque references of both motors for the rate axis.rate. Return True if a motor is at its limit.
-
-    omega: mean motor speed. A single working motor makes the torque of both, up to its limit.
-    """
+    """Set the torque references of both motors for the rate axis.rate. Return True if a motor is at its limit. omega:
+    mean motor speed. A single working motor makes the torque of both, up to its limit."""
     c, m1, m2, k1, k2 = constants, axis.motor_1, axis.motor_2, constants.motor_1, constants.motor_2
     alone = axis.faults & faults.MOTORS_LOST_BITS
     omega_1, omega_2 = (m1.measured, m2.measured) if c.independent and not alone else (omega, omega)

@@ -16,10 +16,8 @@ DEFAULT_BUFFER_MARGIN_RAD = math.radians(2.0)  # default distance from the emerg
 
 
 def mesh_inertia(motor: KilogramMeters2, ratio: float, load: KilogramMeters2) -> KilogramMeters2:
-    """Return the inertia that swings on the stiffness of one mesh, referred to the load axis.
-
-    The mesh lies between one motor (on its shaft) and half of the load, because the axis has two motors.
-    """
+    """Return the inertia that swings on the stiffness of one mesh, referred to the load axis. The mesh lies between
+    one motor (on its shaft) and half of the load, because the axis has two motors."""
     return 1.0 / (1.0 / (motor * ratio**2) + 2.0 / load)
 
 

@@ -104,11 +104,8 @@ class Constants(Record):
 
 
 class State(Record):
-    """State of the drive.
-
-    `State.dtype` is one object, which all state records share. A record with an equal copy would cost 3 us in each
-    call, because numba then compares the copy field by field.
-    """
+    """State of the drive. `State.dtype` is one object, which all state records share. A record with an equal copy
+    would cost 3 us in each call, because numba then compares the copy field by field."""
     azimuth: axis_control.State
     elevation: axis_control.State
     rate: Annotated[Floats, (COMMAND_RING_SIZE, 2)]     # ring of the commands: rates [rad/s]
@@ -231,10 +228,8 @@ def _advance_pins(state: State, constants: Constants, wanted: int) -> None:
 
 @compiled
 def advance(state: State, constants: Constants, pins: int, ready: bool) -> bool:
-    """Advance the phase by a control period. Return True if the brakes grip.
-
-    pins: code of acu/stow_pins; ready: True if the amplifiers of the motors are on.
-    """
+    """Advance the phase by a control period. Return True if the brakes grip. pins: code of acu/stow_pins; ready: True
+    if the amplifiers of the motors are on."""
     if constants.pins.fitted:
         _advance_pins(state, constants, pins)
     phase = _next(state, constants, ready)

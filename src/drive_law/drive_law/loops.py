@@ -75,10 +75,8 @@ def torque_demand(error: RadiansPerSecond, total: NewtonMeters, K_p: float,
 @inlined
 def shared_torques(T_1: NewtonMeters, T_2: NewtonMeters, T_b: NewtonMeters, omega_1: RadiansPerSecond,
                    omega_2: RadiansPerSecond, K_d: float) -> tuple[NewtonMeters, NewtonMeters]:
-    """Return the torque demands of the two motors: T_1,2 +- T_b -+ K_d (omega_1 - omega_2).
-
-    The loop on the mean speed cannot damp motion of the motors against each other, so K_d [Nms/rad] damps it.
-    """
+    """Return the torque demands of the two motors: T_1,2 +- T_b -+ K_d (omega_1 - omega_2). The loop on the mean speed
+    cannot damp motion of the motors against each other, so K_d [Nms/rad] damps it."""
     split = T_b - K_d * (omega_1 - omega_2)
     return T_1 + split, T_2 - split
 
@@ -108,9 +106,7 @@ def scheduled_bias(torque: NewtonMeters, T_b: NewtonMeters, out: NewtonMeters, p
 
 def observer_gains(w_o: RadiansPerSecond, h: Seconds) -> tuple[float, float]:
     """Return the gains (l_1, l_2) that put both poles at exp(-w_o h). w_o = 0: observer off, the estimate of d stays.
-
-    l_1: correction of omega per innovation; l_2: correction of d h / J per innovation.
-    """
+    l_1: correction of omega per innovation; l_2: correction of d h / J per innovation."""
     p = math.exp(-w_o * h)
     return (1.0 - p * p, (1.0 - p) ** 2) if w_o > 0.0 else (1.0, 0.0)
 

@@ -115,10 +115,8 @@ class MountParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class ElevatingParameters(Parameters):
-    """Inertia of the elevating part in its own frame, x along the beam, y to port, z up; see gimbal.py.
-
-    The inertia about y is elevation.load.inertia; azimuth.load.inertia holds at elevation 0.
-    """
+    """Inertia of the elevating part in its own frame, x along the beam, y to port, z up; see gimbal.py. The inertia
+    about y is elevation.load.inertia; azimuth.load.inertia holds at elevation 0."""
     about_beam: float = parameter(0.0, 0.0, 1e7, 'kg m2', 'inertia about x; 0: azimuth inertia is constant, axes do '
                                   'not interact')
     about_lift: float = parameter(0.0, 0.0, 1e7, 'kg m2', 'inertia about z')

@@ -49,10 +49,7 @@ def supervise(drive_inputs: drive_state.Inputs, link: Link) -> None:
 @compiled
 def take_command(drive_inputs: drive_state.Inputs, link: Link, command: AnyRecord) -> None:
     """Write a record of acu/rate_command into the inputs of the drive, and stop the axes if the newest command is
-    stale.
-
-    The record has the stamp NO_STAMP if the step had no command.
-    """
+    stale. The record has the stamp NO_STAMP if the step had no command."""
     if command.stamp != NO_STAMP:
         link.command_stamp = command.stamp
         drive_inputs.azimuth.rate, drive_inputs.elevation.rate = command.velocity[0], command.velocity[1]

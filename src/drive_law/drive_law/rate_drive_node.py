@@ -36,10 +36,8 @@ class RateDriveNode(Timekeeper):
             self.every(1.0, self.save)
 
     def save(self) -> None:
-        """Save the plant state, and keep the reason of a failure for `diagnosed`.
-
-        Because the end of a run disables the drive, the saved `enabled` then keeps its value from before the end.
-        """
+        """Save the plant state, and keep the reason of a failure for `diagnosed`. Because the end of a run disables
+        the drive, the saved `enabled` then keeps its value from before the end."""
         state = self.unit.plant_state()
         if self.stopping:
             state = state._replace(enabled=self.saved.enabled if self.saved else False)

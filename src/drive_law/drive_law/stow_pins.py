@@ -86,10 +86,8 @@ def holds(pins: State, constants: Constants, axis: int) -> bool:
 
 @compiled
 def command_pins(pins: State, constants: Constants, wanted: int, azimuth: Radians, elevation: Radians) -> None:
-    """Take a command of acu/stow_pins. The command `in` waits until both axes are in the window.
-
-    azimuth, elevation: encoder angles of standing axes, NaN for a moving axis.
-    """
+    """Take a command of acu/stow_pins. The command `in` waits until both axes are in the window. azimuth, elevation:
+    encoder angles of standing axes, NaN for a moving axis."""
     if wanted == PIN_COMMAND_OUT:
         _set_command(pins, PIN_COMMAND_OUT)
     elif wanted == PIN_COMMAND_IN and (abs(azimuth - constants.hole[0]) <= constants.window

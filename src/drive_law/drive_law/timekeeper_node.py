@@ -197,10 +197,8 @@ class Timekeeper(unit_node.UnitNode):
         return take
 
     def draining(self) -> bool:
-        """Return True at the end of a realtime run, until the axes have stopped and the brakes hold.
-
-        The first call disables the drive.
-        """
+        """Return True at the end of a realtime run, until the axes have stopped and the brakes hold. The first call
+        disables the drive."""
         if self.graph.lockstep or self.failure or not self.made:
             return False
         if not self.stopping:
@@ -210,11 +208,8 @@ class Timekeeper(unit_node.UnitNode):
         return not all(unit_of(port).rests for port in self.ports)
 
     def end(self) -> None:
-        """End lockstep after the answers to the last step, with the result of the run.
-
-        The wall-clock time begins with the answers to step 0. Before these answers the nodes still discover each
-        other.
-        """
+        """End lockstep after the answers to the last step, with the result of the run. The wall-clock time begins with
+        the answers to step 0. Before these answers the nodes still discover each other."""
         self.result = self._outcome(self.k - 1, self.k)
         self.await_acknowledged()
         self.finished = True

@@ -15,10 +15,7 @@ class Bus(typing.Protocol):
 
     def start(self, drive: int, torque_mode: bool) -> None:
         """Identify a drive, map its data and read the mapping back. Then the drive supervises this node. Raises
-        BusError.
-
-        torque_mode: True if its command holds the target torque in place of the torque offset.
-        """
+        BusError. torque_mode: True if its command holds the target torque in place of the torque offset."""
 
     def exchange(self, commands: Records, reports: Records) -> Bools:
         """Send a command to each drive, let all drives act on it at the same time, and receive their reports, once a

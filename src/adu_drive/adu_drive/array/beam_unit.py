@@ -64,10 +64,8 @@ def decode(beam_inputs: electronic_beam.Inputs, switches: Switches, command: Any
 
 @compiled
 def encode(beam_outputs: electronic_beam.Outputs, switches: Switches, stamp: Nanoseconds, outputs: AnyRecord) -> None:
-    """Write the outputs of the beam into the records of its messages.
-
-    A beam has no rate and no torque, and its reported angles are the true ones.
-    """
+    """Write the outputs of the beam into the records of its messages. A beam has no rate and no torque, and its
+    reported angles are the true ones."""
     joints, truth = outputs[JOINT_STATES_TOPIC], outputs[DRIVE_TRUTH_TOPIC]
     joints.stamp = truth.stamp = outputs[CLOCK_TOPIC].stamp = stamp
     for i in range(2):
@@ -77,10 +75,8 @@ def encode(beam_outputs: electronic_beam.Outputs, switches: Switches, stamp: Nan
 
 @compiled
 def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
-    """Advance from t_k-1 to t_k with the command of step k - 1.
-
-    A beam that is not enabled ignores commands, and discards commands that are still delayed.
-    """
+    """Advance from t_k-1 to t_k with the command of step k - 1. A beam that is not enabled ignores commands, and
+    discards commands that are still delayed."""
     record = memory.record[0]
     if record.switches.stamp != NO_STAMP:
         decode(record.inputs, record.switches, inputs[REFERENCE_TOPIC])

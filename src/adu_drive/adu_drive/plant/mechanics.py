@@ -110,10 +110,8 @@ def buffer_torque(theta: Radians, omega: RadiansPerSecond, lower: Radians, upper
 
 
 def spring_and_damper(inertia: KilogramMeters2, frequency: Hertz, damping: float) -> tuple[float, float]:
-    """Return stiffness [Nm/rad] and damping [Nms/rad] of a dish from frequency and damping ratio on a locked base.
-
-    On a free base the frequency is frequency / sqrt(1 - share of the dish in the load inertia).
-    """
+    """Return stiffness [Nm/rad] and damping [Nms/rad] of a dish from frequency and damping ratio on a locked base. On
+    a free base the frequency is frequency / sqrt(1 - share of the dish in the load inertia)."""
     w = 2.0 * math.pi * frequency
     return inertia * w * w, 2.0 * damping * inertia * w
 
@@ -121,10 +119,8 @@ def spring_and_damper(inertia: KilogramMeters2, frequency: Hertz, damping: float
 @inlined
 def swing(dish: Radians, omega_dish: RadiansPerSecond, theta: Radians, omega: RadiansPerSecond, torque: NewtonMeters,
           k: float, c: float, h: Seconds, h_J: float) -> tuple[Radians, RadiansPerSecond, NewtonMeters]:
-    """Return angle and rate of the dish one sub-step h later, and its torque on the base.
-
-    theta, omega: of the base; torque: on the dish; k, c: see `spring_and_damper`; h_J = h / inertia of the dish.
-    """
+    """Return angle and rate of the dish one sub-step h later, and its torque on the base. theta, omega: of the base;
+    torque: on the dish; k, c: see `spring_and_damper`; h_J = h / inertia of the dish."""
     twist = k * (dish - theta) + c * (omega_dish - omega)
     omega_dish += h_J * (torque - twist)
     return dish + h * omega_dish, omega_dish, twist

@@ -212,10 +212,8 @@ class CanDrive:
 
 
 class CanDrives:
-    """The four drives on one CAN bus, which another object polls.
-
-    on_sync: function that advances the unit to the time of a SYNC.
-    """
+    """The four drives on one CAN bus, which another object polls. on_sync: function that advances the unit to the time
+    of a SYNC."""
 
     def __init__(self, bus: SocketcandServer, unit: SimulatedDrives, on_sync: Callable[[], None]) -> None:
         self.network = canopen.Network(bus)

@@ -64,11 +64,8 @@ FourDrives: TypeAlias = Annotated[Sequence[Drive], (pdo.DRIVE_COUNT,)]
 
 
 class DrivesRecord(Record):
-    """All data of the simulated drives.
-
-    The own fields come first. Numba takes a record that begins with the fields of the drive unit for its subtype, and
-    warns about it.
-    """
+    """All data of the simulated drives. The own fields come first. Numba takes a record that begins with the fields of
+    the drive unit for its subtype, and warns about it."""
     drive: FourDrives
     tick: int               # number of the last period of the speed loops
     period: Nanoseconds     # time between two synchronisations
