@@ -6,7 +6,7 @@ import typing
 from collections.abc import Iterable
 
 from adu_drive import drive_unit, injected, lanes
-from drive_law import drive_state, rate_drive, state_file
+from drive_law import drive_state, rate_drive
 from drive_law.params import AduNodeParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
@@ -191,7 +191,7 @@ class Adu(rate_drive.RateDrive, Simulated):
                  for flags in (*axes, *(c['encoder'] for c in axes[2:])) if name in flags.dtype.names]
         return all(flags) and not self.parameters.inject
 
-    def resume(self, state: state_file.PlantState) -> None:
+    def resume(self, state: rate_drive.PlantState) -> None:
         """Restore the state of the plant before the first step: brakes on, then enabled if the state was enabled."""
         angles = {f'initial_{axis}': min(max(getattr(state, axis), limits.lower), limits.upper) for axis, limits in (
             (axis, getattr(self.parameters, axis).limits) for axis in topics.AXES)}

@@ -1,12 +1,18 @@
 """Base of the units of drives that follow rates: link to the control unit, requests, state and diagnosis."""
+import json
+import math
+import os
+import pathlib
 from collections.abc import Mapping
+from typing import NamedTuple
 
-from drive_law import drive_state, faults, state_file, stow_pins
+from drive_law import drive_state, faults, stow_pins
 from drive_law.params import AduNodeParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis, Unit
-from pedestal_common.quantities import AnyRecord, Bit, Floats, Message, Nanoseconds, Records, Seconds, Vector3
+from pedestal_common.parameters import ParameterError
+from pedestal_common.quantities import AnyRecord, Bit, Floats, Message, Nanoseconds, Radians, Records, Seconds, Vector3
 from pedestal_common.record import Record
 from pedestal_common.wire.commands import Reply
 from pedestal_common.wire.records import NO_STAMP
@@ -72,6 +78,38 @@ def encode_measured(drive_outputs: drive_state.Outputs, stamp: Nanoseconds, outp
     outputs[DRIVE_STATE_TOPIC] = drive_outputs.condition
 
 
+class PlantState(NamedTuple):
+    """State of the plant that a restart keeps in a file: a drive resumes there instead of at its initial angles."""
+    azimuth: Radians        # of the load, whole turns included
+    elevation: Radians
+    enabled: bool           # True if the drive followed commands, or was about to follow them
+    pinned: bool = False    # True if a stow pin was not out
+
+
+def read_plant_state(path: str) -> PlantState | None:
+    """Return the state in a file, or None if there is no file. Raises ParameterError for invalid content."""
+    try:
+        values = json.loads(pathlib.Path(path).read_text())
+        state = PlantState(float(values['azimuth']), float(values['elevation']), values['enabled'] is True,
+                           values.get('pinned') is True)
+        if not math.isfinite(state.azimuth + state.elevation):
+            raise ValueError('an angle is not finite')
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise ParameterError(f"state_file = '{path}': holds no state of a drive ({error}); move it away to start at "
+                             'initial_azimuth and initial_elevation') from None
+    return state
+
+
+def write_plant_state(path: str, state: PlantState) -> None:
+    """Replace a file by one with a state, in one operation. Raises OSError if the disk refuses it."""
+    new = f'{path}.new'
+    with open(new, 'w') as file:
+        json.dump(state._asdict(), file)
+    os.replace(new, path)
+
+
 class RateDrive(Unit):
     """Unit of a drive. Its record has the parts of drive_state and a Link."""
     COMMAND, REQUESTS = RATE_COMMAND_TOPIC, tuple(drive_state.REQUEST_CODES)
@@ -81,7 +119,7 @@ class RateDrive(Unit):
         """Write the present outputs, between two steps."""
         raise NotImplementedError
 
-    def resume(self, state: state_file.PlantState) -> None:
+    def resume(self, state: PlantState) -> None:
         """Restore the state before a restart, before the first step."""
         raise NotImplementedError
 
@@ -94,13 +132,13 @@ class RateDrive(Unit):
         """True if the brakes hold the axes and the motors make no torque."""
         return bool(self.parts['outputs']['phase'] == drive_state.PHASE_DISABLED)
 
-    def plant_state(self) -> state_file.PlantState:
+    def plant_state(self) -> PlantState:
         """Return the state of the plant for `resume`."""
         o = self.parts['outputs']
         enabled = o['wanted'] and not (o['emergency'] or self.tripped)
         pinned = not stow_pins.pins_out(self.parts['state']['pins'])
         azimuth, elevation = (float(o[axis]['position']) for axis in topics.AXES)
-        return state_file.PlantState(azimuth, elevation, bool(enabled), pinned)
+        return PlantState(azimuth, elevation, bool(enabled), pinned)
 
     def encode(self, topic: str, code: int) -> str | Message:
         """Return the text of a code of adu/state, or of another topic as in Unit."""

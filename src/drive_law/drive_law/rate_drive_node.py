@@ -1,8 +1,7 @@
 """Base of the nodes of drives that follow rates: a Timekeeper with a file that keeps the state of the plant over a
 restart."""
-from drive_law import state_file
 from drive_law.params import AduNodeParameters
-from drive_law.rate_drive import RateDrive
+from drive_law.rate_drive import PlantState, RateDrive, read_plant_state, write_plant_state
 from drive_law.timekeeper_node import Timekeeper
 from pedestal_common.node import shell
 from pedestal_common.node.unit import LEVEL_WARN, Diagnosis
@@ -16,13 +15,13 @@ class RateDriveNode(Timekeeper):
 
     def __init__(self, module: str) -> None:
         self.unsaved = ''
-        self.saved: state_file.PlantState | None = None
+        self.saved: PlantState | None = None
         super().__init__(module)
 
     def prepare(self, unit: shell.Unprepared) -> None:
         """Compile the laws, then resume the plant state in the state file."""
         super().prepare(unit)
-        saved = state_file.read(self.parameters.state_file) if self.parameters.state_file else None
+        saved = read_plant_state(self.parameters.state_file) if self.parameters.state_file else None
         if saved is not None:
             assert isinstance(unit, RateDrive)
             unit.resume(saved)
@@ -43,7 +42,7 @@ class RateDriveNode(Timekeeper):
             state = state._replace(enabled=self.saved.enabled if self.saved else False)
         self.saved = state
         try:
-            state_file.write(self.parameters.state_file, state)
+            write_plant_state(self.parameters.state_file, state)
             self.unsaved = ''
         except OSError as error:
             self.unsaved = f'{self.parameters.state_file}: {error.strerror}'

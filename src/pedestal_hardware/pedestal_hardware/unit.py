@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from drive_law import axis_control, drive_state, rate_drive
-from drive_law.state_file import PlantState
 from pedestal_common.graph import nodes, topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import Records, Stamps
@@ -172,11 +171,11 @@ class ServoDrives(rate_drive.RateDrive):
                 state['applied'], state['brake_age'] = 1, 0
         return reply
 
-    def resume(self, state: PlantState) -> None:
+    def resume(self, state: rate_drive.PlantState) -> None:
         """Restore the state before a restart: enabled if it was enabled. The drives know their angles."""
         self.parts['state']['wanted'] = state.enabled
 
-    def plant_state(self) -> PlantState:
+    def plant_state(self) -> rate_drive.PlantState:
         """Return the PlantState for `resume`; an unknown angle is 0."""
         state = super().plant_state()
         return state._replace(azimuth=float(np.nan_to_num(state.azimuth)),
