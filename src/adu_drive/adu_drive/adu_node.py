@@ -1,8 +1,5 @@
-"""ROS node of the simulated drive, whose law is `drive_unit.step`.
-
-`entry` is imported first, so that a signal during the other imports ends the process without a message.
-"""
-import pedestal_common.entry  # noqa: F401
+"""ROS node of the simulated drive, whose law is `drive_unit.step`."""
+import pedestal_common.entry  # noqa: F401  # first, for signals during the other imports
 
 # isort: split
 import sys

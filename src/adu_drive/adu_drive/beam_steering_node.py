@@ -1,9 +1,6 @@
 """ROS node of an electronically steered array: it runs a unit for each beam, whose law is
-`array.electronic_beam.step`.
-
-`entry` is imported first, so that a signal during the other imports ends the process without a message.
-"""
-import pedestal_common.entry  # noqa: F401
+`array.electronic_beam.step`."""
+import pedestal_common.entry  # noqa: F401  # first, for signals during the other imports
 
 # isort: split
 import sys

@@ -106,7 +106,9 @@ def scheduled_bias(torque: NewtonMeters, T_b: NewtonMeters, out: NewtonMeters, p
 
 def observer_gains(w_o: RadiansPerSecond, h: Seconds) -> tuple[float, float]:
     """Return the gains (l_1, l_2) that put both poles at exp(-w_o h). w_o = 0: observer off, the estimate of d stays.
-    l_1: correction of omega per innovation; l_2: correction of d h / J per innovation."""
+
+    l_1: correction of omega per innovation; l_2: correction of d h / J per innovation.
+    """
     p = math.exp(-w_o * h)
     return (1.0 - p * p, (1.0 - p) ** 2) if w_o > 0.0 else (1.0, 0.0)
 

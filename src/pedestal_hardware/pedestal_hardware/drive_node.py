@@ -1,9 +1,6 @@
-"""ROS node of an antenna with four CiA 402 servo drives, in place of `adu_node`.
-
-A thread of the node commissions drives that have not been used yet or that return to the bus. `entry` is imported
-first, so that a signal during the other imports ends the process without a message.
-"""
-import pedestal_common.entry  # noqa: F401
+"""ROS node of an antenna with four CiA 402 servo drives, in place of `adu_node`. A thread of the node commissions
+drives that have not been used yet or that return to the bus."""
+import pedestal_common.entry  # noqa: F401  # first, for signals during the other imports
 
 # isort: split
 import sys

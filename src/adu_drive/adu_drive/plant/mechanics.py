@@ -50,8 +50,9 @@ def tooth_gap(pinion: Radians, teeth: float, ratio: float) -> Radians:
     """Return the additional half lash, on the load axis, of a pinion at an angle without its tooth at 0.
 
     teeth: 0 for a whole pinion; ratio: bull gear to pinion. At the lost tooth, the flanks of its neighbours stop the
-    pinion after half a pitch. They come closer as the pinion turns, so the gap is half a pitch times (cos phi - cos
-    phi_0) / (1 - cos phi_0). Here phi is the angle of the pinion from the lost tooth, and phi_0 = pi / teeth.
+    pinion after half a pitch. They come closer as the pinion turns: the gap is half a pitch times
+
+        (cos phi - cos phi_0) / (1 - cos phi_0)        phi: angle from the lost tooth; phi_0 = pi / teeth
     """
     if teeth == 0.0:
         return 0.0
@@ -119,8 +120,10 @@ def spring_and_damper(inertia: KilogramMeters2, frequency: Hertz, damping: float
 @inlined
 def swing(dish: Radians, omega_dish: RadiansPerSecond, theta: Radians, omega: RadiansPerSecond, torque: NewtonMeters,
           k: float, c: float, h: Seconds, h_J: float) -> tuple[Radians, RadiansPerSecond, NewtonMeters]:
-    """Return angle and rate of the dish one sub-step h later, and its torque on the base. theta, omega: of the base;
-    torque: on the dish; k, c: see `spring_and_damper`; h_J = h / inertia of the dish."""
+    """Return angle and rate of the dish one sub-step h later, and its torque on the base.
+
+    theta, omega: of the base; torque: on the dish; k, c: see `spring_and_damper`; h_J = h / inertia of the dish.
+    """
     twist = k * (dish - theta) + c * (omega_dish - omega)
     omega_dish += h_J * (torque - twist)
     return dish + h * omega_dish, omega_dish, twist

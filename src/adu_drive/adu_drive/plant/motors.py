@@ -64,7 +64,9 @@ def currents(i_d: Amperes, i_q: Amperes, v_d: Volts, v_q: Volts, omega_e: Radian
 def speed(omega: RadiansPerSecond, torque: NewtonMeters, T_c: NewtonMeters, per_v: float, h_J: float,
           q_B: float) -> RadiansPerSecond:
     """Return the shaft speed one sub-step later under the net torque without friction, implicit in the viscous part.
-    per_v = 1 / v; h_J = h / J_m; q_B = 1 / (1 + h B / J_m)."""
+
+    per_v = 1 / v; h_J = h / J_m; q_B = 1 / (1 + h B / J_m).
+    """
     return (omega + h_J * (torque - T_c * tanh(omega * per_v))) * q_B
 
 

@@ -1,9 +1,8 @@
 """ROS node of four simulated CiA 402 drives, with a bus of their own: a socketcand server on this machine.
 
-A thread serves the bus. It advances drives and plant with the time, and publishes adu/truth at each SYNC. `entry` is
-imported first, so that a signal during the other imports ends the process without a message.
+A thread serves the bus. It advances drives and plant with the time, and publishes adu/truth at each SYNC.
 """
-import pedestal_common.entry  # noqa: F401
+import pedestal_common.entry  # noqa: F401  # first, for signals during the other imports
 
 # isort: split
 import sys
