@@ -281,6 +281,29 @@ def begin_period(axis: State, constants: Constants, grip: bool) -> None:
 
 
 @inlined
+def voltages(i_d: Amperes, i_q: Amperes, i_ref: Amperes, omega_e: RadiansPerSecond, sum_d: Volts, sum_q: Volts,
+             K_p: float, K_iT: float, L: float, psi: float, v_max: Volts) -> tuple[Volts, Volts, Volts, Volts, bool]:
+    """Return the voltages v_d, v_q, the two new integral parts, and True if the voltages were limited.
+
+    The current loop of one motor in rotor coordinates: i_d = 0, decoupled, inside the voltage circle v_d^2 + v_q^2 <=
+    v_max^2. K_p = w L and K_i = w R cancel the pole of the winding: the closed loop of each axis is w / (s + w). The
+    terms with omega_e, the electrical speed, decouple the axes.
+    """
+    e_d, e_q = -i_d, i_ref - i_q
+    u_d = K_p * e_d + sum_d - omega_e * L * i_q
+    u_q = K_p * e_q + sum_q + omega_e * (L * i_d + psi)
+    v_d, v_q = u_d, u_q
+    limited = u_d * u_d + u_q * u_q > v_max * v_max
+    if limited:
+        # v_d has priority, because v_d keeps i_d at 0. With i_d = 0 the current gives the largest torque.
+        v_d = min(max(u_d, -v_max), v_max)
+        room = math.sqrt(v_max * v_max - v_d * v_d)
+        v_q = min(max(u_q, -room), room)
+    sum_d, sum_q = loops.integral(sum_d, e_d, K_iT, u_d - v_d), loops.integral(sum_q, e_q, K_iT, u_q - v_q)
+    return v_d, v_q, sum_d, sum_q, limited
+
+
+@inlined
 def current_control(motor: MotorState, constants: MotorConstants) -> None:
     """Run one current-loop period of one motor: compute the phase voltages from the current reference.
 
@@ -288,7 +311,7 @@ def current_control(motor: MotorState, constants: MotorConstants) -> None:
     open terminals show the back-EMF. The model omits the diodes, which empty the inductance within a millisecond.
     """
     k = constants
-    v_d, v_q, sum_d, sum_q, limited = loops.voltages(
+    v_d, v_q, sum_d, sum_q, limited = voltages(
         k.gain * motor.i_d, k.gain * motor.i_q + k.offset, motor.i_ref, k.p * motor.measured, motor.sum_d, motor.sum_q,
         k.K_p, k.K_iT, k.L, k.psi_hat, k.v_max)
     i_d, i_q = motor.i_d, motor.i_q

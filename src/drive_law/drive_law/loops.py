@@ -1,4 +1,4 @@
-"""Laws of the loops of an axis: travel, speed, bias, disturbance observer and current.
+"""Laws of the loops of an axis: travel, speed, bias and disturbance observer.
 
 Travel: close to an end of travel, a limit of the rate command stops the axis in time.
 
@@ -19,22 +19,17 @@ rigid load and gears is J domega/dt = T + d, with the inertia J per motor. T inc
 commanded acceleration is no disturbance, and a limit cannot wind up the estimate. The observer is the linear extended
 state observer of Gao, American Control Conference 2003. Its two poles, there at -w_o, are here at p = exp(-w_o h) of
 discrete time.
-
-Current control of one motor in rotor coordinates: i_d = 0, decoupled, inside the voltage circle v_d^2 + v_q^2 <=
-v_max^2.
 """
 import math
 
 from drive_law.axis_params import BiasParameters
 from pedestal_common.compiled import inlined
 from pedestal_common.quantities import (
-    Amperes,
     NewtonMeters,
     Radians,
     RadiansPerSecond,
     RadiansPerSecond2,
     Seconds,
-    Volts,
 )
 
 MAX_RETURN_RATE_RAD_S = 0.1  # largest rate of the return from beyond an end of travel [rad/s]
@@ -120,24 +115,3 @@ def updated_observer(omega_hat: RadiansPerSecond, d_hat: NewtonMeters, omega: Ra
     predicted = omega_hat + h_J * (T + d_hat)
     e = omega - predicted
     return predicted + l_1 * e, d_hat + l_2 / h_J * e
-
-
-@inlined
-def voltages(i_d: Amperes, i_q: Amperes, i_ref: Amperes, omega_e: RadiansPerSecond, sum_d: Volts, sum_q: Volts,
-             K_p: float, K_iT: float, L: float, psi: float, v_max: Volts) -> tuple[Volts, Volts, Volts, Volts, bool]:
-    """Return the voltages v_d, v_q, the two new integral parts, and True if the voltages were limited.
-
-    K_p = w L and K_i = w R cancel the pole of the winding: the closed loop of each axis is w / (s + w). The terms with
-    omega_e, the electrical speed, decouple the axes.
-    """
-    e_d, e_q = -i_d, i_ref - i_q
-    u_d = K_p * e_d + sum_d - omega_e * L * i_q
-    u_q = K_p * e_q + sum_q + omega_e * (L * i_d + psi)
-    v_d, v_q = u_d, u_q
-    limited = u_d * u_d + u_q * u_q > v_max * v_max
-    if limited:
-        # v_d has priority, because v_d keeps i_d at 0. With i_d = 0 the current gives the largest torque.
-        v_d = min(max(u_d, -v_max), v_max)
-        room = math.sqrt(v_max * v_max - v_d * v_d)
-        v_q = min(max(u_q, -room), room)
-    return (v_d, v_q, integral(sum_d, e_d, K_iT, u_d - v_d), integral(sum_q, e_q, K_iT, u_q - v_q), limited)
