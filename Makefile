@@ -12,7 +12,7 @@
 # make clean   remove everything made here
 
 PYTHON ?= python3
-PACKAGES := pedestal_common receiver_law ship_motion_sim tracking_receiver_sim acu_tracker adu_drive \
+PACKAGES := pedestal_common receiver_law drive_law ship_motion_sim tracking_receiver_sim acu_tracker adu_drive \
 	pedestal_operator pedestal_recording pedestal_results pedestal_hardware equipment_sim pedestal_bringup pedestal_workbench \
 	pedestal_studies pedestal
 ROS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
@@ -29,7 +29,7 @@ REALTIME := test/test_live.py test/test_rotctld.py test/test_page.py test/test_o
 	test/test_rotator.py test/test_field.py test/test_network.py
 # Tests of laws, which lie beside their packages and start no graph. That of the compiler starts processes by the
 # dozen, and compiles.
-LAWS := $(foreach package,receiver_law ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_common,src/$(package)) \
+LAWS := $(foreach package,receiver_law drive_law ship_motion_sim tracking_receiver_sim acu_tracker adu_drive pedestal_common,src/$(package)) \
 	$(patsubst %,--ignore src/pedestal_common/test/test_%.py,compiled law_cache law_orders)
 # The files in the order of pyproject.toml, where those of graphs come first: a file of few tests, each a graph, would
 # else be the last, and one core idle.

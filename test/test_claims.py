@@ -8,7 +8,7 @@ from tools.numbers import claims, published
 
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 from pedestal_results.intervals import missed
 from pedestal_studies.p000_ma import backlash, servo
 from pedestal_studies.p001_zhou_yang_qin import alignment, methods

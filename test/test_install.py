@@ -15,6 +15,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 EXECUTABLES = {
     'pedestal_common': {},
     'receiver_law': {},
+    'drive_law': {},
     'ship_motion_sim': {'ship_motion_node': 'ship_motion_sim.ship_motion_node:main',
                         'ins_node': 'ship_motion_sim.ins_node:main'},
     'tracking_receiver_sim': {'tracking_receiver_node': 'tracking_receiver_sim.tracking_receiver_node:main'},
@@ -41,10 +42,11 @@ EXECUTABLES = {
     'pedestal': {'pedestal': 'pedestal.cli:main'},
 }
 PACKAGES = tuple(EXECUTABLES)
-WITHOUT_ROS = PACKAGES[1:6]     # but for the nodes
-BELOW = {'pedestal_common': (), 'receiver_law': ('pedestal_common',), 'ship_motion_sim': ('pedestal_common',),
+WITHOUT_ROS = PACKAGES[1:7]     # but for the nodes
+BELOW = {'pedestal_common': (), 'receiver_law': ('pedestal_common',), 'drive_law': ('pedestal_common',),
+         'ship_motion_sim': ('pedestal_common',),
          'tracking_receiver_sim': ('pedestal_common', 'receiver_law'), 'acu_tracker': ('pedestal_common',),
-         'adu_drive': ('pedestal_common',), 'pedestal_operator': ('pedestal_common',),
+         'adu_drive': ('pedestal_common', 'drive_law'), 'pedestal_operator': ('pedestal_common',),
          'pedestal_recording': ('pedestal_common',)}
 """{package that does not stand on all packages above it in EXECUTABLES: those on which it stands}."""
 MESSAGES = ('_msgs', '_interfaces', '_srvs')
@@ -171,10 +173,10 @@ def test_packages_import_only_what_is_below_them(package):
 
 
 def test_real_equipment_runs_no_law_of_a_simulator():
-    """Of the simulated receiver and ship, pedestal_hardware knows the parameters only."""
+    """Of the simulated equipment, pedestal_hardware knows the parameters of the receiver only."""
     offenders = [f'{path.name} imports {node.module}' for path in modules('pedestal_hardware')
                  for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ImportFrom)
-                 and node.module.startswith(('tracking_receiver_sim', 'ship_motion_sim'))
+                 and node.module.startswith(('tracking_receiver_sim', 'ship_motion_sim', 'adu_drive'))
                  and node.module != 'tracking_receiver_sim.params']
     assert offenders == []
 

@@ -20,7 +20,7 @@ from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from pedestal_common.graph.graph_parameters import GraphParameters
 
-LAW_PACKAGES = ('pedestal_common', 'receiver_law', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
+LAW_PACKAGES = ('pedestal_common', 'receiver_law', 'drive_law', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
                 'ship_motion_sim')
 """Packages with laws, in the order of the page of laws."""
 

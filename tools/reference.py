@@ -13,7 +13,7 @@ import pedestal_studies
 from acu_tracker import modes
 from acu_tracker.alarms import table as alarms
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
-from adu_drive.controller import faults
+from drive_law import faults
 from pedestal import console
 from pedestal_bringup.scenario import shipped
 from pedestal_bringup.scenario.sections import parameters_of

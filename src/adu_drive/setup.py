@@ -16,8 +16,8 @@ setup(
     zip_safe=False,
     maintainer='pedestal maintainers',
     maintainer_email='pedestal@example.org',
-    description='Antenna drive unit: speed and current loops, dual-motor gear train, friction, wind and '
-                'limits of both axes.',
+    description='Antenna drive unit: current loops, dual-motor gear train, friction and wind of both axes around '
+                'the laws of drive_law.',
     license='Apache-2.0',
     entry_points={'console_scripts': [
         'adu_node = adu_drive.adu_node:main',

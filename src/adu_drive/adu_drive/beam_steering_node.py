@@ -1,15 +1,11 @@
-"""ROS node of an electronically steered array.
-
-The node sets the time of the graph, publishes the beams that are active, and points each beam to its references. For
-each beam the node runs the unit `array.beam_unit.Beam`, whose law is `array.electronic_beam.step`; change the beam
-there. `entry` is imported first, so that a signal during the other imports ends the process without a message.
-"""
-import pedestal_common.entry  # noqa: F401
+"""ROS node of an electronically steered array: it runs a unit for each beam, whose law is
+`array.electronic_beam.step`."""
+import pedestal_common.entry  # noqa: F401  # first, for signals during the other imports
 
 # isort: split
 import sys
 
-from adu_drive.timekeeper_node import Timekeeper, unit_of
+from drive_law.timekeeper_node import Timekeeper, unit_of
 from pedestal_common.node import shell
 from pedestal_common.node.unit import Diagnosis
 

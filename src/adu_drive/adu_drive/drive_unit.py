@@ -1,26 +1,22 @@
 """Antenna drive unit: two axes over one control period T, from commands at t_k to encoders at t_k+1.
 
-The sub-steps run in one compiled call: speed loop 0.5 ms, current loops 100 us, plant 50 us. The unit of the node
-`adu` (adu_drive.unit) calls `step`.
+The sub-steps run in one compiled call: speed loop 0.5 ms, current loops 100 us, plant 50 us.
 """
 import math
-from typing import Annotated
 
-from adu_drive import axis, drive_state, stow_pins
+from adu_drive import axis
 from adu_drive.lanes import at, count
-from adu_drive.params import SPEED_LOOP_PERIOD_S, AduParameters, whole_speed_periods
 from adu_drive.plant import gimbal, mount, wind
 from adu_drive.plant.wind import FieldConstants
+from drive_law import drive_state, stow_pins
+from drive_law.axis_params import SPEED_LOOP_PERIOD_S
+from drive_law.params import AduParameters
 from pedestal_common.compiled import compiled, inlined, separate
 from pedestal_common.quantities import (
-    Bit,
-    Floats,
-    Ints,
     KilogramMeters2,
     NewtonMeters,
     Pair,
     Radians,
-    RadiansPerSecond,
     RadiansPerSecond2,
     Records,
     Seconds,
@@ -28,92 +24,39 @@ from pedestal_common.quantities import (
 )
 from pedestal_common.record import Record
 
-COMMAND_RING_SIZE = 256
-"""Number of commands in the ring of the transport delay.
 
-It exceeds the 200 commands of a configured and an injected delay, each of MAX_TRANSPORT_DELAY_S, at the
-shortest period of 1 ms.
-"""
-
-INITIAL_AGE_PERIODS = 1 << 40
-"""Initial number of periods since the last change of the brakes: longer ago than any time of a brake or a delay."""
-
-MAX_PLAUSIBLE_INPUT = 1e6  # largest valid input [rad/s, Nm, rad/s2]. An input beyond it, infinite or NaN is invalid.
+class DeckMotion(Record):
+    """Motion of the deck, FLU."""
+    base_acceleration: Vector3  # angular acceleration [rad/s2]
+    base_rate: Vector3          # [rad/s]
 
 
-class AxisInputs(Record):
-    """Command to an axis."""
-    rate: RadiansPerSecond
-    torque: NewtonMeters        # feed-forward torque of both motors on the load axis
-
-
-class Inputs(Record):
+class Inputs(drive_state.Inputs, DeckMotion):
     """Inputs of a period."""
-    azimuth: AxisInputs
-    elevation: AxisInputs
-    base_acceleration: Vector3  # angular acceleration of the deck, FLU [rad/s2]
-    enable: Bit                 # 1: follow the command; 0: controlled stop, which begins without the transport delay
-    base_rate: Vector3          # rate of the deck, FLU [rad/s]
-    pins: int                   # code of acu/stow_pins: command to the stow pins
 
 
-class Outputs(Record):
-    """Outputs at t_k+1."""
+class Outputs(drive_state.Outputs):
+    """Outputs at t_k+1, with the true motion of the axes."""
     azimuth: axis.Outputs
     elevation: axis.Outputs
-    # 1 if an input of this call was invalid; the command is then taken as enable 0, a disturbance as 0
-    invalid_command: Bit
-    phase: int                  # index of drive_state.PHASES
-    following: Bit              # 1 if enabled and permitted at t_k+1
-    wanted: Bit                 # 0 after a request to disable
-    emergency: Bit              # 1 while an emergency stop is latched
-    braked: Bit                 # 1 while the brakes grip
-    condition: int              # see drive_state.condition
-    pins: int                   # see stow_pins.state_code
 
 
-class Constants(Record):
-    """Constants of the drive; X_ticks: in periods of the speed loops, X_periods: in control periods."""
+class Constants(drive_state.Constants):
+    """Constants of the drive and its plant."""
     azimuth: axis.Constants
     elevation: axis.Constants
     bodies: gimbal.Constants
     wind: wind.Constants
     field: FieldConstants
     mount: mount.Constants
-    pins: stow_pins.Constants
-    period: Seconds             # T
-    speed_ticks: int            # the control period
-    delay_ticks: int            # transport delay
-    engage_periods: int         # times of the brakes
-    release_periods: int
-    stop_periods: int           # longest controlled stop
     substeps: int               # number of plant sub-steps in a current-loop period
 
 
-class State(Record):
-    """State of the drive.
-
-    `State.dtype` is one object, which all state records share. A record with an equal copy would cost 3 us in each
-    call, because numba then compares the copy field by field.
-    """
+class State(drive_state.State):
+    """State of the drive and its plant."""
     azimuth: axis.State
     elevation: axis.State
-    rate: Annotated[Floats, (COMMAND_RING_SIZE, 2)]     # ring of the commands: rates [rad/s]
-    torque: Annotated[Floats, (COMMAND_RING_SIZE, 2)]   # feed-forward torques [Nm]
-    enable: Annotated[Ints, (COMMAND_RING_SIZE,)]       # inputs `enable`
-    k: int                      # number of the period
     last_rate: Pair             # rates of the loads in the previous period [rad/s]
-    phase: int                  # phase, wanted, emergency, following: see Outputs
-    age: int                    # periods since the last change of the phase
-    wanted: Bit
-    emergency: Bit
-    tick: int                   # speed-loop period whose command is in force
-    late_ticks: int             # injected delay in speed-loop periods
-    applied: Bit                # 1 while the brakes are commanded on
-    brake_age: int              # periods since the last change of the command to the brakes
-    braked: Bit                 # 1 while the brakes grip
-    following: Bit
-    pins: stow_pins.State
 
 
 def constants(params: AduParameters, substeps: int = 2, speed_period: Seconds = SPEED_LOOP_PERIOD_S) -> Records:
@@ -122,43 +65,28 @@ def constants(params: AduParameters, substeps: int = 2, speed_period: Seconds = 
     h = axis.CURRENT_LOOP_PERIOD_S / substeps
     bodies = gimbal.constants(params)
     return Constants.of(
+        **drive_state.constants(params),
         azimuth=axis.constants(params.azimuth, h, bool(bodies['rigid']), speed_period),
         elevation=axis.constants(params.elevation, h, period=speed_period), bodies=bodies,
         wind=wind.constants(params.wind), field=wind.field_constants(params.wind.field),
-        mount=mount.constants(params.mount), pins=stow_pins.constants(params), period=params.period,
-        speed_ticks=whole_speed_periods('period', params.period),
-        delay_ticks=whole_speed_periods('transport_delay', params.transport_delay),
-        **{f'{name}_periods': math.ceil(getattr(params.brakes, f'{name}_time') / params.period - 1e-6)
-           for name in ('engage', 'release', 'stop')},
-        substeps=substeps)
+        mount=mount.constants(params.mount), substeps=substeps)
 
 
 def initial_state(params: AduParameters) -> Records:
     """Return the State (1,) at rest at the initial angles, in balance with wind (t = 0) and unbalance."""
-    axes, enabled = {}, params.initially_enabled and not (params.stow_pins and params.pins.initially_in)
+    axes = {}
     of_field = wind.initial_field_torques(params.wind.field, params.initial_azimuth, params.initial_elevation)
     for name, torque, field in zip(('azimuth', 'elevation'), wind.initial_torques(params.wind), of_field):
         p, theta = getattr(params, name), getattr(params, f'initial_{name}')
         external = torque + field - p.load.unbalance * math.cos(theta)
         axes[name] = axis.initial_state(p, theta, external)
-    return State.of(
-        **axes, enable=1, phase=drive_state.PHASE_ENABLED if enabled else drive_state.PHASE_DISABLED,
-        wanted=params.initially_enabled, tick=-INITIAL_AGE_PERIODS, applied=not enabled,
-        brake_age=INITIAL_AGE_PERIODS, braked=not enabled, pins=stow_pins.initial_state(params))
-
-
-@compiled
-def _plausible(x: float) -> bool:
-    """Return True if an input x is valid, as MAX_PLAUSIBLE_INPUT states; NaN is invalid."""
-    return abs(x) <= MAX_PLAUSIBLE_INPUT
+    return State.of(**drive_state.initial_state(params), **axes)
 
 
 @compiled
 def inertial_torques(azimuth: Radians, J_azimuth: KilogramMeters2, J_elevation: KilogramMeters2, x: RadiansPerSecond2,
                      y: RadiansPerSecond2, z: RadiansPerSecond2) -> tuple[NewtonMeters, NewtonMeters]:
     """Return the torques on azimuth and elevation for a deck acceleration (x, y, z) about its FLU axes.
-
-    azimuth: angle A of the axis; J_azimuth, J_elevation: inertia of the loads.
 
     Relative to the deck, the inertia of a load makes the torque -J (n . acceleration). n is the unit vector about
     which the angle of the axis grows by the right-hand rule. Azimuth grows clockwise: n = (0, 0, -1). Elevation lifts
@@ -170,9 +98,8 @@ def inertial_torques(azimuth: Radians, J_azimuth: KilogramMeters2, J_elevation: 
 @compiled
 def _apply_rigid_body_torques(state: State, constants: Constants, w: Vector3,
                               w_dot: tuple[RadiansPerSecond2, RadiansPerSecond2, RadiansPerSecond2]) -> None:
-    """Set the inertia of azimuth and the torques of the turning bodies on both axes, constant over the period.
+    """Set the inertia of azimuth and the torques of the turning bodies on both axes. w: rate of the deck, FLU.
 
-    w, w_dot: rate [rad/s] and angular acceleration of the deck, FLU. Other symbols: see gimbal.py.
     The coupling of an axis uses the acceleration of the other axis in the previous period. The loop of both couplings
     is stable, because M_AE^2 < M_AA M_EE.
     """
@@ -189,7 +116,7 @@ def _apply_rigid_body_torques(state: State, constants: Constants, w: Vector3,
 @compiled
 def external_torques(state: State, constants: Constants,
                      inputs: Inputs) -> tuple[NewtonMeters, NewtonMeters, bool]:
-    """Return the external torques on both loads, constant over the period, and True for valid inputs."""
+    """Return the torques on both loads over the period, and True for valid inputs."""
     x, y, z = inputs.base_acceleration[0], inputs.base_acceleration[1], inputs.base_acceleration[2]
     azimuth, elevation = state.azimuth.theta, state.elevation.theta
     T_azimuth, T_elevation = wind.torques(constants.wind, state.k * constants.period)
@@ -198,7 +125,7 @@ def external_torques(state: State, constants: Constants,
         T_azimuth, T_elevation = T_azimuth + of_field[0], T_elevation + of_field[1]
     T_azimuth += state.azimuth.gust - constants.azimuth.unbalance * math.cos(azimuth)
     T_elevation += state.elevation.gust - constants.elevation.unbalance * math.cos(elevation)
-    valid = _plausible(x) and _plausible(y) and _plausible(z)
+    valid = drive_state.plausible(x) and drive_state.plausible(y) and drive_state.plausible(z)
     if not valid:
         x = y = z = 0.0
     if constants.bodies.rigid:
@@ -210,21 +137,7 @@ def external_torques(state: State, constants: Constants,
 
 
 @compiled
-def receive_command(state: State, inputs: Inputs, disturbance_valid: bool) -> bool:
-    """Put the command of step k into the ring. Return True if the command and the disturbance are valid."""
-    slot = state.k % COMMAND_RING_SIZE
-    valid = (disturbance_valid and _plausible(inputs.azimuth.rate) and _plausible(inputs.azimuth.torque)
-             and _plausible(inputs.elevation.rate) and _plausible(inputs.elevation.torque))
-    state.enable[slot] = 1 if valid and inputs.enable == 1 else 0
-    if valid:
-        state.rate[slot, 0], state.rate[slot, 1] = inputs.azimuth.rate, inputs.elevation.rate
-        state.torque[slot, 0], state.torque[slot, 1] = inputs.azimuth.torque, inputs.elevation.torque
-    return valid
-
-
-@compiled
 def _beam_from_axes(constants: Constants, azimuth: axis.Outputs, elevation: axis.Outputs) -> None:
-    """Replace the angles and rates of the axes by those of the beam, in the outputs of both."""
     angles, rates = mount.beam(constants.mount, azimuth.load_position, elevation.load_position, azimuth.load_velocity,
                                elevation.load_velocity)
     azimuth.load_position, elevation.load_position = angles
@@ -233,47 +146,23 @@ def _beam_from_axes(constants: Constants, azimuth: axis.Outputs, elevation: axis
 
 @compiled
 def read(state: State, constants: Constants, outputs: Outputs) -> None:
-    """Write the present outputs without integration, for t_0 before the first step."""
+    """Write the present outputs, without a step."""
     axis.read(state.azimuth, constants.azimuth, outputs.azimuth)
     axis.read(state.elevation, constants.elevation, outputs.elevation)
     if not constants.mount.true:
         _beam_from_axes(constants, outputs.azimuth, outputs.elevation)
-    outputs.phase, outputs.wanted = state.phase, state.wanted
-    outputs.emergency, outputs.braked = state.emergency, state.braked
-    outputs.following = state.phase == drive_state.PHASE_ENABLED and drive_state.permitted(state)
-    outputs.condition, outputs.pins = drive_state.condition(state), stow_pins.state_code(state.pins, constants.pins)
-
-
-@compiled
-def request(state: State, constants: Constants, outputs: Outputs, what: int) -> int:
-    """Execute drive_state.request between two periods and update the outputs. Return its reply."""
-    answer = drive_state.request(state, constants, what)
-    read(state, constants, outputs)
-    return answer
+    drive_state.read(state, constants, outputs)
 
 
 @compiled
 def _begin_period(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) -> None:
-    """Begin a period: external torques, command, brakes and windings."""
     state.azimuth.external, state.elevation.external, valid = external_torques(state, constants, inputs)
-    outputs.invalid_command = 0 if receive_command(state, inputs, valid) else 1
+    outputs.invalid_command = 0 if drive_state.receive_command(state, inputs, valid) else 1
     state.braked = drive_state.advance(state, constants, inputs.pins, True)
     axis.begin_period(state.azimuth, constants.azimuth, state.braked)
     axis.begin_period(state.elevation, constants.elevation, state.braked)
     state.azimuth.braked |= stow_pins.holds(state.pins, constants.pins, 0)
     state.elevation.braked |= stow_pins.holds(state.pins, constants.pins, 1)
-
-
-@compiled
-def apply_command(state: State, constants: Constants, inputs: Inputs, j: int) -> None:
-    """Take the command of speed-loop period j out of the ring. state.following is then 1 if it enables the drive."""
-    # While an injected delay begins, `max` repeats the last command. Before the first command, a slot has rate 0.
-    state.tick = max(state.tick, state.k * constants.speed_ticks + j - constants.delay_ticks - state.late_ticks)
-    slot = (state.tick // constants.speed_ticks) % COMMAND_RING_SIZE
-    state.following = state.enable[slot] if state.phase == drive_state.PHASE_ENABLED and inputs.enable == 1 else 0
-    az, el = state.azimuth, state.elevation
-    az.commanded_rate, az.commanded_torque = state.rate[slot, 0], state.torque[slot, 0]
-    el.commanded_rate, el.commanded_torque = state.rate[slot, 1], state.torque[slot, 1]
 
 
 @inlined
@@ -284,10 +173,7 @@ def _speed_control(state: State, of_axis: axis.State, constants: axis.Constants)
 
 @compiled
 def between_speed_periods(state: axis.State, constants: axis.Constants, substeps: int) -> None:
-    """Run current loops and plant of one axis, or of lanes of axes, from one speed-loop period to the next.
-
-    substeps: plant sub-steps per current-loop period.
-    """
+    """Run current loops and plant of one axis, or of lanes of axes, for one speed-loop period."""
     axes = range(count(state))
     for _ in range(axis.CURRENT_LOOP_STEP_COUNT):
         for i in axes:
@@ -300,17 +186,14 @@ def between_speed_periods(state: axis.State, constants: axis.Constants, substeps
 
 @separate
 def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) -> None:
-    """Advance one control period from t_k to t_k+1; state and outputs are written.
-
-    Each record may also be the lanes.Lanes of many drives. All lanes have the period and the number of sub-steps of
-    the first lane.
-    """
+    """Advance one control period from t_k to t_k+1. Each record may also be the lanes.Lanes of many drives. All lanes
+    have the period and the number of sub-steps of the first lane."""
     drives = range(count(state))
     for i in drives:
         _begin_period(at(state, i), at(constants, i), at(inputs, i), at(outputs, i))
     for j in range(at(constants, 0).speed_ticks):
         for i in drives:
-            apply_command(at(state, i), at(constants, i), at(inputs, i), j)
+            drive_state.apply_command(at(state, i), at(constants, i), at(inputs, i), j)
         for i in drives:
             _speed_control(at(state, i), at(state, i).azimuth, at(constants, i).azimuth)
         for i in drives:

@@ -2,6 +2,7 @@
 from typing import Protocol
 
 from adu_drive import axis, drive_unit
+from drive_law.rate_drive import JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import message_faults, schedule, table
@@ -30,9 +31,6 @@ class FaultyDrive(Protocol):
     injected: DriveInjected
 
 
-JOINT_STATES_TOPIC, MOTOR_STATES_TOPIC = 'joint_states', 'adu/motor_states'
-
-
 @compiled
 def _clear_faults(axis_state: axis.State) -> None:
     axis_state.motor_lost[0] = axis_state.motor_lost[1] = axis_state.stuck = axis_state.toothless = 0
@@ -42,11 +40,8 @@ def _clear_faults(axis_state: axis.State) -> None:
 
 @compiled
 def _apply_fault(drive: FaultyDrive, fault: int, values: Floats) -> None:
-    """Apply a fault to the drive.
-
-    values: the arguments of the fault in the order of its row of table.INJECTED_FAULTS. The first argument is the
-    axis, except for faults of the whole drive, such as `delay`.
-    """
+    """Apply a fault. values: its arguments in the order of its row of table.INJECTED_FAULTS, the axis first, except
+    for a fault of the whole drive."""
     i = int(values[0])
     state, constants = drive.state, drive.constants
     s, c = (state.azimuth, constants.azimuth) if i == 0 else (state.elevation, constants.elevation)
@@ -89,11 +84,8 @@ def apply_due_faults(drive: FaultyDrive, stamp: Nanoseconds) -> None:
 
 @compiled
 def corrupt_messages(faults: DriveInjected, stamp: Nanoseconds, outputs: AnyRecord) -> None:
-    """Apply the active message faults to the messages of a step at a stamp.
-
-    A frozen drive repeats 18 stored numbers. The last argument of message_faults.numbers is the index of the first
-    one.
-    """
+    """Apply the active message faults to the messages of a step. A frozen drive repeats 18 stored numbers. The last
+    argument of message_faults.numbers is the index of the first one."""
     joints, motors = outputs[JOINT_STATES_TOPIC], outputs[MOTOR_STATES_TOPIC]
     for i in range(2):
         joints.velocity[i] += faults.bias[i]

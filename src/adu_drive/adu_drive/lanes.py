@@ -1,8 +1,7 @@
 """Lanes: many drives at once, computed by vector instructions from the source of the laws of one drive.
 
-Trials run their drives on lanes. The records of LANE_COUNT drives, of 8-byte numbers (words) each, become one flat
-array, a structure of arrays. Word r of the record of lane i has the index r LANE_COUNT + i. For a record (theta,
-omega) the array holds theta of all lanes, then omega of all lanes, and `s.omega` of lane i is its word LANE_COUNT + i.
+The records of LANE_COUNT drives, of 8-byte numbers (words) each, become one flat array, a structure of arrays. Word r
+of the record of lane i has the index r LANE_COUNT + i.
 
 A law that uses the attributes of a record, such as `s.omega += c.h * a`, also compiles for one Lane. If the law is
 inlined into a loop over the lanes, LLVM makes vector instructions of it. Their results equal those of the scalar code
@@ -11,8 +10,7 @@ to the last bit. A function for records and for Lanes loops by
     for i in range(count(s)):
         law(at(s, i), at(c, i))
 
-For a single record, `count` is 1 and `at` returns the record. Lanes exist in compiled code only, as pointers into the
-flat array. The flat array must exist as long as its Lanes.
+Lanes exist in compiled code only, as pointers into the flat array, which must exist as long as they do.
 
 The private functions below are the hooks by which numba types and compiles these operations: `_type_..` and `generic`
 return the type of a result, the others generate its code.
@@ -136,7 +134,6 @@ def _at(context: BaseContext, builder: IRBuilder, signature: Signature, args: Va
 
 
 def _member(place: Lane | Lanes, attribute: str) -> types.Type:
-    """Return the type of an attribute of a Lane or of Lanes."""
     field = place.what.typeof(attribute)
     if isinstance(field, types.Record):
         return type(place)(field, place.known)
@@ -147,7 +144,6 @@ def _member(place: Lane | Lanes, attribute: str) -> types.Type:
 
 
 def _offset_pointer(context: BaseContext, builder: IRBuilder, pointer: Value, words: int | Value) -> Value:
-    """Return a pointer that is advanced by a number of words within its lane."""
     if isinstance(words, int):
         return builder.gep(pointer, [context.get_constant(types.intp, words * LANE_COUNT)], inbounds=True)
     rows = builder.mul(words, context.get_constant(types.intp, LANE_COUNT))
@@ -155,7 +151,6 @@ def _offset_pointer(context: BaseContext, builder: IRBuilder, pointer: Value, wo
 
 
 def _word(context: BaseContext, builder: IRBuilder, pointer: Value, field: types.Type) -> Value:
-    """Return a pointer cast to a pointer to a number of a type."""
     return builder.bitcast(pointer, context.get_data_type(field).as_pointer())
 
 
@@ -191,7 +186,6 @@ def _set(context: BaseContext, builder: IRBuilder, signature: Signature, args: V
 
 
 def _indices(index: types.Type) -> tuple[types.Type, ...]:
-    """Return the types of the indices of a getitem or setitem."""
     members: Any = index    # numba declares no iteration
     return tuple(members) if isinstance(index, types.BaseTuple) else (index,)
 
@@ -228,7 +222,6 @@ class _SetItem(AbstractTemplate):
 
 def _item_pointer(context: BaseContext, builder: IRBuilder, array: LaneArray, index_type: types.Type, pointer: Value,
                   index: Value) -> Value:
-    """Return a pointer to an item of a LaneArray."""
     many = isinstance(index_type, types.BaseTuple)
     indices = tuple(builder.extract_value(index, i) for i in range(len(_indices(index_type)))) if many else (index,)
     shape, words = array.what.shape, context.get_constant(types.intp, 0)
@@ -258,8 +251,8 @@ def _set_item(context: BaseContext, builder: IRBuilder, signature: Signature, ar
 def view(dtype: DType, known: Mapping[str, int] = MappingProxyType({})) -> Callable[[Floats], AnyRecord]:
     """Return a function for compiled code that gives the Lanes of records of this type in a flat array of `to_lanes`.
 
-    dtype: of one record; known: {attribute: number} of flags, at any depth of the record, with this number in every
-    lane. Code that these flags switch off is not compiled.
+    known: {attribute: number} of flags, at any depth of the record, with this number in every lane. Code that these
+    flags switch off is not compiled.
     """
     lanes = Lanes(numba.from_dtype(dtype), tuple(sorted(dict(known).items())))
 
@@ -272,10 +265,8 @@ def view(dtype: DType, known: Mapping[str, int] = MappingProxyType({})) -> Calla
 
 
 def to_lanes(records: Records) -> Floats:
-    """Return records (n,), n <= LANE_COUNT, as the flat array (words LANE_COUNT,) of their Lanes.
-
-    Lanes beyond n hold the last record.
-    """
+    """Return records (n,), n <= LANE_COUNT, as the flat array (words LANE_COUNT,) of their Lanes. The last record
+    fills the other lanes."""
     words = _words(records)
     lane = np.minimum(np.arange(LANE_COUNT), len(records) - 1)
     return np.ascontiguousarray(words[lane].T).reshape(-1)
@@ -287,5 +278,4 @@ def from_lanes(flat: Floats, records: Records) -> None:
 
 
 def _words(records: Records) -> Floats:
-    """Return a view (n, words) of contiguous records (n,), each a row of 8-byte words."""
     return records.view(np.float64).reshape(len(records), -1)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from adu_drive import drive_unit
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 
 PARAMS = AduParameters(initial_elevation=0.7)
 

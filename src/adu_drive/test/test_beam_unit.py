@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from adu_drive.array.beam_unit import CLOCK_TOPIC, DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, REFERENCE_TOPIC, Beam
-from adu_drive.params import BeamParameters
+from adu_drive.array.params import BeamParameters
 from pedestal_common.wire import records
 
 T = 10_000_000

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from adu_drive import axis, drive_unit
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 
 P = AduParameters(initial_elevation=0.7)
 STEP, K_p = 0.174, 54.85

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from adu_drive.controller import loops
+from adu_drive import axis
 from adu_drive.plant import motors
 
 R, L, P, PSI, V = 0.868, 10.0995e-3, 4.0, 0.4219, 310.0
@@ -16,7 +16,7 @@ def closed_loop(reference, omega=0.0, v_max=V):
     i_d = i_q = sum_d = sum_q = 0.0
     rows = []
     for i_ref in reference:
-        v_d, v_q, sum_d, sum_q, limited = loops.voltages(
+        v_d, v_q, sum_d, sum_q, limited = axis.voltages(
             i_d, i_q, i_ref, P * omega, sum_d, sum_q, W * L, W * R * T, L, PSI, v_max)
         rows.append((i_d, i_q, v_d, v_q, sum_q, limited))
         for _ in range(2):

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from adu_drive.controller import loops
-from adu_drive.params import AduParameters
+from drive_law import loops
+from drive_law.params import AduParameters
 from pedestal_common.parameters import build
 
 H, J = 5e-4, 0.034

@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive import drive_state
-from adu_drive.controller import faults
-from adu_drive.params import AduParameters
+from drive_law import drive_state, faults
+from drive_law.params import AduParameters
 from pedestal_common.parameters import build
 
 ELEVATION = {'initial_elevation': 0.7}

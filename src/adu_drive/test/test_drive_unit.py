@@ -7,15 +7,9 @@ import numpy as np
 import pytest
 
 from adu_drive import drive_unit
-from adu_drive.controller import faults
-from adu_drive.params import (
-    AduParameters,
-    AxisParameters,
-    BiasParameters,
-    GustParameters,
-    LimitParameters,
-    WindParameters,
-)
+from drive_law import faults
+from drive_law.axis_params import AxisParameters, BiasParameters, LimitParameters
+from drive_law.params import AduParameters, GustParameters, WindParameters
 from pedestal_common.geometry.line_of_sight import direction
 from pedestal_common.parameters import ParameterError, build
 

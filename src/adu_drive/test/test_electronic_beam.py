@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from adu_drive.array import electronic_beam
-from adu_drive.params import BEAM_RING_SIZE
+from adu_drive.array.params import BEAM_RING_SIZE
 from pedestal_common.parameters import ParameterError
 
 MS = 1_000_000

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from adu_drive import axis, drive_unit
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 from pedestal_common.parameters import build
 
 STEP, K_p = 0.174, 54.85

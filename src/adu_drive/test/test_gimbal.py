@@ -6,8 +6,8 @@ import pytest
 import sympy
 
 from adu_drive import drive_unit
-from adu_drive.params import AduParameters
 from adu_drive.plant import gimbal
+from drive_law.params import AduParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError, build
 

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from adu_drive import unit
-from adu_drive.params import AduNodeParameters
 from adu_drive.plant import mechanics
+from drive_law import rate_drive
+from drive_law.params import AduNodeParameters
 from pedestal_common.parameters import ParameterError, build
 from pedestal_common.wire import records
 from pedestal_common.wire.commands import Command
@@ -26,7 +27,7 @@ def run(inject='', seconds=2.0, rate=(0.1, 0.0), requests=(), **values):
     outputs, torque = records.empty(drive.outputs_type(), steps), np.zeros((steps, 2))
     for k in range(steps):
         if k:
-            command = drive.inputs[unit.RATE_COMMAND_TOPIC]
+            command = drive.inputs[rate_drive.RATE_COMMAND_TOPIC]
             command['stamp'], command['velocity'], command['effort'] = (k - 1) * PERIOD_NS, rate, 0.0
         for service in dict(requests).get(k, '').split():
             assert drive.command(Command(service)).granted
@@ -35,7 +36,7 @@ def run(inject='', seconds=2.0, rate=(0.1, 0.0), requests=(), **values):
     return drive, outputs, torque
 
 
-def angle(outputs, topic=unit.DRIVE_TRUTH_TOPIC, axis=0):
+def angle(outputs, topic=rate_drive.DRIVE_TRUTH_TOPIC, axis=0):
     return outputs[topic]['position'][:, axis]
 
 
@@ -55,7 +56,7 @@ def test_a_lost_motor_makes_no_torque_and_the_other_one_carries_the_load(motor):
     assert np.abs(torque[201:, lost]).max() < 0.01 < 1.0 < np.abs(torque[150:200, lost]).mean()
     # Friction and viscous torque of the load: 60 Nm sliding and 20 Nms/rad at 0.1 rad/s, over the ratio.
     assert torque[-100:, other].mean() * RATIO == pytest.approx(60.0 + 20.0 * 0.1 + lossy(0.1), rel=0.2)
-    assert outputs[unit.DRIVE_TRUTH_TOPIC]['velocity'][-100:, 0].mean() == pytest.approx(0.1, rel=0.01)
+    assert outputs[rate_drive.DRIVE_TRUTH_TOPIC]['velocity'][-100:, 0].mean() == pytest.approx(0.1, rel=0.01)
     assert drive.condition == 'enabled: azimuth motor lost'
 
 
@@ -68,19 +69,19 @@ def lossy(rate):
 
 def test_a_jump_of_the_load_encoder_is_read_and_tripped_on_while_the_truth_is_smooth():
     _, outputs, _ = run('1 encoder_jump size=0.004 duration=0.5')
-    off = angle(outputs, unit.JOINT_STATES_TOPIC) - angle(outputs)
+    off = angle(outputs, rate_drive.JOINT_STATES_TOPIC) - angle(outputs)
     count = 2.0 * math.pi / 2**22
     assert np.abs(off[200:300] - 0.004).max() < count and np.abs(off[:200]).max() < count > np.abs(off[300:]).max()
-    assert outputs[unit.DRIVE_STATE_TOPIC][-1] == 0                                 # below the 5 mrad that disagree
+    assert outputs[rate_drive.DRIVE_STATE_TOPIC][-1] == 0                           # below the 5 mrad that disagree
     drive, outputs, _ = run('1 encoder_jump size=0.006')
-    assert outputs[unit.DRIVE_STATE_TOPIC][199] == 0 and drive.condition == 'fault: azimuth encoder disagreement'
+    assert outputs[rate_drive.DRIVE_STATE_TOPIC][199] == 0 and drive.condition == 'fault: azimuth encoder disagreement'
 
 
 def test_a_stuck_encoder_stays_where_it_was_until_motor_and_load_disagree():
     drive, outputs, _ = run('1 encoder_stuck')
-    read = angle(outputs, unit.JOINT_STATES_TOPIC)
+    read = angle(outputs, rate_drive.JOINT_STATES_TOPIC)
     assert (read[200:] == read[199]).all() and angle(outputs)[210] > angle(outputs)[199] + 4e-3
-    tripped = np.flatnonzero(outputs[unit.DRIVE_STATE_TOPIC] != 0)[0]
+    tripped = np.flatnonzero(outputs[rate_drive.DRIVE_STATE_TOPIC] != 0)[0]
     assert tripped == pytest.approx(200 + 0.005 / 0.1 / 0.005, abs=2) and 'encoder disagreement' in drive.condition
 
 
@@ -88,7 +89,7 @@ def test_brakes_that_stay_on_cost_their_torque():
     _, _, plain = run()
     _, outputs, torque = run('1 brake_stuck state=on', azimuth__motor_1__brake=10.0, azimuth__motor_2__brake=10.0)
     assert torque[-100:].sum(1).mean() - plain[-100:].sum(1).mean() == pytest.approx(20.0, abs=0.5)
-    assert outputs[unit.DRIVE_TRUTH_TOPIC]['velocity'][-100:, 0].mean() == pytest.approx(0.1, rel=0.01)
+    assert outputs[rate_drive.DRIVE_TRUTH_TOPIC]['velocity'][-100:, 0].mean() == pytest.approx(0.1, rel=0.01)
 
 
 def test_brakes_that_stay_off_let_an_unbalanced_load_fall():
@@ -116,9 +117,9 @@ def test_a_pinion_that_lost_a_tooth_leaves_the_flank_once_a_turn():
     values = {'azimuth__bias__schedule': 'off', 'azimuth__faults__encoder_disagreement': 1.0}
     drive, outputs, _ = run('0 lost_tooth motor=1', 4.0, (0.5, 0.0), **values)
     _, plain, _ = run('', 4.0, (0.5, 0.0), **values)
-    ahead = [o[unit.MOTOR_STATES_TOPIC]['position'][:, 0] / RATIO - angle(o) for o in (outputs, plain)]
+    ahead = [o[rate_drive.MOTOR_STATES_TOPIC]['position'][:, 0] / RATIO - angle(o) for o in (outputs, plain)]
     assert np.abs(ahead[1] - ahead[1].mean())[100:].max() < 1e-4
-    pinion = outputs[unit.MOTOR_STATES_TOPIC]['position'][:, 0] / 8.0
+    pinion = outputs[rate_drive.MOTOR_STATES_TOPIC]['position'][:, 0] / 8.0
     beside = np.abs((pinion + math.pi) % (2.0 * math.pi) - math.pi)
     off = np.abs(ahead[0] - ahead[1].mean())
     assert off[100:][beside[100:] < 0.2].max() > 1e-3 and off[100:][beside[100:] > 1.0].max() < 1e-4
@@ -132,7 +133,7 @@ def test_a_gust_is_held_by_the_motors():
 
 def test_without_commands_it_stops_and_follows_again_when_they_come():
     _, outputs, _ = run('1 drop duration=0.5')
-    rate = outputs[unit.DRIVE_TRUTH_TOPIC]['velocity'][:, 0]
+    rate = outputs[rate_drive.DRIVE_TRUTH_TOPIC]['velocity'][:, 0]
     assert rate[199:210] == pytest.approx(0.1, abs=0.01) and np.abs(rate[230:299]).max() < 1e-3
     assert rate[-50:] == pytest.approx(0.1, abs=0.01)
 
@@ -145,18 +146,18 @@ def test_a_delay_is_the_transport_delay():
 
 def test_what_it_says_freezes_under_new_stamps_while_it_goes_on():
     _, outputs, _ = run('1 freeze duration=0.25')
-    for topic in (unit.JOINT_STATES_TOPIC, unit.MOTOR_STATES_TOPIC):
+    for topic in (rate_drive.JOINT_STATES_TOPIC, rate_drive.MOTOR_STATES_TOPIC):
         for field in ('position', 'velocity', 'effort'):
             frozen = outputs[topic][field][200:250]
             assert (frozen == frozen[0]).all() and (outputs[topic][field][251] != frozen[0]).any()
-    assert (np.diff(outputs[unit.JOINT_STATES_TOPIC]['stamp']) == PERIOD_NS).all()
+    assert (np.diff(outputs[rate_drive.JOINT_STATES_TOPIC]['stamp']) == PERIOD_NS).all()
     assert (np.diff(angle(outputs)[190:260]) > 0.0).all()
 
 
 def test_bias_nan_and_noise_are_on_joint_states_only():
     plain, biased, gone, noisy = (run(inject)[1] for inject in (
         '', '1 bias axis=azimuth size=0.2', '1 nan', '1 noise sigma=0.01 seed=4'))
-    joints = unit.JOINT_STATES_TOPIC
+    joints = rate_drive.JOINT_STATES_TOPIC
     assert biased[joints]['velocity'][200:, 0] - plain[joints]['velocity'][200:, 0] == pytest.approx(0.2)
     assert np.isnan(gone[joints]['position'][200:]).all() and np.isfinite(gone[joints]['position'][:200]).all()
     noise = noisy[joints]['position'][200:] - plain[joints]['position'][200:]

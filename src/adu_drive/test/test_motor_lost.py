@@ -2,10 +2,10 @@
 import numpy as np
 import pytest
 
-from adu_drive import drive_state
-from adu_drive.controller import faults
-from adu_drive.params import AduNodeParameters, AduParameters
-from adu_drive.unit import DRIVE_STATE_TOPIC, Adu
+from adu_drive.unit import Adu
+from drive_law import drive_state, faults
+from drive_law.params import AduNodeParameters, AduParameters
+from drive_law.rate_drive import DRIVE_STATE_TOPIC
 from pedestal_common.graph import topics
 from pedestal_common.parameters import build
 

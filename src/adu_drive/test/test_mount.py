@@ -7,8 +7,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from adu_drive import drive_unit
-from adu_drive.params import AduParameters, MountParameters
 from adu_drive.plant import mount
+from drive_law.params import AduParameters, MountParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import pointing_model
 from pedestal_common.geometry.line_of_sight import direction

@@ -3,17 +3,17 @@ import math
 import pytest
 
 from adu_drive import drive_unit
-from adu_drive.params import (
+from adu_drive.array.params import BeamParameters
+from drive_law.axis_params import (
     PLANT_PERIOD_S,
-    AduParameters,
     AxisParameters,
-    BeamParameters,
     BiasParameters,
     EncoderParameters,
     FrictionParameters,
     LimitParameters,
     MotorParameters,
 )
+from drive_law.params import AduParameters
 from pedestal_common.parameters import ParameterError, build
 
 

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 from pedestal_common.parameters import build
 
 

@@ -3,11 +3,12 @@ import math
 
 import pytest
 
-from adu_drive import state_file, unit
-from adu_drive.params import AduNodeParameters
+from adu_drive import unit
+from drive_law import rate_drive
+from drive_law.params import AduNodeParameters
 from pedestal_common.parameters import ParameterError
 
-LEFT = state_file.PlantState(1.25, 0.75, True)
+LEFT = rate_drive.PlantState(1.25, 0.75, True)
 
 
 def drive(**parameters):
@@ -16,10 +17,10 @@ def drive(**parameters):
 
 def test_what_was_written_is_read(tmp_path):
     path = tmp_path / 'state.json'
-    assert state_file.read(path) is None
+    assert rate_drive.read_plant_state(path) is None
     for left in (LEFT, LEFT._replace(enabled=False, azimuth=-7.5)):
-        state_file.write(path, left)
-        assert state_file.read(path) == left
+        rate_drive.write_plant_state(path, left)
+        assert rate_drive.read_plant_state(path) == left
     assert [file.name for file in tmp_path.iterdir()] == ['state.json']
 
 
@@ -30,7 +31,7 @@ def test_a_file_that_holds_something_else_is_refused_with_its_name(tmp_path, con
     path = tmp_path / 'state.json'
     path.write_text(content)
     with pytest.raises(ParameterError, match=f"state_file = '{path}': holds no state of a drive"):
-        state_file.read(path)
+        rate_drive.read_plant_state(path)
 
 
 @pytest.mark.parametrize('enabled, state', [(True, 'releasing brakes'), (False, 'disabled')])
@@ -46,7 +47,7 @@ def test_a_plant_stands_on_its_brakes_where_it_was_left(enabled, state):
 
 def test_an_angle_beyond_the_travel_is_at_its_end():
     adu = drive()
-    adu.resume(state_file.PlantState(0.0, 1.7, True))
+    adu.resume(rate_drive.PlantState(0.0, 1.7, True))
     assert adu.parts['outputs']['elevation']['position'] == pytest.approx(math.radians(92.0), abs=2e-6)
 
 

@@ -4,10 +4,9 @@ import math
 import numpy as np
 import pytest
 
-from adu_drive import drive_state, state_file, stow_pins
-from adu_drive.controller import faults
-from adu_drive.params import AduNodeParameters, AduParameters
 from adu_drive.unit import Adu
+from drive_law import drive_state, faults, rate_drive, stow_pins
+from drive_law.params import AduNodeParameters, AduParameters
 from pedestal_common.graph import topics
 from pedestal_common.parameters import ParameterError, build
 
@@ -89,10 +88,10 @@ def test_a_drive_without_pins_does_not_hear_of_them(drive):
 def test_a_stowed_antenna_is_still_stowed_after_a_restart(tmp_path):
     p = build(AduNodeParameters, {**STOWED, 'pins.initially_in': True})
     unit = Adu(p, Adu.NODE.reads[:3])
-    state_file.write(tmp_path / 'left', unit.plant_state())
+    rate_drive.write_plant_state(tmp_path / 'left', unit.plant_state())
     again = Adu(build(AduNodeParameters, STOWED), Adu.NODE.reads[:3])
     assert again.parts['outputs']['pins'] == 0
-    again.resume(state_file.read(tmp_path / 'left'))
+    again.resume(rate_drive.read_plant_state(tmp_path / 'left'))
     assert topics.TOPIC_BY_NAME['adu/stow_pins'].texts[again.parts['outputs']['pins']] == 'azimuth in, elevation in'
     assert again.rests and not stow_pins.pins_out(again.parts['state']['pins'])
 

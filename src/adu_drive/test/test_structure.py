@@ -7,8 +7,8 @@ import pytest
 from scipy import linalg
 
 from adu_drive import axis, drive_unit
-from adu_drive.params import AduParameters
 from adu_drive.plant import mechanics
+from drive_law.params import AduParameters
 from pedestal_common.parameters import build
 
 H, J = 50e-6, 210.0

@@ -5,8 +5,8 @@ import types
 import numpy as np
 import pytest
 
-from adu_drive.params import AduParameters
 from adu_drive.plant import mechanics, motors
+from drive_law.params import AduParameters
 from pedestal_common.parameters import build
 
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy import integrate, signal
 
-from adu_drive.params import AduParameters, GustParameters, WindParameters
 from adu_drive.plant import wind
+from drive_law.params import AduParameters, GustParameters, WindParameters
 from pedestal_common.parameters import build
 
 V, SIGMA, L = 15.0, 0.2 * 15.0, 120.0

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from adu_drive.params import AduParameters, WindFieldParameters
 from adu_drive.plant import wind
+from drive_law.params import AduParameters, WindFieldParameters
 from pedestal_common.parameters import build
 
 STEADY = WindFieldParameters(speed=12.0, from_azimuth=2.0, intensity=0.0)

@@ -2,10 +2,11 @@
 import numpy as np
 import pytest
 
-from adu_drive import unit as adu_unit
+from drive_law import rate_drive
 from equipment_sim.drives import law
 from equipment_sim.drives.unit import SimulatedDrives
 from pedestal_common import parameters
+from pedestal_common.wire.records import NO_STAMP
 from pedestal_hardware import commissioning, errors, pdo
 from pedestal_hardware.params import ServoDriveParameters
 from pedestal_hardware.unit import ServoDrives
@@ -65,8 +66,8 @@ class Rig:
 
     def step(self, rates=(0.0, 0.0), torques=(0.0, 0.0)):
         """Make a step with a command; None: no command arrives. Return the outputs of the unit."""
-        command = self.unit.inputs[0][adu_unit.RATE_COMMAND_TOPIC]
-        command['stamp'] = self.now - self.period if rates is not None else adu_unit.NO_STAMP
+        command = self.unit.inputs[0][rate_drive.RATE_COMMAND_TOPIC]
+        command['stamp'] = self.now - self.period if rates is not None else NO_STAMP
         if rates is not None:
             command['velocity'], command['effort'] = rates, torques
         self.unit.step(np.array([self.now]), self.unit.inputs, self.unit.outputs)

@@ -7,7 +7,7 @@ import canopen
 import numpy as np
 import pytest
 
-from adu_drive.drive_state import PHASE_ENGAGING_BRAKES
+from drive_law.drive_state import PHASE_ENGAGING_BRAKES
 from equipment_sim.drives import law
 from equipment_sim.drives.can_drive import CanDrive
 from pedestal_hardware import cia402, errors, pdo, servo_drives

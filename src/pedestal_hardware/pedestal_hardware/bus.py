@@ -1,4 +1,4 @@
-"""Bus of the drives: the five calls that the node needs of it. Nothing above this interface knows which bus it is."""
+"""Bus of the drives: the calls that the node needs of it. Nothing above this interface knows which bus it is."""
 import typing
 
 from pedestal_common.quantities import Bools, Records
@@ -9,26 +9,20 @@ class BusError(OSError):
 
 
 class Bus(typing.Protocol):
-    """Bus with pdo.DRIVE_COUNT drives.
-
-    A drive is `ready` after its `start`. It stays ready until it has no longer reported; the bus then keeps running
-    for the other drives. `notes` holds texts about rejected messages; the node logs and removes them.
-    """
+    """A drive stays ready after its `start` until it has no longer reported; the bus then keeps running for the other
+    drives. `notes` holds texts about rejected messages; the node logs and removes them."""
     notes: list[str]
 
     def start(self, drive: int, torque_mode: bool) -> None:
-        """Bring a drive to the point where it exchanges data. Raises BusError.
-
-        The bus identifies the drive, maps its data and reads the mapping back. Then the drive supervises this node.
-
-        torque_mode: True if its command holds the target torque in place of the torque offset.
-        """
+        """Identify a drive, map its data and read the mapping back. Then the drive supervises this node. Raises
+        BusError. torque_mode: True if its command holds the target torque in place of the torque offset."""
 
     def exchange(self, commands: Records, reports: Records) -> Bools:
-        """Send a command to each drive, let all drives act on it at the same time, and receive their reports.
+        """Send a command to each drive, let all drives act on it at the same time, and receive their reports, once a
+        period.
 
         commands: (4,) of pdo.COMMAND_DTYPE; reports: (4,) of pdo.REPORT_DTYPE, changed for drives that have reported.
-        Return for each drive whether it has reported completely. Called once a period.
+        Return for each drive whether it has reported completely.
         """
 
     def read(self, drive: int, index: int, subindex: int, kind: str) -> int:

@@ -1,7 +1,7 @@
 """Lines to a CAN bus: they send the frames of a period together, and receive the frames that have arrived.
 
-`SocketcandLine` speaks the text protocol of socketcand itself, because the
-objects of python-can would take a third of a period of 2 ms. All other interfaces use python-can.
+`SocketcandLine` speaks the text protocol of socketcand itself, because the objects of python-can would take a third of
+a period of 2 ms. All other interfaces use python-can.
 """
 import contextlib
 import select
@@ -74,7 +74,7 @@ class SocketcandLine:
             raise
 
     def receive(self, timeout: Seconds) -> list[Frame]:
-        """Return the frames that arrive within a time, at least those that have arrived. Raises OSError."""
+        """Return the frames; see Line."""
         if not select.select((self._socket,), (), (), timeout)[0]:
             return []
         data = self._socket.recv(MAX_CHUNK_BYTES)
@@ -111,7 +111,7 @@ class PythonCanLine:
             raise OSError(str(error)) from None
 
     def receive(self, timeout: Seconds) -> list[Frame]:
-        """Return the frames that arrive within a time, at least those that have arrived. Raises OSError."""
+        """Return the frames; see Line."""
         frames: list[Frame] = []
         end = time.monotonic() + timeout
         try:

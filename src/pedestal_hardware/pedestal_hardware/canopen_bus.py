@@ -79,7 +79,7 @@ class CanopenBus:
         self._last_heartbeat = self._exchanged = -np.inf
 
     def start(self, drive: int, torque_mode: bool = False) -> None:
-        """Identify a drive, map its data, and let it begin to exchange them; see bus.Bus. Raises BusError."""
+        """Identify a drive and map its data; see bus.Bus."""
         with self._opening:
             if self._closed:
                 raise BusError('the bus is closed')
@@ -164,7 +164,6 @@ class CanopenBus:
             self._close()
 
     def _open(self) -> None:
-        """Connect to the CAN bus and subscribe to the frames of the drives. Raises BusError."""
         self._close()
         p = self._p
         line: Line
@@ -186,7 +185,6 @@ class CanopenBus:
         threading.Thread(target=self._receive_between_exchanges, args=(line,), daemon=True).start()
 
     def _receive_between_exchanges(self, line: Line) -> None:
-        """Receive the frames of a line while no exchange receives them, until the line is closed."""
         while self._line is line:
             if time.monotonic() - self._exchanged < IDLE_TIME_S:
                 time.sleep(IDLE_TIME_S)
@@ -201,8 +199,7 @@ class CanopenBus:
                 line.close()
 
     def _receive(self, timeout: Seconds) -> None:
-        """Take the frames that arrive within a time, as the holder of `_reading`. An error closes the line. Raises
-        BusError."""
+        """Take the frames that arrive, as the holder of `_reading`. An error closes the line. Raises BusError."""
         line = self._line
         if line is None:
             raise BusError('the bus is closed')
@@ -234,7 +231,6 @@ class CanopenBus:
                 drive.emcy.reset()
 
     def _send_all(self, frames: list[Frame]) -> None:
-        """Send frames together. Raises BusError."""
         line = self._line
         if line is None:
             raise BusError('the bus is closed')
@@ -283,7 +279,6 @@ class CanopenBus:
 
     @contextlib.contextmanager
     def _errors_named(self, index: int, subindex: int) -> Iterator[None]:
-        """Turn the errors of an access to an object into a BusError that names the object."""
         where = f'object {index:04X}:{subindex}'
         try:
             yield
@@ -295,7 +290,6 @@ class CanopenBus:
             raise BusError(f'{where}: {error}') from None
 
     def _take(self, cob: int, data: bytes) -> None:
-        """Take a report of a drive."""
         i, first, size = self._places[cob]
         if len(data) != size:
             self._note(f'{self._labels[i]}: frame 0x{cob:03X} has {len(data)} bytes: must have {size}')

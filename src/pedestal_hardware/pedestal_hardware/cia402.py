@@ -1,7 +1,5 @@
-"""State machine of a drive by CiA 402 (IEC 61800-7-201): states in the statusword, commands in the controlword.
-
-Object 6041 is the statusword, object 6040 the controlword. Only the state machines of this module know their bits.
-"""
+"""State machine of a drive by CiA 402 (IEC 61800-7-201): states in the statusword (object 6041), commands in the
+controlword (6040). Only the state machines of this module know their bits."""
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 
@@ -46,10 +44,8 @@ def state(status: int) -> int:
 
 @compiled
 def controlword(now: int, goal: int) -> int:
-    """Return the controlword that leads a drive one transition nearer to a goal. now: code of its state.
-
-    No controlword of this function resets a fault.
-    """
+    """Return the controlword that leads a drive in the state `now` one transition nearer to a goal. It resets no
+    fault."""
     if now == State.FAULT or now == State.FAULT_REACTION_ACTIVE or goal == GOAL_OFF:
         return COMMAND_DISABLE_VOLTAGE
     if goal == GOAL_QUICK_STOP:

@@ -105,7 +105,6 @@ def velocity_unit(code: int) -> RadiansPerSecond:
 
 
 def _finest_velocity_unit(bus: Bus, drive: int) -> RadiansPerSecond:
-    """Set the finest velocity unit that the drive accepts, and return it."""
     try:
         bus.write(drive, 0x60A9, 0, 'I', MILLI_PREFIX << 24 | UNIT_RPM)
     except BusError:
@@ -114,7 +113,6 @@ def _finest_velocity_unit(bus: Bus, drive: int) -> RadiansPerSecond:
 
 
 def _rated_torque(bus: Bus, drive: int, parameters: ServoDriveParameters) -> NewtonMeters:
-    """Return the rated torque of a drive, near the parameter of the motor."""
     raw = bus.read(drive, 0x6076, 0, 'I')
     expected = getattr(parameters, topics.AXES[drive // 2]).thermal.rated_torque
     for unit in TORQUE_UNITS_NM:
@@ -125,7 +123,6 @@ def _rated_torque(bus: Bus, drive: int, parameters: ServoDriveParameters) -> New
 
 
 def _set(bus: Bus, drive: int, setting: Setting) -> None:
-    """Write a Setting and read it back."""
     try:
         bus.write(drive, setting.number, setting.subindex, setting.kind, setting.value)
         found = bus.read(drive, setting.number, setting.subindex, setting.kind)

@@ -1,10 +1,6 @@
-"""ROS node of an antenna with four CiA 402 servo drives: owns the time, and takes the place of `adu_node`.
-
-The node runs the unit `pedestal_hardware.unit.ServoDrives`, whose law is in `servo_drives`. A thread of the node
-commissions drives that have not been used yet or that return to the bus. `entry` is imported first, so that a signal
-during the other imports ends the process without a message.
-"""
-import pedestal_common.entry  # noqa: F401
+"""ROS node of an antenna with four CiA 402 servo drives, in place of `adu_node`. A thread of the node commissions
+drives that have not been used yet or that return to the bus."""
+import pedestal_common.entry  # noqa: F401  # first, for signals during the other imports
 
 # isort: split
 import sys
@@ -13,7 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from adu_drive.adu_node import AduNode
+from drive_law.rate_drive_node import RateDriveNode
 from pedestal_common.node import shell
 from pedestal_common.node.unit import Diagnosis
 from pedestal_common.quantities import Message
@@ -34,7 +30,7 @@ LEAVE_TIME_S = 2.0  # longest wait for the end of the commissioning thread, afte
 ANSWER_POLL_S = 0.02  # time between two checks whether all drives answer [s]
 
 
-class DriveNode(StartsWithEquipment, AduNode):
+class DriveNode(StartsWithEquipment, RateDriveNode):
     """Node of four servo drives."""
     parameters: ServoDriveParameters
     unit: ServoDrives
@@ -71,8 +67,7 @@ class DriveNode(StartsWithEquipment, AduNode):
         return answer if drives.start_after else f'{answer}, then {super().awaits}'
 
     def make_due_step(self) -> None:
-        """Make the due step as soon as all drives have answered. Raises BusError if a drive does not answer in time.
-        """
+        """Make the due step as soon as all drives have answered. Raises BusError if one does not answer in time."""
         unit = self.unit
         if unit.bus is None:
             missing = [i for i in range(len(DRIVE_LABELS)) if not unit.parts['drives']['ready'][i]]
@@ -86,7 +81,6 @@ class DriveNode(StartsWithEquipment, AduNode):
         super().make_due_step()
 
     def _use_bus(self) -> None:
-        """Begin to exchange data with the drives, which all answer."""
         drives = range(len(DRIVE_LABELS))
         assert self.bus is not None
         found = [self.bus.read(drive, 0x603F, 0, 'H') for drive in drives]
@@ -103,7 +97,7 @@ class DriveNode(StartsWithEquipment, AduNode):
         return self.with_start(super().diagnosed())
 
     def label(self, drive: int) -> str:
-        """Return the name of a drive for texts, with its node."""
+        """Return the name of a drive for texts, with its CANopen node."""
         return f'{DRIVE_LABELS[drive]} (node {self.parameters.drives.nodes[drive]})'
 
     def commission(self, drive: int) -> bool:
@@ -130,8 +124,7 @@ class DriveNode(StartsWithEquipment, AduNode):
             self.changed.clear()
 
     def _service(self, name: str) -> Callable[[Message, Message], Message]:
-        """Return the callback of a service. A reset also commissions the faulty drives again, because some drives
-        accept the reset only then."""
+        """Let a reset also commission the faulty drives again, because some drives accept the reset only then."""
         serve = super()._service(name)
 
         def call(request: Message, response: Message) -> Message:

@@ -3,7 +3,7 @@
 The codes are those of CiA 301, CiA 402 and the firmware specification of EPOS4. A code that has no name here belongs
 to a class, which its first digit states.
 """
-from adu_drive.controller import faults
+from drive_law import faults
 from pedestal_common.compiled import compiled
 
 ERROR_HEARTBEAT_LOST = 0x8130
@@ -48,7 +48,7 @@ def is_of_the_bus(code: int) -> bool:
 
 @compiled
 def fault_of(code: int, motor: int) -> int:
-    """Return the fault word of an axis for the error code of its drive `motor` (0 or 1) in the state `fault`."""
+    """Return the fault word of an axis for the error code of its drive `motor` (0 or 1)."""
     if code == 0x2350 or code & 0xF000 == 0x4000:
         return faults.Bit.OVERTEMPERATURE
     if code & 0xF000 == 0x2000:

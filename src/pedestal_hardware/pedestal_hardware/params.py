@@ -1,7 +1,8 @@
 """Parameters of `drive_node` and of the simulated drives: those of the drive unit, the bus, and the drives on it."""
 import dataclasses
 
-from adu_drive.params import AduNodeParameters, SpeedLoopParameters
+from drive_law.axis_params import SpeedLoopParameters
+from drive_law.params import AduNodeParameters
 from pedestal_common.parameters import ParameterError, Parameters, choice, flag, group, parameter, text
 from pedestal_hardware import pdo
 
@@ -120,7 +121,6 @@ class ServoDriveParameters(AduNodeParameters):
                                  f'frames of a period at bus.bitrate = {self.bus.bitrate}')
 
     def _check_speed_loop(self, axis: str, loop: SpeedLoopParameters) -> None:
-        """Raise ParameterError for a speed loop of an axis that its drives cannot have."""
         if loop.structure != 'mean':
             raise ParameterError(f'{axis}.speed_loop.structure = {loop.structure}: must be mean for servo drives')
         if self.control == 'drive' and loop.disturbance_observer > 0.0:
@@ -134,7 +134,7 @@ class ServoDriveParameters(AduNodeParameters):
                                      f'drives.{step} = {getattr(self.drives, step):g}')
 
     def torque_mode(self, drive: int) -> bool:
-        """Return True if a drive is in the mode of torque. drive: 0 to 3."""
+        """Return True if a drive is in the mode of torque."""
         return self.control == 'torque' or self.control == 'drive' and drive % 2 == 1
 
     def check_graph(self, beams: int, lockstep: bool) -> None:

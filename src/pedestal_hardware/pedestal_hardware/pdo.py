@@ -48,7 +48,7 @@ BITS_PER_BYTE = 8
 
 
 def pdo_bytes(mapping: Mapping) -> int:
-    """Return the number of bytes of a PDO with a mapping."""
+    """Return the number of bytes of a PDO."""
     return sum(bits for _, _, bits in mapping) // BITS_PER_BYTE
 
 

@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 
-from adu_drive.timekeeper_node import Timekeeper
+from drive_law.timekeeper_node import Timekeeper
 from pedestal_common.node import shell
 from pedestal_common.quantities import Nanoseconds
 from pedestal_common.wire.records import Decoded

@@ -1,7 +1,7 @@
 """Parameters of rotator_node: the rotator, its connection and its run."""
 import dataclasses
 
-from adu_drive.params import RunParameters
+from drive_law.params import RunParameters
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
 from pedestal_common.quantities import Degrees, Nanoseconds
 from pedestal_hardware.lines import sources

@@ -1,34 +1,26 @@
 """Law of `drive_node`: from the reports of four drives to their commands, once per control period.
 
-The law contains no control of its own. It writes the measured values of the drives into the state of the antenna
-drive unit (adu_drive), calls the functions of that unit, and turns their torques into commands:
+The law contains no control of its own. It writes the measured values of the drives into the state of a drive of two
+axes (drive_law), calls the functions of that package, and turns their torques into commands:
 
     offset = T - K_p (N rate - omega)
 
-T is the torque of a motor that the speed loop of the unit demands. A drive with the proportional gain K_p adds
-K_p (N rate - omega_i) itself. In the mean of both motors, the sum is the torque of the unit; the difference of both
-speeds is damped by K_p / 2 in addition. Integral, bias, feed-forward and disturbance observer stay here.
+T is the torque of a motor that the speed loop demands. A drive with the proportional gain K_p adds K_p (N rate -
+omega_i) itself. In the mean of both motors, the sum is this torque; the difference of both speeds is damped by K_p / 2
+in addition. Integral, bias, feed-forward and disturbance observer stay here.
 
 This is the control `velocity`. With the control `drive`, motor 1 has its whole speed loop in its drive, and motor 2
-follows the measured torque of motor 1, smoothed:
+follows the measured torque of motor 1, smoothed: T_2 = T_1 - 2 T_b. Without the smoothing the axis would oscillate,
+because the torque of motor 2 comes one period late and motor 2 has no damping of its own. The gains in the constants
+are then 0; limits of rate and travel, bias schedule and faults stay here. With the control `torque` each drive makes
+the torque T.
 
-    T_2 = T_1 - 2 T_b
-
-Without the smoothing the axis would oscillate, because the torque of motor 2 comes one period late and motor 2 has no
-damping of its own.
-
-The gains in the constants of the unit are then 0; limits of rate and travel, bias schedule and faults stay here. With
-the control `torque` each drive makes the torque T that the unit demands.
-
-An axis has the number 0 (azimuth) or 1 (elevation), its drives and motors have those of the package.
+An axis has the number 0 (azimuth) or 1 (elevation).
 """
 import math
 from typing import Annotated, TypeAlias
 
-from adu_drive import axis, drive_state, drive_unit
-from adu_drive import unit as adu_unit
-from adu_drive.controller import encoder, faults, loops
-from adu_drive.plant import motors
+from drive_law import axis_control, drive_state, faults, loops, rate_drive
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
     AnyRecord,
@@ -128,40 +120,37 @@ class Scales(Record):
 
 class ServoRecord(Record):
     """All data of the node."""
-    state: drive_unit.State
-    constants: drive_unit.Constants
-    inputs: drive_unit.Inputs
-    outputs: drive_unit.Outputs
-    link: adu_unit.Link
+    state: drive_state.State
+    constants: drive_state.Constants
+    inputs: drive_state.Inputs
+    outputs: drive_state.Outputs
+    link: rate_drive.Link
     drives: Drives
     scales: Scales
 
 
 @compiled
 def _lost_bit(motor: int) -> int:
-    """Return the fault bit of a lost motor of an axis (0 or 1)."""
     return faults.Bit.MOTOR_1_LOST if motor == 0 else faults.Bit.MOTOR_2_LOST
 
 
 @compiled
-def _measure_motor(motor: axis.MotorState, constants: axis.MotorConstants, angle: Radians, speed: RadiansPerSecond,
-                   torque: NewtonMeters) -> None:
-    """Write the measured motion and torque of a motor into its state."""
+def _measure_motor(motor: axis_control.MotorState, constants: axis_control.MotorConstants, angle: Radians,
+                   speed: RadiansPerSecond, torque: NewtonMeters) -> None:
     motor.theta, motor.measured = angle, speed
-    motor.count = int(encoder.counts(angle, constants.per_rad))
+    motor.count = int(axis_control.counts(angle, constants.per_rad))
     motor.i_q = torque * constants.per_K_t_hat
-    motor.heat = motors.thermal_load(motor.heat, torque, constants.per_rated, constants.heat_gain)
+    motor.heat = faults.thermal_load(motor.heat, torque, constants.per_rated, constants.heat_gain)
 
 
 @compiled
-def _copy_motor(motor: axis.MotorState, other: axis.MotorState) -> None:
+def _copy_motor(motor: axis_control.MotorState, other: axis_control.MotorState) -> None:
     """Write the motion of the other motor of the axis into the state of a motor that reports nothing."""
     motor.theta, motor.measured, motor.count, motor.i_q = other.theta, other.measured, other.count, 0.0
 
 
 @compiled
 def _note_reports(drives: Drives) -> None:
-    """Note age and state of each drive, and the interlock."""
     drives.interlock = 0
     for drive in range(N_DRIVES):
         drives.age[drive] = 0 if drives.reported[drive] and drives.ready[drive] else drives.age[drive] + 1
@@ -174,7 +163,8 @@ def _note_reports(drives: Drives) -> None:
 
 
 @compiled
-def _measure_axis(of_axis: axis.State, constants: axis.Constants, drives: Drives, scales: Scales, number: int) -> None:
+def _measure_axis(of_axis: axis_control.State, constants: axis_control.Constants, drives: Drives, scales: Scales,
+                  number: int) -> None:
     """Write the measured values of an axis into its state.
 
     The load encoder is wired to the drive of motor 1. While this drive is lost, the angle of the axis follows from
@@ -213,38 +203,43 @@ def _measure_axis(of_axis: axis.State, constants: axis.Constants, drives: Drives
 
 
 @compiled
+def read(records: Records) -> None:
+    """Write the present outputs."""
+    record = records[0]
+    state, constants, outputs = record.state, record.constants, record.outputs
+    for number in range(2):
+        of_axis, of_constants, measured = ((state.azimuth, constants.azimuth, outputs.azimuth) if number == 0 else
+                                           (state.elevation, constants.elevation, outputs.elevation))
+        axis_control.read(of_axis, of_constants, axis_control.counts(of_axis.theta, of_constants.per_rad),
+                          of_axis.motor_1.measured, of_axis.motor_2.measured, measured)
+        if not record.drives.angle_known[number]:
+            measured.position = math.nan
+    drive_state.read(state, constants, outputs)
+
+
+@compiled
 def measure(records: Records, stamp: Nanoseconds, messages: AnyRecord) -> None:
-    """Take the reports of the drives and write the messages of the step with a stamp. records: as of `control`."""
+    """Take the reports of the drives and write the messages of the step."""
     record = records[0]
     state, constants, outputs = record.state, record.constants, record.outputs
     drives, scales = record.drives, record.scales
     _note_reports(drives)
     _measure_axis(state.azimuth, constants.azimuth, drives, scales, 0)
     _measure_axis(state.elevation, constants.elevation, drives, scales, 1)
-    drive_unit.read(state, constants, outputs)
-    for number in range(2):
-        of_axis, of_constants, measured = ((state.azimuth, constants.azimuth, outputs.azimuth) if number == 0 else
-                                           (state.elevation, constants.elevation, outputs.elevation))
-        speed_1, speed_2 = of_axis.motor_1.measured, of_axis.motor_2.measured
-        measured.motor_velocity[0], measured.motor_velocity[1] = speed_1, speed_2
-        measured.velocity = of_constants.per_N * axis.mean_motor_speed(of_axis, speed_1, speed_2)
-        if not drives.angle_known[number]:
-            measured.position = math.nan
+    read(records)
     if record.link.stamp != NO_STAMP and outputs.invalid_command:
-        record.link.invalid = adu_unit.INVALID_COMMAND
+        record.link.invalid = rate_drive.INVALID_COMMAND
     record.link.stamp = stamp
-    adu_unit.encode_measured(outputs, stamp, messages)
+    rate_drive.encode_measured(outputs, stamp, messages)
 
 
 @compiled
 def _moves_out(commanded: RadiansPerSecond, measured: RadiansPerSecond) -> bool:
-    """Return True if an axis on a limit switch moves outwards, by its commanded or measured outward rate."""
     return commanded > faults.MIN_OUTWARD_RATE_RAD_S or measured > MAX_RATE_OF_LASH_RAD_S
 
 
 @compiled
-def _note_faults(of_axis: axis.State, drives: Drives, scales: Scales, number: int, phase: int) -> None:
-    """Set the faults of an axis that its drives report."""
+def _note_faults(of_axis: axis_control.State, drives: Drives, scales: Scales, number: int, phase: int) -> None:
     for motor in range(2):
         drive = 2 * number + motor
         drives.reset_left[drive] = max(drives.reset_left[drive] - 1, 0)
@@ -279,7 +274,7 @@ def _note_faults(of_axis: axis.State, drives: Drives, scales: Scales, number: in
 
 
 @compiled
-def _is_up(of_axis: axis.State, drives: Drives, number: int, periods: int) -> bool:
+def _is_up(of_axis: axis_control.State, drives: Drives, number: int, periods: int) -> bool:
     """Return True if every drive of an axis that is not lost is enabled by a report of at most this age."""
     for motor in range(2):
         drive = 2 * number + motor
@@ -290,8 +285,7 @@ def _is_up(of_axis: axis.State, drives: Drives, number: int, periods: int) -> bo
 
 
 @compiled
-def _goal(state: drive_unit.State, of_axis: axis.State, drives: Drives, scales: Scales, drive: int) -> int:
-    """Return the goal of a drive in the present phase, one of cia402.GOALS."""
+def _goal(state: drive_state.State, of_axis: axis_control.State, drives: Drives, scales: Scales, drive: int) -> int:
     if of_axis.faults & _lost_bit(drive % 2) or faults.removes_torque(of_axis.faults):
         return cia402.GOAL_OFF
     if state.phase == drive_state.PHASE_DISABLED:
@@ -308,16 +302,14 @@ def _goal(state: drive_unit.State, of_axis: axis.State, drives: Drives, scales: 
 
 
 @compiled
-def _demanded_torque(state: drive_unit.State, of_axis: axis.State, constants: axis.Constants, drives: Drives,
-                     scales: Scales, drive: int) -> NewtonMeters:
-    """Return the torque in the command of a drive: torque offset, or target torque in a drive in the mode of torque.
-    """
+def _demanded_torque(state: drive_state.State, of_axis: axis_control.State, constants: axis_control.Constants,
+                     drives: Drives, scales: Scales, drive: int) -> NewtonMeters:
     number, motor = drive // 2, drive % 2
     demanded = of_axis.motor_1.torque_ref if motor == 0 else of_axis.motor_2.torque_ref
     if scales.control == CONTROL_TORQUE:
         return demanded
     if scales.control == CONTROL_VELOCITY:
-        omega = axis.mean_motor_speed(of_axis, of_axis.motor_1.measured, of_axis.motor_2.measured)
+        omega = axis_control.mean_motor_speed(of_axis, of_axis.motor_1.measured, of_axis.motor_2.measured)
         return demanded - constants.K_p * (constants.N * of_axis.rate - omega)
     if motor == 1:
         return drives.followed[number] - 2.0 * of_axis.bias
@@ -327,9 +319,7 @@ def _demanded_torque(state: drive_unit.State, of_axis: axis.State, constants: ax
 
 
 @compiled
-def _controlword(state: drive_unit.State, drives: Drives, drive: int, goal: int) -> int:
-    """Return the controlword that leads a drive to its goal: it resets a fault, or holds the motor where no law
-    controls it."""
+def _controlword(state: drive_state.State, drives: Drives, drive: int, goal: int) -> int:
     if drives.reset_left[drive] and drives.state[drive] == cia402.State.FAULT:
         # The rising edge resets the fault.
         word = cia402.CONTROL_RESET if drives.controlword[drive] & cia402.CONTROL_RESET == 0 else 0
@@ -341,13 +331,10 @@ def _controlword(state: drive_unit.State, drives: Drives, drive: int, goal: int)
 
 
 @compiled
-def _command_drive(state: drive_unit.State, of_axis: axis.State, constants: axis.Constants, drives: Drives,
-                   scales: Scales, drive: int, alive: bool, kept: bool) -> None:
-    """Write the command of a drive: controlword, target velocity, torque.
-
-    alive: True if the axis is under control; kept: True if the torque keeps its last value. Otherwise the command is
-    0.
-    """
+def _command_drive(state: drive_state.State, of_axis: axis_control.State, constants: axis_control.Constants,
+                   drives: Drives, scales: Scales, drive: int, alive: bool, kept: bool) -> None:
+    """Write the command of a drive. alive: True if the axis is under control; kept: True if the torque keeps its last
+    value. Otherwise the command is 0."""
     goal = _goal(state, of_axis, drives, scales, drive)
     drives.controlword[drive] = _controlword(state, drives, drive, goal)
     if goal != cia402.GOAL_ENABLED or not (alive or kept):
@@ -360,7 +347,8 @@ def _command_drive(state: drive_unit.State, of_axis: axis.State, constants: axis
 
 
 @compiled
-def _keep_rate(of_axis: axis.State, constants: axis.Constants, drives: Drives, scales: Scales, number: int) -> None:
+def _keep_rate(of_axis: axis_control.State, constants: axis_control.Constants, drives: Drives, scales: Scales,
+               number: int) -> None:
     """Advance the angle of an axis by a period without reports, and keep its rate, reduced before an end of travel."""
     drives.angle[number] += of_axis.rate / scales.per_period
     angle = drives.angle[number]
@@ -371,14 +359,12 @@ def _keep_rate(of_axis: axis.State, constants: axis.Constants, drives: Drives, s
 
 @compiled
 def _whole(x: float, largest: float) -> int:
-    """Return the nearest whole number within +-largest."""
     return int(math.floor(min(max(x, -largest), largest) + 0.5))
 
 
 @compiled
-def _control_axis(state: drive_unit.State, of_axis: axis.State, constants: axis.Constants, drives: Drives,
-                  scales: Scales, number: int) -> None:
-    """Compute the commands of both drives of an axis with the speed loop of adu_drive."""
+def _control_axis(state: drive_state.State, of_axis: axis_control.State, constants: axis_control.Constants,
+                  drives: Drives, scales: Scales, number: int) -> None:
     motor_1, motor_2 = of_axis.motor_1, of_axis.motor_2
     first, second = 2 * number, 2 * number + 1
     _note_faults(of_axis, drives, scales, number, state.phase)
@@ -396,7 +382,7 @@ def _control_axis(state: drive_unit.State, of_axis: axis.State, constants: axis.
         constants.K_p, constants.K_iT = share * scales.K_p[number], share * scales.K_iT[number]
     if alive and drives.held[number]:
         # The drives have stopped the axis meanwhile: the law begins at its rate, and ramps to the command.
-        of_axis.rate = constants.per_N * axis.mean_motor_speed(of_axis, motor_1.measured, motor_2.measured)
+        of_axis.rate = constants.per_N * axis_control.mean_motor_speed(of_axis, motor_1.measured, motor_2.measured)
         of_axis.ramping = 1
         drives.held[number] = 0
     if kept:
@@ -410,8 +396,8 @@ def _control_axis(state: drive_unit.State, of_axis: axis.State, constants: axis.
             motor_1.sum, motor_2.sum, feed_forward = made, made, 0.0
             torque_1 = constants.motor_1.K_t_hat * motor_1.i_q
             drives.followed[number] += scales.follow_gain * (torque_1 - drives.followed[number])
-        axis.control_measured(of_axis, constants, made, of_axis.commanded_rate, feed_forward, state.following, alive,
-                              not state.braked)
+        axis_control.control(of_axis, constants, axis_control.counts(of_axis.theta, constants.per_rad), made,
+                             of_axis.commanded_rate, feed_forward, state.following, alive, not state.braked)
     for drive in (first, second):
         _command_drive(state, of_axis, constants, drives, scales, drive, alive, kept)
 
@@ -420,8 +406,8 @@ def _control_axis(state: drive_unit.State, of_axis: axis.State, constants: axis.
 def control(records: Records, stamp: Nanoseconds, messages: AnyRecord) -> None:
     """Compute the commands of the drives from their last reports and the messages of the step before.
 
-    records: ServoRecords (1,). A record itself as argument would cost 90 us, because numba would examine all its
-    fields in each call. stamp: time of the coming exchange.
+    A record itself as argument would cost 90 us, because numba would examine all its fields in each call. stamp: time
+    of the coming exchange.
     """
     record = records[0]
     state, constants, inputs, outputs = record.state, record.constants, record.inputs, record.outputs
@@ -429,15 +415,15 @@ def control(records: Records, stamp: Nanoseconds, messages: AnyRecord) -> None:
     if record.link.stamp == NO_STAMP:
         state.k = stamp // record.link.period
     else:
-        adu_unit.take_command(inputs, record.link, messages[adu_unit.RATE_COMMAND_TOPIC])
-    outputs.invalid_command = 0 if drive_unit.receive_command(state, inputs, True) else 1
+        rate_drive.take_command(inputs, record.link, messages[rate_drive.RATE_COMMAND_TOPIC])
+    outputs.invalid_command = 0 if drive_state.receive_command(state, inputs, True) else 1
     if drives.interlock:
         state.emergency = 1
     up = _is_up(state.azimuth, drives, 0, 1) and _is_up(state.elevation, drives, 1, 1)
     state.braked = drive_state.advance(state, constants, inputs.pins, up)
-    axis.begin_period(state.azimuth, constants.azimuth, state.braked)
-    axis.begin_period(state.elevation, constants.elevation, state.braked)
-    drive_unit.apply_command(state, constants, inputs, 0)
+    axis_control.begin_period(state.azimuth)
+    axis_control.begin_period(state.elevation)
+    drive_state.apply_command(state, constants, inputs, 0)
     _control_axis(state, state.azimuth, constants.azimuth, drives, scales, 0)
     _control_axis(state, state.elevation, constants.elevation, drives, scales, 1)
     state.k += 1

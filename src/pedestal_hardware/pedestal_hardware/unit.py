@@ -1,5 +1,4 @@
-"""Unit of `drive_node`. A step computes the commands, exchanges them for the reports of the drives, and fills the
-messages of the graph."""
+"""Unit of `drive_node`. A step: commands, their exchange for the reports of the drives, messages of the graph."""
 import dataclasses
 import math
 import typing
@@ -7,14 +6,11 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from adu_drive import drive_state, drive_unit
-from adu_drive import unit as adu_unit
-from adu_drive.state_file import PlantState
+from drive_law import axis_control, drive_state, rate_drive
 from pedestal_common.graph import nodes, topics
-from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN, Diagnosis, Unit
-from pedestal_common.quantities import Nanoseconds, Records, Stamps
-from pedestal_common.wire.commands import Command, Reply
-from pedestal_common.wire.records import NO_STAMP
+from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_WARN, Diagnosis
+from pedestal_common.quantities import Records, Stamps
+from pedestal_common.wire.commands import Reply
 from pedestal_hardware import cia402, errors, pdo, servo_drives
 from pedestal_hardware.bus import Bus
 from pedestal_hardware.commissioning import Scale
@@ -46,62 +42,65 @@ def _scales(params: ServoDriveParameters) -> Records:
 
 
 def _constants(params: ServoDriveParameters) -> Records:
-    """Return the constants for the laws of the drive unit, at the period of the node. The sensors of these laws are
-    exact, because the drives themselves measure."""
-    constants = drive_unit.constants(params, speed_period=params.period)
-    for axis in topics.AXES:
-        c = constants[0][axis]
-        c['encoder']['exact'], c['encoder']['zero'] = 1, 0.0
+    """Return the drive_state.Constants (1,). Their sensors are exact, because the drives themselves measure."""
+    axes = {}
+    for name in topics.AXES:
+        p = getattr(params, name)
+        values = axis_control.constants(p, params.period)
         if params.control == 'drive':
             # The drives contain the gains.
-            c['K_p'] = c['K_iT'] = c['K_d'] = 0.0
+            values.update(K_p=0.0, K_iT=0.0, K_d=0.0)
         for motor in ('motor_1', 'motor_2'):
-            c[motor]['gain'], c[motor]['offset'] = 1.0, 0.0
-    return constants
+            of_motor = axis_control.motor_constants(getattr(p, motor), p.thermal, p.encoder.motor_bits, params.period)
+            values[motor] = axis_control.MotorConstants.of(**{**of_motor, 'gain': 1.0, 'offset': 0.0})
+        axes[name] = axis_control.Constants.of(**{**values, 'zero_hat': 0.0})
+    return drive_state.Constants.of(**drive_state.constants(params), **axes)
 
 
-class ServoDrives(adu_unit.Adu):
+def _initial_state(params: ServoDriveParameters) -> Records:
+    axes = {}
+    for name in topics.AXES:
+        p, theta = getattr(params, name), getattr(params, f'initial_{name}')
+        angle = p.gear_train.ratio * theta
+        count = round(angle * axis_control.counts_per_rad(p.encoder.motor_bits))
+        motor = axis_control.MotorState.of(theta=angle, count=count)
+        axes[name] = axis_control.State.of(theta=theta, motor_1=motor, motor_2=motor)
+    return drive_state.State.of(
+        **{**drive_state.initial_state(dataclasses.replace(params, initially_enabled=False)),
+           'wanted': params.initially_enabled}, **axes)
+
+
+class ServoDrives(rate_drive.RateDrive):
     """Unit of four servo drives."""
     parameters: ServoDriveParameters
-    memory: Memory  # type: ignore[assignment]  # not the memory of the drive unit with its mechanics
+    memory: Memory
     bus: Bus | None         # None before the node has connected it; the drives then report nothing
     problems: list[str]     # reason why each drive cannot be used, or ''
-    NODE, COMMAND, LAWS, VERBS = nodes.SERVO_DRIVE, adu_unit.RATE_COMMAND_TOPIC, {}, ()
+    NODE, LAWS = nodes.SERVO_DRIVE, {}
 
     def __init__(self, parameters: ServoDriveParameters, reads: Iterable[str]) -> None:
-        Unit.__init__(self, parameters, reads)
+        super().__init__(parameters, reads)
         self.bus = None
         self.problems = [''] * pdo.DRIVE_COUNT
         self._commands = np.zeros(pdo.DRIVE_COUNT, pdo.COMMAND_DTYPE)
         self._reports = np.zeros(pdo.DRIVE_COUNT, pdo.REPORT_DTYPE)
-        link, drives = adu_unit.Link.zeros(), servo_drives.Drives.zeros()
+        drives = servo_drives.Drives.zeros()
         drives['age'] = 1     # nothing was reported yet
-        link['stamp'] = link['command_stamp'] = link['truth_stamp'] = NO_STAMP
-        link['timeout'] = round(parameters.command_timeout * parameters.period * 1e9)
-        link['period'] = round(parameters.period * 1e9)
-        at_rest = dataclasses.replace(parameters, initially_enabled=False)
         self.memory = Memory(servo_drives.ServoRecord.of(
-            state=drive_unit.initial_state(at_rest), constants=_constants(parameters),
-            link=link, drives=drives, scales=_scales(parameters)))
+            state=_initial_state(parameters), constants=_constants(parameters),
+            link=rate_drive.initial_link(parameters), drives=drives, scales=_scales(parameters)))
         for i, axis in enumerate(topics.AXES):
             for gain in ('K_p', 'K_iT'):
                 self.parts['scales'][gain][i] = self.parts['constants'][axis][gain]
-        self.parts['state']['wanted'] = parameters.initially_enabled
         d = self.parts['drives']
         self._command_values = [(self._commands[name], d[source]) for name, source in (
             ('controlword', 'controlword'), ('velocity', 'target'), ('torque', 'offset'))]
         self._report_values = [(d[name], self._reports[name]) for name in pdo.REPORT_FIELDS]
-        for axis in topics.AXES:
-            # The torques that hold the axes are measured, not known in advance.
-            for motor in ('motor_1', 'motor_2'):
-                self.parts['state'][axis][motor]['sum'] = 0.0
-            self.parts['state'][axis]['d_hat'] = 0.0
-        drive_unit.read(*(self.parts[name] for name in ('state', 'constants', 'outputs')))
+        self.read()
 
-    def schedule(self) -> list[tuple[Nanoseconds, Command]]:
-        """Return []: real drives have no injected faults. The simulated drives take those of the parameter
-        `inject`."""
-        return []
+    def read(self) -> None:
+        """Write the present outputs, between two steps."""
+        servo_drives.read(self.memory.record)
 
     def step(self, stamps: Stamps, inputs: Records, outputs: Records) -> None:
         """Make the steps of these stamps: commands, exchange, messages."""
@@ -111,7 +110,6 @@ class ServoDrives(adu_unit.Adu):
             servo_drives.measure(self.memory.record, stamp, outputs[k])
 
     def _exchange(self) -> None:
-        """Exchange the commands for the reports of the drives."""
         d = self.parts['drives']
         d['reported'] = 0
         if self.bus is None:
@@ -123,7 +121,7 @@ class ServoDrives(adu_unit.Adu):
             value[...] = report
 
     def use_drive(self, drive: int, scale: Scale) -> None:
-        """Begin to use a drive whose settings are verified. scale: the units of the drive."""
+        """Begin to use a drive whose settings are verified."""
         d, k = self.parts['drives'], self.parts['scales']
         axis = getattr(self.parameters.drives, topics.AXES[drive // 2])
         sign = -1.0 if getattr(axis, f'reversed_{drive % 2 + 1}') else 1.0
@@ -173,12 +171,12 @@ class ServoDrives(adu_unit.Adu):
                 state['applied'], state['brake_age'] = 1, 0
         return reply
 
-    def resume(self, state: PlantState) -> None:
+    def resume(self, state: rate_drive.PlantState) -> None:
         """Restore the state before a restart: enabled if it was enabled. The drives know their angles."""
         self.parts['state']['wanted'] = state.enabled
 
-    def plant_state(self) -> PlantState:
-        """Return the state_file.PlantState for `resume`; an unknown angle is 0."""
+    def plant_state(self) -> rate_drive.PlantState:
+        """Return the PlantState for `resume`; an unknown angle is 0."""
         state = super().plant_state()
         return state._replace(azimuth=float(np.nan_to_num(state.azimuth)),
                               elevation=float(np.nan_to_num(state.elevation)))
@@ -210,5 +208,5 @@ class ServoDrives(adu_unit.Adu):
 
     @property
     def last_prepared(self) -> tuple[Callable[..., object], tuple[object, ...]]:
-        """(law that reads the drives, its arguments): `prepare` calls it last."""
+        """Law that reads the drives, with its arguments: `prepare` calls it last."""
         return servo_drives.measure, (self.memory.record, np.int64(0), self.outputs[0])

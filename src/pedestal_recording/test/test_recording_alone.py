@@ -7,7 +7,7 @@ import sys
 import pedestal_recording
 
 FOLDER = pathlib.Path(pedestal_recording.__file__).parent
-COLUMNS = ('receiver_law', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
+COLUMNS = ('receiver_law', 'drive_law', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive')
 WITHOUT_ROS = f"""
 import sys
 sys.modules.update(dict.fromkeys(('rclpy', 'rosidl_runtime_py', *{COLUMNS!r})))  # an import of one fails

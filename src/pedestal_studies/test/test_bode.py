@@ -12,7 +12,7 @@ import control
 import numpy as np
 import pytest
 
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 from pedestal_bringup.scenario import files, scenario
 from pedestal_common.parameters import as_dict, build
 from pedestal_results import tracking

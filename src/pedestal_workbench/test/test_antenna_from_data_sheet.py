@@ -7,7 +7,7 @@ import shlex
 
 import pytest
 
-from adu_drive import drive_state
+from drive_law import drive_state
 from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import files, scenario
 from pedestal_common.parameters import ParameterError, as_dict

@@ -1,16 +1,13 @@
-"""Unit of one electronic beam: command, active beam, enable and emergency stop.
-
-`beam_steering_node` runs one unit for each beam of an array. The law of the beam is in electronic_beam.
-"""
+"""Unit of one beam of an array. `beam_steering_node` runs one for each beam."""
 import math
 import typing
 from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from adu_drive.angle_drive import DRIVE_STATE_TOPIC, EMERGENCY_STOP_TEXT, ENABLED_TEXT, REFERENCE_TOPIC, AngleDrive
 from adu_drive.array import electronic_beam
-from adu_drive.params import BeamParameters
+from adu_drive.array.params import BeamParameters
+from drive_law.angle_drive import DRIVE_STATE_TOPIC, EMERGENCY_STOP_TEXT, ENABLED_TEXT, REFERENCE_TOPIC, AngleDrive
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import nodes, topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
@@ -57,7 +54,7 @@ def condition(switches: Switches) -> int:
 
 @compiled
 def decode(beam_inputs: electronic_beam.Inputs, switches: Switches, command: AnyRecord) -> None:
-    """Write a command into the inputs of the beam, at the stamp of the last step. command: record of its message."""
+    """Write a command into the inputs of the beam, at the stamp of the last step."""
     beam_inputs.stamp_ns = switches.stamp
     beam_inputs.due = 1 if command.stamp != NO_STAMP and condition(switches) == STATE_CODE_ENABLED else 0
     if beam_inputs.due == 1:
@@ -67,10 +64,8 @@ def decode(beam_inputs: electronic_beam.Inputs, switches: Switches, command: Any
 
 @compiled
 def encode(beam_outputs: electronic_beam.Outputs, switches: Switches, stamp: Nanoseconds, outputs: AnyRecord) -> None:
-    """Write the outputs of the beam into the records of its messages, with a stamp.
-
-    A beam has no rate and no torque, and its reported angles are the true ones.
-    """
+    """Write the outputs of the beam into the records of its messages. A beam has no rate and no torque, and its
+    reported angles are the true ones."""
     joints, truth = outputs[JOINT_STATES_TOPIC], outputs[DRIVE_TRUTH_TOPIC]
     joints.stamp = truth.stamp = outputs[CLOCK_TOPIC].stamp = stamp
     for i in range(2):
@@ -80,10 +75,8 @@ def encode(beam_outputs: electronic_beam.Outputs, switches: Switches, stamp: Nan
 
 @compiled
 def law(memory: Memory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
-    """Advance from t_k-1 to t_k with the command of step k - 1.
-
-    A beam that is not enabled ignores commands, and discards commands that are still delayed.
-    """
+    """Advance from t_k-1 to t_k with the command of step k - 1. A beam that is not enabled ignores commands, and
+    discards commands that are still delayed."""
     record = memory.record[0]
     if record.switches.stamp != NO_STAMP:
         decode(record.inputs, record.switches, inputs[REFERENCE_TOPIC])

@@ -6,7 +6,7 @@ models the closed-loop period of that paper.
 """
 from typing import Annotated
 
-from adu_drive.params import BEAM_RING_SIZE, check_delay
+from adu_drive.array.params import BEAM_RING_SIZE, check_delay
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Bit, Floats, Ints, Nanoseconds, Pair, Radians, Records, Seconds
 from pedestal_common.record import Record
@@ -49,13 +49,13 @@ class Outputs(Record):
 
 
 def constants(period: Seconds, transport_delay: Seconds, timeout: Seconds) -> Records:
-    """Return the Constants (1,) for a period, a delay and the age at which a command is stale."""
+    """Return the Constants (1,)."""
     check_delay(period, transport_delay)
     return Constants.of(delay_ns=round(transport_delay * 1e9), timeout_ns=round(timeout * 1e9))
 
 
 def initial_state(azimuth: Radians, elevation: Radians) -> Records:
-    """Return the State (1,) of the beam at these angles, without a command."""
+    """Return the State (1,) without a command."""
     return State.of(position=(azimuth, elevation), command_stamp_ns=NO_STAMP)
 
 
@@ -74,7 +74,7 @@ def receive(beam: State, inputs: Inputs) -> bool:
 
 @compiled
 def release(beam: State, constants: Constants, stamp_ns: Nanoseconds) -> None:
-    """Release all commands whose delay has ended at stamp_ns; the newest of them is active."""
+    """Release all commands whose delay has ended; the newest of them is active."""
     slot = ring.release(beam, stamp_ns - constants.delay_ns)
     if slot != ring.NONE_DUE:
         beam.position[0], beam.position[1] = beam.ring_position[slot, 0], beam.ring_position[slot, 1]
@@ -88,7 +88,7 @@ def read(beam: State, outputs: Outputs) -> None:
 
 @compiled
 def step(beam: State, constants: Constants, inputs: Inputs, outputs: Outputs) -> None:
-    """Advance one step from t_k to t_k+1; beam and outputs are written."""
+    """Advance one step from t_k to t_k+1."""
     outputs.invalid_command = 1 if inputs.due == 1 and not receive(beam, inputs) else 0
     outputs.stale = 1 if (beam.command_stamp_ns == NO_STAMP
                           or inputs.stamp_ns - beam.command_stamp_ns > constants.timeout_ns) else 0

@@ -1,1 +1,1 @@
-"""Laws of the plant: motors, mechanics, wind and mount."""
+"""Laws of the plant."""

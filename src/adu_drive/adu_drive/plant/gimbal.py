@@ -2,7 +2,6 @@
 
     Q = M(E) (A'', E'') + h(A, E, A', E', w, w')       Q: torques on azimuth and elevation [Nm]
 
-    A, E      angles of the axes; a prime is a time derivative
     w, w'     rate and angular acceleration of the deck, in FLU (x forward, y to port, z up)
     M         inertia; M_AA of azimuth, M_EE of elevation, M_AE of the coupling between both
     h         torques at A'' = E'' = 0: those of the rates, and those of the deck's angular acceleration
@@ -12,15 +11,15 @@
 
 The equations are those of Newton and Euler. In its own frame (x along the beam, y to port, z up) the elevating part
 turns with omega = C(E) (R(A) w + (0, -E', -A')). Both signs are negative, because azimuth grows clockwise, against z,
-and elevation lifts the beam, against y. The torque on the elevating part is I omega' + omega x I omega. The yoke turns
-with the azimuth only, so it has only the inertia J_yoke. Bodies turn about the intersection of the axes; gravity acts
-by the unbalance of an axis. The test compares with Lagrange's equations of the same bodies.
+and elevation lifts the beam, against y. The torque on the elevating part is I omega' + omega x I omega. Bodies turn
+about the intersection of the axes; gravity acts by the unbalance of an axis. The test compares with Lagrange's
+equations of the same bodies.
 """
 import math
 
 import numpy as np
 
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import cross
 from pedestal_common.quantities import (
@@ -47,7 +46,7 @@ class Constants(Record):
 
 
 def constants(params: AduParameters) -> Records:
-    """Return the Constants (1,) of the bodies."""
+    """Return the Constants (1,)."""
     e, I_y = params.elevating, params.elevation.load.inertia
     inertia = np.array([[e.about_beam, -e.product_xy, -e.product_xz], [-e.product_xy, I_y, -e.product_yz],
                         [-e.product_xz, -e.product_yz, e.about_lift]])
@@ -72,7 +71,7 @@ def inertia(constants: Constants, E: Radians) -> tuple[KilogramMeters2, Kilogram
 
 @compiled
 def _on_elevating(A: Radians, E: Radians, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Return a deck vector (x, y, z), FLU, in the frame of the elevating part at the angles A, E of the axes."""
+    """Return a deck vector (x, y, z), FLU, in the frame of the elevating part."""
     forward, left = x * math.cos(A) - y * math.sin(A), x * math.sin(A) + y * math.cos(A)
     return forward * math.cos(E) + z * math.sin(E), left, z * math.cos(E) - forward * math.sin(E)
 
@@ -82,10 +81,7 @@ def gyroscopic(constants: Constants, angles: tuple[Radians, Radians],
                rates: tuple[RadiansPerSecond, RadiansPerSecond], w: Vector3,
                w_dot: tuple[RadiansPerSecond2, RadiansPerSecond2, RadiansPerSecond2],
                ) -> tuple[NewtonMeters, NewtonMeters]:
-    """Return h on azimuth and elevation.
-
-    angles, rates: of azimuth and elevation axis; w, w_dot: rate [rad/s] and angular acceleration of the deck, FLU.
-    """
+    """Return h on azimuth and elevation. w, w_dot: rate [rad/s] and angular acceleration of the deck, FLU."""
     # Vectors in the frame of the elevating part: (wx, wy, wz) is w; (ax, ay, az) the rate of the azimuth axis; (x, y,
     # z) omega; (nx, ny, nz) the torque.
     (A, E), (A_dot, E_dot) = angles, rates

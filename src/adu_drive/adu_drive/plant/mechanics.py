@@ -1,9 +1,7 @@
 """Mechanics of an axis from the pinions to the dish: meshes, bearing, end stops and structure.
 
-Mesh of a pinion with the bull gear: its torque on the load axis, with lash, uneven teeth and a lost tooth.
-
-LuGre friction of the bearing. The two elementary functions that it and the motors use are written out, so that they
-take a few ns and give the same bits on every machine.
+The two elementary functions that the bearing and the motors use are written out, so that they take a few ns and give
+the same bits on every machine.
 
 Flexible structure: part of the load (the dish) on a spring and damper on the rest of the load (the base). The gear,
 the motors and the load encoder are on the base. The beam points with the dish, on which the wind acts.
@@ -24,10 +22,10 @@ class UnevenTeeth(Protocol):
 
 @inlined
 def mesh_torque(delta: Radians, rate: RadiansPerSecond, k: float, c: float, half_lash: Radians) -> NewtonMeters:
-    """Return the torque of a pinion on the load; delta = theta_m / N - theta, rate its derivative.
+    """Return the torque of a pinion on the load. delta = theta_m / N - theta, of the angles of motor and load.
 
-    theta_m, theta: angles of the motor and of the load; N: gear ratio; k, c: stiffness [Nm/rad] and damping [Nms/rad]
-    of the mesh. The dead zone is +-half_lash; a flank pushes and never pulls.
+    k, c: stiffness [Nm/rad] and damping [Nms/rad] of the mesh. The dead zone is +-half_lash; a flank pushes and never
+    pulls.
     """
     if delta > half_lash:
         return max(k * (delta - half_lash) + c * rate, 0.0)
@@ -51,10 +49,10 @@ def transmission_error(pinion: Radians, constants: UnevenTeeth) -> Radians:
 def tooth_gap(pinion: Radians, teeth: float, ratio: float) -> Radians:
     """Return the additional half lash, on the load axis, of a pinion at an angle without its tooth at 0.
 
-    teeth: number of teeth, 0 for a whole pinion; ratio: bull gear to pinion. At the lost tooth, the flanks of its
-    neighbours stop the pinion after half a pitch. They come closer as the pinion turns, so the gap is half a pitch
-    times (cos phi - cos phi_0) / (1 - cos phi_0). Here phi is the angle of the pinion from the lost tooth. The gap is
-    0 from phi_0 = pi / teeth on, half a pitch of the pinion.
+    teeth: 0 for a whole pinion; ratio: bull gear to pinion. At the lost tooth, the flanks of its neighbours stop the
+    pinion after half a pitch. They come closer as the pinion turns: the gap is half a pitch times
+
+        (cos phi - cos phi_0) / (1 - cos phi_0)        phi: angle from the lost tooth; phi_0 = pi / teeth
     """
     if teeth == 0.0:
         return 0.0
@@ -89,12 +87,9 @@ def lugre(z: Radians, v: RadiansPerSecond, T_c: NewtonMeters, T_sc: NewtonMeters
 
         dz/dt = v - sigma_0 |v| z / g(v),  g = T_c + (T_s - T_c) exp(-(v / v_s)^2),  F = sigma_0 z + sigma_1 dz/dt
 
-    The step is implicit in z with one division, because the explicit form is stiff (sigma_0 |v| / g).
-
-    T_c, T_s         Coulomb torque, static torque; T_sc = T_s - T_c
-    v_s              Stribeck rate [rad/s]; per_v2 = 1 / v_s^2
-    sigma_0, sigma_1 stiffness [Nm/rad] and damping [Nm s/rad] of the bristles
-    h                sub-step; h_sigma_0 = h sigma_0; sigma_1_h = sigma_1 / h
+    The step is implicit in z with one division, because the explicit form is stiff (sigma_0 |v| / g). T_c: Coulomb
+    torque; T_sc = T_s - T_c; T_s: breakaway torque; per_v2 = 1 / v_s^2; v_s: Stribeck rate; h: sub-step; h_sigma_0 =
+    h sigma_0; sigma_1_h = sigma_1 / h; sigma_0 [Nm/rad], sigma_1 [Nms/rad]: of the bristles.
 
     Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40 (1995) 419.
     """
@@ -106,11 +101,8 @@ def lugre(z: Radians, v: RadiansPerSecond, T_c: NewtonMeters, T_sc: NewtonMeters
 @inlined
 def buffer_torque(theta: Radians, omega: RadiansPerSecond, lower: Radians, upper: Radians, k: float,
                   c: float) -> NewtonMeters:
-    """Return the torque of the mechanical end stops on the load: spring and damper that only push.
-
-    theta, omega: angle and rate of the load; lower, upper: angles of the end stops; k, c: stiffness [Nm/rad] and
-    damping [Nms/rad].
-    """
+    """Return the torque of the mechanical end stops on the load: spring k [Nm/rad] and damper c [Nms/rad] that only
+    push."""
     if theta > upper:
         return min(-k * (theta - upper) - c * omega, 0.0)
     if theta < lower:
@@ -119,11 +111,8 @@ def buffer_torque(theta: Radians, omega: RadiansPerSecond, lower: Radians, upper
 
 
 def spring_and_damper(inertia: KilogramMeters2, frequency: Hertz, damping: float) -> tuple[float, float]:
-    """Return stiffness [Nm/rad] and damping [Nms/rad] of the spring and the damper of a dish.
-
-    inertia: of the dish; frequency, damping: natural frequency and damping ratio of the dish on a locked
-    base. On a free base the frequency is frequency / sqrt(1 - share of the dish in the load inertia).
-    """
+    """Return stiffness [Nm/rad] and damping [Nms/rad] of a dish from frequency and damping ratio on a locked base. On
+    a free base the frequency is frequency / sqrt(1 - share of the dish in the load inertia)."""
     w = 2.0 * math.pi * frequency
     return inertia * w * w, 2.0 * damping * inertia * w
 
@@ -133,10 +122,7 @@ def swing(dish: Radians, omega_dish: RadiansPerSecond, theta: Radians, omega: Ra
           k: float, c: float, h: Seconds, h_J: float) -> tuple[Radians, RadiansPerSecond, NewtonMeters]:
     """Return angle and rate of the dish one sub-step h later, and its torque on the base.
 
-    dish, omega_dish    angle and rate of the dish; theta, omega: those of the base
-    torque              external torque on the dish
-    k, c                results of `spring_and_damper`
-    h_J                 h / inertia of the dish
+    theta, omega: of the base; torque: on the dish; k, c: see `spring_and_damper`; h_J = h / inertia of the dish.
     """
     twist = k * (dish - theta) + c * (omega_dish - omega)
     omega_dish += h_J * (torque - twist)

@@ -1,25 +1,17 @@
-"""A motor and the brake on its shaft: currents, speed, cogging and heat.
+"""A motor and the brake on its shaft: currents, speed, cogging and resistance.
 
-Permanent-magnet synchronous motor with equal inductances, in rotor coordinates (amplitude invariant):
+Permanent-magnet synchronous motor with equal inductances, in rotor coordinates (amplitude invariant), with the
+electrical speed omega_e = p omega:
 
     L di_d/dt = v_d - R i_d + omega_e L i_q
     L di_q/dt = v_q - R i_q - omega_e (L i_d + psi)
     J_m domega/dt = K_t i_q - T_c tanh(omega / v) - B omega - T_load
 
-omega_e = p omega is the electrical speed, p the number of pole pairs, omega the speed of the shaft [rad/s].
+Its resistance at the thermal load x (drive_law.faults), with R_20 at 20 degrees C and the rise dT at rated torque:
 
-    i_d, i_q, v_d, v_q  currents [A] and voltages [V] along and across the magnets; i_q makes the torque K_t i_q
-    R, L, psi           phase resistance [ohm], inductance [H], flux linkage of the magnets [Wb]
-    J_m, T_c, v, B      inertia [kg m2], Coulomb friction [Nm] and its rate [rad/s], viscous friction [Nms/rad]
-    h                   sub-step [s]; per_v = 1 / v
+    R = R_20 (1 + alpha dT x)
 
-Heating by the torque, as in the I2t protection of a drive, and the resulting resistance:
-
-    tau dx/dt = (T / T_rated)^2 - x        x = 1: steady state at rated torque; torque and current are proportional
-    R = R_20 (1 + alpha dT x)              copper: alpha = 0.00393 / K, dT the rise at rated torque
-
-T: torque of the motor [Nm]; tau: time constant of the winding [s]; R_20: resistance at 20 degrees C [ohm]. Because x
-follows the true torque of the motor, a trip by x represents a sensor in the winding.
+Because x follows the true torque of the motor, a trip by x represents a sensor in the winding.
 
 The brake is applied by springs. Its Coulomb friction acts in exact steps, so that it holds without creep.
 """
@@ -28,11 +20,35 @@ import math
 from adu_drive.plant.mechanics import tanh
 from pedestal_common.compiled import inlined
 from pedestal_common.quantities import Amperes, NewtonMeters, Radians, RadiansPerSecond, Volts
+from pedestal_common.record import Record
 
 COPPER_COEFFICIENT_PER_K = 0.00393  # temperature coefficient of copper at 20 degrees C [1/K] (IEC 60028)
 
-WARNING_THERMAL_LOAD = 0.8
-"""Thermal load of a motor above which the drive reports a warning, and below which overtemperature ends."""
+
+class Constants(Record):
+    """A motor and its brake, with true values."""
+    p: float                # pole pairs
+    psi: float              # [Wb]
+    L: float                # [H]
+    K_t: float              # [Nm/A]
+    h_L: float
+    h_R_L: float            # at 20 degrees C
+    rise: float             # alpha dT: relative rise of the resistance at thermal load 1
+    h_brake_J: RadiansPerSecond     # h T / J of the brake
+    T_c: NewtonMeters
+    per_v: float
+    h_J: float
+    q_B: float
+    T_cog: NewtonMeters     # amplitude of the cogging
+    cogs: float             # its periods in a turn
+
+
+class State(Record):
+    """A motor; its currents and its angle, which are also measured, are in drive_law.axis_control.MotorState."""
+    v_d: Volts
+    v_q: Volts
+    omega: RadiansPerSecond
+    q_R: float              # 1 / (1 + h R / L) of the warm winding
 
 
 @inlined
@@ -47,42 +63,26 @@ def currents(i_d: Amperes, i_q: Amperes, v_d: Volts, v_q: Volts, omega_e: Radian
 @inlined
 def speed(omega: RadiansPerSecond, torque: NewtonMeters, T_c: NewtonMeters, per_v: float, h_J: float,
           q_B: float) -> RadiansPerSecond:
-    """Return the shaft speed one sub-step later under the net torque without friction.
+    """Return the shaft speed one sub-step later under the net torque without friction, implicit in the viscous part.
 
-    Implicit in the viscous part: h_J = h / J_m, q_B = 1 / (1 + h B / J_m).
+    per_v = 1 / v; h_J = h / J_m; q_B = 1 / (1 + h B / J_m).
     """
     return (omega + h_J * (torque - T_c * tanh(omega * per_v))) * q_B
 
 
 @inlined
 def cogging(theta: Radians, T_cog: NewtonMeters, per_turn: float) -> NewtonMeters:
-    """Return the torque of the magnets on the slots at a shaft angle; its mean over a turn is 0.
-
-    per_turn: least common multiple of slots and poles.
-    """
+    """Return the torque of the magnets on the slots. per_turn: least common multiple of slots and poles."""
     return T_cog * math.sin(per_turn * theta)
 
 
 @inlined
-def thermal_load(x: float, torque: NewtonMeters, per_rated: float, gain: float) -> float:
-    """Return the thermal load one period h later, from the thermal load x, under a torque.
-
-    per_rated = 1 / T_rated; gain = 1 - exp(-h / tau).
-    """
-    relative = torque * per_rated
-    return x + gain * (relative * relative - x)
-
-
-@inlined
 def resistive_damping(h_R_L: float, rise: float, x: float) -> float:
-    """Return the factor 1 / (1 + h R / L) of the implicit step of the current at thermal load x; rise = alpha dT."""
+    """Return the factor 1 / (1 + h R / L) of the implicit step of the current. rise = alpha dT."""
     return 1.0 / (1.0 + h_R_L * (1.0 + rise * x))
 
 
 @inlined
 def braked(omega: RadiansPerSecond, h_T_J: RadiansPerSecond) -> RadiansPerSecond:
-    """Return the shaft speed after a sub-step h with the brake on: reduced by h T / J, but not reversed.
-
-    T: torque of the brake [Nm]; J: inertia of the motor [kg m2].
-    """
+    """Return the shaft speed after a sub-step h with the brake on: reduced by h T / J, but not reversed."""
     return math.copysign(max(abs(omega) - h_T_J, 0.0), omega)

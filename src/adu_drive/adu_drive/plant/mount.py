@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from adu_drive.params import MountParameters
+from drive_law.params import MountParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import angles, wrap
 from pedestal_common.quantities import Bit, Matrix3, Radians, RadiansPerSecond, Records
@@ -44,7 +44,7 @@ class Constants(Record):
 
 
 def _tilt(forward: Radians, starboard: Radians) -> Matrix3:
-    """Return the rotation, FLU, that leans the vertical by `forward` and `starboard` about one axis."""
+    """Return the rotation, FLU, that leans the vertical about one axis."""
     tau = math.hypot(forward, starboard)
     if tau == 0.0:
         return np.eye(3)
@@ -53,7 +53,7 @@ def _tilt(forward: Radians, starboard: Radians) -> Matrix3:
 
 
 def constants(p: MountParameters) -> Records:
-    """Return the Constants (1,) of a mount."""
+    """Return the Constants (1,)."""
     lean, off = p.non_perpendicularity, p.collimation
     return Constants.of(true=p.tilt_forward == p.tilt_starboard == lean == off == p.sag == 0.0,
                         tilt=_tilt(p.tilt_forward, p.tilt_starboard), sin_lean=math.sin(lean),
@@ -62,7 +62,6 @@ def constants(p: MountParameters) -> Records:
 
 @compiled
 def _leaning(constants: Constants, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Return a vector (x, y, z) of the elevating part in the frame of the yoke, whose elevation axis leans."""
     sin, cos = constants.sin_lean, constants.cos_lean
     return x, cos * y + sin * z, cos * z - sin * y
 
@@ -70,10 +69,10 @@ def _leaning(constants: Constants, x: float, y: float, z: float) -> tuple[float,
 @compiled
 def beam(constants: Constants, A: Radians, E: Radians, A_dot: RadiansPerSecond, E_dot: RadiansPerSecond,
          ) -> tuple[tuple[Radians, Radians], tuple[RadiansPerSecond, RadiansPerSecond]]:
-    """Return ((azimuth, elevation), their rates) of the beam, as deck angles.
+    """Return ((azimuth, elevation), their rates) of the beam, as deck angles, from the angles and rates of the axes.
 
-    A, E, A_dot, E_dot: angles and rates of the axes. Among azimuths whole turns apart, the result is nearest to A. If
-    the elevation axis is beyond 90 deg, the elevation of the beam is too.
+    Among azimuths whole turns apart, the result is nearest to A. If the elevation axis is beyond 90 deg, the elevation
+    of the beam is too.
     """
     E_beam, E_beam_dot = E - constants.sag * math.cos(E), (1.0 + constants.sag * math.sin(E)) * E_dot
     cos_E, sin_E = constants.cos_off * math.cos(E_beam), constants.cos_off * math.sin(E_beam)

@@ -5,17 +5,14 @@ random phases, one for each of SPECTRAL_LINE_COUNT equal steps of log f. So v(t)
 Deodatis, Applied Mechanics Reviews 44 (1991) 191), and equal times give equal torques. Drag grows with the square of
 the wind speed: torque = mean torque times (1 + v / V)^2.
 
-f: frequency [Hz]; V: mean speed of the wind [m/s]; v, sigma_v: turbulence along the wind and its standard deviation.
-
 The wind field has a speed, a direction and turbulence in three components. Its torques on a dish depend on the angles
 of the axes:
 
     W = V ((1 + u) along + v across + w up),    T = rho / 2 |W|^2 S D C,    C = c_1 sin alpha + c_2 sin 2 alpha
 
-    V, W     mean speed of the wind, its velocity vector [m/s]; along, across, up: unit vectors
-    u, v, w  turbulence along the wind, across and up, divided by V; f: its frequency [Hz]
-    rho      density of the air [kg/m3]
-    S, D     area [m2] and diameter [m] of the dish
+    V        mean speed of the wind; along, across, up: unit vectors
+    u, v, w  turbulence along the wind, across and up, divided by V
+    S, D     area and diameter of the dish
     alpha    angle between the beam and the direction of the wind source
     C        torque coefficient; a positive C turns the beam to the lee
 
@@ -31,7 +28,7 @@ from typing import Annotated, cast
 
 import numpy as np
 
-from adu_drive.params import GustParameters, WindFieldParameters, WindParameters
+from drive_law.params import GustParameters, WindFieldParameters, WindParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import cross, direction
 from pedestal_common.law import Law
@@ -76,7 +73,7 @@ class Constants(Record):
 
 
 def davenport(f: Floats, V: MetersPerSecond) -> Floats:
-    """Return the density [s] of v^2 / sigma_v^2 at f [Hz] for a mean speed V, by Davenport's spectrum.
+    """Return the density [s] of v^2 / sigma_v^2 at f [Hz] by Davenport's spectrum:
 
         2/3 x^2 / (f (1 + x^2)^(4/3)),  x = 1200 m f / V
 
@@ -103,7 +100,7 @@ def _lines(gust: GustParameters) -> Floats:
 
 
 def constants(p: WindParameters) -> Records:
-    """Return the Constants (1,) of a wind."""
+    """Return the Constants (1,)."""
     amplitude, omega, phase = _lines(p.gust)
     return Constants.of(azimuth=p.azimuth, elevation=p.elevation, kind=_GUST_KINDS[p.gust.kind],
                         gust_azimuth=p.gust.azimuth, gust_elevation=p.gust.elevation, start=p.gust.start,
@@ -112,7 +109,7 @@ def constants(p: WindParameters) -> Records:
 
 @compiled
 def turbulence(t: Seconds, amplitude: Floats, omega: Floats, phase: Floats) -> float:
-    """Return the longitudinal turbulence v / V at the time t."""
+    """Return the longitudinal turbulence v / V."""
     v = 0.0
     for i in range(SPECTRAL_LINE_COUNT):
         v += amplitude[i] * math.cos(omega[i] * t + phase[i])
@@ -121,7 +118,7 @@ def turbulence(t: Seconds, amplitude: Floats, omega: Floats, phase: Floats) -> f
 
 @compiled
 def torques(wind: Constants, t: Seconds) -> tuple[NewtonMeters, NewtonMeters]:
-    """Return the torques on the azimuth and elevation loads at the time t."""
+    """Return the torques on the azimuth and elevation loads."""
     if wind.kind == GUST_SPECTRUM:
         g = 1.0 + turbulence(t, wind.amplitude, wind.omega, wind.phase)
         # A gust that reverses the wind reverses the torque.
@@ -153,7 +150,7 @@ class FieldConstants(Record):
 
 
 def field_constants(p: WindFieldParameters) -> Records:
-    """Return the FieldConstants (1,) of a wind."""
+    """Return the FieldConstants (1,)."""
     edges = geomspace(MIN_GUST_FREQUENCY_HZ, MAX_GUST_FREQUENCY_HZ, SPECTRAL_LINE_COUNT + 1)
     random = np.random.default_rng(p.seed)
     phase = random.uniform(0.0, 2.0 * math.pi, (3, SPECTRAL_LINE_COUNT))
@@ -172,7 +169,7 @@ def field_constants(p: WindFieldParameters) -> Records:
 
 @compiled
 def field_torques(wind: FieldConstants, t: Seconds, A: Radians, E: Radians) -> tuple[NewtonMeters, NewtonMeters]:
-    """Return the torques on the azimuth and elevation loads at the time t with the axes at azimuth A, elevation E."""
+    """Return the torques on the azimuth and elevation loads with the axes at A, E."""
     u, v, w = (turbulence(t, wind.amplitude[0], wind.omega[0], wind.phase[0]),
                turbulence(t, wind.amplitude[1], wind.omega[1], wind.phase[1]),
                turbulence(t, wind.amplitude[2], wind.omega[2], wind.phase[2]))

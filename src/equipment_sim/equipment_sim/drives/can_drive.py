@@ -9,7 +9,7 @@ import numpy as np
 from canopen import objectdictionary
 from canopen.sdo.base import SdoVariable
 
-from adu_drive.params import SPEED_LOOP_PERIOD_S
+from drive_law.axis_params import SPEED_LOOP_PERIOD_S
 from equipment_sim.drives import law, objects
 from equipment_sim.drives.socketcand_server import SocketcandServer
 from equipment_sim.drives.unit import SimulatedDrives
@@ -79,7 +79,6 @@ class CanDrive:
         return time.monotonic() < self._silent_until
 
     def _boot(self) -> None:
-        """Set the communication to its defaults, and send the boot-up message."""
         for index in COMMUNICATION_OBJECTS:
             self.local.data_store.pop(index, None)
         self._staged = {}
@@ -115,7 +114,6 @@ class CanDrive:
         return found
 
     def _stage(self, cob: int, data: bytearray, _time: float) -> None:
-        """Keep a command until the next SYNC."""
         k = (cob >> 8) - 2
         if self.local.nmt.state != 'OPERATIONAL' or k not in self._receives:
             return
@@ -135,7 +133,7 @@ class CanDrive:
         self._staged.clear()
 
     def report_frames(self, data: bytes) -> list[Frame]:
-        """Return the frames of the reports after a SYNC. data: bytes of its record, pdo.REPORT_DTYPE."""
+        """Return the frames of the reports after a SYNC. data: bytes of its record."""
         if self.silent or self.local.nmt.state != 'OPERATIONAL':
             return []
         return [(0x180 + 0x100 * k + self.node, b''.join([data[first:first + size] for first, size in places]))
@@ -155,7 +153,6 @@ class CanDrive:
         self._put(index, subindex, int.from_bytes(data, 'little', signed=signed))
 
     def _put(self, index: int, subindex: int, value: int) -> None:
-        """Take the value of an object, by SDO or PDO."""
         d = self.record
         if (index, subindex) in FIELD_OF_OBJECT:
             d[FIELD_OF_OBJECT[index, subindex]] = value
@@ -215,10 +212,8 @@ class CanDrive:
 
 
 class CanDrives:
-    """The four drives on one CAN bus, which another object polls.
-
-    on_sync: function that advances the unit to the time of a SYNC.
-    """
+    """The four drives on one CAN bus, which another object polls. on_sync: function that advances the unit to the time
+    of a SYNC."""
 
     def __init__(self, bus: SocketcandServer, unit: SimulatedDrives, on_sync: Callable[[], None]) -> None:
         self.network = canopen.Network(bus)
@@ -228,7 +223,7 @@ class CanDrives:
         self._packed = np.zeros(pdo.DRIVE_COUNT, pdo.REPORT_DTYPE)
 
     def poll(self, timeout: Seconds) -> None:
-        """Take frames of the bus for a time, at least those that have arrived; then watch the heartbeats."""
+        """Take frames of the bus; then watch the heartbeats."""
         message = self._bus.recv(timeout)
         while message is not None:
             self._take(message)

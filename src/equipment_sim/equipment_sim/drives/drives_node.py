@@ -1,9 +1,8 @@
 """ROS node of four simulated CiA 402 drives, with a bus of their own: a socketcand server on this machine.
 
-A thread serves the bus. It advances drives and plant with the time, and publishes adu/truth at each SYNC. `entry` is
-imported first, so that a signal during the other imports ends the process without a message.
+A thread serves the bus. It advances drives and plant with the time, and publishes adu/truth at each SYNC.
 """
-import pedestal_common.entry  # noqa: F401
+import pedestal_common.entry  # noqa: F401  # first, for signals during the other imports
 
 # isort: split
 import sys
@@ -93,7 +92,6 @@ class DrivesNode(unit_node.UnitNode):
         return locked
 
     def _serve(self) -> None:
-        """Serve the bus and advance the plant until the node ends."""
         while not self.ending:
             self.drives.poll(POLL_S)
             with self.lock:
@@ -106,7 +104,6 @@ class DrivesNode(unit_node.UnitNode):
                     self.get_logger().warning(f'{DRIVE_LABELS[drive.number]}: {drive.notes.pop(0)}')
 
     def _on_sync(self) -> None:
-        """Advance the unit to now, and publish the truth of the step."""
         [port] = self.ports
         with self.lock:
             _, utc = self.clock()

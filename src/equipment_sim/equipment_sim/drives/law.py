@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 from adu_drive import axis, drive_unit, injected
 from adu_drive import unit as adu_unit
-from adu_drive.controller import loops
-from adu_drive.params import SPEED_LOOP_PERIOD_S
+from drive_law import loops, rate_drive
+from drive_law.axis_params import SPEED_LOOP_PERIOD_S
 from pedestal_common.compiled import compiled
 from pedestal_common.injection import schedule
 from pedestal_common.quantities import AnyRecord, Bit, Nanoseconds, NewtonMeters, RadiansPerSecond, Records, Stamps
@@ -64,11 +64,8 @@ FourDrives: TypeAlias = Annotated[Sequence[Drive], (pdo.DRIVE_COUNT,)]
 
 
 class DrivesRecord(Record):
-    """All data of the simulated drives.
-
-    The own fields come first. Numba takes a record that begins with the fields of the drive unit for its subtype, and
-    warns about it.
-    """
+    """All data of the simulated drives. The own fields come first. Numba takes a record that begins with the fields of
+    the drive unit for its subtype, and warns about it."""
     drive: FourDrives
     tick: int               # number of the last period of the speed loops
     period: Nanoseconds     # time between two synchronisations
@@ -76,14 +73,13 @@ class DrivesRecord(Record):
     constants: drive_unit.Constants
     inputs: drive_unit.Inputs
     outputs: drive_unit.Outputs
-    link: adu_unit.Link
+    link: rate_drive.Link
     schedule: schedule.Schedule
     injected: injected.DriveInjected
 
 
 @compiled
 def _switch_off(drive: Drive, state: int) -> None:
-    """Remove the torque at once, close the brake, and enter a state."""
     drive.power = drive.entering = 0
     drive.leaving, drive.rate, drive.sum, drive.state = STAY, 0.0, 0.0, state
     _move_brake(drive, 0)
@@ -91,7 +87,6 @@ def _switch_off(drive: Drive, state: int) -> None:
 
 @compiled
 def _move_brake(drive: Drive, open_: Bit) -> None:
-    """Command the brake of a drive."""
     if drive.brake_open != open_:
         drive.brake_open, drive.brake_ticks = open_, 0
 
@@ -142,7 +137,6 @@ def obey(drive: Drive, control: int) -> None:
 
 @compiled
 def _ramps(drive: Drive) -> bool:
-    """Return True if a drive ramps to standstill by itself."""
     return (drive.state != State.OPERATION_ENABLED or drive.leaving != STAY
             or drive.control & cia402.CONTROL_HALT != 0 or not (
                 drive.mode == servo_drives.MODE_CYCLIC_VELOCITY or drive.mode == servo_drives.MODE_CYCLIC_TORQUE))
@@ -150,7 +144,6 @@ def _ramps(drive: Drive) -> bool:
 
 @compiled
 def _torque(drive: Drive, omega: RadiansPerSecond) -> NewtonMeters:
-    """Return the torque of a drive for one period of its speed loop. omega: speed of the motor."""
     if not drive.power:
         return 0.0
     offset = 0.0
@@ -175,7 +168,6 @@ def _torque(drive: Drive, omega: RadiansPerSecond) -> NewtonMeters:
 
 @compiled
 def _advance_state(drive: Drive, omega: RadiansPerSecond, engage_ticks: int, release_ticks: int) -> None:
-    """Advance brake and automatic transitions of a drive by a period. omega: speed of the motor."""
     drive.brake_ticks += 1
     if drive.entering and drive.brake_ticks >= release_ticks:
         drive.entering, drive.state = 0, State.OPERATION_ENABLED
@@ -198,7 +190,6 @@ def _advance_state(drive: Drive, omega: RadiansPerSecond, engage_ticks: int, rel
 
 @compiled
 def _grips(first: Drive, second: Drive, engage_ticks: int, release_ticks: int) -> bool:
-    """Return True if the brakes of an axis grip, from its two drives."""
     for_first = first.brake_open and first.brake_ticks >= release_ticks or (
         not first.brake_open and first.brake_ticks < engage_ticks)
     for_second = second.brake_open and second.brake_ticks >= release_ticks or (
@@ -209,7 +200,6 @@ def _grips(first: Drive, second: Drive, engage_ticks: int, release_ticks: int) -
 @compiled
 def _drive_motor(drive: Drive, motor: axis.MotorState, constants: axis.MotorConstants, lost: Bit, engage_ticks: int,
                  release_ticks: int) -> None:
-    """Run one period of a drive with its motor. lost: 1 for the fault `motor_loss`."""
     axis.read_motor_sensors(motor, constants)
     if motor.limited:
         drive.limited = 1
@@ -223,7 +213,6 @@ def _drive_motor(drive: Drive, motor: axis.MotorState, constants: axis.MotorCons
 
 @compiled
 def _drive_axis(unit: DrivesRecord, of_axis: axis.State, constants: axis.Constants, number: int) -> None:
-    """Run one period of the drives and of the plant of an axis."""
     first, second = unit.drive[2 * number], unit.drive[2 * number + 1]
     engage = unit.constants.engage_periods * unit.constants.speed_ticks
     release = unit.constants.release_periods * unit.constants.speed_ticks
@@ -235,7 +224,7 @@ def _drive_axis(unit: DrivesRecord, of_axis: axis.State, constants: axis.Constan
 
 @compiled
 def advance(records: Records, now: Nanoseconds) -> None:
-    """Advance drives and plant to a time, at most by MAX_CATCH_UP_TICKS. records: DrivesRecords (1,)."""
+    """Advance drives and plant to a time, at most by MAX_CATCH_UP_TICKS. records: DrivesRecord (1,)."""
     _advance(records[0], now)
 
 
@@ -270,14 +259,13 @@ def status(drive: Drive) -> int:
 
 @compiled
 def _steps(x: float, bits: int) -> int:
-    """Return the nearest whole number of an object with this number of bits."""
     largest = 2.0 ** (bits - 1)
     return int(math.floor(min(max(x, -largest), largest - 1.0) + 0.5))
 
 
 @compiled
 def report(records: Records, reports: Records) -> None:
-    """Write the reports of the drives (4,), with the fields of pdo.REPORT_DTYPE. records: as of `advance`."""
+    """Write the reports of the drives (4,), with the fields of pdo.REPORT_DTYPE."""
     unit = records[0]
     state, constants, outputs = unit.state, unit.constants, unit.outputs
     drive_unit.read(state, constants, outputs)
@@ -301,12 +289,12 @@ def law(memory: 'Memory', stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRec
     unit = memory.record[0]
     if schedule.pending(unit.schedule, stamp):
         injected.apply_due_faults(unit, stamp)
-    ship = inputs[adu_unit.SHIP_TRUTH_TOPIC]
+    ship = inputs[rate_drive.SHIP_TRUTH_TOPIC]
     if ship.stamp != NO_STAMP:
         adu_unit.deck_acceleration(unit.inputs, unit.link, ship)
     _advance(unit, stamp)
     drive_unit.read(unit.state, unit.constants, unit.outputs)
-    adu_unit.encode_truth(unit.outputs, stamp // unit.period * unit.period, outputs[adu_unit.DRIVE_TRUTH_TOPIC])
+    adu_unit.encode_truth(unit.outputs, stamp // unit.period * unit.period, outputs[rate_drive.DRIVE_TRUTH_TOPIC])
 
 
 @compiled

@@ -64,7 +64,7 @@ def _record(index: int, name: str, members: Iterable[tuple[int, int, str, int]])
 
 
 def dictionary(node: int, profile: int) -> od.ObjectDictionary:
-    """Return the object dictionary of the CANopen node `node`. profile: number in its device type (1000)."""
+    """Return the object dictionary of a CANopen node. profile: number in its device type (1000)."""
     found = od.ObjectDictionary()
     found.node_id = node
     found.add_object(_variable(0x1000, 0, 'device type', od.UNSIGNED32, READ_ONLY, 2 << 16 | profile))

@@ -24,7 +24,6 @@ SEND_TIMEOUT_S = 0.2  # time after which a client that reads nothing is disconne
 
 
 def _text(cob: int, data: bytes | bytearray) -> bytes:
-    """Return the text of a frame."""
     return f'< frame {cob:03X} {time.time():.6f} {data.hex().upper()} >'.encode()
 
 
@@ -47,7 +46,6 @@ class SocketcandServer(can.BusABC):
         return (self._received.pop(0) if self._received else None), False
 
     def _take(self, ready: socket.socket) -> None:
-        """Accept a client, or take its commands."""
         if ready is self._listener:
             client, _ = ready.accept()
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -90,7 +88,6 @@ class SocketcandServer(can.BusABC):
             self._forward(_text(message.arbitration_id, message.data), client)
 
     def _forward(self, text: bytes, sender: socket.socket | None) -> None:
-        """Send the text of frames to all clients in raw mode except their sender."""
         now = time.monotonic()
         for client in list(self._buffers):
             if client is not sender and self._open_from.get(client, now) < now:

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from adu_drive import drive_unit, injected
-from adu_drive import unit as adu_unit
-from adu_drive.params import AxisParameters
+from drive_law import rate_drive
+from drive_law.axis_params import AxisParameters
 from equipment_sim.drives import law
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection import schedule, table
@@ -41,7 +41,7 @@ class SimulatedDrives(Simulated):
 
     def __init__(self, parameters: ServoDriveParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
-        link = adu_unit.Link.zeros()
+        link = rate_drive.Link.zeros()
         link['truth_stamp'] = NO_STAMP
         at_rest = dataclasses.replace(parameters, initially_enabled=False)
         self.memory = Memory(law.DrivesRecord.of(

@@ -91,7 +91,7 @@ NODES = (
          obeys='acu/command', replies='acu/command_result',
          doc='antenna control unit: filter, modes, position loop',
          stands_for='nothing: this node is the real control unit', of_beam=True),
-    Node(DRIVE_NODE, 'adu_drive.adu_node', 'adu_drive.params:AduNodeParameters', 'adu_drive.unit:Adu',
+    Node(DRIVE_NODE, 'adu_drive.adu_node', 'drive_law.params:AduNodeParameters', 'adu_drive.unit:Adu',
          reads=('clock', 'acu/rate_command', 'ship/truth', 'acu/stow_pins'),
          writes=('joint_states', 'adu/truth', 'clock', 'adu/motor_states', 'adu/state', 'adu/stow_pins'),
          answer='joint_states', obeys='adu/inject', replies='adu/injected',
@@ -109,7 +109,7 @@ NODES = (
 )
 """Rows of the nodes, in the order in which a graph is started. Nodes with a unit also publish `diagnostics`."""
 
-ARRAY_DRIVE = Node(DRIVE_NODE, 'adu_drive.beam_steering_node', 'adu_drive.params:BeamParameters',
+ARRAY_DRIVE = Node(DRIVE_NODE, 'adu_drive.beam_steering_node', 'adu_drive.array.params:BeamParameters',
                    'adu_drive.array.beam_unit:Beam',
                    reads=('clock', 'acu/reference'),
                    writes=('joint_states', 'adu/truth', 'clock', 'adu/state'),

@@ -2,7 +2,7 @@
 the results.
 
 The class UnitNode runs every unit. Subclasses add tasks that are no law: the drive owns the time
-(adu_drive.timekeeper_node), and the ship publishes NMEA sentences.
+(drive_law.timekeeper_node), and the ship publishes NMEA sentences.
 """
 import collections
 import dataclasses

@@ -17,7 +17,7 @@ from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.geometry.vector import AxisMotion, Motion
 from adu_drive import drive_unit, lanes
 from adu_drive import unit as adu_unit
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 from pedestal_bringup.loop import closed_loop, side_by_side
 from pedestal_bringup.scenario import scenario
 from pedestal_common.compiled import compiled

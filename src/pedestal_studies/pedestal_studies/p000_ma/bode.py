@@ -19,7 +19,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from acu_tracker.params import AcuParameters
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Complexes, Floats, Row
 from pedestal_results.intervals import row

@@ -21,7 +21,7 @@ from typing import TypeAlias
 import numpy as np
 from matplotlib.figure import Figure
 
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_common.quantities import Floats, Json, Radians, RadiansPerSecond, Row, Seconds
 from pedestal_results import tracking

@@ -26,7 +26,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from acu_tracker.program.program_track import checked
-from adu_drive.params import AxisParameters
+from drive_law.axis_params import AxisParameters
 from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan

@@ -24,7 +24,8 @@ import typing
 from collections.abc import Iterable, Iterator, Mapping
 
 from acu_tracker.servo import ends
-from adu_drive.params import PLANT_PERIOD_S, AduParameters, MotorParameters, mesh_inertia
+from drive_law.axis_params import PLANT_PERIOD_S, MotorParameters, mesh_inertia
+from drive_law.params import AduParameters
 from pedestal_bringup.scenario import files, scenario
 from pedestal_bringup.scenario.header import PROGRAM_ERRORS
 from pedestal_bringup.scenario.program import Plan

@@ -27,7 +27,8 @@ from typing import TypeAlias
 import numpy as np
 
 from adu_drive import axis, drive_unit
-from adu_drive.params import SPEED_LOOP_PERIOD_S, AduParameters, AxisParameters
+from drive_law.axis_params import SPEED_LOOP_PERIOD_S, AxisParameters
+from drive_law.params import AduParameters
 from pedestal_bringup.loop import closed_loop
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.topics import AXES

@@ -21,7 +21,7 @@ import numpy as np
 
 from acu_tracker.servo import controllers
 from adu_drive import drive_unit
-from adu_drive.params import AduParameters, WindParameters
+from drive_law.params import AduParameters, WindParameters
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics

@@ -51,7 +51,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acu_tracker.estimation.params import FilterParameters, ImmParameters
-from adu_drive.params import SPEED_LOOP_PERIOD_S, AxisParameters
+from drive_law.axis_params import SPEED_LOOP_PERIOD_S, AxisParameters
 from pedestal_bringup.scenario import files, scenario
 from pedestal_common import parameters
 from pedestal_common.graph.topics import AXES

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from adu_drive.params import AduParameters
+from drive_law.params import AduParameters
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import files
 from pedestal_bringup.scenario import scenario as scenarios

@@ -9,7 +9,7 @@ import dataclasses
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from adu_drive.params import AxisParameters
+from drive_law.axis_params import AxisParameters
 from pedestal_common.quantities import Floats, Pairs, Times
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording

@@ -12,8 +12,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from adu_drive.params import AduParameters
 from adu_drive.plant import gimbal
+from drive_law.params import AduParameters
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import as_dict, build
 from pedestal_common.quantities import Estimate, Floats, Json, KilogramMeters2, Pair, Pairs, Radians, Vectors3

@@ -1,4 +1,4 @@
-"""Laws of the loops of an axis: travel, speed, bias, disturbance observer and current.
+"""Laws of the loops of an axis: travel, speed, bias and disturbance observer.
 
 Travel: close to an end of travel, a limit of the rate command stops the axis in time.
 
@@ -14,40 +14,22 @@ the schedule of the bias over the torque demand open. The schedules are those of
 `hold` and then a straight line to zero at `out`. A pinion would lose contact without the bias at a low demand. A bias
 of zero from `out` on leaves the peak torque for acceleration.
 
-Observer of the disturbance torque on the mean motor shaft, in parallel to the speed loop. Its model per motor with
-rigid load and gears is
-
-    J domega/dt = T + d
-
-    J, h    inertia per motor [kg m2], period of the observer [s]
-    omega   mean speed [rad/s]
-    T, d    torque that a motor makes, with feed-forward and limits; disturbance [Nm]
-    w_o     bandwidth of the observer [rad/s]
-
-So a commanded acceleration is no disturbance, and a limit cannot wind up the estimate. The observer is the linear
-extended state observer of Gao, American Control Conference 2003. Its two poles, there at -w_o, are here at
-p = exp(-w_o h) of discrete time.
-
-Current control of one motor in rotor coordinates: i_d = 0, decoupled, inside the voltage circle.
-
-    i_d, i_q        currents along and across the magnets [A]; i_q makes the torque
-    v_d, v_q        voltages along and across the magnets [V]; the voltage circle is v_d^2 + v_q^2 <= v_max^2
-    sum_d, sum_q    integral parts of the two PI controllers [V]
-    R, L, psi       phase resistance [ohm], inductance [H], flux linkage [Wb] of the motor
-    w, K_iT         bandwidth of the loop [rad/s]; K_i times the period of the loop
+Observer of the disturbance torque d on the mean motor shaft, in parallel to the speed loop. Its model per motor with
+rigid load and gears is J domega/dt = T + d, with the inertia J per motor. T includes feed-forward and limits. So a
+commanded acceleration is no disturbance, and a limit cannot wind up the estimate. The observer is the linear extended
+state observer of Gao, American Control Conference 2003. Its two poles, there at -w_o, are here at p = exp(-w_o h) of
+discrete time.
 """
 import math
 
-from adu_drive.params import BiasParameters
+from drive_law.axis_params import BiasParameters
 from pedestal_common.compiled import inlined
 from pedestal_common.quantities import (
-    Amperes,
     NewtonMeters,
     Radians,
     RadiansPerSecond,
     RadiansPerSecond2,
     Seconds,
-    Volts,
 )
 
 MAX_RETURN_RATE_RAD_S = 0.1  # largest rate of the return from beyond an end of travel [rad/s]
@@ -72,9 +54,8 @@ def integral(total: float, error: float, K_iT: float, excess: float) -> float:
     """Return the integral part of a PI controller after one period T: total + K_i T e.
 
     excess = demanded output - realised output. The integral is held while excess and error e have the same sign,
-    because integration would then demand even more of an output that is at its limit. An error of the other sign leads
-    back from the limit and is integrated. Because the realised output is that of the actuator, every limit down the
-    chain counts: the torque limit, and the voltage limit of the inverter.
+    because integration would then demand even more of an output that is at its limit. Because the realised output is
+    that of the actuator, every limit down the chain counts: the torque limit, and the voltage limit of the inverter.
     """
     return total if excess * error > 0.0 else total + K_iT * error
 
@@ -82,21 +63,15 @@ def integral(total: float, error: float, K_iT: float, excess: float) -> float:
 @inlined
 def torque_demand(error: RadiansPerSecond, total: NewtonMeters, K_p: float,
                   feed_forward: NewtonMeters) -> NewtonMeters:
-    """Return the torque demand per motor from a speed error on the motor shaft.
-
-    total: integral part; K_p: proportional gain [Nms/rad].
-    """
+    """Return the torque demand per motor. total: integral part; K_p [Nms/rad]."""
     return K_p * error + total + feed_forward
 
 
 @inlined
 def shared_torques(T_1: NewtonMeters, T_2: NewtonMeters, T_b: NewtonMeters, omega_1: RadiansPerSecond,
                    omega_2: RadiansPerSecond, K_d: float) -> tuple[NewtonMeters, NewtonMeters]:
-    """Return the torque demands of the two motors: T_1,2 +- T_b -+ K_d (omega_1 - omega_2).
-
-    T_1, T_2: demands of the speed loop; T_b: bias torque; K_d: damping between the motors [Nms/rad]. The loop on the
-    mean speed cannot damp motion of the motors against each other, so K_d damps it.
-    """
+    """Return the torque demands of the two motors: T_1,2 +- T_b -+ K_d (omega_1 - omega_2). The loop on the mean speed
+    cannot damp motion of the motors against each other, so K_d [Nms/rad] damps it."""
     split = T_b - K_d * (omega_1 - omega_2)
     return T_1 + split, T_2 - split
 
@@ -108,11 +83,8 @@ def limited_torque(T: NewtonMeters, limit: NewtonMeters) -> NewtonMeters:
 
 
 def bias_constants(p: BiasParameters) -> tuple[NewtonMeters, NewtonMeters, float]:
-    """Return (T_b, out, per_fade) for `scheduled_bias`.
-
-    T_b: full bias; out: demand with zero bias; per_fade: slope of the line between them [1/Nm]. An infinite
-    `out` makes the bias constant; a full bias of 0 switches it off.
-    """
+    """Return (T_b, out, per_fade) for `scheduled_bias`: full bias, demand with zero bias, slope of the line between
+    them [1/Nm]. An infinite `out` makes the bias constant; a full bias of 0 switches it off."""
     if p.schedule == 'off':
         return 0.0, p.out, 1.0
     if p.schedule == 'constant':
@@ -139,32 +111,7 @@ def observer_gains(w_o: RadiansPerSecond, h: Seconds) -> tuple[float, float]:
 @inlined
 def updated_observer(omega_hat: RadiansPerSecond, d_hat: NewtonMeters, omega: RadiansPerSecond, T: NewtonMeters,
                      l_1: float, l_2: float, h_J: float) -> tuple[RadiansPerSecond, NewtonMeters]:
-    """Return the estimates of speed and disturbance torque one period h later.
-
-    omega_hat, d_hat: estimates before; omega: measured speed; T: torque of a motor in the period; l_1, l_2: see
-    `observer_gains`; h_J = h / J.
-    """
+    """Return the estimates of speed and disturbance torque one period h later. h_J = h / J."""
     predicted = omega_hat + h_J * (T + d_hat)
     e = omega - predicted
     return predicted + l_1 * e, d_hat + l_2 / h_J * e
-
-
-@inlined
-def voltages(i_d: Amperes, i_q: Amperes, i_ref: Amperes, omega_e: RadiansPerSecond, sum_d: Volts, sum_q: Volts,
-             K_p: float, K_iT: float, L: float, psi: float, v_max: Volts) -> tuple[Volts, Volts, Volts, Volts, bool]:
-    """Return the voltages v_d, v_q, the two new integral parts, and True if the voltages were limited.
-
-    K_p = w L and K_i = w R cancel the pole of the winding: the closed loop of each axis is w / (s + w). The terms with
-    omega_e, the electrical speed, decouple the axes. i_ref: reference of i_q.
-    """
-    e_d, e_q = -i_d, i_ref - i_q
-    u_d = K_p * e_d + sum_d - omega_e * L * i_q
-    u_q = K_p * e_q + sum_q + omega_e * (L * i_d + psi)
-    v_d, v_q = u_d, u_q
-    limited = u_d * u_d + u_q * u_q > v_max * v_max
-    if limited:
-        # v_d has priority, because v_d keeps i_d at 0. With i_d = 0 the current gives the largest torque.
-        v_d = min(max(u_d, -v_max), v_max)
-        room = math.sqrt(v_max * v_max - v_d * v_d)
-        v_q = min(max(u_q, -room), room)
-    return (v_d, v_q, integral(sum_d, e_d, K_iT, u_d - v_d), integral(sum_q, e_q, K_iT, u_q - v_q), limited)

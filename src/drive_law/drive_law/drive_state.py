@@ -1,4 +1,4 @@
-"""Enable, brakes and faults of the drive: one state machine for both axes, which advances once per control period.
+"""Drive of two axes: its records, its commands, and one state machine for enable, brakes and faults of both axes.
 
     enabled -> stopping -> engaging brakes -> disabled -> releasing brakes -> enabled
 
@@ -8,13 +8,14 @@ pins may move only in the phase `disabled`. Overcurrent, and a stop that takes t
 the brakes at once.
 """
 import math
-from typing import Protocol
+from typing import Annotated
 
-from adu_drive import axis, stow_pins
-from adu_drive.controller import faults
+from drive_law import axis_control, faults, stow_pins
+from drive_law.params import AduParameters, whole_speed_periods
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
-from pedestal_common.quantities import Bit
+from pedestal_common.quantities import Bit, Floats, Ints, NewtonMeters, RadiansPerSecond, Records, Seconds
+from pedestal_common.record import Record
 
 PHASES = ('enabled', 'stopping', 'engaging brakes', 'disabled', 'releasing brakes')
 PHASE_ENABLED, PHASE_STOPPING, PHASE_ENGAGING_BRAKES, PHASE_DISABLED, PHASE_RELEASING_BRAKES = range(len(PHASES))
@@ -47,27 +48,98 @@ of the fault words of azimuth and elevation."""
 STANDSTILL_RATE_RAD_S = 1e-3  # load rate below which an axis counts as standing [rad/s]
 
 
-class State(Protocol):
-    """Part of drive_unit.State that this module reads and changes."""
-    azimuth: axis.State
-    elevation: axis.State
-    phase: int
-    age: int
+COMMAND_RING_SIZE = 256
+"""Number of commands in the ring of the transport delay.
+
+It exceeds the 200 commands of a configured and an injected delay, each of MAX_TRANSPORT_DELAY_S, at the
+shortest period of 1 ms.
+"""
+
+INITIAL_AGE_PERIODS = 1 << 40
+"""Initial number of periods since the last change of the brakes: longer ago than any time of a brake or a delay."""
+
+MAX_PLAUSIBLE_INPUT = 1e6  # largest valid input [rad/s, Nm, rad/s2]. An input beyond it, infinite or NaN is invalid.
+
+
+class AxisInputs(Record):
+    """Command to an axis."""
+    rate: RadiansPerSecond
+    torque: NewtonMeters        # feed-forward torque of both motors on the load axis
+
+
+class Inputs(Record):
+    """Inputs of a period."""
+    azimuth: AxisInputs
+    elevation: AxisInputs
+    enable: Bit                 # 1: follow the command; 0: controlled stop, which begins without the transport delay
+    pins: int                   # code of acu/stow_pins: command to the stow pins
+
+
+class Outputs(Record):
+    """Outputs at t_k+1."""
+    azimuth: axis_control.Outputs
+    elevation: axis_control.Outputs
+    # 1 if an input of this call was invalid; the command is then taken as enable 0, a disturbance as 0
+    invalid_command: Bit
+    phase: int                  # index of PHASES
+    following: Bit              # 1 if enabled and permitted at t_k+1
+    wanted: Bit                 # 0 after a request to disable
+    emergency: Bit              # 1 while an emergency stop is latched
+    braked: Bit                 # 1 while the brakes grip
+    condition: int              # see `condition`
+    pins: int                   # see stow_pins.state_code
+
+
+class Constants(Record):
+    """Constants of the drive; X_ticks: in periods of the speed loops, X_periods: in control periods."""
+    azimuth: axis_control.Constants
+    elevation: axis_control.Constants
+    pins: stow_pins.Constants
+    period: Seconds             # T
+    speed_ticks: int            # the control period
+    delay_ticks: int            # transport delay
+    engage_periods: int         # times of the brakes
+    release_periods: int
+    stop_periods: int           # longest controlled stop
+
+
+class State(Record):
+    """State of the drive. `State.dtype` is one object, which all state records share. A record with an equal copy
+    would cost 3 us in each call, because numba then compares the copy field by field."""
+    azimuth: axis_control.State
+    elevation: axis_control.State
+    rate: Annotated[Floats, (COMMAND_RING_SIZE, 2)]     # ring of the commands: rates [rad/s]
+    torque: Annotated[Floats, (COMMAND_RING_SIZE, 2)]   # feed-forward torques [Nm]
+    enable: Annotated[Ints, (COMMAND_RING_SIZE,)]       # inputs `enable`
+    k: int                      # number of the period
+    phase: int                  # phase, wanted, emergency, following: see Outputs
+    age: int                    # periods since the last change of the phase
     wanted: Bit
     emergency: Bit
-    applied: Bit
-    brake_age: int
+    tick: int                   # speed-loop period whose command is in force
+    late_ticks: int             # injected delay in speed-loop periods
+    applied: Bit                # 1 while the brakes are commanded on
+    brake_age: int              # periods since the last change of the command to the brakes
+    braked: Bit                 # 1 while the brakes grip
+    following: Bit
     pins: stow_pins.State
 
 
-class Constants(Protocol):
-    """Part of drive_unit.Constants that this module reads."""
-    azimuth: axis.Constants
-    elevation: axis.Constants
-    pins: stow_pins.Constants
-    engage_periods: int
-    release_periods: int
-    stop_periods: int
+def constants(params: AduParameters) -> dict[str, float | Records]:
+    """Return the values of Constants without those of the axes."""
+    return {'pins': stow_pins.constants(params), 'period': params.period,
+            'speed_ticks': whole_speed_periods('period', params.period),
+            'delay_ticks': whole_speed_periods('transport_delay', params.transport_delay),
+            **{f'{name}_periods': math.ceil(getattr(params.brakes, f'{name}_time') / params.period - 1e-6)
+               for name in ('engage', 'release', 'stop')}}
+
+
+def initial_state(params: AduParameters) -> dict[str, float | Records]:
+    """Return the values of State without those of the axes."""
+    enabled = params.initially_enabled and not (params.stow_pins and params.pins.initially_in)
+    return {'enable': 1, 'phase': PHASE_ENABLED if enabled else PHASE_DISABLED, 'wanted': params.initially_enabled,
+            'tick': -INITIAL_AGE_PERIODS, 'applied': not enabled, 'brake_age': INITIAL_AGE_PERIODS,
+            'braked': not enabled, 'pins': stow_pins.initial_state(params)}
 
 
 @compiled
@@ -114,7 +186,7 @@ def state_text(condition: int) -> str:
 
 
 @compiled
-def is_moving(axis: axis.State, constants: axis.Constants) -> bool:
+def is_moving(axis: axis_control.State, constants: axis_control.Constants) -> bool:
     """Return True if an axis turns by its motor encoders."""
     return abs(axis.motor_1.measured + axis.motor_2.measured) * constants.per_2N > STANDSTILL_RATE_RAD_S
 
@@ -144,7 +216,7 @@ def _next(state: State, constants: Constants, ready: bool) -> int:
 
 @compiled
 def _advance_pins(state: State, constants: Constants, wanted: int) -> None:
-    """Advance the stow pins by a period. They move while the drive is disabled. wanted: code of acu/stow_pins."""
+    """Advance the stow pins by a period. They move while the drive is disabled."""
     az, el, c = state.azimuth, state.elevation, constants
     stow_pins.command_pins(state.pins, c.pins, wanted,
                            math.nan if is_moving(az, c.azimuth) else c.azimuth.rad * az.reading,
@@ -156,10 +228,8 @@ def _advance_pins(state: State, constants: Constants, wanted: int) -> None:
 
 @compiled
 def advance(state: State, constants: Constants, pins: int, ready: bool) -> bool:
-    """Advance the phase by a control period. Return True if the brakes grip.
-
-    pins: code of acu/stow_pins; ready: True if the amplifiers of the motors are on.
-    """
+    """Advance the phase by a control period. Return True if the brakes grip. pins: code of acu/stow_pins; ready: True
+    if the amplifiers of the motors are on."""
     if constants.pins.fitted:
         _advance_pins(state, constants, pins)
     phase = _next(state, constants, ready)
@@ -175,8 +245,8 @@ def advance(state: State, constants: Constants, pins: int, ready: bool) -> bool:
 def request(state: State, constants: Constants, what: int) -> int:
     """Execute a request between two periods. Return REPLY_ACCEPTED or the code of a refusal.
 
-    what: a code of REQUEST_CODES. The request takes effect in the next period. Faults and emergency stop can be reset
-    while both axes stand and no cause is present. A reset enables the drive again if it was enabled before.
+    The request takes effect in the next period. Faults and emergency stop can be reset while both axes stand and no
+    cause is present. A reset enables the drive again if it was enabled before.
     """
     if what == REQUEST_DISABLE:
         state.wanted = 0
@@ -196,3 +266,43 @@ def request(state: State, constants: Constants, what: int) -> int:
         state.azimuth.faults = state.elevation.faults = state.emergency = 0
         stow_pins.retry(state.pins)
     return REPLY_ACCEPTED
+
+
+@compiled
+def plausible(x: float) -> bool:
+    """Return True if an input is valid, as MAX_PLAUSIBLE_INPUT states; NaN is invalid."""
+    return abs(x) <= MAX_PLAUSIBLE_INPUT
+
+
+@compiled
+def receive_command(state: State, inputs: Inputs, disturbance_valid: bool) -> bool:
+    """Put the command of step k into the ring. Return True if command and disturbance are valid."""
+    slot = state.k % COMMAND_RING_SIZE
+    valid = (disturbance_valid and plausible(inputs.azimuth.rate) and plausible(inputs.azimuth.torque)
+             and plausible(inputs.elevation.rate) and plausible(inputs.elevation.torque))
+    state.enable[slot] = 1 if valid and inputs.enable == 1 else 0
+    if valid:
+        state.rate[slot, 0], state.rate[slot, 1] = inputs.azimuth.rate, inputs.elevation.rate
+        state.torque[slot, 0], state.torque[slot, 1] = inputs.azimuth.torque, inputs.elevation.torque
+    return valid
+
+
+@compiled
+def apply_command(state: State, constants: Constants, inputs: Inputs, j: int) -> None:
+    """Take the command of speed-loop period j out of the ring, and set state.following."""
+    # While an injected delay begins, `max` repeats the last command. Before the first command, a slot has rate 0.
+    state.tick = max(state.tick, state.k * constants.speed_ticks + j - constants.delay_ticks - state.late_ticks)
+    slot = (state.tick // constants.speed_ticks) % COMMAND_RING_SIZE
+    state.following = state.enable[slot] if state.phase == PHASE_ENABLED and inputs.enable == 1 else 0
+    az, el = state.azimuth, state.elevation
+    az.commanded_rate, az.commanded_torque = state.rate[slot, 0], state.torque[slot, 0]
+    el.commanded_rate, el.commanded_torque = state.rate[slot, 1], state.torque[slot, 1]
+
+
+@compiled
+def read(state: State, constants: Constants, outputs: Outputs) -> None:
+    """Write the present outputs, without those of the axes."""
+    outputs.phase, outputs.wanted = state.phase, state.wanted
+    outputs.emergency, outputs.braked = state.emergency, state.braked
+    outputs.following = state.phase == PHASE_ENABLED and permitted(state)
+    outputs.condition, outputs.pins = condition(state), stow_pins.state_code(state.pins, constants.pins)

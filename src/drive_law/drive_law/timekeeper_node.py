@@ -1,7 +1,6 @@
 """Node that owns the time of the drive: clock, steps and pacing.
 
-It is the base of `adu_node`, whose unit is one drive, and of `beam_steering_node`, with a unit for each beam. A port
-(unit_node.Port, in `self.ports`) connects one unit to its topics.
+A port (unit_node.Port, in `self.ports`) connects one unit to its topics: one drive, or each beam of an array.
 """
 import time
 from collections.abc import Callable, Mapping
@@ -9,7 +8,7 @@ from typing import Protocol, cast
 
 from rclpy.executors import Executor
 
-from adu_drive.params import RunParameters
+from drive_law.params import RunParameters
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import unit_node
 from pedestal_common.node.unit import Diagnosis, Unit
@@ -39,7 +38,7 @@ class DriveUnit(Unit, Protocol):
 
 
 def unit_of(port: unit_node.Port) -> DriveUnit:
-    """Return the unit of a port of a Timekeeper."""
+    """Return the unit of a port."""
     return cast(DriveUnit, port.unit)   # the modules of its subclasses name only drives
 
 
@@ -86,7 +85,6 @@ class Timekeeper(unit_node.UnitNode):
                         self.reader(name, unit_node.decoding(decoder), self._newest_receiver(name))
 
     def _count_from_first_step(self) -> None:
-        """Reset the numbers of steps, and the newest messages and stamps of commands."""
         self.k, self.made = (-1 if self.graph.lockstep else self.FIRST_STEP - 1), 0
         self.lost_steps = self.missed_steps = self.late_ticks = 0
         self.newest: dict[str, Decoded] = {}
@@ -101,7 +99,7 @@ class Timekeeper(unit_node.UnitNode):
 
     @property
     def awaits(self) -> str:
-        """Condition for the first step: subscribers in lockstep, start time in realtime."""
+        """Condition for the first step."""
         if self.graph.lockstep:
             return 'the subscribers of its topics'
         _, now = self.clock()
@@ -115,11 +113,10 @@ class Timekeeper(unit_node.UnitNode):
         self.steps.take(self.unit.trigger, 0, (0, ()))
 
     def answer(self, stamp: Nanoseconds, values: Mapping[str, Decoded | None]) -> None:
-        """Make the next step of lockstep; called when all nodes have answered the previous step, whose number is
-        self.k.
+        """Make the next step of lockstep, when all nodes have answered the previous step, whose number is self.k.
 
-        stamp: of the new step; values: {topic: message} of the previous step. The step after the new one is
-        announced to `self.steps`, which waits for the answers to the new step and then calls this method again.
+        The step after the new one is announced to `self.steps`, which waits for the answers to the new step and then
+        calls this method again.
         """
         if self.k == self.last_step:     # all nodes have answered the last step
             self.end()
@@ -132,10 +129,7 @@ class Timekeeper(unit_node.UnitNode):
         self.steps.take(self.unit.trigger, stamp + self.period_ns, (stamp + self.period_ns, ()))
 
     def _make(self, stamp: Nanoseconds, values: Mapping[str, Decoded | None]) -> None:
-        """Make the step number self.k with the messages of the previous step.
-
-        values: {topic: message}.
-        """
+        """Make the step number self.k with the messages of the previous step."""
         for port in self.ports:
             port.step(stamp, values)
         if self.k < 0:
@@ -165,7 +159,7 @@ class Timekeeper(unit_node.UnitNode):
             self.guarded_step()
 
     def make_due_step(self) -> None:
-        """Make the due step of realtime, unless it was made, and set the wait for the next step [s]."""
+        """Make the due step of realtime, unless it was made, and set the wait for the next step."""
         now, utc = self.clock()
         start = self.epoch(utc)
         k, min_wait = (utc - start) // self.period_ns, 0.0
@@ -177,10 +171,8 @@ class Timekeeper(unit_node.UnitNode):
         self.wait = min(max(wait, min_wait), MAX_WAIT_S)
 
     def _make_realtime_step(self, k: int, stamp: Nanoseconds, now: Nanoseconds) -> None:
-        """Make step k. stamp: of the step; now: time of the monotonic clock.
-
-        Skipped earlier steps are not published. They count as missed and as lost.
-        """
+        """Make step k. now: time of the monotonic clock. Skipped earlier steps are not published. They count as missed
+        and as lost."""
         previous_stamp = stamp - self.period_ns
         if self.made:
             periods = (now - self.last_step_time) / self.period_ns
@@ -198,7 +190,6 @@ class Timekeeper(unit_node.UnitNode):
             self.finished = True
 
     def _newest_receiver(self, name: str) -> Callable[[Decoded, object], None]:
-        """Return the callback of a topic in realtime, which keeps the newest message."""
         def take(message: Decoded, _: object) -> None:
             self.newest[name] = message
             if name in self.commands:
@@ -206,10 +197,8 @@ class Timekeeper(unit_node.UnitNode):
         return take
 
     def draining(self) -> bool:
-        """Return True at the end of a realtime run, until the axes have stopped and the brakes hold.
-
-        The first call disables the drive.
-        """
+        """Return True at the end of a realtime run, until the axes have stopped and the brakes hold. The first call
+        disables the drive."""
         if self.graph.lockstep or self.failure or not self.made:
             return False
         if not self.stopping:
@@ -219,35 +208,29 @@ class Timekeeper(unit_node.UnitNode):
         return not all(unit_of(port).rests for port in self.ports)
 
     def end(self) -> None:
-        """End lockstep after the answers to the last step, with the result of the run.
-
-        The wall-clock time begins with the answers to step 0. Before these answers the nodes still discover each
-        other.
-        """
+        """End lockstep after the answers to the last step, with the result of the run. The wall-clock time begins with
+        the answers to step 0. Before these answers the nodes still discover each other."""
         self.result = self._outcome(self.k - 1, self.k)
         self.await_acknowledged()
         self.finished = True
 
     def close(self) -> None:
-        """End the node; in realtime, first keep the result of the run, see `_outcome`."""
+        """End the node; in realtime, first keep the result of the run."""
         if not self.graph.lockstep:
             # Without graph.start the number of a step counts from midnight.
             self.result = self._outcome(self.made, self.made + int(self.missed_steps))
         super().close()
 
     def _outcome(self, made: int, steps: int) -> dict[str, float]:
-        """Return the result of the run: {name: value}.
-
-        made: number of steps made in the wall-clock time, from which the realtime factor follows; steps: number of the
-        steps of the run.
-        """
+        """Return the result of the run. made: number of steps in the wall-clock time, from which the realtime factor
+        follows."""
         wall = max(time.monotonic_ns() - self.begun, 1) * 1e-9
         return {'steps': steps, 'wall_s': wall, 'realtime_factor': made * self.parameters.period / wall,
                 'lost_steps': int(self.lost_steps), 'missed_steps': int(self.missed_steps),
                 'late_ticks': int(self.late_ticks)}
 
     def diagnose(self) -> Diagnosis:
-        """Return the Diagnosis of the drive with the step and the lost, late and missed steps in its values."""
+        """Return the Diagnosis of the drive with the step and the lost, late and missed steps."""
         diagnosis = super().diagnose()
         values = [*diagnosis.values, ('step', str(self.k)), ('lost_steps', str(int(self.lost_steps))),
                   ('late_ticks', str(int(self.late_ticks)))]

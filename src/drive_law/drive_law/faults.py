@@ -1,10 +1,9 @@
 """Faults that a drive detects by its own measurements. A fault is latched until its reset (drive_state.request)."""
 from typing import NamedTuple
 
-from adu_drive.plant.motors import WARNING_THERMAL_LOAD
 from pedestal_common.codes import bits
 from pedestal_common.compiled import inlined
-from pedestal_common.quantities import Ints, Radians, RadiansPerSecond
+from pedestal_common.quantities import Ints, NewtonMeters, Radians, RadiansPerSecond
 from pedestal_common.record import Record
 
 
@@ -41,6 +40,9 @@ AXIS_FAULTS = (
 )
 """Faults of an axis; bit i of a fault word is AXIS_FAULTS[i]."""
 
+WARNING_THERMAL_LOAD = 0.8
+"""Thermal load of a motor above which the drive reports a warning, and below which overtemperature ends."""
+
 Bit = bits([fault.name for fault in AXIS_FAULTS])
 MOTORS_LOST_BITS = Bit.MOTOR_1_LOST | Bit.MOTOR_2_LOST
 ALL_FAULT_BITS = (1 << len(AXIS_FAULTS)) - 1
@@ -50,7 +52,7 @@ _STOP_BITS = sum(1 << i for i, fault in enumerate(AXIS_FAULTS) if fault.stops)
 
 
 class Limits(Record):
-    """Trip levels and places of the switches of an axis, from params.FaultParameters and params.LimitParameters."""
+    """Trip levels and places of the switches of an axis."""
     current_2: float                # square of the overcurrent [A2]
     omega: RadiansPerSecond         # overspeed of a motor
     disagreement: Radians
@@ -72,6 +74,18 @@ MIN_OUTWARD_RATE_RAD_S = 1e-3  # smallest rate of an axis that counts as outward
 
 
 @inlined
+def thermal_load(x: float, torque: NewtonMeters, per_rated: float, gain: float) -> float:
+    """Return the thermal load one period h later, as in the I2t protection; torque and current are proportional:
+
+        tau dx/dt = (T / T_rated)^2 - x        x = 1: steady state at rated torque
+
+    per_rated = 1 / T_rated; gain = 1 - exp(-h / tau).
+    """
+    relative = torque * per_rated
+    return x + gain * (relative * relative - x)
+
+
+@inlined
 def stops(bits: int) -> bool:
     """Return True if the drive stops on the faults of an axis."""
     return bits & _STOP_BITS != 0 or bits & MOTORS_LOST_BITS == MOTORS_LOST_BITS
@@ -85,7 +99,7 @@ def removes_torque(bits: int) -> bool:
 
 @inlined
 def late(periods: int, error: RadiansPerSecond, limit: RadiansPerSecond) -> int:
-    """Return the number of successive periods with a rate error beyond its limit; periods: number before."""
+    """Return the number of successive periods with a rate error beyond its limit."""
     return periods + 1 if abs(error) > limit else 0
 
 
@@ -97,7 +111,7 @@ def lost_motor_faults(motors: Ints) -> int:
 
 @inlined
 def end_switch_faults(theta: Radians, omega: RadiansPerSecond, limits: Limits) -> int:
-    """Return the fault word of the switches beyond the ends of travel for a load at theta with the rate omega."""
+    """Return the fault word of the switches beyond the ends of travel."""
     bits = 0
     if (theta > limits.final_high and omega > MIN_OUTWARD_RATE_RAD_S
             or theta < limits.final_low and omega < -MIN_OUTWARD_RATE_RAD_S):

@@ -1,16 +1,15 @@
-"""Stow pins: one per axis, pushed into a hole of the turning part while the brakes hold the axis.
+"""Stow pins: one per axis (0 azimuth, 1 elevation), pushed into a hole of the turning part while the brakes hold the
+axis.
 
 A command to move the pins in waits until both axes stand within the window about their holes. The drive then stops,
 the brakes grip, and the pins move in. The drive stays off until both pins are out again. A pin that does not reach its
 position in time has failed, which is a fault of its axis. A reset of the faults retries the motion.
-
-Argument `axis` is 0 for azimuth, 1 for elevation.
 """
 import math
 from typing import Annotated
 
-from adu_drive.controller import faults
-from adu_drive.params import AduParameters
+from drive_law import faults
+from drive_law.params import AduParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
 from pedestal_common.quantities import Bit, Ints, Pair, Radians, Records
@@ -43,7 +42,7 @@ class State(Record):
 
 
 def constants(params: AduParameters) -> Records:
-    """Return the Constants (1,) of the pins."""
+    """Return the Constants (1,)."""
     p = params.pins
     return Constants.of(fitted=params.stow_pins, hole=[p.azimuth, p.elevation], window=p.window,
                         travel=max(math.ceil(p.travel_time / params.period - 1e-6), 1),
@@ -51,7 +50,7 @@ def constants(params: AduParameters) -> Records:
 
 
 def initial_state(params: AduParameters) -> Records:
-    """Return the State (1,) of pins that are out, or in."""
+    """Return the State (1,)."""
     pin_in = params.stow_pins and params.pins.initially_in
     return State.of(ordered=PIN_COMMAND_IN if pin_in else PIN_COMMAND_OUT,
                     n=constants(params)['travel'] if pin_in else 0)
@@ -87,10 +86,8 @@ def holds(pins: State, constants: Constants, axis: int) -> bool:
 
 @compiled
 def command_pins(pins: State, constants: Constants, wanted: int, azimuth: Radians, elevation: Radians) -> None:
-    """Take a command of acu/stow_pins. The command `in` waits until both axes are in the window.
-
-    azimuth, elevation: encoder angles of standing axes, NaN for a moving axis.
-    """
+    """Take a command of acu/stow_pins. The command `in` waits until both axes are in the window. azimuth, elevation:
+    encoder angles of standing axes, NaN for a moving axis."""
     if wanted == PIN_COMMAND_OUT:
         _set_command(pins, PIN_COMMAND_OUT)
     elif wanted == PIN_COMMAND_IN and (abs(azimuth - constants.hole[0]) <= constants.window

@@ -1,1 +1,0 @@
-"""Laws of the controller of the drive, on the motor shaft."""
