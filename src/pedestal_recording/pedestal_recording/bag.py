@@ -42,8 +42,9 @@ INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish
 """Names and types of the fields of Bag.index."""
 _UNREADABLE, _OTHER_PUBLISHER = 1, 2
 """Values of the field `foreign` for a foreign message: its reason. The value 0 means a message of the graph."""
-_DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
-"""Kinds of records outside chunks that hold no messages and are read."""
+_KINDS = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA, Opcode.CHUNK,
+          Opcode.MESSAGE)
+"""Kinds of records outside chunks that are read."""
 Index: typing.TypeAlias = np.recarray[tuple[int], DType]    # rows of Bag.index
 Content = typing.TypeVar('Content')  # type of the values in a dictionary {topic or node: value}
 MetadataRecords = Mapping[str, Mapping[str, str]]  # metadata records of a bag, {name: {text: text}}
@@ -230,16 +231,15 @@ class Bag:
 
     def _scan(self, number: int, file: McapFile, blocks: list[Records]) -> None:
         """Add the messages of a file to the blocks of the index. Raises EOFError if the file ends early."""
-        for opcode, start, stop in file.pieces():
+        for opcode, start, stop, content in mcap_file.walk(file, _KINDS):
             try:
                 if opcode == Opcode.CHUNK:
-                    data = file.chunk(start, stop)
                     self._chunks.append((file, start, stop))
-                    blocks += self._walk(number, data, 0, len(self._chunks) - 1)
-                elif opcode == Opcode.MESSAGE:
-                    blocks += self._walk(number, file.read(start, stop), start, -1 - number)
-                elif opcode in _DECLARED:
-                    self._declare(number, opcode, file.read(start + 9, stop))
+                if isinstance(content, bytes):
+                    offset, chunk = (0, len(self._chunks) - 1) if opcode == Opcode.CHUNK else (start, -1 - number)
+                    blocks += self._walk(number, content, offset, chunk)
+                else:
+                    self._declare(number, content)
             except BagError:
                 raise
             except Exception as error:  # a decoder may raise anything on broken bytes
@@ -263,7 +263,7 @@ class Bag:
                 at += 9 + length
             else:
                 opcode, stop = mcap_file.frame(data, at)
-                self._declare(number, opcode, data[at + 9:stop])
+                self._declare(number, mcap_file.parsed(opcode, data[at + 9:stop]))
                 at = stop
         if at > len(data):
             raise ValueError('a message that is longer than its chunk')
@@ -305,12 +305,12 @@ class Bag:
                     self._judges[channel] = Readable(name, self.topics[name], 'pacing' in self.metadata)
                 block['foreign'][rows[~self._judges[channel].mask(data, start, stop)]] = _UNREADABLE
 
-    def _declare(self, number: int, opcode: int, content: bytes) -> None:
-        """Note the schema, channel, metadata or statistics in a record of the file with a number.
+    def _declare(self, number: int, record: mcap_file.Content) -> None:
+        """Note a schema, channel, metadata or statistics of the file with a number.
 
         Raises BagError for a channel that is not CDR, ValueError for an invalid record.
         """
-        record, base = mcap_file.parsed(opcode, content), number << 16
+        base = number << 16
         if isinstance(record, Schema):
             self._schemas[base | record.id] = record.name
         elif isinstance(record, Channel):

@@ -35,7 +35,7 @@ from pedestal_common.quantities import Json, Nanoseconds
 from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
 from pedestal_recording.bag import locate, planned_end
-from pedestal_recording.mcap_file import MESSAGE_HEAD, BagError, McapFile, frames, parsed, reason, unpacked
+from pedestal_recording.mcap_file import MESSAGE_HEAD, BagError, McapFile, frames, reason, walk
 
 TARGET_CHUNK_BYTES = 1_000_000
 TARGET_CHUNK_SPAN_NS = 1_000_000_000
@@ -43,6 +43,8 @@ TARGET_CHUNK_MESSAGES = 100_000  # size [bytes], span of log times [ns] and numb
 
 COMMON_METADATA_KEYS = ('scenario', 'pacing', 'seed', 'planned_end_ns')
 """Keys of the metadata with equal values in all files of a bag."""
+
+_DECLARED = Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA  # kinds of records that describe the messages of a file
 
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 """Duration by which rosbag2 states that a quality of service has no limit."""
@@ -215,20 +217,19 @@ class BagFile:
         self._start(_Disk(self.file, self._disk.stream, self._disk.end))
         file = McapFile(self.file, locked=True)
         with contextlib.suppress(EOFError):
-            for opcode, start, stop in file.pieces():
-                record = parsed(opcode, file.read(start + 9, stop))
-                if isinstance(record, records.Schema):
-                    self.add_schema(record.name, record.encoding, record.data)
-                elif isinstance(record, records.Channel):
-                    self.add_channel(record.topic, record.schema_id, record.metadata)
-                elif isinstance(record, records.Metadata):
-                    self.add_metadata(record.name, record.metadata)
-                elif isinstance(record, records.Chunk):
-                    data = unpacked(record)
-                    for kind, at, end in frames(data):
+            for _, _, _, content in walk(file, (*_DECLARED, Opcode.CHUNK)):
+                if isinstance(content, records.Schema):
+                    self.add_schema(content.name, content.encoding, content.data)
+                elif isinstance(content, records.Channel):
+                    self.add_channel(content.topic, content.schema_id, content.metadata)
+                elif isinstance(content, records.Metadata):
+                    self.add_metadata(content.name, content.metadata)
+                elif isinstance(content, bytes):
+                    for kind, at, end in frames(content):
                         if kind == Opcode.MESSAGE:
-                            _, channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(data, at)
-                            self._mcap.add_message(channel, log, data[at + MESSAGE_HEAD.size:end], publish, sequence)
+                            _, channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(content, at)
+                            self._mcap.add_message(channel, log, content[at + MESSAGE_HEAD.size:end], publish,
+                                                   sequence)
                     self._mcap.flush()
         self._mcap.flush()
 
@@ -281,24 +282,19 @@ class _Content:
         times: list[Nanoseconds] = []
         file = McapFile(path, locked=True)
         with contextlib.suppress(EOFError):
-            for opcode, start, stop in file.pieces():
+            for opcode, start, _, content in walk(file, _DECLARED):
                 if opcode == Opcode.CHUNK:
                     times += _PAIR.unpack(file.read(start + 9, start + 9 + _PAIR.size))
                 elif opcode == Opcode.MESSAGE_INDEX:
                     channel, size = _INDEX.unpack(file.read(start + 9, start + 9 + _INDEX.size))
                     self._counts[channel] += size // _PAIR.size
-                elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA, Opcode.METADATA):
-                    self._declare(parsed(opcode, file.read(start + 9, stop)))
+                elif isinstance(content, records.Metadata):
+                    self.metadata[content.name] = content.metadata
+                elif isinstance(content, records.Schema):
+                    self._schemas[content.id] = content.name
+                elif isinstance(content, records.Channel):
+                    self._channels[content.id] = content
         self.first, self.last, self.total = min(times, default=0), max(times, default=0), self._counts.total()
-
-    def _declare(self, record: records.McapRecord | None) -> None:
-        """Note a record of metadata, a schema or a channel."""
-        if isinstance(record, records.Metadata):
-            self.metadata[record.name] = record.metadata
-        elif isinstance(record, records.Schema):
-            self._schemas[record.id] = record.name
-        elif isinstance(record, records.Channel):
-            self._channels[record.id] = record
 
     def topics(self) -> Iterator[tuple[records.Channel, str, int]]:
         """Yield (channel, name of its type, number of messages) of every topic."""
