@@ -26,6 +26,21 @@ This avoids a huge table from a file whose messages each name other columns.
 STATUS_TEXTS = ('name', 'hardware_id', 'message')  # fields of a DiagnosticStatus that are texts
 
 
+class Shape:
+    """The bytes of a message outside its numbers, which all messages of one shape share.
+
+    message: CDR bytes; spans: (start, stop) of these bytes, such as cdr.Places.fixed.
+    """
+
+    def __init__(self, message: bytes, spans: Iterable[tuple[int, int]]) -> None:
+        self.places = np.concatenate([np.arange(start, stop) for start, stop in spans])
+        self._bytes = np.frombuffer(message, np.uint8)[self.places]
+
+    def equals(self, taken: Bytes) -> Bools:
+        """Return True for each message of the same length with this shape; taken: its bytes at `places`, as a row."""
+        return (taken == self._bytes).all(axis=1)
+
+
 def stamps(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanoseconds]) -> Stamps:
     """Return the stamps in the headers of messages; data: their CDR bytes, log: their log times.
 
@@ -88,10 +103,10 @@ def _fill(out: Table, block: Bytes, rows: Ints, type_name: str, count: int, most
     shapes = 0
     while rows.size:
         walk = cdr.Places(block[0].tobytes(), type_name)
-        fixed = np.concatenate([np.arange(start, stop) for start, stop in walk.fixed])
+        shape = Shape(walk.data, walk.fixed)
         shapes += 1
         tried = len(block) if shapes < MAX_MESSAGE_SHAPES else 1
-        alike = (block[:tried, fixed] == block[0, fixed]).all(axis=1)
+        alike = shape.equals(block[:tried, shape.places])
         same, where = block[:tried][alike], rows[:tried][alike]
         for path, start, dtype in walk.numbers:
             name = layouts.column(type_name, path, walk.texts)
@@ -119,15 +134,11 @@ def alike(data: Sequence[bytes], type_name: str, template: bytes, names: Collect
     names: the columns that may differ. The padding that DDS adds at the end of a message does not count.
     """
     walk = cdr.Places(template, type_name)
-    fixed = [np.arange(start, stop) for start, stop in walk.fixed]
-    for path, start, dtype in walk.numbers:
-        column = layouts.column(type_name, path, walk.texts)
-        if not path.startswith(('header.stamp.', 'clock.')) and column not in names:
-            fixed.append(np.arange(start, start + int(dtype[2:])))
-    places = np.concatenate(fixed)
-    wanted = np.frombuffer(template, np.uint8)[places]
-    size = len(template)
+    equal = [(start, start + int(dtype[2:])) for path, start, dtype in walk.numbers
+             if not path.startswith(('header.stamp.', 'clock.'))
+             and layouts.column(type_name, path, walk.texts) not in names]
+    shape, size = Shape(template, walk.fixed + equal), len(template)
     same = np.array([0 <= len(message) - size < cdr.PADDING_LIMIT_BYTES for message in data], bool)
     block = np.frombuffer(b''.join([message[:size] for message, fits in zip(data, same) if fits]), np.uint8)
-    same[same] = (block.reshape(-1, size)[:, places] == wanted).all(axis=1)
+    same[same] = shape.equals(block.reshape(-1, size)[:, shape.places])
     return same
