@@ -22,11 +22,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeAlias
 
 from pedestal_common.quantities import Row
-from pedestal_results import (
-    mode_pointing,
-    sensor_frame,
-    tracking,
-)
+from pedestal_results import intervals, mode_pointing, sensor_frame, tracking
 from pedestal_results.tracking import DEG_PER_RAD, known_rms, largest
 
 Values: TypeAlias = dict[str, tuple[float, str]]    # {name of a result: (value, unit)}
@@ -238,15 +234,10 @@ def remarks(noted: Mapping[str, str], values: Values) -> list[str]:
             for note, names in found.items()]
 
 
-def row(case: str, metric: str, value: float, unit: str = '', target: str | None = None) -> Row:
-    """Return a row of a --json file. Its value is None if the result could not be measured."""
-    return {'case': case, 'metric': metric, 'value': value if math.isfinite(value) else None, 'unit': unit,
-            'paper': None, 'target': target}
-
-
 def rows(case: str, values: Values) -> list[Row]:
     """Return the rows of a --json file for the values that `measured` returns."""
-    return [row(case, name, value, unit, RESULT_BY_NAME[name].target) for name, (value, unit) in values.items()]
+    return [intervals.single(case, name, value, unit, RESULT_BY_NAME[name].target)
+            for name, (value, unit) in values.items()]
 
 
 def documented(table: Sequence[Result] = RESULTS) -> list[tuple[str, str, str, str]]:

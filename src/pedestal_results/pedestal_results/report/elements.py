@@ -1,4 +1,4 @@
-"""HTML elements of report pages: numbers, tables, figures, the page as one self-contained file, and its print."""
+"""HTML elements of report pages: numbers, figures, the page as one self-contained file, and its print."""
 import html
 import io
 import math
@@ -7,7 +7,7 @@ import pathlib
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from pedestal_results.report import figures
 
@@ -69,20 +69,6 @@ def number(value: float, unit: str = '') -> str:
     """Return a value with its unit as text."""
     text = f'{value:#.4g}'.rstrip('.') if math.isfinite(value) else 'not measured'
     return f'{text}\N{NO-BREAK SPACE}{unit}'.rstrip() if math.isfinite(value) else text
-
-
-def table(head: Sequence[str] | None, rows: Iterable[Sequence[str]], kind: str = '') -> str:
-    """Return an HTML table; head: its header; rows: the name of the row first.
-
-    kind: CSS class; 'n' aligns the other cells to the right, 'meta' is for the table at the head of a page.
-    """
-    def line(cells: Sequence[str], tag: str) -> str:
-        rest = ''.join(f'<{tag} class="{kind}">{html.escape(cell)}</{tag}>' if kind != 'meta' and kind else
-                       f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells[1:])
-        return f'<tr><th>{html.escape(cells[0])}</th>{rest}</tr>'
-    top = f'<thead>{line(head, "th")}</thead>' if head else ''
-    return (f'<div class="wide"><table class="{kind}">{top}<tbody>{"".join(line(row, "td") for row in rows)}'
-            '</tbody></table></div>')
 
 
 def browser() -> str:

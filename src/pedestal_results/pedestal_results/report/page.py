@@ -9,6 +9,7 @@ import numpy as np
 from pedestal_common.graph import topics
 from pedestal_common.graph.topics import AXES
 from pedestal_common.text_files.files import sha256
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_recording import bag as bags
 from pedestal_recording import recording as recordings
 from pedestal_recording.verify import Report, verify
@@ -151,7 +152,7 @@ def _results(bag: bags.Bag, run: RecordedRun, check: Report) -> list[str]:
     if run.no_truth:
         parts.append(f'<p class="bad">No comparison with the truth: {html.escape(run.no_truth)}.</p>')
         if run.motors:
-            parts.append(elements.table(['', 'azimuth', 'elevation', ''], _torques(run), 'n'))
+            parts.append(TextTable(('', 'azimuth', 'elevation', ''), _torques(run)).html('n'))
     else:
         known = run.tracking.parts
         if tracking.by_encoders(bag):
@@ -159,14 +160,14 @@ def _results(bag: bags.Bag, run: RecordedRun, check: Report) -> list[str]:
                          f'{html.escape(tracking.ENCODER_BEAM_NOTE)}.</p>')
         if not run.tracking.tracking.any():
             parts.append(f'<p class="bad">{_not_evaluated(run.tracking)}</p>')
-        parts.append(elements.table(['', 'cross-elevation (azimuth)', 'elevation', 'both axes'],
-                                    _pointing(run, results.measured(known)), 'n'))
+        parts.append(TextTable(('', 'cross-elevation (azimuth)', 'elevation', 'both axes'),
+                               _pointing(run, results.measured(known))).html('n'))
         parts.append('<p class="soft">Pointing and noise are computed over the evaluated part: autotrack, from '
                      f'{tracking.HANDOVER_SETTLING_S:g} s after the first hand-over. "Both axes" pools the samples of '
                      'both axes.</p>')
         rows = _labelled(known, 'pointing_loss_mean_db', 'pointing_loss_max_db', 'single_sample_noise_deg',
                          'lock_time_s', 'autotrack_time_s', 'evaluated_time_s', 'loss_s')
-    return [*parts, elements.table(None, rows + _loop(bag, run, check), 'n')]
+    return [*parts, TextTable(('', ''), rows + _loop(bag, run, check)).html('n')]
 
 
 def _gaps(bag: bags.Bag, check: Report) -> list[str]:
@@ -200,8 +201,8 @@ def _events(run: RecordedRun) -> list[str]:
     title = '<h2 id="events">What happened</h2>'
     if not run.events:
         return [title, '<p class="soft">No event in the bag.</p>']
-    return [title, elements.table(['no.', 'time [s]', 'duration [s]', 'event', 'by', 'what'],
-                                  events.rows(run.events, run.bag.end)),
+    return [title, TextTable(('no.', 'time [s]', 'duration [s]', 'event', 'by', 'what'),
+                             events.rows(run.events, run.bag.end)).html(),
             '<p class="soft">The numbers mark these events on the curves below.</p>']
 
 
@@ -226,7 +227,7 @@ def _consistency_table(known: consistency.Consistency) -> str:
             row('rate error, rms', 'rate_error', unit='deg/s', scale=DEG_PER_RAD),
             row('stated sigma of the rate', 'rate_sigma', unit='deg/s', scale=DEG_PER_RAD)]
     verdicts = ''.join(f'<p>{name.capitalize()}: {html.escape(axis.verdict)}.</p>' for name, axis in zip(AXES, judged))
-    return elements.table(['', 'azimuth', 'elevation', ''], rows, 'n') + verdicts + (
+    return TextTable(('', 'azimuth', 'elevation', ''), rows).html('n') + verdicts + (
         '<p class="soft">Computed over the evaluated part. NIS: squared innovations over their stated variance. NEES: '
         'squared errors against the truth over the stated covariance. On a ship the errors include the attitude error '
         'of the INS, which the target filter does not model.</p>')
@@ -237,7 +238,8 @@ def _deck(run: RecordedRun) -> list[str]:
     if run.attitude is None:
         return []
     return ['<h2 id="attitude">Attitude of the ship</h2>',
-            elements.table(None, _labelled({'attitude': run.attitude}) + _labelled({'isolation': run.isolation}), 'n'),
+            TextTable(('', ''), [*_labelled({'attitude': run.attitude}),
+                                 *_labelled({'isolation': run.isolation})]).html('n'),
             *_figures(run_figures.ATTITUDE_FIGURES, run)]
 
 
@@ -256,7 +258,7 @@ def _diagnostics(statuses: Sequence[Status]) -> list[str]:
         return [title, '<p>None.</p>' if statuses else '<p class="soft">No diagnostics in the bag.</p>']
     shown = [rows[place] for place in sorted(rows)][:MAX_DIAGNOSTICS_ROWS]
     hidden = len(rows) - len(shown)
-    return [title, elements.table(['time [s]', 'node', 'level', 'message'], shown),
+    return [title, TextTable(('time [s]', 'node', 'level', 'message'), shown).html(),
             *([f'<p class="soft">and {hidden} more.</p>'] if hidden else [])]
 
 
@@ -273,7 +275,7 @@ def _provenance_table(bag: bags.Bag, run: RecordedRun, author: str) -> str:
             ['file', f'{", ".join(file.name for file in bag.files)}, '
              f'{sum(file.stat().st_size for file in bag.files) / 1e6:.2f} MB, {stamps.size} messages'],
             ['sha256', ', '.join(map(sha256, bag.files))]]
-    return elements.table(None, rows, 'meta')
+    return TextTable(('', ''), rows).html('meta')
 
 
 def _parameters(bag: bags.Bag) -> list[str]:
@@ -282,7 +284,7 @@ def _parameters(bag: bags.Bag) -> list[str]:
     if not bag.configuration['parameters']:
         return [title, '<p class="soft">The bag states no parameters.</p>']
     rows = subject.changed_parameters(bag)
-    return [title, elements.table(['parameter', 'value', 'default', 'unit'], rows) if rows else '<p>None.</p>']
+    return [title, TextTable(('parameter', 'value', 'default', 'unit'), rows).html() if rows else '<p>None.</p>']
 
 
 def _page(bag: bags.Bag, run: RecordedRun, check: Report, author: str) -> str:
