@@ -4,6 +4,7 @@ questions that they ask of it.
     bag.Bag                             the files of a recording; it has more, which recover, verify and replay need
     memory_recording.MemoryRecording    a run of the closed loop, without files
     what_if.Overlay                     another recording, in which some outputs are replaced
+    Decoded                             another recording, whose topics are decoded once
 """
 import contextlib
 import math
@@ -81,6 +82,39 @@ class Recording(Protocol):
 
     def last_values(self, node: str) -> dict[str, str]:
         """Return {key: value} of the last diagnostics of a node, {} without any."""
+
+
+class Decoded:
+    """A Recording that decodes each topic of another recording at most once, because parts of a run share topics."""
+
+    def __init__(self, bag: Recording) -> None:
+        self.path, self.beam, self.beams, self.start = bag.path, bag.beam, bag.beams, bag.start
+        self.metadata, self.topics, self.rows, self.last_values = bag.metadata, bag.topics, bag.rows, bag.last_values
+        self._bag = bag
+        self._tables: dict[str, Table] = {}
+        self._messages: dict[str, list[tuple[str, Nanoseconds, Nanoseconds, Message]]] = {}
+
+    @property
+    def end(self) -> Seconds:
+        """Time of the last message."""
+        return self._bag.end
+
+    @property
+    def configuration(self) -> Mapping[str, Json]:
+        """'parameters' are {node: {dotted name: value}}, {} if unknown."""
+        return self._bag.configuration
+
+    def table(self, topic: str) -> Table:
+        """Return the columns of a topic, which nobody may change."""
+        if topic not in self._tables:
+            self._tables[topic] = self._bag.table(topic)
+        return self._tables[topic]
+
+    def messages(self, topic: str) -> Iterator[tuple[str, Nanoseconds, Nanoseconds, Message]]:
+        """Yield (topic, log time, publish time, message) of the messages of a topic."""
+        if topic not in self._messages:
+            self._messages[topic] = list(self._bag.messages(topic))
+        yield from self._messages[topic]
 
 
 def parameters(bag: Recording, node: str) -> dict[str, Json]:

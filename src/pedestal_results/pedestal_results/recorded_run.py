@@ -37,8 +37,8 @@ class RecordedRun:
     """A recording of one beam, and its parts. Each part is computed once, on first use."""
 
     def __init__(self, bag: Recording) -> None:
-        self.bag = bag
-        self._tables: dict[str, Table] = {}
+        self.bag = recordings.Decoded(bag)
+        self._file = getattr(bag, 'file', bag.path)     # a recording in memory has no file
 
     def holds(self, topic: str) -> bool:
         """Return True if the recording has a message of a topic, and the type of the topic is that of the graph."""
@@ -46,9 +46,7 @@ class RecordedRun:
 
     def table(self, topic: str) -> Table | None:
         """Return the columns of a topic, None for a topic that the recording does not hold."""
-        if topic not in self._tables and self.holds(topic):
-            self._tables[topic] = self.bag.table(topic)
-        return self._tables.get(topic)
+        return self.bag.table(topic) if self.holds(topic) else None
 
     def check_stamps(self) -> None:
         """Raise bag.BagError if the stamps of a topic go back, because a plot over them would be wrong."""
@@ -57,8 +55,7 @@ class RecordedRun:
             t = columns['t'] if columns else np.zeros(0)
             back = np.flatnonzero(np.diff(t) < 0.0)
             if back.size:
-                file = getattr(self.bag, 'file', self.bag.path)     # only a recording of files may have such stamps
-                raise bags.BagError(f'{file}: the stamps of {topic} go back, the first from {t[back[0]]:.6f} to '
+                raise bags.BagError(f'{self._file}: the stamps of {topic} go back, the first from {t[back[0]]:.6f} to '
                                     f'{t[back[0] + 1]:.6f} s; `pedestal verify` lists all problems')
 
     @functools.cached_property
