@@ -1,9 +1,8 @@
-"""Messages of one topic as columns: each number of a message becomes an array over all messages. `Bag.table` uses it.
+"""Messages of one topic as columns: each number of a message becomes an array over all messages.
 
-CDR is the byte format of ROS 2 messages. Two messages have the same shape if they have the same length and the same
-bytes outside their numbers, such as names. Their numbers then stand at the same places. The definition of the type
-gives these places for the first message. All messages of its shape form one array of bytes, and a column is a slice of
-this array. The messages of the other shapes follow, one shape after another.
+Two messages have the same shape if they have the same length and the same bytes outside their numbers, such as names.
+Their numbers then stand at the same places, which the definition of the type gives for the first message. All messages
+of its shape form one array of bytes, and a column is a slice of this array. The messages of the other shapes follow.
 """
 from collections.abc import Collection, Iterable, Sequence
 
@@ -42,9 +41,8 @@ class Shape:
 
 
 def stamps(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanoseconds]) -> Stamps:
-    """Return the stamps in the headers of messages; data: their CDR bytes, log: their log times.
-
-    Return the log times for a type without header, or if a message is too short for a header.
+    """Return the stamps in the headers of messages. Return the log times for a type without header, or if a message is
+    too short for a header.
     """
     log = np.asarray(log, np.int64)
     if type_name not in STAMPED_TYPES or not len(data) or min(map(len, data)) < 12:
@@ -55,7 +53,7 @@ def stamps(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanosec
 
 def table(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanoseconds], start: Nanoseconds = 0,
           as_sent: bool = False) -> Table:
-    """Return the columns of the messages of one type. data: their CDR bytes; log: their log times.
+    """Return the columns of the CDR messages of one type.
 
     The column `t` [s] is the stamp of the header minus start; for a type without header, it is the log time minus
     start. The names of the other columns depend on the type:
@@ -90,14 +88,14 @@ def table(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanoseco
 
 
 def values_text(pairs: Iterable[tuple[str, str]]) -> str:
-    """Return the (key, value) pairs of a DiagnosticStatus as one text, 'key=value; key=value'."""
+    """Return the values of a DiagnosticStatus as one text, 'key=value; key=value'."""
     return '; '.join(f'{key}={value}' for key, value in pairs)
 
 
 def _fill(out: Table, block: Bytes, rows: Ints, type_name: str, count: int, most: int, as_sent: bool) -> None:
-    """Put the numbers of m messages of one length into the columns `out`.
+    """Put the numbers of messages of one length into the columns `out`.
 
-    block: their bytes (m, length); rows: their rows in the columns; count: number of all rows; most: largest number
+    block: their bytes (m, length); rows: their rows in the columns, of which there are `count`; most: largest number
     of cells in `out`.
     """
     shapes = 0
@@ -129,9 +127,9 @@ def _numbers(block: Bytes, start: int, dtype: str) -> Floats:
 
 
 def alike(data: Sequence[bytes], type_name: str, template: bytes, names: Collection[str]) -> Bools:
-    """Return True for each message that equals a template outside stamp and named columns. data, template: CDR bytes.
+    """Return True for each message that equals a template outside its stamp and the named columns.
 
-    names: the columns that may differ. The padding that DDS adds at the end of a message does not count.
+    The padding that DDS adds at the end of a message does not count.
     """
     walk = cdr.Places(template, type_name)
     equal = [(start, start + int(dtype[2:])) for path, start, dtype in walk.numbers

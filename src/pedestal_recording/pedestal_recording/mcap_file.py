@@ -84,7 +84,7 @@ def reason(error: OSError) -> str:
 
 
 def frame(data: Data, at: int) -> tuple[int, int]:
-    """Return (opcode, stop) of the record that begins at the position `at`; stop: its end.
+    """Return (opcode, stop) of the record that begins at a position of data.
 
     Raises ValueError if no whole record begins there.
     """
@@ -135,7 +135,7 @@ def unpacked(chunk: records.Chunk) -> bytes:
 
 
 def _zstd(data: bytes, size: int) -> bytes:
-    """Return the decompressed bytes of a zstd frame, b'' if the frame states another length than `size`.
+    """Return the decompressed bytes, b'' if the frame states another length than `size`.
 
     Memory for a frame that states a false length is therefore never allocated.
     """
@@ -151,7 +151,7 @@ _UNPACK: dict[str, Callable[[bytes, int], bytes]] = {
 
 
 class McapFile:
-    """An open MCAP file, which is read in pieces. size: its length [bytes].
+    """An open MCAP file, which is read in pieces.
 
     locked: True if this process itself writes the file and holds its lock. Otherwise a lock on the file is an error.
     Raises BagError if the file is missing, empty, not regular or not MCAP, or while its recorder still writes it.
@@ -182,7 +182,6 @@ class McapFile:
         self._messages = 0
 
     def _check_lock(self) -> None:
-        """Raise BagError if another process holds the lock of the file, because it writes the file."""
         try:
             fcntl.flock(self._stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
             fcntl.flock(self._stream, fcntl.LOCK_UN)
@@ -234,7 +233,7 @@ class McapFile:
         """Return the records in the chunk at [start, stop) of the file as bytes, decompressed.
 
         again: True if the chunk was unpacked before, and so does not count again for UNPACKED_LIMITS. Raises
-        ValueError if unpacking fails, or if the chunks of the file unpack to more than UNPACKED_LIMITS.
+        ValueError.
         """
         if stop - start > 2 * MAX_CHUNK_BYTES:
             raise ValueError(f'a chunk of {stop - start} bytes, must be at most {MAX_CHUNK_BYTES}')
@@ -313,7 +312,6 @@ def _walk_damaged(file: McapFile, data: Data, kinds: Container[int], on_damage: 
 
 
 def _record_begins(data: Data, position: int) -> bool:
-    """Return True if a record with a possible length begins at a position."""
     try:
         return bool(frame(data, position))
     except ValueError:

@@ -1,11 +1,8 @@
-"""Check of recorded messages. A readable message holds the CDR bytes of the type of its topic, with a valid stamp.
+"""Check of recorded messages: a readable message holds the CDR bytes of the type of its topic, with a valid stamp.
 
-CDR is the byte format of ROS 2 messages. The recorder and the reader of bags use this check: an unreadable message on
-a topic of the graph is foreign, because another program published it.
-
-To deserialize each message would be slow. Most messages of a topic differ in their numbers only. Therefore numpy
-compares the bytes outside the numbers (the shape) with those of a message known as readable. Only a message of a new
-shape is deserialized.
+An unreadable message on a topic of the graph is foreign, because another program published it. Because deserialising
+each message would be slow, numpy compares the bytes outside its numbers (the shape) with those of a message known as
+readable. Only a message of a new shape is deserialised.
 """
 import numpy as np
 
@@ -19,7 +16,7 @@ MAX_SHAPES = 20  # largest number of readable messages of one length with which 
 
 
 class Readable:
-    """Check of the messages of one topic, whose ROS type is type_name.
+    """Check of the messages of one topic.
 
     ours: True in a recording of this graph. There a message of a topic of every step must also hold at least one of
     the columns of its topic, such as `azimuth.position`.
@@ -50,10 +47,7 @@ class Readable:
 
     @staticmethod
     def _alike(content: Bytes, start: Ints, rows: Ints, shape: Shape | None, readable: Bools) -> Ints:
-        """Set the mask `readable` at the rows whose messages have a shape. Return the remaining rows.
-
-        start: begin of each message in content; rows: places in start, of messages of one length.
-        """
+        """Set the mask `readable` at the rows whose messages have a shape. Return the remaining rows."""
         if shape is None or not rows.size:
             return rows
         same = shape.equals(content[start[rows, np.newaxis] + shape.places])
@@ -61,10 +55,7 @@ class Readable:
         return rows[~same]
 
     def _added(self, message: bytes) -> Shape | None:
-        """Note the shape of a readable message, and return it.
-
-        Return None if no message is compared with it: see MAX_SHAPED_BYTES and MAX_SHAPES.
-        """
+        """Note the shape of a readable message, and return it; None beyond MAX_SHAPED_BYTES and MAX_SHAPES."""
         shapes = self._shapes.setdefault(len(message), [])
         if len(message) > MAX_SHAPED_BYTES or len(shapes) >= MAX_SHAPES or self._type not in layouts.LAYOUTS:
             return None

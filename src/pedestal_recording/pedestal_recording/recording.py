@@ -160,8 +160,8 @@ def at(bag: Recording, t: Times, topic: str, columns: Sequence[str]) -> Floats:
 def of_equipment(bag: Recording, t: Times, topic: str, columns: Sequence[str]) -> Floats:
     """Return m columns of a topic of the receiver or of the INS, by their names, at n stamps, as (n, m).
 
-    Simulated equipment stamps its messages with the steps; the result is that of `at`. Real equipment has stamps
-    or an interval of its own; the result is then that of its newest message, NaN where this message is too old.
+    Simulated equipment stamps its messages with the steps; the result is that of `at`. Real equipment has stamps or an
+    interval of its own; the result is then that of its newest message, NaN where this message is too old.
     """
     stamps = bag.table(topic)['t'] if topic in bag.topics else np.zeros(0)
     if not len(stamps) or t.size < 2:
@@ -189,7 +189,7 @@ def diagnostics(bag: Recording) -> Iterator[tuple[Seconds, Message]]:
 
 
 def modes(bag: Recording, t: Times) -> Texts:
-    """Return the mode of the ACU at every stamp t, '' where the recording does not state it.
+    """Return the mode of the ACU at every stamp, '' where the recording does not state it.
 
     acu/mode states each change. In a recording that begins during a run, the first diagnostics of the ACU state the
     mode before the first change.
@@ -203,7 +203,6 @@ def modes(bag: Recording, t: Times) -> Texts:
 
 
 def _first_mode(bag: Recording, change: Seconds) -> str:
-    """Return the mode in the first diagnostics of the ACU before the first change; '' without them."""
     for t, status in diagnostics(bag):
         if status.name == f'{bag.beam}acu' and t < change:
             return next((value.value for value in status.values if value.key == 'mode'), '')

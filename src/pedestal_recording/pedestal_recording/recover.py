@@ -1,9 +1,7 @@
-"""`pedestal recover`: write the readable messages of a damaged bag to a new bag.
+"""`pedestal recover`: write the readable messages of a damaged bag to a new bag of one file.
 
-The recorder of the bag was killed, its disk was full, or its file was cut or corrupted. Each file is read through
-mmap, chunk after chunk; a chunk is a compressed group of messages with a checksum. The messages of each chunk with a
-correct checksum are written to the new bag. Memory is needed for one chunk and the index, not for the whole recording.
-A bag of several files becomes a bag of one file.
+The recorder of the bag was killed, its disk was full, or its file was cut or corrupted. The messages of each chunk
+with a correct checksum are written. Memory is needed for one chunk and the index, not for the whole recording.
 """
 import collections
 import dataclasses
@@ -96,9 +94,9 @@ class Recovered:
 
 
 def recover(path: str | pathlib.Path, output: str | pathlib.Path | None = None) -> Recovered:
-    """Write the readable messages of the bag at a path to a new bag. The old bag stays unchanged.
+    """Write the readable messages of the bag at a path to a new bag, by default beside it with '-recovered' after its
+    name.
 
-    output: directory of the new bag, by default beside the old bag, with '-recovered' after its name.
     Raises BagError if nothing is readable, if the old bag is being written, or if the new bag cannot be written. After
     an error, no part of the new bag remains.
     """
@@ -146,7 +144,6 @@ def _summary(file: McapFile) -> Iterator[records.McapRecord | None]:
 class _Salvage:
     """Writer of the messages of damaged files to a new BagFile, and counter of the unusable bytes.
 
-    "File" means a file of the damaged bag, and "bag" the new bag.
     several: True if the damaged bag has several files, so a gap must name its file.
     """
     _file: McapFile
@@ -173,7 +170,6 @@ class _Salvage:
         self._ended = False     # True if the last file comes to its regular end
 
     def add_file(self, file: McapFile) -> None:
-        """Add all readable messages of a file to the bag."""
         self._file = file
         self._schemas, self._channels, self._before, self._offsets = {}, {}, dict(self._sequence), {}
         try:
@@ -205,7 +201,6 @@ class _Salvage:
             self._declare(content)
 
     def _declare(self, record: Content) -> None:
-        """Add a new schema or channel to the bag; other records are left out."""
         if isinstance(record, records.Schema):
             if record.id not in self._schemas:
                 self._schemas[record.id] = self._once(self._bag.add_schema, record.name, record.encoding, record.data)
@@ -230,7 +225,7 @@ class _Salvage:
         return self._declared[key]
 
     def _skip(self, start: int, stop: int, problem: str) -> None:
-        """Note the unusable bytes [start, stop) as a new Gap, or as a part of the Gap that ends at `start`."""
+        """Note the unusable bytes as a new Gap, or as a part of the Gap that ends at `start`."""
         file = self._file.path.name if self._several else ''
         if self._gaps and self._gaps[-1].stop == start and self._gaps[-1].file == file:
             self._gaps[-1].stop = stop
@@ -267,7 +262,7 @@ class _Salvage:
         self._last = last if self._last is None else max(self._last, last)
 
     def _add(self, channel: int, sequence: int, log: Nanoseconds, publish: Nanoseconds, data: bytes) -> None:
-        """Add a message to a channel of the bag. data: CDR bytes.
+        """Add a message to a channel of the bag.
 
         The recorder numbers the messages of each topic from 1 in each file. The sequence number of the first message
         after a gap therefore gives the number of lost messages. A tool that splits a recording continues the numbers

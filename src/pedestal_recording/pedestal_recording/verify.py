@@ -1,8 +1,7 @@
 """`pedestal verify`: check that a recording is complete.
 
 Each topic of the rate `step` must have one message for each step of the drive, in order. The message counts and the
-sequence numbers must agree. The report also states whether the run came to its planned end. The recording of an
-aborted run may be complete up to its end.
+sequence numbers must agree. The recording of an aborted run may be complete up to its end.
 """
 import collections
 import dataclasses
@@ -189,9 +188,8 @@ def steps_before(bag: Bag) -> int:
 
 
 def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut: bool) -> list[str]:
-    """Return the problems of a topic.
+    """Return the problems of a topic; stamp: since the start.
 
-    stamp: its stamps, since the start.
     cut: True if the recording begins during its run. The number of messages before its begin is then unknown.
     """
     topic, ours = bag.graph.get(name), 'pacing' in bag.metadata
@@ -224,7 +222,6 @@ def _differences(claimed: Mapping[str, int], counts: Mapping[str, int]) -> str:
 
 
 def _grid(stamps: Mapping[str, Stamps]) -> _Grid:
-    """Return the _Grid of a run from the stamps of its topics of the rate `step`."""
     if not stamps:
         return _Grid(0, 0, 0)
     steps = np.unique(next((stamp for name, stamp in stamps.items() if nodes.plain(name) == 'joint_states'),
@@ -234,7 +231,6 @@ def _grid(stamps: Mapping[str, Stamps]) -> _Grid:
 
 
 def _order(stamp: Stamps) -> list[str]:
-    """Return [text about the stamps that go back], [] if none does."""
     back = np.flatnonzero(np.diff(stamp) < 0)
     return [f'{back.size} stamps go back, the first from {stamp[back[0]] / 1e9:.6f} '
             f'to {stamp[back[0] + 1] / 1e9:.6f} s'] if back.size else []
@@ -279,10 +275,7 @@ def _steps(stamp: Stamps, of_drive: bool, grid: _Grid) -> list[str]:
 
 
 def _seconds(bag: Bag, name: str, stamp: Stamps, grid: _Grid) -> list[str]:
-    """Return texts about missing diagnostics: each node with a topic in the bag publishes them at each whole second.
-
-    name: topic of the diagnostics.
-    """
+    """Return texts about missing diagnostics, which each node in the bag publishes at each whole second."""
     first, last = -(-grid.first // NS_PER_SECOND), grid.last // NS_PER_SECOND
     count = max(last - first + (grid.at(last * NS_PER_SECOND) <= grid.last), 0)
     stamps_of: dict[str, list[Nanoseconds]] = collections.defaultdict(list)
@@ -308,10 +301,7 @@ def _seconds(bag: Bag, name: str, stamp: Stamps, grid: _Grid) -> list[str]:
 
 
 def _unrecorded_steps(of_steps: Sequence[Index], start: Nanoseconds, grid: _Grid) -> list[str]:
-    """Return texts about the gaps between two files: a recorder was killed, and another recorder was started later.
-
-    of_steps: rows of the index, for each topic of the rate `step`; start: stamp of time 0.
-    """
+    """Return texts about the gaps between two files: a recorder was killed, and another recorder was started later."""
     none = np.zeros(0, np.int64)
     number = np.concatenate([none, *(row.channel >> 16 for row in of_steps)])
     stamp = np.concatenate([none, *(row.stamp - start for row in of_steps)])
@@ -324,8 +314,8 @@ def _numbering(rows: Index, cut: bool) -> list[str]:
     """Return texts about lost messages and doubled or descending sequence numbers of a topic.
 
     The recorder counts from 1 in each file, and leaves out a number for each lost message. The number 0 marks a
-    message of a foreign publisher. cut: True in a recording of a part of its run, which begins with a higher number.
-    A tool that splits a recording continues the numbers of the file before.
+    message of a foreign publisher. A recording of a part of its run (`cut`) begins with a higher number. A tool that
+    splits a recording continues the numbers of the file before.
     """
     lost = back = 0
     file, numbers = rows.channel >> 16, rows.sequence
@@ -342,8 +332,6 @@ def _numbering(rows: Index, cut: bool) -> list[str]:
 
 
 def _metadata_file(bag: Bag, counts: Mapping[str, int]) -> list[str]:
-    """Return texts about the differences between metadata.yaml and the files. counts: messages by topic, in the files.
-    """
     file = bag.path / 'metadata.yaml'
     try:
         information = plain_yaml.read(file)['rosbag2_bagfile_information']

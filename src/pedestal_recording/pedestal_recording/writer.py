@@ -1,6 +1,5 @@
-"""Writing of a bag, the recording of a run: a rosbag2 directory (metadata.yaml version 9) with an MCAP file.
-
-The recorder node, `pedestal recover` and the recomputation write bags by this module. It works without ROS.
+"""Writing of a bag, the recording of a run: a rosbag2 directory (metadata.yaml version 9) with an MCAP file. Works
+without ROS.
 
 The Writer of the mcap library makes the records of the file. This module adds four properties:
 
@@ -69,7 +68,7 @@ def _qos(rate: str) -> list[dict[str, object]]:
 class _Disk:
     """Output stream of the Writer of the mcap library. The bytes between two flushes reach the file all or not at all.
 
-    stream: the open file; size: number of bytes at its beginning that are already written, and not written again.
+    size: number of bytes at its beginning that are already written, and not written again.
     """
 
     def __init__(self, path: pathlib.Path, stream: io.FileIO, size: int = 0) -> None:
@@ -100,10 +99,7 @@ class _Disk:
 
 
 class BagFile:
-    """A bag that is being written.
-
-    directory: path of the bag; must not exist, unless the bag has earlier files. earlier: MCAP files of the bag before
-    this file.
+    """A bag that is being written; the directory must not exist, unless the bag has earlier files.
 
     Raises BagError with the name of the file if the disk is full. The earlier chunks then stay readable. All later
     messages are dropped, so a bag has no gap.
@@ -142,9 +138,8 @@ class BagFile:
         return self._declared(records.Schema(id=number, name=name, encoding=encoding, data=data))
 
     def add_channel(self, topic: str, schema: int, metadata: dict[str, str]) -> int:
-        """Add a topic: its name with '/', the number of the schema of its type, and metadata.
-
-        Return the number of the channel. Its messages are CDR, the byte format of ROS 2.
+        """Add a topic, whose messages are CDR: its name with '/', and the number of the schema of its type. Return its
+        number.
         """
         number = self._mcap.register_channel(topic, 'cdr', schema, metadata)
         return self._declared(records.Channel(id=number, topic=topic, message_encoding='cdr', schema_id=schema,
@@ -163,7 +158,7 @@ class BagFile:
 
     def add_message(self, channel: int, sequence: int, log_time: Nanoseconds, publish_time: Nanoseconds,
                     data: bytes) -> None:
-        """Add a message: number of its channel, its sequence number, times, CDR bytes."""
+        """Add the CDR bytes of a message."""
         if self._full:
             return
         if not self._in_chunk:
@@ -234,7 +229,6 @@ class BagFile:
         self._mcap.flush()
 
     def _write_metadata_file(self) -> None:
-        """Write metadata.yaml from the content of the files."""
         contents = [_Content(file) for file in (*self._earlier, self.file)]
         files = [{'path': content.path.name, **_times([content]), 'message_count': content.total}
                  for content in contents]
@@ -270,7 +264,7 @@ class BagFile:
 class _Content:
     """Summary of an MCAP file of the recorder, which need not be whole: its recorder may have been killed.
 
-    first, last: log times of its first and last message, 0 without a message; total: number of messages.
+    first, last: log times of its first and last message, 0 without a message.
     """
 
     def __init__(self, path: pathlib.Path) -> None:
@@ -310,7 +304,6 @@ def _times(contents: Sequence[_Content]) -> dict[str, dict[str, Nanoseconds]]:
 
 
 def _profiles(channel: records.Channel) -> Json:
-    """Return the quality of service that a channel states (offered_qos_profiles), [] if unreadable."""
     try:
         return plain_yaml.parse(channel.metadata.get('offered_qos_profiles', ''), aliases=True) or []
     except yaml.YAMLError:
@@ -351,12 +344,8 @@ def _earlier_files(directory: str | pathlib.Path, metadata: Mapping[str, object]
 class Writer(BagFile):
     """A bag of topics of the graph that is being written. The messages of each topic are numbered from 1.
 
-    directory   path of the bag: must not exist, or must hold an unfinished bag to continue (_earlier_files)
-    rows        topics of the bag; the methods take the index of a row
-    metadata    of the run, for the metadata record `pedestal`
-    more        further metadata records by name
-
-    Raises BagError like a BagFile.
+    The directory must not exist, or must hold an unfinished bag to continue (_earlier_files). The methods take the
+    index of a topic in `rows`. metadata: of the run, for the record `pedestal`; more: further records by name.
     """
 
     def __init__(self, directory: str | pathlib.Path, rows: Sequence[nodes.Link | topics.Topic],
@@ -373,7 +362,7 @@ class Writer(BagFile):
         self.flush()
 
     def write(self, topic: int, log_time: Nanoseconds, publish_time: Nanoseconds, data: bytes) -> None:
-        """Add a message: index of its topic, log time and publish time, CDR bytes."""
+        """Add a message to a topic."""
         self._sequences[topic] = sequence = self._sequences[topic] + 1
         self.add_message(self._channels[topic], sequence & 0xffffffff, log_time, publish_time, data)
 
