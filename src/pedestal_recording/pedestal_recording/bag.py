@@ -1,6 +1,4 @@
-"""Reading of a bag, the recording of a run: a rosbag2 directory with its MCAP files, or one MCAP file. ROS is not
-needed.
-"""
+"""Reading of a bag, the recording of a run: a rosbag2 directory with its MCAP files, or one MCAP file, without ROS."""
 import contextlib
 import copy
 import functools
@@ -29,21 +27,17 @@ from pedestal_recording.readable import Readable
 
 MAX_CACHE_BYTES = 64_000_000  # largest size of the cache of unpacked chunks [bytes]
 
-MAX_SEARCHED_DIAGNOSTICS = 100
-"""Number of messages at the end of a bag in which the last diagnostics of a node are searched."""
+MAX_SEARCHED_DIAGNOSTICS = 100  # messages at the end of a bag in which the last diagnostics of a node are searched
 
 MAX_CHANNELS = 2000  # largest number of channels of a file; a channel is the record of a topic in an MCAP file
 MAX_SHOWN_FOREIGN_MESSAGES = 3  # largest number of foreign messages of a topic whose time and size are shown
 INDEX_BLOCK_ROWS = 65_536  # largest number of rows that are added to the index, or taken from it, at once
 
 INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'foreign', 'chunk',
-                                              'start', 'stop')]
-"""Names and types of the fields of Bag.index."""
-_UNREADABLE, _OTHER_PUBLISHER = 1, 2
-"""Values of the field `foreign` for a foreign message: its reason. The value 0 means a message of the graph."""
+                                          'start', 'stop')]     # of Bag.index
+_UNREADABLE, _OTHER_PUBLISHER = 1, 2    # values of the field `foreign` for a foreign message: its reason
 _KINDS = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA, Opcode.CHUNK,
-          Opcode.MESSAGE)
-"""Kinds of records outside chunks that are read."""
+          Opcode.MESSAGE)   # records outside chunks that are read
 Index: typing.TypeAlias = np.recarray[tuple[int], DType]    # rows of Bag.index
 Content = typing.TypeVar('Content')  # type of the values in a dictionary {topic or node: value}
 MetadataRecords = Mapping[str, Mapping[str, str]]  # metadata records of a bag, {name: {text: text}}
@@ -221,7 +215,6 @@ class Bag:
             rows.foreign[zero & np.isin(rows.channel, numbered) & (rows.foreign == 0)] = _OTHER_PUBLISHER
 
     def _scan(self, number: int, file: McapFile, blocks: list[Records]) -> None:
-        """Add the messages of a file to the blocks of the index. Raises EOFError if the file ends early."""
         for opcode, start, stop, content in mcap_file.walk(file, _KINDS):
             try:
                 if opcode == Opcode.CHUNK:
@@ -237,9 +230,7 @@ class Bag:
                 raise EOFError(f'broken record at byte {start}: {error}') from None
 
     def _walk(self, number: int, data: bytes, offset: int, chunk: int) -> Iterator[Records]:
-        """Yield blocks of the index for messages that are at a byte `offset` of the file, 0 for those of an unpacked
-        chunk.
-        """
+        """Yield blocks of the index for messages at a byte `offset` of the file, which is 0 for an unpacked chunk."""
         unpack, base, at = MESSAGE_HEAD.unpack_from, number << 16, 0
         rows: list[tuple[int, ...]] = []
         add, file = rows.append, self._opened[number]
@@ -293,10 +284,7 @@ class Bag:
                 block['foreign'][rows[~self._judges[channel].mask(data, start, stop)]] = _UNREADABLE
 
     def _declare(self, number: int, record: mcap_file.Content) -> None:
-        """Note a schema, channel, metadata or statistics of the file with a number.
-
-        Raises BagError for a channel that is not CDR, ValueError for an invalid record.
-        """
+        """Note a record of the file with a number. Raises BagError for a channel that is not CDR."""
         base = number << 16
         if isinstance(record, Schema):
             self._schemas[base | record.id] = record.name
@@ -373,14 +361,13 @@ class Bag:
 
     @property
     def graph(self) -> dict[str, nodes.Link]:
-        """Topics of the recorded graph, {name: nodes.Link} with type, rate, publishers and subscribers."""
+        """Topics of the recorded graph by name."""
         return nodes.links(self.beams, self.servo, self.iq)
 
     def view(self, beam: str = '') -> 'Bag':
-        """Return this Bag reduced to one beam of an array; '' for the first beam.
+        """Return this Bag reduced to one beam of an array; '' for the first beam. Raises BagError for a missing beam.
 
-        It has the topics of the beam under their plain names, and the topics that all beams share. A Bag of one beam
-        is its own view. Raises BagError for a missing beam.
+        It has the topics of the beam under their plain names, and the topics that all beams share.
         """
         prefixes = nodes.prefixes(self.beams)
         if prefixes == ('',) and beam:
@@ -415,8 +402,7 @@ class Bag:
 
     @functools.cached_property
     def configuration(self) -> dict[str, Json]:
-        """{'scenario': its YAML, 'parameters': {node: {dotted name: value}}}, '' and {} in a bag without a
-        configuration.
+        """Scenario as YAML, and {node: {dotted name: value}} of the parameters; both empty in a foreign bag.
 
         Raises BagError for invalid YAML, or for a node without a section of parameters.
         """
@@ -495,10 +481,7 @@ class Bag:
                 yield names[channel], log, publish, take(*place)
 
     def messages(self, topic: str | None = None) -> Iterator[tuple[str, Nanoseconds, Nanoseconds, Message]]:
-        """Yield (topic, log time, publish time, message object) of the messages of a topic, None for all topics.
-
-        Raises BagError for bytes that are no message of the type.
-        """
+        """Yield (topic, log time, publish time, message object) of a topic, None for all topics. Raises BagError."""
         for name, log, publish, data in self.raw(topic):
             try:
                 message = messages.deserialize(data, self.topics[name])

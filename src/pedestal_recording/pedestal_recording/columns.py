@@ -41,9 +41,7 @@ class Shape:
 
 
 def stamps(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanoseconds]) -> Stamps:
-    """Return the stamps in the headers of messages. Return the log times for a type without header, or if a message is
-    too short for a header.
-    """
+    """Return the stamps in the headers of messages; the log times, if the type or a message has no header."""
     log = np.asarray(log, np.int64)
     if type_name not in STAMPED_TYPES or not len(data) or min(map(len, data)) < 12:
         return log.copy()

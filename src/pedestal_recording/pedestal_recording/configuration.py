@@ -78,9 +78,7 @@ def recorder_parameters(scenario: Scenario) -> dict[str, str]:
 
 
 def records(scenario_yaml: str, parameters_yaml: str) -> dict[str, dict[str, str]]:
-    """Return the metadata records of a bag by name, from the texts of recorder_parameters. An empty text gives no
-    record.
-    """
+    """Return the metadata records of a bag from the texts of recorder_parameters; none for an empty text."""
     content = {}
     if scenario_yaml:
         content['scenario'] = {'yaml': scenario_yaml}

@@ -230,10 +230,9 @@ class McapFile:
         return self.read(start, stop) if opcode == Opcode.MESSAGE else parsed(opcode, self.read(start + 9, stop))
 
     def chunk(self, start: int, stop: int, again: bool = False) -> bytes:
-        """Return the records in the chunk at [start, stop) of the file as bytes, decompressed.
+        """Return the unpacked records in the chunk at [start, stop). Raises ValueError.
 
-        again: True if the chunk was unpacked before, and so does not count again for UNPACKED_LIMITS. Raises
-        ValueError.
+        again: True if the chunk was unpacked before, and so does not count again for UNPACKED_LIMITS.
         """
         if stop - start > 2 * MAX_CHUNK_BYTES:
             raise ValueError(f'a chunk of {stop - start} bytes, must be at most {MAX_CHUNK_BYTES}')

@@ -1,5 +1,5 @@
-"""Writing of a bag, the recording of a run: a rosbag2 directory (metadata.yaml version 9) with an MCAP file. Works
-without ROS.
+"""Writing of a bag, the recording of a run: a rosbag2 directory (metadata.yaml version 9) with an MCAP file, without
+ROS.
 
 The Writer of the mcap library makes the records of the file. This module adds four properties:
 
@@ -124,7 +124,6 @@ class BagFile:
         self._start(_Disk(self.file, stream))
 
     def _start(self, disk: _Disk) -> None:
-        """Begin a new file by a new Writer of the mcap library on a _Disk."""
         self._disk = disk
         self._mcap = writer.Writer(cast(IO[bytes], disk), chunk_size=sys.maxsize)  # flush() alone ends a chunk
         self._mcap.start('ros2', 'pedestal')
@@ -138,9 +137,7 @@ class BagFile:
         return self._declared(records.Schema(id=number, name=name, encoding=encoding, data=data))
 
     def add_channel(self, topic: str, schema: int, metadata: dict[str, str]) -> int:
-        """Add a topic, whose messages are CDR: its name with '/', and the number of the schema of its type. Return its
-        number.
-        """
+        """Add a topic of CDR messages: its name with '/', and the number of its schema. Return its number."""
         number = self._mcap.register_channel(topic, 'cdr', schema, metadata)
         return self._declared(records.Channel(id=number, topic=topic, message_encoding='cdr', schema_id=schema,
                                               metadata=metadata))
