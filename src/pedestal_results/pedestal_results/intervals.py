@@ -15,7 +15,7 @@ CONFIDENCE_LEVEL = 0.95  # confidence level of the interval of a mean [-]
 
 
 def interval(values: ArrayLike) -> Estimate:
-    """Return the Estimate of the mean of a result in n independent runs, from its values.
+    """Return the Estimate of the mean of a result in n independent runs.
 
         low, high = mean -+ t_(n-1) s / sqrt(n)
 
@@ -35,8 +35,8 @@ def interval(values: ArrayLike) -> Estimate:
 def pseudo_values(parts: list[_P], statistic: Callable[[list[_P]], float | Floats]) -> Floats:
     """Return values for `interval` of a statistic that is taken over all runs together, such as an rms.
 
-    parts: n about equal parts of the runs. The method is Tukey's jackknife (Efron and
-    Stein, Annals of Statistics 9 (1981) 586):
+    parts: n about equal parts of the runs. The method is Tukey's jackknife (Efron and Stein, Annals of Statistics 9
+    (1981) 586):
 
         value i = n theta - (n - 1) theta_-i
 

@@ -61,10 +61,7 @@ def _decibels(large: float, small: float) -> Decibels:
 
 
 def _beam_axes(direction: Vectors3) -> Floats:
-    """Return the axes (n, 3, 3) of beams in the directions FLU.
-
-    The three rows are unit vectors FLU in cross-elevation, in elevation and along the beam.
-    """
+    """Return the unit vectors FLU in cross-elevation, in elevation and along each beam, as rows of (n, 3, 3)."""
     x, y, z = direction.T
     flat = np.hypot(x, y)
     sa, ca = -y / flat, x / flat
@@ -113,10 +110,7 @@ def measure(dt: Seconds, error: Pairs, target: Vectors3, attitude: Quaternions, 
 
 
 def read(bag: Recording, run: tracking.Tracking) -> Isolation | None:
-    """Return the Isolation of a recording whose Tracking is `run`.
-
-    Return None for an antenna ashore, or if the evaluated time is below MIN_TRACKED_TIME_S.
-    """
+    """Return the Isolation of a recording; None ashore, or with an evaluated time below MIN_TRACKED_TIME_S."""
     if 'ship/truth' not in bag.topics or run.t.size < 2:
         return None
     ship = recordings.at(bag, run.t, 'ship/truth', [*(f'orientation.{letter}' for letter in 'xyzw'),

@@ -1,4 +1,4 @@
-"""Recorded run: a recording of one beam with the parts from which results, verdict and report are made."""
+"""Recorded run: a recording of one beam with its parts, each computed once, on first use."""
 import contextlib
 import functools
 from collections.abc import Callable, Iterable
@@ -34,7 +34,9 @@ class Status(NamedTuple):
 
 
 class RecordedRun:
-    """A recording of one beam, and its parts. Each part is computed once, on first use."""
+    """A recording of one beam, and its parts, from which results, verdict and report are made. A part is computed on
+    first use.
+    """
 
     def __init__(self, bag: Recording) -> None:
         self.bag = recordings.Decoded(bag)
@@ -97,9 +99,8 @@ class RecordedRun:
 
     @functools.cached_property
     def parts(self) -> dict[str, object]:
-        """The parts by name for results.measured. A missing part is absent, None or empty.
-
-        Raises ValueError like `tracking`.
+        """The parts by name for results.measured; a missing part is absent, None or empty. Raises ValueError like
+        `tracking`.
         """
         return {**self.tracking.parts, **mode_pointing.read(self.bag, self.tracking), 'filter': self.filter,
                 'keyholes': tracking.keyholes(self.bag), 'isolation': self.isolation, 'attitude': self.attitude}

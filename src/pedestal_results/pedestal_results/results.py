@@ -12,8 +12,7 @@ attitude    known_attitude.KnownAttitude
 run         pedestal_bringup.graph.start.Outcome
 supervised  the same Outcome, of a run in realtime
 MODE        pointing errors of mode_pointing.read in this mode, one of its FOLLOWED_DIRECTIONS
-Errors are taken per axis and sample. "Both axes together" pools the samples of both axes; the result is not the angle
-between beam and target.
+"Both axes together" pools the samples of both axes; the result is not the angle between beam and target.
 """
 import itertools
 import math
@@ -52,7 +51,6 @@ ENCODER_DEFINITION = 'This result includes all errors between dish and encoders,
 
 
 def _of_mode(mode: str) -> tuple[Result, Result]:
-    """Return the two Results of the pointing error in a mode of mode_pointing.FOLLOWED_DIRECTIONS: rms, maximum."""
     against = f'{mode_pointing.FOLLOWED_DIRECTIONS[mode]} minus true beam'
     return (Result(f'{mode}_pointing_rms_deg', 'deg', mode, known_rms,
                    f'Rms of the true pointing error ({against}), both axes together, in settled `{mode}`.'),
@@ -201,7 +199,6 @@ def measured(parts: Mapping[str, object], table: Sequence[Result] = RESULTS) -> 
 
 
 def _exists(parts: Mapping[str, object], result: Result) -> bool:
-    """Return True if the part of a Result exists and is not empty."""
     part = parts.get(result.part)
     return part is not None and (not isinstance(part, list | dict) or bool(part))
 
@@ -215,8 +212,8 @@ def marks(parts: Mapping[str, object], table: Sequence[Result] = RESULTS) -> dic
 def brief(columns: Iterable[Values], count: int = BRIEF_COUNT) -> list[str]:
     """Return the names of the results that are printed by default, in the order of the table.
 
-    columns: of `measured`, for each beam and for the run. At most `count` names are
-    returned. Results with the flag `brief` have precedence; other measured results fill the remaining places.
+    columns: of `measured`, for each beam and for the run. Results with the flag `brief` have precedence; other
+    measured results fill the remaining of `count` places.
     """
     found = [result for result in RESULTS
              if any(name == result.name and math.isfinite(value) for values in columns

@@ -52,10 +52,7 @@ def page(title: str, parts: Iterable[str]) -> str:
 
 
 def figure(spec: figures.Spec, data: object, reason: str = '') -> str:
-    """Return a figure as an HTML element with title and caption.
-
-    data: argument of spec.draw; reason: why the figure cannot be drawn, or ''.
-    """
+    """Return a figure as an HTML element with title and caption; reason: why it cannot be drawn, or ''."""
     caption = f'<h3>{html.escape(spec.title)}</h3>'
     if reason:
         return f'<figure id="{spec.key}">{caption}<p class="bad">Not drawn: {html.escape(reason)}.</p></figure>'
@@ -81,7 +78,7 @@ def browser() -> str:
 
 
 def print_pdf(program: str, page: pathlib.Path, output: pathlib.Path) -> None:
-    """Print a page (path of an HTML file) by the browser `program` to a path. Raises ValueError if it fails.
+    """Print a page by the browser `program` to a path. Raises ValueError if it fails.
 
     A browser prints the page as it shows it. This avoids a second layout of the page and a further library: matplotlib
     would only write the figures, and WeasyPrint needs the system library Pango.

@@ -28,9 +28,9 @@ PAPER_SCENARIOS = ('uav_flyby',)
 def write(bag_path: str | pathlib.Path, output: str | pathlib.Path | None = None,
           png_folder: str | pathlib.Path | None = None, beam: str = '', author: str = '',
           pdf: bool = False) -> pathlib.Path:
-    """Write the report of a bag, and return the path of its file.
+    """Write the report of a bag, by default report.html in the bag (beside a bare .mcap), and return the path of its
+    file.
 
-    output       file of the report, by default report.html in the bag (beside a bare .mcap)
     png_folder   folder for the figures and the overview as PNG, None for no such files
     beam         name of one of several beams, '' for the first
     author       text on the page, '' for none
@@ -66,7 +66,6 @@ def _of_axes(name: str, values: Sequence[tuple[float, str]], last: str = '') -> 
 
 
 def _pointing(run: RecordedRun, values: results.Values) -> list[list[str]]:
-    """Return the rows of the table of pointing errors and torques."""
     noise = values['single_sample_noise_deg'][0]
 
     def row(name: str, *keys: str, scale: float = 1.0, unit: str = 'deg') -> list[str]:
@@ -88,27 +87,21 @@ def _pointing(run: RecordedRun, values: results.Values) -> list[list[str]]:
 
 
 def _torques(run: RecordedRun) -> list[list[str]]:
-    """Return the rows of the motor torques, [] without them."""
     return [_of_axes(f'torque of motor {i}, rms of the run',
                      [(tracking.known_rms(run.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
             for i in (1, 2)] if run.motors else []
 
 
 def _labelled(parts: Mapping[str, object], *names: str) -> list[list[str]]:
-    """Return rows [label, number] of results with a label; parts: see results.measured.
-
-    They are the results in names or, without names, all of them.
-    """
+    """Return rows [label, number] of the results in names or, without names, of all results with a label."""
     values = results.measured(parts)
     return [[results.RESULT_BY_NAME[name].label, elements.number(*values[name])] for name in names or values
             if results.RESULT_BY_NAME[name].label]
 
 
 def _loop(bag: bags.Bag, run: RecordedRun, check: Report) -> list[list[str]]:
-    """Return rows on the control loop: its rate by the time of the drive, lost steps, and steps missing in the
-    recording.
-
-    In realtime they also state the rate and the jitter by the wall time.
+    """Return rows on the control loop: its rate by the time of the drive, in realtime also by the wall time with its
+    jitter, lost steps, and steps missing in the recording.
     """
     rows = []
     joints = run.table('joint_states')
@@ -146,7 +139,6 @@ def _not_evaluated(run: tracking.Tracking) -> str:
 
 
 def _results(bag: bags.Bag, run: RecordedRun, check: Report) -> list[str]:
-    """Return the section on the results of the run, against the truth if it was recorded, and on its control loop."""
     parts = ['<h2 id="results">Results</h2>']
     rows: list[list[str]] = []
     if run.no_truth:
@@ -171,7 +163,6 @@ def _results(bag: bags.Bag, run: RecordedRun, check: Report) -> list[str]:
 
 
 def _gaps(bag: bags.Bag, check: Report) -> list[str]:
-    """Return the section on the problems of the recording, and on topics without a message."""
     parts = []
     if not check.complete:
         problems = check.problems + [f'{topic.name}: {problem}' for topic in check.topics
@@ -185,7 +176,6 @@ def _gaps(bag: bags.Bag, check: Report) -> list[str]:
 
 
 def _warnings(check: Report) -> list[str]:
-    """Return the warnings at the head of the page: aborted run, lost steps, foreign messages."""
     return [line for line in (check.ending, check.loss, *check.foreign) if line]
 
 
@@ -197,7 +187,6 @@ def _figures(specs: Iterable[figures.Spec], run: RecordedRun, of_paper: bool = F
 
 
 def _events(run: RecordedRun) -> list[str]:
-    """Return the section with the table of the events."""
     title = '<h2 id="events">What happened</h2>'
     if not run.events:
         return [title, '<p class="soft">No event in the bag.</p>']
@@ -279,7 +268,6 @@ def _provenance_table(bag: bags.Bag, run: RecordedRun, author: str) -> str:
 
 
 def _parameters(bag: bags.Bag) -> list[str]:
-    """Return the section on the parameters that differ from their defaults."""
     title = '<h2 id="parameters">Parameters that differ from their defaults</h2>'
     if not bag.configuration['parameters']:
         return [title, '<p class="soft">The bag states no parameters.</p>']
@@ -288,7 +276,6 @@ def _parameters(bag: bags.Bag) -> list[str]:
 
 
 def _page(bag: bags.Bag, run: RecordedRun, check: Report, author: str) -> str:
-    """Return the text of the page."""
     scenario = bag.metadata.get('scenario', '')
     name = (scenario or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     of_paper = scenario in PAPER_SCENARIOS

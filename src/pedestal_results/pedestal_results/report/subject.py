@@ -43,7 +43,6 @@ def date(bag: Bag) -> str:
 
 
 def _utc(seconds: Seconds) -> str:
-    """Return a Unix time as UTC text."""
     return f'{datetime.datetime.fromtimestamp(seconds, datetime.timezone.utc):%Y-%m-%d %H:%M:%S}'
 
 
@@ -91,7 +90,7 @@ def rows(bag: Bag, run: RecordedRun) -> list[list[str]]:
 
 
 def _sky(run: RecordedRun) -> list[list[str]]:
-    """Return rows [name, text] on the UTC at 0 s and on the highest elevation; [] for a target without a date."""
+    """Return rows on the UTC at 0 s and on the highest elevation; [] for a target without a date."""
     try:
         begin = orbit.instant('stamp_0_utc', _begin(run))
     except orbit.TargetError:
@@ -107,6 +106,5 @@ def _sky(run: RecordedRun) -> list[list[str]]:
 
 
 def _begin(run: RecordedRun) -> str:
-    """Return the text of the UTC at 0 s that the receiver states in its diagnostics, '' if it states none."""
     return next((value.value for _, status in recordings.diagnostics(run.bag) for value in status.values
                  if value.key == 'stamp_0_utc'), '')
