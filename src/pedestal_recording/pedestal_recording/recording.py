@@ -105,7 +105,7 @@ class Decoded:
         return self._bag.configuration
 
     def table(self, topic: str) -> Table:
-        """Return the columns of a topic, which nobody may change."""
+        """Return the columns of a topic, which are not to be changed."""
         if topic not in self._tables:
             self._tables[topic] = self._bag.table(topic)
         return self._tables[topic]

@@ -15,6 +15,7 @@ from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.quantities import Ints, Nanoseconds, Seconds, Stamps
 from pedestal_common.text_files import plain_yaml
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_common.wire import messages
 from pedestal_recording import configuration
 from pedestal_recording.bag import Bag, Index
@@ -92,11 +93,12 @@ class Report:
 
     def lines(self) -> list[str]:
         """Return the report as lines of text: a row per topic, its gaps below it, the verdict last."""
-        width = max([len(check.name) for check in self.topics], default=5)
-        lines = [f'{"topic":{width}} {"messages":>9} {"first s":>14} {"last s":>14}']
-        for check in self.topics:
-            lines.append(f'{check.name:{width}} {check.count:9} {check.first:14.6f} {check.last:14.6f}')
-            lines += [f'  {problem}' for problem in check.problems]
+        columns = ('topic', ('messages', '>9'), ('first s', '>14.6f'), ('last s', '>14.6f'))
+        head, *rows = TextTable(columns, [(check.name, check.count, check.first, check.last)
+                                          for check in self.topics]).lines()
+        lines = [head]
+        for check, row in zip(self.topics, rows):
+            lines += [row, *(f'  {problem}' for problem in check.problems)]
         lines += [*self.problems, *self.foreign, self.made]
         if self.loss:
             lines.append(self.loss)
