@@ -60,9 +60,7 @@ def _bar(columns: Callable[[ModuleType], _Columns], advance: Callable[..., None]
          total: float | None = None, rate: str = '') -> Iterator[Callable[..., None]]:
     """Yield a function of the progress: on a terminal it calls advance(bar, task, ...), in a pipe it does nothing.
 
-    columns                      function of the module rich.progress that returns the columns of the progress bar
-    advance                      advance(bar, task, ...) shows the new progress
-    description, total, rate     properties of the only task of the bar
+    columns: function of the module rich.progress; description, total, rate: of the only task of the bar.
     """
     if not sys.stderr.isatty():
         yield lambda *_: None
@@ -73,10 +71,7 @@ def _bar(columns: Callable[[ModuleType], _Columns], advance: Callable[..., None]
 
 
 def progress_of_run(duration: Seconds) -> AbstractContextManager[Callable[..., None]]:
-    """Return a context with a function progress(time of the run): a bar on a terminal, nothing in a pipe.
-
-    duration: length of the run.
-    """
+    """Return a context with a function progress(time of the run): a bar on a terminal, nothing in a pipe."""
     def columns(rich: ModuleType) -> _Columns:
         return (rich.TextColumn('{task.description}'), rich.BarColumn(),
                 rich.TextColumn('{task.completed:.0f} / {task.total:.0f} s'), rich.TimeElapsedColumn())
@@ -87,10 +82,7 @@ def progress_of_run(duration: Seconds) -> AbstractContextManager[Callable[..., N
 
 
 def progress_of_share() -> AbstractContextManager[Callable[..., None]]:
-    """Return a context with a function progress(share of the work that is done [-], text of the next item).
-
-    It shows a bar on a terminal, and nothing in a pipe.
-    """
+    """Return a context with a function progress(share of the done work [-], text of the next item), as a bar."""
     def columns(rich: ModuleType) -> _Columns:
         return rich.BarColumn(), rich.TextColumn('{task.description}'), rich.TimeElapsedColumn()
 
@@ -100,9 +92,8 @@ def progress_of_share() -> AbstractContextManager[Callable[..., None]]:
 
 
 def progress_of_trials() -> AbstractContextManager[Callable[..., None]]:
-    """Return a context with a function progress(number of trials done, number of all trials).
-
-    It shows a bar with the rate of the trials and the remaining time on a terminal, and nothing in a pipe.
+    """Return a context with a function progress(trials done, all trials), as a bar with their rate and the remaining
+    time.
     """
     def columns(rich: ModuleType) -> _Columns:
         return (rich.BarColumn(), rich.MofNCompleteColumn(), rich.TextColumn('trials, {task.fields[rate]}'),
@@ -191,10 +182,9 @@ def _show(table: TextTable, title: str = '', width: int = 0, framed: bool = Fals
 
 def show_results(title: str, columns: Sequence[str], results: Sequence[Values], whole: Values,
                  marks: Iterable[Mapping[str, str]] = ()) -> None:
-    """Print the table of the results of a run.
+    """Print the table of the results of a run, with a column for each beam.
 
-    columns   texts of the heads, one for each beam; '' for a single column
-    results   of each column
+    columns   names of the beams; '' for a single column
     whole     results of the run as a whole
     marks     {name: note on a value that is not as expected} of each column
     """
@@ -248,8 +238,8 @@ def show_study(title: str, rows: Iterable[Row], missed: Callable[[Row], bool]) -
 def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None = None) -> None:
     """Print the statistics of results over trials as a table.
 
-    rows: of trials.statistics and trials.comparison; metrics: names of the printed results in their order, None
-    for all rows. The rows of a comparison are printed for the first of these results only.
+    metrics: names of the printed results in their order, None for all rows. The rows of a comparison are printed for
+    the first of these results only.
     """
     from pedestal_results.intervals import interval_text, number
     from pedestal_workbench.trials.statistics import coverage
@@ -275,10 +265,7 @@ def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None =
 
 
 def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:
-    """Print the values that a search has tried as a table, with the mean of the result at each.
-
-    key, unit: parameter 'node.key' of the search and its unit; tried: by rising value.
-    """
+    """Print the values that a search has tried as a table; key, unit: of the parameter of the search."""
     from pedestal_results.intervals import interval_text, number
     from pedestal_workbench.trials.solve import reason
     lines = []

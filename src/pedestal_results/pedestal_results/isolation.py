@@ -25,6 +25,7 @@ tracking_receiver.receiver.cn0_dbhz, and the noises of the node `ins`.
 """
 import dataclasses
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -109,7 +110,7 @@ def measure(dt: Seconds, error: Pairs, target: Vectors3, attitude: Quaternions, 
                      math.sqrt(np.sum(power * weight) / (2 * n)))
 
 
-def read(bag: Recording, run: tracking.Tracking) -> Isolation | None:
+def read(bag: Recording, run: tracking.Tracking, keyholes: Iterable[tracking.Slew]) -> Isolation | None:
     """Return the Isolation of a recording; None ashore, or with an evaluated time below MIN_TRACKED_TIME_S."""
     if 'ship/truth' not in bag.topics or run.t.size < 2:
         return None
@@ -122,7 +123,7 @@ def read(bag: Recording, run: tracking.Tracking) -> Isolation | None:
     on = run.tracking & np.isfinite(np.column_stack((ship, target, error))).all(axis=1)
     if math.isfinite(run.beamwidth):
         on &= np.hypot(*error.T) <= 0.5 * run.beamwidth
-    for begin, end, _ in tracking.keyholes(bag):
+    for begin, end, _ in keyholes:
         on &= (run.t < begin) | (run.t > end + tracking.HANDOVER_SETTLING_S)
     dt = float(np.median(np.diff(run.t)))
     if np.sum(on) * dt < MIN_TRACKED_TIME_S:

@@ -17,7 +17,7 @@ from pedestal_results.consistency import Consistency
 from pedestal_results.events import Event, ModeSpan
 from pedestal_results.isolation import Isolation
 from pedestal_results.known_attitude import KnownAttitude
-from pedestal_results.tracking import Tracking
+from pedestal_results.tracking import Slew, Tracking
 
 SHOWN_TOPICS = ('joint_states', 'target/truth', 'ship/truth', 'adu/motor_states', 'tracking_receiver/angle_error',
                 'acu/filter', known_attitude.ATTITUDE_TOPIC)
@@ -93,9 +93,14 @@ class RecordedRun:
         return None
 
     @functools.cached_property
+    def keyholes(self) -> list[Slew]:
+        """The slews through a keyhole that the ACU predicted."""
+        return tracking.keyholes(self.bag)
+
+    @functools.cached_property
     def isolation(self) -> Isolation | None:
         """Isolation from the rotation of the ship; None ashore, without truth, or for too short a run."""
-        return None if self.no_truth else isolation.read(self.bag, self.tracking)
+        return None if self.no_truth else isolation.read(self.bag, self.tracking, self.keyholes)
 
     @functools.cached_property
     def parts(self) -> dict[str, object]:
@@ -103,7 +108,7 @@ class RecordedRun:
         `tracking`.
         """
         return {**self.tracking.parts, **mode_pointing.read(self.bag, self.tracking), 'filter': self.filter,
-                'keyholes': tracking.keyholes(self.bag), 'isolation': self.isolation, 'attitude': self.attitude}
+                'keyholes': self.keyholes, 'isolation': self.isolation, 'attitude': self.attitude}
 
     @functools.cached_property
     def verdict(self) -> verdicts.Verdict:
