@@ -255,7 +255,7 @@ def test_the_chain_from_power_up_to_autotrack(told):
 
 @pytest.mark.thorough
 def test_the_rows_of_a_run_say_its_isolation(told):
-    found = isolation.read(told.bag, tracking.read(told.bag))
+    found = isolation.read(told.bag, tracking.read(told.bag), tracking.keyholes(told.bag))
     assert told.rows['isolation_db']['value'] == found.isolation and told.rows['isolation_db']['target'] == '>= 60'
     assert told.rows['isolation_limit_db']['value'] == found.limit
 

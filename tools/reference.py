@@ -20,6 +20,7 @@ from pedestal_bringup.scenario.sections import parameters_of
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.injection.table import INJECTED_FAULTS
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_results import results
 from pedestal_studies.system.faults import FAULT_EXPECTATIONS
 from pedestal_workbench.again import what_if
@@ -50,17 +51,12 @@ RATE_TEXTS = {'step': 'every step', 'once': 'once, latched or not', 'second': '1
 """{rate of a topic, as in topics.Topic: its text in the table of topics}."""
 
 
-def _table(head, rows):
-    """Return the lines of a Markdown table. head: texts of the header; rows: sequences of as many texts."""
-    return ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head), *('| ' + ' | '.join(row) + ' |' for row in rows)]
-
-
 def node_table():
     """Return the table of the nodes: executable, function, and the equipment of a real antenna that the node stands
     for."""
     rows = [(f'`{node.name}`', f'`{node.executable}` ({node.package})' if node.module else '', node.doc,
              node.stands_for) for node in (*nodes.NODES, *nodes.HARDWARE_ROWS)]
-    return _table(('node', 'executable (package)', 'function', 'stands for'), rows)
+    return TextTable(('node', 'executable (package)', 'function', 'stands for'), rows)
 
 
 def topic_table():
@@ -72,14 +68,14 @@ def topic_table():
         writers = 'every node' if len(link.writers) > 1 else ''.join(link.writers)
         when = RATE_TEXTS[topic.rate] + (f'; with `{topic.flag}`' if topic.flag else '')
         rows.append((f'`{topic.name}`', kind, writers, ', '.join(link.readers), when, topic.doc))
-    return _table(('topic', 'type', 'from', 'to', 'rate', 'content'), rows)
+    return TextTable(('topic', 'type', 'from', 'to', 'rate', 'content'), rows)
 
 
 def service_table():
     """Return the table of the services of each node that has services."""
     rows = [(f'`{node.name}` ({node.executable})', ', '.join(f'`{name}`' for name in node.unit_type().REQUESTS))
             for node in nodes.UNIT_NODES if node.unit_type().REQUESTS]
-    return _table(('node', 'services (std_srvs/Trigger)'), rows)
+    return TextTable(('node', 'services (std_srvs/Trigger)'), rows)
 
 
 def command_table():
@@ -88,14 +84,14 @@ def command_table():
     rows = [(f'`{node.obeys}`', f'`{verb.name}`', ', '.join(map(_argument, verb.arguments)), verb.doc)
             for node in nodes.UNIT_NODES if node.obeys and node.name not in INJECTED_FAULTS
             for verb in node.unit_type().VERBS]
-    return _table(('topic', 'command', 'arguments', 'effect'), rows)
+    return TextTable(('topic', 'command', 'arguments', 'effect'), rows)
 
 
 def injection_table():
     """Return the table of the faults that can be injected into each simulated node."""
     rows = [(f'`{node}`', f'`{fault.name}`', ', '.join(map(_defaulted, fault.arguments[:-1])), fault.doc,
              '' if fault.lockstep else 'no') for node, faults in INJECTED_FAULTS.items() for fault in faults]
-    return _table(('node', 'fault', 'arguments', 'effect', 'in lockstep'), rows)
+    return TextTable(('node', 'fault', 'arguments', 'effect', 'in lockstep'), rows)
 
 
 def _defaulted(argument):
@@ -113,7 +109,7 @@ def expectation_table():
         for mode, expected in of_modes.items():
             alike.setdefault(expected.texts(mode), []).append(mode)
         rows += [(f'`{fault}`', ', '.join(modes), *texts) for texts, modes in alike.items()]
-    return _table(('fault', 'in', 'report', 'largest error', 'ends in'), rows)
+    return TextTable(('fault', 'in', 'report', 'largest error', 'ends in'), rows)
 
 
 def _argument(argument):
@@ -124,20 +120,20 @@ def _argument(argument):
 
 def mode_table():
     """Return the table of the modes of the control unit."""
-    return _table(('mode', 'motion of the axes', 'condition for entry', 'automatic exit'),
-                  [(f'`{mode.name}`', mode.doc, mode.entry, mode.exit) for mode in modes.MODE_ROWS])
+    return TextTable(('mode', 'motion of the axes', 'condition for entry', 'automatic exit'),
+                     [(f'`{mode.name}`', mode.doc, mode.entry, mode.exit) for mode in modes.MODE_ROWS])
 
 
 def filter_table():
     """Return the table of the kinds of target filter."""
-    return _table(('`filter.kind`', 'model'), [(f'`{name}`', kind.doc) for name, kind in FILTER_KINDS.items()])
+    return TextTable(('`filter.kind`', 'model'), [(f'`{name}`', kind.doc) for name, kind in FILTER_KINDS.items()])
 
 
 def fault_table():
     """Return the table of the faults on which the drive trips."""
-    return _table(('fault, per axis', 'condition', 'parameter'),
-                  [(f'`{fault.name}`', fault.doc, ', '.join(f'`{name}`' for name in fault.parameters))
-                   for fault in faults.AXIS_FAULTS])
+    return TextTable(('fault, per axis', 'condition', 'parameter'),
+                     [(f'`{fault.name}`', fault.doc, ', '.join(f'`{name}`' for name in fault.parameters))
+                      for fault in faults.AXIS_FAULTS])
 
 
 def alarm_table():
@@ -145,24 +141,24 @@ def alarm_table():
     name of the axis."""
     def both(text):
         return text.replace(f'{topics.AXES[0]} ', 'AXIS ')
-    return _table(('alarm', 'priority', 'delay on, off [s]', 'latched', 'consequence of', 'meaning',
-                   'action of the operator'),
-                  [(f'`{both(alarm.name)}`', alarm.priority, f'{alarm.on_delay:g}, {alarm.off_delay:g}',
-                    'yes' if alarm.latched else '', ', '.join(both(name) for name in alarm.cause
-                                                              if not name.startswith(topics.AXES[1])),
-                    alarm.meaning, alarm.action)
-                   for alarm in alarms.ALARMS if not alarm.name.startswith(topics.AXES[1])])
+    return TextTable(('alarm', 'priority', 'delay on, off [s]', 'latched', 'consequence of', 'meaning',
+                      'action of the operator'),
+                     [(f'`{both(alarm.name)}`', alarm.priority, f'{alarm.on_delay:g}, {alarm.off_delay:g}',
+                       'yes' if alarm.latched else '', ', '.join(both(name) for name in alarm.cause
+                                                                 if not name.startswith(topics.AXES[1])),
+                       alarm.meaning, alarm.action)
+                      for alarm in alarms.ALARMS if not alarm.name.startswith(topics.AXES[1])])
 
 
 def scenario_table():
     """Return the table of the scenarios that come with the product."""
-    return _table(('scenario', 'events'), [(f'`{name}`', title) for name, title in shipped.available().items()])
+    return TextTable(('scenario', 'events'), [(f'`{name}`', title) for name, title in shipped.available().items()])
 
 
 def study_table():
     """Return the table of the studies."""
-    return _table(('study', 'measurement'),
-                  [(f'`{name}`', line) for name, line in pedestal_studies.descriptions().items()])
+    return TextTable(('study', 'measurement'),
+                     [(f'`{name}`', line) for name, line in pedestal_studies.descriptions().items()])
 
 
 def parameter_table():
@@ -176,20 +172,20 @@ def parameter_table():
         allowed = (f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ())))
         text = f'{value:g}' if isinstance(value, float) else str(value)
         rows.append((f'`{name}`', text, allowed, meta.get('unit', ''), meta['doc']))
-    return _table(('parameter', 'default', 'range', 'unit', 'meaning'), rows)
+    return TextTable(('parameter', 'default', 'range', 'unit', 'meaning'), rows)
 
 
 def result_table(table=results.RESULTS):
     """Return the table of results: name, unit, meaning, target. table: rows of results.RESULTS, by default those of a
     run."""
-    return _table(('result', 'unit', 'meaning', 'target'),
-                  [(f'`{name}`', unit, sentence, target) for name, unit, sentence, target in
-                   results.documented(table)])
+    return TextTable(('result', 'unit', 'meaning', 'target'),
+                     [(f'`{name}`', unit, sentence, target) for name, unit, sentence, target in
+                      results.documented(table)])
 
 
 def exit_code_table():
     """Return the table of the exit codes of `pedestal run`."""
-    return _table(('exit code', 'meaning'), [(str(code), meaning) for code, meaning in console.EXIT_CODES.items()])
+    return TextTable(('exit code', 'meaning'), [(str(code), meaning) for code, meaning in console.EXIT_CODES.items()])
 
 
 REFERENCE_TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table, 'topics': topic_table,
@@ -199,7 +195,7 @@ REFERENCE_TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': sc
                     'results': result_table, 'exit codes': exit_code_table,
                     'recomputed results': lambda: result_table(what_if.COMPARISON_RESULTS),
                     'first parameters': parameter_table}
-"""{name of a table: function that returns its lines}."""
+"""{name of a table: function that returns it}."""
 
 
 def with_tables(text, rows):
@@ -209,8 +205,8 @@ def with_tables(text, rows):
     """
     def table(match):
         name = match[1]
-        lines = _table(*published.TABLES[name](rows)) if name in published.TABLES else REFERENCE_TABLES[name]()
-        return '\n'.join((f'<!-- table {name} -->', *lines, '<!-- end -->'))
+        found = TextTable(*published.TABLES[name](rows)) if name in published.TABLES else REFERENCE_TABLES[name]()
+        return '\n'.join((f'<!-- table {name} -->', *found.markdown(), '<!-- end -->'))
     return re.sub(r'<!-- table ([\w ]+) -->\n.*?<!-- end -->', table, text, flags=re.DOTALL)
 
 

@@ -19,8 +19,7 @@ from tools.numbers import claims
 import pedestal_studies
 from pedestal import console
 from pedestal_common.quantities import Row
-from pedestal_results import row_text
-from pedestal_results.intervals import missed
+from pedestal_results.intervals import interval_text, missed, number
 from pedestal_studies.p000_ma import filter_families
 from pedestal_studies.p001_zhou_yang_qin import alignment, alignment_speed
 from pedestal_studies.p002_jia import phased_array
@@ -114,8 +113,8 @@ def write(rows: Rows, root: str | pathlib.Path = '.') -> None:
 
 def _cells(row: Row) -> tuple[str, str, str]:
     """Return the texts of a row: value with unit, interval, number of runs."""
-    value = f'{row_text.number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
-    return value, row_text.interval(row), str(row.get('runs', ''))
+    value = f'{number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
+    return value, interval_text(row), str(row.get('runs', ''))
 
 
 def _target_text(row: Row) -> str:
@@ -132,7 +131,7 @@ def _spread(row: Row) -> str:
     """
     half = 0.5 * (row['ci_high'] - row['ci_low']) if 'runs' in row else 0.0
     if half <= 1e-9 * abs(row['value']):
-        return row_text.number(row['value'])
+        return number(row['value'])
     decimals = max(0, 1 - math.floor(math.log10(half)))
     return f'{row["value"]:.{decimals}f} +- {half:.{decimals}f}'
 
@@ -242,7 +241,7 @@ def alignment_speed_numbers(rows: Rows) -> Content:
 def matrix_table(rows: Rows) -> Content:
     """Return the table of the matrices of paper 004's proof of stability, in seconds, with rank and condition."""
     lines = [(name, '; '.join(' '.join(f'{value:.4g}' for value in line) for line in matrix),
-              *(row_text.number(rows['telemetry-flight', name, metric]['value'])
+              *(number(rows['telemetry-flight', name, metric]['value'])
                 for metric in ('rank', 'condition', 'condition_in_seconds')))
              for name, (matrix, _) in telemetry_flight.matrices().items()]
     return ('matrix', 'rows of the matrix, in seconds', 'rank', 'condition, time in T',

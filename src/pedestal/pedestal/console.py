@@ -13,14 +13,13 @@ import typing
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 
-from pedestal_results.row_text import interval, measured, number
+from pedestal_common.text_files.text_table import TextTable
 
 if typing.TYPE_CHECKING:    # these imports are slow, and most verbs need none of them
     import argparse
     from types import ModuleType
 
     from rich import progress
-    from rich.console import JustifyMethod
 
     from pedestal_common.quantities import Row, Seconds
     from pedestal_results.results import Result, Values
@@ -61,9 +60,7 @@ def _bar(columns: Callable[[ModuleType], _Columns], advance: Callable[..., None]
          total: float | None = None, rate: str = '') -> Iterator[Callable[..., None]]:
     """Yield a function of the progress: on a terminal it calls advance(bar, task, ...), in a pipe it does nothing.
 
-    columns                      function of the module rich.progress that returns the columns of the progress bar
-    advance                      advance(bar, task, ...) shows the new progress
-    description, total, rate     properties of the only task of the bar
+    columns: function of the module rich.progress; description, total, rate: of the only task of the bar.
     """
     if not sys.stderr.isatty():
         yield lambda *_: None
@@ -74,10 +71,7 @@ def _bar(columns: Callable[[ModuleType], _Columns], advance: Callable[..., None]
 
 
 def progress_of_run(duration: Seconds) -> AbstractContextManager[Callable[..., None]]:
-    """Return a context with a function progress(time of the run): a bar on a terminal, nothing in a pipe.
-
-    duration: length of the run.
-    """
+    """Return a context with a function progress(time of the run): a bar on a terminal, nothing in a pipe."""
     def columns(rich: ModuleType) -> _Columns:
         return (rich.TextColumn('{task.description}'), rich.BarColumn(),
                 rich.TextColumn('{task.completed:.0f} / {task.total:.0f} s'), rich.TimeElapsedColumn())
@@ -88,10 +82,7 @@ def progress_of_run(duration: Seconds) -> AbstractContextManager[Callable[..., N
 
 
 def progress_of_share() -> AbstractContextManager[Callable[..., None]]:
-    """Return a context with a function progress(share of the work that is done [-], text of the next item).
-
-    It shows a bar on a terminal, and nothing in a pipe.
-    """
+    """Return a context with a function progress(share of the done work [-], text of the next item), as a bar."""
     def columns(rich: ModuleType) -> _Columns:
         return rich.BarColumn(), rich.TextColumn('{task.description}'), rich.TimeElapsedColumn()
 
@@ -101,9 +92,8 @@ def progress_of_share() -> AbstractContextManager[Callable[..., None]]:
 
 
 def progress_of_trials() -> AbstractContextManager[Callable[..., None]]:
-    """Return a context with a function progress(number of trials done, number of all trials).
-
-    It shows a bar with the rate of the trials and the remaining time on a terminal, and nothing in a pipe.
+    """Return a context with a function progress(trials done, all trials), as a bar with their rate and the remaining
+    time.
     """
     def columns(rich: ModuleType) -> _Columns:
         return (rich.BarColumn(), rich.MofNCompleteColumn(), rich.TextColumn('trials, {task.fields[rate]}'),
@@ -174,38 +164,50 @@ def exit_codes() -> str:
                      for code, meaning in EXIT_CODES.items())
 
 
-def show_results(title: str, columns: Sequence[str], results: Sequence[Values], whole: Values,
-                 marks: Iterable[Mapping[str, str]] = ()) -> None:
-    """Print the table of the results of a run.
-
-    columns   texts of the heads, one for each beam; '' for a single column
-    results   of each column
-    whole     results of the run as a whole
-    marks     {name: note on a value that is not as expected} of each column
-    """
+def _show(table: TextTable, title: str = '', width: int = 0, framed: bool = False) -> None:
+    """Print a title and a table by rich, at least `width` characters wide. framed: with a frame and wrapped cells."""
+    from rich.box import HEAVY_HEAD, SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
-    table = Table()
-    table.add_column('metric')
-    for column in columns:
-        table.add_column(column or 'value', justify='right')
-    table.add_column('unit')
+    box, padding = (HEAVY_HEAD, (0, 1)) if framed else (SIMPLE_HEAD, (0, 1, 0, 0))
+    shown = Table(title=Text(title) if title else None, title_justify='left', box=box, padding=padding,
+                  pad_edge=framed)
+    for head, right in zip(table.heads, table.right):
+        shown.add_column(Text(head), justify='right' if right else 'left', no_wrap=not framed)
+    for row in table.rows:
+        shown.add_row(*map(Text, row))
+    Console(width=max(Console().width, width) if width else None).print(shown)
+
+
+def show_results(title: str, columns: Sequence[str], results: Sequence[Values], whole: Values,
+                 marks: Iterable[Mapping[str, str]] = ()) -> None:
+    """Print the table of the results of a run, with a column for each beam.
+
+    columns   names of the beams; '' for a single column
+    whole     results of the run as a whole
+    marks     {name: note on a value that is not as expected} of each column
+    """
+    from pedestal_results.intervals import measured
     marked: dict[str, list[str]] = {}
     for column, notes in zip(columns, marks):
         for metric, text in notes.items():
             marked.setdefault(metric, []).append(f'{column}: {text}' if column else text)
-    if marked:
-        table.add_column('off')
     units = {metric: unit for values in results for metric, (_, unit) in values.items()}
-    for metric, unit in units.items():
-        table.add_row(metric, *(measured(values.get(metric, (math.nan,))[0]) for values in results), unit,
-                      *([', '.join(marked.get(metric, ()))] if marked else ()))
-    for metric, (value, unit) in whole.items():
-        table.add_row(metric, measured(value), *[''] * (len(columns) - 1), unit)
-    screen = Console(width=max(Console().width, MIN_TABLE_COLUMNS) if len(columns) > 1 else None)
-    screen.print(Text(title))
-    screen.print(table)
+    rows = [(metric, *(measured(values.get(metric, (math.nan,))[0]) for values in results), unit,
+             ', '.join(marked.get(metric, ()))) for metric, unit in units.items()]
+    rows += [(metric, measured(value), *[''] * (len(columns) - 1), unit, '')
+             for metric, (value, unit) in whole.items()]
+    heads = ('metric', *((column or 'value', '>') for column in columns), 'unit', *(['off'] if marked else ()))
+    print(title)
+    _show(TextTable(heads, rows), width=MIN_TABLE_COLUMNS if len(columns) > 1 else 0, framed=True)
+
+
+def show_measured(title: str, rows: Iterable[Row]) -> None:
+    """Print rows of single numbers as a table."""
+    _show(TextTable(('case', 'metric', ('value', '>.4g'), 'unit', ('target', '>')),
+                    [(row['case'], row['metric'], row['value'], row['unit'], row['target']) for row in rows]),
+          title, framed=True)
 
 
 def add_all(parser: argparse.ArgumentParser,
@@ -226,32 +228,20 @@ def explain(table: Iterable[Result], names: Container[str]) -> None:
 
 def show_study(title: str, rows: Iterable[Row], missed: Callable[[Row], bool]) -> None:
     """Print the rows of a study as a table; missed: function that returns True for a row that misses its target."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-    table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    heads: tuple[tuple[str, JustifyMethod], ...] = (
-        ('case', 'left'), ('metric', 'left'), ('paper', 'right'), ('ours', 'right'), ('95 % interval', 'right'),
-        ('target', 'left'), ('unit', 'left'), ('', 'left'))
-    for name, justify in heads:
-        table.add_column(name, justify=justify, no_wrap=True)
-    for row in rows:
-        table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), interval(row),
-                      row['target'] or '', row['unit'], 'MISSED' if missed(row) else '')
-    Console(width=max(Console().width, MIN_TABLE_COLUMNS)).print(table)
+    from pedestal_results.intervals import interval_text, number
+    _show(TextTable(('case', 'metric', ('paper', '>'), ('ours', '>'), ('95 % interval', '>'), 'target', 'unit', ''),
+                    [(row['case'], row['metric'], number(row['paper']), number(row['value']), interval_text(row),
+                      row['target'], row['unit'], 'MISSED' if missed(row) else '') for row in rows]),
+          title, MIN_TABLE_COLUMNS)
 
 
 def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None = None) -> None:
     """Print the statistics of results over trials as a table.
 
-    rows: of trials.statistics and trials.comparison; metrics: names of the printed results in their order, None
-    for all rows. The rows of a comparison are printed for the first of these results only.
+    metrics: names of the printed results in their order, None for all rows. The rows of a comparison are printed for
+    the first of these results only.
     """
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
+    from pedestal_results.intervals import interval_text, number
     from pedestal_workbench.trials.statistics import coverage
     of_results: dict[tuple[str, str, str], dict[str, Row]] = {}
     others: list[Row] = []
@@ -264,40 +254,28 @@ def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None =
         elif key in ('rate', 'difference', 'gain', 'wins') and (metrics is None or metric == metrics[0]):
             others.append(row)
     order = metrics or list(dict.fromkeys(metric for _, metric, _ in of_results))
-    table = Table(title=Text(title), title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    for name in ('result', 'case', 'mean', '95 % interval', '5 %', 'median', '95 %', 'largest', 'trials', 'unit'):
-        table.add_column(name, justify='left' if name in ('case', 'result', 'unit') else 'right', no_wrap=True)
-    for case, metric, unit in sorted(of_results, key=lambda key: order.index(key[1])):
-        found = of_results[case, metric, unit]
-        mean = found['mean']
-        table.add_row(metric, case, number(mean['value']), interval(mean),
-                      *(number(found[key]['value']) for key in ('p05', 'p50', 'p95', 'max')), coverage(mean), unit)
-    for row in others:
-        table.add_row(row['metric'], row['case'], number(row['value']), interval(row), '', '', '', '',
-                      coverage(row), row['unit'])
-    longest = max((len(row['case']) for row in rows), default=0)
-    Console(width=max(Console().width, MIN_TABLE_COLUMNS + longest)).print(table)
+    lines = [(metric, case, number(found['mean']['value']), interval_text(found['mean']),
+              *(number(found[key]['value']) for key in ('p05', 'p50', 'p95', 'max')), coverage(found['mean']), unit)
+             for (case, metric, unit), found in sorted(of_results.items(), key=lambda item: order.index(item[0][1]))]
+    lines += [(row['metric'], row['case'], number(row['value']), interval_text(row), '', '', '', '', coverage(row),
+               row['unit']) for row in others]
+    numbers = ('mean', '95 % interval', '5 %', 'median', '95 %', 'largest', 'trials')
+    _show(TextTable(('result', 'case', *((name, '>') for name in numbers), 'unit'), lines), title,
+          MIN_TABLE_COLUMNS + max((len(row['case']) for row in rows), default=0))
 
 
 def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:
-    """Print the values that a search has tried as a table, with the mean of the result at each.
-
-    key, unit: parameter 'node.key' of the search and its unit; tried: by rising value.
-    """
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-
+    """Print the values that a search has tried as a table; key, unit: of the parameter of the search."""
+    from pedestal_results.intervals import interval_text, number
     from pedestal_workbench.trials.solve import reason
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    for name in (f'{key} {f"[{unit}]" if unit else ""}'.strip().replace('[', r'\['), 'mean', '95 % interval', 'unit',
-                 'tracked', 'trials'):
-        table.add_column(name, justify='left' if name in ('unit', 'trials') else 'right', no_wrap=True)
+    lines = []
     for one in tried:
         cells = ('', '', '', '')
         if one.row:
             share = one.row['tracked_percent']
-            cells = (number(one.row['value']), interval(one.row), one.row['unit'],
+            cells = (number(one.row['value']), interval_text(one.row), one.row['unit'],
                      '' if share is None else f'{share:.3g} %')
-        table.add_row(f'{one.value:.6g}', *cells, reason(one))
-    Console(width=max(Console().width, MIN_TABLE_COLUMNS)).print(table)
+        lines.append((f'{one.value:.6g}', *cells, reason(one)))
+    name = f'{key} [{unit}]' if unit else key
+    _show(TextTable(((name, '>'), ('mean', '>'), ('95 % interval', '>'), 'unit', ('tracked', '>'), 'trials'), lines),
+          width=MIN_TABLE_COLUMNS)

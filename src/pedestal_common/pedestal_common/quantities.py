@@ -5,7 +5,7 @@ mypy do not. The types at the end stand for data without a declared type.
 an array in a record (record.Record).
 """
 from collections.abc import Sequence
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import Annotated, Any, TypeAlias, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,5 +64,30 @@ AnyRecord: TypeAlias = Any  # a record whose fields depend on data, as those of 
 Message: TypeAlias = Any    # a ROS message, whose class is made by ROS without types
 Json: TypeAlias = Any       # what a JSON or YAML file holds; the code that takes a value from it checks the value
 Value: TypeAlias = Any      # of a parameter or of an argument of a command, whose declaration states the type
-Row: TypeAlias = dict[str, Any]     # of the rows of a --json file, see pedestal_results.intervals.row
 Table: TypeAlias = dict[str, Any]   # {column: Floats} with a row per message of a topic; a column of texts is a list
+
+
+class SingleRow(TypedDict):
+    """Row of a --json file: one measured number."""
+    case: str
+    metric: str
+    value: float | None     # None if the number could not be measured
+    unit: str
+    paper: float | None     # number that a paper prints
+    target: str | None      # for pedestal_results.intervals.meets
+
+
+class Coverage(TypedDict, total=False):
+    """Fields of a row of trials that some of them did not measure."""
+    of: int     # number of all trials
+    left_out: dict[str, int]    # {first word of a verdict: number of trials without the result}
+
+
+class Row(SingleRow, Coverage, total=False):
+    """Row of a --json file. A row of several runs states their mean and its confidence interval."""
+    ci_low: float | None
+    ci_high: float | None
+    runs: int
+    tracked_percent: float | None   # mean share of the trials in autotrack
+    text: str       # of the value
+    alarms: list[str]

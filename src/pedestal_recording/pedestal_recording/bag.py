@@ -1,7 +1,4 @@
-"""Reading of a bag, the recording of a run: a rosbag2 directory with its MCAP files, or one MCAP file.
-
-The report, the verification, the export and the recomputation read bags by this module. It works without ROS.
-"""
+"""Reading of a bag, the recording of a run: a rosbag2 directory with its MCAP files, or one MCAP file, without ROS."""
 import contextlib
 import copy
 import functools
@@ -30,20 +27,17 @@ from pedestal_recording.readable import Readable
 
 MAX_CACHE_BYTES = 64_000_000  # largest size of the cache of unpacked chunks [bytes]
 
-MAX_SEARCHED_DIAGNOSTICS = 100
-"""Number of messages at the end of a bag in which the last diagnostics of a node are searched."""
+MAX_SEARCHED_DIAGNOSTICS = 100  # messages at the end of a bag in which the last diagnostics of a node are searched
 
 MAX_CHANNELS = 2000  # largest number of channels of a file; a channel is the record of a topic in an MCAP file
 MAX_SHOWN_FOREIGN_MESSAGES = 3  # largest number of foreign messages of a topic whose time and size are shown
 INDEX_BLOCK_ROWS = 65_536  # largest number of rows that are added to the index, or taken from it, at once
 
 INDEX_FIELDS = [(name, 'i8') for name in ('channel', 'sequence', 'log', 'publish', 'stamp', 'foreign', 'chunk',
-                                              'start', 'stop')]
-"""Names and types of the fields of Bag.index."""
-_UNREADABLE, _OTHER_PUBLISHER = 1, 2
-"""Values of the field `foreign` for a foreign message: its reason. The value 0 means a message of the graph."""
-_DECLARED = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA)
-"""Kinds of records outside chunks that hold no messages and are read."""
+                                          'start', 'stop')]     # of Bag.index
+_UNREADABLE, _OTHER_PUBLISHER = 1, 2    # values of the field `foreign` for a foreign message: its reason
+_KINDS = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.METADATA, Opcode.CHUNK,
+          Opcode.MESSAGE)   # records outside chunks that are read
 Index: typing.TypeAlias = np.recarray[tuple[int], DType]    # rows of Bag.index
 Content = typing.TypeVar('Content')  # type of the values in a dictionary {topic or node: value}
 MetadataRecords = Mapping[str, Mapping[str, str]]  # metadata records of a bag, {name: {text: text}}
@@ -55,9 +49,8 @@ RETIRED_PARAMETERS = {'ins': ('alignment.classical_bandwidth', 'alignment.adrc.o
 
 
 def read(path: str | pathlib.Path, beam: str | None = None) -> 'Bag':
-    """Return the Bag in a directory or an .mcap file.
+    """Return the Bag in a directory or an .mcap file; beam: see Bag.view, None for all beams.
 
-    beam: name of the beam of an array to which the Bag is reduced (Bag.view), '' for the first; None for all beams.
     Logs a warning for each topic with foreign messages. Raises BagError if the bag is missing, empty, damaged or no
     ROS 2 recording, or has no such beam.
     """
@@ -84,11 +77,7 @@ def chosen_topics(bag: 'Bag', names: Iterable[str]) -> list[str]:
 
 
 def load(path: str | pathlib.Path) -> 'Bag':
-    """Return the Bag in a directory or an .mcap file, up to its first damage.
-
-    Its `damage` states place and reason of the early end, '' for a whole bag. Raises BagError if nothing is
-    readable.
-    """
+    """Return the Bag at a path, up to its first damage. Raises BagError if nothing is readable."""
     opened = [McapFile(file) for file in locate(path)]
     try:
         return Bag(pathlib.Path(path), opened)
@@ -97,7 +86,7 @@ def load(path: str | pathlib.Path) -> 'Bag':
 
 
 def locate(path: str | pathlib.Path) -> list[pathlib.Path]:
-    """Return the MCAP files of a bag in their order; the bag is a directory or one file.
+    """Return the MCAP files of a bag, a directory or one file, in their order.
 
     Each restart of the recorder begins a new file: NAME_0.mcap, NAME_1.mcap and so on. Files with other names are in
     the order of metadata.yaml. Raises BagError for no file, for several files without an order, or for messages that
@@ -127,7 +116,7 @@ def locate(path: str | pathlib.Path) -> list[pathlib.Path]:
 
 
 def _described(path: pathlib.Path) -> dict[str, Json]:
-    """Return the content of metadata.yaml in the directory of a bag, {} if the file is missing or unreadable."""
+    """Return the content of metadata.yaml, {} if the file is missing or unreadable."""
     try:
         return dict(plain_yaml.read(path / 'metadata.yaml')['rosbag2_bagfile_information'])
     except (OSError, yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError):
@@ -143,12 +132,12 @@ def compressed_messages(path: pathlib.Path, name: str | None) -> BagError:
 
 
 def start(metadata_records: MetadataRecords) -> Nanoseconds:
-    """Return the stamp of time 0 of the scenario, from the metadata records of a bag: UTC in realtime, else 0."""
+    """Return the stamp of time 0 of the scenario: UTC in realtime, else 0."""
     return _nanoseconds(metadata_records.get('pedestal', {}).get('start')) or 0
 
 
 def planned_end(metadata_records: MetadataRecords) -> Nanoseconds | None:
-    """Return the planned end of a run, a stamp, from the metadata records of its bag; None if unknown."""
+    """Return the planned end of a run, a stamp; None if unknown."""
     planned = _nanoseconds(metadata_records.get('pedestal', {}).get('planned_end_ns'))
     if planned is None:  # an older recording has only the parameter `duration` of the recorder
         with contextlib.suppress(KeyError, TypeError, ValueError, OverflowError, yaml.YAMLError):
@@ -157,7 +146,6 @@ def planned_end(metadata_records: MetadataRecords) -> Nanoseconds | None:
 
 
 def _nanoseconds(text: str | None) -> Nanoseconds | None:
-    """Return a text of the metadata as a time, None if the text is no time."""
     return int(text) if text and text.isdecimal() and len(text) < 20 else None
 
 
@@ -168,8 +156,6 @@ def foreign_encoding(file: pathlib.Path, channel: Channel) -> BagError:
 
 class Bag:
     """A recording: an index of all its messages, and the methods that read them.
-
-    index: one row for each message of the graph, in the order of the files.
 
     Fields of a row of the index:
     channel            number of the channel in its file, plus 65536 times the number of the file
@@ -233,27 +219,22 @@ class Bag:
             rows.foreign[zero & np.isin(rows.channel, numbered) & (rows.foreign == 0)] = _OTHER_PUBLISHER
 
     def _scan(self, number: int, file: McapFile, blocks: list[Records]) -> None:
-        """Add the messages of a file to the blocks of the index. Raises EOFError if the file ends early."""
-        for opcode, start, stop in file.pieces():
+        for opcode, start, stop, content in mcap_file.walk(file, _KINDS):
             try:
                 if opcode == Opcode.CHUNK:
-                    data = file.chunk(start, stop)
                     self._chunks.append((file, start, stop))
-                    blocks += self._walk(number, data, 0, len(self._chunks) - 1)
-                elif opcode == Opcode.MESSAGE:
-                    blocks += self._walk(number, file.read(start, stop), start, -1 - number)
-                elif opcode in _DECLARED:
-                    self._declare(number, opcode, file.read(start + 9, stop))
+                if isinstance(content, bytes):
+                    offset, chunk = (0, len(self._chunks) - 1) if opcode == Opcode.CHUNK else (start, -1 - number)
+                    blocks += self._walk(number, content, offset, chunk)
+                else:
+                    self._declare(number, content)
             except BagError:
                 raise
             except Exception as error:  # a decoder may raise anything on broken bytes
                 raise EOFError(f'broken record at byte {start}: {error}') from None
 
     def _walk(self, number: int, data: bytes, offset: int, chunk: int) -> Iterator[Records]:
-        """Yield blocks of the index for the messages in records, given as bytes `data` of the file with a number.
-
-        offset: place of the bytes in the file, 0 for an unpacked chunk; chunk: value of that field of the index.
-        """
+        """Yield blocks of the index for messages at a byte `offset` of the file, which is 0 for an unpacked chunk."""
         unpack, base, at = MESSAGE_HEAD.unpack_from, number << 16, 0
         rows: list[tuple[int, ...]] = []
         add, file = rows.append, self._opened[number]
@@ -267,7 +248,7 @@ class Bag:
                 at += 9 + length
             else:
                 opcode, stop = mcap_file.frame(data, at)
-                self._declare(number, opcode, data[at + 9:stop])
+                self._declare(number, mcap_file.parsed(opcode, data[at + 9:stop]))
                 at = stop
         if at > len(data):
             raise ValueError('a message that is longer than its chunk')
@@ -275,10 +256,7 @@ class Bag:
             yield self._block(file, rows, data, offset)
 
     def _block(self, file: McapFile, rows: list[tuple[int, ...]], data: bytes, offset: int) -> Records:
-        """Return rows of the index as an array, with the stamp from the header of each message that has one.
-
-        data: the bytes that hold the messages; offset: see _walk.
-        """
+        """Return rows of the index as an array, with the stamp from the header of each message that has one."""
         file.count(len(rows))
         block = np.array(rows, INDEX_FIELDS)
         unknown = set(np.unique(block['channel']).tolist()) - set(self._channels)
@@ -296,7 +274,7 @@ class Bag:
         return block
 
     def _judge(self, block: Records, data: bytes) -> None:
-        """Mark unreadable messages of a block of the index as foreign; count the messages compressed one by one."""
+        """Mark unreadable messages of a block as foreign, and count the messages that are compressed one by one."""
         for channel in np.unique(block['channel']).tolist():
             rows = np.flatnonzero(block['channel'] == channel)
             start, stop = block['start'][rows], block['stop'][rows]
@@ -309,12 +287,9 @@ class Bag:
                     self._judges[channel] = Readable(name, self.topics[name], 'pacing' in self.metadata)
                 block['foreign'][rows[~self._judges[channel].mask(data, start, stop)]] = _UNREADABLE
 
-    def _declare(self, number: int, opcode: int, content: bytes) -> None:
-        """Note the schema, channel, metadata or statistics in a record of the file with a number.
-
-        Raises BagError for a channel that is not CDR, ValueError for an invalid record.
-        """
-        record, base = mcap_file.parsed(opcode, content), number << 16
+    def _declare(self, number: int, record: mcap_file.Content) -> None:
+        """Note a record of the file with a number. Raises BagError for a channel that is not CDR."""
+        base = number << 16
         if isinstance(record, Schema):
             self._schemas[base | record.id] = record.name
         elif isinstance(record, Channel):
@@ -338,7 +313,6 @@ class Bag:
                     self._counts[name] = self._counts.get(name, 0) + count
 
     def _bytes(self, chunk: int, start: int, stop: int) -> bytes:
-        """Return the CDR bytes of a message from the fields chunk, start and stop of its row of the index."""
         if chunk < 0:
             return self._opened[-1 - chunk].read(start, stop)
         if chunk not in self._cache:
@@ -351,7 +325,7 @@ class Bag:
 
     @property
     def metadata(self) -> dict[str, str]:
-        """Metadata {text: text} of the run (record `pedestal`); empty in a foreign bag."""
+        """Metadata of the run (record `pedestal`); empty in a foreign bag."""
         return self.metadata_records.get('pedestal', {})
 
     @property
@@ -391,14 +365,13 @@ class Bag:
 
     @property
     def graph(self) -> dict[str, nodes.Link]:
-        """Topics of the recorded graph, {name: nodes.Link} with type, rate, publishers and subscribers."""
+        """Topics of the recorded graph by name."""
         return nodes.links(self.beams, self.servo, self.iq)
 
     def view(self, beam: str = '') -> 'Bag':
-        """Return this Bag reduced to one of the beams of an array, by the name of the beam; '' for the first beam.
+        """Return this Bag reduced to one beam of an array; '' for the first beam. Raises BagError for a missing beam.
 
-        It has the topics of the beam under their plain names, and the topics that all beams share. A Bag of one beam
-        is its own view. Raises BagError for a missing beam.
+        It has the topics of the beam under their plain names, and the topics that all beams share.
         """
         prefixes = nodes.prefixes(self.beams)
         if prefixes == ('',) and beam:
@@ -433,10 +406,9 @@ class Bag:
 
     @functools.cached_property
     def configuration(self) -> dict[str, Json]:
-        """Configuration of the run: {'scenario': its YAML, 'parameters': {node: {dotted name: value}}}.
+        """Scenario as YAML, and {node: {dotted name: value}} of the parameters; both empty in a foreign bag.
 
-        The values are '' and {} in a bag without a configuration. Raises BagError for invalid YAML, or for a node
-        without a section of parameters.
+        Raises BagError for invalid YAML, or for a node without a section of parameters.
         """
         parameters: dict[str, dict[str, Json]] = {}
         for node, text in self.metadata_records.get('parameters', {}).items():
@@ -463,7 +435,7 @@ class Bag:
         return self.index[self.where(topic)].view(np.recarray)
 
     def recorded(self, topic: str) -> Index:
-        """Return the rows of all messages of a topic in the form of `index`, also those of foreign messages."""
+        """Return the rows of all messages of a topic, also those of foreign messages."""
         channels = [channel for channel, name in self._channels.items() if name == topic]
         return self._recorded[np.isin(self._recorded.channel, channels)].view(np.recarray)
 
@@ -483,7 +455,6 @@ class Bag:
         return lines
 
     def _foreign_line(self, name: str, rows: Index, reason: int) -> str:
-        """Return the line on the foreign messages of a topic that have one reason; rows: their rows of the index."""
         shown = ', '.join(f'{(row.log - self.start) / 1e9:.6f} s ({row.stop - row.start} bytes)'
                           for row in rows[:MAX_SHOWN_FOREIGN_MESSAGES])
         more = f' and {rows.size - MAX_SHOWN_FOREIGN_MESSAGES} more' if rows.size > MAX_SHOWN_FOREIGN_MESSAGES else ''
@@ -516,10 +487,7 @@ class Bag:
                 yield names[channel], log, publish, take(*place)
 
     def messages(self, topic: str | None = None) -> Iterator[tuple[str, Nanoseconds, Nanoseconds, Message]]:
-        """Yield (topic, log time, publish time, message object) of the messages of a topic, None for all topics.
-
-        Raises BagError for bytes that are no message of the type.
-        """
+        """Yield (topic, log time, publish time, message object) of a topic, None for all topics. Raises BagError."""
         for name, log, publish, data in self.raw(topic):
             try:
                 message = messages.deserialize(data, self.topics[name])
@@ -528,10 +496,7 @@ class Bag:
             yield name, log, publish, message
 
     def table(self, topic: str) -> Table:
-        """Return the columns of a topic, one row per message; for the names see columns.table.
-
-        Raises BagError for bytes that are no message of the type.
-        """
+        """Return the columns of a topic, one row per message; for the names see columns.table. Raises BagError."""
         rows = self.rows(topic)
         try:
             return columns.table([data for _, _, _, data in self.raw(topic)], self.topics[topic.lstrip('/')], rows.log,

@@ -1,9 +1,8 @@
-"""Messages of one topic as columns: each number of a message becomes an array over all messages. `Bag.table` uses it.
+"""Messages of one topic as columns: each number of a message becomes an array over all messages.
 
-CDR is the byte format of ROS 2 messages. Two messages have the same shape if they have the same length and the same
-bytes outside their numbers, such as names. Their numbers then stand at the same places. The definition of the type
-gives these places for the first message. All messages of its shape form one array of bytes, and a column is a slice of
-this array. The messages of the other shapes follow, one shape after another.
+Two messages have the same shape if they have the same length and the same bytes outside their numbers, such as names.
+Their numbers then stand at the same places, which the definition of the type gives for the first message. All messages
+of its shape form one array of bytes, and a column is a slice of this array. The messages of the other shapes follow.
 """
 from collections.abc import Collection, Iterable, Sequence
 
@@ -26,11 +25,23 @@ This avoids a huge table from a file whose messages each name other columns.
 STATUS_TEXTS = ('name', 'hardware_id', 'message')  # fields of a DiagnosticStatus that are texts
 
 
-def stamps(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanoseconds]) -> Stamps:
-    """Return the stamps in the headers of messages; data: their CDR bytes, log: their log times.
+class Shape:
+    """The bytes of a message outside its numbers, which all messages of one shape share.
 
-    Return the log times for a type without header, or if a message is too short for a header.
+    message: CDR bytes; spans: (start, stop) of these bytes, such as cdr.Places.fixed.
     """
+
+    def __init__(self, message: bytes, spans: Iterable[tuple[int, int]]) -> None:
+        self.places = np.concatenate([np.arange(start, stop) for start, stop in spans])
+        self._bytes = np.frombuffer(message, np.uint8)[self.places]
+
+    def equals(self, taken: Bytes) -> Bools:
+        """Return True for each message of the same length with this shape; taken: its bytes at `places`, as a row."""
+        return (taken == self._bytes).all(axis=1)
+
+
+def stamps(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanoseconds]) -> Stamps:
+    """Return the stamps in the headers of messages; the log times, if the type or a message has no header."""
     log = np.asarray(log, np.int64)
     if type_name not in STAMPED_TYPES or not len(data) or min(map(len, data)) < 12:
         return log.copy()
@@ -40,7 +51,7 @@ def stamps(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanosec
 
 def table(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanoseconds], start: Nanoseconds = 0,
           as_sent: bool = False) -> Table:
-    """Return the columns of the messages of one type. data: their CDR bytes; log: their log times.
+    """Return the columns of the CDR messages of one type.
 
     The column `t` [s] is the stamp of the header minus start; for a type without header, it is the log time minus
     start. The names of the other columns depend on the type:
@@ -75,23 +86,23 @@ def table(data: Sequence[bytes], type_name: str, log: Stamps | Sequence[Nanoseco
 
 
 def values_text(pairs: Iterable[tuple[str, str]]) -> str:
-    """Return the (key, value) pairs of a DiagnosticStatus as one text, 'key=value; key=value'."""
+    """Return the values of a DiagnosticStatus as one text, 'key=value; key=value'."""
     return '; '.join(f'{key}={value}' for key, value in pairs)
 
 
 def _fill(out: Table, block: Bytes, rows: Ints, type_name: str, count: int, most: int, as_sent: bool) -> None:
-    """Put the numbers of m messages of one length into the columns `out`.
+    """Put the numbers of messages of one length into the columns `out`.
 
-    block: their bytes (m, length); rows: their rows in the columns; count: number of all rows; most: largest number
+    block: their bytes (m, length); rows: their rows in the columns, of which there are `count`; most: largest number
     of cells in `out`.
     """
     shapes = 0
     while rows.size:
         walk = cdr.Places(block[0].tobytes(), type_name)
-        fixed = np.concatenate([np.arange(start, stop) for start, stop in walk.fixed])
+        shape = Shape(walk.data, walk.fixed)
         shapes += 1
         tried = len(block) if shapes < MAX_MESSAGE_SHAPES else 1
-        alike = (block[:tried, fixed] == block[0, fixed]).all(axis=1)
+        alike = shape.equals(block[:tried, shape.places])
         same, where = block[:tried][alike], rows[:tried][alike]
         for path, start, dtype in walk.numbers:
             name = layouts.column(type_name, path, walk.texts)
@@ -114,20 +125,16 @@ def _numbers(block: Bytes, start: int, dtype: str) -> Floats:
 
 
 def alike(data: Sequence[bytes], type_name: str, template: bytes, names: Collection[str]) -> Bools:
-    """Return True for each message that equals a template outside stamp and named columns. data, template: CDR bytes.
+    """Return True for each message that equals a template outside its stamp and the named columns.
 
-    names: the columns that may differ. The padding that DDS adds at the end of a message does not count.
+    The padding that DDS adds at the end of a message does not count.
     """
     walk = cdr.Places(template, type_name)
-    fixed = [np.arange(start, stop) for start, stop in walk.fixed]
-    for path, start, dtype in walk.numbers:
-        column = layouts.column(type_name, path, walk.texts)
-        if not path.startswith(('header.stamp.', 'clock.')) and column not in names:
-            fixed.append(np.arange(start, start + int(dtype[2:])))
-    places = np.concatenate(fixed)
-    wanted = np.frombuffer(template, np.uint8)[places]
-    size = len(template)
+    equal = [(start, start + int(dtype[2:])) for path, start, dtype in walk.numbers
+             if not path.startswith(('header.stamp.', 'clock.'))
+             and layouts.column(type_name, path, walk.texts) not in names]
+    shape, size = Shape(template, walk.fixed + equal), len(template)
     same = np.array([0 <= len(message) - size < cdr.PADDING_LIMIT_BYTES for message in data], bool)
     block = np.frombuffer(b''.join([message[:size] for message, fits in zip(data, same) if fits]), np.uint8)
-    same[same] = (block.reshape(-1, size)[:, places] == wanted).all(axis=1)
+    same[same] = shape.equals(block.reshape(-1, size)[:, shape.places])
     return same

@@ -1,7 +1,6 @@
-"""Origin of a bag: scenario, parameters of all nodes, versions and git revision, as texts.
+"""Origin of a bag: scenario, parameters of all nodes, versions and git revision, as texts in its metadata.
 
-The recorder stores these texts in the metadata of the bag. They do not depend on the path, the host or the wall clock,
-so equal runs give equal bytes.
+They do not depend on the path, the host or the wall clock, so equal runs give equal bytes.
 """
 import contextlib
 import importlib.metadata
@@ -79,10 +78,7 @@ def recorder_parameters(scenario: Scenario) -> dict[str, str]:
 
 
 def records(scenario_yaml: str, parameters_yaml: str) -> dict[str, dict[str, str]]:
-    """Return the metadata records of a bag by name, from the texts of recorder_parameters.
-
-    An empty text gives no record.
-    """
+    """Return the metadata records of a bag from the texts of recorder_parameters; none for an empty text."""
     content = {}
     if scenario_yaml:
         content['scenario'] = {'yaml': scenario_yaml}

@@ -1,8 +1,8 @@
 """`pedestal export`: write a recording as one table per topic, for MATLAB, pandas and other readers of CSV or Parquet.
 
 A row is one message. The first two columns are its stamp in seconds and in integer nanoseconds. Each further column is
-one number of the message (columns.table). Two kinds of topics have more rows: a trajectory of several points has one
-row per point, and a diagnostics message has one row per status.
+one number of the message (columns.table). A trajectory of several points has one row per point, and a diagnostics
+message has one row per status.
 """
 import contextlib
 import csv
@@ -26,15 +26,13 @@ _TableWriter: TypeAlias = Callable[[pathlib.Path, Table, dict[str, str]], None] 
 def export(path: str | pathlib.Path, file_format: str = 'csv', output: str | pathlib.Path | None = None,
            names: Collection[str] = (),
            overwrite: bool = False) -> Iterator[tuple[pathlib.Path, int, int] | tuple[None, str, str]]:
-    """Write the topics of the bag at a path as tables, and yield one tuple per topic.
+    """Write the topics of the bag at a path as tables ('csv' or 'parquet').
 
-    The tuple is (file, number of rows, number of columns), or (None, reason, name) for a topic that is omitted.
+    Yield (file, number of rows, number of columns) per topic, or (None, reason, name) for a topic that is omitted.
 
-    file_format   'csv' or 'parquet'
     names         topics to write, each of a known type; when empty, all topics except those of unknown type
     output        folder of the tables, by default `export` in the bag (beside a bare .mcap). The table of the topic
                   acu/rate_command is `acu.rate_command.csv`.
-    overwrite     True to replace existing files
 
     Raises bag.BagError, ValueError if Parquet cannot be written, or FileExistsError before the first write.
     """
@@ -87,12 +85,10 @@ def table(bag: bags.Bag, name: str) -> Table:
 
 
 def _times(stamps: Stamps) -> Table:
-    """Return the first two columns of a table."""
     return {TIME_COLUMN: stamps / 1e9, STAMP_COLUMN: stamps}
 
 
 def _header(name: str, type_name: str, column: str) -> str:
-    """Return the header of a column, with its unit if the topic and its type are those of the graph."""
     unit = layouts.unit(nodes.plain(name), type_name, column)
     return f'{column} [{unit}]' if unit else column
 
@@ -126,7 +122,6 @@ def _tracks(bag: bags.Bag, name: str, stamps: Stamps) -> Table:
 
 
 def _diagnostics(bag: bags.Bag, name: str, stamps: Stamps) -> Table:
-    """Return the table of a diagnostics topic. A row is a status, with its values as columns.values_text."""
     statuses = [(stamp, status) for stamp, (_, _, _, message) in zip(stamps.tolist(), bag.messages(name))
                 for status in message.status]
     return {**_times(np.array([stamp for stamp, _ in statuses], np.int64)),
@@ -137,11 +132,7 @@ def _diagnostics(bag: bags.Bag, name: str, stamps: Stamps) -> Table:
 
 
 def _write_csv(file: pathlib.Path, content: Table, _description: object) -> None:
-    """Write a table as CSV.
-
-    A number is the shortest text that reads back as the same float. A missing number is NaN. Texts have quotes where
-    needed.
-    """
+    """Write a table as CSV. A number is the shortest text that reads back as the same float, else NaN."""
     with open(file, 'w', newline='', encoding='utf-8') as stream:
         writer = csv.writer(stream, lineterminator='\n')
         writer.writerow(content)
@@ -149,14 +140,12 @@ def _write_csv(file: pathlib.Path, content: Table, _description: object) -> None
 
 
 def _texts(values: Floats | Stamps | list[str]) -> Floats | Stamps | list[str]:
-    """Return a column of a table as a list of cells for CSV; texts and whole numbers stay unchanged."""
     if isinstance(values, list) or values.dtype.kind == 'i':
         return values
     return ['NaN' if value != value else repr(value) for value in values.tolist()]
 
 
 def _parquet_writer() -> _TableWriter:
-    """Return the function that writes Parquet. Raises ValueError."""
     try:
         import pyarrow
         import pyarrow.parquet

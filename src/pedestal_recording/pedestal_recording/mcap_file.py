@@ -1,4 +1,4 @@
-"""Reading of one MCAP file, the file of a recording. `bag`, `recover` and `writer` read their files by this module.
+"""Reading of one MCAP file, the file of a recording. `walk` is the only walk over the records of a file.
 
 An MCAP file is a series of records. A record is its opcode (1 byte, the kind of the record), the length of its content
 (8 bytes) and its content. A channel is the record of a topic, and a schema is the record of a message type. A chunk is
@@ -7,14 +7,16 @@ a record that holds further records, compressed or not.
 A few bytes of a compressed chunk can stand for gigabytes of zeros, or for millions of empty messages. Therefore
 MAX_CHUNK_BYTES, UNPACKED_LIMITS and MESSAGE_LIMITS limit time and memory, in proportion to the length of the file.
 """
+import contextlib
 import fcntl
 import io
 import mmap
 import os
 import pathlib
+import re
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from typing import TypeAlias
 
 import lz4.frame
@@ -39,7 +41,10 @@ MESSAGE_HEAD = struct.Struct('<xQHIQQ')
 """Head of a message record: opcode (skipped), length of the content, number of the channel, sequence number, log time
 and publish time [ns]. The CDR bytes of the message follow."""
 
+END_OPCODES = Opcode.DATA_END, Opcode.FOOTER    # kinds of records that end the messages of a file
+
 Data: TypeAlias = bytes | mmap.mmap     # of a file or of a chunk
+Content: TypeAlias = records.McapRecord | bytes | None  # of a record; bytes: the records in a chunk, or messages
 
 SQLITE_MAGIC = b'SQLite format 3'
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'  # first bytes of an SQLite file, and of data in the compression zstd
@@ -52,7 +57,15 @@ COMPRESSED_MAGIC = {
 _RECORD = struct.Struct('<BQ')
 """Opcode of a record, and length of its content [bytes]. The content begins after these 9 bytes."""
 _WINDOW = 1_000_000
-"""Number of bytes that one access reads from the disk. It is also the largest size of a piece of McapFile.pieces."""
+"""Number of bytes that one access reads from the disk. It is also the largest size of messages that `walk` joins."""
+_COMPRESSION = re.compile(rb'\x04\x00\x00\x00zstd|\x03\x00\x00\x00lz4')
+"""Length and name of the compression in a chunk record. The search for intact chunks looks for these bytes."""
+_BEFORE_COMPRESSION = 9 + 8 + 8 + 8 + 4
+"""Length of a chunk record before the name of its compression [bytes].
+
+It consists of opcode and length, first and last log time, unpacked size, checksum, and length of the name.
+"""
+_LENGTH = struct.Struct('<Q')  # length of the compressed data in a chunk record [bytes]
 _READ: dict[int, Callable[[ReadDataStream], records.McapRecord]] = {
     Opcode.HEADER: records.Header.read, Opcode.SCHEMA: records.Schema.read, Opcode.CHANNEL: records.Channel.read,
     Opcode.METADATA: records.Metadata.read, Opcode.STATISTICS: records.Statistics.read,
@@ -71,7 +84,7 @@ def reason(error: OSError) -> str:
 
 
 def frame(data: Data, at: int) -> tuple[int, int]:
-    """Return (opcode, stop) of the record that begins at the position `at`; stop: its end.
+    """Return (opcode, stop) of the record that begins at a position of data.
 
     Raises ValueError if no whole record begins there.
     """
@@ -122,7 +135,7 @@ def unpacked(chunk: records.Chunk) -> bytes:
 
 
 def _zstd(data: bytes, size: int) -> bytes:
-    """Return the decompressed bytes of a zstd frame, b'' if the frame states another length than `size`.
+    """Return the decompressed bytes, b'' if the frame states another length than `size`.
 
     Memory for a frame that states a false length is therefore never allocated.
     """
@@ -138,7 +151,7 @@ _UNPACK: dict[str, Callable[[bytes, int], bytes]] = {
 
 
 class McapFile:
-    """An open MCAP file, which is read in pieces. size: its length [bytes].
+    """An open MCAP file, which is read in pieces.
 
     locked: True if this process itself writes the file and holds its lock. Otherwise a lock on the file is an error.
     Raises BagError if the file is missing, empty, not regular or not MCAP, or while its recorder still writes it.
@@ -169,7 +182,6 @@ class McapFile:
         self._messages = 0
 
     def _check_lock(self) -> None:
-        """Raise BagError if another process holds the lock of the file, because it writes the file."""
         try:
             fcntl.flock(self._stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
             fcntl.flock(self._stream, fcntl.LOCK_UN)
@@ -186,50 +198,41 @@ class McapFile:
             self._start, self._window = start, os.pread(self._stream.fileno(), _WINDOW, start)
         return self._window[start - self._start:stop - self._start]
 
-    def pieces(self) -> Iterator[tuple[int, int, int]]:
-        """Yield (opcode, start, stop) of each record up to the footer, at the bytes [start, stop) of the file.
+    def mapped(self) -> mmap.mmap:
+        """Return the bytes of the file, as a context."""
+        return mmap.mmap(self._stream.fileno(), 0, access=mmap.ACCESS_READ)
 
-        Neighbouring messages outside chunks come as one piece. Raises EOFError with place and reason if the file ends
-        early.
-        """
-        messages = None
-        try:
-            for opcode, start, stop in self._frames():
-                if opcode == Opcode.MESSAGE and messages and stop - messages[0] <= _WINDOW:
-                    messages = messages[0], stop
-                    continue
-                if messages:
-                    yield Opcode.MESSAGE, *messages
-                messages = (start, stop) if opcode == Opcode.MESSAGE else None
-                if not messages:
-                    yield opcode, start, stop
-        except EOFError:
-            if messages:
-                yield Opcode.MESSAGE, *messages
-            raise
+    def frame(self, at: int) -> tuple[int, int]:
+        """Return (opcode, stop) of the record at a byte of the file. Raises EOFError if the file ends early there."""
+        if at + 9 > self.size:
+            raise EOFError(f'the file ends at byte {self.size} without a summary (recorder killed, or disk full)')
+        opcode, length = _RECORD.unpack(self.read(at, at + 9))
+        if not opcode:
+            raise EOFError(f'broken record at byte {at}: no record')
+        stop = at + 9 + length
+        if stop > self.size:
+            raise EOFError(f'the file ends at byte {self.size} inside a record that ends at byte {stop}')
+        return opcode, stop
 
-    def _frames(self) -> Iterator[tuple[int, int, int]]:
-        """Yield (opcode, start, stop) of each record up to the footer. Raises EOFError if the file ends early."""
-        at, opcode = len(MAGIC), None
-        while opcode != Opcode.FOOTER:
-            if at + 9 > self.size:
-                raise EOFError(f'the file ends at byte {self.size} without a summary (recorder killed, or disk full)')
-            opcode, length = _RECORD.unpack(self.read(at, at + 9))
-            if not opcode:
-                raise EOFError(f'broken record at byte {at}: no record')
-            stop = at + 9 + length
-            if stop > self.size:
-                raise EOFError(f'the file ends at byte {self.size} inside a record that ends at byte {stop}')
-            yield opcode, at, stop
-            at = stop
-        if self.read(at, at + len(MAGIC) + 1) != MAGIC:
-            raise EOFError(f'the file does not end with its footer at byte {at}')
+    def messages_end(self, start: int, stop: int) -> int:
+        """Return the end of the neighbouring messages of which the first is at [start, stop) of the file."""
+        with contextlib.suppress(EOFError):
+            opcode, after = self.frame(stop)
+            while opcode == Opcode.MESSAGE and after - start <= _WINDOW:
+                stop = after
+                opcode, after = self.frame(stop)
+        return stop
+
+    def content(self, opcode: int, start: int, stop: int) -> Content:
+        """Return the content of the record at [start, stop) of the file; None for a kind not read here."""
+        if opcode == Opcode.CHUNK:
+            return self.chunk(start, stop)
+        return self.read(start, stop) if opcode == Opcode.MESSAGE else parsed(opcode, self.read(start + 9, stop))
 
     def chunk(self, start: int, stop: int, again: bool = False) -> bytes:
-        """Return the records in the chunk at [start, stop) of the file as bytes, decompressed.
+        """Return the unpacked records in the chunk at [start, stop). Raises ValueError.
 
-        again: True if the chunk was unpacked before, and so does not count again for UNPACKED_LIMITS. Raises
-        ValueError if unpacking fails, or if the chunks of the file unpack to more than UNPACKED_LIMITS.
+        again: True if the chunk was unpacked before, and so does not count again for UNPACKED_LIMITS.
         """
         if stop - start > 2 * MAX_CHUNK_BYTES:
             raise ValueError(f'a chunk of {stop - start} bytes, must be at most {MAX_CHUNK_BYTES}')
@@ -249,3 +252,81 @@ class McapFile:
         self._messages += messages
         if self._messages > MESSAGE_LIMITS[0] + MESSAGE_LIMITS[1] * self.size:
             raise ValueError(f'more than {self._messages - messages} messages in {self.size} bytes')
+
+
+def walk(file: McapFile, kinds: Container[int], on_damage: Callable[[int, int, str], None] | None = None
+         ) -> Iterator[tuple[int, int, int, Content]]:
+    """Yield (opcode, start, stop, content) of each record of a file, which is at its bytes [start, stop).
+
+    kinds: opcodes of the records whose content is read; the content of all others is None.
+    on_damage: function(start, stop, reason) that takes unusable bytes. Without it they raise EOFError with place and
+    reason.
+
+    Without on_damage the walk ends at the footer, and neighbouring messages outside chunks come as one record. With
+    on_damage it ends at the first of END_OPCODES.
+    """
+    if on_damage:
+        with file.mapped() as data:
+            yield from _walk_damaged(file, data, kinds, on_damage)
+        return
+    at, opcode = len(MAGIC), None
+    while opcode != Opcode.FOOTER:
+        start, (opcode, at) = at, file.frame(at)
+        if opcode == Opcode.MESSAGE:
+            at = file.messages_end(start, at)
+        try:
+            content = file.content(opcode, start, at) if opcode in kinds else None
+        except Exception as error:  # a decoder may raise anything on broken bytes
+            raise EOFError(f'broken record at byte {start}: {error}') from None
+        yield opcode, start, at, content
+    if file.read(at, at + len(MAGIC) + 1) != MAGIC:
+        raise EOFError(f'the file does not end with its footer at byte {at}')
+
+
+def _walk_damaged(file: McapFile, data: Data, kinds: Container[int], on_damage: Callable[[int, int, str], None]
+                  ) -> Iterator[tuple[int, int, int, Content]]:
+    """Yield the records of a damaged file as `walk` does; data: its bytes.
+
+    After a broken record whose stated length leads to the begin of another record, the walk continues there. Otherwise
+    it continues at the next intact chunk after the last good record.
+    """
+    start = last_good_end = len(MAGIC)
+    while start < len(data):
+        stop = None
+        try:
+            opcode, stop = frame(data, start)
+            content = file.content(opcode, start, stop) if opcode in kinds else None
+        except Exception as error:  # a decoder may raise anything on broken bytes
+            if stop is None or not _record_begins(data, stop):
+                stop = _next_chunk(file, data, last_good_end)
+            if stop > start:
+                on_damage(start, stop, str(error) or type(error).__name__)
+        else:
+            yield opcode, start, stop, content
+            if opcode in END_OPCODES:
+                return
+            if content is not None:
+                last_good_end = stop
+        start = stop
+
+
+def _record_begins(data: Data, position: int) -> bool:
+    try:
+        return bool(frame(data, position))
+    except ValueError:
+        return False
+
+
+def _next_chunk(file: McapFile, data: Data, start: int) -> int:
+    """Return the position of the first chunk with a correct checksum from `start` on; the end of data without one."""
+    for name in _COMPRESSION.finditer(data, start):
+        at = name.start() - _BEFORE_COMPRESSION
+        try:
+            if at >= start and data[at] == Opcode.CHUNK:
+                _, stop = frame(data, at)
+                if name.end() + 8 + _LENGTH.unpack_from(data, name.end())[0] == stop:
+                    file.chunk(at, stop)
+                    return at
+        except Exception:  # a decoder may raise anything on bytes that are no chunk
+            continue
+    return len(data)

@@ -1,28 +1,22 @@
-"""Check of recorded messages. A readable message holds the CDR bytes of the type of its topic, with a valid stamp.
+"""Check of recorded messages: a readable message holds the CDR bytes of the type of its topic, with a valid stamp.
 
-CDR is the byte format of ROS 2 messages. The recorder and the reader of bags use this check: an unreadable message on
-a topic of the graph is foreign, because another program published it.
-
-To deserialize each message would be slow. Most messages of a topic differ in their numbers only. Therefore numpy
-compares the bytes outside the numbers (the shape) with those of a message known as readable. Only a message of a new
-shape is deserialized.
+An unreadable message on a topic of the graph is foreign, because another program published it. Because deserialising
+each message would be slow, numpy compares the bytes outside its numbers (the shape) with those of a message known as
+readable. Only a message of a new shape is deserialised.
 """
-from typing import TypeAlias
-
 import numpy as np
 
 from pedestal_common.graph import layouts, nodes, topics
 from pedestal_common.quantities import Bools, Bytes, Ints
 from pedestal_common.wire import cdr, messages
+from pedestal_recording.columns import Shape
 
 MAX_SHAPED_BYTES = 4000  # largest size of a message whose bytes are compared [bytes]; a larger message is deserialized
 MAX_SHAPES = 20  # largest number of readable messages of one length with which others are compared
 
-_Shape: TypeAlias = tuple[Ints, Bytes]  # places of the bytes of a message outside its numbers, and these bytes
-
 
 class Readable:
-    """Check of the messages of one topic, whose ROS type is type_name.
+    """Check of the messages of one topic.
 
     ours: True in a recording of this graph. There a message of a topic of every step must also hold at least one of
     the columns of its topic, such as `azimuth.position`.
@@ -31,7 +25,7 @@ class Readable:
     def __init__(self, topic: str, type_name: str, ours: bool) -> None:
         row = topics.TOPIC_BY_NAME.get(nodes.plain(topic))
         self._type = type_name
-        self._shapes: dict[int, list[_Shape]] = {}     # by the length of the messages
+        self._shapes: dict[int, list[Shape]] = {}     # by the length of the messages
         self._columns: frozenset[str] = frozenset()
         if ours and row is not None and row.type == type_name and row.rate == 'step':
             self._columns = frozenset(column.name for column in layouts.columns(row.name))
@@ -52,28 +46,20 @@ class Readable:
         return readable
 
     @staticmethod
-    def _alike(content: Bytes, start: Ints, rows: Ints, shape: _Shape | None, readable: Bools) -> Ints:
-        """Set the mask `readable` at the rows whose messages have a shape. Return the remaining rows.
-
-        start: begin of each message in content; rows: places in start, of messages of one length.
-        """
+    def _alike(content: Bytes, start: Ints, rows: Ints, shape: Shape | None, readable: Bools) -> Ints:
+        """Set the mask `readable` at the rows whose messages have a shape. Return the remaining rows."""
         if shape is None or not rows.size:
             return rows
-        places, wanted = shape
-        same = (content[start[rows, np.newaxis] + places] == wanted).all(axis=1)
+        same = shape.equals(content[start[rows, np.newaxis] + shape.places])
         readable[rows[same]] = True
         return rows[~same]
 
-    def _added(self, message: bytes) -> _Shape | None:
-        """Note the shape of a readable message, and return it.
-
-        Return None if no message is compared with it: see MAX_SHAPED_BYTES and MAX_SHAPES.
-        """
+    def _added(self, message: bytes) -> Shape | None:
+        """Note the shape of a readable message, and return it; None beyond MAX_SHAPED_BYTES and MAX_SHAPES."""
         shapes = self._shapes.setdefault(len(message), [])
         if len(message) > MAX_SHAPED_BYTES or len(shapes) >= MAX_SHAPES or self._type not in layouts.LAYOUTS:
             return None
-        places = np.concatenate([np.arange(start, stop) for start, stop in cdr.Places(message, self._type).fixed])
-        shapes.append((places, np.frombuffer(message, np.uint8)[places]))
+        shapes.append(Shape(message, cdr.Places(message, self._type).fixed))
         return shapes[-1]
 
     def problem(self, message: bytes) -> str:

@@ -63,10 +63,7 @@ _Counter: TypeAlias = Callable[[bytes, MessageInfo], bool]
 
 
 class TopicPublishers:
-    """Publishers of one topic in realtime: the graph's publisher, and foreign publishers if there are any.
-
-    A PublisherGate distinguishes them, as in the other nodes of the graph.
-    """
+    """Publishers of one topic in realtime: a PublisherGate distinguishes the graph's publisher from foreign ones."""
 
     def __init__(self, node: 'RecorderNode', link: nodes.Link) -> None:
         self._node, self._link = node, link
@@ -81,7 +78,7 @@ class TopicPublishers:
         return self._gate.streams.several(now)
 
     def take(self, data: bytes, info: MessageInfo) -> bool:
-        """Return True for a message of the graph, False for a message of a foreign publisher; data: CDR bytes.
+        """Return True for a message of the graph, False for a message of a foreign publisher.
 
         A message is foreign if the gate rejects it as a message of another publisher, and two more conditions hold.
         The graph's publisher is distinguished from the others, and has sent within CONFIRMED_TAKEOVER_NS. ROS names a
@@ -98,7 +95,6 @@ class TopicPublishers:
                     and self._named(now))
 
     def _count(self) -> int | None:
-        """Return the number of foreign publishers that ROS names, None where it is unknown."""
         names = subscriptions.foreign_publishers(self._node, self._link, self._link.name)
         return None if names is None else len(names)
 
@@ -157,10 +153,7 @@ class RecorderNode(shell.Shell):
             self.every(1.0, lambda: self._write(self._bag.flush))
 
     def _record(self, index: int, topic: nodes.Link) -> None:
-        """Subscribe to a topic, by its index.
-
-        The queue of the subscription keeps all messages in lockstep, and those of several seconds in realtime.
-        """
+        """Subscribe to a topic. The queue keeps all messages in lockstep, and those of several seconds in realtime."""
         take = self._receiver(index, topic)
         if self.graph.lockstep:
             profile = middleware.qos(topic.rate)
@@ -172,7 +165,6 @@ class RecorderNode(shell.Shell):
             subscriptions.subscribe(self, topic, topic.name, take, 'recorded')
 
     def _record_last(self) -> None:
-        """Subscribe to LAST_OPENED_TOPIC, once the executor runs."""
         self._opening.cancel()
         for index, topic in self._last:
             self._record(index, topic)
@@ -196,10 +188,10 @@ class RecorderNode(shell.Shell):
         return take
 
     def _lockstep_counter(self, index: int, topic: nodes.Link) -> _Counter:
-        """Return the function count(data, info) that checks the sequence numbers of a topic in lockstep.
+        """Return the function that checks the sequence numbers of a topic in lockstep, False for a foreign message.
 
         The numbers of the graph's publisher rise by 1, and begin at 1 on a topic of every step. A gap counts as lost
-        messages and ends the run. The function returns False for a foreign message (subscriptions.LockstepSubscriber).
+        messages and ends the run.
         """
         numbers = subscriptions.SoleNumbers(self, topic, topic.name,
                                             first=1 if topic.rate == 'step' and self.graph.members else None)
@@ -223,10 +215,7 @@ class RecorderNode(shell.Shell):
         return count
 
     def _realtime_counter(self, index: int, topic: nodes.Link) -> _Counter:
-        """Return the function count(data, info) that counts the missing messages of a topic in realtime.
-
-        The function returns False for a message of a foreign publisher.
-        """
+        """Return the function that counts the missing messages of a topic in realtime, False for a foreign message."""
         publishers = self._heard[topic.name] = TopicPublishers(self, topic)
 
         def count(data: bytes, info: MessageInfo) -> bool:
@@ -239,7 +228,6 @@ class RecorderNode(shell.Shell):
         return count
 
     def _losses(self) -> str:
-        """Return a text on the lost messages of each topic."""
         return 'lost ' + ', '.join(f'{count} of {name}' for name, count in self._lost.items())
 
     def _fail(self, reason: str) -> None:
@@ -251,7 +239,6 @@ class RecorderNode(shell.Shell):
         self.finished = True
 
     def _stamp_in(self, data: bytes) -> Nanoseconds | None:
-        """Return the stamp in the bytes of a message, None without a valid stamp."""
         try:
             return messages.stamp_of(data)
         except ValueError:
@@ -267,7 +254,7 @@ class RecorderNode(shell.Shell):
             return ''
 
     def _into_step(self, index: int, topic: nodes.Link) -> Take:
-        """Return the function put(data, info) that passes a message of a topic to the StepOrder in lockstep."""
+        """Return the function that passes a message of a topic to the StepOrder in lockstep."""
         order, stamp_in, slot = self._order, self._stamp_in, self._order.slot(topic.name)
 
         def put(data: bytes, _: object) -> Nanoseconds | None:
@@ -314,7 +301,7 @@ class RecorderNode(shell.Shell):
         return self._stamp
 
     def _on_arrival(self, index: int, topic: nodes.Link) -> Take:
-        """Return the function put(data, info) that writes a message of a topic at its arrival in realtime."""
+        """Return the function that writes a message of a topic at its arrival in realtime."""
         write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
         clock = PublisherGate(lambda data: (messages.stamp_of(data),) * 2, round(self.graph.future * NS_PER_SECOND))
 
@@ -348,14 +335,12 @@ class RecorderNode(shell.Shell):
             self.finished = True
 
     def _write(self, write: Callable[[], None]) -> None:
-        """Call a function that writes to the disk, and end the node if it raises BagError."""
         try:
             write()
         except BagError as error:
             self._fail(str(error))
 
     def _diagnosis(self) -> Diagnosis:
-        """Return the Diagnosis of the recorder: level, message, and counts."""
         level, message = LEVEL_OK, 'recording'
         if self._without_stamp or self._order.unplaced:
             level, message = LEVEL_WARN, 'recording; some messages have no valid stamp or no place in a step'

@@ -4,6 +4,7 @@ questions that they ask of it.
     bag.Bag                             the files of a recording; it has more, which recover, verify and replay need
     memory_recording.MemoryRecording    a run of the closed loop, without files
     what_if.Overlay                     another recording, in which some outputs are replaced
+    Decoded                             another recording, whose topics are decoded once
 """
 import contextlib
 import math
@@ -83,6 +84,39 @@ class Recording(Protocol):
         """Return {key: value} of the last diagnostics of a node, {} without any."""
 
 
+class Decoded:
+    """A Recording that decodes each topic of another recording at most once, because parts of a run share topics."""
+
+    def __init__(self, bag: Recording) -> None:
+        self.path, self.beam, self.beams, self.start = bag.path, bag.beam, bag.beams, bag.start
+        self.metadata, self.topics, self.rows, self.last_values = bag.metadata, bag.topics, bag.rows, bag.last_values
+        self._bag = bag
+        self._tables: dict[str, Table] = {}
+        self._messages: dict[str, list[tuple[str, Nanoseconds, Nanoseconds, Message]]] = {}
+
+    @property
+    def end(self) -> Seconds:
+        """Time of the last message."""
+        return self._bag.end
+
+    @property
+    def configuration(self) -> Mapping[str, Json]:
+        """'parameters' are {node: {dotted name: value}}, {} if unknown."""
+        return self._bag.configuration
+
+    def table(self, topic: str) -> Table:
+        """Return the columns of a topic, which are not to be changed."""
+        if topic not in self._tables:
+            self._tables[topic] = self._bag.table(topic)
+        return self._tables[topic]
+
+    def messages(self, topic: str) -> Iterator[tuple[str, Nanoseconds, Nanoseconds, Message]]:
+        """Yield (topic, log time, publish time, message) of the messages of a topic."""
+        if topic not in self._messages:
+            self._messages[topic] = list(self._bag.messages(topic))
+        yield from self._messages[topic]
+
+
 def parameters(bag: Recording, node: str) -> dict[str, Json]:
     """Return {dotted name: value} of the recorded parameters of a node, {} if unknown."""
     return bag.configuration['parameters'].get(node, {})
@@ -126,8 +160,8 @@ def at(bag: Recording, t: Times, topic: str, columns: Sequence[str]) -> Floats:
 def of_equipment(bag: Recording, t: Times, topic: str, columns: Sequence[str]) -> Floats:
     """Return m columns of a topic of the receiver or of the INS, by their names, at n stamps, as (n, m).
 
-    Simulated equipment stamps its messages with the steps; the result is that of `at`. Real equipment has stamps
-    or an interval of its own; the result is then that of its newest message, NaN where this message is too old.
+    Simulated equipment stamps its messages with the steps; the result is that of `at`. Real equipment has stamps or an
+    interval of its own; the result is then that of its newest message, NaN where this message is too old.
     """
     stamps = bag.table(topic)['t'] if topic in bag.topics else np.zeros(0)
     if not len(stamps) or t.size < 2:
@@ -155,7 +189,7 @@ def diagnostics(bag: Recording) -> Iterator[tuple[Seconds, Message]]:
 
 
 def modes(bag: Recording, t: Times) -> Texts:
-    """Return the mode of the ACU at every stamp t, '' where the recording does not state it.
+    """Return the mode of the ACU at every stamp, '' where the recording does not state it.
 
     acu/mode states each change. In a recording that begins during a run, the first diagnostics of the ACU state the
     mode before the first change.
@@ -169,7 +203,6 @@ def modes(bag: Recording, t: Times) -> Texts:
 
 
 def _first_mode(bag: Recording, change: Seconds) -> str:
-    """Return the mode in the first diagnostics of the ACU before the first change; '' without them."""
     for t, status in diagnostics(bag):
         if status.name == f'{bag.beam}acu' and t < change:
             return next((value.value for value in status.values if value.key == 'mode'), '')

@@ -1,15 +1,11 @@
-"""`pedestal recover`: write the readable messages of a damaged bag to a new bag.
+"""`pedestal recover`: write the readable messages of a damaged bag to a new bag of one file.
 
-The recorder of the bag was killed, its disk was full, or its file was cut or corrupted. Each file is read through
-mmap, chunk after chunk; a chunk is a compressed group of messages with a checksum. The messages of each chunk with a
-correct checksum are written to the new bag. Memory is needed for one chunk and the index, not for the whole recording.
-A bag of several files becomes a bag of one file.
+The recorder of the bag was killed, its disk was full, or its file was cut or corrupted. The messages of each chunk
+with a correct checksum are written. Memory is needed for one chunk and the index, not for the whole recording.
 """
 import collections
 import dataclasses
-import mmap
 import pathlib
-import re
 import shutil
 import struct
 import zlib
@@ -22,33 +18,22 @@ from pedestal_common.graph import nodes, topics
 from pedestal_common.quantities import Nanoseconds
 from pedestal_recording import bag as bags
 from pedestal_recording.mcap_file import (
+    END_OPCODES,
     MAGIC,
     MESSAGE_HEAD,
     ZSTD_MAGIC,
     BagError,
-    Data,
+    Content,
     McapFile,
-    frame,
     frames,
     parsed,
     reason,
-    unpacked,
+    walk,
 )
 from pedestal_recording.writer import BagFile
 
 _COPIED_OPCODES = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.CHUNK)
 """Kinds of records that are copied to the new bag."""
-_END_OPCODES = (Opcode.DATA_END, Opcode.FOOTER)  # kinds of records that end the messages of a file
-_COMPRESSION = re.compile(rb'\x04\x00\x00\x00zstd|\x03\x00\x00\x00lz4')
-"""Length and name of the compression in a chunk record. The search for intact chunks looks for these bytes."""
-_BEFORE_COMPRESSION = 9 + 8 + 8 + 8 + 4
-"""Length of a chunk record before the name of its compression [bytes].
-
-It consists of opcode and length, first and last log time, unpacked size, checksum, and length of the name.
-"""
-
-_UNUSABLE = 0  # value in place of an opcode, for bytes that are no readable record
-_LENGTH = struct.Struct('<Q')  # length of the compressed data in a chunk record [bytes]
 _FOOTER = 9 + 20 + len(MAGIC)  # length of the footer record and the last bytes of a whole file [bytes]
 
 
@@ -109,9 +94,8 @@ class Recovered:
 
 
 def recover(path: str | pathlib.Path, output: str | pathlib.Path | None = None) -> Recovered:
-    """Write the readable messages of the bag at a path to a new bag. The old bag stays unchanged.
+    """Write the readable messages of the bag at a path to a new bag, by default beside it and named '-recovered'.
 
-    output: directory of the new bag, by default beside the old bag, with '-recovered' after its name.
     Raises BagError if nothing is readable, if the old bag is being written, or if the new bag cannot be written. After
     an error, no part of the new bag remains.
     """
@@ -123,8 +107,7 @@ def recover(path: str | pathlib.Path, output: str | pathlib.Path | None = None) 
     try:
         salvage = _Salvage(bag, len(files) > 1)
         for file in files:
-            with open(file.path, 'rb') as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                salvage.add_file(file, data)
+            salvage.add_file(file)
         if not bag.messages:
             raise BagError(f'{files[0].path}: no message in it is readable')
         bag.flush()
@@ -140,90 +123,26 @@ def recover(path: str | pathlib.Path, output: str | pathlib.Path | None = None) 
     return recovered
 
 
-def _record_begins(data: Data, position: int) -> bool:
-    """Return True if a record with a possible length begins at a position."""
-    try:
-        return bool(frame(data, position))
-    except ValueError:
-        return False
-
-
-def _read(file: McapFile, opcode: int, data: Data, start: int, stop: int) -> records.McapRecord | bytes | None:
-    """Return the record at [start, stop) of data, for a chunk its unpacked bytes.
-
-    Return None for a kind of record that is not copied.
-    """
-    if opcode not in _COPIED_OPCODES:
-        return None
-    record = parsed(opcode, data[start + 9:stop])
-    if not isinstance(record, records.Chunk):
-        return record
-    file.spend(record)
-    return unpacked(record)
-
-
-def _next_chunk(file: McapFile, data: Data, start: int) -> int:
-    """Return the position of the first chunk with a correct checksum from `start` on; the end of data without one."""
-    for name in _COMPRESSION.finditer(data, start):
-        at = name.start() - _BEFORE_COMPRESSION
-        try:
-            if at >= start and data[at] == Opcode.CHUNK:
-                opcode, stop = frame(data, at)
-                if name.end() + 8 + _LENGTH.unpack_from(data, name.end())[0] == stop:
-                    _read(file, opcode, data, at, stop)
-                    return at
-        except Exception:  # a decoder may raise anything on bytes that are no chunk
-            continue
-    return len(data)
-
-
-def _pieces(file: McapFile, data: Data) -> Iterator[tuple[int, int, int, records.McapRecord | bytes | str | None]]:
-    """Yield (opcode, start, stop, record) of each record before the summary of a file; data: its bytes.
-
-    Unusable bytes give (_UNUSABLE, start, stop, reason) instead. After a broken record whose stated length leads to
-    the begin of another record, the reading continues there. Otherwise it continues at the next intact chunk after
-    the last good record.
-    """
-    start = last_good_end = len(MAGIC)
-    while start < len(data):
-        stop = None
-        try:
-            opcode, stop = frame(data, start)
-            record = _read(file, opcode, data, start, stop)
-        except Exception as error:  # a decoder may raise anything on broken bytes
-            if stop is None or not _record_begins(data, stop):
-                stop = _next_chunk(file, data, last_good_end)
-            if stop > start:
-                yield _UNUSABLE, start, stop, str(error) or type(error).__name__
-        else:
-            yield opcode, start, stop, record
-            if opcode in _END_OPCODES:
-                return
-            if record is not None:
-                last_good_end = stop
-        start = stop
-
-
-def _summary(data: Data) -> Iterator[records.McapRecord | None]:
+def _summary(file: McapFile) -> Iterator[records.McapRecord | None]:
     """Yield the schemas and channels that the summary at the end of a file repeats; none in a file without a summary.
 
     This avoids the loss of messages whose schema and channel stand in a broken chunk.
     """
-    footer = len(data) - _FOOTER
-    if footer < len(MAGIC) or data[footer] != Opcode.FOOTER or data[-len(MAGIC):] != MAGIC:
-        return
-    at, _, crc = struct.unpack_from('<QQI', data, footer + 9)
-    if not at or at > footer or crc and zlib.crc32(data[at:footer + 25]) != crc:
-        return
-    for opcode, start, stop in frames(data, at, footer):
-        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            yield parsed(opcode, data[start + 9:stop])
+    with file.mapped() as data:
+        footer = len(data) - _FOOTER
+        if footer < len(MAGIC) or data[footer] != Opcode.FOOTER or data[-len(MAGIC):] != MAGIC:
+            return
+        at, _, crc = struct.unpack_from('<QQI', data, footer + 9)
+        if not at or at > footer or crc and zlib.crc32(data[at:footer + 25]) != crc:
+            return
+        for opcode, start, stop in frames(data, at, footer):
+            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                yield parsed(opcode, data[start + 9:stop])
 
 
 class _Salvage:
     """Writer of the messages of damaged files to a new BagFile, and counter of the unusable bytes.
 
-    "File" means a file of the damaged bag, and "bag" the new bag.
     several: True if the damaged bag has several files, so a gap must name its file.
     """
     _file: McapFile
@@ -249,47 +168,38 @@ class _Salvage:
         self._gaps: list[Gap] = []
         self._ended = False     # True if the last file comes to its regular end
 
-    def add_file(self, file: McapFile, data: Data) -> None:
-        """Add all readable messages of a file to the bag; data: its bytes."""
+    def add_file(self, file: McapFile) -> None:
         self._file = file
         self._schemas, self._channels, self._before, self._offsets = {}, {}, dict(self._sequence), {}
         try:
-            for declared in _summary(data):
+            for declared in _summary(file):
                 self._declare(declared)
         except BagError:
             raise
         except Exception:  # a decoder may raise anything on broken bytes; the file itself declares all again
             pass
-        for opcode, start, stop, record in _pieces(file, data):
+        for opcode, start, stop, content in walk(file, _COPIED_OPCODES, self._skip):
             try:
-                self._take(opcode, record, data[start:stop] if opcode == Opcode.MESSAGE else b'')
+                self._take(opcode, file.read(start, stop) if opcode == Opcode.MESSAGE else content)
+                self._ended = opcode in END_OPCODES
             except BagError:
                 raise
             except (ValueError, struct.error) as error:
                 self._skip(start, stop, str(error))
 
-    def _take(self, opcode: int, record: records.McapRecord | bytes | str | None, message: bytes) -> None:
-        """Add a record of _pieces to the bag. Raises ValueError for unusable bytes.
-
-        message: bytes of a message record outside chunks, b'' for any other record.
-        """
-        if opcode == _UNUSABLE:
-            raise ValueError(record)
-        if opcode == Opcode.MESSAGE:
-            self._add_messages(message)
-        elif isinstance(record, bytes):     # of a chunk
-            self._add_messages(record)
-        elif isinstance(record, records.Schema | records.Channel):
-            self._declare(record)
-        elif isinstance(record, records.Metadata) and record.name != 'recovered' and record.name not in self._metadata:
-            self._metadata[record.name] = record.metadata
-            self._bag.add_metadata(record.name, record.metadata)
+    def _take(self, opcode: int, content: Content) -> None:
+        """Add a record of the file to the bag. Raises ValueError for unusable bytes."""
+        if isinstance(content, bytes):     # of a chunk or of a message
+            self._add_messages(content)
+        elif isinstance(content, records.Metadata) and content.name not in ('recovered', *self._metadata):
+            self._metadata[content.name] = content.metadata
+            self._bag.add_metadata(content.name, content.metadata)
         elif opcode == Opcode.ATTACHMENT:
             raise ValueError('an attachment')
-        self._ended = opcode in _END_OPCODES
+        else:
+            self._declare(content)
 
-    def _declare(self, record: records.McapRecord | None) -> None:
-        """Add a new schema or channel to the bag; other records are left out."""
+    def _declare(self, record: Content) -> None:
         if isinstance(record, records.Schema):
             if record.id not in self._schemas:
                 self._schemas[record.id] = self._once(self._bag.add_schema, record.name, record.encoding, record.data)
@@ -314,7 +224,7 @@ class _Salvage:
         return self._declared[key]
 
     def _skip(self, start: int, stop: int, problem: str) -> None:
-        """Note the unusable bytes [start, stop) as a new Gap, or as a part of the Gap that ends at `start`."""
+        """Note the unusable bytes as a new Gap, or as a part of the Gap that ends at `start`."""
         file = self._file.path.name if self._several else ''
         if self._gaps and self._gaps[-1].stop == start and self._gaps[-1].file == file:
             self._gaps[-1].stop = stop
@@ -327,24 +237,23 @@ class _Salvage:
 
         Raises ValueError, and adds none of the messages, if a message has no known channel or an invalid head.
         """
-        logs = []
+        found = []
         for opcode, at, stop in frames(raw):
             if opcode == Opcode.MESSAGE:
-                _, channel, _, log, _ = MESSAGE_HEAD.unpack_from(raw, at)
+                _, channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(raw, at)
                 if channel not in self._channels:
                     raise ValueError(f'channel {channel} is not declared')
                 if stop < at + MESSAGE_HEAD.size or log >= 2**63:
                     raise ValueError('a message with an invalid head')
-                logs.append(log)
+                found.append((channel, sequence, log, publish, at + MESSAGE_HEAD.size, stop))
             else:
                 self._declare(parsed(opcode, raw[at + 9:stop]))
-        if not logs:
+        if not found:
             return
-        self._file.count(len(logs))
-        for opcode, at, stop in frames(raw):
-            if opcode == Opcode.MESSAGE:
-                _, channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(raw, at)
-                self._add(self._channels[channel], sequence, log, publish, raw[at + MESSAGE_HEAD.size:stop])
+        self._file.count(len(found))
+        for channel, sequence, log, publish, start, stop in found:
+            self._add(self._channels[channel], sequence, log, publish, raw[start:stop])
+        logs = [log for _, _, log, *_ in found]
         first, last = min(logs), max(logs)
         for gap in self._gaps:
             gap.after = first if gap.after is None else gap.after
@@ -352,7 +261,7 @@ class _Salvage:
         self._last = last if self._last is None else max(self._last, last)
 
     def _add(self, channel: int, sequence: int, log: Nanoseconds, publish: Nanoseconds, data: bytes) -> None:
-        """Add a message to a channel of the bag. data: CDR bytes.
+        """Add a message to a channel of the bag.
 
         The recorder numbers the messages of each topic from 1 in each file. The sequence number of the first message
         after a gap therefore gives the number of lost messages. A tool that splits a recording continues the numbers

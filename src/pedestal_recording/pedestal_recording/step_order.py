@@ -1,7 +1,6 @@
 """Order of the messages in a lockstep recording: step after step, and within a step as in the table of topics.
 
-The recorder node passes each message to a StepOrder, which writes them in this order. The order of arrival depends on
-the load of the machine, the order of steps does not. So equal runs give equal files.
+The order of arrival depends on the load of the machine, the order of steps does not. So equal runs give equal files.
 """
 import heapq
 from collections.abc import Callable, Collection, Sequence
@@ -16,10 +15,7 @@ MAX_WAITING_STEPS = 10_000  # largest number of steps whose messages wait becaus
 
 
 class OrderError(ValueError):
-    """Error of more than MAX_WAITING_STEPS steps that wait for an incomplete step.
-
-    Its text is one line with the stamp of the incomplete step and its missing messages.
-    """
+    """Error of more than MAX_WAITING_STEPS steps that wait for an incomplete step."""
 
 
 _Bucket: TypeAlias = list[Any]  # of one step: item 0 a number, the others CDR bytes or None, see StepOrder
@@ -28,10 +24,8 @@ _Bucket: TypeAlias = list[Any]  # of one step: item 0 a number, the others CDR b
 class StepOrder:
     """Collector of the messages of each step. A step is written when it is complete and all earlier steps are written.
 
-    topics   recorded topics
-    nodes    names of the nodes in the graph
-    write    function write(index of the topic, log time, publish time, CDR bytes). Its calls are in the order of
-             steps, with the stamp of the step as both times.
+    `write` is called in the order of steps as write(index of the topic, log time, publish time, CDR bytes), with the
+    stamp of the step as both times.
 
     A step is complete with one message of every topic of the rate `step`. At every whole second it also needs the
     diagnostics of every node of the graph. The first step also needs the topics of the rate `once`. An unplaced
@@ -79,7 +73,7 @@ class StepOrder:
         return self._slot_of.get((name, node))
 
     def take(self, slot: int, stamp: Nanoseconds, data: bytes) -> None:
-        """Take a message by its slot, its stamp and its CDR bytes. Raises OrderError if too many steps wait."""
+        """Take the CDR bytes of a message by its slot and stamp. Raises OrderError if too many steps wait."""
         bucket = self._buckets.get(stamp)
         if bucket is None:
             if stamp <= self.written:
@@ -98,7 +92,7 @@ class StepOrder:
             self._advance()
 
     def take_change(self, index: int, data: bytes) -> None:
-        """Take the CDR bytes of a message of a topic of EVENT_RATES, by the index of the topic.
+        """Take a message of a topic of EVENT_RATES, by the index of the topic.
 
         The message belongs to the step after the last step that its publisher has answered. A node answers a step by
         the first of its step topics.
@@ -106,12 +100,11 @@ class StepOrder:
         self._changes[index].append((self._last_answer[self._answer_slot[index]], data))
 
     def take_unplaced(self, index: int, data: bytes) -> None:
-        """Take the CDR bytes of a message without a place in a step, by the index of its topic."""
+        """Take a message without a place in a step, by the index of its topic."""
         self.unplaced += 1
         self._unplaced.append((index, data))
 
     def _open(self, stamp: Nanoseconds) -> _Bucket:
-        """Add a bucket for the step with a stamp, and return it. Raises OrderError if too many steps wait."""
         if len(self._stamps) >= MAX_WAITING_STEPS:
             first = self._stamps[0]
             raise OrderError(f'step {first / NS_PER_SECOND:.6f} s still waits for {", ".join(self.missing(first))} '
@@ -121,7 +114,6 @@ class StepOrder:
         return bucket
 
     def _missing_slots(self, stamp: Nanoseconds) -> list[int]:
-        """Return the empty slots that keep the step with a stamp incomplete."""
         bucket = self._buckets[stamp]
         needed = self._needed['step'] if bucket[0] else []
         if self.written < 0:
@@ -136,7 +128,6 @@ class StepOrder:
         return [f'{topic.name} of {node}' if node else topic.name for _, topic, node in slots]
 
     def _advance(self) -> None:
-        """Write the earliest waiting steps as long as they are complete."""
         while self._stamps and not self._buckets[self._stamps[0]][0] and not self._missing_slots(self._stamps[0]):
             self._write_first_step()
 
@@ -156,7 +147,6 @@ class StepOrder:
         self._put_unplaced()
 
     def _put_unplaced(self) -> None:
-        """Write the messages without a place in a step, with the stamp of the last written step."""
         unplaced, self._unplaced = self._unplaced, []
         for index, data in unplaced:
             self._write(index, max(self.written, 0), max(self.written, 0), data)

@@ -1,8 +1,7 @@
 """`pedestal verify`: check that a recording is complete.
 
 Each topic of the rate `step` must have one message for each step of the drive, in order. The message counts and the
-sequence numbers must agree. The report also states whether the run came to its planned end. The recording of an
-aborted run may be complete up to its end.
+sequence numbers must agree. The recording of an aborted run may be complete up to its end.
 """
 import collections
 import dataclasses
@@ -16,6 +15,7 @@ from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.quantities import Ints, Nanoseconds, Seconds, Stamps
 from pedestal_common.text_files import plain_yaml
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_common.wire import messages
 from pedestal_recording import configuration
 from pedestal_recording.bag import Bag, Index
@@ -93,11 +93,12 @@ class Report:
 
     def lines(self) -> list[str]:
         """Return the report as lines of text: a row per topic, its gaps below it, the verdict last."""
-        width = max([len(check.name) for check in self.topics], default=5)
-        lines = [f'{"topic":{width}} {"messages":>9} {"first s":>14} {"last s":>14}']
-        for check in self.topics:
-            lines.append(f'{check.name:{width}} {check.count:9} {check.first:14.6f} {check.last:14.6f}')
-            lines += [f'  {problem}' for problem in check.problems]
+        columns = ('topic', ('messages', '>9'), ('first s', '>14.6f'), ('last s', '>14.6f'))
+        head, *rows = TextTable(columns, [(check.name, check.count, check.first, check.last)
+                                          for check in self.topics]).lines()
+        lines = [head]
+        for check, row in zip(self.topics, rows):
+            lines += [row, *(f'  {problem}' for problem in check.problems)]
         lines += [*self.problems, *self.foreign, self.made]
         if self.loss:
             lines.append(self.loss)
@@ -189,9 +190,8 @@ def steps_before(bag: Bag) -> int:
 
 
 def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut: bool) -> list[str]:
-    """Return the problems of a topic.
+    """Return the problems of a topic; stamp: since the start.
 
-    stamp: its stamps, since the start.
     cut: True if the recording begins during its run. The number of messages before its begin is then unknown.
     """
     topic, ours = bag.graph.get(name), 'pacing' in bag.metadata
@@ -224,7 +224,6 @@ def _differences(claimed: Mapping[str, int], counts: Mapping[str, int]) -> str:
 
 
 def _grid(stamps: Mapping[str, Stamps]) -> _Grid:
-    """Return the _Grid of a run from the stamps of its topics of the rate `step`."""
     if not stamps:
         return _Grid(0, 0, 0)
     steps = np.unique(next((stamp for name, stamp in stamps.items() if nodes.plain(name) == 'joint_states'),
@@ -234,7 +233,6 @@ def _grid(stamps: Mapping[str, Stamps]) -> _Grid:
 
 
 def _order(stamp: Stamps) -> list[str]:
-    """Return [text about the stamps that go back], [] if none does."""
     back = np.flatnonzero(np.diff(stamp) < 0)
     return [f'{back.size} stamps go back, the first from {stamp[back[0]] / 1e9:.6f} '
             f'to {stamp[back[0] + 1] / 1e9:.6f} s'] if back.size else []
@@ -279,10 +277,7 @@ def _steps(stamp: Stamps, of_drive: bool, grid: _Grid) -> list[str]:
 
 
 def _seconds(bag: Bag, name: str, stamp: Stamps, grid: _Grid) -> list[str]:
-    """Return texts about missing diagnostics: each node with a topic in the bag publishes them at each whole second.
-
-    name: topic of the diagnostics.
-    """
+    """Return texts about missing diagnostics, which each node in the bag publishes at each whole second."""
     first, last = -(-grid.first // NS_PER_SECOND), grid.last // NS_PER_SECOND
     count = max(last - first + (grid.at(last * NS_PER_SECOND) <= grid.last), 0)
     stamps_of: dict[str, list[Nanoseconds]] = collections.defaultdict(list)
@@ -308,10 +303,7 @@ def _seconds(bag: Bag, name: str, stamp: Stamps, grid: _Grid) -> list[str]:
 
 
 def _unrecorded_steps(of_steps: Sequence[Index], start: Nanoseconds, grid: _Grid) -> list[str]:
-    """Return texts about the gaps between two files: a recorder was killed, and another recorder was started later.
-
-    of_steps: rows of the index, for each topic of the rate `step`; start: stamp of time 0.
-    """
+    """Return texts about the gaps between two files: a recorder was killed, and another recorder was started later."""
     none = np.zeros(0, np.int64)
     number = np.concatenate([none, *(row.channel >> 16 for row in of_steps)])
     stamp = np.concatenate([none, *(row.stamp - start for row in of_steps)])
@@ -324,8 +316,8 @@ def _numbering(rows: Index, cut: bool) -> list[str]:
     """Return texts about lost messages and doubled or descending sequence numbers of a topic.
 
     The recorder counts from 1 in each file, and leaves out a number for each lost message. The number 0 marks a
-    message of a foreign publisher. cut: True in a recording of a part of its run, which begins with a higher number.
-    A tool that splits a recording continues the numbers of the file before.
+    message of a foreign publisher. A recording of a part of its run (`cut`) begins with a higher number. A tool that
+    splits a recording continues the numbers of the file before.
     """
     lost = back = 0
     file, numbers = rows.channel >> 16, rows.sequence
@@ -342,8 +334,6 @@ def _numbering(rows: Index, cut: bool) -> list[str]:
 
 
 def _metadata_file(bag: Bag, counts: Mapping[str, int]) -> list[str]:
-    """Return texts about the differences between metadata.yaml and the files. counts: messages by topic, in the files.
-    """
     file = bag.path / 'metadata.yaml'
     try:
         information = plain_yaml.read(file)['rosbag2_bagfile_information']

@@ -1,6 +1,5 @@
-"""Writing of a bag, the recording of a run: a rosbag2 directory (metadata.yaml version 9) with an MCAP file.
-
-The recorder node, `pedestal recover` and the recomputation write bags by this module. It works without ROS.
+"""Writing of a bag, the recording of a run: a rosbag2 directory (metadata.yaml version 9) with an MCAP file, without
+ROS.
 
 The Writer of the mcap library makes the records of the file. This module adds four properties:
 
@@ -35,7 +34,7 @@ from pedestal_common.quantities import Json, Nanoseconds
 from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
 from pedestal_recording.bag import locate, planned_end
-from pedestal_recording.mcap_file import MESSAGE_HEAD, BagError, McapFile, frames, parsed, reason, unpacked
+from pedestal_recording.mcap_file import MESSAGE_HEAD, BagError, McapFile, frames, reason, walk
 
 TARGET_CHUNK_BYTES = 1_000_000
 TARGET_CHUNK_SPAN_NS = 1_000_000_000
@@ -43,6 +42,8 @@ TARGET_CHUNK_MESSAGES = 100_000  # size [bytes], span of log times [ns] and numb
 
 COMMON_METADATA_KEYS = ('scenario', 'pacing', 'seed', 'planned_end_ns')
 """Keys of the metadata with equal values in all files of a bag."""
+
+_DECLARED = Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA  # kinds of records that describe the messages of a file
 
 _INFINITE = {'sec': 9223372036, 'nsec': 854775807}
 """Duration by which rosbag2 states that a quality of service has no limit."""
@@ -67,7 +68,7 @@ def _qos(rate: str) -> list[dict[str, object]]:
 class _Disk:
     """Output stream of the Writer of the mcap library. The bytes between two flushes reach the file all or not at all.
 
-    stream: the open file; size: number of bytes at its beginning that are already written, and not written again.
+    size: number of bytes at its beginning that are already written, and not written again.
     """
 
     def __init__(self, path: pathlib.Path, stream: io.FileIO, size: int = 0) -> None:
@@ -98,10 +99,7 @@ class _Disk:
 
 
 class BagFile:
-    """A bag that is being written.
-
-    directory: path of the bag; must not exist, unless the bag has earlier files. earlier: MCAP files of the bag before
-    this file.
+    """A bag that is being written; the directory must not exist, unless the bag has earlier files.
 
     Raises BagError with the name of the file if the disk is full. The earlier chunks then stay readable. All later
     messages are dropped, so a bag has no gap.
@@ -126,7 +124,6 @@ class BagFile:
         self._start(_Disk(self.file, stream))
 
     def _start(self, disk: _Disk) -> None:
-        """Begin a new file by a new Writer of the mcap library on a _Disk."""
         self._disk = disk
         self._mcap = writer.Writer(cast(IO[bytes], disk), chunk_size=sys.maxsize)  # flush() alone ends a chunk
         self._mcap.start('ros2', 'pedestal')
@@ -140,10 +137,7 @@ class BagFile:
         return self._declared(records.Schema(id=number, name=name, encoding=encoding, data=data))
 
     def add_channel(self, topic: str, schema: int, metadata: dict[str, str]) -> int:
-        """Add a topic: its name with '/', the number of the schema of its type, and metadata.
-
-        Return the number of the channel. Its messages are CDR, the byte format of ROS 2.
-        """
+        """Add a topic of CDR messages: its name with '/', and the number of its schema. Return its number."""
         number = self._mcap.register_channel(topic, 'cdr', schema, metadata)
         return self._declared(records.Channel(id=number, topic=topic, message_encoding='cdr', schema_id=schema,
                                               metadata=metadata))
@@ -161,7 +155,7 @@ class BagFile:
 
     def add_message(self, channel: int, sequence: int, log_time: Nanoseconds, publish_time: Nanoseconds,
                     data: bytes) -> None:
-        """Add a message: number of its channel, its sequence number, times, CDR bytes."""
+        """Add the CDR bytes of a message."""
         if self._full:
             return
         if not self._in_chunk:
@@ -215,25 +209,23 @@ class BagFile:
         self._start(_Disk(self.file, self._disk.stream, self._disk.end))
         file = McapFile(self.file, locked=True)
         with contextlib.suppress(EOFError):
-            for opcode, start, stop in file.pieces():
-                record = parsed(opcode, file.read(start + 9, stop))
-                if isinstance(record, records.Schema):
-                    self.add_schema(record.name, record.encoding, record.data)
-                elif isinstance(record, records.Channel):
-                    self.add_channel(record.topic, record.schema_id, record.metadata)
-                elif isinstance(record, records.Metadata):
-                    self.add_metadata(record.name, record.metadata)
-                elif isinstance(record, records.Chunk):
-                    data = unpacked(record)
-                    for kind, at, end in frames(data):
+            for _, _, _, content in walk(file, (*_DECLARED, Opcode.CHUNK)):
+                if isinstance(content, records.Schema):
+                    self.add_schema(content.name, content.encoding, content.data)
+                elif isinstance(content, records.Channel):
+                    self.add_channel(content.topic, content.schema_id, content.metadata)
+                elif isinstance(content, records.Metadata):
+                    self.add_metadata(content.name, content.metadata)
+                elif isinstance(content, bytes):
+                    for kind, at, end in frames(content):
                         if kind == Opcode.MESSAGE:
-                            _, channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(data, at)
-                            self._mcap.add_message(channel, log, data[at + MESSAGE_HEAD.size:end], publish, sequence)
+                            _, channel, sequence, log, publish = MESSAGE_HEAD.unpack_from(content, at)
+                            self._mcap.add_message(channel, log, content[at + MESSAGE_HEAD.size:end], publish,
+                                                   sequence)
                     self._mcap.flush()
         self._mcap.flush()
 
     def _write_metadata_file(self) -> None:
-        """Write metadata.yaml from the content of the files."""
         contents = [_Content(file) for file in (*self._earlier, self.file)]
         files = [{'path': content.path.name, **_times([content]), 'message_count': content.total}
                  for content in contents]
@@ -269,7 +261,7 @@ class BagFile:
 class _Content:
     """Summary of an MCAP file of the recorder, which need not be whole: its recorder may have been killed.
 
-    first, last: log times of its first and last message, 0 without a message; total: number of messages.
+    first, last: log times of its first and last message, 0 without a message.
     """
 
     def __init__(self, path: pathlib.Path) -> None:
@@ -281,24 +273,19 @@ class _Content:
         times: list[Nanoseconds] = []
         file = McapFile(path, locked=True)
         with contextlib.suppress(EOFError):
-            for opcode, start, stop in file.pieces():
+            for opcode, start, _, content in walk(file, _DECLARED):
                 if opcode == Opcode.CHUNK:
                     times += _PAIR.unpack(file.read(start + 9, start + 9 + _PAIR.size))
                 elif opcode == Opcode.MESSAGE_INDEX:
                     channel, size = _INDEX.unpack(file.read(start + 9, start + 9 + _INDEX.size))
                     self._counts[channel] += size // _PAIR.size
-                elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA, Opcode.METADATA):
-                    self._declare(parsed(opcode, file.read(start + 9, stop)))
+                elif isinstance(content, records.Metadata):
+                    self.metadata[content.name] = content.metadata
+                elif isinstance(content, records.Schema):
+                    self._schemas[content.id] = content.name
+                elif isinstance(content, records.Channel):
+                    self._channels[content.id] = content
         self.first, self.last, self.total = min(times, default=0), max(times, default=0), self._counts.total()
-
-    def _declare(self, record: records.McapRecord | None) -> None:
-        """Note a record of metadata, a schema or a channel."""
-        if isinstance(record, records.Metadata):
-            self.metadata[record.name] = record.metadata
-        elif isinstance(record, records.Schema):
-            self._schemas[record.id] = record.name
-        elif isinstance(record, records.Channel):
-            self._channels[record.id] = record
 
     def topics(self) -> Iterator[tuple[records.Channel, str, int]]:
         """Yield (channel, name of its type, number of messages) of every topic."""
@@ -314,7 +301,6 @@ def _times(contents: Sequence[_Content]) -> dict[str, dict[str, Nanoseconds]]:
 
 
 def _profiles(channel: records.Channel) -> Json:
-    """Return the quality of service that a channel states (offered_qos_profiles), [] if unreadable."""
     try:
         return plain_yaml.parse(channel.metadata.get('offered_qos_profiles', ''), aliases=True) or []
     except yaml.YAMLError:
@@ -355,12 +341,8 @@ def _earlier_files(directory: str | pathlib.Path, metadata: Mapping[str, object]
 class Writer(BagFile):
     """A bag of topics of the graph that is being written. The messages of each topic are numbered from 1.
 
-    directory   path of the bag: must not exist, or must hold an unfinished bag to continue (_earlier_files)
-    rows        topics of the bag; the methods take the index of a row
-    metadata    of the run, for the metadata record `pedestal`
-    more        further metadata records by name
-
-    Raises BagError like a BagFile.
+    The directory must not exist, or must hold an unfinished bag to continue (_earlier_files). The methods take the
+    index of a topic in `rows`. metadata: of the run, for the record `pedestal`; more: further records by name.
     """
 
     def __init__(self, directory: str | pathlib.Path, rows: Sequence[nodes.Link | topics.Topic],
@@ -377,7 +359,7 @@ class Writer(BagFile):
         self.flush()
 
     def write(self, topic: int, log_time: Nanoseconds, publish_time: Nanoseconds, data: bytes) -> None:
-        """Add a message: index of its topic, log time and publish time, CDR bytes."""
+        """Add a message to a topic."""
         self._sequences[topic] = sequence = self._sequences[topic] + 1
         self.add_message(self._channels[topic], sequence & 0xffffffff, log_time, publish_time, data)
 

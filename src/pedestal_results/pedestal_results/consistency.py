@@ -3,12 +3,8 @@
 The NIS (normalised innovation squared) answers this for the innovations, and the NEES (normalised estimation error
 squared) for the errors of the estimate. Both are squared errors in units of the covariance that the filter states
 (Bar-Shalom, Li, Kirubarajan 2001, section 5.4). In a consistent filter the NIS is chi-square distributed, with one
-degree of freedom for each measured number. The NEES of angle and rate has two degrees of freedom. Larger values mean
-that the stated covariance is too small (the filter is too sure). Smaller values mean that it is too large (the filter
-is too careful).
-
-The filter estimates the target in the frame of its sensors, so the truth for the NEES is that of the module
-sensor_frame.
+degree of freedom for each measured number. The NEES of angle and rate has two. With larger values the filter is too
+sure, with smaller values too careful. The truth for the NEES is that of the module sensor_frame.
 """
 import dataclasses
 import functools
@@ -69,7 +65,7 @@ Band: TypeAlias = tuple[float, float]   # low, high: BAND_PROBABILITY of the con
 
 @dataclasses.dataclass
 class Consistency:
-    """Numbers of the target filter at the steps of a Tracking. Pairs are azimuth and elevation. NaN where missing."""
+    """Numbers of the target filter at the steps of a Tracking; azimuth and elevation, NaN where missing."""
     t: Times    # of the step
     innovation: Pairs   # measurement minus prediction, of the angle [rad]
     rate_innovation: Pairs  # the same of the rate [rad/s]
@@ -100,9 +96,8 @@ def _rates(relative: Vectors3, velocity: Vectors3, attitude: Quaternions, ship_v
     """Fill the rates [rad/s] of earth azimuth and elevation of a target seen from a ship.
 
     relative        vector from ship to target, ENU [m]
-    velocity        velocity of the target, ENU [m/s]
-    attitude        rotation deck -> earth
-    ship_velocity   velocity of the ship in its own frame, FLU [m/s]
+    velocity        of the target, ENU [m/s]
+    ship_velocity   in the frame of the ship, FLU [m/s]
     """
     for k in range(len(relative)):
         q = attitude[k]
@@ -162,7 +157,7 @@ def read(bag: Recording, run: tracking.Tracking) -> Consistency | None:
 
 
 def effective_count(values: Floats) -> float:
-    """Return the number of independent samples whose mean is as accurate as the mean of a correlated series (n,).
+    """Return the number of independent samples whose mean is as accurate as the mean of a correlated series.
 
     This number is n / (1 + 2 sum of the autocorrelations). The sum ends at the first pair of neighbours whose sum is
     not positive (Geyer 1992, initial positive sequence).
@@ -179,10 +174,7 @@ def effective_count(values: Floats) -> float:
 
 
 def bounds(freedoms: float | Floats | Ints) -> tuple[Floats, Floats]:
-    """Return (low, high), between which a chi-square value lies with BAND_PROBABILITY.
-
-    freedoms: its degrees of freedom.
-    """
+    """Return (low, high), between which a chi-square value lies with BAND_PROBABILITY."""
     # Because chdtri is slow and a long run has few different degrees of freedom, each of them is computed once.
     different, places = np.unique(freedoms, return_inverse=True)
     places = places.reshape(np.shape(freedoms))
@@ -198,9 +190,8 @@ def band(freedoms: float, count: float) -> Band:
 
 
 class Axis:
-    """Statistics of one axis i, 0 azimuth or 1 elevation, of a Consistency over the evaluated part of the run.
-
-    A value is NaN where nothing was measured.
+    """Statistics of one axis i, 0 azimuth or 1 elevation, over the evaluated part of the run; NaN without
+    measurements.
     """
     nis: float      # mean
     nis_expected: float     # expected mean NIS, the mean of its degrees of freedom
@@ -265,10 +256,7 @@ class Axis:
 
 
 def mark(mean: float, expected: float, band: Band) -> str:
-    """Return 'too sure' or 'too careful' for a mean that is outside its band and off by more than NOTABLE_DEVIATION.
-
-    Return '' otherwise. mean: mean NIS or NEES; expected: its expectation.
-    """
+    """Return the note on a mean that is outside its band and off by more than NOTABLE_DEVIATION, else ''."""
     if mean > max(band[1], (1.0 + NOTABLE_DEVIATION) * expected):
         return 'too sure'
     return 'too careful' if mean < min(band[0], (1.0 - NOTABLE_DEVIATION) * expected) else ''

@@ -1,8 +1,7 @@
 """Directions on the sky in a recording: of the beam, and the measured direction of the target.
 
-The direction of the beam follows from the encoder angles and the reports on acu/pointing. The measured direction
-follows from the beam, the receiver errors and the attitude of the deck. The report shows the measured direction beside
-the truth, and `pedestal export --format tdm` writes it.
+The direction of the beam follows from the encoder angles and the reports on acu/pointing; that of the target also from
+the receiver errors and the attitude of the deck.
 """
 import numpy as np
 
@@ -16,10 +15,7 @@ POINTING_TOPIC = 'acu/pointing'
 
 
 def reports(bag: Recording) -> list[tuple[Seconds, pointing_report.Report]]:
-    """Return [(time, report)] of a recording of one beam, [] without a pointing model.
-
-    Raises bag.BagError for a text that is no report.
-    """
+    """Return [(time, report)] of a recording of one beam, [] without a pointing model. Raises bag.BagError."""
     table = bag.table(POINTING_TOPIC) if POINTING_TOPIC in bag.topics else {}
     try:
         return [(float(t), pointing_report.read(text)) for t, text in zip(table.get('t', ()), table.get('data', ()))]
@@ -51,9 +47,7 @@ def titles(bag: Recording) -> list[str]:
 
 @compiled
 def _displaced(azimuth: Floats, elevation: Floats, errors: Pairs, quaternions: Quaternions, earth: Pairs) -> None:
-    """Fill earth with the earth angles [rad] of a target. azimuth, elevation: deck angles of the beam; the rest as in
-    `of_target`.
-    """
+    """Fill earth with the earth angles [rad] of a target; azimuth, elevation: deck angles of the beam."""
     mat_ed = np.empty((3, 3))
     for k in range(azimuth.size):
         line_of_sight.rotation(quaternions[k, 0], quaternions[k, 1], quaternions[k, 2], quaternions[k, 3], mat_ed)
@@ -64,13 +58,11 @@ def _displaced(azimuth: Floats, elevation: Floats, errors: Pairs, quaternions: Q
 
 
 def of_target(beam: Pairs, errors: Pairs, quaternions: Quaternions | None = None) -> Pairs:
-    """Return the earth angles [rad] of the target: azimuth in (-pi, pi] and elevation.
+    """Return the earth angles [rad] of the target: azimuth in (-pi, pi] and elevation; NaN where an input is NaN.
 
-    beam          azimuth and elevation of the beam on the deck [rad]
+    beam          its azimuth and elevation on the deck [rad]
     errors        receiver errors in cross-elevation and elevation [rad]
     quaternions   rotation deck -> earth, None ashore
-
-    The result is NaN where an input is NaN.
     """
     if quaternions is None:
         quaternions = np.tile(np.array(line_of_sight.ASHORE_ATTITUDE), (len(beam), 1))

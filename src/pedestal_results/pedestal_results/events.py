@@ -1,5 +1,6 @@
 """Events of a recording: modes, commands and refusals with their senders, injected faults, states of the equipment,
-alarms. A table lists them, and marks with the numbers of its rows show them on the curves (figures.mark)."""
+alarms. The numbers of their table mark them on the curves (figures.mark).
+"""
 import contextlib
 import math
 import typing
@@ -42,7 +43,6 @@ def read(bag: Recording, mode_spans: Sequence[ModeSpan]) -> list[Event]:
 
 
 def _messages(bag: Recording, topic: str, message_type: str) -> Iterator[tuple[Seconds, Message]]:
-    """Yield (time, message) of a topic, nothing if it is missing or of another type."""
     if bag.topics.get(topic) == message_type:
         for _, log, _, message in bag.messages(topic):
             yield (log - bag.start) / NS_PER_SECOND, message
@@ -66,7 +66,6 @@ def _replies(bag: Recording) -> list[Event]:
 
 
 def _reply(t: Seconds, node: str, command: commands.Command, reply: commands.Reply) -> Event:
-    """Return the Event of a command to a node and its reply."""
     if not reply.granted:
         return Event(t, 'refused', command.who, f'{node}: {command}: {reply.text}')
     if command.verb not in [fault.name for fault in INJECTED_FAULTS.get(node, ())]:
@@ -113,7 +112,6 @@ def rows(events: Sequence[Event], end: Seconds) -> list[list[str]]:
 
 
 def _duration(event: Event, end: Seconds) -> str:
-    """Return the duration of an event as text, '' for an event without one; end: as in `rows`."""
     if math.isnan(event.end):
         return ''
     return f'{event.end - event.t:.2f}' if event.end < end else 'to the end'

@@ -1,7 +1,4 @@
-"""Confidence intervals of results over independent runs, their rows in a --json file, and targets of results.
-
-The trials and the studies use this module.
-"""
+"""Rows of a --json file: results, their confidence intervals over independent runs, their targets, and their texts."""
 import math
 from collections.abc import Callable
 from typing import TypeVar
@@ -18,7 +15,7 @@ CONFIDENCE_LEVEL = 0.95  # confidence level of the interval of a mean [-]
 
 
 def interval(values: ArrayLike) -> Estimate:
-    """Return the Estimate of the mean of a result in n independent runs, from its values.
+    """Return the Estimate of the mean of a result in n independent runs.
 
         low, high = mean -+ t_(n-1) s / sqrt(n)
 
@@ -38,8 +35,8 @@ def interval(values: ArrayLike) -> Estimate:
 def pseudo_values(parts: list[_P], statistic: Callable[[list[_P]], float | Floats]) -> Floats:
     """Return values for `interval` of a statistic that is taken over all runs together, such as an rms.
 
-    parts: n about equal parts of the runs. The method is Tukey's jackknife (Efron and
-    Stein, Annals of Statistics 9 (1981) 586):
+    parts: n about equal parts of the runs. The method is Tukey's jackknife (Efron and Stein, Annals of Statistics 9
+    (1981) 586):
 
         value i = n theta - (n - 1) theta_-i
 
@@ -50,27 +47,32 @@ def pseudo_values(parts: list[_P], statistic: Callable[[list[_P]], float | Float
                      for i in range(n)])
 
 
+def single(case: str, metric: str, value: float, unit: str = '', target: str | None = None,
+           paper: float | None = None) -> Row:
+    """Return the Row of one number, which is None if the number could not be measured. An integer stays one."""
+    return {'case': case, 'metric': metric, 'value': value if math.isfinite(value) else None, 'unit': unit,
+            'paper': paper, 'target': target}
+
+
 def row(case: str, metric: str, value: ArrayLike, unit: str = '', paper: float | None = None,
         target: str | None = None, runs: int | None = None) -> Row:
-    """Return one row of a --json file.
+    """Return the Row of a number, or of the values of n random runs.
 
-    value: a number, or the values of n random runs. For values, the row states their mean, its interval and the
-    number of runs. This number is n, or `runs` if each value belongs to several runs.
-    paper: number that a paper prints; target: text for `meets`.
+    For values, the Row states their mean, its interval and the number of runs. This number is n, or `runs` if each
+    value belongs to several runs.
     """
     values = np.asarray(value, float)
     if values.ndim:
         return estimated(case, metric, interval(values), unit, runs or len(values), paper, target)
-    return {'case': case, 'metric': metric, 'value': _finite(float(values)), 'unit': unit, 'paper': paper,
-            'target': target}
+    return single(case, metric, float(values), unit, target, paper)
 
 
 def estimated(case: str, metric: str, estimate: Estimate, unit: str, runs: int, paper: float | None = None,
               target: str | None = None) -> Row:
-    """Return the `row` of an estimate from a number of runs."""
+    """Return the Row of an estimate from a number of runs."""
     value, low, high = estimate
-    return {**row(case, metric, value, unit, paper, target), 'ci_low': _finite(low), 'ci_high': _finite(high),
-            'runs': runs}
+    return {**single(case, metric, float(value), unit, target, paper), 'ci_low': _finite(low),
+            'ci_high': _finite(high), 'runs': runs}
 
 
 def _finite(value: float) -> float | None:
@@ -92,6 +94,23 @@ def meets(value: float | None, target: str) -> bool:
 
 
 def missed(row: Row) -> bool:
-    """Return True if a row misses its target. Of a random value, the whole interval must meet the target."""
-    judged = ('ci_low', 'ci_high') if 'runs' in row else ('value',)
-    return row['target'] is not None and not all(meets(row[key], row['target']) for key in judged)
+    """Return True if a Row misses its target. Of a random value, the whole interval must meet the target."""
+    target, judged = row['target'], (row['ci_low'], row['ci_high']) if 'runs' in row else (row['value'],)
+    return target is not None and not all(meets(value, target) for value in judged)
+
+
+def number(value: float | None) -> str:
+    """Return a number of a Row as text, '-' for None."""
+    return '-' if value is None else f'{value:.4g}'
+
+
+def interval_text(row: Row) -> str:
+    """Return the confidence interval of a Row as text, '' for a single number."""
+    return f'{number(row["ci_low"])} to {number(row["ci_high"])}' if 'runs' in row else ''
+
+
+def measured(value: float) -> str:
+    """Return a result of a run as text: four digits, but all digits of a large whole number."""
+    if not math.isfinite(value):
+        return 'not measured'
+    return f'{value:,.0f}' if abs(value) >= 1e4 and value == int(value) else number(value)

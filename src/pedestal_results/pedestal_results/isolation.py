@@ -25,6 +25,7 @@ tracking_receiver.receiver.cn0_dbhz, and the noises of the node `ins`.
 """
 import dataclasses
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -61,10 +62,7 @@ def _decibels(large: float, small: float) -> Decibels:
 
 
 def _beam_axes(direction: Vectors3) -> Floats:
-    """Return the axes (n, 3, 3) of beams in the directions FLU.
-
-    The three rows are unit vectors FLU in cross-elevation, in elevation and along the beam.
-    """
+    """Return the unit vectors FLU in cross-elevation, in elevation and along each beam, as rows of (n, 3, 3)."""
     x, y, z = direction.T
     flat = np.hypot(x, y)
     sa, ca = -y / flat, x / flat
@@ -112,11 +110,8 @@ def measure(dt: Seconds, error: Pairs, target: Vectors3, attitude: Quaternions, 
                      math.sqrt(np.sum(power * weight) / (2 * n)))
 
 
-def read(bag: Recording, run: tracking.Tracking) -> Isolation | None:
-    """Return the Isolation of a recording whose Tracking is `run`.
-
-    Return None for an antenna ashore, or if the evaluated time is below MIN_TRACKED_TIME_S.
-    """
+def read(bag: Recording, run: tracking.Tracking, keyholes: Iterable[tracking.Slew]) -> Isolation | None:
+    """Return the Isolation of a recording; None ashore, or with an evaluated time below MIN_TRACKED_TIME_S."""
     if 'ship/truth' not in bag.topics or run.t.size < 2:
         return None
     ship = recordings.at(bag, run.t, 'ship/truth', [*(f'orientation.{letter}' for letter in 'xyzw'),
@@ -128,7 +123,7 @@ def read(bag: Recording, run: tracking.Tracking) -> Isolation | None:
     on = run.tracking & np.isfinite(np.column_stack((ship, target, error))).all(axis=1)
     if math.isfinite(run.beamwidth):
         on &= np.hypot(*error.T) <= 0.5 * run.beamwidth
-    for begin, end, _ in tracking.keyholes(bag):
+    for begin, end, _ in keyholes:
         on &= (run.t < begin) | (run.t > end + tracking.HANDOVER_SETTLING_S)
     dt = float(np.median(np.diff(run.t)))
     if np.sum(on) * dt < MIN_TRACKED_TIME_S:

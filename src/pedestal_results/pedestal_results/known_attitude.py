@@ -66,8 +66,7 @@ def read(bag: Recording) -> KnownAttitude | None:
 
 
 def aligned_from(bag: Recording, first: Seconds) -> Seconds:
-    """Return the stamp at which the INS became aligned, as KnownAttitude.aligned; first: first stamp of the
-    attitude."""
+    """Return the stamp at which the INS became aligned, as KnownAttitude.aligned; first: stamp of the attitude."""
     if not recordings.holds(bag, INS_STATE_TOPIC):
         return float(first)
     states = bag.table(INS_STATE_TOPIC)

@@ -39,10 +39,10 @@ MAX_REFERENCE_STEP_RAD = 1e-5  # largest motion within SETTLING_TIME_S of a refe
 
 
 def read(bag: Recording, run: Tracking) -> dict[str, Pairs]:
-    """Return {mode: pointing errors [deg]} in the settled part of each mode; run: Tracking of the recording.
+    """Return {mode: pointing errors [deg] in cross-elevation and elevation} in the settled part of each mode.
 
-    Pairs are cross-elevation, elevation. An electronic beam has two rows per step: at the end and at the beginning of
-    the interval. A mode without a settled part is left out.
+    An electronic beam has two rows per step: at the end and at the beginning of the interval. A mode without a settled
+    part is left out.
     """
     found = {}
     for mode, direction in FOLLOWED_DIRECTIONS.items():
@@ -57,7 +57,6 @@ def read(bag: Recording, run: Tracking) -> dict[str, Pairs]:
 
 
 def _window(run: Tracking) -> int:
-    """Return SETTLING_TIME_S as a number of steps."""
     return max(1, round(SETTLING_TIME_S / run.period))
 
 
@@ -84,7 +83,6 @@ def _to_earth_direction(run: Tracking, directions: Pairs) -> Pairs:
 
 
 def _of_table(_: Recording, run: Tracking, inside: Bools) -> _Part:
-    """Return the part of a mode that follows a table of directions; inside: the steps in the mode."""
     return _after_slew(run.error, run, inside)
 
 
@@ -110,12 +108,10 @@ def _still(error: Pairs, run: Tracking) -> Bools:
 
 
 def _of_steps(_: Recording, run: Tracking, inside: Bools) -> _Part:
-    """Return the part of step track."""
     return run.error, tracking.settled(inside, run.t)
 
 
 def _of_preset(bag: Recording, run: Tracking, inside: Bools) -> _Part:
-    """Return the part of the mode `preset`: reference minus beam."""
     columns, window = ('azimuth.position', 'elevation.position'), _window(run)
     beam = recordings.at(bag, run.t, 'adu/truth' if 'adu/truth' in bag.topics else 'joint_states', columns)
     error, on = run.reference - beam, np.zeros(run.t.size, bool)
@@ -128,7 +124,6 @@ def _of_preset(bag: Recording, run: Tracking, inside: Bools) -> _Part:
 
 
 def _of_slave(bag: Recording, run: Tracking, inside: Bools) -> _Part:
-    """Return the part of the mode `slave`: the error against the commanded direction."""
     directions, air = np.full((run.t.size, 2), np.nan), None
     known = recordings.parameters(bag, 'acu')
     if known.get('refraction.slave') != 'apparent':
@@ -173,7 +168,7 @@ def predictor_of(bag: Recording, known: Mapping[str, Json]) -> Predictor:
 
 
 def _of_sun(bag: Recording, run: Tracking, inside: Bools) -> _Part:
-    """Return the part of the mode `sun`: the error against the sun, NaN without recorded parameters."""
+    """Return the part of the mode `sun`, NaN without recorded parameters."""
     known = recordings.parameters(bag, 'acu')
     if not known:
         return np.full((run.t.size, 2), np.nan), inside

@@ -1,4 +1,4 @@
-"""Recorded run: a recording of one beam with the parts from which results, verdict and report are made."""
+"""Recorded run: a recording of one beam with its parts, each computed once, on first use."""
 import contextlib
 import functools
 from collections.abc import Callable, Iterable
@@ -17,7 +17,7 @@ from pedestal_results.consistency import Consistency
 from pedestal_results.events import Event, ModeSpan
 from pedestal_results.isolation import Isolation
 from pedestal_results.known_attitude import KnownAttitude
-from pedestal_results.tracking import Tracking
+from pedestal_results.tracking import Slew, Tracking
 
 SHOWN_TOPICS = ('joint_states', 'target/truth', 'ship/truth', 'adu/motor_states', 'tracking_receiver/angle_error',
                 'acu/filter', known_attitude.ATTITUDE_TOPIC)
@@ -34,11 +34,13 @@ class Status(NamedTuple):
 
 
 class RecordedRun:
-    """A recording of one beam, and its parts. Each part is computed once, on first use."""
+    """A recording of one beam, and its parts, from which results, verdict and report are made. A part is computed on
+    first use.
+    """
 
     def __init__(self, bag: Recording) -> None:
-        self.bag = bag
-        self._tables: dict[str, Table] = {}
+        self.bag = recordings.Decoded(bag)
+        self._file = getattr(bag, 'file', bag.path)     # a recording in memory has no file
 
     def holds(self, topic: str) -> bool:
         """Return True if the recording has a message of a topic, and the type of the topic is that of the graph."""
@@ -46,9 +48,7 @@ class RecordedRun:
 
     def table(self, topic: str) -> Table | None:
         """Return the columns of a topic, None for a topic that the recording does not hold."""
-        if topic not in self._tables and self.holds(topic):
-            self._tables[topic] = self.bag.table(topic)
-        return self._tables.get(topic)
+        return self.bag.table(topic) if self.holds(topic) else None
 
     def check_stamps(self) -> None:
         """Raise bag.BagError if the stamps of a topic go back, because a plot over them would be wrong."""
@@ -57,8 +57,7 @@ class RecordedRun:
             t = columns['t'] if columns else np.zeros(0)
             back = np.flatnonzero(np.diff(t) < 0.0)
             if back.size:
-                file = getattr(self.bag, 'file', self.bag.path)     # only a recording of files may have such stamps
-                raise bags.BagError(f'{file}: the stamps of {topic} go back, the first from {t[back[0]]:.6f} to '
+                raise bags.BagError(f'{self._file}: the stamps of {topic} go back, the first from {t[back[0]]:.6f} to '
                                     f'{t[back[0] + 1]:.6f} s; `pedestal verify` lists all problems')
 
     @functools.cached_property
@@ -94,18 +93,22 @@ class RecordedRun:
         return None
 
     @functools.cached_property
+    def keyholes(self) -> list[Slew]:
+        """The slews through a keyhole that the ACU predicted."""
+        return tracking.keyholes(self.bag)
+
+    @functools.cached_property
     def isolation(self) -> Isolation | None:
         """Isolation from the rotation of the ship; None ashore, without truth, or for too short a run."""
-        return None if self.no_truth else isolation.read(self.bag, self.tracking)
+        return None if self.no_truth else isolation.read(self.bag, self.tracking, self.keyholes)
 
     @functools.cached_property
     def parts(self) -> dict[str, object]:
-        """The parts by name for results.measured. A missing part is absent, None or empty.
-
-        Raises ValueError like `tracking`.
+        """The parts by name for results.measured; a missing part is absent, None or empty. Raises ValueError like
+        `tracking`.
         """
         return {**self.tracking.parts, **mode_pointing.read(self.bag, self.tracking), 'filter': self.filter,
-                'keyholes': tracking.keyholes(self.bag), 'isolation': self.isolation, 'attitude': self.attitude}
+                'keyholes': self.keyholes, 'isolation': self.isolation, 'attitude': self.attitude}
 
     @functools.cached_property
     def verdict(self) -> verdicts.Verdict:

@@ -12,8 +12,7 @@ attitude    known_attitude.KnownAttitude
 run         pedestal_bringup.graph.start.Outcome
 supervised  the same Outcome, of a run in realtime
 MODE        pointing errors of mode_pointing.read in this mode, one of its FOLLOWED_DIRECTIONS
-Errors are taken per axis and sample. "Both axes together" pools the samples of both axes; the result is not the angle
-between beam and target.
+"Both axes together" pools the samples of both axes; the result is not the angle between beam and target.
 """
 import itertools
 import math
@@ -22,11 +21,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeAlias
 
 from pedestal_common.quantities import Row
-from pedestal_results import (
-    mode_pointing,
-    sensor_frame,
-    tracking,
-)
+from pedestal_results import intervals, mode_pointing, sensor_frame, tracking
 from pedestal_results.tracking import DEG_PER_RAD, known_rms, largest
 
 Values: TypeAlias = dict[str, tuple[float, str]]    # {name of a result: (value, unit)}
@@ -56,7 +51,6 @@ ENCODER_DEFINITION = 'This result includes all errors between dish and encoders,
 
 
 def _of_mode(mode: str) -> tuple[Result, Result]:
-    """Return the two Results of the pointing error in a mode of mode_pointing.FOLLOWED_DIRECTIONS: rms, maximum."""
     against = f'{mode_pointing.FOLLOWED_DIRECTIONS[mode]} minus true beam'
     return (Result(f'{mode}_pointing_rms_deg', 'deg', mode, known_rms,
                    f'Rms of the true pointing error ({against}), both axes together, in settled `{mode}`.'),
@@ -205,7 +199,6 @@ def measured(parts: Mapping[str, object], table: Sequence[Result] = RESULTS) -> 
 
 
 def _exists(parts: Mapping[str, object], result: Result) -> bool:
-    """Return True if the part of a Result exists and is not empty."""
     part = parts.get(result.part)
     return part is not None and (not isinstance(part, list | dict) or bool(part))
 
@@ -219,8 +212,8 @@ def marks(parts: Mapping[str, object], table: Sequence[Result] = RESULTS) -> dic
 def brief(columns: Iterable[Values], count: int = BRIEF_COUNT) -> list[str]:
     """Return the names of the results that are printed by default, in the order of the table.
 
-    columns: of `measured`, for each beam and for the run. At most `count` names are
-    returned. Results with the flag `brief` have precedence; other measured results fill the remaining places.
+    columns: of `measured`, for each beam and for the run. Results with the flag `brief` have precedence; other
+    measured results fill the remaining of `count` places.
     """
     found = [result for result in RESULTS
              if any(name == result.name and math.isfinite(value) for values in columns
@@ -238,15 +231,10 @@ def remarks(noted: Mapping[str, str], values: Values) -> list[str]:
             for note, names in found.items()]
 
 
-def row(case: str, metric: str, value: float, unit: str = '', target: str | None = None) -> Row:
-    """Return a row of a --json file. Its value is None if the result could not be measured."""
-    return {'case': case, 'metric': metric, 'value': value if math.isfinite(value) else None, 'unit': unit,
-            'paper': None, 'target': target}
-
-
 def rows(case: str, values: Values) -> list[Row]:
     """Return the rows of a --json file for the values that `measured` returns."""
-    return [row(case, name, value, unit, RESULT_BY_NAME[name].target) for name, (value, unit) in values.items()]
+    return [intervals.single(case, name, value, unit, RESULT_BY_NAME[name].target)
+            for name, (value, unit) in values.items()]
 
 
 def documented(table: Sequence[Result] = RESULTS) -> list[tuple[str, str, str, str]]:

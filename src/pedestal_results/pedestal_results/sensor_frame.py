@@ -2,10 +2,8 @@
 
 The control unit estimates the target in the frame of its sensors: encoders, receiver and INS. The slow errors of these
 sensors turn this frame. Examples are the bend between dish and encoder, a tilted mount, the boresight offset of the
-receiver, and a wrong heading of the INS. The measurements cannot show these errors. Because the antenna points in the
-same frame, the slow errors are no error of the filter. The faster errors are noise, which the filter must expect.
-
-The error of the estimate, the noise reduction, the lag and the NEES compare the estimate with this truth.
+receiver, and a wrong heading of the INS. Because the measurements cannot show these errors, and the antenna points in
+the same frame, they are no error of the filter. The faster errors are noise, which the filter must expect.
 """
 import numpy as np
 
@@ -28,12 +26,7 @@ DEFINITION = 'Slow errors of the sensors, such as the bend between dish and enco
 @compiled
 def _offsets_of_sensors(deck: Pairs, error: Pairs, known_attitude: Quaternions, target: Pairs, offsets: Pairs) -> None:
     """Fill offsets (cross-elevation, elevation) [rad]: the direction that the sensors measure without noise, seen from
-    the true direction.
-
-    deck             angles of the encoders [rad]
-    error            error that the receiver measures without noise (cross-elevation, elevation) [rad]
-    known_attitude   attitude of the INS
-    target           true earth angles of the target [rad]
+    the true direction; arguments as of `truth`.
     """
     mat = np.empty((3, 3))
     for k in range(len(deck)):
@@ -54,9 +47,8 @@ def _displace_rows(angles: Pairs, offsets: Pairs) -> None:
 
 
 def _slow(values: Pairs, period: Seconds) -> Pairs:
-    """Return values averaged over SLOW_ERROR_TIME_S about each row, without NaN; period: of the rows.
-
-    In a shorter recording the average is over at most its rows.
+    """Return values averaged over SLOW_ERROR_TIME_S about each row, without NaN; in a shorter recording over at most
+    its rows.
     """
     longest = (len(values) - 1) // 2
     half = min(round(0.5 * SLOW_ERROR_TIME_S / period), longest) if longest > 0 and period > 0.0 else 0

@@ -1,10 +1,8 @@
 """`pedestal export --format tdm`: write the measured directions of the target as a CCSDS Tracking Data Message.
 
-A program for orbit determination reads this message. The format is CCSDS 503.0-B-2 in keyword = value notation. A
-record contains azimuth and elevation (direction of the beam plus receiver error), the range if it was measured, and
-C/N0. The direction of the beam follows from the encoders and the pointing model in force. Only steps in autotrack with
-a locked receiver are written. On a ship, the attitude of the INS rotates the deck angles to earth angles. Nothing is
-corrected for refraction. Times are UTC.
+A program for orbit determination reads this message. The format is CCSDS 503.0-B-2 in keyword = value notation. Only
+steps in autotrack with a locked receiver are written. On a ship, the attitude of the INS rotates the deck angles to
+earth angles. Nothing is corrected for refraction. Times are UTC.
 """
 import datetime
 import json
@@ -62,7 +60,6 @@ def export(path: str | pathlib.Path, created: datetime.datetime, output: str | p
     rate          largest number of records per second
     participants  names of the station and of the target; by default DEFAULT_STATION_NAME, and the international
                   designator of a satellite
-    overwrite     True to replace existing files
 
     Raises bag.BagError and ValueError, or FileExistsError before anything is written.
     """
@@ -87,9 +84,8 @@ def export(path: str | pathlib.Path, created: datetime.datetime, output: str | p
 
 
 def _files(bag: bags.Bag, output: str | pathlib.Path | None, overwrite: bool) -> dict[pathlib.Path, bags.Bag]:
-    """Return {file to write: the bag of one beam}.
-
-    Raises FileExistsError, and ValueError for one file with several beams.
+    """Return {file to write: the bag of one beam}. Raises FileExistsError, and ValueError for one file with several
+    beams.
     """
     views = [bag.view(prefix[:-1]) for prefix in nodes.prefixes(bag.beams)]
     output = pathlib.Path(output) if output is not None else bag.file.parent / 'export'
@@ -123,7 +119,6 @@ class _Tracks:
         self.stamps: Stamps = stamps[first]     # of these steps
 
     def segments(self) -> Iterator[_Segment]:
-        """Yield each segment that is not empty."""
         for at in range(0, len(self.stamps), SEGMENT_STEPS):
             stamps = self.stamps[at:at + SEGMENT_STEPS]
             beam, error = self._at('joint_states', stamps), self._at('tracking_receiver/angle_error', stamps)
@@ -157,11 +152,11 @@ class _Tracks:
 
 
 def _utc_of_zero(bag: bags.Bag) -> np.datetime64:
-    """Return the UTC of the time 0 of a bag of one beam, in microseconds.
+    """Return the UTC of the time 0 of a bag of one beam, in microseconds. Raises bag.BagError if it has no date.
 
     For a target with a date (a satellite, a flight with a date), the receiver publishes this UTC. For another target
     it is the start stamp of a realtime recording, which is UTC. A lockstep recording starts at stamp 0, which is no
-    date. Raises bag.BagError if neither exists.
+    date.
     """
     date = bag.last_values(f'{bag.beam}tracking_receiver').get('stamp_0_utc', '')
     if date:
@@ -174,7 +169,6 @@ def _utc_of_zero(bag: bags.Bag) -> np.datetime64:
 
 
 def _header(bag: bags.Bag, created: datetime.datetime) -> str:
-    """Return the text of the header of a message."""
     run = ', '.join(filter(None, (bag.metadata.get('scenario', ''), f'seed {bag.metadata.get("seed", "unknown")}',
                                   bag.metadata.get('pacing', ''))))
     run = ''.join(letter if ' ' <= letter <= '~' else '?' for letter in run[:200])
@@ -201,11 +195,7 @@ def _participants(bag: bags.Bag, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _segment(segment: _Segment, participants: Sequence[str], models: Sequence[str]) -> str:
-    """Return the text of a segment, with the keywords in the order of table 3-3 of CCSDS
-    503.0-B-2.
-
-    participants: names of station and target; models: pointing models in words.
-    """
+    """Return the text of a segment, with the keywords in the order of table 3-3 of CCSDS 503.0-B-2."""
     times, angles, distance, cn0 = segment
     lines = ['META_START', 'COMMENT angles = encoders + error of the receiver, not corrected for refraction',
              *(f'COMMENT pointing model: {title}' for title in models),

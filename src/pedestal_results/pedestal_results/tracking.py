@@ -1,8 +1,7 @@
 """Tracking of a recorded run: errors of beam, encoders, receiver and filter against the recorded truth, at each step.
 
-The results, the verdict, the report and the trials take their data from Tracking. In this module deck angles are
-azimuth (clockwise) and elevation on the deck; an attitude is the quaternion x, y, z, w of the rotation deck -> earth.
-An error is the direction to the target minus the direction of the beam, in cross-elevation and elevation.
+Deck angles are azimuth (clockwise) and elevation on the deck; an attitude is the quaternion x, y, z, w of the rotation
+deck -> earth. An error is the direction to the target minus that of the beam, in cross-elevation and elevation.
 """
 import contextlib
 import dataclasses
@@ -66,14 +65,13 @@ def _true_error(direction: Pairs, relative: Vectors3, attitude: Quaternions, err
 
 @compiled
 def _deck_direction(mat_ed: Matrix3, azimuth: Radians, elevation: Radians) -> tuple[float, float, float]:
-    """Return the unit vector FLU of earth angles on a deck; mat_ed: rotation deck -> earth."""
+    """Return the unit vector FLU of earth angles on a deck."""
     east, north, up = line_of_sight.earth_direction(azimuth, elevation)
     return line_of_sight.to_deck(mat_ed, east, north, up)
 
 
 @compiled
 def _earth_angles(mat_ed: Matrix3, x: float, y: float, z: float) -> tuple[Radians, Radians]:
-    """Return the earth angles of a vector FLU; mat_ed: rotation deck -> earth."""
     east, north, up = line_of_sight.to_earth(mat_ed, x, y, z)
     return line_of_sight.earth_angles(east, north, up)
 
@@ -87,7 +85,6 @@ def _view_from_beam(beam: Pairs, attitude: Quaternions, known_attitude: Quaterni
     beam_earth       earth angles of the beam
     estimate_earth   true earth angles of the estimate's direction on the deck
     beam             deck angles
-    attitude         true attitude
     known_attitude   attitude that the INS reports
     estimate         earth angles, computed with the attitude that the INS reports
     truth            earth angles of the target in the frame of the sensors
@@ -110,7 +107,6 @@ def _view_from_beam(beam: Pairs, attitude: Quaternions, known_attitude: Quaterni
 
 @compiled
 def _interval_start_error(beam: Pairs, error: Pairs, out: Pairs) -> None:
-    """Fill `out` as interval_start_error states."""
     for k in range(1, len(beam)):
         azimuth, elevation = line_of_sight.displaced(beam[k - 1, 0], beam[k - 1, 1], error[k - 1, 0], error[k - 1, 1])
         x, y, z = line_of_sight.direction(azimuth, elevation)
@@ -119,9 +115,7 @@ def _interval_start_error(beam: Pairs, error: Pairs, out: Pairs) -> None:
 
 @compiled
 def _fill_power(error: Pairs, beamwidth: Radians, power: Floats) -> None:
-    """Fill power: received power over that on the beam axis [-]. error: pointing errors in cross-elevation and
-    elevation [rad].
-    """
+    """Fill power: received power over that on the beam axis [-], for pointing errors [rad]."""
     for k in range(len(error)):
         voltage = sum_pattern(error[k, 0] / beamwidth) * sum_pattern(error[k, 1] / beamwidth)
         power[k] = voltage * voltage
@@ -130,13 +124,9 @@ def _fill_power(error: Pairs, beamwidth: Radians, power: Floats) -> None:
 def interval_start_error(beam: Pairs, error: Pairs) -> Pairs:
     """Return the pointing error [rad] of an electronic beam at the beginning of the interval before each stamp.
 
-    The beam of an array jumps at each step, and stands during the interval until the next step.
-
-    beam    its deck angles in the interval that ends at stamp k [rad]
-    error   pointing error at stamp k [rad]
-
-    At the beginning of this interval the beam is already beam k, but the target is still that of stamp k - 1. The
-    first row is NaN.
+    The beam of an array jumps at each step, and stands during the interval until the next step. At the beginning of
+    the interval that ends at stamp k, the beam is already beam k, but the target is still that of stamp k - 1. The
+    first row is NaN. beam: its deck angles [rad]; error: pointing error at the stamps [rad].
     """
     out = np.full(beam.shape, np.nan)
     _interval_start_error(np.ascontiguousarray(beam), np.ascontiguousarray(error), out)
@@ -152,10 +142,10 @@ class Slew(NamedTuple):
 
 @dataclasses.dataclass(kw_only=True)
 class Tracking:
-    """A recorded run as arrays, one row per step of the drive. NaN where nothing was measured.
+    """A recorded run as arrays, one row per step of the drive. NaN where nothing was measured. Pairs are angles [rad].
 
-    Pairs are azimuth and elevation, or for errors cross-elevation and elevation [rad]. An electronic beam is that of
-    an array. Its reference is meant for a later interval than the measured beam, so it has no following error.
+    An electronic beam is that of an array. Its reference is meant for a later interval than the measured beam, so it
+    has no following error.
     """
     t: Times        # of the step
     encoders: Pairs         # deck angles of the beam by encoders and pointing model, or of an electronic beam
@@ -225,8 +215,8 @@ class Tracking:
         """Receiver error minus the error without noise [deg] over the evaluated part.
 
         The error without noise is the true error minus the boresight offset. The receiver of an electronic beam
-        measures the error in the middle of the interval between two steps. The true error there is the mean of those
-        at the beginning and at the end.
+        measures the error in the middle of the interval between two steps, which is the mean of those at the beginning
+        and at the end.
         """
         true = 0.5 * (self.true + self.begun[self.tracking]) if self.electronic else self.true
         return (self.measured[self.tracking] - (true - self.boresight)) * DEG_PER_RAD
@@ -242,20 +232,18 @@ class Tracking:
         return self.estimate_error[self.tracking] * DEG_PER_RAD
 
     def pointing(self, measure: Callable[[Floats], float], axis: int | slice = slice(None)) -> Degrees:
-        """Return a statistic of the true pointing error over the evaluated part.
+        """Return a statistic of the true pointing error over the evaluated part, by default of both axes.
 
-        measure: function of the errors, such as known_rms; axis: 0 cross-elevation, 1 elevation, by default both. For
-        an electronic beam, return the larger of the two values at the beginnings and at the ends of the intervals.
+        For an electronic beam, return the larger of the two values at the beginnings and at the ends of the intervals.
         """
         errors = (self.true, self.begun[self.tracking]) if self.electronic else (self.true,)
         return max(measure(error[:, axis]) for error in errors) * DEG_PER_RAD
 
     @functools.cached_property
     def power(self) -> Floats:
-        """Received power over that on the beam axis [-], by the pattern of the beam, in the evaluated part.
+        """Received power over that on the beam axis [-], by the sum pattern of the beam, in the evaluated part.
 
-        The pattern is the sum pattern of tracking_receiver_sim.monopulse: the received voltage by the angle from the
-        beam axis. Empty without a beamwidth.
+        Empty without a beamwidth.
         """
         if not math.isfinite(self.beamwidth):
             return np.zeros(0)
@@ -277,8 +265,9 @@ class Tracking:
 
     @property
     def lock_time(self) -> Seconds:
-        """Stamp of the receiver's first error; NaN without an error, and in a recording that begins during the run
-        with a locked receiver."""
+        """Stamp of the receiver's first error; NaN without an error, and in a recording that begins with a locked
+        receiver.
+        """
         locked = np.isfinite(self.measured[:, 0])
         unknown = locked[:1].any() and self.t.size > 1 and self.t[0] > self.period
         return float(self.t[locked][0]) if locked.any() and not unknown else math.nan
@@ -305,9 +294,8 @@ class Tracking:
 
     @property
     def loss(self) -> Seconds:
-        """Time, in any mode from the first evaluated step on, with the target further than half a beamwidth off.
-
-        NaN without an evaluated step or without a beamwidth.
+        """Time, in any mode from the first evaluated step on, with the target further than half a beamwidth off; else
+        NaN.
         """
         if not (self.since.any() and math.isfinite(self.beamwidth)):
             return math.nan
@@ -335,10 +323,10 @@ def _lever_arm(bag: Recording, attitude: Quaternions) -> Vectors3:
 
 
 def _arriving(bag: Recording, relative: Vectors3, velocity: Vectors3) -> Vectors3:
-    """Return the vector ENU [m] from the antenna to the apparent position of the target.
+    """Return the vector ENU [m] from the antenna to the apparent position of the target, which refraction and light
+    time shift.
 
-    relative: vector to its true position, ENU [m]; velocity: its velocity, ENU [m/s]. Refraction and
-    light time of the signal, by the parameters in the bag, shift the apparent position.
+    relative: vector to its true position, ENU [m]; velocity: its velocity, ENU [m/s].
     """
     of_receiver = recordings.parameters(bag, 'tracking_receiver')
     given = {key: value for key, value in of_receiver.items() if key in ('path.refractivity', 'path.light_time')}
@@ -349,8 +337,7 @@ def _arriving(bag: Recording, relative: Vectors3, velocity: Vectors3) -> Vectors
 def by_encoders(bag: Recording) -> bool:
     """Return True if Tracking takes the direction of the beam from the encoders, because the bag has no adu/truth.
 
-    ENCODER_BEAM_NOTE is the note for this case. An array has no encoders: the angles to which it steers its beam are
-    the true direction.
+    An array has no encoders: the angles to which it steers its beam are the true direction.
     """
     return not bag.beams and 'adu/truth' not in bag.topics
 
@@ -408,8 +395,7 @@ def read(bag: Recording) -> Tracking:
 def keyholes(bag: Recording) -> list[Slew]:
     """Return the slews through a keyhole that the ACU predicted in its diagnostics, each once.
 
-    A renewed plan replaces the earlier plan of the same slew. A plan that is cancelled before its slew begins
-    does not count.
+    A renewed plan replaces the earlier plan of the same slew. A plan that is cancelled before its slew does not count.
     """
     slews: list[Slew] = []
     for t, status in recordings.diagnostics(bag):

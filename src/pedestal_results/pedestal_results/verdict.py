@@ -92,26 +92,21 @@ def _trip(bag: Recording) -> str:
 
 
 def _replies(bag: Recording) -> Iterator[tuple[Seconds, commands.Command, commands.Reply]]:
-    """Yield (time, Command, Reply) of all replies in a bag."""
     for topic in REPLY_TOPICS:
         yield from recordings.replies(bag, topic)
 
 
 def _refusals(bag: Recording) -> list[str]:
-    """Return a text for each refused command of the scenario."""
     return [f'{command.verb} at {t:.4g} s refused: {_reason(reply.text)}' for t, command, reply in _replies(bag)
             if command.who == commands.SCHEDULE_CLIENT and not reply.granted]
 
 
 def _reason(text: str) -> str:
-    """Return the reason in the text of a refusal."""
     return text.removeprefix('refused: ').partition('; mode is ')[0]
 
 
 def _leads_to_tracking(mode: str, handover: bool) -> bool:
-    """Return True if a mode tracks, or hands over to a mode that leads to tracking.
-
-    handover: True if the modes of a predicted track (`program`, `tle`) may hand over, by the parameter
+    """Return True if a mode tracks, or hands over to a mode that leads to tracking; handover: parameter
     tracker.handover.
     """
     row = next((row for row in modes.MODE_ROWS if row.name == mode), None)
@@ -183,11 +178,7 @@ def _never_began(bag: Recording, mode: str) -> tuple[str, str]:
 
 def _never_tracked(bag: Recording, run: Tracking, distance: Floats, near: Bools,
                    acu: Mapping[str, Json]) -> tuple[str, str]:
-    """Return (word, sentence) on a run that followed a direction to the target, but never tracked by the receiver.
-
-    distance: angle from beam to target [rad]; near: True with the target within half a beamwidth; acu: the parameters
-    of the control unit.
-    """
+    """Return (word, sentence) on a run that followed a direction to the target, but never tracked by the receiver."""
     receiver = recordings.parameters(bag, 'tracking_receiver')
     count = acu.get('tracker.lock_count', 0) * run.period
     follows = np.isin(run.mode, [row.name for row in modes.MODE_ROWS if row.follows])
@@ -227,10 +218,7 @@ def _next_command(acu: Mapping[str, Json], end: Seconds) -> str:
 
 
 def _approaches(run: Tracking, distance: Floats) -> bool:
-    """Return True if the beam approaches the target at the end, and has not come near and gone away again before.
-
-    distance: angle from beam to target [rad].
-    """
+    """Return True if the beam approaches the target at the end, and has not come near and gone away again before."""
     window = round(APPROACH_WINDOW_S / run.period)
     if not (distance.size > window and run.mode[-1] not in ('', 'standby')
             and distance[-1 - window] - distance[-1] > MIN_APPROACH * run.beamwidth):

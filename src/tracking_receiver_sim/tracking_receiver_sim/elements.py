@@ -234,48 +234,52 @@ def _json(path: FilePath) -> Iterator[Satellite]:
         at = skipped(at)
 
 
-def _xml(path: FilePath) -> Iterator[Satellite]:
-    """Read the segments of an OMM or NDM; expat keeps no parsed data in memory."""
-    satellites: list[Satellite] = []
-    open_elements: list[str] = []
-    texts: dict[str, str] = {}
-    line = 1        # of the open segment
+class _Segments:
+    """Satellites of the segments of an OMM or NDM, from the events of an expat parser."""
 
-    def doctype(*_: object) -> None:
-        raise lines.wrong(path, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1,
+    def __init__(self, path: FilePath, parser: expat.XMLParserType) -> None:
+        self.satellites: list[Satellite] = []   # of the segments that have ended
+        self._path, self._parser = path, parser
+        self._open: list[str] = []      # names of the open elements
+        self._texts: dict[str, str] = {}    # of the keywords in the open segment, which begins at _line
+        self._line = 1
+        parser.buffer_text = True
+        parser.StartDoctypeDeclHandler, parser.CharacterDataHandler = self._doctype, self._text
+        parser.StartElementHandler, parser.EndElementHandler = self._start, self._end
+
+    def _doctype(self, *_: object) -> None:
+        raise lines.wrong(self._path, self._parser.CurrentLineNumber, self._parser.CurrentColumnNumber + 1,
                           'a document type declaration: an OMM has none')
 
-    def start(name: str, _attributes: dict[str, str]) -> None:
-        nonlocal line
-        if len(open_elements) >= MAX_XML_DEPTH:
-            raise csv_table.TableError(f'{path}: line {parser.CurrentLineNumber}: must be at most {MAX_XML_DEPTH} '
-                                       'nested elements')
-        name = name.rpartition(':')[2][:MAX_VALUE_CHARS]
-        open_elements.append(name)
-        if name == 'segment':
-            texts.clear()
-            line = parser.CurrentLineNumber
+    def _start(self, name: str, _attributes: dict[str, str]) -> None:
+        if len(self._open) >= MAX_XML_DEPTH:
+            raise csv_table.TableError(f'{self._path}: line {self._parser.CurrentLineNumber}: must be at most '
+                                       f'{MAX_XML_DEPTH} nested elements')
+        self._open.append(name.rpartition(':')[2][:MAX_VALUE_CHARS])
+        if self._open[-1] == 'segment':
+            self._texts.clear()
+            self._line = self._parser.CurrentLineNumber
 
-    def text(data: str) -> None:
-        if open_elements and open_elements[-1] in omm.KEYWORDS:
-            texts[open_elements[-1]] = (texts.get(open_elements[-1], '') + data)[:MAX_VALUE_CHARS]
+    def _text(self, data: str) -> None:
+        if self._open and self._open[-1] in omm.KEYWORDS:
+            self._texts[self._open[-1]] = (self._texts.get(self._open[-1], '') + data)[:MAX_VALUE_CHARS]
 
-    def end(_name: str) -> None:
-        nonlocal line
-        if open_elements.pop() == 'segment':
-            satellites.append(_omm(line, {keyword: value.strip() for keyword, value in texts.items()}))
-            line = 1
+    def _end(self, _name: str) -> None:
+        if self._open.pop() == 'segment':
+            self.satellites.append(_omm(self._line, {key: value.strip() for key, value in self._texts.items()}))
+            self._line = 1
 
+
+def _xml(path: FilePath) -> Iterator[Satellite]:
+    """Yield the satellites of the segments of an OMM or NDM as XML; expat keeps no parsed data in memory."""
     try:
         with csv_table.stream(path) as stream:
             parser = content.xml_parser(stream)
-            parser.buffer_text = True
-            parser.StartDoctypeDeclHandler, parser.CharacterDataHandler = doctype, text
-            parser.StartElementHandler, parser.EndElementHandler = start, end
+            segments = _Segments(path, parser)
             while piece := stream.read(PARSE_CHUNK_BYTES):
                 parser.Parse(piece)
-                yield from satellites
-                satellites.clear()
+                yield from segments.satellites
+                segments.satellites.clear()
             parser.Parse(b'', True)
     except expat.ExpatError as error:
         raise lines.wrong(path, error.lineno, error.offset + 1, 'not well-formed XML: '

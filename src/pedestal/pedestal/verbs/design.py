@@ -275,7 +275,10 @@ def _bench(options: argparse.Namespace) -> int:
     from pedestal_studies import bench
     content: dict[str, Json] = {'name': 'bench', 'rows': []}
     for what in (options.what,) if options.what else bench.BENCH_MODULES:
-        content['rows'] += importlib.import_module(f'{bench.__name__}.{bench.BENCH_MODULES[what]}').run()
+        measured = importlib.import_module(f'{bench.__name__}.{bench.BENCH_MODULES[what]}').run()
+        console.show_measured(measured.title, measured.rows)
+        print(measured.remark, end='\n' if measured.remark else '')
+        content['rows'] += measured.rows
     console.write_json(options.json, content)
     return 0
 

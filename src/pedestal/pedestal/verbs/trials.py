@@ -12,7 +12,6 @@ from pedestal import console
 from pedestal.verbs import arguments
 from pedestal.verbs.arguments import Verb
 from pedestal_common.quantities import Row
-from pedestal_results import row_text
 
 if typing.TYPE_CHECKING:
     from pedestal_workbench.trials.plan import Plan
@@ -170,9 +169,10 @@ def _tables(options: argparse.Namespace, plans: 'Sequence[Plan]', files: Iterabl
 
 def _worst_lines(plan: 'Plan', table: 'Table', ranking: str, worst: Iterable[int]) -> list[str]:
     """Return a line for each of the worst trials: its result, its command and the verdict on it."""
+    from pedestal_results import intervals
     from pedestal_workbench.trials import statistics
     values, whys = table.column(ranking), table.text(statistics.why_column(ranking))
-    return [f'{row_text.number(values[i] if math.isfinite(values[i]) else None):>10}  {plan.command(i)}'
+    return [f'{intervals.number(values[i] if math.isfinite(values[i]) else None):>10}  {plan.command(i)}'
             + (f'  # {whys[i]}' if whys[i] else '') for i in worst]
 
 
@@ -238,28 +238,31 @@ def _result_names(plan: 'Plan') -> list[str]:
 def _requirement_lines(rows: Iterable[Row], required: 'Iterable[Requirement]') -> list[str]:
     """Return a line for each requirement and case: the share of the trials that meet it, and the trials without the
     result."""
+    from pedestal_results import intervals
     found = []
     for one in required:
         for row in rows:
             if row['metric'] == f'require({one.text})/rate':
-                count = round(row['value'] * row['runs'] / 100.0)
+                count = round((row['value'] or 0.0) * row['runs'] / 100.0)
                 left_out = ', '.join(f'{number} {word}' for word, number in row['left_out'].items())
                 without = f'; without the result: {left_out}' if left_out else ''
                 found.append(f'{row["case"]}: {one.text} in {count} of {row["runs"]} trials, {row["value"]:.3g} % '
-                             f'({row_text.interval(row)} %){without}')
+                             f'({intervals.interval_text(row)} %){without}')
     return found
 
 
 def _sensitivity_lines(rows: Iterable[Row], ranking: str) -> list[str]:
     """Return lines with the sensitivity of the ranking result to each varied parameter, the strongest first. A line
     names its case if there are several."""
+    from pedestal_results import intervals
     # Because eta_squared is the square of a correlation, its square root is compared with a rank correlation.
     powers = {f'{ranking}/rank_correlation': 1.0, f'{ranking}/eta_squared': 0.5}
     found = [row for row in rows if row['metric'].partition('(')[0] in powers]
     several = len({row['case'] for row in found}) > 1
     return [f'{row["case"]}: ' * several
-            + f'{row["metric"]}: {row_text.number(row["value"])} ({row_text.interval(row)})'
-            for row in sorted(found, key=lambda row: -abs(row['value'])**powers[row['metric'].partition('(')[0]])]
+            + f'{row["metric"]}: {intervals.number(row["value"])} ({intervals.interval_text(row)})'
+            for row in sorted(found, key=lambda row: -abs(row['value'] or 0.0)**powers[
+                row['metric'].partition('(')[0]])]
 
 
 VERBS = {

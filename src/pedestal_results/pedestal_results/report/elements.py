@@ -1,4 +1,4 @@
-"""HTML elements of report pages: numbers, tables, figures, the page as one self-contained file, and its print."""
+"""HTML elements of report pages: numbers, figures, the page as one self-contained file, and its print."""
 import html
 import io
 import math
@@ -7,7 +7,7 @@ import pathlib
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from pedestal_results.report import figures
 
@@ -52,10 +52,7 @@ def page(title: str, parts: Iterable[str]) -> str:
 
 
 def figure(spec: figures.Spec, data: object, reason: str = '') -> str:
-    """Return a figure as an HTML element with title and caption.
-
-    data: argument of spec.draw; reason: why the figure cannot be drawn, or ''.
-    """
+    """Return a figure as an HTML element with title and caption; reason: why it cannot be drawn, or ''."""
     caption = f'<h3>{html.escape(spec.title)}</h3>'
     if reason:
         return f'<figure id="{spec.key}">{caption}<p class="bad">Not drawn: {html.escape(reason)}.</p></figure>'
@@ -71,20 +68,6 @@ def number(value: float, unit: str = '') -> str:
     return f'{text}\N{NO-BREAK SPACE}{unit}'.rstrip() if math.isfinite(value) else text
 
 
-def table(head: Sequence[str] | None, rows: Iterable[Sequence[str]], kind: str = '') -> str:
-    """Return an HTML table; head: its header; rows: the name of the row first.
-
-    kind: CSS class; 'n' aligns the other cells to the right, 'meta' is for the table at the head of a page.
-    """
-    def line(cells: Sequence[str], tag: str) -> str:
-        rest = ''.join(f'<{tag} class="{kind}">{html.escape(cell)}</{tag}>' if kind != 'meta' and kind else
-                       f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells[1:])
-        return f'<tr><th>{html.escape(cells[0])}</th>{rest}</tr>'
-    top = f'<thead>{line(head, "th")}</thead>' if head else ''
-    return (f'<div class="wide"><table class="{kind}">{top}<tbody>{"".join(line(row, "td") for row in rows)}'
-            '</tbody></table></div>')
-
-
 def browser() -> str:
     """Return the path of an installed browser. Raises ValueError without one."""
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
@@ -95,7 +78,7 @@ def browser() -> str:
 
 
 def print_pdf(program: str, page: pathlib.Path, output: pathlib.Path) -> None:
-    """Print a page (path of an HTML file) by the browser `program` to a path. Raises ValueError if it fails.
+    """Print a page by the browser `program` to a path. Raises ValueError if it fails.
 
     A browser prints the page as it shows it. This avoids a second layout of the page and a further library: matplotlib
     would only write the figures, and WeasyPrint needs the system library Pango.

@@ -1,6 +1,5 @@
-"""Drawing of the figures of all reports: colours, style, panels, lines, and output as a file or as part of a page.
-
-Measured values are grey, filtered or commanded values blue, and true values orange.
+"""Drawing of the figures of all reports. Measured values are grey, filtered or commanded values blue, true values
+orange.
 """
 import pathlib
 import re
@@ -66,7 +65,7 @@ def existing(part: _Part | None) -> _Part:
 
 
 def thin(t: Times, y: Floats, bins: int = 1000) -> tuple[Times, Floats]:
-    """Return a line t, y with fewer points: the smallest and the largest value in each of `bins` parts.
+    """Return a line with fewer points: the smallest and the largest value in each of `bins` parts.
 
     Because gaps must stay visible, the first NaN of each part stays too.
     """
@@ -91,12 +90,11 @@ def spans(flags: Bools) -> list[tuple[int, int]]:
 def new_panels(rows: int, columns: int = 1, height: float | None = None, width: float = FIGURE_WIDTH_INCH,
                x: str | Sequence[str] = 'time [s]', y: str | Sequence[str] = '',
                **options: Any) -> tuple[Figure, Panels]:  # of matplotlib, which has many
-    """Return a figure with some panels.
+    """Return a figure with some panels. The default height [inch] is 0.5, plus 1.75 for each row.
 
-    height, width   size of the figure [inch]; the default height is 0.5, plus 1.75 for each row
-    x               label below the last row: one text for all columns, or one for each
-    y               label left of the first column: one text for all rows, or one for each
-    options         arguments of Figure.subplots
+    x         label below the last row: one text for all columns, or one for each
+    y         label left of the first column: one text for all rows, or one for each
+    options   of Figure.subplots
     """
     figure = Figure(figsize=(width, height or 0.5 + 1.75 * rows), layout='constrained')
     axes = figure.subplots(rows, columns, squeeze=False, **options)
@@ -146,8 +144,7 @@ def mark(figure: Figure, events: Sequence['Event']) -> None:
 
 
 def _labels(seen: Sequence[tuple[int, 'Event']], distance: Seconds) -> list[tuple[str, Seconds, str]]:
-    """Return [(text, time, colour)] of the numbers of events; seen: (number, event) in order; distance: smallest
-    distance of two numbers."""
+    """Return (text, time, colour) of the numbers of events; closer events than `distance` share one."""
     groups: list[list[tuple[int, Event]]] = []
     for numbered in seen:
         if groups and numbered[1].t - groups[-1][0][1].t < distance:
@@ -198,10 +195,7 @@ def _dash(lines: Iterable[Line2D]) -> None:
 
 
 def store(figure: Figure, output: pathlib.Path | IO[str], dpi: int = 150) -> None:
-    """Write a figure to a path or to a stream.
-
-    The suffix of the path is the format; PNG and PDF have a white background. A stream receives a transparent SVG.
-    """
+    """Write a figure to a path by its suffix, with a white background; to a stream as a transparent SVG."""
     kind = str(output).rpartition('.')[2] if isinstance(output, pathlib.Path) else 'svg'
     colours = {'transparent': True} if kind == 'svg' else {'facecolor': 'white'}
     figure.savefig(output, format=kind, dpi=dpi, metadata=FILE_METADATA[kind], **colours)
@@ -217,11 +211,7 @@ def render(spec: Spec, data: object, output: pathlib.Path | IO[str]) -> None:
 
 
 def inline(svg: str) -> str:
-    """Return the text of an SVG file as an element of an HTML page.
-
-    The prolog, the names of elements and the metadata are left out. Texts have the colour of the page. Coordinates are
-    cut to 0.01 pt.
-    """
+    """Return the text of an SVG file as an element of an HTML page, with the colour of the page and cut to 0.01 pt."""
     svg = svg[svg.index('<svg'):]
     svg = re.sub(r'<metadata>.*?</metadata>', '', svg, flags=re.DOTALL)
     svg = re.sub(r' xmlns(:xlink)?="[^"]*"', '', svg)

@@ -1,7 +1,4 @@
-"""Figures of a report on the target filter: its errors and stated sigma, its innovations, its motion models.
-
-Each function of FIGURES takes a RecordedRun (`data`).
-"""
+"""Figures of a report on the target filter: its errors and stated sigma, its innovations, its motion models."""
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -69,10 +66,9 @@ def innovations(data: RecordedRun) -> Figure:
 
 
 def _averaged(t: Times, nis: Floats, freedoms: Floats) -> tuple[Times, Floats, Floats, Floats, Floats]:
-    """Return the mean NIS in spans of NIS_SPAN_S: time, mean, expectation, low and high.
+    """Return the mean NIS in spans of NIS_SPAN_S: time, mean, expectation, low and high of a consistent filter.
 
-    t, nis, freedoms: time of the steps, NIS and its degrees of freedom. low and high are the band of a consistent
-    filter. A span with less than half of the largest number of measurements is NaN.
+    A span with less than half of the largest number of measurements is NaN.
     """
     part = np.floor((t - t[0]) / NIS_SPAN_S).astype(int)
     known = np.isfinite(nis)

@@ -9,6 +9,7 @@ import numpy as np
 from pedestal_common.graph import topics
 from pedestal_common.graph.topics import AXES
 from pedestal_common.text_files.files import sha256
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_recording import bag as bags
 from pedestal_recording import recording as recordings
 from pedestal_recording.verify import Report, verify
@@ -27,9 +28,9 @@ PAPER_SCENARIOS = ('uav_flyby',)
 def write(bag_path: str | pathlib.Path, output: str | pathlib.Path | None = None,
           png_folder: str | pathlib.Path | None = None, beam: str = '', author: str = '',
           pdf: bool = False) -> pathlib.Path:
-    """Write the report of a bag, and return the path of its file.
+    """Write the report of a bag, by default report.html in the bag (beside a bare .mcap), and return the path of its
+    file.
 
-    output       file of the report, by default report.html in the bag (beside a bare .mcap)
     png_folder   folder for the figures and the overview as PNG, None for no such files
     beam         name of one of several beams, '' for the first
     author       text on the page, '' for none
@@ -65,7 +66,6 @@ def _of_axes(name: str, values: Sequence[tuple[float, str]], last: str = '') -> 
 
 
 def _pointing(run: RecordedRun, values: results.Values) -> list[list[str]]:
-    """Return the rows of the table of pointing errors and torques."""
     noise = values['single_sample_noise_deg'][0]
 
     def row(name: str, *keys: str, scale: float = 1.0, unit: str = 'deg') -> list[str]:
@@ -87,27 +87,21 @@ def _pointing(run: RecordedRun, values: results.Values) -> list[list[str]]:
 
 
 def _torques(run: RecordedRun) -> list[list[str]]:
-    """Return the rows of the motor torques, [] without them."""
     return [_of_axes(f'torque of motor {i}, rms of the run',
                      [(tracking.known_rms(run.motors[f'{axis}_motor_{i}.effort']), 'Nm') for axis in AXES])
             for i in (1, 2)] if run.motors else []
 
 
 def _labelled(parts: Mapping[str, object], *names: str) -> list[list[str]]:
-    """Return rows [label, number] of results with a label; parts: see results.measured.
-
-    They are the results in names or, without names, all of them.
-    """
+    """Return rows [label, number] of the results in names or, without names, of all results with a label."""
     values = results.measured(parts)
     return [[results.RESULT_BY_NAME[name].label, elements.number(*values[name])] for name in names or values
             if results.RESULT_BY_NAME[name].label]
 
 
 def _loop(bag: bags.Bag, run: RecordedRun, check: Report) -> list[list[str]]:
-    """Return rows on the control loop: its rate by the time of the drive, lost steps, and steps missing in the
-    recording.
-
-    In realtime they also state the rate and the jitter by the wall time.
+    """Return rows on the control loop: its rate by the time of the drive, in realtime also by the wall time with its
+    jitter, lost steps, and steps missing in the recording.
     """
     rows = []
     joints = run.table('joint_states')
@@ -145,13 +139,12 @@ def _not_evaluated(run: tracking.Tracking) -> str:
 
 
 def _results(bag: bags.Bag, run: RecordedRun, check: Report) -> list[str]:
-    """Return the section on the results of the run, against the truth if it was recorded, and on its control loop."""
     parts = ['<h2 id="results">Results</h2>']
     rows: list[list[str]] = []
     if run.no_truth:
         parts.append(f'<p class="bad">No comparison with the truth: {html.escape(run.no_truth)}.</p>')
         if run.motors:
-            parts.append(elements.table(['', 'azimuth', 'elevation', ''], _torques(run), 'n'))
+            parts.append(TextTable(('', 'azimuth', 'elevation', ''), _torques(run)).html('n'))
     else:
         known = run.tracking.parts
         if tracking.by_encoders(bag):
@@ -159,18 +152,17 @@ def _results(bag: bags.Bag, run: RecordedRun, check: Report) -> list[str]:
                          f'{html.escape(tracking.ENCODER_BEAM_NOTE)}.</p>')
         if not run.tracking.tracking.any():
             parts.append(f'<p class="bad">{_not_evaluated(run.tracking)}</p>')
-        parts.append(elements.table(['', 'cross-elevation (azimuth)', 'elevation', 'both axes'],
-                                    _pointing(run, results.measured(known)), 'n'))
+        parts.append(TextTable(('', 'cross-elevation (azimuth)', 'elevation', 'both axes'),
+                               _pointing(run, results.measured(known))).html('n'))
         parts.append('<p class="soft">Pointing and noise are computed over the evaluated part: autotrack, from '
                      f'{tracking.HANDOVER_SETTLING_S:g} s after the first hand-over. "Both axes" pools the samples of '
                      'both axes.</p>')
         rows = _labelled(known, 'pointing_loss_mean_db', 'pointing_loss_max_db', 'single_sample_noise_deg',
                          'lock_time_s', 'autotrack_time_s', 'evaluated_time_s', 'loss_s')
-    return [*parts, elements.table(None, rows + _loop(bag, run, check), 'n')]
+    return [*parts, TextTable(('', ''), rows + _loop(bag, run, check)).html('n')]
 
 
 def _gaps(bag: bags.Bag, check: Report) -> list[str]:
-    """Return the section on the problems of the recording, and on topics without a message."""
     parts = []
     if not check.complete:
         problems = check.problems + [f'{topic.name}: {problem}' for topic in check.topics
@@ -184,7 +176,6 @@ def _gaps(bag: bags.Bag, check: Report) -> list[str]:
 
 
 def _warnings(check: Report) -> list[str]:
-    """Return the warnings at the head of the page: aborted run, lost steps, foreign messages."""
     return [line for line in (check.ending, check.loss, *check.foreign) if line]
 
 
@@ -196,12 +187,11 @@ def _figures(specs: Iterable[figures.Spec], run: RecordedRun, of_paper: bool = F
 
 
 def _events(run: RecordedRun) -> list[str]:
-    """Return the section with the table of the events."""
     title = '<h2 id="events">What happened</h2>'
     if not run.events:
         return [title, '<p class="soft">No event in the bag.</p>']
-    return [title, elements.table(['no.', 'time [s]', 'duration [s]', 'event', 'by', 'what'],
-                                  events.rows(run.events, run.bag.end)),
+    return [title, TextTable(('no.', 'time [s]', 'duration [s]', 'event', 'by', 'what'),
+                             events.rows(run.events, run.bag.end)).html(),
             '<p class="soft">The numbers mark these events on the curves below.</p>']
 
 
@@ -226,7 +216,7 @@ def _consistency_table(known: consistency.Consistency) -> str:
             row('rate error, rms', 'rate_error', unit='deg/s', scale=DEG_PER_RAD),
             row('stated sigma of the rate', 'rate_sigma', unit='deg/s', scale=DEG_PER_RAD)]
     verdicts = ''.join(f'<p>{name.capitalize()}: {html.escape(axis.verdict)}.</p>' for name, axis in zip(AXES, judged))
-    return elements.table(['', 'azimuth', 'elevation', ''], rows, 'n') + verdicts + (
+    return TextTable(('', 'azimuth', 'elevation', ''), rows).html('n') + verdicts + (
         '<p class="soft">Computed over the evaluated part. NIS: squared innovations over their stated variance. NEES: '
         'squared errors against the truth over the stated covariance. On a ship the errors include the attitude error '
         'of the INS, which the target filter does not model.</p>')
@@ -237,7 +227,8 @@ def _deck(run: RecordedRun) -> list[str]:
     if run.attitude is None:
         return []
     return ['<h2 id="attitude">Attitude of the ship</h2>',
-            elements.table(None, _labelled({'attitude': run.attitude}) + _labelled({'isolation': run.isolation}), 'n'),
+            TextTable(('', ''), [*_labelled({'attitude': run.attitude}),
+                                 *_labelled({'isolation': run.isolation})]).html('n'),
             *_figures(run_figures.ATTITUDE_FIGURES, run)]
 
 
@@ -256,7 +247,7 @@ def _diagnostics(statuses: Sequence[Status]) -> list[str]:
         return [title, '<p>None.</p>' if statuses else '<p class="soft">No diagnostics in the bag.</p>']
     shown = [rows[place] for place in sorted(rows)][:MAX_DIAGNOSTICS_ROWS]
     hidden = len(rows) - len(shown)
-    return [title, elements.table(['time [s]', 'node', 'level', 'message'], shown),
+    return [title, TextTable(('time [s]', 'node', 'level', 'message'), shown).html(),
             *([f'<p class="soft">and {hidden} more.</p>'] if hidden else [])]
 
 
@@ -273,20 +264,18 @@ def _provenance_table(bag: bags.Bag, run: RecordedRun, author: str) -> str:
             ['file', f'{", ".join(file.name for file in bag.files)}, '
              f'{sum(file.stat().st_size for file in bag.files) / 1e6:.2f} MB, {stamps.size} messages'],
             ['sha256', ', '.join(map(sha256, bag.files))]]
-    return elements.table(None, rows, 'meta')
+    return TextTable(('', ''), rows).html('meta')
 
 
 def _parameters(bag: bags.Bag) -> list[str]:
-    """Return the section on the parameters that differ from their defaults."""
     title = '<h2 id="parameters">Parameters that differ from their defaults</h2>'
     if not bag.configuration['parameters']:
         return [title, '<p class="soft">The bag states no parameters.</p>']
     rows = subject.changed_parameters(bag)
-    return [title, elements.table(['parameter', 'value', 'default', 'unit'], rows) if rows else '<p>None.</p>']
+    return [title, TextTable(('parameter', 'value', 'default', 'unit'), rows).html() if rows else '<p>None.</p>']
 
 
 def _page(bag: bags.Bag, run: RecordedRun, check: Report, author: str) -> str:
-    """Return the text of the page."""
     scenario = bag.metadata.get('scenario', '')
     name = (scenario or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     of_paper = scenario in PAPER_SCENARIOS

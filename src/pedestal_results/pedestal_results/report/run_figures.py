@@ -1,7 +1,6 @@
 """Figures of a report on a run: pointing, errors, angles, torques, signal, sky plot, modes and INS, in degrees.
 
-Each function of FIGURES takes a RecordedRun (`data`). Functions named draw_ draw into given axes
-of matplotlib, and are also used by the overview.
+Functions named draw_ draw into given axes of matplotlib, and are also used by the overview.
 """
 import functools
 import itertools
@@ -47,9 +46,8 @@ SKY_POINTS = 3000  # largest number of points of a path in the sky plot
 
 
 def _continuous(angle: Floats, beside: Floats | None = None) -> Floats:
-    """Return an angle [rad] in degrees, without jumps at +-180.
-
-    beside: another angle without jumps [deg]. The result is then within half a turn of that angle.
+    """Return an angle [rad] in degrees without jumps at +-180, within half a turn of the angle `beside` [deg] if
+    given.
     """
     angle = np.degrees(angle)
     if beside is not None:
@@ -61,10 +59,7 @@ def _continuous(angle: Floats, beside: Floats | None = None) -> Floats:
 
 
 def _middle(run: Tracking) -> Window:
-    """Return the ZOOM_SPAN_S in the middle of the evaluated part of a Tracking.
-
-    Without an evaluated part it is the middle of the run.
-    """
+    """Return the ZOOM_SPAN_S in the middle of the evaluated part, else in the middle of the run."""
     t = run.t[run.tracking] if run.tracking.any() else run.t
     middle = 0.5 * (t[0] + t[-1])
     return middle - 0.5 * ZOOM_SPAN_S, middle + 0.5 * ZOOM_SPAN_S
@@ -82,10 +77,7 @@ def _slowest(run: Tracking, angles: Pairs) -> Window:
 
 
 def _scale_to(axes: Axes, curves: Sequence[Floats], tracking: Bools, unit: str = '°', centred: bool = True) -> None:
-    """Scale the axes to the evaluated part of curves; add a note if values outside the part leave the frame.
-
-    tracking: the evaluated part; centred: True for a frame with zero in the middle.
-    """
+    """Scale the axes to the evaluated part of curves; add a note if values outside the part leave the frame."""
     whole = np.concatenate([values[np.isfinite(values)] for values in curves])
     shown = np.concatenate([values[tracking & np.isfinite(values)] for values in curves])
     low, high = _frame(shown, centred)
@@ -100,7 +92,6 @@ def _scale_to(axes: Axes, curves: Sequence[Floats], tracking: Bools, unit: str =
 
 
 def _frame(shown: Floats, centred: bool) -> tuple[float, float]:
-    """Return the (lowest, highest) value of a frame around values, equal without a frame."""
     if not shown.size:
         return 0.0, 0.0
     if centred:
@@ -115,10 +106,7 @@ AXIS_TITLES = (('cross-elevation', 'azimuth'), ('elevation', 'elevation'))
 
 
 def draw_errors(axes: Axes, data: RecordedRun, i: int, window: Window | None = None) -> None:
-    """Draw the receiver error and the filtered error [deg]; i: 0 cross-elevation, 1 elevation.
-
-    window: to draw, then together with the true error; None for the whole run.
-    """
+    """Draw the receiver error and the filtered error [deg] of axis i; in a window also the true error."""
     run = data.tracking
     raw, filtered = np.degrees(run.measured[:, i]), np.degrees(run.filtered[:, i])
     draw_line(axes, run.t, raw, window, color=RAW_COLOUR, linewidth=0.7, label='receiver, before the filter')
@@ -133,7 +121,7 @@ def draw_errors(axes: Axes, data: RecordedRun, i: int, window: Window | None = N
 
 
 def error(data: RecordedRun, window: Window | None = None) -> Figure:
-    """Return the figure of receiver error and filtered error on both axes [deg]; window: see `draw_errors`."""
+    """Return the figure of receiver error and filtered error on both axes [deg]."""
     figure, panels = new_panels(2, sharex=True)
     for i in range(2):
         draw_errors(panels[i, 0], data, i, window)
@@ -188,16 +176,12 @@ def azimuth(data: RecordedRun) -> Figure:
 
 
 def _shade_modes(axes: Axes, data: RecordedRun) -> None:
-    """Shade each time by the colour of its mode, and mark the changes of the mode by dotted lines."""
     for start, stop, mode in data.modes:
         axes.axvspan(start, stop, color=MODE_COLOURS.get(mode, RAW_COLOUR), alpha=0.10, linewidth=0.0)
 
 
 def draw_pointing(axes: Axes, data: RecordedRun, i: int) -> None:
-    """Draw the true pointing error [deg]; i: 0 cross-elevation, 1 elevation.
-
-    Dashed lines mark a tenth of the beamwidth.
-    """
+    """Draw the true pointing error [deg] of axis i. Dashed lines mark a tenth of the beamwidth."""
     run = data.tracking
     error = np.degrees(run.error[:, i])
     draw_line(axes, run.t, error, color=TRUTH_COLOUR, linewidth=0.8)
@@ -210,9 +194,8 @@ def draw_pointing(axes: Axes, data: RecordedRun, i: int) -> None:
 
 
 def pointing(data: RecordedRun) -> Figure:
-    """Return the figure of the true pointing error on both axes, and of the angle from the beam to the target [deg].
-
-    The background shows the modes of the ACU.
+    """Return the figure of the true pointing error, and of the angle from the beam to the target [deg], over the
+    modes.
     """
     run = data.tracking
     figure, panels = new_panels(3, sharex=True)
@@ -238,9 +221,8 @@ def _mode_legend(figure: Figure, data: RecordedRun) -> None:
 
 
 def draw_torques(axes: Axes, data: RecordedRun, axis: str, window: Window | None = None) -> None:
-    """Draw the torques of both motors of an axis ('azimuth' or 'elevation'), and their bias torque [Nm].
-
-    Without a window the axes show the torques of the evaluated part, if any.
+    """Draw the torques of both motors of an axis, and their bias torque [Nm]; without a window scaled to the evaluated
+    part.
     """
     motors = existing(data.motors)
     first, second = motors[f'{axis}_motor_1.effort'], motors[f'{axis}_motor_2.effort']
@@ -258,7 +240,6 @@ def draw_torques(axes: Axes, data: RecordedRun, axis: str, window: Window | None
 
 
 def _start(data: RecordedRun) -> Window:
-    """Return the first ZOOM_SPAN_S of the motor torques."""
     start = existing(data.motors)['t'][0]
     return start, start + ZOOM_SPAN_S
 

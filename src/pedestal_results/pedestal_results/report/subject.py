@@ -43,7 +43,6 @@ def date(bag: Bag) -> str:
 
 
 def _utc(seconds: Seconds) -> str:
-    """Return a Unix time as UTC text."""
     return f'{datetime.datetime.fromtimestamp(seconds, datetime.timezone.utc):%Y-%m-%d %H:%M:%S}'
 
 
@@ -87,13 +86,13 @@ def rows(bag: Bag, run: RecordedRun) -> list[list[str]]:
     if not values:
         return beamwidth
     station = [['station', place(target.station)]] if target.kind in STATION_TARGET_KINDS else []
-    return [['target', TARGET_DESCRIPTIONS[target.kind](target)], *_sky(bag, run), *station, *beamwidth]
+    return [['target', TARGET_DESCRIPTIONS[target.kind](target)], *_sky(run), *station, *beamwidth]
 
 
-def _sky(bag: Bag, run: RecordedRun) -> list[list[str]]:
-    """Return rows [name, text] on the UTC at 0 s and on the highest elevation; [] for a target without a date."""
+def _sky(run: RecordedRun) -> list[list[str]]:
+    """Return rows on the UTC at 0 s and on the highest elevation; [] for a target without a date."""
     try:
-        begin = orbit.instant('stamp_0_utc', _begin(bag))
+        begin = orbit.instant('stamp_0_utc', _begin(run))
     except orbit.TargetError:
         return []
     highest = []
@@ -106,7 +105,6 @@ def _sky(bag: Bag, run: RecordedRun) -> list[list[str]]:
     return [['0 s is', f'{begin:%Y-%m-%d %H:%M:%S} UTC'], *highest]
 
 
-def _begin(bag: Bag) -> str:
-    """Return the text of the UTC at 0 s that the receiver states in its diagnostics, '' if it states none."""
-    return next((value.value for _, status in recordings.diagnostics(bag) for value in status.values
+def _begin(run: RecordedRun) -> str:
+    return next((value.value for _, status in recordings.diagnostics(run.bag) for value in status.values
                  if value.key == 'stamp_0_utc'), '')

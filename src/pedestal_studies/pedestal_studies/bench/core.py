@@ -23,8 +23,8 @@ from pedestal_bringup.scenario import scenario
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import build
 from pedestal_common.quantities import AnyRecord, Floats, Json, Records, Row, Times, Vectors3
-from pedestal_results.results import row
-from pedestal_studies.bench import best_of, show
+from pedestal_results.intervals import single
+from pedestal_studies.bench import Measured, best_of
 from pedestal_workbench.trials import ensemble
 
 CORE_DURATION_S, TRIAL_DURATION_S = 20.0, 10.0  # simulated durations of the closed loop and of a trial [s]
@@ -157,9 +157,9 @@ def filter_rows() -> list[Row]:
     rows = []
     for metric, ours, target, theirs in zip(('kalman', 'imm3', 'imm_ukf'), steps, ('<= 2', '<= 10', None),
                                             filterpy_steps()):
-        rows += [row('core', f'{metric}_step_us', ours, 'us', target),
-                 row('filterpy', f'{metric}_step_us', theirs, 'us'),
-                 row('filterpy', f'{metric}_ratio', theirs / ours, '')]
+        rows += [single('core', f'{metric}_step_us', ours, 'us', target),
+                 single('filterpy', f'{metric}_step_us', theirs, 'us'),
+                 single('filterpy', f'{metric}_ratio', theirs / ours, '')]
     return rows
 
 
@@ -188,19 +188,20 @@ def drive_rows() -> list[Row]:
         loops, begun = [closed_loop.Loop(trial) for trial in trials], time.process_time()
         side_by_side.runs(loops, ensemble.MEASURED_TOPICS)
         seconds = min(seconds, time.process_time() - begun)
-    return [row('core', 'substep_ns', substep, 'ns', '<= 45'), row('lanes', 'substep_ns', on_lanes, 'ns', '<= 8'),
-            row('lanes', 'ratio', substep / on_lanes, '-', '>= 4'),
-            row('lanes', 'realtime_factor', lanes.LANE_COUNT * TRIAL_DURATION_S / seconds, '', '>= 1000')]
+    return [single('core', 'substep_ns', substep, 'ns', '<= 45'),
+            single('lanes', 'substep_ns', on_lanes, 'ns', '<= 8'),
+            single('lanes', 'ratio', substep / on_lanes, '-', '>= 4'),
+            single('lanes', 'realtime_factor', lanes.LANE_COUNT * TRIAL_DURATION_S / seconds, '', '>= 1000')]
 
 
-def run() -> list[Row]:
-    """Print the table and return its rows."""
+def run() -> Measured:
+    """Run the benchmark."""
     drives = drive_rows()
     loop = scenario.load('ship_pass', duration=CORE_DURATION_S)
     closed_loop.Loop(loop).run()
     loops = [closed_loop.Loop(loop) for _ in range(5)]
     factor = CORE_DURATION_S / best_of(lambda: loops.pop().run())
 
-    rows = [*drives, row('core', 'realtime_factor', factor, '', '>= 200'), *filter_rows()]
-    show(f'compiled core, one core of {llvmlite.binding.get_host_cpu_name()}, numba {numba.__version__}', rows)
-    return rows
+    rows = [*drives, single('core', 'realtime_factor', factor, '', '>= 200'), *filter_rows()]
+    return Measured(f'compiled core, one core of {llvmlite.binding.get_host_cpu_name()}, numba {numba.__version__}',
+                    rows)

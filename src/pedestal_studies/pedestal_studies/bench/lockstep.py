@@ -14,10 +14,10 @@ from pedestal_bringup.graph import graph
 from pedestal_bringup.graph.start import Outcome
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
-from pedestal_common.quantities import Floats, Row, Seconds
+from pedestal_common.quantities import Floats, Seconds
 from pedestal_recording import bag
-from pedestal_results.results import row
-from pedestal_studies.bench import show
+from pedestal_results.intervals import single
+from pedestal_studies.bench import Measured
 
 ROUND_COUNT = 3  # number of runs in lockstep, of which the median counts
 RUN_DURATION_S, LATENCY_DURATION_S = 15.0, 10.0
@@ -49,16 +49,15 @@ def latencies(path: pathlib.Path) -> Floats:
                      for stamp, published in sent['acu/rate_command'].items() if stamp in sent['joint_states']])
 
 
-def run() -> list[Row]:
-    """Print the table and return its rows."""
+def run() -> Measured:
+    """Run the benchmark."""
     with tempfile.TemporaryDirectory() as folder:
         laps, factors = zip(*(lap(folder, number) for number in range(ROUND_COUNT)))
         result, path = graph_run(folder, 'realtime', 'realtime', LATENCY_DURATION_S)
         latency = latencies(path)
-    rows = [row('graph', 'lap_us', statistics.median(laps), 'us'),
-            row('graph', 'realtime_factor', statistics.median(factors), '', '>= 4'),
-            row('realtime', 'latency_p50_us', float(np.percentile(latency, 50)) * 1e6, 'us'),
-            row('realtime', 'latency_p99_us', float(np.percentile(latency, 99)) * 1e6, 'us'),
-            row('realtime', 'lost_steps', result.drive['lost_steps'], '')]
-    show(f'lockstep ring, median of {ROUND_COUNT} runs, {len(os.sched_getaffinity(0))} cores', rows)
-    return rows
+    rows = [single('graph', 'lap_us', statistics.median(laps), 'us'),
+            single('graph', 'realtime_factor', statistics.median(factors), '', '>= 4'),
+            single('realtime', 'latency_p50_us', float(np.percentile(latency, 50)) * 1e6, 'us'),
+            single('realtime', 'latency_p99_us', float(np.percentile(latency, 99)) * 1e6, 'us'),
+            single('realtime', 'lost_steps', result.drive['lost_steps'], '')]
+    return Measured(f'lockstep ring, median of {ROUND_COUNT} runs, {len(os.sched_getaffinity(0))} cores', rows)

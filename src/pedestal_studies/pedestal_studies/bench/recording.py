@@ -11,12 +11,12 @@ import sys
 import tempfile
 import time
 
-from pedestal_common.quantities import Row, Seconds
+from pedestal_common.quantities import Seconds
 from pedestal_common.wire import messages
 from pedestal_recording import bag
 from pedestal_recording.verify import verify
-from pedestal_results.results import row
-from pedestal_studies.bench import best_of, show
+from pedestal_results.intervals import single
+from pedestal_studies.bench import Measured, best_of
 from pedestal_studies.bench.lockstep import graph_run
 from pedestal_workbench.again import recompute, replay
 
@@ -76,8 +76,8 @@ def disk_rate(folder: str) -> float:
     return DISK_TEST_BYTES / best_of(fill, 3)
 
 
-def run() -> list[Row]:
-    """Print the table and return its rows: the recorder at TRAFFIC_FACTOR and at unlimited rate, verify, recompute."""
+def run() -> Measured:
+    """Measure the recorder at TRAFFIC_FACTOR and at unlimited rate, verify, recompute."""
     with tempfile.TemporaryDirectory() as folder:
         _, path = graph_run(folder, 'demo', 'lockstep', BAG_DURATION_S)
         rate, lost, load = measure_recorder(path, f'{folder}/paced', TRAFFIC_FACTOR)
@@ -90,23 +90,24 @@ def run() -> list[Row]:
         read = count / best_of(lambda: [messages.deserialize(data, kind) for kind, data in raw], 3)
         disk = disk_rate(folder)
         factor = statistics.median(recompute.measure(path) for _ in range(ROUND_COUNT))
-    rows = [row('record', 'messages_per_s', rate, '1/s'), row('record', 'lost', lost, '', '0'),
-            row('record', 'cpu_percent', 100.0 * load, '%'),
-            row('record', 'bytes_per_message', size / count, 'B'),
-            row('record', 'cdr_bytes_per_message', sum(len(data) for _, data in raw) / count, 'B'),
-            row('record', 'limit_messages_per_s', limit, '1/s'), row('record', 'limit_lost', lost_at_limit, '', '0'),
-            row('record', 'disk_messages_per_s', disk / (size / count), '1/s'),
-            row('verify', 'messages_per_s', checked, '1/s'),
-            row('verify', 'scan_messages_per_s', scanned, '1/s'),
-            row('verify', 'deserialise_messages_per_s', read, '1/s'),
-            row('recompute', 'realtime_factor', factor, '', '>= 100')]
-    show(f'bags: {count} messages of the demo, {BAG_DURATION_S:g} s, recorded again at {TRAFFIC_FACTOR:g} x real time',
-         rows)
-    print(f'record: with unlimited rate, the publisher and the recorder together reach {limit:.0f} messages/s, '
-          f'{limit * BAG_DURATION_S / count:.0f} x the demo. The disk ({disk / 1e6:.0f} MB/s) could store '
-          f'{disk * count / size:.0f} messages/s.\n'
-          'The work per message of these two processes is the limit, at '
-          f'{limit * size / count / disk:.2%} of the rate of the disk.\n'
-          f'verify: {checked / scanned:.0%} of the rate at which the messages are found in the file. Deserialisation '
-          f'of all messages would allow {read:.0f} messages/s.')
-    return rows
+    rows = [single('record', 'messages_per_s', rate, '1/s'), single('record', 'lost', lost, '', '0'),
+            single('record', 'cpu_percent', 100.0 * load, '%'),
+            single('record', 'bytes_per_message', size / count, 'B'),
+            single('record', 'cdr_bytes_per_message', sum(len(data) for _, data in raw) / count, 'B'),
+            single('record', 'limit_messages_per_s', limit, '1/s'),
+            single('record', 'limit_lost', lost_at_limit, '', '0'),
+            single('record', 'disk_messages_per_s', disk / (size / count), '1/s'),
+            single('verify', 'messages_per_s', checked, '1/s'),
+            single('verify', 'scan_messages_per_s', scanned, '1/s'),
+            single('verify', 'deserialise_messages_per_s', read, '1/s'),
+            single('recompute', 'realtime_factor', factor, '', '>= 100')]
+    return Measured(
+        f'bags: {count} messages of the demo, {BAG_DURATION_S:g} s, recorded again at {TRAFFIC_FACTOR:g} x real time',
+        rows,
+        f'record: with unlimited rate, the publisher and the recorder together reach {limit:.0f} messages/s, '
+        f'{limit * BAG_DURATION_S / count:.0f} x the demo. The disk ({disk / 1e6:.0f} MB/s) could store '
+        f'{disk * count / size:.0f} messages/s.\n'
+        'The work per message of these two processes is the limit, at '
+        f'{limit * size / count / disk:.2%} of the rate of the disk.\n'
+        f'verify: {checked / scanned:.0%} of the rate at which the messages are found in the file. Deserialisation '
+        f'of all messages would allow {read:.0f} messages/s.')

@@ -14,7 +14,7 @@ from pedestal_common.wire import records
 from pedestal_hardware.monopulse import blocks, sigmf
 from pedestal_hardware.monopulse.params import MonopulseParameters
 from pedestal_hardware.monopulse.unit import ANGLE_ERROR_TOPIC, MonopulseReceiver
-from pedestal_results.results import row
+from pedestal_results.intervals import single
 from pedestal_workbench.again import recompute
 
 
@@ -83,6 +83,6 @@ def main(bag: pathlib.Path, samples: pathlib.Path) -> tuple[list[str], list[Row]
         lines.append(file.cut)
     well = bool(recorded) and not missing and not different
     lines.append(f'{node}: {"identical" if well else "DIFFERS"}')
-    rows = [row(node, name, len(found)) for name, found in (('recorded', recorded), ('different', different),
+    rows = [single(node, name, len(found)) for name, found in (('recorded', recorded), ('different', different),
                                                             ('missing', missing))]
     return lines, rows, well

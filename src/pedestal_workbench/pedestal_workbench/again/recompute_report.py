@@ -10,11 +10,12 @@ from pedestal_common import parameters
 from pedestal_common.graph import topics
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.quantities import Json, Message, Row, Stamps
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_common.wire import commands, messages, records
 from pedestal_recording.verify import steps_before
 from pedestal_recording.writer import Writer
-from pedestal_results import row_text, tracking
-from pedestal_results.results import row
+from pedestal_results import intervals, tracking
+from pedestal_results.intervals import single
 from pedestal_workbench.again import difference, recompute, what_if
 from pedestal_workbench.again.difference import Output
 from pedestal_workbench.again.recompute import FedRecording, Recomputed
@@ -155,16 +156,16 @@ def _against_recorded(recording: FedRecording, done: Recomputed, tolerance: diff
         return _new_numbers(recording, done)
     rows = []
     for topic in compared:
-        rows += [row(done.node, f'{topic.name} recorded', topic.was),
-                 row(done.node, f'{topic.name} recomputed', topic.now),
-                 row(done.node, f'{topic.name} problems', len(topic.problems)),
-                 row(done.node, f'{topic.name} differences', sum(field.different for field in topic.fields))]
+        rows += [single(done.node, f'{topic.name} recorded', topic.was),
+                 single(done.node, f'{topic.name} recomputed', topic.now),
+                 single(done.node, f'{topic.name} problems', len(topic.problems)),
+                 single(done.node, f'{topic.name} differences', sum(field.different for field in topic.fields))]
         for field in topic.fields:
             name = f'{topic.name} {field.name}'
-            rows += [row(done.node, f'{name} different', field.different),
-                     row(done.node, f'{name} beyond tolerance', field.beyond),
-                     row(done.node, f'{name} largest', field.largest),
-                     row(done.node, f'{name} first', field.first, 's')]
+            rows += [single(done.node, f'{name} different', field.different),
+                     single(done.node, f'{name} beyond tolerance', field.beyond),
+                     single(done.node, f'{name} largest', field.largest),
+                     single(done.node, f'{name} first', field.first, 's')]
     equal = all(topic.equal for topic in compared)
     verdict = 'identical' if all(topic.identical for topic in compared) else \
         'equal within tolerance' if equal else 'DIFFERS'
@@ -176,12 +177,13 @@ def _new_numbers(recording: FedRecording, done: Recomputed) -> NodeReport:
     """Return the NodeReport of a node without recorded outputs: the numbers of messages and, for the ACU, results."""
     lines = [f'{done.node}: the recording has no output of the node, so there is no comparison']
     lines += [f'{name:34} {len(output.stamps):9} messages' for name, output in done.outputs.items()]
-    rows = [row(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
+    rows = [single(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
     if done.node == 'acu' and len(done.feed.stamps):
         numbers = what_if.numbers(recording.bag, [done.outputs])
         lines += _encoder_note(recording)
-        lines += [f'{name:42} {row_text.measured(value):>12} {unit}' for name, ((value,), unit) in numbers.items()]
-        rows += [row(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
+        lines += TextTable((('', '<42'), ('', '>12'), ''), [(name, intervals.measured(value), unit)
+                                                           for name, ((value,), unit) in numbers.items()]).lines()
+        rows += [single(done.node, name, value, unit) for name, ((value,), unit) in numbers.items()]
     return NodeReport(lines, rows, done.outputs, done.unit.messages, not done.feed.problem)
 
 
@@ -213,12 +215,13 @@ def _old_against_new(recording: FedRecording, old: Recomputed, new: Recomputed, 
     lines += [line for step, made in new.requests.items() for line in _requests_of_step(new, step, made)]
     rows = []
     if new.node == 'acu' and len(new.feed.stamps):
-        lines += [f'note: {what_if.COMPARISON_NOTE}', *_encoder_note(recording),
-                  f'{"metric":42} {"old":>12} {"new":>12} {"new/old":>9}']
+        cells = []
         for name, ((a, b), unit) in what_if.numbers(recording.bag, [before, new.outputs]).items():
-            ratio = f'{b / a:9.4g}' if a and math.isfinite(b / a) else f'{"":9}'
-            lines.append(f'{name:42} {row_text.measured(a):>12} {row_text.measured(b):>12} {ratio} {unit}'.rstrip())
-            rows += [row(new.node, f'{name} old', a, unit), row(new.node, f'{name} new', b, unit)]
+            ratio = b / a if a and math.isfinite(b / a) else None
+            cells.append((name, intervals.measured(a), intervals.measured(b), ratio, unit))
+            rows += [single(new.node, f'{name} old', a, unit), single(new.node, f'{name} new', b, unit)]
+        table = TextTable((('metric', '<42'), ('old', '>12'), ('new', '>12'), ('new/old', '>9.4g'), ''), cells)
+        lines += [f'note: {what_if.COMPARISON_NOTE}', *_encoder_note(recording), *table.lines()]
     lines += difference.lines([difference.compare(name, before[name], output, tolerance)
                                for name, output in new.outputs.items() if not tolerance.ignores(name)])
     return NodeReport(lines, rows, new.outputs, new.unit.messages)

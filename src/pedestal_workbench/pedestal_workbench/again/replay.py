@@ -17,6 +17,7 @@ from pedestal_common.graph.nodes import Link
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import middleware, shell
 from pedestal_common.quantities import Seconds
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_recording import bag as bags
 from pedestal_workbench.again.player import ANSWER_TOPICS, Player, answer_of
 from pedestal_workbench.again.playlist import Playlist, selected_topics, writes
@@ -56,8 +57,7 @@ class ReplayResult:
 
     def lines(self) -> list[str]:
         """Return the result as lines of text."""
-        width = max(map(len, self.sent))
-        lines = [f'{name:{width}} {count:9}' for name, count in self.sent.items()]
+        lines = TextTable(('', ('', '>9')), self.sent.items()).lines()
         lines += [f'{node} answered {count} of {steps} steps' for node, (count, steps) in self.answers.items()]
         span = self.last - self.first
         factor = f' ({span / self.wall:.3g} x real time)' if self.ended == 'whole' and span > 0.0 else ''

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from pedestal_common.geometry.pointing_report import residual_text
 from pedestal_common.quantities import Ints, Json, Row
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_recording import bag as bags
 from pedestal_results.intervals import estimated, row
 from pedestal_results.tracking import rms
@@ -107,14 +108,15 @@ def term_lines(found: Calibration) -> list[str]:
     """Return the lines of the table of the terms, with a title."""
     measured, fitted = found.offsets, found.fit
     half = fitted.interval * fitted.sigma
-    table = [f'{"term":5} {"value":>10} {"sigma":>9}  {"95 % interval":23} {"unit":4} meaning']
+    rows = []
     for name, value, sigma, width in zip(fitted.names, fitted.values, fitted.sigma, half):
         term = terms.TERM_BY_NAME[name]
-        interval = f'{value - width:.5f} to {value + width:.5f}'
-        table.append(f'{name:5} {value:10.5f} {sigma:9.5f}  {interval:23} {term.unit:4} {term.meaning} '
-                     f'({term.tpoint} of TPOINT)')
+        rows.append((name, value, sigma, f'{value - width:.5f} to {value + width:.5f}', term.unit,
+                     f'{term.meaning} ({term.tpoint} of TPOINT)'))
+    table = TextTable((('term', '<5'), ('value', '>10.5f'), ('sigma', '>9.5f'), ('95 % interval', '<23'),
+                       ('unit', '<4'), 'meaning'), rows)
     return [f'{len(measured.places)} offsets of {measured.source} ({measured.format})'
-            f'{f" of {found.date}" if found.date else ""}, {fitted.form} form', '', *table, '']
+            f'{f" of {found.date}" if found.date else ""}, {fitted.form} form', '', *table.lines(), '']
 
 
 def residual_lines(found: Calibration) -> list[str]:

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 
 from pedestal_common.quantities import Degrees, Pairs
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_results.report import elements
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, Spec, new_panels
 from pedestal_workbench.calibration import terms
@@ -113,10 +114,10 @@ def page(found: 'Calibration', summary: Iterable[str], remarks: Sequence[str], c
         f'<h1>Pointing calibration: {html.escape(measured.source)}</h1>',
         f'<p class="soft">{html.escape(command)}</p>',
         f'<p>{len(measured.places)} offsets{f" of {found.date}" if found.date else ""}, {fitted.form} form.</p>',
-        elements.table(['term', 'value', 'sigma', '95 % interval', 'unit', 'meaning'], table, 'n'),
+        TextTable(('term', 'value', 'sigma', '95 % interval', 'unit', 'meaning'), table).html('n'),
         f'<pre class="wide">{html.escape(chr(10).join(summary))}</pre>',
         *([f'<ul>{"".join(f"<li>{html.escape(line)}</li>" for line in remarks)}</ul>'] if remarks else []),
         *(elements.figure(spec, found) for spec in FIGURES),
-        '<h2>Correlation of the terms</h2>', elements.table(['', *fitted.names], correlation, 'n'),
-        '<h2>Points</h2>', elements.table(['place', 'azimuth', 'elevation', 'xel offset', 'el offset', 'xel residual',
-                                           'el residual', 'xel left out', 'el left out'], points, 'n')])
+        '<h2>Correlation of the terms</h2>', TextTable(('', *fitted.names), correlation).html('n'),
+        '<h2>Points</h2>', TextTable(('place', 'azimuth', 'elevation', 'xel offset', 'el offset', 'xel residual',
+                                        'el residual', 'xel left out', 'el left out'), points).html('n')])

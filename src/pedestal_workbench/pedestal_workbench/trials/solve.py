@@ -69,14 +69,15 @@ class Tried(NamedTuple):
     autotrack [%], None where it is not measured.
     """
     value: float
-    row: Row            # {} if the scenario refused the value
+    row: Row | None     # None if the scenario refused the value
     why: str            # text of the refusal, or ''
     measured: bool      # True if the mean counts, see MIN_MEASURED_SHARE
 
     @property
     def mean(self) -> float:
         """Mean of the result, NaN if it does not count."""
-        return self.row['value'] if self.measured else math.nan
+        value = self.row['value'] if self.row and self.measured else None
+        return math.nan if value is None else value
 
 
 class Solution(NamedTuple):
@@ -158,7 +159,7 @@ class Search:
                 made[value] = self._make_plan([files.override(self._wanted.key, value)])
             except ScenarioError as error:
                 refused[value] = str(error)
-        found = [Tried(value, {}, text, False) for value, text in refused.items()]
+        found = [Tried(value, None, text, False) for value, text in refused.items()]
         with contextlib.ExitStack() as stack:
             tables = [stack.enter_context(ensemble.open_table(plan, self._folder, self._name(value)))
                       for value, plan in made.items()]
@@ -176,9 +177,9 @@ class Search:
         values = table.column(name)
         known = np.isfinite(values)
         estimate = intervals.interval(values[known]) if known.any() else (math.nan,) * 3
-        row = {**intervals.estimated(f'{self._wanted.key}={value:.6g}', f'{nodes.plain(name)}/mean', estimate,
-                                     statistics.unit(name), int(known.sum())),
-               **statistics.coverage_fields(table, name, known), 'tracked_percent': _tracked(table, name)}
+        row: Row = {**intervals.estimated(f'{self._wanted.key}={value:.6g}', f'{nodes.plain(name)}/mean', estimate,
+                                          statistics.unit(name), int(known.sum())),
+                    **statistics.coverage_fields(table, name, known), 'tracked_percent': _tracked(table, name)}
         return Tried(value, row, '', bool(known.mean() >= MIN_MEASURED_SHARE))
 
     def run(self) -> Solution:
@@ -201,7 +202,7 @@ class Search:
         value = round(value) if wanted.whole else value
         return Solution(value, self.tried, f'{wanted.key} = {value:.4g} {wanted.unit}'.rstrip()
                         + f': {what} is reached between {low.value:.4g} and {high.value:.4g}, with '
-                        f'{statistics.coverage(low.row)} trials{_losses(low, high)}{self._gaps()}')
+                        f'{reason(low)} trials{_losses(low, high)}{self._gaps()}')
 
     def _crossings(self, tried: Sequence[Tried]) -> list[tuple[Tried, Tried]]:
         """Return the pairs of neighbours whose means lie on different sides of the limit.
@@ -277,11 +278,10 @@ class Search:
 
 def _losses(low: Tried, high: Tried) -> str:
     """Return a warning if the trials at one of two values have lost the target for a part of the time, else ''."""
-    known = [one for one in (low, high) if one.row['tracked_percent'] is not None]
-    worst = min(known, key=lambda one: one.row['tracked_percent'], default=None)
-    if worst is None or worst.row['tracked_percent'] >= MIN_TRACKED_PERCENT:
-        return ''
-    return f'; at {worst.value:.4g} the target is tracked for {worst.row["tracked_percent"]:.3g} % of the time only'
+    known = [(one.row['tracked_percent'], one.value) for one in (low, high) if one.row]
+    share, value = min(((share, value) for share, value in known if share is not None), default=(math.inf, math.nan))
+    return f'; at {value:.4g} the target is tracked for {share:.3g} % of the time only' if (
+        share < MIN_TRACKED_PERCENT) else ''
 
 
 def _tracked(table: Table, name: str) -> float | None:
@@ -294,4 +294,4 @@ def _tracked(table: Table, name: str) -> float | None:
 
 def reason(one: Tried) -> str:
     """Return the text on the trials at a value: the refusal of the value, or the number of trials with the result."""
-    return one.why or statistics.coverage(one.row)
+    return statistics.coverage(one.row) if one.row else one.why

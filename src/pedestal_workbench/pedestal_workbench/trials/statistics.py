@@ -31,7 +31,7 @@ from scipy import optimize, stats
 
 from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
-from pedestal_common.quantities import Bools, Estimate, Floats, Ints, Json, Row
+from pedestal_common.quantities import Bools, Coverage, Estimate, Floats, Ints, Row
 from pedestal_results import intervals, results, verdict
 from pedestal_workbench.trials.table import Table
 
@@ -122,7 +122,7 @@ def of_requirements(case: str, table: Table, requirements: Iterable[Requirement]
 
     A trial without the result does not meet its criterion. Each row also has the fields of coverage_fields.
     """
-    found = []
+    found: list[Row] = []
     for required in requirements:
         for name in table.results:
             own, metric = case_of(case, name)
@@ -208,7 +208,7 @@ def case_of(case: str, name: str) -> tuple[str, str]:
     return f'{case}/{beam}'.rstrip('/'), plain
 
 
-def coverage_fields(table: Table, name: str, known: Bools) -> dict[str, Json]:
+def coverage_fields(table: Table, name: str, known: Bools) -> Coverage:
     """Return the fields `of` and `left_out` of a row of --json, which state how many trials have a result.
 
     name: column of the result; known: mask (n,) of the trials with the result. `of` is the number of all trials.
@@ -245,7 +245,7 @@ def of_results(case: str, table: Table) -> list[Row]:
 
     Each row also has the fields of coverage_fields.
     """
-    found = []
+    found: list[Row] = []
     for name in table.measured_results:
         values = table.column(name)
         known = np.isfinite(values)

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import nodes
 from pedestal_common.quantities import Floats, Row
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_results import tracking
 from pedestal_results.report import elements
 from pedestal_results.report.figures import (
@@ -168,7 +169,7 @@ def _estimates(rows: Sequence[Row], head: Sequence[str]) -> str:
                                                           row['unit']),
               '' if row['ci_low'] is None and row['ci_high'] is None else
               f'{_bound(row["ci_low"])} to {_bound(row["ci_high"])}', statistics.coverage(row)] for row in rows]
-    return elements.table(head, lines)
+    return TextTable(head, lines).html()
 
 
 def _bound(value: float | None) -> str:
@@ -182,11 +183,11 @@ def page(trials: Trials, rows: Sequence[Row]) -> str:
     worst = [[f'trial {i}', elements.number(values[i], statistics.unit(trials.by)), trials.plan.command(i)]
              for i in trials.worst]
     head = ['case', 'metric', 'value', '95 % interval', 'trials']
-    parts = [f'<h1>{html.escape(title)}</h1>', elements.table(None, [['made by', trials.command]], 'meta')]
+    parts = [f'<h1>{html.escape(title)}</h1>', TextTable(('', ''), [['made by', trials.command]]).html('meta')]
     parts += [f'<p><b>{html.escape(line)}</b></p>' for line in trials.sentences]
     parts += ['<h2 id="figures">Figures</h2>', *(elements.figure(spec, trials, reason)
                                                 for spec, reason in _figures(trials)),
               f'<h2 id="worst-trials">Worst trials by {html.escape(trials.by)}</h2>',
-              elements.table(['trial', trials.by, 'command that runs the same trial in the graph'], worst),
+              TextTable(('trial', trials.by, 'command that runs the same trial in the graph'), worst).html(),
               '<h2 id="numbers">Numbers</h2>', _estimates(rows, head)]
     return elements.page(title, parts)

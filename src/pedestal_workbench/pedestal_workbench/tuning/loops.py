@@ -69,6 +69,7 @@ from pedestal_common.quantities import (
     Seconds,
 )
 from pedestal_common.text_files import parameter_file
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_recording import configuration
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.tuning import frequency_response as frequency
@@ -448,21 +449,21 @@ def table(rows: Iterable[LoopRow], required: LoopRequirements) -> list[str]:
 
     rows: as of `design`.
     """
-    width = max(20, *(len(f'{name} {loop}') for loop, name, *_ in rows))
-    lines = [f'{"loop":{width}} {"required":>9} {"crossover":>10} {"bandwidth":>10} {"phase margin":>21} '
-             f'{"gain margin":>20}']
+    cells = []
     for loop, name, wanted, margins in rows:
         values = {key: value for key, (value, _) in margins.items()}
         limits = required.phase_margin, required.gain_margin
         floor = [f'(>= {limit:g})' for limit in limits] if loop != 'current' else ('', '')
-        lines.append(f'{f"{name} {loop}":{width}} {wanted:6.3g} Hz {_text(values["crossover_hz"], "Hz", 10)} '
-                     f'{_text(values["bandwidth_hz"], "Hz", 10)} {_text(values["phase_margin_deg"], "deg", 13)} '
-                     f'{floor[0]:>7} {_text(values["gain_margin_db"], "dB", 12)} {floor[1]:>7}'.rstrip())
-    return lines
+        cells.append((f'{name} {loop}', f'{wanted:.3g} Hz', _text(values['crossover_hz'], 'Hz'),
+                      _text(values['bandwidth_hz'], 'Hz'),
+                      f'{_text(values["phase_margin_deg"], "deg")} {floor[0]:>7}',
+                      f'{_text(values["gain_margin_db"], "dB")} {floor[1]:>7}'))
+    return TextTable((('loop', '<20'), ('required', '>9'), ('crossover', '>10'), ('bandwidth', '>10'),
+                      ('phase margin', '>21'), ('gain margin', '>20')), cells).lines()
 
 
-def _text(value: float, unit: str, width: int) -> str:
-    return f'{f"{value:.3g} {unit}" if math.isfinite(value) else "none":>{width}}'
+def _text(value: float, unit: str) -> str:
+    return f'{value:.3g} {unit}' if math.isfinite(value) else 'none'
 
 
 def remarks(loops: Loops, rows: Sequence[LoopRow]) -> list[str]:

@@ -39,6 +39,7 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node.unit import Unit
 from pedestal_common.quantities import Floats, Json, Pair, Pairs, Records, Seconds
 from pedestal_common.text_files import parameter_file
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_common.wire import records
 from pedestal_recording import configuration
 from pedestal_results.tracking import HANDOVER_SETTLING_S
@@ -379,8 +380,8 @@ def _table(source: Source, old: Score, new: Score, axes: Collection[str]) -> lis
                      (f'{axis}: {source.kept}', old.kept[i], new.kept[i], source.unit),
                      (f'{axis}: NIS mean', old.nis[i], new.nis[i], '')]
     rows += [(name, value, new.pointing[name][0], unit) for name, (value, unit) in old.pointing.items()]
-    lines = [f'{"":52} {"old":>11} {"new":>11}']
-    return lines + [f'{name:52} {_text(a):>11} {_text(b):>11} {unit}'.rstrip() for name, a, b, unit in rows]
+    return TextTable((('', '<52'), ('old', '>11'), ('new', '>11'), ''),
+                     [(name, _text(a), _text(b), unit) for name, a, b, unit in rows]).lines()
 
 
 def _remarks(source: Source, old: Score, new: Score, axes: Iterable[str], settings: Mapping[str, Json]) -> list[str]:

@@ -20,6 +20,7 @@ from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import as_dict, build, defaults
 from pedestal_common.quantities import Json, Pairs, Row
 from pedestal_common.text_files import parameter_file
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_recording import bag as bags
 from pedestal_recording import recording as recordings
 from pedestal_results import intervals
@@ -134,13 +135,14 @@ def lines(result: Identified) -> list[str]:
     """Return the lines of the table, with the torque errors and remarks."""
     drive, listed = as_dict(result.recordings[0].drive), []
     for name, found in result.found.items():
-        listed += [f'{name:17} {"nominal":>11} {"identified":>11}  {"95 % interval":26} {"unit":8} meaning']
+        cells = []
         for key, (value, low, high) in found.items():
             parameter = twin.PARAMETER_NAMES.get(key)
             nominal = f'{drive[f"{name}.{parameter}"]:.5g}' if parameter else ''
             interval = f'{low:.5g} to {high:.5g}' if math.isfinite(low) else ''
-            listed.append(f'  {key:16}{nominal:>11} {value:11.5g}  {interval:26} {QUANTITIES[key][0]:8} '
-                          f'{QUANTITIES[key][1]}')
+            cells.append((f'  {key}', nominal, value, interval, *QUANTITIES[key]))
+        listed += TextTable(((name, '<17'), ('nominal', '>11'), ('identified', '>11.5g'), ('95 % interval', '<26'),
+                             ('unit', '<8'), 'meaning'), cells).lines()
         chosen = f', {100.0 * result.after[name]:.1f} % with the chosen values' if result.kept[name] else ''
         listed += [f'  torque of the twin is off by {100.0 * result.before[name]:.1f} % rms with nominal values, '
                    f'{100.0 * result.identified[name]:.1f} % with identified values{chosen} '

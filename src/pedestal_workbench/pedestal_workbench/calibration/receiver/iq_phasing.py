@@ -17,6 +17,7 @@ from equipment_sim.iq.unit import SimulatedIq
 from pedestal_bringup.loop import iq_run, memory_recording
 from pedestal_common.graph import nodes
 from pedestal_common.quantities import Complexes, Floats, Json, Pair, Pairs, Radians, Row
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_hardware.monopulse import sigmf
 from pedestal_hardware.monopulse.params import THREE_CHANNELS, MonopulseParameters
 from pedestal_recording import recording as recordings
@@ -124,15 +125,15 @@ def rows(found: IqPhasing) -> list[Row]:
 
 def table(found: IqPhasing) -> list[str]:
     """Return the lines of the table of the calibration matrix: in force, new, and the intervals of the new one."""
-    lines = [f'{"element":8} {"in force: gain":>15} {"phase":>9}   {"new: gain":>9}  {"95 % interval":16} '
-             f'{"phase":>11}  95 % interval']
+    rows = []
     for name, value, half, phase_half, in_force in _elements(found):
         gain, phase, phase_half = abs(value), math.degrees(cmath.phase(value)), math.degrees(phase_half)
         interval = f'{max(gain - half, 0.0):.4f} to {gain + half:.4f}'
         interval_of_phase = f'{phase - phase_half:.1f} to {phase + phase_half:.1f}' if phase_half < 180.0 else 'any'
-        lines.append(f'{name:8} {abs(in_force):15.4f} {math.degrees(cmath.phase(in_force)):5.1f} deg   {gain:9.4f}  '
-                     f'{interval:16} {phase:7.1f} deg  {interval_of_phase}')
-    return lines
+        rows.append((name, abs(in_force), f'{math.degrees(cmath.phase(in_force)):.1f} deg', gain, interval,
+                     f'{phase:.1f} deg', interval_of_phase))
+    return TextTable((('element', '<8'), ('in force: gain', '>15.4f'), ('phase', '>9'), ('new: gain', '>11.4f'),
+                      ('95 % interval', '<16'), ('phase', '>11'), '95 % interval'), rows).lines()
 
 
 def summary(found: IqPhasing) -> list[str]:

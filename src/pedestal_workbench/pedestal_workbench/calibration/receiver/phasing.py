@@ -12,6 +12,7 @@ import numpy as np
 
 from acu_tracker.params import AcuParameters
 from pedestal_common.quantities import Floats, Json, Pair, Row
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import intervals, tracking
@@ -96,16 +97,16 @@ def passed(found: 'Phasing | IqPhasing') -> bool:
 def table(found: Phasing) -> list[str]:
     """Return the lines of the table of slopes, matrix in force and new matrix."""
     slopes = found.slopes
-    lines = [f'{"element":8} {"slope C":>9}  {"95 % interval":19} {"in force":>9} {"new matrix":>11}  meaning']
+    rows = []
     meanings = (('slope of cross-elevation', 'elevation offset in the cross-elevation error'),
                 ('cross-elevation offset in the elevation error', 'slope of elevation'))
     for i, names in enumerate(tracking.ERROR_MATRIX_NAMES):
         for j, name in enumerate(names):
             value, half = slopes.C[i, j], slopes.half[i, j]
-            interval = f'{value - half:.4f} to {value + half:.4f}'
-            lines.append(f'{name:8} {value:9.4f}  {interval:19} {found.in_force[i, j]:9.4f} '
-                         f'{slopes.matrix[i, j]:11.4f}  {meanings[i][j]}')
-    return lines
+            rows.append((name, value, f'{value - half:.4f} to {value + half:.4f}', found.in_force[i, j],
+                         slopes.matrix[i, j], meanings[i][j]))
+    return TextTable((('element', '<8'), ('slope C', '>9.4f'), ('95 % interval', '<19'), ('in force', '>9.4f'),
+                      ('new matrix', '>11.4f'), 'meaning'), rows).lines()
 
 
 def summary(found: Phasing) -> list[str]:

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pedestal_common.quantities import Pairs
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_results.report import elements
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, Spec, new_panels
 from pedestal_workbench.calibration.receiver.offsets import Points
@@ -84,4 +85,4 @@ def laid_out(found: 'Phasing | IqPhasing', figures: Iterable[Spec], printed: Ite
         f'<pre class="wide">{html.escape(chr(10).join(printed))}</pre>',
         *(elements.figure(spec, found) for spec in figures),
         f'<h2>{heading}</h2>',
-        elements.table(list(columns), points, 'n')])
+        TextTable(list(columns), points).html('n')])
