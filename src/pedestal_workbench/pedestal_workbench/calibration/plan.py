@@ -7,7 +7,7 @@ import numpy as np
 from pedestal_bringup.scenario import scenario
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Degrees, Pairs
-from pedestal_workbench.calibration import distribution, fit, terms
+from pedestal_workbench.calibration import fit, terms
 
 MAX_POINTS = 500  # largest number of directions of a plan
 TRAVEL_RANGE_DEG = (-270.0, 270.0)  # travel of the azimuth axis without a scenario [deg]
@@ -26,13 +26,13 @@ def directions(count: int, azimuths: tuple[Degrees, Degrees] = TRAVEL_RANGE_DEG,
     and the elevation. A travel of more than a turn is covered as a whole, so a part of the sky is measured in both
     turns of the wrap. Raises ValueError.
     """
-    if not distribution.MIN_POINTS <= count <= MAX_POINTS:
-        raise ValueError(f'--plan {count}: must be {distribution.MIN_POINTS} to {MAX_POINTS}')
+    if not fit.MIN_POINTS <= count <= MAX_POINTS:
+        raise ValueError(f'--plan {count}: must be {fit.MIN_POINTS} to {MAX_POINTS}')
     low, high = azimuths[0] + EDGE_DEG, azimuths[1] - EDGE_DEG
     lowest, highest = (float(np.clip(edge, elevations[0] + EDGE_DEG, elevations[1] - EDGE_DEG))
                        for edge in PLAN_ELEVATION_RANGE_DEG)
-    if (high - low < 360.0 - distribution.MAX_AZIMUTH_GAP_DEG
-            or highest - lowest < distribution.MIN_ELEVATION_SPAN_DEG):
+    if (high - low < 360.0 - fit.MAX_AZIMUTH_GAP_DEG
+            or highest - lowest < fit.MIN_ELEVATION_SPAN_DEG):
         raise ValueError(f'--plan {count}: the travel, azimuth {azimuths[0]:.4g} to {azimuths[1]:.4g} deg and '
                          f'elevation {elevations[0]:.4g} to {elevations[1]:.4g} deg, is too small for a model')
     i = np.arange(count)

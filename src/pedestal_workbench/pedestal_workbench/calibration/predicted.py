@@ -20,13 +20,10 @@ from pedestal_common.wire import messages
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import known_attitude, mode_pointing
+from pedestal_workbench.calibration.calibration import CalibrationError
 
 PROGRAM_TOPIC, S_PER_NS = 'acu/program_track', 1e-9
 TABLE_MODES = tuple(row.name for row in MODE_ROWS if row.table)  # modes that follow a table
-
-
-class PredictionError(ValueError):
-    """Error of a recording without a prediction. Its text is one line."""
 
 
 @compiled
@@ -114,7 +111,7 @@ def followed(bag: Recording, modes: Texts, tracks: Sequence[ProgramTrack]) -> Te
 def on_deck(bag: Recording, t: Times, tracks: Sequence[ProgramTrack], modes: Texts) -> Pairs:
     """Return the predicted deck angles [rad] at the steps; NaN where nothing is predicted.
 
-    tracks: of `programs`; modes: of the steps. Raises PredictionError for predictions that need more than the
+    tracks: of `programs`; modes: of the steps. Raises CalibrationError for predictions that need more than the
     recording.
     """
     tables, out = followed(bag, modes, tracks), np.full((t.size, 2), np.nan)
@@ -124,7 +121,7 @@ def on_deck(bag: Recording, t: Times, tracks: Sequence[ProgramTrack], modes: Tex
         try:
             predictor = mode_pointing.predictor_of(bag, recordings.parameters(bag, 'acu'))
         except ParameterError as error:
-            raise PredictionError(str(error)) from None
+            raise CalibrationError(str(error)) from None
         for mode, angles in (('tle', lambda times: _satellite(bag, predictor, times)), ('sun', predictor.sun_angles)):
             if (tables == mode).any():
                 out[tables == mode] = angles(t[tables == mode])

@@ -13,13 +13,10 @@ from adu_drive.params import AxisParameters
 from pedestal_common.quantities import Floats, Pairs, Times
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
+from pedestal_workbench.calibration.calibration import CalibrationError
 
 SMOOTHING_S = 0.012  # standard deviation of the Gaussian of the smoothing filter [s]
 MOVING_RATE_RAD_S = 2e-4  # least rate of a moving axis [rad/s]
-
-
-class MotionError(ValueError):
-    """Error of a recording that allows no calibration of the drive. Its text is one line."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,9 +48,9 @@ class Motion:
 
 
 def read(bag: Recording, name: str, axis: AxisParameters) -> Motion:
-    """Return the motion of the axis `name` in a recording. Raises MotionError."""
+    """Return the motion of the axis `name` in a recording. Raises CalibrationError."""
     if missing := recordings.missing(bag, 'joint_states', 'adu/motor_states'):
-        raise MotionError(f'the recording holds no {missing}')
+        raise CalibrationError(f'the recording holds no {missing}')
     joints = bag.table('joint_states')
     t = joints['t']
     columns = [f'{name}_motor_{k}.{column}' for column in ('position', 'effort') for k in (1, 2)]
@@ -61,7 +58,7 @@ def read(bag: Recording, name: str, axis: AxisParameters) -> Motion:
     theta = joints[f'{name}.position']
     if not (np.isfinite(motors).all() and np.isfinite(theta).all()):
         at = t[~(np.isfinite(motors).all(1) & np.isfinite(theta))][0]
-        raise MotionError(f'{name}: an angle or a torque is missing or NaN at {at:.3f} s')
+        raise CalibrationError(f'{name}: an angle or a torque is missing or NaN at {at:.3f} s')
     return smoothed(t, theta, motors, axis.gear_train.ratio)
 
 
@@ -72,11 +69,11 @@ def smoothed(t: Times, theta: Floats, motors: Floats, ratio: float) -> Motion:
     motors (n, 4)  angles [rad] and torques [Nm] of motors 1 and 2 on the motor shaft
     ratio          turns of the motor per turn of the axis
 
-    Raises MotionError for missing steps.
+    Raises CalibrationError for missing steps.
     """
     period = float(np.median(np.diff(t)))
     if not np.allclose(np.diff(t), period, rtol=0.0, atol=0.1 * period):
-        raise MotionError(f'the steps of the recording are not {period:g} s apart; steps are missing')
+        raise CalibrationError(f'the steps of the recording are not {period:g} s apart; steps are missing')
     smooth = gaussian_filter1d(np.column_stack((theta, motors)), SMOOTHING_S / period, axis=0, mode='nearest')
     # Central differences: those of a straight line and of a parabola are exact, whatever the angle is.
     rate, acceleration = np.zeros_like(smooth[:, :3]), np.zeros_like(smooth[:, :3])

@@ -19,6 +19,7 @@ from pedestal_common.parameters import as_dict, build
 from pedestal_common.quantities import Estimate, Floats, Json, KilogramMeters2, Pair, Pairs, Radians, Vectors3
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
+from pedestal_workbench.calibration.calibration import CalibrationError
 from pedestal_workbench.calibration.drive import estimates, mode, motion_data
 from pedestal_workbench.calibration.drive.estimates import Estimates
 from pedestal_workbench.calibration.drive.motion_data import Motion
@@ -54,13 +55,13 @@ class DriveRecording:
 
 
 def read(bag: Recording, drive: AduParameters) -> DriveRecording:
-    """Return what a calibration takes from a recording of one beam. Raises MotionError."""
+    """Return what a calibration takes from a recording of one beam. Raises CalibrationError."""
     if 'ship/imu/data' in bag.topics:
-        raise motion_data.MotionError('the recording is of a ship, whose motion moves the axes too')
+        raise CalibrationError('the recording is of a ship, whose motion moves the axes too')
     states = bag.table('adu/state')['data'] if 'adu/state' in bag.topics else ()
     wrong = [text for text in states if text != 'enabled']
     if wrong:
-        raise motion_data.MotionError(f'the drive was not enabled all the time; it reported {wrong[0]!r}')
+        raise CalibrationError(f'the drive was not enabled all the time; it reported {wrong[0]!r}')
     motions = {name: motion_data.read(bag, name, getattr(drive, name)) for name in AXES}
     joints = bag.table('joint_states')
     columns = [f'{name}.{kind}' for kind in ('velocity', 'effort') for name in AXES]

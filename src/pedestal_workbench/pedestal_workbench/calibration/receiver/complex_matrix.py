@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from pedestal_common.quantities import Complexes, Floats, Pairs
+from pedestal_workbench.calibration.calibration import CalibrationError
 from pedestal_workbench.calibration.receiver import matrix
 
 MAX_INTERVAL_SHARE = 0.5
@@ -23,13 +24,13 @@ PHASE_OFF_DEG, REVERSED_DEG = 10.0, 135.0
 
 
 def fit(offsets: Pairs, ratios: Complexes) -> matrix.ComplexSlopes:
-    """Return the slopes of complex ratios (n, 2) over k_m at offsets [beamwidths]. Raises MatrixError."""
+    """Return the slopes of complex ratios (n, 2) over k_m at offsets [beamwidths]. Raises CalibrationError."""
     found = matrix.least_squares(offsets, ratios)
     smallest = np.linalg.svd(found.C, compute_uv=False)[-1]
     if not found.half.max() <= MAX_INTERVAL_SHARE * smallest:
-        raise matrix.MatrixError('the ratios of difference and sum hardly follow the offsets: smallest slope '
-                                 f'{smallest:.3g} +- {found.half.max():.2g} k_m; a difference channel may be missing, '
-                                 'or contain the signal of the other')
+        raise CalibrationError('the ratios of difference and sum hardly follow the offsets: smallest slope '
+                               f'{smallest:.3g} +- {found.half.max():.2g} k_m; a difference channel may be missing, '
+                               'or contain the signal of the other')
     return found
 
 

@@ -25,6 +25,7 @@ from scipy.special import stdtrit
 
 from pedestal_common.quantities import Complexes, Decibels, Floats, Pair, Pairs, Radians
 from pedestal_results.intervals import CONFIDENCE_LEVEL
+from pedestal_workbench.calibration.calibration import CalibrationError
 
 SMALLEST_OFFSET_BEAMWIDTHS = 0.05  # offset below which the weight of a point does not grow further [beamwidths]
 MIN_SLOPE = 0.2  # least root of the determinant of C [-]. Below it the receiver hardly measures the offsets.
@@ -41,10 +42,6 @@ BOTH_NEGATIVE_TEXT = ('180 deg: both slopes are negative; the phase of the sum c
                       'off by 180 deg')
 REVERSED_SIGN_TEXT = 'reversed sign: the slope of {} is negative'
 """Sentences on the faults of both signs and of one sign."""
-
-
-class MatrixError(ValueError):
-    """Error of offsets from which no matrix can be computed. Its text is one line."""
 
 
 _Number = TypeVar('_Number', np.float64, np.complex128)
@@ -74,13 +71,15 @@ ComplexSlopes: TypeAlias = Slopes[np.complex128]
 
 
 def least_squares(offsets: Pairs, errors: NDArray[_Number]) -> Slopes[_Number]:
-    """Return the slopes of real or complex errors (n, 2) at offsets, both [beamwidths]. Raises MatrixError for offsets
-    on one line."""
+    """Return the slopes of real or complex errors (n, 2) at offsets, both [beamwidths].
+
+    Raises CalibrationError for offsets on one line.
+    """
     size = np.maximum(np.hypot(*offsets.T), SMALLEST_OFFSET_BEAMWIDTHS)[:, np.newaxis]
     A = np.column_stack((offsets, np.ones(len(offsets)))) / size
     solution, _, rank, _ = np.linalg.lstsq(A, errors / size, rcond=None)
     if rank < A.shape[1]:
-        raise MatrixError('the offsets are on one line, and cannot tell slope and cross-talk apart')
+        raise CalibrationError('the offsets are on one line, and cannot tell slope and cross-talk apart')
     residuals = errors / size - A @ solution
     # A complex number counts as two real numbers, with the same variance.
     degrees = max(len(offsets) - A.shape[1], 1) * (2 if np.iscomplexobj(errors) else 1)
@@ -91,12 +90,12 @@ def least_squares(offsets: Pairs, errors: NDArray[_Number]) -> Slopes[_Number]:
 
 
 def fit(offsets: Pairs, errors: Pairs) -> RealSlopes:
-    """Return the slopes of errors at offsets, both [beamwidths]. Raises MatrixError."""
+    """Return the slopes of errors at offsets, both [beamwidths]. Raises CalibrationError."""
     found = least_squares(offsets, errors)
     if found.gain < MIN_SLOPE:
-        raise MatrixError(f'the errors hardly follow the offsets: mean slope {found.gain:.3g}, must be at least '
-                          f'{MIN_SLOPE:g}; the phase of both channels may be off by 90 deg, or the receiver follows '
-                          'another signal')
+        raise CalibrationError(f'the errors hardly follow the offsets: mean slope {found.gain:.3g}, must be at least '
+                               f'{MIN_SLOPE:g}; the phase of both channels may be off by 90 deg, or the receiver '
+                               'follows another signal')
     return found
 
 
@@ -132,14 +131,9 @@ def explained(C: Floats) -> Explanation:
     return min(cases, key=cost)
 
 
-def turn(C: Floats) -> Radians:
-    """Return the angle by which a matrix C turns the axes of the errors, after signs and channels are right."""
-    return explained(C).angle
-
-
 def turned_axes(C: Floats) -> list[str]:
     """Return a list with the sentence on the turn of a matrix C, empty up to TURNED_AXES_DEG."""
-    angle = math.degrees(turn(C))
+    angle = math.degrees(explained(C).angle)
     if not abs(angle) > TURNED_AXES_DEG:
         return []
     return [f'turned axes: the axes of the errors are turned by {angle:.1f} deg']

@@ -27,7 +27,8 @@ from scipy.special import stdtrit
 
 from pedestal_common.quantities import Bools, Decibels, Degrees, Floats, Hertz, Pair, Pairs
 from pedestal_results.intervals import CONFIDENCE_LEVEL
-from pedestal_workbench.calibration.sensitivity.levels import LevelError, Levels
+from pedestal_workbench.calibration.calibration import CalibrationError
+from pedestal_workbench.calibration.sensitivity.levels import Levels
 
 MIN_SHARE = 0.25  # least power above P_0 that is fitted, as a share of the highest [-]
 MIN_LEVELS = 7  # smallest number of fitted levels: two more than the unknowns
@@ -77,7 +78,7 @@ def pattern(offsets: Pairs, place: Pair, width: Pair, points: Pairs) -> Floats:
 
 
 def fit(levels: Levels, diameter: Degrees) -> Beam:
-    """Return the beam of levels about a source of a diameter. Raises LevelError."""
+    """Return the beam of levels about a source of a diameter. Raises CalibrationError."""
     points, offsets = disk(diameter), levels.offsets
     floor = 0.0 if levels.of_source else float(levels.power.min())
     found = _fit(offsets, levels.power, floor, points)
@@ -86,8 +87,8 @@ def fit(levels: Levels, diameter: Degrees) -> Beam:
     width = max(found.width)
     off = np.hypot(*(offsets - found.place).T) > OFF_BEAMWIDTHS * width + 0.5 * diameter
     if not off.any():
-        raise LevelError(f'no level off the source, must be at least 1 further than '
-                         f'{OFF_BEAMWIDTHS * width + 0.5 * diameter:.3g} deg from it')
+        raise CalibrationError('no level off the source, must be at least 1 further than '
+                               f'{OFF_BEAMWIDTHS * width + 0.5 * diameter:.3g} deg from it')
     return _fit(offsets, levels.power, float(levels.power[off].mean()), points)
 
 
@@ -96,15 +97,15 @@ def _fit(offsets: Pairs, power: Floats, floor: float, points: Pairs) -> Beam:
     above = power - floor
     used = above > MIN_SHARE * above.max()
     if floor and above.max() < (10.0**(0.1 * MIN_Y_DB) - 1.0) * floor:
-        raise LevelError(f'Y factor {10.0 * math.log10(power.max() / floor):.2g} dB, must be at least '
-                         f'{MIN_Y_DB:g} dB')
+        raise CalibrationError(f'Y factor {10.0 * math.log10(power.max() / floor):.2g} dB, must be at least '
+                               f'{MIN_Y_DB:g} dB')
     if used.sum() < MIN_LEVELS or min(np.ptp(offsets[used], axis=0)) == 0.0:
-        raise LevelError(f'{used.sum()} levels above {MIN_SHARE:g} of the highest, must be at least {MIN_LEVELS}, '
-                         'with offsets on both axes')
+        raise CalibrationError(f'{used.sum()} levels above {MIN_SHARE:g} of the highest, must be at least '
+                               f'{MIN_LEVELS}, with offsets on both axes')
     x, P = offsets[used], above[used]
     low, high, top = x.min(0), x.max(0), x[np.argmax(P)]
     if not ((low < top) & (top < high)).all():
-        raise LevelError('the highest level is at the edge of the scanned area; scan a wider one')
+        raise CalibrationError('the highest level is at the edge of the scanned area; scan a wider one')
     middle = (x * P[:, np.newaxis]).sum(0) / P.sum()
     spread = np.sqrt((((x - middle)**2) * P[:, np.newaxis]).sum(0) / P.sum())
     begin = np.concatenate(((math.log(P.max()),), middle, np.log(2.0 * spread)))
@@ -115,7 +116,7 @@ def _fit(offsets: Pairs, power: Floats, floor: float, points: Pairs) -> Beam:
     solved = least_squares(residual, begin, x_scale=np.concatenate(((1.0,), spread, (1.0, 1.0))))
     A, place, width = math.exp(solved.x[0]), solved.x[1:3], np.exp(solved.x[3:])
     if not ((low <= place) & (place <= high)).all():
-        raise LevelError('the highest level is not inside the scanned area; scan a wider one')
+        raise CalibrationError('the highest level is not inside the scanned area; scan a wider one')
     degrees = max(P.size - 5, 1)
     sigma = math.sqrt(float((solved.fun**2).sum()) / degrees)
     spread = np.sqrt(np.diag(np.linalg.pinv(solved.jac.T @ solved.jac))) * sigma
