@@ -17,7 +17,8 @@ from pedestal_results import row_text, tracking
 from pedestal_results.results import row
 from pedestal_workbench.again import difference, recompute, what_if
 from pedestal_workbench.again.difference import Output
-from pedestal_workbench.again.recompute import FedRecording, Recomputed
+from pedestal_workbench.again.feed import FedRecording
+from pedestal_workbench.again.recompute import Recomputed
 
 
 @dataclasses.dataclass
@@ -52,17 +53,17 @@ def main(options: RecomputeOptions) -> tuple[list[str], list[Row], bool]:
     Raises ValueError for an option that does not fit the bag.
     """
     lockstep = None if options.pacing is None else options.pacing == 'lockstep'     # None: as the bag states
-    recording = recompute.FedRecording(options.bag, lockstep, options.beam)
+    recording = FedRecording(options.bag, lockstep, options.beam)
     given = recompute.file_parameters(options.params_file, recording.bag.beam) if options.params_file else None
     nodes = recompute.chosen(recording, options.node, given)
     changes = recompute.overrides(options.param, nodes)
     if changes:
         unchanged = [name for name in nodes if options.node and name not in changes]
         if unchanged:
-            raise recompute.RecomputeError(f'--node {unchanged[0]}: has no effect, because no --param is of it')
+            raise ValueError(f'--node {unchanged[0]}: has no effect, because no --param is of it')
         nodes = list(changes)
     if options.output and options.output.exists():
-        raise recompute.RecomputeError(f'--output {options.output} exists already; a recording is never overwritten')
+        raise ValueError(f'--output {options.output} exists already; a recording is never overwritten')
     reports = [_node_report(recording, node, given, changes.get(node), options) for node in nodes]
     lines: list[str] = []
     for report in reports:

@@ -24,7 +24,8 @@ from pedestal_recording.recording import Recording
 from pedestal_results import tracking
 from pedestal_results.intervals import estimated, row
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, Spec, new_panels
-from pedestal_workbench.again import iq, recompute
+from pedestal_workbench.again import iq
+from pedestal_workbench.again.feed import FedRecording
 from pedestal_workbench.calibration.calibration import CalibrationError, PageTable, named
 from pedestal_workbench.calibration.receiver import complex_matrix, matrix, offsets, phasing, ratios
 
@@ -209,7 +210,7 @@ def _opened(options: IqPhasingOptions, changes: Sequence[str]) -> tuple[Recordin
     """Return (recording, its name, samples). Raises ValueError."""
     bag: Recording
     if options.bag is not None:
-        recording = recompute.FedRecording(options.bag)
+        recording = FedRecording(options.bag)
         bag, source, epoch = recording.bag, str(options.bag), recording.bag.start
         parameters = _of_three_channels(iq.parameters_of(recording), source)
     else:
