@@ -152,9 +152,7 @@ def outputs(recording: FedRecording, done: recompute.Recomputed,
 
 def _graph(recording: FedRecording, unit: Unit) -> tuple[str, ...]:
     """Return the parameter graph.nodes of the process: the node, the recorder, and the optional nodes that feed it.
-
-    Because the recorder subscribes to every output, the process publishes each of them.
-    """
+    Because the recorder subscribes to every output, the process publishes each of them."""
     optional = [node.name for node in nodes.NODES if (node.optional or node.name == 'operator')
                 and any(topic in unit.NODE.reads and recording.has(topic) for topic in node.writes)]
     return (unit.NODE.name, 'recorder', *optional)

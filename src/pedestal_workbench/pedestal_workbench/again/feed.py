@@ -72,11 +72,8 @@ class FedRecording:
         return self._rows[topic]
 
     def arrival(self, topic: str) -> Ints:
-        """Return numbers that increase in the order of arrival of the messages of a topic.
-
-        They are the publish times by the clock of the machine. In a recording of another tool, they are the
-        places in the file.
-        """
+        """Return numbers that increase in the order of arrival of the messages of a topic. They are publish times or,
+        in a recording of another tool, places in the file."""
         rows = self.rows(topic)
         # A place is the number of a chunk and the offset in the unpacked chunk, which is far below 2^40 bytes.
         return rows.publish if 'pacing' in self.bag.metadata else (rows.chunk << 40) + rows.start
@@ -119,10 +116,8 @@ class FedRecording:
         return np.append(self.output(answer).stamps, AFTER_LAST_STAMP)[after]
 
     def commands(self, topic: str, stamps: Stamps) -> dict[int, list[commands.Command]]:
-        """Return the commands in a topic of replies, by step; stamps: of the steps. Raises ValueError.
-
-        Because the unit makes the commands of schedules by itself, from its parameters, these are left out.
-        """
+        """Return the commands in a topic of replies, by step; stamps: of the steps. Raises ValueError. Because the
+        unit makes the commands of schedules by itself, from its parameters, these are left out."""
         found: dict[int, list[commands.Command]] = {}
         rows = np.searchsorted(stamps, self.steps(topic)).tolist() if self.has(topic) else ()
         for step, data in zip(rows, self.data(topic) if self.has(topic) else ()):
@@ -155,10 +150,8 @@ class Feed:
     refused: int    # number of messages that belong to no step
 
     def stretches(self, stops: Iterable[int] = ()) -> Iterator[tuple[int, int, list[tuple[str, int]]]]:
-        """Yield (first step, step after the last, [(topic, index)] of the messages before the first step).
-
-        A stretch begins at each step that such messages precede, and at the stops.
-        """
+        """Yield (first step, step after the last, [(topic, index)] of the messages before the first step). A stretch
+        begins at each step that such messages precede, and at the stops."""
         before = {step: [event[1:] for event in group]
                   for step, group in itertools.groupby(self.events, lambda event: event[0])}
         count = len(self.stamps)
@@ -208,11 +201,8 @@ def matched(recording: FedRecording, unit: Unit) -> Feed:
 
 
 def _events(recording: FedRecording, unit: Unit, stamps: Stamps, taken: Sequence[int]) -> list[Event]:
-    """Return the events of a Feed, in order.
-
-    stamps: of the steps; taken: arrival of the last input of each step. A publisher whose step
-    topic has a latency publishes its other messages with an equal latency.
-    """
+    """Return the events of a Feed, in order; taken: arrival of the last input of each step. A publisher whose step
+    topic has a latency publishes its other messages with an equal latency."""
     events: list[Event] = []
     for name in unit.reads:
         if topics.TOPIC_BY_NAME[name].rate != 'step' and recording.has(name):
@@ -228,7 +218,6 @@ def _events(recording: FedRecording, unit: Unit, stamps: Stamps, taken: Sequence
 
 def _gathered(recording: FedRecording, unit: Unit, trigger: str,
               steps: Sequence[_Step]) -> tuple[Records, dict[str, Ints]]:
-    """Return the fields (inputs, rows) of a Feed."""
     rows = {trigger: np.array([row for _, row, _ in steps], np.int64)}
     for name in unit.latencies:
         rows[name] = np.array([-1 if row[name] is None else row[name] for _, _, row in steps], np.int64)

@@ -20,7 +20,7 @@ from pedestal_workbench.again.feed import FedRecording
 
 
 def parameters_of(recording: FedRecording) -> MonopulseParameters:
-    """Return the parameters of the receiver of a recording. Raises ValueError for another receiver."""
+    """Return the parameters of the recorded receiver. Raises ValueError for a receiver without I/Q samples."""
     if not recording.bag.iq:
         raise ValueError(f'{recording.bag.path}: --iq: the receiver of this recording had no I/Q samples')
     parameters = recompute.parameters_of(recording, nodes.MONOPULSE_RECEIVER.name)
@@ -45,10 +45,7 @@ def steps(unit: MonopulseReceiver, recording: sigmf.Recording, epoch: Nanosecond
 
 def angle_errors(recording: sigmf.Recording, parameters: MonopulseParameters,
                  epoch: Nanoseconds) -> tuple[dict[Nanoseconds, bytes], MonopulseReceiver]:
-    """Return ({stamp: CDR bytes} of the angle errors of a recording, the unit after the last step).
-
-    epoch: stamp from which the unit counts.
-    """
+    """Return ({stamp: CDR bytes} of the angle errors of a recording, the unit after the last step)."""
     unit = unit_of(parameters)
     encoder = records.Encoder(ANGLE_ERROR_TOPIC, unit.messages[ANGLE_ERROR_TOPIC], unit.outputs)
     found = {}
@@ -59,8 +56,7 @@ def angle_errors(recording: sigmf.Recording, parameters: MonopulseParameters,
 
 
 def main(bag: pathlib.Path, samples: pathlib.Path) -> tuple[list[str], list[Row], bool]:
-    """Return (lines to print, rows of --json, True if all errors in the bag are equal to the last bit). Raises
-    ValueError for a bag or a file that does not fit."""
+    """Return (lines to print, rows of --json, True if all errors in the bag are equal to the last bit)."""
     recording = FedRecording(bag)
     node = nodes.MONOPULSE_RECEIVER.name
     if not recording.has(ANGLE_ERROR_TOPIC):

@@ -37,11 +37,10 @@ def latched(graph: Mapping[str, Link], name: str) -> bool:
 
 
 def selected_topics(bag: bags.Bag, input_nodes: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return the topics of a bag that a replay publishes.
+    """Return the topics in names, without names the inputs of input_nodes that none of these nodes publishes, and
+    without both all topics.
 
-    They are the topics in names. Without names they are the inputs of input_nodes that none of these nodes publishes.
-    Without both they are all topics. Raises BagError for a topic that is not in the bag, an unknown node, or a node
-    without inputs in the bag.
+    Raises BagError for a topic that is not in the bag, an unknown node, or a node without inputs in the bag.
     """
     if names:
         return bags.chosen_topics(bag, names)
@@ -63,13 +62,7 @@ def selected_topics(bag: bags.Bag, input_nodes: Sequence[str], names: Sequence[s
 
 
 class Playlist:
-    """Messages of a bag in the order that the module states.
-
-    names         topics
-    start         begin of the playlist, counted from `origin`
-    duration      length of the playlist, None to the end
-    origin, end   stamps of the first message of a topic that is not latched, and of the last message of the bag
-    first, last   stamps of the first and the last message of the playlist
+    """Messages of some topics of a bag, in the order that the module states. start: counted from `origin`.
 
     Because a latched message stays valid, the last message of each latched topic before the start comes first.
     Raises BagError if there are no messages.
@@ -90,6 +83,7 @@ class Playlist:
             raise bags.BagError(f'{bag.path}: no message of {", ".join(names)}')
         order = np.lexsort((where, ranks, stamps))
         where, stamps, ranks = where[order], stamps[order], ranks[order]
+        # of the first message of a topic that is not latched, and of the last message of the bag
         self.origin = int(stamps[ranks >= 0][0] if (ranks >= 0).any() else stamps[0])
         self.end = int(stamps[-1])
         begin = self.origin + round(start * NS_PER_SECOND)

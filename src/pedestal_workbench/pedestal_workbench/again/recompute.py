@@ -1,14 +1,9 @@
 """`pedestal recompute`: feed the recorded inputs of a node to its unit, and compare new outputs with recorded outputs.
 
-A unit is the set of step functions of a node with their state, without ROS. The feed (feed.py) gives each step its
-inputs. Further:
-
 Recorded commands and service calls are repeated before the step at which the node replied. If a node has no recorded
 replies, some changes of acu/mode or adu/state cannot follow from the inputs alone. Such a change is requested at its
-step.
-A parameter that was changed during the run leaves no trace in the recording.
-In a recording that begins during its run, the unit begins with its initial state. Its outputs then differ until the
-filter has converged.
+step. A parameter that was changed during the run leaves no trace in the recording. In a recording that begins during
+its run, the unit begins with its initial state. Its outputs then differ until the filter has converged.
 """
 import dataclasses
 import pathlib
@@ -36,8 +31,7 @@ Made: TypeAlias = dict[int, list[tuple[commands.Command, bool]]]    # {step: [(r
 
 
 def row_of(recording: FedRecording, node: str) -> nodes.Node:
-    """Return the row of a node, for a recording whose drive may be an array or servo drives, and whose receiver may
-    be one of I/Q samples."""
+    """Return the row of a node in the recorded graph."""
     return nodes.row(node, recording.bag.beams > 0, recording.bag.servo, recording.bag.iq)
 
 
@@ -91,7 +85,7 @@ def compute(recording: FedRecording, unit: Unit, fed: Feed, states: Mapping[int,
 
 
 def outputs_of(unit: Unit, fed: Feed, outputs: Records) -> dict[str, difference.Output]:
-    """Return the outputs that `compute` returned for a unit and its Feed, by topic."""
+    """Return the outputs of `compute` by topic."""
     written = {}
     for name in unit.writes:
         if not records.is_text(name):
@@ -115,7 +109,7 @@ class Recomputed:
 
 
 def unit_of(recording: FedRecording, node: str, params: parameters.Parameters) -> Unit:
-    """Return a new unit of a node in the recorded graph; params: its parameters."""
+    """Return a new unit of a node in the recorded graph."""
     row = row_of(recording, node)
     names = [other.name for other in nodes.NODES if any(map(recording.has, other.writes))]
     flags = [flag for flag in topics.TOPIC_FLAGS if getattr(params, flag, False)]
@@ -126,11 +120,8 @@ def unit_of(recording: FedRecording, node: str, params: parameters.Parameters) -
 
 def recompute(recording: FedRecording, node: str, params: parameters.Parameters,
               requests: Mapping[int, Sequence[commands.Command]] | None = None) -> Recomputed:
-    """Recompute a node; params: its parameters.
-
-    requests: to make, by step. None: those of the recorded replies or, without replies, those that the
-    recorded states need.
-    """
+    """Recompute a node. requests: by step. None: those of the recorded replies or, without replies, those that the
+    recorded states need."""
     unit = unit_of(recording, node, params)
     fed = feed.matched(recording, unit)
     states = None
@@ -143,10 +134,7 @@ def recompute(recording: FedRecording, node: str, params: parameters.Parameters,
 
 
 def idle(recording: FedRecording, done: Recomputed) -> str:
-    """Return the reason why a recording does not exercise a node, such as a receiver without lock; '' if it does.
-
-    The unit judges the recorded outputs or, without these, the recomputed outputs.
-    """
+    """Return the reason why a recording does not exercise a node, such as a receiver without lock; '' if it does."""
     numbers: dict[str, Floats | list[str]] = {}
     for name, output in done.outputs.items():
         output = recording.output(name) if recording.has(name) else output
@@ -194,9 +182,7 @@ def allowed(recording: FedRecording, node: str, known: Values) -> bool:
 
 def chosen(recording: FedRecording, names: Iterable[str], file_values: Values | None) -> list[str]:
     """Return the nodes to recompute: the nodes in names or, if empty, all nodes that the recording allows.
-
-    file_values: parameters in place of the recorded ones. Raises ValueError.
-    """
+    file_values: parameters in place of the recorded ones. Raises ValueError."""
     names = [name.removeprefix(recording.bag.beam) for name in names]
     for name in names:
         if nodes.beam_of(name):
@@ -216,10 +202,7 @@ def chosen(recording: FedRecording, names: Iterable[str], file_values: Values | 
 
 
 def file_parameters(path: str | pathlib.Path, beam: str = '') -> Values:
-    """Return the parameters in a ROS 2 parameter file or a scenario; beam: prefix such as 'beam_2/'.
-
-    Raises ScenarioError or ParameterFileError.
-    """
+    """Return the parameters in a ROS 2 parameter file or a scenario; beam: prefix such as 'beam_2/'."""
     sections = files.file_sections(path)
     if 'scenario' in sections and 'recorder' not in sections:
         chosen = scenario.load(str(path))
@@ -230,10 +213,8 @@ def file_parameters(path: str | pathlib.Path, beam: str = '') -> Values:
 
 
 def overrides(texts: Iterable[str], names: Sequence[str]) -> dict[str, dict[str, Json]]:
-    """Return the parameters in texts node.key=value; names: the recomputed nodes.
-
-    With only one node, a text may leave out its name. Raises ValueError.
-    """
+    """Return the parameters in texts node.key=value. With one name of a node, a text may leave it out. Raises
+    ValueError."""
     found: dict[str, dict[str, Json]] = {}
     for text in texts:
         if text.partition('=')[0].partition('.')[0] not in SECTION_NODES and len(names) == 1:
@@ -247,11 +228,8 @@ def overrides(texts: Iterable[str], names: Sequence[str]) -> dict[str, dict[str,
 
 def parameters_of(recording: FedRecording, node: str, file_values: Values | None = None,
                   changes: Mapping[str, Json] | None = None) -> parameters.Parameters:
-    """Return the parameters of a node: those of the file or, without a file, the recorded ones.
-
-    file_values: of the file; changes: {key: value} that replace them. A parameter
-    without a value has its default. Raises ValueError.
-    """
+    """Return the parameters of a node: those of a file or, without a file, the recorded ones, with changes. A
+    parameter without a value has its default. Raises ValueError."""
     values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
     values = {key: value for key, value in values.items() if not key.startswith('graph.')}
     try:
@@ -264,10 +242,8 @@ def parameters_of(recording: FedRecording, node: str, file_values: Values | None
 
 
 def measure(path: str | pathlib.Path, node: str = 'acu') -> float:
-    """Return the recorded time of a bag, divided by the wall time to read it, recompute a node and compare.
-
-    A first run, which compiles the laws, does not count.
-    """
+    """Return the recorded time of a bag per wall time to read, recompute and compare. A first run, which compiles the
+    laws, does not count."""
     def run() -> float:
         recording = FedRecording(path)
         done = recompute(recording, node, parameters_of(recording, node))

@@ -93,10 +93,8 @@ class Calibration(abc.ABC):
               for table in self.tables())])
 
     def write(self, files: ResultFiles) -> list[str]:
-        """Write the files and return a line for each of them. Raises ParameterError for a value out of its range.
-
-        A result that is not verified gets no parameter file, because it must not be used.
-        """
+        """Write the files and return a line for each of them. Raises ParameterError for a value out of its range. A
+        result that is not verified gets no parameter file, because it must not be used."""
         said = []
         if files.output and not self.verified:
             said.append(f'not written: {files.output}, because the result is not verified')

@@ -39,11 +39,8 @@ class Point(NamedTuple):
 
 
 def points(bag: Recording, tracks: Sequence[ProgramTrack], count: int = DEFAULT_POINTS) -> tuple[Times, Pairs, Pairs]:
-    """Return (times, directions [deg], offsets [deg]) of at most `count` points of a recording.
-
-    tracks: predicted.programs. The points are in the middle of equal parts of the steps in settled autotrack. Raises
-    CalibrationError.
-    """
+    """Return (times, directions [deg], offsets [deg]) of at most `count` points. Raises CalibrationError. tracks:
+    predicted.programs. The points are in the middle of equal parts of the steps in settled autotrack."""
     joints = bag.table('joint_states')
     t = joints['t']
     modes = recordings.modes(bag, t)
@@ -83,15 +80,13 @@ def points(bag: Recording, tracks: Sequence[ProgramTrack], count: int = DEFAULT_
 
 
 def listed(kind: str, table: Iterable[Floats]) -> list[Point]:
-    """Return the points of one kind from the arrays (times, directions, offsets)."""
+    """Return the points of the arrays (times, directions, offsets)."""
     return [Point(kind, *one) for one in zip(*table)]
 
 
 def every_point(bag: Recording, count: int = DEFAULT_POINTS) -> list[Point]:
-    """Return the points of the passes and scans of a recording.
-
-    count: largest number of points from autotrack. Raises CalibrationError.
-    """
+    """Return the points of the passes and scans of a recording, at most `count` from autotrack. Raises
+    CalibrationError."""
     tracks = predicted.programs(bag)
     found, reasons = [], []
     try:
@@ -109,7 +104,7 @@ def every_point(bag: Recording, count: int = DEFAULT_POINTS) -> list[Point]:
 
 
 def joined(parts: Sequence[tuple[str, Sequence[Point]]], source: str) -> Offsets:
-    """Return the offsets of several recordings; parts: (label, its points) of each; source: their name."""
+    """Return the offsets of several recordings, whose parts are (label, points)."""
     places = [' '.join(f'{label} {kind} at {time:.1f} s'.split()) for label, found in parts
               for kind, time, *_ in found]
     directions, values = (np.array([one[column] for _, found in parts for one in found]) for column in (2, 3))

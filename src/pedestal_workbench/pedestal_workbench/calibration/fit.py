@@ -115,11 +115,8 @@ class Fit:
         return np.divide(self.covariance, scale, out=np.eye(len(sigma)), where=scale > 0.0)
 
     def outliers(self, sigma: Pairs) -> Ints:
-        """Return the places of the points whose left-out residual exceeds OUTLIER_SIGMAS.
-
-        sigma: stated standard deviations [deg]. Their scale is taken from the median of the residuals, because an
-        outlier does not move the median.
-        """
+        """Return the places of the points whose left-out residual exceeds OUTLIER_SIGMAS of the stated sigma [deg].
+        The scale of sigma is taken from the median of the residuals, because an outlier does not move the median."""
         size = np.hypot(*(self.left_out / sigma).T)
         own = np.median(np.hypot(*(self.residuals / sigma).T)) / MEDIAN_RAYLEIGH
         return np.flatnonzero(size > max(OUTLIER_SIGMAS * own, 1e-9))
@@ -133,10 +130,8 @@ class Fit:
 
 
 def linear(names: Sequence[str], directions: Pairs, values: Pairs, sigma: Pairs) -> Fit:
-    """Return the Fit of terms, to first order, to offsets `values` with standard deviations sigma, all [deg].
-
-    Raises CalibrationError if the data cannot tell terms apart.
-    """
+    """Return the Fit of terms, to first order, to offsets `values` with standard deviations sigma, all [deg]. Raises
+    CalibrationError."""
     A = terms.design(names, directions)
     x, solved = solve(names, A, values, sigma)
     return _fitted('linear', names, x, solved, values - A @ x, sigma)
@@ -179,11 +174,7 @@ def _fitted(form: str, names: Sequence[str], x: Floats, solved: Solved, residual
 
 @compiled
 def _exact_offsets(model: Records, directions: Pairs) -> Pairs:
-    """Return the offsets of a PointingModel (1,) on the sky [rad]: cross-elevation and elevation to add to the
-    command.
-
-    directions: wanted azimuth and elevation [rad]
-    """
+    """Return the offsets [rad] of a PointingModel (1,) at wanted directions [rad]."""
     offsets = np.empty_like(directions)
     for i in range(len(directions)):
         azimuth, elevation = directions[i]
@@ -193,7 +184,7 @@ def _exact_offsets(model: Records, directions: Pairs) -> Pairs:
 
 
 def model(names: Iterable[str], values: Iterable[float]) -> Records:
-    """Return the PointingModel (1,) with terms [deg, -]; see pointing_model.model."""
+    """Return the PointingModel (1,) with terms [deg, -]."""
     return pointing_model.model({name.lower(): float(value if terms.TERM_BY_NAME[name].factor else np.radians(value))
                                  for name, value in zip(names, values)})
 
@@ -224,9 +215,8 @@ def without_doubtful(names: Sequence[str],
                      fit: Callable[[Sequence[str]], Fit]) -> tuple[Fit, list[tuple[str, float, float]]]:
     """Return (Fit, [(name, value, sigma)] of the dropped terms) after each term below its sigma is dropped.
 
-    The terms are dropped one after another, the most doubtful first, because each drop changes the other terms. A
-    dropped term is not 0, but smaller than its sigma. So the variance of a term that is kept is at least its variance
-    in the fit of all terms.
+    The most doubtful term is dropped first, because each drop changes the other terms. A dropped term is not 0, but
+    smaller than its sigma. So the variance of a kept term is at least its variance in the fit of all terms.
     """
     whole = found = fit(names)
     dropped = []
@@ -249,9 +239,6 @@ def unit_covariance(names: Sequence[str], directions: Pairs) -> Floats:
 
 
 def model_error(names: Sequence[str], covariance: Floats, directions: Pairs) -> Degrees:
-    """Return the rms error of a model on the sky, of both axes together, over directions [deg].
-
-    covariance (p, p): of its terms.
-    """
+    """Return the rms error of a model with a covariance (p, p) on the sky, of both axes together, over directions."""
     A = terms.design(names, directions)
     return math.sqrt(float(np.einsum('nip,pq,niq->', A, covariance, A)) / (2 * len(directions)))

@@ -57,10 +57,8 @@ class Offsets(NamedTuple):
 
 
 def read(path: str | pathlib.Path, latest: str = '') -> Offsets:
-    """Return the Offsets of a file. Raises TableError, which names file, line, field, value and allowed range.
-
-    latest: date, as in 2026-11-26, after which no date is that of the measurement; '': every date may be.
-    """
+    """Return the offsets of a file. Raises TableError. latest: date, as in 2026-11-26, after which no date is that of
+    the measurement; '': every date may be."""
     notes: tuple[str, ...] = ()
     text = csv_table.text(path)
     if not text.strip():
@@ -106,7 +104,6 @@ def valid_date(text: str, latest: str) -> str:
 
 
 def _table(path: str | pathlib.Path, text: str) -> tuple[list[OffsetRow], list[str], str]:
-    """Return (rows, dates, format) of a CSV file."""
     try:
         table = csv_table.Table(path, text)
         katpoint = set(_KATPOINT_NAMES) <= set(table.fieldnames)
@@ -117,7 +114,6 @@ def _table(path: str | pathlib.Path, text: str) -> tuple[list[OffsetRow], list[s
 
 
 def _plain(table: csv_table.Table) -> Iterator[OffsetRow]:
-    """Yield the rows of a CSV file with named columns."""
     sky = [table.column(quantity) for quantity in _SKY]
     offset = [table.column(quantity) for quantity in _OFFSET]
     sigma = table.column(_SIGMA, required=False)
@@ -131,7 +127,7 @@ def _plain(table: csv_table.Table) -> Iterator[OffsetRow]:
 
 
 def _katpoint(table: csv_table.Table) -> Iterator[OffsetRow]:
-    """Yield the rows of a file of katpoint's reduction scripts, which state offsets of the axes in degrees."""
+    """Yield the rows of a file of katpoint, which states offsets of the axes in degrees."""
     has_sigma = set(_KATPOINT_SIGMA_NAMES) <= set(table.fieldnames)
     for row in table:
         def number(name: str, low: float, high: float, row: csv_table.Cells = row) -> float:

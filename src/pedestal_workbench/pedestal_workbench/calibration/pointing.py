@@ -35,10 +35,8 @@ def _sky(axes: PolarAxes) -> None:
 
 
 def _arrows(axes: PolarAxes, directions: Pairs, vectors: Pairs, scale: Degrees, colour: str) -> None:
-    """Draw arrows for vectors [deg] in cross-elevation and elevation at directions [deg].
-
-    scale: size of the vector whose arrow has the length ARROW_LENGTH_DEG
-    """
+    """Draw arrows for vectors [deg] in cross-elevation and elevation at directions [deg]. scale: size of the vector
+    whose arrow has the length ARROW_LENGTH_DEG"""
     az, el = np.radians(directions).T
     radius = 90.0 - directions[:, 1]
     # East and north on the plane of the plot: cross-elevation points along the azimuth, elevation to the middle.

@@ -28,7 +28,7 @@ TABLE_MODES = tuple(row.name for row in MODE_ROWS if row.table)  # modes that fo
 
 @compiled
 def _of_table(program: ProgramTrack, times: Times, out: Pairs) -> None:
-    """Fill out with the directions of a program track at times; NaN outside its table."""
+    """Fill out with the directions of a program track; NaN outside its table."""
     for k in range(len(times)):
         out[k, 0] = out[k, 1] = np.nan
         if program.times[0] <= times[k] <= program.times[-1]:
@@ -47,10 +47,7 @@ def _on_deck(attitude: Quaternions, angles: Pairs) -> None:
 
 
 def programs(bag: Recording) -> list[ProgramTrack]:
-    """Return the program tracks of a recording in the order of their messages, as the control unit followed them.
-
-    Refraction is a part of them if the recorded control unit adds it.
-    """
+    """Return the program tracks of a recording in their order, with the refraction that the control unit added."""
     found = []
     for _, _, _, message in bag.messages(PROGRAM_TOPIC) if PROGRAM_TOPIC in bag.topics else ():
         if len(message.points) > 1:
@@ -98,10 +95,8 @@ def _satellite(bag: Recording, predictor: Predictor, t: Times) -> Pairs:
 
 
 def followed(bag: Recording, modes: Texts, tracks: Sequence[ProgramTrack]) -> Texts:
-    """Return the mode of the table that the control unit followed last at each step.
-
-    Before the first table, the program track is expected, and without one the satellite of the mode tle.
-    """
+    """Return the mode of the table that the control unit followed last at each step. Before the first table, the
+    program track is expected, and without a track the satellite of the mode tle."""
     inside = np.isin(modes, TABLE_MODES)
     last = np.maximum.accumulate(np.where(inside, np.arange(modes.size), -1))
     first = 'program' if tracks else 'tle'
@@ -109,11 +104,8 @@ def followed(bag: Recording, modes: Texts, tracks: Sequence[ProgramTrack]) -> Te
 
 
 def on_deck(bag: Recording, t: Times, tracks: Sequence[ProgramTrack], modes: Texts) -> Pairs:
-    """Return the predicted deck angles [rad] at the steps; NaN where nothing is predicted.
-
-    tracks: of `programs`; modes: of the steps. Raises CalibrationError for predictions that need more than the
-    recording.
-    """
+    """Return the predicted deck angles [rad] at the steps; NaN where nothing is predicted. Raises CalibrationError for
+    predictions that need more than the recording."""
     tables, out = followed(bag, modes, tracks), np.full((t.size, 2), np.nan)
     if 'program' in tables:
         out[tables == 'program'] = of_programs(tracks, t[tables == 'program'])

@@ -1,8 +1,8 @@
 """Pointing offsets from scans of the level: the antenna steps about the predicted direction of a source.
 
 Five points (middle and both sides of each axis) and a raster are scans. The commands `offset` of the control unit move
-the antenna in a mode that follows a table: `sun`, or `program` and `tle` for the moon and a beacon. A dwell is the
-time from one command to the next. Its level is the mean over its last part, in which the antenna has come to rest.
+the antenna in a mode that follows a table. A dwell is the time from one command to the next. Its level is the mean
+over its last part, in which the antenna has come to rest.
 
 A Gaussian beam is fitted to the levels L at the offsets x (cross-elevation) and y (elevation) of the encoders from the
 predicted direction:
@@ -77,11 +77,8 @@ class Dwell(NamedTuple):
 
 
 def scans(bag: Recording, t: Times, modes: Texts) -> list[list[Dwell]]:
-    """Return the scans of a recording, each with its dwells in the order of time.
-
-    t, modes: of the steps. A scan ends with a dwell that no command ends within MAX_DWELL_S, or with a change of the
-    mode. The last dwell is at most as long as the dwell before it.
-    """
+    """Return the scans of a recording; t, modes: of the steps. A scan ends with a dwell that no command ends within
+    MAX_DWELL_S, or with a change of the mode. The last dwell is at most as long as the dwell before it."""
     commands = [(time, command.arguments) for time, command, reply in recordings.replies(bag, 'acu/command_result')
                 if command.verb == 'offset' and reply.granted]
     found: list[list[Dwell]] = [[]]
@@ -115,10 +112,8 @@ def at_rest(dwell: Dwell) -> slice:
 
 
 def points(bag: Recording, tracks: Sequence[ProgramTrack]) -> tuple[Times, Pairs, Pairs, Pairs]:
-    """Return (times, directions, offsets, sigmas) of the scans of a recording, all except the times [deg].
-
-    tracks: predicted.programs. Raises CalibrationError without a scan, or for a scan that gives no offset.
-    """
+    """Return (times, directions, offsets, sigmas) of the scans of a recording, all except the times [deg]. Raises
+    CalibrationError without a scan, or for a scan that gives no offset."""
     joints = bag.table('joint_states')
     t = joints['t']
     modes = recordings.modes(bag, t)

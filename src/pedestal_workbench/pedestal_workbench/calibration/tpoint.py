@@ -41,7 +41,7 @@ _NUMBERS_PATTERN = re.compile(r'[-+]?\.?\d')
 
 
 def is_tpoint(text: str) -> bool:
-    """Return True for a text of TPOINT: a line of it begins with : (an option) or with ! (a comment)."""
+    """Return True for a text of TPOINT, in which a line begins with : (an option) or with ! (a comment)."""
     return any(line.lstrip().startswith((':', '!')) or line.strip().upper() in _ALTAZ_OPTIONS
                for line in text.splitlines())
 
@@ -74,8 +74,7 @@ def date(text: str) -> str:
 
 
 def origin(path: str | pathlib.Path, text: str) -> tuple[str, int]:
-    """Return (`north` or `south`, line of the comment that states it, 0 without one). Raises TableError for comments
-    that contradict each other."""
+    """Return (`north` or `south`, line of the comment that states it, 0 without one). Raises TableError."""
     stated: dict[str, int] = {}
     for line, content in enumerate(text.splitlines(), start=1):
         match = _ORIGIN_PATTERN.search(content.partition('!')[2])
@@ -89,10 +88,7 @@ def origin(path: str | pathlib.Path, text: str) -> tuple[str, int]:
 
 
 def rows(path: str | pathlib.Path, text: str) -> list[OffsetRow]:
-    """Return the offsets of the file, without a standard deviation. Raises TableError.
-
-    The azimuth is in the turn of the wrap in which the mount was.
-    """
+    """Return the offsets of the file, in the turn of the wrap in which the mount was. Raises TableError."""
     numbers, options = _records(text)
     if not set(options) & set(_ALTAZ_OPTIONS):
         others = f'; options found: {", ".join(options)}' if options else ''

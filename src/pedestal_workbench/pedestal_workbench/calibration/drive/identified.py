@@ -254,10 +254,8 @@ def plan_parameters(chosen: Scenario) -> tuple[motions.Plan, dict[str, dict[str,
 
 
 def write_plan(chosen: Scenario, given: str, path: pathlib.Path) -> list[str]:
-    """Write the motions for the antenna of a scenario to a new parameter file. Return lines for the user.
-
-    given: name or path of the scenario, as the user gave it.
-    """
+    """Write the motions for the antenna of a scenario to a new parameter file. Return lines for the user. given: name
+    or path of the scenario, as the user gave it."""
     run = shlex.join(('pedestal', 'run', given, '--params-file', str(path)))
     plan, sections = plan_parameters(chosen)
     stated = [f'motions of {motions.time_text(plan.duration)} for the antenna of {chosen.name}, within', *plan.limits]
@@ -268,11 +266,8 @@ def write_plan(chosen: Scenario, given: str, path: pathlib.Path) -> list[str]:
 
 
 def _in_memory(name: str, overrides: Sequence[str]) -> list[twin.DriveRecording]:
-    """Return two runs of a scenario in memory, the second without bias torque.
-
-    overrides: changed parameters 'node.key=value', the true values of the simulated drive. The nominal values are
-    those of the scenario itself.
-    """
+    """Return two runs of a scenario in memory, the second without bias torque. overrides: changed parameters
+    'node.key=value', the true values of the simulated drive. The nominal values are those of the scenario itself."""
     chosen = scenarios.load(name, overrides)
     nominal = scenarios.load(name).node_parameters('adu')
     _, plan = plan_parameters(chosen)
@@ -310,10 +305,8 @@ def _of_bags(paths: Iterable[pathlib.Path]) -> list[twin.DriveRecording]:
 
 
 def calibrated(paths: Sequence[pathlib.Path], scenario_name: str, changes: Sequence[str]) -> Identified:
-    """Return the calibration by recordings, or without them by a scenario. Raises ValueError.
-
-    changes: texts 'node.key=value' of --params-file and --param.
-    """
+    """Return the calibration by recordings, or without them by a scenario. Raises ValueError. changes: texts
+    'node.key=value' of --params-file and --param."""
     source = ', '.join(str(path) for path in paths) or scenario_name
     with named(source):
         return calibrate(_of_bags(paths) if paths else _in_memory(scenario_name, changes), source)

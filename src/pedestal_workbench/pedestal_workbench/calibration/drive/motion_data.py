@@ -1,8 +1,7 @@
 """Motion of one axis in a recording: angles, rates and accelerations of load and motors, and their torques.
 
-All numbers pass through one smoothing filter (a Gaussian of SMOOTHING_S), whose derivatives give rates and
-accelerations. Because the equations of motion are linear in these numbers, equal filters on both sides leave the
-estimates right.
+All numbers pass through one Gaussian filter, whose derivatives give rates and accelerations. Because the equations of
+motion are linear in these numbers, equal filters on both sides leave the estimates right.
 """
 import dataclasses
 
@@ -32,10 +31,7 @@ class Motion:
     motor_torque: Pairs         # of both motors on the motor shaft [Nm]
 
     def mesh_torque(self, axis: AxisParameters) -> Pairs:
-        """Return the torques [Nm] on the motor shaft that the gears get from the motors.
-
-        axis: inertia and friction of the motors.
-        """
+        """Return the torques [Nm] on the motor shaft that the gears get, less inertia and friction of the motors."""
         motors = axis.motor_1, axis.motor_2
         return np.column_stack([
             self.motor_torque[:, k] - m.inertia * self.motor_acceleration[:, k]
@@ -63,13 +59,10 @@ def read(bag: Recording, name: str, axis: AxisParameters) -> Motion:
 
 
 def smoothed(t: Times, theta: Floats, motors: Floats, ratio: float) -> Motion:
-    """Return the motion of an axis from its raw numbers.
+    """Return the motion of an axis from its raw numbers. Raises CalibrationError for missing steps.
 
-    theta (n,)     load encoder [rad]
-    motors (n, 4)  angles [rad] and torques [Nm] of motors 1 and 2 on the motor shaft
-    ratio          turns of the motor per turn of the axis
-
-    Raises CalibrationError for missing steps.
+    theta: load encoder [rad]; motors (n, 4): angles [rad] and torques [Nm] of motors 1 and 2 on the motor shaft;
+    ratio: turns of the motor per turn of the axis.
     """
     period = float(np.median(np.diff(t)))
     if not np.allclose(np.diff(t), period, rtol=0.0, atol=0.1 * period):

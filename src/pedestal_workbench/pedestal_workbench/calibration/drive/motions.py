@@ -58,7 +58,7 @@ class _Schedule:
 
     def command(self, i: int, angle: Radians, wait: Seconds, rate: RadiansPerSecond = 0.0,
                 moves: Seconds = 0.0) -> None:
-        """Command axis i to an angle, from which it moves at a rate for the time `moves`; then wait."""
+        """Command axis i to an angle, move from there at a rate for the time `moves`, and wait."""
         self.angles[i] = angle
         text = f'{self.t:.3f} preset ' + ' '.join(f'{name}={at:.6f}' for name, at in zip(AXES, self.angles))
         if rate:
@@ -79,7 +79,7 @@ class _Schedule:
 
 
 def _range(acu: AcuParameters, name: str) -> tuple[Radians, Radians]:
-    """Return the lowest and highest angle of the motions of an axis. Raises ValueError for a too short travel."""
+    """Return the range of the motions of an axis. Raises ValueError for a too short travel."""
     limits, cause = getattr(acu, name).limits, f'acu.{name}.limits'
     low, high = limits.low, limits.high
     _, heights = floor.points(acu.floor)
@@ -131,7 +131,6 @@ def plan(acu: AcuParameters) -> Plan:
 
 def _rates(schedule: _Schedule, i: int, middle: Radians, travel: Radians, largest: RadiansPerSecond,
            acceleration: RadiansPerSecond2) -> None:
-    """Add constant rates both ways about the middle."""
     for rate in (*(rate for rate in SLOW_RATES_RAD_S if rate < 0.8 * largest), largest):
         time = min(max(RATE_TIME_S, SLOWEST_TRAVEL_RAD / rate), travel / rate)
         schedule.slew(i, middle - 0.5 * rate * time)
@@ -150,7 +149,6 @@ def _reversals(schedule: _Schedule, i: int, middle: Radians, rate: RadiansPerSec
 
 def _pulses(schedule: _Schedule, i: int, middle: Radians, rate: RadiansPerSecond,
             acceleration: RadiansPerSecond2) -> None:
-    """Add small steps on a constant rate about the middle."""
     # A step of this size keeps the sign of the rate, and takes about PULSE_TIME_S.
     step = min(acceleration * (0.5 * PULSE_TIME_S)**2, 0.25 * rate * rate / acceleration)
     begin = middle - 0.5 * rate * PULSES_TIME_S

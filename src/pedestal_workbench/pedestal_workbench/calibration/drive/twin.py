@@ -55,7 +55,7 @@ class DriveRecording:
 
 
 def read(bag: Recording, drive: AduParameters) -> DriveRecording:
-    """Return what a calibration takes from a recording of one beam. Raises CalibrationError."""
+    """Return the data of a recording of one beam. Raises CalibrationError."""
     if 'ship/imu/data' in bag.topics:
         raise CalibrationError('the recording is of a ship, whose motion moves the axes too')
     states = bag.table('adu/state')['data'] if 'adu/state' in bag.topics else ()
@@ -72,7 +72,7 @@ def read(bag: Recording, drive: AduParameters) -> DriveRecording:
 
 
 def replayed(recording: DriveRecording, changes: Mapping[str, float]) -> dict[str, Motion]:
-    """Return {axis: motion} of the twin of a recording; changes: {parameter: value} of adu that replace its values."""
+    """Return {axis: motion} of the twin of a recording; changes: {parameter: value} of adu."""
     drive = changed(recording.drive, changes)
     zero = np.array([getattr(drive, name).encoder.error.zero for name in AXES])
     at = dict(zip(('initial_azimuth', 'initial_elevation'), (recording.start - zero).tolist()))
@@ -98,20 +98,13 @@ def load_inertia_change(drive: AduParameters, elevation: Radians) -> KilogramMet
 
 
 def constant_rates(motion: Motion, load: Floats, found: Estimates) -> Vectors3:
-    """Return the estimates.plateaus of a motion, without the torques that accelerate its base and dish.
-
-    load (n,): torque on the load [Nm]; found: estimates of mode.identify.
-    """
+    """Return estimates.plateaus without the torques that accelerate base and dish; load: torque on the load [Nm]."""
     return estimates.plateaus(motion, load - mode.inertia_torque(motion, found))
 
 
 def estimate(recordings: Sequence[DriveRecording], motions: Sequence[Motion], name: str,
              flexible: bool = True) -> Estimates:
-    """Return the estimates of an axis. Raises ValueError, which names too few motions.
-
-    recordings: their parameters are used; motions: of each recording, recorded or replayed; flexible: False for a
-    rigid structure.
-    """
+    """Return the estimates of an axis from the recorded or replayed motion of each recording. Raises ValueError."""
     axes = [getattr(recording.drive, name) for recording in recordings]
     gravity = name == 'elevation'
     loads = [motion.load_torque(axis) for motion, axis in zip(motions, axes)]
@@ -173,10 +166,7 @@ def extra_inertia(recordings: Sequence[DriveRecording]) -> dict[str, KilogramMet
 
 def _moved(value: float, first: float, low: float, high: float, rattling: bool) -> Estimate:
     """Return the estimate `value` with the width of the interval of a first estimate, scaled if the value is larger.
-
-    rattling: True for an estimate of a mesh. Teeth that rattle make its correction by the twin uncertain, so the
-    interval also covers the first estimate.
-    """
+    Teeth that rattle make the correction of a mesh uncertain, so its interval also covers the first estimate."""
     scale, more = max(1.0, abs(value / first)) if first else 1.0, abs(value - first) if rattling else 0.0
     return value, value + scale * (low - first) - more, value + scale * (high - first) + more
 
@@ -199,10 +189,7 @@ def parameters(recordings: Sequence[DriveRecording], values: Mapping[str, Mappin
 
 
 def torque_errors(recordings: Sequence[DriveRecording], changes: Mapping[str, float]) -> Errors:
-    """Return the rms difference of the torques of recording and twin, over the rms torque of the recording.
-
-    changes: {parameter: value} of adu for the twin. Only moving steps count.
-    """
+    """Return the rms difference of the torques of recording and twin, over the rms torque of the moving steps."""
     squares: dict[str, list[list[float]]] = {name: [] for name in AXES}
     for recording in recordings:
         twins = replayed(recording, changes)

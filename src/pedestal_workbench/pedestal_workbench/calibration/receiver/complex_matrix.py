@@ -41,17 +41,13 @@ def half_of_inverse(slopes: matrix.ComplexSlopes) -> Floats:
 
 
 def phase_half(values: Complexes, half: Floats) -> Floats:
-    """Return half of the confidence interval of the phases of complex values [rad], pi if a phase is unknown.
-
-    half: half of the interval of their real or imaginary part.
-    """
+    """Return half of the interval of the phases of values [rad], pi if a phase is unknown; half: of their parts."""
     share = half / np.maximum(np.abs(values), np.finfo(float).tiny)
     return np.where(share < 1.0, np.arcsin(np.minimum(share, 1.0)), math.pi)
 
 
 def faults(slopes: matrix.ComplexSlopes, in_force: Complexes) -> list[str]:
-    """Return sentences that name the faults of a receiver with slopes and the matrix in force (2, 2): exchanged
-    channels, reversed signs, wrong phases, turned axes, weak slopes."""
+    """Return sentences that name the faults of a receiver with slopes and the matrix in force (2, 2)."""
     E, exchanged = matrix.unexchanged(in_force @ slopes.C)
     found = []
     if exchanged:

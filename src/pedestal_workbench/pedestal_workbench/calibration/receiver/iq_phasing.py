@@ -1,8 +1,4 @@
-"""`pedestal calibrate receiver --iq`: the complex calibration matrix of a receiver of I/Q samples.
-
-The offsets come from the encoders in the recording, and the ratios of difference and sum from the samples of the same
-run.
-"""
+"""`pedestal calibrate receiver --iq`: the complex calibration matrix of a receiver, from the I/Q samples of a run."""
 import cmath
 import dataclasses
 import math
@@ -168,10 +164,8 @@ class IqPhasing(phasing.ReceiverCalibration):
 
 
 def calibrate(bag: Recording, source: str, samples: ratios.Samples, recorded: bool) -> IqPhasing:
-    """Return the result for a recording of one beam and its samples. Raises CalibrationError.
-
-    recorded: True if the errors in the bag were made of these samples.
-    """
+    """Return the result for a recording of one beam and its samples. Raises CalibrationError. recorded: True if the
+    errors in the bag were made of these samples."""
     points = offsets.read(bag)
     antenna, in_force = samples.parameters.antenna, np.array(samples.parameters.calibration.matrix)
     if abs(antenna.beamwidth / recordings.beamwidth(bag) - 1.0) > 1e-9:
@@ -207,7 +201,6 @@ class IqPhasingOptions:
 
 
 def _opened(options: IqPhasingOptions, changes: Sequence[str]) -> tuple[Recording, str, ratios.Samples]:
-    """Return (recording, its name, samples). Raises ValueError."""
     bag: Recording
     if options.bag is not None:
         recording = FedRecording(options.bag)
@@ -232,11 +225,8 @@ def _of_three_channels(parameters: MonopulseParameters, source: str) -> Monopuls
 
 
 def calibrated(options: IqPhasingOptions, changes: Sequence[str]) -> IqPhasing:
-    """Return the calibration by the recording or the scenario of the options. Raises ValueError.
-
-    changes: texts 'node.key=value' of a scenario. Its samples are those of `pedestal simulate receiver --output` with
-    the same scenario and the same changes.
-    """
+    """Return the calibration by the recording or the scenario of the options. Raises ValueError. The samples of a
+    scenario are those of `pedestal simulate receiver --output` with the same changes."""
     bag, source, samples = _opened(options, changes)
     with named(source):
         return calibrate(bag, source, samples, options.bag is not None)

@@ -1,8 +1,7 @@
 """Offsets about a beacon from a recording: where the beam stands still, its offset and the mean error of the receiver.
 
-The control unit moves the beam off the beacon in steps (scenario receiver_phasing) and waits after each step. A point
-is one such wait: the mean of the errors of the receiver, and the offset of the beacon from the beam. The offset comes
-from the encoders, through the pointing model in force. In `preset` the beacon is in the middle of the points; in
+A point is a wait between two steps of the beam (scenario receiver_phasing): the mean error of the receiver, and the
+offset by the encoders, through the pointing model in force. In `preset` the beacon is in the middle of the points; in
 `program` it is where the program track is without the offset of the operator. A constant error of this place changes
 only the null of the errors, and not their slopes.
 
@@ -12,6 +11,7 @@ matrix is fitted to all other points, and verified on the circle.
 import dataclasses
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,12 +46,12 @@ class Points:
 
     @property
     def times(self) -> Times:
-        """Return the middle of each point."""
+        """Middle of each point."""
         return self.spans.mean(1)
 
     @property
     def fitted(self) -> Bools:
-        """Return the mask (n,) of the points to which the matrix is fitted."""
+        """Mask (n,) of the points to which the matrix is fitted."""
         return ~self.circle & (np.hypot(*self.offsets.T) <= MAX_OFFSET_BEAMWIDTHS)
 
 
@@ -83,10 +83,8 @@ def read(bag: Recording) -> Points:
 
 
 def _from_beacon(bag: Recording, t: Times, beam: Pairs) -> tuple[Pairs, bool]:
-    """Return (offsets [rad] of the beacon from the beam, True if the place of the beacon is not known yet).
-
-    The offsets are NaN outside the modes preset and program; beam: directions [rad].
-    """
+    """Return (offsets [rad] of the beacon from the beam, NaN outside preset and program; True if the place of the
+    beacon is not known yet)."""
     modes = recordings.modes(bag, t)
     usable = (modes == 'preset') | (modes == 'program')
     if not usable.any():
@@ -120,12 +118,16 @@ def _still(t: Times, offsets: Pairs, beamwidth: Radians) -> Iterator[tuple[int, 
             yield first + settling, last
 
 
-def _point(t: Times, offsets: Pairs, errors: Vectors3,
-           beamwidth: Radians) -> tuple[tuple[Seconds, Seconds], Pair, Pair, Pair, DecibelHertz]:
-    """Return ((first, last time), mean offset, mean error, its standard deviation, C/N0) of a point.
+class _Point(NamedTuple):
+    span: tuple[Seconds, Seconds]
+    offset: Pair
+    error: Pair
+    sigma: Pair
+    level: DecibelHertz
 
-    Raises CalibrationError. offsets [beamwidths], errors [rad, rad, dB-Hz]: rows of the point.
-    """
+
+def _point(t: Times, offsets: Pairs, errors: Vectors3, beamwidth: Radians) -> _Point:
+    """Return the means of offsets [beamwidths] and errors [rad, rad, dB-Hz]. Raises CalibrationError."""
     known = np.isfinite(errors[:, :2]).all(1)
     if (~known).mean() > MAX_MISSING_SHARE:
         level = errors[:, 2][np.isfinite(errors[:, 2])]
@@ -133,8 +135,8 @@ def _point(t: Times, offsets: Pairs, errors: Vectors3,
         raise CalibrationError(f'receiver not locked at {t[0]:.1f} to {t[-1]:.1f} s: {100.0 * (~known).mean():.0f} '
                                f'% of its errors are NaN or missing ({stated}); each offset needs a locked receiver')
     values = errors[known, :2] / beamwidth
-    return ((t[0], t[-1]), offsets.mean(0), values.mean(0), values.std(0) / math.sqrt(len(values)),
-            float(np.mean(errors[known, 2])))
+    return _Point((t[0], t[-1]), offsets.mean(0), values.mean(0), values.std(0) / math.sqrt(len(values)),
+                  float(np.mean(errors[known, 2])))
 
 
 def _circle(radius: Floats) -> Bools:
@@ -147,7 +149,6 @@ def _circle(radius: Floats) -> Bools:
 
 
 def _checked(points: Points) -> Points:
-    """Return points that suffice for fit and verification. Raises CalibrationError."""
     fitted = points.offsets[points.fitted]
     if len(fitted) < MIN_FITTED_POINTS:
         raise CalibrationError(f'{len(fitted)} offsets outside the circle, must be at least {MIN_FITTED_POINTS}: to '

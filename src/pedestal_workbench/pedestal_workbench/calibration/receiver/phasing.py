@@ -64,7 +64,6 @@ class ReceiverCalibration(Calibration):
                 row(self.STEP, 'cross_talk_db', self.after.cross_talk_db, 'dB', target=CROSS_TALK_TARGET)]
 
     def _summary(self) -> list[str]:
-        """Return the lines on the faults, on the null of the errors and on the verification."""
         lines = [f'FAULT {sentence}' for sentence in self.faults]
         x, y = np.round(self.null, 3) + 0.0    # without the sign of a zero
         lines.append(f'null of the errors                    cross-elevation {x:.3f}, elevation {y:.3f} beamwidths '
@@ -99,7 +98,7 @@ class ReceiverCalibration(Calibration):
         return figure
 
     def _points_table(self, heading: str, columns: tuple[str, ...], values: list[list[str]]) -> PageTable:
-        """Return the table of the points: time, offset, then columns with the values (n, k), and the use."""
+        """Return the table of the points; columns, values: between offset and use."""
         points = self.points
         rows = [[f'{time:.1f} s', *(f'{value:.4f}' for value in offset), *more, 'circle' if on else 'fit']
                 for time, offset, more, on in zip(points.times, points.offsets, values, points.circle)]

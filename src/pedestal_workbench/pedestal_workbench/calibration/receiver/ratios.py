@@ -1,12 +1,10 @@
 """Complex ratios of difference and sum at the points of a recording, from the I/Q samples of its run.
 
-The samples go through the unit of the monopulse receiver, as in `pedestal recompute --iq`. In each step the unit
-integrates sum S and differences D. The ratio of a point is
+In each step the unit of the monopulse receiver integrates sum S and differences D. The ratio of a point is
 
     sum of D conj(S) / (sum of |S|^2 - noise power)
 
-over the integrals of the point. The noise of the channels is independent, so it has no effect on the mean of the
-numerator. The noise power of the unit removes its effect on the denominator.
+over its integrals. The noise of the channels is independent, so it has no effect on the mean of the numerator.
 """
 import dataclasses
 
@@ -56,10 +54,7 @@ class _Sums:
 
 
 def at_points(samples: Samples, spans: Pairs) -> Complexes:
-    """Return the ratios (n, 2) of the points with first and last times spans [s]: D_x / S, D_e / S.
-
-    Raises CalibrationError for a point without samples or without lock.
-    """
+    """Return the ratios (n, 2) of the points with first and last times spans [s]. Raises CalibrationError."""
     unit = iq.unit_of(samples.parameters)
     sums = [_Sums() for _ in spans]
     ends: tuple[Nanoseconds, Nanoseconds] | None = None
@@ -75,10 +70,7 @@ def at_points(samples: Samples, spans: Pairs) -> Complexes:
 
 
 def _check(found: _Sums, span: Pair, samples: Samples, ends: tuple[Nanoseconds, Nanoseconds] | None) -> None:
-    """Raise CalibrationError for a point without samples or lock.
-
-    ends: UTC of the first and the last step of the samples, None without a step.
-    """
+    """Raise CalibrationError for a point without samples or lock; ends: UTC of the first and the last step."""
     place, expected = f'{span[0]:.1f} to {span[1]:.1f} s', (span[1] - span[0]) / samples.parameters.period
     if found.steps < (1.0 - offsets.MAX_MISSING_SHARE) * expected:
         covered = ('holds no whole step' if ends is None else

@@ -54,7 +54,7 @@ class Beam:
 
     @property
     def correction(self) -> float:
-        """Return L, the correction for the size of the source [-]."""
+        """L, the correction for the size of the source [-]."""
         return self.amplitude / self.peak
 
 
@@ -126,10 +126,8 @@ def _fit(offsets: Pairs, power: Floats, floor: float, points: Pairs) -> Beam:
 
 
 def null(levels: Levels, place: Pair, width: Pair) -> Pair | None:
-    """Return the offset [deg] at which both errors of the receiver are 0; None without enough errors.
-
-    A linear fit to the errors of the levels within half a beamwidth of the highest power.
-    """
+    """Return the offset [deg] at which both errors of the receiver are 0, by a linear fit to those near the highest
+    power; None without enough errors."""
     near = (np.hypot(*((levels.offsets - place) / width).T) < 0.6) & np.isfinite(levels.errors).all(1)
     if near.sum() < 5:
         return None
@@ -141,11 +139,7 @@ def null(levels: Levels, place: Pair, width: Pair) -> Pair | None:
 
 
 def g_over_t_db(ratio: float, flux_sfu: float, frequency_hz: Hertz, attenuation_db: Decibels = 0.0) -> float:
-    """Return G/T [dB/K] from ratio = (Y - 1) L.
-
-    flux_sfu: flux density of the source [1e-22 W/m2/Hz], in random polarisation; attenuation_db: of the atmosphere
-    between source and antenna.
-    """
+    """Return G/T [dB/K] from ratio = (Y - 1) L; flux_sfu: flux density [1e-22 W/m2/Hz], in random polarisation."""
     S = flux_sfu * FLUX_UNIT_W_M2_HZ * 10.0**(-0.1 * attenuation_db)
     wavelength = LIGHT_SPEED_M_S / frequency_hz
     return 10.0 * math.log10(8.0 * math.pi * BOLTZMANN_J_K * ratio / (S * wavelength**2))

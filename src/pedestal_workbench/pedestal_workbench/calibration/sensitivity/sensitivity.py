@@ -105,10 +105,8 @@ class Sensitivity(Calibration):
         return said
 
     def parameters(self) -> dict[str, dict[str, Json]]:
-        """Return the beamwidth, for control unit and simulated receiver.
-
-        The peak off the source is an error of the pointing, which the pointing model corrects.
-        """
+        """Return the beamwidth, for control unit and simulated receiver. The peak off the source is an error of the
+        pointing, which the pointing model corrects."""
         width = round(math.radians(math.sqrt(float(np.prod(self.beam.width)))), 8)
         return {'acu': {'tracker.receiver.beamwidth': width}, 'tracking_receiver': {'antenna.beamwidth': width}}
 
@@ -137,8 +135,7 @@ class Sensitivity(Calibration):
 
 
 def _diameter_of_source(measured: levels.Levels, options: SensitivityOptions) -> Degrees:
-    """Return the diameter of the source of levels: that of the options, of the sun with a flux, or that which the
-    recording states. Raises ValueError without any of them."""
+    """Return the diameter of the options, of the sun with a flux, or of the recording. Raises ValueError."""
     if options.diameter is not None:
         return options.diameter
     if options.flux:
@@ -166,10 +163,8 @@ def calibrate(measured: levels.Levels, options: SensitivityOptions) -> Sensitivi
 
 
 def calibrated(source: pathlib.Path, recorded: bool, options: SensitivityOptions) -> Sensitivity:
-    """Return the calibration by a CSV file of levels or, if `recorded` is True, by the recording of a scan.
-
-    Raises ValueError.
-    """
+    """Return the calibration by a CSV file of levels or, if `recorded` is True, by the recording of a scan. Raises
+    ValueError."""
     options.check()
     with named(source):
         measured = (levels.of_recording(bags.read(source, ''), str(source)) if recorded else
