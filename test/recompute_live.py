@@ -160,7 +160,6 @@ def _graph(recording: FedRecording, unit: Unit) -> tuple[str, ...]:
 
 def _run(recording: FedRecording, done: recompute.Recomputed, params: parameters.Parameters,
          folder: pathlib.Path) -> dict[str, Output]:
-    """Start the process of the node with its files in a folder, feed it, end it, and return its {topic: Output}."""
     file, log = folder / 'parameters.yaml', folder / 'log'
     names = _graph(recording, done.unit)
     values = {**parameters.as_dict(params), 'graph.pacing': 'lockstep', 'graph.nodes': ','.join(names),

@@ -14,7 +14,7 @@ from pedestal_bringup.scenario import files, scenario
 from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_results import tracking
 from pedestal_workbench.calibration.calibration import CalibrationError
-from pedestal_workbench.calibration.receiver import matrix, offsets, phasing
+from pedestal_workbench.calibration.receiver import beacon_offsets, matrix, phasing
 
 CROSS = np.array([(r * s, 0.0) for r in (0.1, 0.2, 0.3) for s in (1, -1)]
                  + [(0.0, r * s) for r in (0.1, 0.2, 0.3) for s in (1, -1)])
@@ -176,7 +176,7 @@ def test_nan_in_a_locked_receiver_is_refused():
     errors = np.zeros((300, 3)) + 46.0
     errors[50:80, 1] = np.nan
     with pytest.raises(CalibrationError, match='10 % of its errors are NaN'):
-        offsets._point(t, still, errors, 0.0175)
+        beacon_offsets._point(t, still, errors, 0.0175)
 
 
 def test_the_result_closes_a_loop_that_does_not_close_without_it(capfd, tmp_path):

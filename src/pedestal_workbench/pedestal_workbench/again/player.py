@@ -161,7 +161,6 @@ class Player(Node):
         self._next_refresh = self._next_subscriber_check = self._last_spin = 0.0    # monotonic [s]
 
     def _publisher(self, name: str, type_name: str) -> Publisher:
-        """Return a publisher of a recorded topic. Raises BagError for a wrong type or a type that is not installed."""
         topic = self.graph.get(name)
         if topic is not None and topic.type != type_name:
             raise bags.BagError(f'{self.playlist.bag.path}: {name} is a {type_name}; must be a {topic.type}')
@@ -261,7 +260,6 @@ class Player(Node):
         self._await_arrival(name, self.deadline)
 
     def _send(self, name: str, stamp: Nanoseconds, data: bytes) -> None:
-        """Publish a message. Before it, wait if too many messages are unacknowledged (MAX_UNACKNOWLEDGED_MESSAGES)."""
         channel = self.channels[name]
         if channel.sent - channel.arrived >= MAX_UNACKNOWLEDGED_MESSAGES:
             self._await_arrival(name, self.deadline)
@@ -320,7 +318,6 @@ class Player(Node):
         return KEYBOARD_POLL_S
 
     def _late(self, stamp: Nanoseconds = -1) -> NodeUnderTest | None:
-        """Return the first node under test that must still answer before the messages of a stamp, or None."""
         return next((node for node in self.under_test if node.owes(stamp)), None)
 
     def _show_position(self, now: Seconds) -> None:
@@ -332,7 +329,6 @@ class Player(Node):
                              + (f'   {KEY_HELP}' if self.keyboard.available else ''))
 
     def _check_subscribers(self, now: Seconds) -> None:
-        """Raise GraphError if a topic has lost a subscriber."""
         if now >= self._next_subscriber_check:
             self._next_subscriber_check = now + SUBSCRIBER_POLL_S
             unread = self._unread()

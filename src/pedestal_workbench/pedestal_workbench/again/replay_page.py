@@ -125,7 +125,6 @@ class ShownRecording(page_state.PageAntenna):
         return [messages.deserialize(data, self._bag.topics[name]) for _, data in self._last(name, most)]
 
     def _read_log(self) -> None:
-        """Fill the event log with all events of the recording, in the order of their log times."""
         events: list[tuple[Nanoseconds, str, Message]] = []
         for name in ('acu/mode', 'adu/state', 'acu/command_result', 'acu/alarms'):
             if name in self._rows:

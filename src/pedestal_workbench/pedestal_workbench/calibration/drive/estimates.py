@@ -55,8 +55,7 @@ def jackknife(names: Sequence[str], parts: list[_Part], statistic: Callable[[lis
 
 def plateaus(motion: Motion, torque: Floats) -> Vectors3:
     """Return mean rate [rad/s], torque on the load [Nm] and angle [rad] of the pieces of constant rate."""
-    period = float(np.median(np.diff(motion.t)))
-    size, settling = round(PLATEAU_S / period), round(PLATEAU_SETTLING_S / period)
+    size, settling = round(PLATEAU_S / motion.period), round(PLATEAU_SETTLING_S / motion.period)
     slow = np.convolve(motion.v, np.ones(size) / size, 'same')
     steady = (np.abs(motion.v - slow) < PLATEAU_CHANGE * np.abs(slow) + 1e-4) & (np.abs(slow) > 2e-4)
     pieces = []
@@ -124,7 +123,7 @@ def lash(parts: Iterable[tuple[Motion, Pairs]], ratio: float) -> Estimates:
     """
     rows, times, before = [], [], 0
     for motion, torque in parts:
-        contact = np.ones(2 * round(CONTACT_TIME_S / float(np.median(np.diff(motion.t)))) + 1)
+        contact = np.ones(2 * round(CONTACT_TIME_S / motion.period) + 1)
         for i in range(2):
             T = torque[:, i]
             least = STRONG_TORQUE_SHARE * np.percentile(np.abs(T), 99.5)
@@ -194,7 +193,7 @@ def encoder(motion: Motion, pinion_ratio: float) -> tuple[Estimates, Pairs]:
 def _turn(motion: Motion, sign: float) -> slice | None:
     """Return the longest stretch in one direction, of at least MIN_TURN_RAD, without the accelerations at its ends.
     Their torques twist the gears."""
-    longest, settling = None, round(TURN_SETTLING_S / float(np.median(np.diff(motion.t))))
+    longest, settling = None, round(TURN_SETTLING_S / motion.period)
     for first, last in tracking.stretches(sign * motion.v > 1e-2):
         rate = sign * motion.v[first:last]
         fast = first + np.flatnonzero(rate > TURN_RATE_SHARE * np.median(rate))

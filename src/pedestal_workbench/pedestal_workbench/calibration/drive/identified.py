@@ -243,7 +243,7 @@ def _rounded(value: float) -> float:
     return float(f'{value:.{VALUE_DIGITS}g}')
 
 
-def plan_parameters(chosen: Scenario) -> tuple[motions.Plan, dict[str, dict[str, Json]]]:
+def plan_parameters(chosen: Scenario) -> tuple[motions.MotionPlan, dict[str, dict[str, Json]]]:
     """Return (plan, {node: {parameter: value}}) that let a scenario make the motions."""
     plan = motions.plan(chosen.node_parameters('acu'))
     start = dict(zip(AXES, plan.start))

@@ -85,8 +85,7 @@ def inertia_torque(motion: Motion, found: Estimates) -> Floats:
     if 'frequency' not in found:
         return found['inertia'][0] * motion.a if 'inertia' in found else np.zeros_like(motion.a)
     J, J_d, f, zeta = (found[name][0] for name in ('inertia', 'dish_inertia', 'frequency', 'damping'))
-    period = float(np.median(np.diff(motion.t)))
-    return (J - J_d) * motion.a + J_d * _swing(period, motion.a, slice(None), 2.0 * math.pi * f, zeta)
+    return (J - J_d) * motion.a + J_d * _swing(motion.period, motion.a, slice(None), 2.0 * math.pi * f, zeta)
 
 
 def _flexible(rows: Floats, dish: Callable[[float, float], Floats], w: RadiansPerSecond, zeta: float) -> Estimates:
@@ -111,7 +110,7 @@ def _rows(motion: Motion, torque: Floats, known: Mapping[str, float],
           gravity: bool) -> tuple[Seconds, Floats, Ints, Floats]:
     """Return (period, acceleration (n,), used steps, their rows (k, 4): acceleration, sign of the rate, rate, torque
     less friction)."""
-    v, period = motion.v, float(np.median(np.diff(motion.t)))
+    v, period = motion.v, motion.period
     kinds = {'coulomb': known['coulomb'], 'breakaway': known.get('breakaway', known['coulomb']),
              'stribeck_rate': known.get('stribeck_rate', 2e-3), 'viscous': known['viscous']}
     rest = torque - friction_torque(v, **kinds) - known['offset']

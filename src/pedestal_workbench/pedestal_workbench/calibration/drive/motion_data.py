@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from adu_drive.params import AxisParameters
-from pedestal_common.quantities import Floats, Pairs, Times
+from pedestal_common.quantities import Floats, Pairs, Seconds, Times
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_workbench.calibration.calibration import CalibrationError
@@ -29,6 +29,11 @@ class Motion:
     motor_rate: Pairs           # of both motors on the motor shaft [rad/s]
     motor_acceleration: Pairs   # the same [rad/s2]
     motor_torque: Pairs         # of both motors on the motor shaft [Nm]
+
+    @property
+    def period(self) -> Seconds:
+        """Time from a step to the next."""
+        return float(np.median(np.diff(self.t)))
 
     def mesh_torque(self, axis: AxisParameters) -> Pairs:
         """Return the torques [Nm] on the motor shaft that the gears get, less inertia and friction of the motors."""

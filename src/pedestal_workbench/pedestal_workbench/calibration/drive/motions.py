@@ -38,7 +38,7 @@ LONG_TIME_S, MAX_TIME_S = 3600.0, 86400.0  # duration that is remarked, and long
 
 
 @dataclasses.dataclass(frozen=True)
-class Plan:
+class MotionPlan:
     """Motions of a calibration of the drive."""
     commands: str           # text for the parameter acu.commands
     start: tuple[Radians, ...]      # azimuth, elevation
@@ -100,7 +100,7 @@ def time_text(seconds: Seconds) -> str:
     return f'{hours} h {minutes} min'
 
 
-def plan(acu: AcuParameters) -> Plan:
+def plan(acu: AcuParameters) -> MotionPlan:
     """Return the plan for the limits of a control unit. Raises ValueError for a short travel or too long motions."""
     schedule, limits, times = _Schedule(acu), [], {}
     for i, (name, axis) in enumerate(zip(AXES, (acu.azimuth, acu.elevation))):
@@ -126,7 +126,7 @@ def plan(acu: AcuParameters) -> Plan:
             raise ValueError(f'{reason}{time_text(times[slow])} for the motions; a run has at most '
                              f'{time_text(MAX_TIME_S)}')
         limits.append(f'{reason}{time_text(times[slow])} of it; a larger rate shortens the motions')
-    return Plan('; '.join(schedule.parts), schedule.start, math.ceil(schedule.t + 1.0), tuple(limits))
+    return MotionPlan('; '.join(schedule.parts), schedule.start, math.ceil(schedule.t + 1.0), tuple(limits))
 
 
 def _rates(schedule: _Schedule, i: int, middle: Radians, travel: Radians, largest: RadiansPerSecond,

@@ -23,7 +23,7 @@ from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COL
 from pedestal_workbench.again import iq
 from pedestal_workbench.again.feed import FedRecording
 from pedestal_workbench.calibration.calibration import CalibrationError, PageTable, named
-from pedestal_workbench.calibration.receiver import complex_matrix, matrix, offsets, phasing, ratios
+from pedestal_workbench.calibration.receiver import beacon_offsets, complex_matrix, matrix, phasing, ratios
 
 ELEMENT_NAMES = ('x_from_x', 'x_from_e'), ('e_from_x', 'e_from_e')
 """Names of the elements of the calibration matrix, by row and column."""
@@ -166,7 +166,7 @@ class IqPhasing(phasing.ReceiverCalibration):
 def calibrate(bag: Recording, source: str, samples: ratios.Samples, recorded: bool) -> IqPhasing:
     """Return the result for a recording of one beam and its samples. Raises CalibrationError. recorded: True if the
     errors in the bag were made of these samples."""
-    points = offsets.read(bag)
+    points = beacon_offsets.read(bag)
     antenna, in_force = samples.parameters.antenna, np.array(samples.parameters.calibration.matrix)
     if abs(antenna.beamwidth / recordings.beamwidth(bag) - 1.0) > 1e-9:
         raise CalibrationError(f'antenna.beamwidth = {antenna.beamwidth:g} rad of the receiver: must be that of the '
@@ -182,7 +182,7 @@ def calibrate(bag: Recording, source: str, samples: ratios.Samples, recorded: bo
     return IqPhasing(source, points, before, after, samples, measured, slopes, of_unit)
 
 
-def _check_errors(points: offsets.Points, errors: Pairs, meta: pathlib.Path) -> None:
+def _check_errors(points: beacon_offsets.Points, errors: Pairs, meta: pathlib.Path) -> None:
     """Raise CalibrationError if errors by the samples of a file differ from those of the recording [beamwidths]."""
     deviation = np.where(points.fitted | points.circle, np.abs(errors - points.errors).max(1), 0.0)
     k = int(deviation.argmax())

@@ -15,7 +15,7 @@ from pedestal_results import intervals, tracking
 from pedestal_results.intervals import estimated, row
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, Spec, new_panels
 from pedestal_workbench.calibration.calibration import Calibration, PageTable, named
-from pedestal_workbench.calibration.receiver import matrix, offsets
+from pedestal_workbench.calibration.receiver import beacon_offsets, matrix
 
 ERROR_TARGET, CROSS_TALK_TARGET = '< 5', '< -20'  # targets of the error on the circle [%] and of the cross-talk [dB]
 SLOPE_RANGE = 0.1, 10.0  # range of acu.tracker.receiver.slope
@@ -29,7 +29,7 @@ class ReceiverCalibration(Calibration):
     """Calibration of a receiver, real or complex."""
     STEP = 'receiver'
 
-    points: offsets.Points
+    points: beacon_offsets.Points
     before: matrix.Verification     # with the matrix in force
     after: matrix.Verification      # with the new matrix
 
@@ -68,7 +68,7 @@ class ReceiverCalibration(Calibration):
         x, y = np.round(self.null, 3) + 0.0    # without the sign of a zero
         lines.append(f'null of the errors                    cross-elevation {x:.3f}, elevation {y:.3f} beamwidths '
                      'from the assumed beacon')
-        unit = f'{offsets.CIRCLE_BEAMWIDTHS:g} beamwidths'
+        unit = f'{beacon_offsets.CIRCLE_BEAMWIDTHS:g} beamwidths'
         lines.append(f'error on the circle of {unit}   {100.0 * self.before.error:.2f} % before, '
                      f'{100.0 * self.after.error:.2f} % after (must be {ERROR_TARGET} %)')
         lines.append(f'cross-talk                            {self.before.cross_talk_db:.1f} dB before, '
@@ -204,7 +204,7 @@ class Phasing(ReceiverCalibration):
 def calibrated(bag: Recording, source: str) -> Phasing:
     """Return the calibration by a recording of one beam. Raises ValueError."""
     with named(source):
-        points = offsets.read(bag)
+        points = beacon_offsets.read(bag)
         slopes = matrix.fit(points.offsets[points.fitted], points.errors[points.fitted])
     in_force = tracking.error_matrix(bag)
     circle = points.offsets[points.circle], points.errors[points.circle]

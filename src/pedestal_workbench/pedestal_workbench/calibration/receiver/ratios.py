@@ -18,7 +18,7 @@ from pedestal_hardware.monopulse.params import MonopulseParameters
 from pedestal_hardware.monopulse.unit import MonopulseReceiver
 from pedestal_workbench.again import iq
 from pedestal_workbench.calibration.calibration import CalibrationError
-from pedestal_workbench.calibration.receiver import offsets
+from pedestal_workbench.calibration.receiver import beacon_offsets
 
 SMALLEST_POWER_OVER_NOISE = 1e-3  # smallest power of the sum of a point, over its noise power, for a ratio [-]
 
@@ -72,12 +72,12 @@ def at_points(samples: Samples, spans: Pairs) -> Complexes:
 def _check(found: _Sums, span: Pair, samples: Samples, ends: tuple[Nanoseconds, Nanoseconds] | None) -> None:
     """Raise CalibrationError for a point without samples or lock; ends: UTC of the first and the last step."""
     place, expected = f'{span[0]:.1f} to {span[1]:.1f} s', (span[1] - span[0]) / samples.parameters.period
-    if found.steps < (1.0 - offsets.MAX_MISSING_SHARE) * expected:
+    if found.steps < (1.0 - beacon_offsets.MAX_MISSING_SHARE) * expected:
         covered = ('holds no whole step' if ends is None else
                    f'holds samples from {sigmf.text_of(ends[0])} to {sigmf.text_of(ends[1])}')
         raise CalibrationError(f'samples are missing at {place}: {samples.file.meta} {covered}, and time 0 of the '
                                f'recording is {sigmf.text_of(samples.epoch)}; both must be of the same run')
-    if found.unlocked > offsets.MAX_MISSING_SHARE * found.steps:
+    if found.unlocked > beacon_offsets.MAX_MISSING_SHARE * found.steps:
         raise CalibrationError(f'receiver not locked at {place}: {found.unlocked} of {found.steps} steps of '
                                f'{samples.file.meta} have no lock; each offset needs a locked receiver')
     if found.power - found.noise < SMALLEST_POWER_OVER_NOISE * found.noise:
