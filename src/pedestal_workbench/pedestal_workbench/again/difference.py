@@ -1,8 +1,5 @@
-"""Differences between the recorded and the new messages of a topic: first number and order, then each field.
-
-`pedestal recompute` uses `compare`, which pairs messages by stamp and allows a tolerance of the numbers.
-`pedestal rerun` uses `compare_messages`, which pairs messages by position and allows no difference.
-"""
+"""Differences between recorded and new messages of a topic: `compare` pairs messages by stamp, with a tolerance of the
+numbers, and `compare_messages` by position, without any."""
 import dataclasses
 import fnmatch
 import itertools

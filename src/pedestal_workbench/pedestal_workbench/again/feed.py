@@ -1,11 +1,7 @@
 """Recorded messages of a bag as inputs of the steps of a node, for its unit in memory or its process.
 
-pedestal_common.graph.steps, the code of the nodes themselves, matches inputs to steps. Accuracy:
-
-lockstep   Stamps assign inputs to steps. Therefore an equal version on the same machine gives equal bits.
-realtime   A step receives the messages that were published before the next step began. In a recording of another tool
-           it receives the messages that were recorded before. These are the inputs that the node had, except for
-           messages in transit at that moment.
+pedestal_common.graph.steps, the code of the nodes themselves, matches inputs to steps: in lockstep by stamps, in
+realtime by the order of publication. docs/graph.md (Recomputing) states the accuracy.
 """
 import dataclasses
 import itertools

@@ -1,7 +1,6 @@
-"""Playlist of a replay: selection and order of the recorded messages. The module works without ROS.
+"""Playlist of a replay: the recorded messages in the order of stamps; a message without a header has its log time.
 
-The messages are in the order of their stamps; a message without a header has its log time. Messages with equal stamps
-are in this order:
+Messages with equal stamps are in this order:
 
 1. latched topics. All subscribers acknowledge such a message before the next message, as with Shell.announce.
 2. the other topics of the table of topics, in the order of the table

@@ -1,9 +1,6 @@
 """`pedestal recompute`: feed the recorded inputs of a node to its unit, and compare new outputs with recorded outputs.
 
-Recorded commands and service calls are repeated before the step at which the node replied. If a node has no recorded
-replies, some changes of acu/mode or adu/state cannot follow from the inputs alone. Such a change is requested at its
-step. A parameter that was changed during the run leaves no trace in the recording. In a recording that begins during
-its run, the unit begins with its initial state. Its outputs then differ until the filter has converged.
+docs/graph.md (Recomputing) states which commands are repeated, and what no recording holds.
 """
 import dataclasses
 import pathlib

@@ -1,12 +1,10 @@
 """Pointing offsets from recordings of satellite passes: boresight in autotrack less the predicted direction.
 
-In autotrack the receiver closes the loop, so the encoders show how far the antenna must turn from the predicted
-direction until the beam is on the target. The offset of a point is the mean over WINDOW_S of
+The offset of a point is the mean over WINDOW_S, in cross-elevation and elevation on the deck, of
 
-    encoder angles + receiver error - predicted direction
+    encoder angles + receiver error - predicted direction (predicted.py)
 
-in cross-elevation and elevation on the deck. The prediction is that of the control unit (predicted.py). The errors of
-the prediction (refraction, time, elements) and, on a ship, of the INS are a part of the offsets.
+The errors of the prediction and, on a ship, of the INS are a part of it (docs/how-to/calibrate.md).
 """
 import math
 from collections.abc import Iterable, Sequence

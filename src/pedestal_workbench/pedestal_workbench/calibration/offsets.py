@@ -1,14 +1,7 @@
 """Files of measured pointing offsets: a CSV file, a file of katpoint's reduction scripts, or a TPOINT file.
 
-The content of a file shows its format:
-
-    CSV       columns az_deg, el_deg, cross_elevation_deg, elevation_deg and possibly sigma_deg; other units of
-              angle and other separators are accepted, see csv_table. The first two are the direction wanted on the
-              sky; the next two are the offset that had to be added to the command. The names az, el, d_xel, d_el and
-              sigma without a unit are degrees
-    katpoint  columns azimuth, elevation, delta_azimuth, delta_elevation and possibly delta_azimuth_std and
-              delta_elevation_std, in degrees; the azimuth offset is one of the axis
-    TPOINT    see tpoint.py
+The content of a file shows its format (docs/how-to/calibrate.md). In a CSV file, the names az, el, d_xel, d_el and
+sigma without a unit are degrees. A file of katpoint states offsets of the azimuth axis, and its standard deviations.
 """
 import csv
 import datetime

@@ -1,8 +1,7 @@
-"""Directions on the deck that a recorded control unit predicted: of its program track, of a satellite and of the sun.
+"""Directions on the deck that a recorded control unit predicted, by the table that it followed last.
 
-The prediction of a step is that of the table which the control unit followed last: `program`, `tle` or `sun`. It
-contains the refraction that the control unit adds, and not the offsets that an operator has commanded. On a ship, the
-recorded attitude of the INS turns the earth direction to the deck, from the alignment of the INS on.
+They contain the refraction that the control unit adds, and not the offsets that an operator has commanded. On a ship,
+the recorded attitude of the INS turns them to the deck, from its alignment on.
 """
 from collections.abc import Iterable, Sequence
 

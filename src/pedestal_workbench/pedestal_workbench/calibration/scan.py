@@ -1,11 +1,8 @@
 """Pointing offsets from scans of the level: the antenna steps about the predicted direction of a source.
 
-Five points (middle and both sides of each axis) and a raster are scans. The commands `offset` of the control unit move
-the antenna in a mode that follows a table. A dwell is the time from one command to the next. Its level is the mean
-over its last part, in which the antenna has come to rest.
-
-A Gaussian beam is fitted to the levels L at the offsets x (cross-elevation) and y (elevation) of the encoders from the
-predicted direction:
+A dwell is the time from one command `offset` to the next. Its level is the mean over its last part, in which the
+antenna has come to rest. A Gaussian beam is fitted to the levels L at the offsets x (cross-elevation) and y
+(elevation) of the encoders from the predicted direction:
 
     ln L = c0 + c1 x + c2 y - c3 (x^2 + y^2)        weights L^2, for a noise that is equal at all levels
 

@@ -7,9 +7,8 @@
     192.3860283 77.34684 -167.27889 77.34754     azimuth and elevation on the sky, then those of the mount
     END
 
-Further numbers of an observation, such as the angle of a rotator, are ignored. The azimuth counts from north through
-east. Some observatories count it from south (east is 90 deg), and state it in a comment such as `South = 0`. Because
-both conventions fit equally well, the convention of a file is always stated with the result.
+Further numbers of an observation are ignored. The azimuth counts from north through east, or by a comment such as
+`South = 0` from south. Because both fit equally well, the origin is always stated with the result.
 """
 import datetime
 import math

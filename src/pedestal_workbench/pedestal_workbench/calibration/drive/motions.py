@@ -1,14 +1,7 @@
 """Plan of safe motions that show the properties of a drive: a schedule of `preset` commands for the control unit.
 
-Each axis moves alone, about the middle of its travel, in this order:
-
-    rates        constant rates both ways, from 0.5 mrad/s to half the rate of the shaper: friction
-    reversals    of half the largest rate: inertia, and lash in a run without bias torque
-    pulses       small steps on a constant rate: first mode of the structure. At this rate the friction is constant
-    turn         a turn both ways, if the travel allows a turn: encoder
-
-The motions stay inside the limits of the control unit: MAX_RATE_SHARE of the shaper's rate, the shaper's acceleration,
-and the travel less MARGIN_SHARE at each end. The elevation stays above the highest point of the floor.
+Each axis moves alone about the middle of its travel: constant rates, reversals, pulses, and a turn both ways if the
+travel allows a turn. docs/how-to/calibrate.md states what they show, and their limits.
 """
 import dataclasses
 import math

@@ -1,10 +1,9 @@
 """Twin of a drive: the simulated drive with estimated parameters, driven by the recorded commands.
 
-The drive reports its torque once per step. Between two steps the torque follows the staircase of the rate commands, so
-the reported torque differs from its mean, and an inertia from it is too small by some tens of percent. The twin has
-the same loops and the same staircase. Each estimate is therefore corrected by its ratio, or its difference, to the
-same estimate from the twin, until both agree (indirect inference: Gourieroux, Monfort and Renault,
-J. Applied Econometrics 8 (1993) S85).
+Between two reports the torque follows the staircase of the rate commands, so an inertia from the reported torque is
+too small by some tens of percent. The twin has the same loops and the same staircase. Each estimate is therefore
+corrected by its ratio, or its difference, to the same estimate from the twin, until both agree (indirect inference:
+Gourieroux, Monfort and Renault, J. Applied Econometrics 8 (1993) S85).
 """
 import dataclasses
 from collections.abc import Mapping, Sequence

@@ -1,12 +1,9 @@
 """Offsets about a beacon from a recording: where the beam stands still, its offset and the mean error of the receiver.
 
-A point is a wait between two steps of the beam (scenario receiver_phasing): the mean error of the receiver, and the
-offset by the encoders, through the pointing model in force. In `preset` the beacon is in the middle of the points; in
-`program` it is where the program track is without the offset of the operator. A constant error of this place changes
-only the null of the errors, and not their slopes.
-
-A point of the circle belongs to MIN_CIRCLE_POINTS or more consecutive points with the radius CIRCLE_BEAMWIDTHS. The
-matrix is fitted to all other points, and verified on the circle.
+The offset is by the encoders, through the pointing model in force. In `preset` the beacon is in the middle of the
+points; in `program` it is where the program track is without the offset of the operator. A constant error of this
+place changes only the null of the errors, and not their slopes. The matrix is fitted to the points off the circle,
+and verified on the circle.
 """
 import dataclasses
 import math

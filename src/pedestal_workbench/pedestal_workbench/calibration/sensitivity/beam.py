@@ -9,8 +9,7 @@
     u_j, v_j    n points that fill the disk of the source evenly [deg]
 
 A real beam is no Gaussian far out, so only power above MIN_SHARE of the highest is fitted. P_0 comes from the levels
-off the source. A / P_0 = (Y - 1) L: Y is the Y factor on axis, and L the correction for a source that is not small
-against the beam. For W below b, L = 1 + 0.38 (W / b)^2 (ITU-R S.733); this fit also holds for a wide source.
+off the source. A / P_0 = (Y - 1) L: Y is the Y factor on axis, and L the correction for the size of the source.
 
 The G/T of a receiver with one polarisation, from a source with a flux density S in random polarisation, is
 

@@ -1,10 +1,7 @@
-"""Levels at offsets about a source, from a CSV file or from a recording.
+"""Levels at offsets about a source, from a CSV file or from a recording (docs/how-to/calibrate.md).
 
-A file has the columns cross_elevation_deg, elevation_deg and level_db; or az_deg, el_deg and level_db, of which az_deg
-is an offset in azimuth. Its level is the total power, of source and system noise, in dB.
-
-In a recording the commands `offset` of the control unit move the antenna about the table that it follows. The level of
-the receiver is a C/N0 in dB-Hz: the power of the source alone over the noise power in 1 Hz.
+The level of a file is the total power, of source and system noise, in dB. The level of a recording is a C/N0 in dB-Hz:
+the power of the source alone over the noise power in 1 Hz.
 """
 import csv
 import dataclasses
