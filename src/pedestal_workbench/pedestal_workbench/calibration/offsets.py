@@ -116,7 +116,7 @@ def _plain(table: csv_table.Table) -> Iterator[OffsetRow]:
         numbers = (number(sky[0], AZIMUTH_RANGE_DEG), number(sky[1], ELEVATION_RANGE_DEG),
                    number(offset[0], OFFSET_RANGE_DEG), number(offset[1], OFFSET_RANGE_DEG))
         of_both = number(sigma, SIGMA_RANGE_DEG) if sigma else np.nan
-        yield table.line_num, *numbers, of_both, of_both
+        yield OffsetRow(table.line_num, *numbers, of_both, of_both)
 
 
 def _katpoint(table: csv_table.Table) -> Iterator[OffsetRow]:
@@ -134,7 +134,7 @@ def _katpoint(table: csv_table.Table) -> Iterator[OffsetRow]:
                  ] if has_sigma else [0.0, 0.0]
         # The scripts write 0 for a standard deviation that they have not estimated.
         of_xel, of_el = (cosine * sigma[0], sigma[1]) if min(sigma) > 0.0 else (np.nan, np.nan)
-        yield table.line_num, az, el, xel, offset, of_xel, of_el
+        yield OffsetRow(table.line_num, az, el, xel, offset, of_xel, of_el)
 
 
 def _dates(text: str) -> list[str]:

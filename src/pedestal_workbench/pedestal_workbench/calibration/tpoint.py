@@ -14,20 +14,15 @@ import datetime
 import math
 import pathlib
 import re
-from typing import TypeAlias
+from typing import NamedTuple
 
+from pedestal_common.quantities import Degrees
 from pedestal_common.text_files import csv_table
 from pedestal_common.text_files.csv_table import TableError
 
 AXIS_RANGE_DEG = (-540.0, 720.0)  # accepted azimuths [deg]
 MOUNT_ELEVATION_RANGE_DEG = (-10.0, 95.0)  # accepted elevations of the mount [deg]; those on the sky are at most 90
 MAX_DIFFERENCE_DEG = 5.0  # largest accepted offset on the sky [deg]
-
-OffsetRow: TypeAlias = tuple[int, float, float, float, float, float, float]
-"""Line in the file, azimuth and elevation, offsets in cross-elevation and elevation, their standard deviations [deg].
-
-A standard deviation is NaN if the file states none.
-"""
 
 _ALTAZ_OPTIONS = ('ALTAZ', 'AZALT')
 _MIN_DATE_NUMBERS = 6
@@ -37,6 +32,17 @@ _ORIGIN_PATTERN = re.compile(r'\b(?:(north|south)\s*=\s*0(?:\.0+)?\s*(?:deg\w*)?
 """Comments that state where the azimuth begins; a letter alone counts only with a second direction, as N=0, E=90."""
 _LATITUDE_PATTERN = re.compile(r'[-+]?\d{1,2}$')
 _NUMBERS_PATTERN = re.compile(r'[-+]?\.?\d')
+
+
+class OffsetRow(NamedTuple):
+    """Offset in a file, of any format. A standard deviation is NaN if the file states none."""
+    line: int
+    azimuth: Degrees
+    elevation: Degrees
+    across: Degrees         # offset in cross-elevation
+    up: Degrees             # offset in elevation
+    across_sigma: Degrees
+    up_sigma: Degrees
 
 
 def is_tpoint(text: str) -> bool:
@@ -116,5 +122,5 @@ def rows(path: str | pathlib.Path, text: str) -> list[OffsetRow]:
             if abs(value) > MAX_DIFFERENCE_DEG:
                 raise TableError(f'{path}: line {line}: {name} of the mount minus that on the sky = {value:g} deg: '
                                  f'must be {-MAX_DIFFERENCE_DEG:g} to {MAX_DIFFERENCE_DEG:g}')
-        found.append((line, az, el, *offset, math.nan, math.nan))
+        found.append(OffsetRow(line, az, el, *offset, math.nan, math.nan))
     return found
