@@ -68,8 +68,8 @@ class FedRecording:
         return self._rows[topic]
 
     def arrival(self, topic: str) -> Ints:
-        """Return numbers that increase in the order of arrival of the messages of a topic. They are publish times or,
-        in a recording of another tool, places in the file."""
+        """Return numbers that increase in the order of arrival of the messages of a topic: publish times or, in a
+        recording of another tool, places in the file."""
         rows = self.rows(topic)
         # A place is the number of a chunk and the offset in the unpacked chunk, which is far below 2^40 bytes.
         return rows.publish if 'pacing' in self.bag.metadata else (rows.chunk << 40) + rows.start

@@ -46,8 +46,8 @@ POSITION_REFRESH_S, SUBSCRIBER_POLL_S, KEYBOARD_POLL_S = 0.1, 0.5, 0.05
 """Periods of the update of the shown position, of the check of subscribers, and of the check for pressed keys [s]."""
 
 SUBSCRIBER_EXIT_TIMEOUT_S = 5.0
-"""Time without acknowledgement after which a lost subscriber counts as killed [s]. One that ends by itself disappears
-at once. Of a killed one, Fast DDS waits 20 s for acknowledgement, and then drops its messages."""
+"""Time without acknowledgement after which a lost subscriber counts as killed [s]. A subscriber that ends by itself
+disappears at once. Fast DDS waits 20 s for a killed subscriber to acknowledge, and then drops its messages."""
 
 MAX_SPIN_PAUSE_S = 0.01  # largest time between two spins of the player, in which it receives answers [s]
 

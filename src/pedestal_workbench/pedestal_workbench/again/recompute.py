@@ -1,6 +1,6 @@
 """`pedestal recompute`: feed the recorded inputs of a node to its unit, and compare new outputs with recorded outputs.
 
-docs/graph.md (Recomputing) states which commands are repeated, and what no recording holds.
+docs/graph.md (Recomputing) states the repeated commands, and the inputs that no recording holds.
 """
 import dataclasses
 import pathlib
@@ -210,8 +210,8 @@ def file_parameters(path: str | pathlib.Path, beam: str = '') -> Values:
 
 
 def overrides(texts: Iterable[str], names: Sequence[str]) -> dict[str, dict[str, Json]]:
-    """Return the parameters in texts node.key=value. With one name of a node, a text may leave it out. Raises
-    ValueError."""
+    """Return the parameters in texts node.key=value; names: of the recomputed nodes. The name of a single node may be
+    left out. Raises ValueError."""
     found: dict[str, dict[str, Json]] = {}
     for text in texts:
         if text.partition('=')[0].partition('.')[0] not in SECTION_NODES and len(names) == 1:

@@ -75,8 +75,8 @@ def main(options: RecomputeOptions) -> tuple[list[str], list[Row], bool]:
 
 def _node_report(recording: FedRecording, node: str, given: recompute.Values | None,
                  changes: Mapping[str, Json] | None, options: RecomputeOptions) -> NodeReport:
-    """Return the report on a node; given: parameters of --params-file; without changes of --param it is compared with
-    the recorded outputs."""
+    """Return the report on a node; given: parameters of --params-file. Without changes of --param, new outputs are
+    compared with recorded outputs."""
     params = recompute.parameters_of(recording, node, given)
     done = recompute.recompute(recording, node, params)
     tolerance = difference.Tolerance(options.absolute, options.relative, tuple(options.ignore))

@@ -65,7 +65,7 @@ class ReplayResult:
 
 @contextlib.contextmanager
 def stop_by_signal() -> Iterator[Callable[[], bool]]:
-    """Yield stopped(), which returns True after a signal. Without this handler it would interrupt a call of rclpy."""
+    """Yield stopped(), True after a signal. Without this handler a signal would interrupt a call of rclpy."""
     signals: list[bool] = []
     before = {number: signal.signal(number, lambda *_: signals.append(True))
               for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

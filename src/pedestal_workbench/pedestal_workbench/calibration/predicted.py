@@ -1,7 +1,7 @@
 """Directions on the deck that a recorded control unit predicted, by the table that it followed last.
 
-They contain the refraction that the control unit adds, and not the offsets that an operator has commanded. On a ship,
-the recorded attitude of the INS turns them to the deck, from its alignment on.
+The directions contain the refraction that the control unit adds, and not the offsets that an operator has commanded.
+On a ship, the recorded attitude of the INS turns earth directions to the deck, from the alignment of the INS on.
 """
 from collections.abc import Iterable, Sequence
 

@@ -8,7 +8,7 @@
     END
 
 Further numbers of an observation are ignored. The azimuth counts from north through east, or by a comment such as
-`South = 0` from south. Because both fit equally well, the origin is always stated with the result.
+`South = 0` from south. Because both origins fit equally well, the origin is always stated with the result.
 """
 import datetime
 import math

@@ -1,4 +1,4 @@
-"""Estimates of an axis from its Motion: friction, lash, bias, encoder. {}: the motions do not show the property.
+"""Estimates of an axis from its Motion: friction, lash, bias, encoder. No estimate: the motions do not show it.
 
 The intervals are by the jackknife over parts of the data (results.intervals).
 """
@@ -192,7 +192,7 @@ def encoder(motion: Motion, pinion_ratio: float) -> tuple[Estimates, Pairs]:
 
 def _turn(motion: Motion, sign: float) -> slice | None:
     """Return the longest stretch in one direction, of at least MIN_TURN_RAD, without the accelerations at its ends.
-    Their torques twist the gears."""
+    The torques of accelerations twist the gears."""
     longest, settling = None, round(TURN_SETTLING_S / motion.period)
     for first, last in tracking.stretches(sign * motion.v > 1e-2):
         rate = sign * motion.v[first:last]
