@@ -4,7 +4,6 @@ over ROS, and compare its outputs with the recorded ones. Exit code 1 if they ar
 The program starts the process of the node, and takes the place of all other nodes of the graph. It proves that the
 process of a node and its unit, which `pedestal recompute` uses, are equal, services included.
 """
-import collections
 import functools
 import os
 import pathlib
@@ -36,6 +35,7 @@ from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import commands, messages, records
 from pedestal_workbench.again import difference, recompute
 from pedestal_workbench.again.difference import Output
+from pedestal_workbench.again.feed import FedRecording
 
 NODE_START_TIMEOUT_S = 300.0
 """Time allowed for the start of the node [s]. The node may have to compile its laws first."""
@@ -134,7 +134,7 @@ class Live:
         self.feeder.destroy_client(client)
 
 
-def outputs(recording: recompute.FedRecording, done: recompute.Recomputed,
+def outputs(recording: FedRecording, done: recompute.Recomputed,
             params: parameters.Parameters) -> dict[str, Output]:
     """Return {topic: Output} of the process of a node that is fed with the inputs of the recomputation `done`.
 
@@ -150,19 +150,16 @@ def outputs(recording: recompute.FedRecording, done: recompute.Recomputed,
             try_shutdown()
 
 
-def _graph(recording: recompute.FedRecording, unit: Unit) -> tuple[str, ...]:
+def _graph(recording: FedRecording, unit: Unit) -> tuple[str, ...]:
     """Return the parameter graph.nodes of the process: the node, the recorder, and the optional nodes that feed it.
-
-    Because the recorder subscribes to every output, the process publishes each of them.
-    """
+    Because the recorder subscribes to every output, the process publishes each of them."""
     optional = [node.name for node in nodes.NODES if (node.optional or node.name == 'operator')
                 and any(topic in unit.NODE.reads and recording.has(topic) for topic in node.writes)]
     return (unit.NODE.name, 'recorder', *optional)
 
 
-def _run(recording: recompute.FedRecording, done: recompute.Recomputed, params: parameters.Parameters,
+def _run(recording: FedRecording, done: recompute.Recomputed, params: parameters.Parameters,
          folder: pathlib.Path) -> dict[str, Output]:
-    """Start the process of the node with its files in a folder, feed it, end it, and return its {topic: Output}."""
     file, log = folder / 'parameters.yaml', folder / 'log'
     names = _graph(recording, done.unit)
     values = {**parameters.as_dict(params), 'graph.pacing': 'lockstep', 'graph.nodes': ','.join(names),
@@ -194,12 +191,9 @@ def _run(recording: recompute.FedRecording, done: recompute.Recomputed, params: 
     return {name: _output(name, data, done, steps[name]) for name, data in feeder.answers.items()}
 
 
-def _feed(recording: recompute.FedRecording, done: recompute.Recomputed, live: Live) -> dict[str, list[int]]:
+def _feed(recording: FedRecording, done: recompute.Recomputed, live: Live) -> dict[str, list[int]]:
     """Feed all steps to the process. Return {output topic: [step at which each message came]}."""
     feed, feeder = done.feed, live.feeder
-    events: dict[int, list[tuple[str, int]]] = collections.defaultdict(list)
-    for step, name, row in feed.events:
-        events[step].append((name, row))
     due = {name: _due(done, name) for name in done.outputs}
     steps: dict[str, list[int]] = {name: [] for name in done.outputs}
 
@@ -212,8 +206,8 @@ def _feed(recording: recompute.FedRecording, done: recompute.Recomputed, live: L
         names = [name for name, count in due.items() if len(feeder.answers[name]) < count[step]]
         return f'{", ".join(names)} for step {feed.stamps[step] / NS_PER_SECOND:.6f} s'
 
-    for step in range(len(feed.stamps)):
-        for name, row in events[step]:
+    for step, _, came in feed.stretches(range(len(feed.stamps))):
+        for name, row in came:
             feeder.announce_now(name, recording.data(name)[row])
         for command, _ in done.requests.get(step, ()):
             live.send_command(command)
@@ -240,7 +234,7 @@ def _output(name: str, data: list[bytes], done: recompute.Recomputed, steps: lis
 
 def main(bag: str, node: str) -> int:
     """Print the comparison of a node in a bag. Return the exit code, 1 for a difference."""
-    recording = recompute.FedRecording(bag)
+    recording = FedRecording(bag)
     params = recompute.parameters_of(recording, node)
     done = recompute.recompute(recording, node, params)
     exact = difference.Tolerance(0.0, 0.0)

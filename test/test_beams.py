@@ -20,6 +20,7 @@ from pedestal_recording.verify import verify
 from pedestal_results import tracking
 from pedestal_results.report.page import write as write_report
 from pedestal_workbench.again import difference, recompute
+from pedestal_workbench.again.feed import FedRecording
 
 pytestmark = pytest.mark.thorough
 
@@ -91,7 +92,7 @@ def test_the_same_run_gives_the_same_file(runs, run_process, tmp_path):
 @pytest.mark.parametrize('name, beam', [('four', 'beam_1'), ('four', 'beam_4'), ('sway', ''),
                                         ('type 1, 1 ms', '')])
 def test_every_node_of_a_beam_recomputes_identically(runs, name, beam):
-    recording = recompute.FedRecording(runs[name].bag, beam=beam)
+    recording = FedRecording(runs[name].bag, beam=beam)
     nodes = recompute.chosen(recording, (), None)
     assert set(nodes) >= {'tracking_receiver', 'acu', 'adu'}
     for node in nodes:
@@ -116,9 +117,9 @@ def test_a_beam_has_the_beamwidth_of_its_own_antenna(views):
 
 
 def test_a_node_of_another_beam_is_not_recomputed(runs):
-    recording = recompute.FedRecording(runs['four'].bag, beam='beam_2')
+    recording = FedRecording(runs['four'].bag, beam='beam_2')
     assert recompute.chosen(recording, ['beam_2/acu'], None) == ['acu']
-    with pytest.raises(recompute.RecomputeError, match='--node beam_3/acu: .* use --beam beam_3 --node acu'):
+    with pytest.raises(ValueError, match='--node beam_3/acu: .* use --beam beam_3 --node acu'):
         recompute.chosen(recording, ['beam_3/acu'], None)
 
 

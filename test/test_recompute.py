@@ -19,6 +19,7 @@ from pedestal_recording.verify import verify
 from pedestal_recording.writer import Writer as BagWriter
 from pedestal_results import results, tracking
 from pedestal_workbench.again import difference, recompute, recompute_report
+from pedestal_workbench.again.feed import FedRecording
 
 REFERENCES = pathlib.Path(__file__).parent.parent / 'bags' / 'reference'
 LIVE = pathlib.Path(__file__).with_name('recompute_live.py')
@@ -93,7 +94,7 @@ def test_a_lockstep_recording_comes_out_the_same_to_the_last_bit(runs, name, nod
         f'{node}: identical' for node in nodes]
     values = {(row['case'], row['metric']): row['value'] for row in json.loads(rows.read_text())['rows']}
     assert {case for case, _ in values} == set(nodes)
-    recording = recompute.FedRecording(runs[name].bag)
+    recording = FedRecording(runs[name].bag)
     written = {name for name, link in graph.links().items()
                if set(link.writers) & set(nodes) and link.rate != 'second' and recording.has(name)} - {'acu/alarms'}
     assert {metric.split()[0] for _, metric in values} == written
@@ -206,7 +207,7 @@ def test_a_changed_parameter_is_reported_old_against_new(runs, pedestal, tmp_pat
 def test_the_numbers_of_a_recording_and_of_a_late_estimate(runs):
     """Those of the recording are what its run said; the recorded estimate, delayed by 20 ms, lags 20 ms more."""
     from pedestal_workbench.again import what_if
-    recording = recompute.FedRecording(runs['leo'].bag)
+    recording = FedRecording(runs['leo'].bag)
     old = {name: recording.output(name) for name in OUTPUTS}
     late = difference.Output(old[ESTIMATE].stamps[4:], old[ESTIMATE].values[:-4])
     numbers = what_if.numbers(recording.bag, [old, {**old, ESTIMATE: late}])
@@ -343,7 +344,7 @@ REQUESTS = {'acu': (MODE, {400: 'acu/standby', 500: 'acu/program'}, ['standby', 
 @pytest.fixture(params=REQUESTS)
 def requested(runs, tmp_path, request):
     """(node, path) of the run ashore as it would have been recorded had someone asked something of a node."""
-    recording, node = recompute.FedRecording(runs['leo'].bag), request.param
+    recording, node = FedRecording(runs['leo'].bag), request.param
     requests = REQUESTS[node][1]
     done = recompute.recompute(recording, node, recompute.parameters_of(recording, node),
                                {step: [Command(service, SERVICE_CLIENT)] for step, service in requests.items()})

@@ -20,6 +20,7 @@ from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
 from pedestal_results import isolation, known_attitude, results, tracking
 from pedestal_workbench.again import difference, recompute
+from pedestal_workbench.again.feed import FedRecording
 from ship_motion_sim.sea import motion
 from tracking_receiver_sim import target
 
@@ -263,7 +264,7 @@ def test_the_rows_of_a_run_say_its_isolation(told):
 @pytest.mark.thorough
 def test_the_chain_is_recomputed_from_its_recording(told):
     """The INS that aligns and the control unit that waits for it answer the recorded messages with the same bits."""
-    recording = recompute.FedRecording(told.bag.path)
+    recording = FedRecording(told.bag.path)
     for node in ('ins', 'acu'):
         done = recompute.recompute(recording, node, recompute.parameters_of(recording, node))
         assert not done.requests and not done.feed.problem

@@ -14,6 +14,7 @@ from pedestal_common.graph import topics
 from pedestal_recording import bag as bags
 from pedestal_recording.writer import Writer
 from pedestal_workbench.again import recompute
+from pedestal_workbench.again.feed import FedRecording
 from pedestal_workbench.tuning import tune
 
 BAG = pathlib.Path(__file__).parent.parent / 'bags' / 'reference' / 'uav_flyby'
@@ -68,7 +69,7 @@ def test_recording(tuned_bag):
 def test_criterion_is_the_innovations_of_a_recomputation(tuned_bag):
     """The mean log-density by another route: pedestal recompute's outputs, NIS and the Gaussian density in full."""
     file, output = tuned_bag
-    recording = recompute.FedRecording(BAG)
+    recording = FedRecording(BAG)
     params = recompute.parameters_of(recording, 'acu', changes=written(file))
     table = recompute.recompute(recording, 'acu', params).outputs['acu/filter'].table('acu/filter')
     t, nu, nis = table['t'], table['azimuth_innovation.position'], table['azimuth_nis.position']

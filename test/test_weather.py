@@ -7,6 +7,7 @@ from pedestal_common.parameters import build
 from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
 from pedestal_workbench.again import recompute
+from pedestal_workbench.again.feed import FedRecording
 
 pytestmark = pytest.mark.thorough
 
@@ -61,7 +62,7 @@ def test_the_readings_are_recorded_and_recomputed(run):
     bag = bags.read(run.bag)
     for topic, (field, value) in READINGS.items():
         assert (bag.table(topic)[field] == value).any(), topic
-    recording = recompute.FedRecording(run.bag)
+    recording = FedRecording(run.bag)
     acu = {key: value for key, value in bag.configuration['parameters']['acu'].items() if not key.startswith('graph.')}
     done = recompute.recompute(recording, 'acu', build(parameters_of('acu'), acu))
     assert done.unit.followed.air.revision == 1

@@ -7,7 +7,7 @@ from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.geometry.line_of_sight import wrap
 from pedestal_studies.system import calibration
-from pedestal_workbench.calibration import distribution, exact
+from pedestal_workbench.calibration import fit
 
 
 @pytest.mark.parametrize('azimuth, elevation', [(-1.2, 0.2), (2.0, 1.2)])
@@ -22,7 +22,7 @@ def test_the_true_terms_give_the_direction_of_the_dish(azimuth, elevation):
         'tracking_receiver').antenna
     true['P4'] -= np.degrees(antenna.boresight_cross_elevation)
     true['P7'] += np.degrees(antenna.boresight_elevation)
-    expected = exact.offsets(tuple(true), list(true.values()), np.degrees(dish)[None])[0]
+    expected = fit.exact_offsets(tuple(true), list(true.values()), np.degrees(dish)[None])[0]
     measured = np.degrees((wrap(encoders[0] - dish[0]) * np.cos(dish[1]), encoders[1] - dish[1]))
     np.testing.assert_allclose(measured, expected, atol=5e-4)
     assert np.hypot(*measured) > 0.2
@@ -36,7 +36,7 @@ def test_the_passes_cover_the_sky():
         inside = (times > 15.0) & (times < 285.0)
         directions.append(np.degrees(angles[inside][::27]))
     directions = np.concatenate(directions)
-    distribution.check(calibration.TERMS, directions)
+    fit.check_distribution(calibration.TERMS, directions)
     _, angles = Plan(calibration.of_pass(calibration.TEST_PASS, 1)).tables['']
     apart = [np.hypot((directions[:, 0] - az + 180.0) % 360.0 - 180.0, directions[:, 1] - el).min()
              for az, el in np.degrees(angles)]

@@ -14,6 +14,7 @@ from pedestal_bringup.scenario import files, scenario
 from pedestal_common.parameters import as_dict
 from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import commands
+from pedestal_workbench.calibration.calibration import CalibrationError
 from pedestal_workbench.calibration.drive import estimates, identified, motion_data, motions, twin
 
 TRUE = {'azimuth.load.inertia': 273.0, 'azimuth.friction.coulomb': 90.0, 'azimuth.friction.breakaway': 120.0,
@@ -256,6 +257,6 @@ def test_recordings_without_the_motions_are_refused():
     recording = twin.read(memory_recording.record(chosen), chosen.node_parameters('adu'))
     with pytest.raises(ValueError, match='pieces of constant rate at .* run the motions of --plan'):
         identified.calibrate([recording], 'leo_pass')
-    with pytest.raises(motion_data.MotionError, match='not enabled all the time'):
+    with pytest.raises(CalibrationError, match='not enabled all the time'):
         chosen = scenario.load('leo_pass', ('adu.initially_enabled=false',), duration=2.0)
         twin.read(memory_recording.record(chosen), chosen.node_parameters('adu'))

@@ -11,7 +11,8 @@ from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan, program_message
 from pedestal_common.wire import messages
 from pedestal_recording import recording as recordings
-from pedestal_workbench.calibration import collect, exact, pointing, predicted
+from pedestal_workbench.calibration import collect, fit, pointing, predicted
+from pedestal_workbench.calibration.calibration import CalibrationError
 
 DURATION_S = 60.0
 
@@ -36,7 +37,7 @@ def test_the_offsets_are_those_of_the_true_errors(station):
     """Within the errors that station_new has besides: refraction, boresight, eccentricity, wind, time, noise."""
     record, track, true = station
     times, directions, values = collect.points(record, [track], 5)
-    expected = exact.offsets(tuple(true), list(true.values()), directions)
+    expected = fit.exact_offsets(tuple(true), list(true.values()), directions)
     assert len(times) == 5 and np.hypot(*expected.T).min() > 0.25
     np.testing.assert_allclose(values, expected, atol=0.02)
 
@@ -74,13 +75,13 @@ def test_a_receiver_with_stamps_of_its_own_gives_the_same_offsets(station):
 def test_a_recording_without_autotrack_gives_no_offset(station):
     record, track, _ = station
     late = predicted.checked(track.times + 1000.0, track.angles)
-    with pytest.raises(collect.CollectError, match='no autotrack of 8 s with a predicted direction'):
+    with pytest.raises(CalibrationError, match='no autotrack of 8 s with a predicted direction'):
         collect.points(record, [late])
     # Without a program track, a recording must hold the elements of the mode tle.
     bare = copy.copy(record)
     bare._run = dataclasses.replace(record._run, tracks={})
     vars(bare).pop('topics', None)
-    with pytest.raises(collect.CollectError, match='no autotrack of 8 s with a predicted direction; no scan of 5'):
+    with pytest.raises(CalibrationError, match='no autotrack of 8 s with a predicted direction; no scan of 5'):
         collect.every_point(bare)
 
 
@@ -108,7 +109,7 @@ def test_refraction_that_the_control_unit_adds_is_no_offset(direction, refractiv
     assert len(found.places) == 5
     with pytest.raises(ValueError, match='--bag copy: has the same offsets as pass_1; each recording must be given'):
         pointing.collected([pathlib.Path('pass_1'), pathlib.Path('copy')], 5)
-    np.testing.assert_allclose(found.values, exact.offsets(tuple(true), list(true.values()), found.directions),
+    np.testing.assert_allclose(found.values, fit.exact_offsets(tuple(true), list(true.values()), found.directions),
                                atol=0.02)
     [followed] = predicted.programs(record)
     lifted = np.degrees(followed.angles[:, 1] - track.angles[:, 1])
@@ -130,7 +131,7 @@ def test_the_offsets_of_a_ship_are_those_of_its_pedestal_on_the_deck():
     times, directions, values = collect.points(record, [track], 5)
     on_earth = np.degrees(track.angles[np.searchsorted(track.times, times)])
     assert np.abs(directions[:, 1] - on_earth[:, 1]).max() > 0.5
-    np.testing.assert_allclose(values, exact.offsets(tuple(true), list(true.values()), directions), atol=0.004)
+    np.testing.assert_allclose(values, fit.exact_offsets(tuple(true), list(true.values()), directions), atol=0.004)
 
 
 def test_a_pass_in_mode_tle_is_predicted_by_its_elements():
@@ -144,4 +145,4 @@ def test_a_pass_in_mode_tle_is_predicted_by_its_elements():
     found = collect.every_point(record, 5)
     directions, values = (np.array([one[column] for one in found]) for column in (2, 3))
     assert len(found) == 5
-    np.testing.assert_allclose(values, exact.offsets(tuple(true), list(true.values()), directions), atol=0.006)
+    np.testing.assert_allclose(values, fit.exact_offsets(tuple(true), list(true.values()), directions), atol=0.006)

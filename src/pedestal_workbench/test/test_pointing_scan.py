@@ -6,7 +6,8 @@ from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
 from pedestal_recording import recording as recordings
 from pedestal_studies.system import calibration
-from pedestal_workbench.calibration import collect, exact, scan
+from pedestal_workbench.calibration import collect, fit, scan
+from pedestal_workbench.calibration.calibration import CalibrationError
 from receiver_law import monopulse
 
 FIVE_POINTS = np.array([(0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)])
@@ -44,7 +45,7 @@ def test_sigma_is_the_scatter_of_the_place():
     (RASTER, (1.5, 0.0), 'not inside the scanned area'),
     (RASTER * 4.0, (0.1, 0.1), '1 levels above')])
 def test_a_scan_without_a_place_is_refused(offsets, place, text):
-    with pytest.raises(scan.ScanError, match=text):
+    with pytest.raises(CalibrationError, match=text):
         scan.peak(offsets, levels(offsets, np.array(place), 0.3))
 
 
@@ -55,7 +56,7 @@ def recorded(*overrides):
 def test_a_raster_of_the_sun_gives_the_errors_of_the_station():
     record, true = recorded(), calibration.truth()
     [(kind, begins, direction, offset)] = collect.every_point(record)
-    expected, = exact.offsets(tuple(true), list(true.values()), direction[np.newaxis])
+    expected, = fit.exact_offsets(tuple(true), list(true.values()), direction[np.newaxis])
     assert kind.startswith('scan (sigma 0.00') and begins == pytest.approx(8.0, abs=0.01)
     np.testing.assert_allclose(offset, expected, atol=0.002)
     np.testing.assert_allclose(np.hypot(*expected), 0.39, atol=0.01)
@@ -66,7 +67,7 @@ def test_a_scan_beside_the_sun_is_refused():
                       f'elevation={0.002 * (k // 3) - 0.007:g};'
                       for k in range(9))
     record = recorded(f'acu.commands={beside.rstrip(";")}', 'scenario.duration=24.0')
-    with pytest.raises(collect.CollectError, match='no autotrack; scan at 8.0 s: the highest level is not inside'):
+    with pytest.raises(CalibrationError, match='no autotrack; scan at 8.0 s: the highest level is not inside'):
         collect.every_point(record)
 
 

@@ -13,7 +13,8 @@ from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import files, scenario
 from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_results import tracking
-from pedestal_workbench.calibration.receiver import matrix, offsets, phasing
+from pedestal_workbench.calibration.calibration import CalibrationError
+from pedestal_workbench.calibration.receiver import beacon_offsets, matrix, phasing
 
 CROSS = np.array([(r * s, 0.0) for r in (0.1, 0.2, 0.3) for s in (1, -1)]
                  + [(0.0, r * s) for r in (0.1, 0.2, 0.3) for s in (1, -1)])
@@ -84,9 +85,9 @@ def test_weak_and_steep_slopes_and_offsets_on_one_line_are_named():
                for sentence in matrix.faults(matrix.fit(CROSS, 5.0 * CROSS)))
     assert any('weak slope' in sentence and '66 deg' in sentence
                for sentence in matrix.faults(matrix.fit(CROSS, 0.4 * CROSS)))
-    with pytest.raises(matrix.MatrixError, match='mean slope 0.1, must be at least 0.2'):
+    with pytest.raises(CalibrationError, match='mean slope 0.1, must be at least 0.2'):
         matrix.fit(CROSS, 0.1 * CROSS)
-    with pytest.raises(matrix.MatrixError, match='on one line'):
+    with pytest.raises(CalibrationError, match='on one line'):
         matrix.fit(CROSS[:6], CROSS[:6])
 
 
@@ -174,8 +175,8 @@ def test_nan_in_a_locked_receiver_is_refused():
     t, still = np.arange(0.0, 3.0, 0.01), np.zeros((300, 2))
     errors = np.zeros((300, 3)) + 46.0
     errors[50:80, 1] = np.nan
-    with pytest.raises(offsets.OffsetError, match='10 % of its errors are NaN'):
-        offsets._point(t, still, errors, 0.0175)
+    with pytest.raises(CalibrationError, match='10 % of its errors are NaN'):
+        beacon_offsets._point(t, still, errors, 0.0175)
 
 
 def test_the_result_closes_a_loop_that_does_not_close_without_it(capfd, tmp_path):
@@ -200,5 +201,5 @@ def test_the_control_unit_refuses_a_matrix_that_loses_a_direction(change, messag
 
 
 def test_the_slope_of_the_noise_model_counts_without_the_matrix_in_force():
-    found = phasing.Phasing('', None, matrix.fit(CROSS, 3.0 * CROSS), np.diag((0.5, 0.5)), 4.0, None, None)
-    assert phasing.parameters(found)['tracker.receiver.slope'] == pytest.approx(4.0 * 0.5 * 3.0)
+    found = phasing.Phasing('', None, None, None, matrix.fit(CROSS, 3.0 * CROSS), np.diag((0.5, 0.5)), 4.0)
+    assert found.parameters()['acu']['tracker.receiver.slope'] == pytest.approx(4.0 * 0.5 * 3.0)

@@ -84,7 +84,7 @@ def test_the_intervals_hold_the_truth(tmp_path):
     inside, options = [], sensitivity.SensitivityOptions(flux=FLUX_SFU, frequency=FREQUENCY_GHZ)
     for seed in range(30):
         found = sensitivity.calibrate(levels.read(write(tmp_path / 'x.csv', measured(0.02, seed))), options)
-        rows = {row['metric']: row for row in sensitivity.rows(found)}
+        rows = {row['metric']: row for row in found.rows()}
         inside.append([rows[name]['ci_low'] < true < rows[name]['ci_high'] for name, true in (
             ('beamwidth_elevation_deg', WIDTH[1]), ('peak_cross_elevation_deg', PLACE[0]),
             ('g_over_t_db_k', G_OVER_T_DB_K))])
@@ -162,8 +162,8 @@ def test_the_beam_of_the_simulated_receiver():
         f'tracking_receiver.antenna.boresight_elevation={boresight[1]}'), duration=45.0)
     found = sensitivity.calibrate(levels.of_recording(memory_recording.record(chosen), 'raster'),
                                   sensitivity.SensitivityOptions())
-    print(sensitivity.lines(found))
-    made = sensitivity.parameters(found)
+    print(found.lines())
+    made = found.parameters()
     assert made['tracking_receiver']['antenna.beamwidth'] == pytest.approx(width, rel=0.02)
     assert made['acu']['tracker.receiver.beamwidth'] == made['tracking_receiver']['antenna.beamwidth']
     # The sum and the differences of the simulated receiver have the same axis, at -boresight from the source.

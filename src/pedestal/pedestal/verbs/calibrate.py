@@ -8,17 +8,20 @@ from pedestal.verbs import arguments
 from pedestal.verbs.arguments import Verb
 
 if typing.TYPE_CHECKING:
-    from pedestal_workbench.calibration.output_files import ResultFiles
+    from pedestal_workbench.calibration.calibration import Calibration
 
 UNUSED_WITH = {'offsets': ('scenario', 'points', 'collected'), 'bag': ('scenario',),
                'plan': ('terms', 'form', 'antenna', 'date', 'report', 'points', 'collected', 'json')}
 """{source of the step `pointing`: options that have no effect with it}."""
 
 
-def _files(options: argparse.Namespace) -> 'ResultFiles':
-    """Return the files that a step writes, by its options --output and --report."""
-    from pedestal_workbench.calibration.output_files import ResultFiles
-    return arguments.typed(ResultFiles, options)
+def _finish(options: argparse.Namespace, found: 'Calibration') -> int:
+    """Print a calibration and write its files. Return exit code 0, or EXIT_FAILED_RUN if it is not verified."""
+    from pedestal_workbench.calibration.calibration import ResultFiles
+    written = found.write(arguments.typed(ResultFiles, options))
+    print('\n'.join([*found.lines(), *written]))
+    console.write_json(options.json, found.content())
+    return 0 if found.verified else console.EXIT_FAILED_RUN
 
 
 def _add_pointing(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +62,6 @@ def _add_pointing(parser: argparse.ArgumentParser) -> None:
 
 
 def _pointing(options: argparse.Namespace) -> int:
-    """Fit or plan, write the files and print the result. Return exit code 0."""
     from pedestal_workbench.calibration import plan, pointing
     source = next(name for name in UNUSED_WITH if getattr(options, name) is not None)
     arguments.refuse_given(options, UNUSED_WITH[source], f'has no effect with --{source}')
@@ -67,11 +69,8 @@ def _pointing(options: argparse.Namespace) -> int:
     if options.plan is not None:
         print('\n'.join(plan.main(options.plan, options.scenario, options.output)))
         return 0
-    printed, content = pointing.main(arguments.typed(pointing.PointingOptions, options, bag=options.bag or []),
-                                     _files(options))
-    print('\n'.join(printed))
-    console.write_json(options.json, content)
-    return 0
+    return _finish(options, pointing.calibrated(
+        arguments.typed(pointing.PointingOptions, options, bag=options.bag or [])))
 
 
 def _add_receiver(parser: argparse.ArgumentParser) -> None:
@@ -102,19 +101,14 @@ def _add_receiver(parser: argparse.ArgumentParser) -> None:
 
 
 def _receiver(options: argparse.Namespace) -> int:
-    """Calibrate, write the files and print the result. Return exit code 0, or EXIT_FAILED_RUN if not verified."""
     arguments.check_result_files(options)
     if options.iq is not None:
         from pedestal_workbench.calibration.receiver import iq_phasing
         arguments.check_recording(options)
-        printed, content, verified = iq_phasing.main(arguments.typed(iq_phasing.IqPhasingOptions, options),
-                                                      arguments.changes(options), _files(options))
-    else:
-        from pedestal_workbench.calibration.receiver import phasing
-        printed, content, verified = phasing.main(*arguments.recording(options), _files(options))
-    print('\n'.join(printed))
-    console.write_json(options.json, content)
-    return 0 if verified else console.EXIT_FAILED_RUN
+        return _finish(options, iq_phasing.calibrated(arguments.typed(iq_phasing.IqPhasingOptions, options),
+                                                      arguments.changes(options)))
+    from pedestal_workbench.calibration.receiver import phasing
+    return _finish(options, phasing.calibrated(*arguments.recording(options)))
 
 
 def _add_drive(parser: argparse.ArgumentParser) -> None:
@@ -142,7 +136,6 @@ def _add_drive(parser: argparse.ArgumentParser) -> None:
 
 
 def _drive(options: argparse.Namespace) -> int:
-    """Plan or identify, write the files and print the result. Return exit code 0, or EXIT_FAILED_RUN."""
     from pedestal_workbench.calibration.drive import identified
     if options.bag:
         arguments.refuse_given(options, ('plan',), 'has no effect with --bag')
@@ -156,10 +149,7 @@ def _drive(options: argparse.Namespace) -> int:
         chosen = scenario.load(options.scenario, changes)
         print('\n'.join(identified.write_plan(chosen, options.scenario, options.plan)))
         return 0
-    printed, content, verified = identified.main(options.bag or (), options.scenario, changes, _files(options))
-    print('\n'.join(printed))
-    console.write_json(options.json, content)
-    return 0 if verified else console.EXIT_FAILED_RUN
+    return _finish(options, identified.calibrated(options.bag or (), options.scenario, changes))
 
 
 def _add_sensitivity(parser: argparse.ArgumentParser) -> None:
@@ -189,17 +179,13 @@ def _add_sensitivity(parser: argparse.ArgumentParser) -> None:
 
 
 def _sensitivity(options: argparse.Namespace) -> int:
-    """Measure, write the files and print the result. Return exit code 0."""
     from pedestal_workbench.calibration.sensitivity import sensitivity
     arguments.check_result_files(options)
     for name, other in (('attenuation', 'flux'), ('bandwidth', 'bag'), ('elevation', 'levels')):
         if getattr(options, other) is None:
             arguments.refuse_given(options, (name,), f'has no effect without --{other}')
-    printed, content = sensitivity.main(options.levels or options.bag, options.bag is not None, arguments.typed(
-        sensitivity.SensitivityOptions, options), _files(options))
-    print('\n'.join(printed))
-    console.write_json(options.json, content)
-    return 0
+    return _finish(options, sensitivity.calibrated(options.levels or options.bag, options.bag is not None,
+                                                   arguments.typed(sensitivity.SensitivityOptions, options)))
 
 
 STEPS = {

@@ -18,6 +18,7 @@ The rows of case `terms` state the terms of the model and their true values. `wi
 terms, over all runs, whose error is below three of their sigmas; `cases` is their number. A term that was dropped
 counts with the value 0 and the sigma that it had before.
 """
+import dataclasses
 import functools
 import math
 from collections.abc import Sequence
@@ -39,7 +40,7 @@ from pedestal_studies.result import Result
 from pedestal_workbench.calibration import collect, pointing, scan
 from pedestal_workbench.calibration.collect import Point
 from pedestal_workbench.calibration.offsets import Offsets
-from pedestal_workbench.calibration.pointing import Calibration
+from pedestal_workbench.calibration.pointing import PointingCalibration
 from pedestal_workbench.calibration.terms import DEFAULT_TERMS
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
@@ -98,9 +99,10 @@ def offset_of_sun(begin: str, seed: int) -> tuple[str, list[Point]]:
     return begin, collect.listed('scan', scan.points(memory_recording.record(chosen), [])[:3])
 
 
-def overrides(found: Calibration) -> list[str]:
+def overrides(found: PointingCalibration) -> list[str]:
     """Return the overrides that give the control unit the model of a calibration."""
-    return [f'acu.{name}={value}' for name, value in pointing.parameters(found, 'study').items() if value]
+    model = dataclasses.replace(found, file='study').parameters()['acu']
+    return [f'acu.{name}={value}' for name, value in model.items() if value]
 
 
 def program_error(seed: int, changes: Sequence[str] = (), duration: Seconds | None = None) -> Degrees:
@@ -169,7 +171,7 @@ def _numbers(seed: int, duration: Seconds | None) -> list[float]:
             len(offsets.places), *_of_terms(found)]
 
 
-def _of_terms(found: Calibration) -> tuple[float, ...]:
+def _of_terms(found: PointingCalibration) -> tuple[float, ...]:
     """Return the values of TERMS, then their sigmas."""
     values = dict(zip(found.fit.names, zip(found.fit.values, found.fit.sigma)))
     values |= {name: (0.0, sigma) for name, _, sigma in found.dropped}

@@ -1,8 +1,5 @@
-"""Differences between the recorded and the new messages of a topic: first number and order, then each field.
-
-`pedestal recompute` uses `compare`, which pairs messages by stamp and allows a tolerance of the numbers.
-`pedestal rerun` uses `compare_messages`, which pairs messages by position and allows no difference.
-"""
+"""Differences between recorded and new messages of a topic: `compare` pairs messages by stamp, with a tolerance of the
+numbers, and `compare_messages` by position, without any."""
 import dataclasses
 import fnmatch
 import itertools
@@ -100,7 +97,7 @@ class Output:
     read: Annotated[Floats, '(n, columns)'] | None = None
 
     def table(self, topic: str) -> Table:
-        """Return the columns with the names of pedestal_recording.columns.table; topic: name of the topic."""
+        """Return the columns with the names of pedestal_recording.columns.table."""
         if self.texts is not None:
             return {'t': self.stamps / 1e9, 'data': self.texts}
         return {'t': self.stamps / 1e9,
@@ -108,10 +105,7 @@ class Output:
 
 
 def recorded(data: Sequence[bytes], log: Stamps, topic: str) -> Output:
-    """Return the Output of messages of a topic, from their CDR bytes and log times.
-
-    Raises ValueError for invalid messages.
-    """
+    """Return the messages of a topic from their CDR bytes and log times. Raises ValueError for invalid messages."""
     type_name = topics.TOPIC_BY_NAME[topic].type
     log = np.asarray(log, np.int64)
     if type_name == 'std_msgs/msg/String':
@@ -131,11 +125,8 @@ def _values(table: Table, topic: str) -> Floats:
 
 def compare(topic: str, was: Output, now: Output, tolerance: Tolerance = Tolerance(),
             data: Sequence[bytes] | None = None, template: Message | None = None) -> TopicDifference:
-    """Return the TopicDifference between the recorded messages `was` of a topic and the recomputed messages `now`.
-
-    data, template: CDR bytes of the recorded messages, and a message that the node makes. With them, the content
-    outside the numbers is compared too (REST_FIELD).
-    """
+    """Return the differences between recorded and recomputed messages of a topic. With their bytes and a template, a
+    message of the node, the content outside the numbers counts too (REST_FIELD)."""
     difference = TopicDifference(topic, len(was.stamps), len(now.stamps), _order(was.stamps, now.stamps), [])
     # Pair the messages by stamp: was.values[here[k]] and now.values[there[k]] have the same stamp.
     _, here, there = np.intersect1d(was.stamps, now.stamps, return_indices=True)
@@ -167,7 +158,7 @@ def compare(topic: str, was: Output, now: Output, tolerance: Tolerance = Toleran
 
 
 def _order(was: Stamps, now: Stamps) -> list[str]:
-    """Return texts on missing, doubled and descending stamps; was, now: recorded and recomputed stamps."""
+    """Return texts on missing, doubled and descending stamps."""
     problems = []
     if len(was) != len(now):
         problems.append(f'{len(was)} messages recorded, {len(now)} recomputed')
@@ -199,7 +190,7 @@ _Timed: TypeAlias = tuple[Nanoseconds, bytes]   # log time and CDR bytes of a me
 
 
 def compare_messages(name: str, was: Bag, now: Bag) -> MessageDifference | None:
-    """Return the MessageDifference of a topic in two bags; None if its messages have equal bytes."""
+    """Return the differences of a topic in two bags; None if its messages have equal bytes."""
     kinds = was.topics.get(name, 'none'), now.topics.get(name, 'none')
     old, new = ([(log, data) for _, log, _, data in bag.raw(name)] if name in bag.topics else []
                 for bag in (was, now))
@@ -215,10 +206,7 @@ def compare_messages(name: str, was: Bag, now: Bag) -> MessageDifference | None:
 
 
 def compare_order(was: Bag, now: Bag) -> MessageDifference | None:
-    """Return the MessageDifference at the first position at which the order of the messages differs, or None.
-
-    was, now: bags whose topics have equal messages.
-    """
+    """Return the first position at which the order of messages differs in bags whose topics have equal messages."""
     for old, new in zip(was.raw(), now.raw()):
         if old != new:
             change = f'position in the file; the new file has {new[0]} at {new[1] / 1e9:.6f} s there'
@@ -229,7 +217,6 @@ def compare_order(was: Bag, now: Bag) -> MessageDifference | None:
 
 
 def _changes(was: _Timed | None, now: _Timed | None, kinds: tuple[str, str]) -> list[str]:
-    """Return texts on the differences of two messages of these types; None for a missing message."""
     if was is None or now is None:
         return ['not recorded' if was is None else 'no new message']
     if was[0] != now[0]:

@@ -16,13 +16,13 @@ from pedestal_hardware.monopulse.params import MonopulseParameters
 from pedestal_hardware.monopulse.unit import ANGLE_ERROR_TOPIC, MonopulseReceiver
 from pedestal_results.intervals import single
 from pedestal_workbench.again import recompute
+from pedestal_workbench.again.feed import FedRecording
 
 
-def parameters_of(recording: recompute.FedRecording) -> MonopulseParameters:
-    """Return the parameters of the receiver of a recording. Raises RecomputeError for another receiver."""
+def parameters_of(recording: FedRecording) -> MonopulseParameters:
+    """Return the parameters of the recorded receiver. Raises ValueError for a receiver without I/Q samples."""
     if not recording.bag.iq:
-        raise recompute.RecomputeError(f'{recording.bag.path}: --iq: the receiver of this recording had no I/Q '
-                                       'samples')
+        raise ValueError(f'{recording.bag.path}: --iq: the receiver of this recording had no I/Q samples')
     parameters = recompute.parameters_of(recording, nodes.MONOPULSE_RECEIVER.name)
     assert isinstance(parameters, MonopulseParameters)
     return parameters
@@ -45,10 +45,7 @@ def steps(unit: MonopulseReceiver, recording: sigmf.Recording, epoch: Nanosecond
 
 def angle_errors(recording: sigmf.Recording, parameters: MonopulseParameters,
                  epoch: Nanoseconds) -> tuple[dict[Nanoseconds, bytes], MonopulseReceiver]:
-    """Return ({stamp: CDR bytes} of the angle errors of a recording, the unit after the last step).
-
-    epoch: stamp from which the unit counts.
-    """
+    """Return ({stamp: CDR bytes} of the angle errors of a recording, the unit after the last step)."""
     unit = unit_of(parameters)
     encoder = records.Encoder(ANGLE_ERROR_TOPIC, unit.messages[ANGLE_ERROR_TOPIC], unit.outputs)
     found = {}
@@ -59,12 +56,11 @@ def angle_errors(recording: sigmf.Recording, parameters: MonopulseParameters,
 
 
 def main(bag: pathlib.Path, samples: pathlib.Path) -> tuple[list[str], list[Row], bool]:
-    """Return (lines to print, rows of --json, True if all errors in the bag are equal to the last bit). Raises
-    ValueError for a bag or a file that does not fit."""
-    recording = recompute.FedRecording(bag)
+    """Return (lines to print, rows of --json, True if all errors in the bag are equal to the last bit)."""
+    recording = FedRecording(bag)
     node = nodes.MONOPULSE_RECEIVER.name
     if not recording.has(ANGLE_ERROR_TOPIC):
-        raise recompute.RecomputeError(f'{bag}: no {ANGLE_ERROR_TOPIC} in the bag')
+        raise ValueError(f'{bag}: no {ANGLE_ERROR_TOPIC} in the bag')
     parameters = parameters_of(recording)
     file = sigmf.Recording(samples, parameters.feed.channels, parameters.source.rate)
     found, _ = angle_errors(file, parameters, recording.bag.start)

@@ -1,8 +1,5 @@
-"""Player: the ROS node of `pedestal replay` that publishes a Playlist of recorded messages.
-
-The player waits for the subscribers of its topics, keeps the due times of the messages, and checks that subscribers
-acknowledge the messages. With --lockstep it also waits for the answers of the nodes under test.
-"""
+"""Player: the ROS node of `pedestal replay` that publishes a Playlist, and waits for subscribers, due times,
+acknowledgement and, with --lockstep, the answers of the nodes under test."""
 import contextlib
 import dataclasses
 import struct
@@ -29,10 +26,10 @@ if TYPE_CHECKING:
 
 ANSWER_TOPICS = {node.name: (None if node.reads[0] in node.writes else node.reads[0], node.answer)
                  for node in nodes.NODES if node.answer}
-"""{node: (topic that triggers a step, topic of its answer with the stamp of the step)} for the replay in lockstep.
+"""{node: (topic that triggers a step, topic of its answer with the stamp of the step)}.
 
-Because the drive begins the steps itself, it has no trigger (None). Because the INS answers late by its latency, it is
-not in the table.
+Because the drive begins the steps itself, it has no trigger. Because the INS answers late by its latency, it is not in
+the table.
 """
 
 KEY_HELP = 'space: pause, resume   n or right arrow: one step   q: quit'
@@ -49,28 +46,20 @@ POSITION_REFRESH_S, SUBSCRIBER_POLL_S, KEYBOARD_POLL_S = 0.1, 0.5, 0.05
 """Periods of the update of the shown position, of the check of subscribers, and of the check for pressed keys [s]."""
 
 SUBSCRIBER_EXIT_TIMEOUT_S = 5.0
-"""Time without acknowledgement after which a subscriber that disappeared counts as killed [s].
-
-A subscriber that ends by itself disappears at once. Of a killed subscriber, Fast DDS waits 20 s for acknowledgement,
-and then drops its messages.
-"""
+"""Time without acknowledgement after which a lost subscriber counts as killed [s]. A subscriber that ends by itself
+disappears at once. Fast DDS waits 20 s for a killed subscriber to acknowledge, and then drops its messages."""
 
 MAX_SPIN_PAUSE_S = 0.01  # largest time between two spins of the player, in which it receives answers [s]
 
 ANSWER_QUIET_S, STOPPED_ARRIVAL_TIMEOUT_S = 0.5, 1.0
-"""ANSWER_QUIET_S: time without an answer after which the wait for the last answers ends [s].
-
-STOPPED_ARRIVAL_TIMEOUT_S: time for which a stopped replay waits for acknowledgement [s].
-"""
+"""Time without an answer after which the wait for the last answers ends, and time for which a stopped replay waits for
+acknowledgement [s]."""
 
 _stamp_of = struct.Struct('<iI').unpack_from
 
 
 def answer_of(node: str, graph: Mapping[str, nodes.Link]) -> tuple[str | None, str]:
-    """Return the row of ANSWER_TOPICS of a node, with the names of the topics in a graph.
-
-    An array answers by the topics of its first beam.
-    """
+    """Return the row of ANSWER_TOPICS of a node in a graph. An array answers by the topics of its first beam."""
     trigger, answer = ANSWER_TOPICS[nodes.plain(node)]
 
     def of_beam(name: str) -> str:
@@ -90,7 +79,7 @@ class NodeUnderTest:
     answers: int = 0    # number of answers
 
     def owes(self, stamp: Nanoseconds = -1) -> bool:
-        """Return True if the node must still answer before messages with a stamp may be published."""
+        """Return True if the node must still answer before a stamp may be published."""
         return self.answered < (stamp if self.trigger is None else self.triggered)
 
     def silence(self, stamp: Nanoseconds, deadline: Seconds) -> GraphError:
@@ -101,10 +90,8 @@ class NodeUnderTest:
 
 
 class Pace:
-    """Pace of a replay: due times of the messages. Keys pause it, make a single step or quit.
-
-    rate: multiples of real time, None if each message is due at once; paused, quit: states.
-    """
+    """Due times of the messages. Keys pause the replay, make a single step or quit. rate: multiples of real time, None
+    if each message is due at once."""
 
     def __init__(self, rate: float | None, paused: bool) -> None:
         self.rate, self.paused, self.quit = rate, paused, False
@@ -122,10 +109,7 @@ class Pace:
             self.quit = True
 
     def wait(self, stamp: Nanoseconds, now: Seconds) -> Seconds:
-        """Return the time to wait until the messages of a stamp are due; now: steady time.
-
-        A single step that was requested by a key is used up.
-        """
+        """Return the time to wait until a stamp is due; now: steady time. A step that a key requested is used up."""
         if self.paused:
             self._base = None
             if self._steps:
@@ -151,12 +135,10 @@ class Channel:
 
 
 class Player(Node):
-    """ROS node that publishes a Playlist as the ReplayOptions state.
+    """ROS node that publishes a Playlist as the ReplayOptions state, until stopped() returns True.
 
-    companion   topic (the clock) that is published too if it has no other publisher; it needs no subscriber
-    stopped     function stopped() that returns True when the replay must end
-
-    Each topic must have the nodes of the options as its subscribers or, without nodes, any subscriber.
+    Each topic must have the nodes of the options as its subscribers or, without nodes, any subscriber. Only the
+    companion (the clock) needs none, and is published if it has no other publisher.
     """
 
     def __init__(self, playlist: Playlist, companion: str | None, options: 'ReplayOptions', keyboard: Keyboard,
@@ -179,7 +161,6 @@ class Player(Node):
         self._next_refresh = self._next_subscriber_check = self._last_spin = 0.0    # monotonic [s]
 
     def _publisher(self, name: str, type_name: str) -> Publisher:
-        """Return a publisher of a recorded topic. Raises BagError for a wrong type or a type that is not installed."""
         topic = self.graph.get(name)
         if topic is not None and topic.type != type_name:
             raise bags.BagError(f'{self.playlist.bag.path}: {name} is a {type_name}; must be a {topic.type}')
@@ -207,11 +188,8 @@ class Player(Node):
         self._last_spin = time.monotonic()
 
     def _other_writers(self, name: str) -> list[str]:
-        """Return the names of the other nodes that publish a topic.
-
-        A topic with several publishers, such as the diagnostics, may have other publishers than the recorded nodes.
-        Those are left out.
-        """
+        """Return the names of the other nodes that publish a topic. Of a topic with several publishers, such as the
+        diagnostics, only the recorded nodes count."""
         others = [shell.node_of(info) for info in self.get_publishers_info_by_topic(name)]
         if self.get_name() in others:
             others.remove(self.get_name())
@@ -231,10 +209,10 @@ class Player(Node):
         return None
 
     def connect(self) -> bool:
-        """Wait until each topic has its subscribers. Return True, or False if the replay ended meanwhile.
+        """Wait until each topic has its subscribers. Return False if the replay ended meanwhile.
 
-        Raises GraphError if a topic already has another publisher, or has no subscriber after the deadline. Because a
-        publisher whose node is not discovered yet may be one of this node, it counts only after the deadline.
+        Raises GraphError for another publisher, and without a subscriber after the deadline. Because a publisher whose
+        node is not discovered yet may be one of this node, it counts only after the deadline.
         """
         begun = settled = time.monotonic()
         while not self._ended():
@@ -261,11 +239,8 @@ class Player(Node):
         return False
 
     def play(self) -> None:
-        """Publish the messages until the end of the playlist, a key or a signal.
-
-        Raises GraphError if a subscriber disappears, or if an answer in lockstep is missing after the deadline. Raises
-        shell.Stopped after a signal while a subscriber acknowledges nothing.
-        """
+        """Publish the messages until the end of the playlist, a key or a signal. Raises GraphError for a lost
+        subscriber or a missing answer, and shell.Stopped after a signal while a subscriber acknowledges nothing."""
         for stamp, group in self.playlist.steps():
             if not self._await_turn(stamp):
                 return
@@ -285,7 +260,6 @@ class Player(Node):
         self._await_arrival(name, self.deadline)
 
     def _send(self, name: str, stamp: Nanoseconds, data: bytes) -> None:
-        """Publish a message. Before it, wait if too many messages are unacknowledged (MAX_UNACKNOWLEDGED_MESSAGES)."""
         channel = self.channels[name]
         if channel.sent - channel.arrived >= MAX_UNACKNOWLEDGED_MESSAGES:
             self._await_arrival(name, self.deadline)
@@ -296,10 +270,8 @@ class Player(Node):
                 node.triggered, node.steps = stamp, node.steps + 1
 
     def _await_arrival(self, name: str, limit: Seconds) -> None:
-        """Wait until the subscribers of a topic have acknowledged all messages; limit: longest wait.
-
-        Raises GraphError after the limit or if a subscriber died, and shell.Stopped after a signal.
-        """
+        """Wait until all messages of a topic are acknowledged. Raises GraphError after the limit or if a subscriber
+        died, and shell.Stopped after a signal."""
         channel = self.channels[name]
         since, readers = time.monotonic(), channel.publisher.get_subscription_count()
         while not channel.publisher.wait_for_all_acked(Duration(seconds=0)):
@@ -337,10 +309,7 @@ class Player(Node):
         return self.pace.quit or self.stopped()
 
     def _time_to_wait(self, stamp: Nanoseconds, now: Seconds, since: Seconds) -> Seconds:
-        """Return the time to wait for the messages of a stamp; now, since: now and start of the wait.
-
-        Raises GraphError if an answer is missing after the deadline.
-        """
+        """Return the time to wait for a stamp. Raises GraphError if an answer is missing after the deadline."""
         late = self._late(stamp) if self.pace.rate is None else None
         if late is None:
             return self.pace.wait(stamp, now)
@@ -349,11 +318,9 @@ class Player(Node):
         return KEYBOARD_POLL_S
 
     def _late(self, stamp: Nanoseconds = -1) -> NodeUnderTest | None:
-        """Return the first node under test that must still answer before the messages of a stamp, or None."""
         return next((node for node in self.under_test if node.owes(stamp)), None)
 
     def _show_position(self, now: Seconds) -> None:
-        """Show the position, the pace and the keys in the status line; now: steady time."""
         if now >= self._next_refresh:
             self._next_refresh = now + POSITION_REFRESH_S
             start, end = self.playlist.origin, self.playlist.end
@@ -362,7 +329,6 @@ class Player(Node):
                              + (f'   {KEY_HELP}' if self.keyboard.available else ''))
 
     def _check_subscribers(self, now: Seconds) -> None:
-        """Raise GraphError if a topic has lost a subscriber."""
         if now >= self._next_subscriber_check:
             self._next_subscriber_check = now + SUBSCRIBER_POLL_S
             unread = self._unread()
@@ -371,11 +337,8 @@ class Player(Node):
                 raise GraphError(f'{name} lost its subscriber at {self.position / NS_PER_SECOND:.6f} s: {missing}')
 
     def finish(self) -> None:
-        """Wait until all messages are acknowledged and the nodes under test have answered.
-
-        Raises GraphError after the deadline. After a key or a signal to end, wait for acknowledgement only, at most
-        STOPPED_ARRIVAL_TIMEOUT_S for each topic.
-        """
+        """Wait until all messages are acknowledged and the nodes under test have answered. Raises GraphError. After a
+        key or a signal to end, wait for acknowledgement only."""
         if self._ended():
             with contextlib.suppress(GraphError, shell.Stopped):
                 for name in self.channels:

@@ -1,7 +1,6 @@
-"""Playlist of a replay: selection and order of the recorded messages. The module works without ROS.
+"""Playlist of a replay: the recorded messages in the order of stamps; a message without a header has its log time.
 
-The messages are in the order of their stamps; a message without a header has its log time. Messages with equal stamps
-are in this order:
+Messages with equal stamps are in this order:
 
 1. latched topics. All subscribers acknowledge such a message before the next message, as with Shell.announce.
 2. the other topics of the table of topics, in the order of the table
@@ -37,11 +36,10 @@ def latched(graph: Mapping[str, Link], name: str) -> bool:
 
 
 def selected_topics(bag: bags.Bag, input_nodes: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return the topics of a bag that a replay publishes.
+    """Return the topics in names, without names the inputs of input_nodes that none of these nodes publishes, and
+    without both all topics.
 
-    They are the topics in names. Without names they are the inputs of input_nodes that none of these nodes publishes.
-    Without both they are all topics. Raises BagError for a topic that is not in the bag, an unknown node, or a node
-    without inputs in the bag.
+    Raises BagError for a topic that is not in the bag, an unknown node, or a node without inputs in the bag.
     """
     if names:
         return bags.chosen_topics(bag, names)
@@ -63,13 +61,7 @@ def selected_topics(bag: bags.Bag, input_nodes: Sequence[str], names: Sequence[s
 
 
 class Playlist:
-    """Messages of a bag in the order that the module states.
-
-    names         topics
-    start         begin of the playlist, counted from `origin`
-    duration      length of the playlist, None to the end
-    origin, end   stamps of the first message of a topic that is not latched, and of the last message of the bag
-    first, last   stamps of the first and the last message of the playlist
+    """Messages of some topics of a bag, in the order that the module states. start: counted from `origin`.
 
     Because a latched message stays valid, the last message of each latched topic before the start comes first.
     Raises BagError if there are no messages.
@@ -90,6 +82,7 @@ class Playlist:
             raise bags.BagError(f'{bag.path}: no message of {", ".join(names)}')
         order = np.lexsort((where, ranks, stamps))
         where, stamps, ranks = where[order], stamps[order], ranks[order]
+        # of the first message of a topic that is not latched, and of the last message of the bag
         self.origin = int(stamps[ranks >= 0][0] if (ranks >= 0).any() else stamps[0])
         self.end = int(stamps[-1])
         begin = self.origin + round(start * NS_PER_SECOND)

@@ -18,7 +18,8 @@ from pedestal_results import intervals, tracking
 from pedestal_results.intervals import single
 from pedestal_workbench.again import difference, recompute, what_if
 from pedestal_workbench.again.difference import Output
-from pedestal_workbench.again.recompute import FedRecording, Recomputed
+from pedestal_workbench.again.feed import FedRecording
+from pedestal_workbench.again.recompute import Recomputed
 
 
 @dataclasses.dataclass
@@ -48,22 +49,19 @@ class RecomputeOptions:
 
 
 def main(options: RecomputeOptions) -> tuple[list[str], list[Row], bool]:
-    """Return (lines to print, rows of --json, True if the outputs of all nodes are as required).
-
-    Raises ValueError for an option that does not fit the bag.
-    """
+    """Return (lines to print, rows of --json, True if the outputs of all nodes are as required). Raises ValueError."""
     lockstep = None if options.pacing is None else options.pacing == 'lockstep'     # None: as the bag states
-    recording = recompute.FedRecording(options.bag, lockstep, options.beam)
+    recording = FedRecording(options.bag, lockstep, options.beam)
     given = recompute.file_parameters(options.params_file, recording.bag.beam) if options.params_file else None
     nodes = recompute.chosen(recording, options.node, given)
     changes = recompute.overrides(options.param, nodes)
     if changes:
         unchanged = [name for name in nodes if options.node and name not in changes]
         if unchanged:
-            raise recompute.RecomputeError(f'--node {unchanged[0]}: has no effect, because no --param is of it')
+            raise ValueError(f'--node {unchanged[0]}: has no effect, because no --param is of it')
         nodes = list(changes)
     if options.output and options.output.exists():
-        raise recompute.RecomputeError(f'--output {options.output} exists already; a recording is never overwritten')
+        raise ValueError(f'--output {options.output} exists already; a recording is never overwritten')
     reports = [_node_report(recording, node, given, changes.get(node), options) for node in nodes]
     lines: list[str] = []
     for report in reports:
@@ -78,11 +76,8 @@ def main(options: RecomputeOptions) -> tuple[list[str], list[Row], bool]:
 
 def _node_report(recording: FedRecording, node: str, given: recompute.Values | None,
                  changes: Mapping[str, Json] | None, options: RecomputeOptions) -> NodeReport:
-    """Return the NodeReport of a node.
-
-    given: of --params-file, None for the recorded parameters; changes: {key: value} of --param, None to compare with
-    the recorded outputs.
-    """
+    """Return the report on a node; given: parameters of --params-file. Without changes of --param, new outputs are
+    compared with recorded outputs."""
     params = recompute.parameters_of(recording, node, given)
     done = recompute.recompute(recording, node, params)
     tolerance = difference.Tolerance(options.absolute, options.relative, tuple(options.ignore))
@@ -109,7 +104,6 @@ def _node_report(recording: FedRecording, node: str, given: recompute.Values | N
 
 
 def _title(recording: FedRecording, done: Recomputed, params_file: pathlib.Path | None) -> str:
-    """Return the first line of a report: bag, node, steps, pacing and origin of the parameters."""
     stamps = done.feed.stamps / NS_PER_SECOND
     span = f'{stamps[0]:g} to {stamps[-1]:g} s' if len(stamps) else 'no step'
     pacing = 'lockstep' if recording.lockstep else 'realtime'
@@ -123,13 +117,11 @@ def _title(recording: FedRecording, done: Recomputed, params_file: pathlib.Path 
 
 
 def _substitutes(recording: FedRecording, done: Recomputed) -> list[str]:
-    """Return lines on the inputs that were not recorded, and on the topics that replace them."""
     return [f'no {topic} in the recording: {source} replaces it' for topic in done.feed.rows
             if (source := recording.source(topic)) != topic]
 
 
 def _input_problems(done: Recomputed) -> list[str]:
-    """Return lines on inputs that could not be matched to steps."""
     lines = []
     if done.feed.problem:
         lines.append(f'NOT recomputed to the end: {done.feed.problem}')
@@ -139,7 +131,6 @@ def _input_problems(done: Recomputed) -> list[str]:
 
 
 def _requests(done: Recomputed) -> list[str]:
-    """Return lines on the commands and service calls that were repeated."""
     lines = [line for step, made in done.requests.items() for line in _requests_of_step(done, step, made)]
     return lines + ([f'{len(lines)} requests repeated'] if lines else [])
 
@@ -150,7 +141,6 @@ def _requests_of_step(done: Recomputed, step: int, made: Sequence[tuple[commands
 
 
 def _against_recorded(recording: FedRecording, done: Recomputed, tolerance: difference.Tolerance) -> NodeReport:
-    """Return the NodeReport that compares outputs of a node with its recorded outputs."""
     compared = recompute.compare(recording, done.outputs, done.unit, tolerance)
     if not compared:
         return _new_numbers(recording, done)
@@ -174,7 +164,7 @@ def _against_recorded(recording: FedRecording, done: Recomputed, tolerance: diff
 
 
 def _new_numbers(recording: FedRecording, done: Recomputed) -> NodeReport:
-    """Return the NodeReport of a node without recorded outputs: the numbers of messages and, for the ACU, results."""
+    """Return the report on a node without recorded outputs: numbers of messages and, for the ACU, results."""
     lines = [f'{done.node}: the recording has no output of the node, so there is no comparison']
     lines += [f'{name:34} {len(output.stamps):9} messages' for name, output in done.outputs.items()]
     rows = [single(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
@@ -188,13 +178,12 @@ def _new_numbers(recording: FedRecording, done: Recomputed) -> NodeReport:
 
 
 def _encoder_note(recording: FedRecording) -> list[str]:
-    """Return [the note tracking.ENCODER_BEAM_NOTE], or [] if the true direction of the dish was recorded."""
+    """Return the note on a recording without the true direction of the dish."""
     return [f'note: {tracking.ENCODER_BEAM_NOTE}'] if tracking.by_encoders(recording.bag) else []
 
 
 def _changed(params: parameters.Parameters, changes: Mapping[str, Json], params_file: pathlib.Path | None) -> str:
-    """Return the line on changes {key: value} of parameters: which differ from its values and which do
-    not."""
+    """Return the line on the changes of parameters: which differ from the old values and which do not."""
     values, origin = parameters.as_dict(params), params_file or 'the recording'
     same = ', '.join(f'{key} = {value}' for key, value in changes.items() if value == values[key])
     different = ', '.join(f'{key} = {value}' for key, value in changes.items() if value != values[key])
@@ -205,10 +194,7 @@ def _changed(params: parameters.Parameters, changes: Mapping[str, Json], params_
 
 def _old_against_new(recording: FedRecording, old: Recomputed, new: Recomputed, tolerance: difference.Tolerance,
                      changed: str) -> NodeReport:
-    """Return the NodeReport of a node with changed parameters: old and new results, and differences of the messages.
-
-    old, new: with the unchanged and with the changed parameters; changed: line about the changes.
-    """
+    """Return the report on a node with changed parameters: old and new results, and differences of the messages."""
     before = {name: recording.output(name) if recording.has(name) else output for name, output in old.outputs.items()}
     origin = 'recorded' if any(map(recording.has, old.outputs)) else 'recomputed with unchanged parameters'
     lines = [f'{changed}; old: {origin}']
@@ -229,9 +215,8 @@ def _old_against_new(recording: FedRecording, old: Recomputed, new: Recomputed, 
 
 def write(path: pathlib.Path, recording: FedRecording, outputs: Mapping[str, Output], templates: Mapping[str, Message],
           changes: recompute.Values) -> None:
-    """Write a bag at a path: the recording with the recomputed topics in place of the recorded ones.
+    """Write the recording as a new bag, with the recomputed topics in place of the recorded ones.
 
-    templates: see NodeReport; changes: of the parameters, for the metadata.
     In lockstep the log time of a message is its stamp. In realtime a recomputed message gets the log time of the
     newest recorded joint state whose stamp is not later than its own.
     """
@@ -260,7 +245,6 @@ def _logged(recording: FedRecording, stamps: Stamps) -> Stamps:
 
 
 def _bytes(topic: str, output: Output, templates: Mapping[str, Message]) -> list[bytes]:
-    """Return the CDR bytes of the messages of an Output."""
     if output.texts is not None:
         return [messages.serialize(messages.String(data=text)) for text in output.texts]
     encoder = records.Encoder(topic, templates[topic])

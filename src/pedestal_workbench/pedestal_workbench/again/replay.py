@@ -1,7 +1,4 @@
-"""`pedestal replay`: publish the recorded messages of a bag into a live graph of ROS nodes, byte by byte.
-
-playlist.py chooses and orders the messages, and player.py publishes them.
-"""
+"""`pedestal replay`: publish the recorded messages of a bag into a live graph of ROS nodes, byte by byte."""
 import contextlib
 import dataclasses
 import math
@@ -68,10 +65,7 @@ class ReplayResult:
 
 @contextlib.contextmanager
 def stop_by_signal() -> Iterator[Callable[[], bool]]:
-    """Yield a function stopped() that returns True after a signal to end the process.
-
-    Without this handler the signal would interrupt a call of rclpy.
-    """
+    """Yield stopped(), True after a signal. Without this handler a signal would interrupt a call of rclpy."""
     signals: list[bool] = []
     before = {number: signal.signal(number, lambda *_: signals.append(True))
               for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -84,11 +78,8 @@ def stop_by_signal() -> Iterator[Callable[[], bool]]:
 
 
 def replay(path: str | pathlib.Path, options: ReplayOptions, ready: Callable[[], None] = lambda: None) -> ReplayResult:
-    """Publish the bag at a path into the live graph of this ROS domain, as the ReplayOptions state.
-
-    ready() is called before the first message. Raises BagError; ValueError for options that do not fit the bag;
-    GraphError for a graph that does not fit.
-    """
+    """Publish a bag into the live graph of this ROS domain; ready() is called before the first message. Raises
+    BagError; ValueError for options that do not fit the bag; GraphError for a graph that does not fit."""
     bag = bags.read(path)
     chosen = selected_topics(bag, options.nodes, options.names)
     if options.rate is None:

@@ -1,7 +1,4 @@
-"""`pedestal replay --page`: show a recording on the page of the operator, with a slider for the time.
-
-The page takes the messages from the bag. No graph of ROS nodes runs.
-"""
+"""`pedestal replay --page`: show a recording, without a graph, on the page of the operator with a slider."""
 import math
 import queue
 import threading
@@ -41,10 +38,8 @@ LIST_TOPICS = ('acu/alarms', 'acu/program_track', 'diagnostics', 'acu/command_re
 
 
 class ShownRecording(page_state.PageAntenna):
-    """A recording with the interface of a live Antenna: it has the newest messages at a position in the recording.
-
-    bag: of one beam. Raises BagError if the bag has no joint_states.
-    """
+    """A recording of one beam with the interface of a live Antenna: the newest messages at a position. Raises BagError
+    if the bag has no joint_states."""
 
     def __init__(self, bag: bags.Bag) -> None:
         self.position: Seconds = 0.0    # time since the first joint state
@@ -114,7 +109,6 @@ class ShownRecording(page_state.PageAntenna):
         self._received: dict[str, Seconds] = {}     # time of the last message of a topic or node
 
     def _count(self, name: str) -> int:
-        """Return the number of messages of a topic up to the position."""
         moment = self._begin + round(self.position * NS_PER_SECOND)
         return int(np.searchsorted(self._times[name], moment, 'right')) if name in self._rows else 0
 
@@ -128,11 +122,9 @@ class ShownRecording(page_state.PageAntenna):
                                                           self._bag.take(self._rows[name][first:last]))]
 
     def _messages(self, name: str, most: int) -> list[Message]:
-        """Return the messages of `_last`, deserialized."""
         return [messages.deserialize(data, self._bag.topics[name]) for _, data in self._last(name, most)]
 
     def _read_log(self) -> None:
-        """Fill the event log with all events of the recording, in the order of their log times."""
         events: list[tuple[Nanoseconds, str, Message]] = []
         for name in ('acu/mode', 'adu/state', 'acu/command_result', 'acu/alarms'):
             if name in self._rows:
@@ -150,11 +142,7 @@ class ShownRecording(page_state.PageAntenna):
 
 
 class Player:
-    """Player that shows a recording on pages: play, pause, go to a position.
-
-    port: TCP port of the server of the pages; options: start, rate and paused count.
-    url: address of the page.
-    """
+    """Player that shows a recording on pages. Of the options, start, rate and paused count."""
 
     def __init__(self, recording: ShownRecording, port: int, options: ReplayOptions) -> None:
         self._recording, self._lock = recording, threading.Lock()

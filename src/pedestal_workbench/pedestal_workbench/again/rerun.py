@@ -1,8 +1,4 @@
-"""Two parts of `pedestal rerun`: the scenario of a recorded run, and the comparison of the old and new recordings.
-
-The verb (pedestal/verbs/recordings.py) runs the scenario between these two parts. The comparison covers the
-bytes of the files, the messages and the metadata.
-"""
+"""`pedestal rerun`: the scenario of a recorded run, and the comparison of its recording with that of its rerun."""
 import dataclasses
 import pathlib
 
@@ -33,10 +29,7 @@ class RerunResult:
 
     @property
     def cut(self) -> bool:
-        """True if the old recording is equal up to its end, and only lacks the later messages.
-
-        On each topic, the number of different messages then equals the number of missing messages.
-        """
+        """True if the old recording only lacks the later messages: on each topic, as many differ as are missing."""
         return all(topic.was < topic.now == topic.was + topic.different for topic in self.topics)
 
     @property
@@ -62,7 +55,6 @@ class RerunResult:
 
 
 def _line(topic: difference.MessageDifference) -> str:
-    """Return a difference as one line."""
     counts = f'{topic.was} messages' if topic.was == topic.now else f'{topic.was} messages, now {topic.now}'
     more = f' and {len(topic.changes) - MAX_SHOWN_FIELDS} more fields' if len(topic.changes) > MAX_SHOWN_FIELDS else ''
     return (f'{topic.name}: {counts}, {topic.different} differ, the first at {topic.first / 1e9:.6f} s: '
@@ -77,11 +69,8 @@ def _short(text: str | None) -> str:
 
 
 def scenario_of_recording(bag: bags.Bag) -> scenario.Scenario:
-    """Return the scenario of a recording.
-
-    A parameter whose default has changed since the recording has its recorded value. Raises bag.BagError for a
-    recording that cannot be rerun.
-    """
+    """Return the scenario of a recording. Raises BagError for a recording that cannot be rerun. A parameter whose
+    default has changed since the recording has its recorded value."""
     recorded = bag.configuration['parameters']
     if not bag.configuration['scenario']:
         raise bags.BagError(f'{bag.file}: contains no configuration, so it cannot be rerun')

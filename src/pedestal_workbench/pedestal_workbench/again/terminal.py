@@ -18,10 +18,8 @@ RIGHT_ARROW_CODES = (b'\x1b[C', b'\x1bOC')  # bytes of the right arrow key, in b
 
 
 def _in_foreground() -> bool:
-    """Return True if this process runs in the foreground of the terminal.
-
-    Signals (SIGTTIN, SIGTTOU) would stop a process in the background that uses the terminal.
-    """
+    """Return True if this process runs in the foreground of the terminal. Signals (SIGTTIN, SIGTTOU) would stop a
+    process in the background that uses the terminal."""
     try:
         return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
     except OSError:
@@ -29,10 +27,8 @@ def _in_foreground() -> bool:
 
 
 class Keyboard:
-    """Keyboard that gives each key without waiting for Enter; Ctrl-C remains a signal. Use as a context.
-
-    available: False if standard input is no terminal, or if this process is in the background. There are no keys then.
-    """
+    """Keyboard that gives each key without waiting for Enter; Ctrl-C remains a signal. Use as a context. available:
+    False if standard input is no terminal, or if this process is in the background. There are no keys then."""
 
     def __init__(self) -> None:
         self.available = sys.stdin is not None and not sys.stdin.closed and sys.stdin.isatty() and _in_foreground()

@@ -1,9 +1,7 @@
 """Effect of other parameters of the ACU on a recorded run, for `pedestal recompute --param`.
 
-The module compares the recorded outputs of the ACU with outputs that are recomputed from the recording with other
-parameters. Because the recorded antenna does not move with the recomputed command, the comparison cannot show the
-pointing that the other parameters would give. It can show the error of the estimate against the recorded truth, the
-noise and the lag of the estimate, and the noise of the command.
+Because the recorded antenna does not move with the recomputed command, the comparison cannot show the pointing that
+the other parameters would give. It shows error, noise and lag of the estimate, and the noise of the command.
 """
 import dataclasses
 import functools
@@ -193,11 +191,8 @@ COMPARISON_RESULTS = (
 
 
 def numbers(bag: Recording, versions: Sequence[Mapping[str, Output]]) -> dict[str, tuple[list[float], str]]:
-    """Return {metric: ([value of each version], unit)} of several versions of the outputs of an ACU.
-
-    versions: outputs by topic. All versions are evaluated on the same samples: those in which all of them
-    are in settled autotrack.
-    """
+    """Return {metric: ([value of each version], unit)} of several versions of the outputs of an ACU. All versions are
+    evaluated on the samples in which all of them are in settled autotrack."""
     overlays = [Overlay(bag, outputs) for outputs in versions]
     acus = [RecomputedAcu(overlay) for overlay in overlays]
     try:

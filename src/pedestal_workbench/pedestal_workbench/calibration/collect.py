@@ -1,12 +1,10 @@
 """Pointing offsets from recordings of satellite passes: boresight in autotrack less the predicted direction.
 
-In autotrack the receiver closes the loop, so the encoders show how far the antenna must turn from the predicted
-direction until the beam is on the target. The offset of a point is the mean over WINDOW_S of
+The offset of a point is the mean over WINDOW_S, in cross-elevation and elevation on the deck, of
 
-    encoder angles + receiver error - predicted direction
+    encoder angles + receiver error - predicted direction (predicted.py)
 
-in cross-elevation and elevation on the deck. The prediction is that of the control unit (predicted.py). The errors of
-the prediction (refraction, time, elements) and, on a ship, of the INS are a part of the offsets.
+The errors of the prediction and, on a ship, of the INS are a part of the offset (docs/how-to/calibrate.md).
 """
 import math
 from collections.abc import Iterable, Sequence
@@ -21,17 +19,13 @@ from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import tracking
 from pedestal_workbench.calibration import predicted, scan
+from pedestal_workbench.calibration.calibration import CalibrationError
 from pedestal_workbench.calibration.offsets import Offsets
-from pedestal_workbench.calibration.predicted import PredictionError
 
 WINDOW_S = 8.0  # length of the part of a recording whose mean is one offset [s]
 DEFAULT_POINTS = 10  # default number of offsets from one recording
 MAX_MEAN_ERROR_BEAMWIDTHS = 0.25
 """Largest mean receiver error of a point [beamwidths]; beyond it the receiver is not linear."""
-
-
-class CollectError(ValueError):
-    """Error of a recording that gives no offset. Its text is one line."""
 
 
 class Point(NamedTuple):
@@ -43,11 +37,8 @@ class Point(NamedTuple):
 
 
 def points(bag: Recording, tracks: Sequence[ProgramTrack], count: int = DEFAULT_POINTS) -> tuple[Times, Pairs, Pairs]:
-    """Return (times, directions [deg], offsets [deg]) of at most `count` points of a recording.
-
-    tracks: predicted.programs. The points are in the middle of equal parts of the steps in settled autotrack. Raises
-    CollectError.
-    """
+    """Return (times, directions [deg], offsets [deg]) of at most `count` points. Raises CalibrationError. tracks:
+    predicted.programs. The points are in the middle of equal parts of the steps in settled autotrack."""
     joints = bag.table('joint_states')
     t = joints['t']
     modes = recordings.modes(bag, t)
@@ -55,17 +46,14 @@ def points(bag: Recording, tracks: Sequence[ProgramTrack], count: int = DEFAULT_
     errors = recordings.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y'))
     errors = errors @ tracking.error_matrix(bag).T
     if not (modes == 'autotrack').any():
-        raise CollectError('no autotrack')
-    try:
-        directions = predicted.on_deck(bag, t, tracks, modes)
-    except PredictionError as error:
-        raise CollectError(str(error)) from None
+        raise CalibrationError('no autotrack')
+    directions = predicted.on_deck(bag, t, tracks, modes)
     settled = tracking.settled(modes == 'autotrack', t)
     usable = np.isfinite(errors).all(1) & np.isfinite(directions).all(1) & settled
     places = np.flatnonzero(usable)
     half = 0.5 * WINDOW_S
     if not places.size or t[places[-1]] - t[places[0]] < WINDOW_S:
-        raise CollectError(f'no autotrack of {WINDOW_S:g} s with a predicted direction')
+        raise CalibrationError(f'no autotrack of {WINDOW_S:g} s with a predicted direction')
     found = []
     beamwidth = recordings.beamwidth(bag)
     # Because the windows of two points must not overlap, a short recording gives fewer points.
@@ -84,39 +72,37 @@ def points(bag: Recording, tracks: Sequence[ProgramTrack], count: int = DEFAULT_
         at = scan.mean_direction(directions[window])
         found.append((middle, *np.degrees((at[0], at[1], xel + mean_error[0], el + mean_error[1]))))
     if not found:
-        raise CollectError('no part in autotrack has small receiver errors for long enough')
+        raise CalibrationError('no part in autotrack has small receiver errors for long enough')
     table = np.array(found)
     return table[:, 0], table[:, 1:3], table[:, 3:5]
 
 
 def listed(kind: str, table: Iterable[Floats]) -> list[Point]:
-    """Return the points of one kind from the arrays (times, directions, offsets)."""
+    """Return the points of the arrays (times, directions, offsets)."""
     return [Point(kind, *one) for one in zip(*table)]
 
 
 def every_point(bag: Recording, count: int = DEFAULT_POINTS) -> list[Point]:
-    """Return the points of the passes and scans of a recording.
-
-    count: largest number of points from autotrack. Raises CollectError.
-    """
+    """Return the points of the passes and scans of a recording, at most `count` from autotrack. Raises
+    CalibrationError."""
     tracks = predicted.programs(bag)
     found, reasons = [], []
     try:
         found += listed('', points(bag, tracks, count))
-    except CollectError as error:
+    except CalibrationError as error:
         reasons.append(str(error))
     try:
         *table, sigma = scan.points(bag, tracks)
         found += [Point(f'scan (sigma {max(wide):.4f} deg)', *one) for *one, wide in zip(*table, sigma)]
-    except scan.ScanError as error:
+    except CalibrationError as error:
         reasons.append(str(error))
     if not found:
-        raise CollectError('; '.join(reasons))
+        raise CalibrationError('; '.join(reasons))
     return found
 
 
 def joined(parts: Sequence[tuple[str, Sequence[Point]]], source: str) -> Offsets:
-    """Return the offsets of several recordings; parts: (label, its points) of each; source: their name."""
+    """Return the offsets of several recordings, whose parts are (label, points)."""
     places = [' '.join(f'{label} {kind} at {time:.1f} s'.split()) for label, found in parts
               for kind, time, *_ in found]
     directions, values = (np.array([one[column] for _, found in parts for one in found]) for column in (2, 3))

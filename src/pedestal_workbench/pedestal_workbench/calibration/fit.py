@@ -10,18 +10,32 @@ cross-elevation and its elevation. With the singular values s of A, whose column
 
 The residual of a point against the fit without this point is (I - H_i)^-1 r_i, where H_i is the 2 x 2 block of the
 point in H and r_i its residual. Their rms is the leave-one-out rms, the error to be expected in a new direction.
+
+The exact form takes the law of the control unit in place of A x, by the method of Gauss and Newton.
 """
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
 
-from pedestal_common.quantities import Degrees, Floats, Ints, Pairs
+from pedestal_common.compiled import compiled
+from pedestal_common.geometry import pointing_model
+from pedestal_common.geometry.line_of_sight import wrap
+from pedestal_common.quantities import Degrees, Floats, Ints, Pairs, Records
 from pedestal_results.intervals import CONFIDENCE_LEVEL
 from pedestal_workbench.calibration import terms
+from pedestal_workbench.calibration.calibration import CalibrationError
+
+MIN_POINTS, GOOD_POINTS = 10, 20
+"""Smallest number of points for a fit, and number below which a sentence recommends more of them."""
+EXTRA_POINTS = 3  # smallest number of points above the number of terms
+MIN_ELEVATION_SPAN_DEG = 20.0  # smallest range of the elevations [deg]
+MAX_AZIMUTH_GAP_DEG = 160.0  # largest range of azimuths without a point [deg]
+_ELEVATION_TERMS = {'P1', 'P3', 'P4'}, {'P7', 'P8', 'P9', 'P11', 'P19', 'P20'}
+"""Sets of terms that differ by the elevation only."""
 
 SMALLEST_SINGULAR_VALUE = 1e-8
 """Ratio to the largest singular value below which terms have the same effect at all points [-]."""
@@ -32,9 +46,38 @@ OUTLIER_SIGMAS = 4.5
 MEDIAN_RAYLEIGH = math.sqrt(math.log(4.0))
 """Median of the length of a vector of two normal numbers [standard deviations]."""
 
+MAX_ITERATIONS, CONVERGENCE_DEG = 30, 1e-10
+"""Largest number of iterations of the exact form, and change of the terms that ends them [deg]."""
+DIFFERENCE_DEG = 1e-3
+"""Change of a term by which the derivative of the law is measured [deg]; the error is of third order."""
 
-class FitError(ValueError):
-    """Error of offsets that do not allow a fit. Its text is one line."""
+
+def check_distribution(names: Sequence[str], directions: Pairs) -> None:
+    """Raise CalibrationError for too few directions [deg], or for directions that leave terms undetermined."""
+    az, el = directions.T
+    least = max(MIN_POINTS, len(names) + EXTRA_POINTS)
+    if len(az) < least:
+        raise CalibrationError(f'{len(az)} points, must be at least {least} for {len(names)} terms; {GOOD_POINTS} to '
+                               '40 points all over the sky are recommended (--plan)')
+    alike = [sorted(group & set(names), key=names.index) for group in _ELEVATION_TERMS if len(group & set(names)) > 1]
+    if alike and np.ptp(el) < MIN_ELEVATION_SPAN_DEG:
+        raise CalibrationError(f'bad distribution: all elevations are within {el.min():.4g} to {el.max():.4g} deg, '
+                               f'and must span at least {MIN_ELEVATION_SPAN_DEG:g} deg to tell '
+                               f'{" and ".join(", ".join(group) for group in alike)} apart')
+    turning = [name for name in names if name in terms.FULL_TURN_TERMS]
+    gap, start = largest_gap(az)
+    if turning and gap > MAX_AZIMUTH_GAP_DEG:
+        raise CalibrationError(f'bad distribution: no point between azimuth {start % 360.0:.4g} and '
+                               f'{(start + gap) % 360.0:.4g} deg, a gap of {gap:.4g} deg, must be at most '
+                               f'{MAX_AZIMUTH_GAP_DEG:g} deg for {", ".join(turning)}')
+
+
+def largest_gap(azimuths: Floats) -> tuple[Degrees, Degrees]:
+    """Return (size, start) of the largest range without any of the azimuths [deg], modulo a turn."""
+    ordered = np.unique(np.mod(azimuths, 360.0))
+    gaps = np.diff(ordered, append=ordered[0] + 360.0)
+    place = int(np.argmax(gaps))
+    return float(gaps[place]), float(ordered[place])
 
 
 class Solved(NamedTuple):
@@ -61,22 +104,19 @@ class Fit:
 
     @property
     def sigma(self) -> Floats:
-        """Return the standard deviations (p,) of the terms."""
+        """Standard deviations (p,) of the terms."""
         return np.sqrt(np.diag(self.covariance) + self.of_dropped)
 
     @property
     def correlation(self) -> Floats:
-        """Return the correlations (p, p) of the terms; 0 where a standard deviation is 0."""
+        """Correlations (p, p) of the terms; 0 where a standard deviation is 0."""
         sigma = np.sqrt(np.diag(self.covariance))
         scale = np.outer(sigma, sigma)
         return np.divide(self.covariance, scale, out=np.eye(len(sigma)), where=scale > 0.0)
 
     def outliers(self, sigma: Pairs) -> Ints:
-        """Return the places of the points whose left-out residual exceeds OUTLIER_SIGMAS.
-
-        sigma: stated standard deviations [deg]. Their scale is taken from the median of the residuals, because an
-        outlier does not move the median.
-        """
+        """Return the places of the points whose left-out residual exceeds OUTLIER_SIGMAS of the stated sigma [deg].
+        The scale of sigma is taken from the median of the residuals, because an outlier does not move the median."""
         size = np.hypot(*(self.left_out / sigma).T)
         own = np.median(np.hypot(*(self.residuals / sigma).T)) / MEDIAN_RAYLEIGH
         return np.flatnonzero(size > max(OUTLIER_SIGMAS * own, 1e-9))
@@ -90,34 +130,31 @@ class Fit:
 
 
 def linear(names: Sequence[str], directions: Pairs, values: Pairs, sigma: Pairs) -> Fit:
-    """Return the Fit of terms to offsets `values` at directions with standard deviations sigma, all [deg].
-
-    The model is first order in its terms. Raises FitError if the data cannot tell terms apart.
-    """
+    """Return the Fit of terms, to first order, to offsets `values` with standard deviations sigma, all [deg]. Raises
+    CalibrationError."""
     A = terms.design(names, directions)
     x, solved = solve(names, A, values, sigma)
-    return fitted('linear', names, x, solved, values - A @ x, sigma)
+    return _fitted('linear', names, x, solved, values - A @ x, sigma)
 
 
 def solve(names: Sequence[str], A: Floats, values: Pairs, sigma: Pairs) -> tuple[Floats, Solved]:
-    """Return (x, Solved) of the weighted least squares. Raises FitError."""
+    """Return (x, Solved) of the weighted least squares. Raises CalibrationError."""
     rows = (A / sigma[:, :, None]).reshape(-1, len(names))
     lengths = np.linalg.norm(rows, axis=0)
     for name, length in zip(names, lengths):
         if length == 0.0:
-            raise FitError(f'{name}: has no effect at any of the points')
+            raise CalibrationError(f'{name}: has no effect at any of the points')
     U, s, V = np.linalg.svd(rows / lengths, full_matrices=False)
     unknown = V[s < SMALLEST_SINGULAR_VALUE * s[0]]
     if len(unknown):
         shared = [name for name, part in zip(names, np.abs(unknown).max(0)) if part > SHARED_PART]
-        raise FitError(f'the offsets cannot tell these terms apart: {", ".join(shared)}; leave one of them out '
-                       '(--terms), or add points in other directions')
+        raise CalibrationError(f'the offsets cannot tell these terms apart: {", ".join(shared)}; leave one of them '
+                               'out (--terms), or add points in other directions')
     b = (values / sigma).reshape(-1)
     return V.T @ (U.T @ b / s) / lengths, Solved(U, s, V, lengths)
 
 
-def fitted(form: str, names: Sequence[str], x: Floats, solved: Solved, residuals: Pairs, sigma: Pairs) -> Fit:
-    """Return the Fit of the terms x of `solve`; residuals, sigma [deg]."""
+def _fitted(form: str, names: Sequence[str], x: Floats, solved: Solved, residuals: Pairs, sigma: Pairs) -> Fit:
     U, s, V, lengths = solved
     n, p = len(residuals), len(names)
     r = residuals / sigma
@@ -128,20 +165,58 @@ def fitted(form: str, names: Sequence[str], x: Floats, solved: Solved, residuals
     kept = np.eye(2) - blocks @ blocks.transpose(0, 2, 1)
     if np.linalg.det(kept).min() < SMALLEST_SINGULAR_VALUE:
         place = int(np.argmin(np.linalg.det(kept)))
-        raise FitError(f'the offset number {place + 1} determines a term alone; add points near it, or correct its '
-                       'sigma if it is far below that of the other offsets')
+        raise CalibrationError(f'the offset number {place + 1} determines a term alone; add points near it, or '
+                               'correct its sigma if it is far below that of the other offsets')
     left_out = np.linalg.solve(kept, r[:, :, None])[:, :, 0] * sigma
     half = float(stdtrit(degrees, 0.5 * (1.0 + CONFIDENCE_LEVEL)))
     return Fit(form, tuple(names), x, scale**2 * C, np.zeros(p), half, float(s[0] / s[-1]), residuals, left_out, scale)
+
+
+@compiled
+def _exact_offsets(model: Records, directions: Pairs) -> Pairs:
+    """Return the offsets [rad] of a PointingModel (1,) at wanted directions [rad]."""
+    offsets = np.empty_like(directions)
+    for i in range(len(directions)):
+        azimuth, elevation = directions[i]
+        A, E, _ = pointing_model.encoder_of(model[0], azimuth, elevation)
+        offsets[i, 0], offsets[i, 1] = wrap(A - azimuth) * np.cos(elevation), E - elevation
+    return offsets
+
+
+def model(names: Iterable[str], values: Iterable[float]) -> Records:
+    """Return the PointingModel (1,) with terms [deg, -]."""
+    return pointing_model.model({name.lower(): float(value if terms.TERM_BY_NAME[name].factor else np.radians(value))
+                                 for name, value in zip(names, values)})
+
+
+def exact_offsets(names: Sequence[str], values: Floats, directions: Pairs) -> Pairs:
+    """Return the exact offsets [deg] of terms `values` (p,) [deg, -] at directions [deg]."""
+    return np.degrees(_exact_offsets(model(names, values), np.radians(directions)))
+
+
+def exact(names: Sequence[str], directions: Pairs, values: Pairs, sigma: Pairs) -> Fit:
+    """Return the Fit of terms as `linear` does, but with the exact law. Raises CalibrationError."""
+    x = linear(names, directions, values, sigma).values
+    steps = np.array([np.radians(DIFFERENCE_DEG) if terms.TERM_BY_NAME[name].factor else DIFFERENCE_DEG
+                      for name in names])
+    for _ in range(MAX_ITERATIONS):
+        residuals = values - exact_offsets(names, x, directions)
+        A = np.stack([(exact_offsets(names, x + step, directions) - exact_offsets(names, x - step, directions))
+                      / (2.0 * step.sum()) for step in np.diag(steps)], axis=2)
+        change, solved = solve(names, A, residuals, sigma)
+        x = x + change
+        if np.abs(change).max() < CONVERGENCE_DEG:
+            return _fitted('exact', names, x, solved, values - exact_offsets(names, x, directions), sigma)
+    raise CalibrationError(f'the exact fit has not converged in {MAX_ITERATIONS} iterations; remove outliers and '
+                           'points at the zenith')
 
 
 def without_doubtful(names: Sequence[str],
                      fit: Callable[[Sequence[str]], Fit]) -> tuple[Fit, list[tuple[str, float, float]]]:
     """Return (Fit, [(name, value, sigma)] of the dropped terms) after each term below its sigma is dropped.
 
-    The terms are dropped one after another, the most doubtful first, because each drop changes the other terms. A
-    dropped term is not 0, but smaller than its sigma. So the variance of a term that is kept is at least its variance
-    in the fit of all terms.
+    The most doubtful term is dropped first, because each drop changes the other terms. A dropped term is not 0, but
+    smaller than its sigma. So the variance of a kept term is at least its variance in the fit of all terms.
     """
     whole = found = fit(names)
     dropped = []
@@ -164,9 +239,6 @@ def unit_covariance(names: Sequence[str], directions: Pairs) -> Floats:
 
 
 def model_error(names: Sequence[str], covariance: Floats, directions: Pairs) -> Degrees:
-    """Return the rms error of a model on the sky, of both axes together, over directions [deg].
-
-    covariance (p, p): of its terms.
-    """
+    """Return the rms error of a model with a covariance (p, p) on the sky, of both axes together, over directions."""
     A = terms.design(names, directions)
     return math.sqrt(float(np.einsum('nip,pq,niq->', A, covariance, A)) / (2 * len(directions)))

@@ -1,14 +1,7 @@
 """Files of measured pointing offsets: a CSV file, a file of katpoint's reduction scripts, or a TPOINT file.
 
-The content of a file shows its format:
-
-    CSV       columns az_deg, el_deg, cross_elevation_deg, elevation_deg and possibly sigma_deg; other units of
-              angle and other separators are accepted, see csv_table. The first two are the direction wanted on the
-              sky; the next two are the offset that had to be added to the command. The names az, el, d_xel, d_el and
-              sigma without a unit are degrees
-    katpoint  columns azimuth, elevation, delta_azimuth, delta_elevation and possibly delta_azimuth_std and
-              delta_elevation_std, in degrees; the azimuth offset is one of the axis
-    TPOINT    see tpoint.py
+The content of a file shows its format (docs/how-to/calibrate.md). In a CSV file, the names az, el, d_xel, d_el and
+sigma without a unit are degrees. A file of katpoint states offsets of the azimuth axis, and its standard deviations.
 """
 import csv
 import datetime
@@ -57,10 +50,8 @@ class Offsets(NamedTuple):
 
 
 def read(path: str | pathlib.Path, latest: str = '') -> Offsets:
-    """Return the Offsets of a file. Raises TableError, which names file, line, field, value and allowed range.
-
-    latest: date, as in 2026-11-26, after which no date is that of the measurement; '': every date may be.
-    """
+    """Return the offsets of a file. Raises TableError. latest: date, as in 2026-11-26, after which no date is that of
+    the measurement; '': every date may be."""
     notes: tuple[str, ...] = ()
     text = csv_table.text(path)
     if not text.strip():
@@ -106,7 +97,6 @@ def valid_date(text: str, latest: str) -> str:
 
 
 def _table(path: str | pathlib.Path, text: str) -> tuple[list[OffsetRow], list[str], str]:
-    """Return (rows, dates, format) of a CSV file."""
     try:
         table = csv_table.Table(path, text)
         katpoint = set(_KATPOINT_NAMES) <= set(table.fieldnames)
@@ -117,7 +107,6 @@ def _table(path: str | pathlib.Path, text: str) -> tuple[list[OffsetRow], list[s
 
 
 def _plain(table: csv_table.Table) -> Iterator[OffsetRow]:
-    """Yield the rows of a CSV file with named columns."""
     sky = [table.column(quantity) for quantity in _SKY]
     offset = [table.column(quantity) for quantity in _OFFSET]
     sigma = table.column(_SIGMA, required=False)
@@ -127,11 +116,11 @@ def _plain(table: csv_table.Table) -> Iterator[OffsetRow]:
         numbers = (number(sky[0], AZIMUTH_RANGE_DEG), number(sky[1], ELEVATION_RANGE_DEG),
                    number(offset[0], OFFSET_RANGE_DEG), number(offset[1], OFFSET_RANGE_DEG))
         of_both = number(sigma, SIGMA_RANGE_DEG) if sigma else np.nan
-        yield table.line_num, *numbers, of_both, of_both
+        yield OffsetRow(table.line_num, *numbers, of_both, of_both)
 
 
 def _katpoint(table: csv_table.Table) -> Iterator[OffsetRow]:
-    """Yield the rows of a file of katpoint's reduction scripts, which state offsets of the axes in degrees."""
+    """Yield the rows of a file of katpoint, which states offsets of the axes in degrees."""
     has_sigma = set(_KATPOINT_SIGMA_NAMES) <= set(table.fieldnames)
     for row in table:
         def number(name: str, low: float, high: float, row: csv_table.Cells = row) -> float:
@@ -145,7 +134,7 @@ def _katpoint(table: csv_table.Table) -> Iterator[OffsetRow]:
                  ] if has_sigma else [0.0, 0.0]
         # The scripts write 0 for a standard deviation that they have not estimated.
         of_xel, of_el = (cosine * sigma[0], sigma[1]) if min(sigma) > 0.0 else (np.nan, np.nan)
-        yield table.line_num, az, el, xel, offset, of_xel, of_el
+        yield OffsetRow(table.line_num, az, el, xel, offset, of_xel, of_el)
 
 
 def _dates(text: str) -> list[str]:

@@ -1,8 +1,7 @@
-"""Directions on the deck that a recorded control unit predicted: of its program track, of a satellite and of the sun.
+"""Directions on the deck that a recorded control unit predicted, by the table that it followed last.
 
-The prediction of a step is that of the table which the control unit followed last: `program`, `tle` or `sun`. It
-contains the refraction that the control unit adds, and not the offsets that an operator has commanded. On a ship, the
-recorded attitude of the INS turns the earth direction to the deck, from the alignment of the INS on.
+The directions contain the refraction that the control unit adds, and not the offsets that an operator has commanded.
+On a ship, the recorded attitude of the INS turns earth directions to the deck, from the alignment of the INS on.
 """
 from collections.abc import Iterable, Sequence
 
@@ -20,18 +19,15 @@ from pedestal_common.wire import messages
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import known_attitude, mode_pointing
+from pedestal_workbench.calibration.calibration import CalibrationError
 
 PROGRAM_TOPIC, S_PER_NS = 'acu/program_track', 1e-9
 TABLE_MODES = tuple(row.name for row in MODE_ROWS if row.table)  # modes that follow a table
 
 
-class PredictionError(ValueError):
-    """Error of a recording without a prediction. Its text is one line."""
-
-
 @compiled
 def _of_table(program: ProgramTrack, times: Times, out: Pairs) -> None:
-    """Fill out with the directions of a program track at times; NaN outside its table."""
+    """Fill out with the directions of a program track; NaN outside its table."""
     for k in range(len(times)):
         out[k, 0] = out[k, 1] = np.nan
         if program.times[0] <= times[k] <= program.times[-1]:
@@ -50,10 +46,7 @@ def _on_deck(attitude: Quaternions, angles: Pairs) -> None:
 
 
 def programs(bag: Recording) -> list[ProgramTrack]:
-    """Return the program tracks of a recording in the order of their messages, as the control unit followed them.
-
-    Refraction is a part of them if the recorded control unit adds it.
-    """
+    """Return the program tracks of a recording in their order, with the refraction that the control unit added."""
     found = []
     for _, _, _, message in bag.messages(PROGRAM_TOPIC) if PROGRAM_TOPIC in bag.topics else ():
         if len(message.points) > 1:
@@ -101,10 +94,8 @@ def _satellite(bag: Recording, predictor: Predictor, t: Times) -> Pairs:
 
 
 def followed(bag: Recording, modes: Texts, tracks: Sequence[ProgramTrack]) -> Texts:
-    """Return the mode of the table that the control unit followed last at each step.
-
-    Before the first table, the program track is expected, and without one the satellite of the mode tle.
-    """
+    """Return the mode of the table that the control unit followed last at each step. Before the first table, the
+    program track is expected, and without a track the satellite of the mode tle."""
     inside = np.isin(modes, TABLE_MODES)
     last = np.maximum.accumulate(np.where(inside, np.arange(modes.size), -1))
     first = 'program' if tracks else 'tle'
@@ -112,11 +103,8 @@ def followed(bag: Recording, modes: Texts, tracks: Sequence[ProgramTrack]) -> Te
 
 
 def on_deck(bag: Recording, t: Times, tracks: Sequence[ProgramTrack], modes: Texts) -> Pairs:
-    """Return the predicted deck angles [rad] at the steps; NaN where nothing is predicted.
-
-    tracks: of `programs`; modes: of the steps. Raises PredictionError for predictions that need more than the
-    recording.
-    """
+    """Return the predicted deck angles [rad] at the steps; NaN where nothing is predicted. Raises CalibrationError for
+    predictions that need more than the recording."""
     tables, out = followed(bag, modes, tracks), np.full((t.size, 2), np.nan)
     if 'program' in tables:
         out[tables == 'program'] = of_programs(tracks, t[tables == 'program'])
@@ -124,7 +112,7 @@ def on_deck(bag: Recording, t: Times, tracks: Sequence[ProgramTrack], modes: Tex
         try:
             predictor = mode_pointing.predictor_of(bag, recordings.parameters(bag, 'acu'))
         except ParameterError as error:
-            raise PredictionError(str(error)) from None
+            raise CalibrationError(str(error)) from None
         for mode, angles in (('tle', lambda times: _satellite(bag, predictor, times)), ('sun', predictor.sun_angles)):
             if (tables == mode).any():
                 out[tables == mode] = angles(t[tables == mode])

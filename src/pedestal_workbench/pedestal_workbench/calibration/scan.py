@@ -1,11 +1,8 @@
 """Pointing offsets from scans of the level: the antenna steps about the predicted direction of a source.
 
-Five points (middle and both sides of each axis) and a raster are scans. The commands `offset` of the control unit move
-the antenna in a mode that follows a table: `sun`, or `program` and `tle` for the moon and a beacon. A dwell is the
-time from one command to the next. Its level is the mean over its last part, in which the antenna has come to rest.
-
-A Gaussian beam is fitted to the levels L at the offsets x (cross-elevation) and y (elevation) of the encoders from the
-predicted direction:
+A dwell is the time from one command `offset` to the next. Its level is the mean over its last part, in which the
+antenna has come to rest. A Gaussian beam is fitted to the levels L at the offsets x (cross-elevation) and y
+(elevation) of the encoders from the predicted direction:
 
     ln L = c0 + c1 x + c2 y - c3 (x^2 + y^2)        weights L^2, for a noise that is equal at all levels
 
@@ -24,7 +21,7 @@ from pedestal_common.quantities import Floats, Pair, Pairs, Radians, Texts, Time
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_workbench.calibration import predicted
-from pedestal_workbench.calibration.predicted import PredictionError
+from pedestal_workbench.calibration.calibration import CalibrationError
 
 MIN_LEVELS = 5  # smallest number of levels of a scan
 MIN_LEVEL_SHARE = 0.2  # smallest level that is fitted, as a share of the highest; further out a beam is no Gaussian
@@ -32,10 +29,6 @@ MAX_DWELL_S, MIN_DWELL_S = 60.0, 0.5  # longest and shortest time between two co
 DWELL_SHARE = 0.4  # share of a dwell, at its end, over which its level is averaged
 MAX_MOTION_BEAMWIDTHS = 0.1  # largest motion of the antenna against the source in this part of a dwell [beamwidths]
 MAX_SIGMA_BEAMWIDTHS = 0.1  # largest standard deviation of the offset of a scan [beamwidths]
-
-
-class ScanError(ValueError):
-    """Error of a scan that gives no offset. Its text is one line."""
 
 
 class Peak(NamedTuple):
@@ -46,22 +39,22 @@ class Peak(NamedTuple):
 
 
 def peak(offsets: Pairs, levels: Floats) -> Peak:
-    """Return the Peak of levels [any linear unit] at offsets. Raises ScanError."""
+    """Return the Peak of levels [any linear unit] at offsets. Raises CalibrationError."""
     used = levels >= MIN_LEVEL_SHARE * levels.max(initial=0.0)
     x, y = offsets[used].T
     L = levels[used] / levels.max(initial=0.0)
     if L.size < MIN_LEVELS:
-        raise ScanError(f'{L.size} levels above {MIN_LEVEL_SHARE:g} of the highest, must be at least {MIN_LEVELS}; '
-                        'scan with smaller steps')
+        raise CalibrationError(f'{L.size} levels above {MIN_LEVEL_SHARE:g} of the highest, must be at least '
+                               f'{MIN_LEVELS}; scan with smaller steps')
     design = np.column_stack((np.ones_like(x), x, y, -(x * x + y * y))) * L[:, np.newaxis]
     if np.linalg.matrix_rank(design, 1e-9) < design.shape[1]:
-        raise ScanError('the levels are on one line; scan both axes')
+        raise CalibrationError('the levels are on one line; scan both axes')
     c, *_ = np.linalg.lstsq(design, L * np.log(L), rcond=None)
     inside = np.ptp(offsets, axis=0) > 0.0
     place = c[1:3] / (2.0 * c[3])
     low, high = offsets.min(axis=0), offsets.max(axis=0)
     if not (c[3] > 0.0 and inside.all() and (low <= place).all() and (place <= high).all()):
-        raise ScanError('the highest level is not inside the scanned area; scan a wider one')
+        raise CalibrationError('the highest level is not inside the scanned area; scan a wider one')
     variance = np.sum((design @ c - L * np.log(L))**2) / max(L.size - design.shape[1], 1)
     covariance = variance * np.linalg.inv(design.T @ design)
     # place = c / (2 c3): its derivatives by c1 or c2, and by c3.
@@ -81,11 +74,8 @@ class Dwell(NamedTuple):
 
 
 def scans(bag: Recording, t: Times, modes: Texts) -> list[list[Dwell]]:
-    """Return the scans of a recording, each with its dwells in the order of time.
-
-    t, modes: of the steps. A scan ends with a dwell that no command ends within MAX_DWELL_S, or with a change of the
-    mode. The last dwell is at most as long as the dwell before it.
-    """
+    """Return the scans of a recording; t, modes: of the steps. A scan ends with a dwell that no command ends within
+    MAX_DWELL_S, or with a change of the mode. The last dwell is at most as long as the dwell before it."""
     commands = [(time, command.arguments) for time, command, reply in recordings.replies(bag, 'acu/command_result')
                 if command.verb == 'offset' and reply.granted]
     found: list[list[Dwell]] = [[]]
@@ -119,20 +109,15 @@ def at_rest(dwell: Dwell) -> slice:
 
 
 def points(bag: Recording, tracks: Sequence[ProgramTrack]) -> tuple[Times, Pairs, Pairs, Pairs]:
-    """Return (times, directions, offsets, sigmas) of the scans of a recording, all except the times [deg].
-
-    tracks: predicted.programs. Raises ScanError without a scan, or for a scan that gives no offset.
-    """
+    """Return (times, directions, offsets, sigmas) of the scans of a recording, all except the times [deg]. Raises
+    CalibrationError without a scan, or for a scan that gives no offset."""
     joints = bag.table('joint_states')
     t = joints['t']
     modes = recordings.modes(bag, t)
     found_scans = [one for one in scans(bag, t, modes) if len(one) >= MIN_LEVELS]
     if not found_scans:
-        raise ScanError(f'no scan of {MIN_LEVELS} commands `offset` in a mode that follows a table')
-    try:
-        directions = predicted.on_deck(bag, t, tracks, modes)
-    except PredictionError as error:
-        raise ScanError(str(error)) from None
+        raise CalibrationError(f'no scan of {MIN_LEVELS} commands `offset` in a mode that follows a table')
+    directions = predicted.on_deck(bag, t, tracks, modes)
     level = 10.0**(0.1 * recordings.of_equipment(bag, t, 'tracking_receiver/angle_error', ('z',))[:, 0])
     azimuth = np.array([wrap(angle) for angle in joints['azimuth.position'] - directions[:, 0]])
     off = np.column_stack((np.cos(directions[:, 1]) * azimuth, joints['elevation.position'] - directions[:, 1]))
@@ -143,15 +128,15 @@ def points(bag: Recording, tracks: Sequence[ProgramTrack]) -> tuple[Times, Pairs
                 and np.ptp(off[part], axis=0).max() < MAX_MOTION_BEAMWIDTHS * beamwidth]
         begins = t[dwells[0].first]
         if len(rest) < MIN_LEVELS:
-            raise ScanError(f'scan at {begins:.1f} s: the antenna came to rest at {len(rest)} of {len(rows)} offsets, '
-                            f'must be at least {MIN_LEVELS}; dwell longer')
+            raise CalibrationError(f'scan at {begins:.1f} s: the antenna came to rest at {len(rest)} of {len(rows)} '
+                                   f'offsets, must be at least {MIN_LEVELS}; dwell longer')
         try:
             top = peak(np.array([off[part].mean(0) for part in rest]), np.array([level[part].mean() for part in rest]))
-        except ScanError as error:
-            raise ScanError(f'scan at {begins:.1f} s: {error}') from None
+        except CalibrationError as error:
+            raise CalibrationError(f'scan at {begins:.1f} s: {error}') from None
         if top.sigma.max() > MAX_SIGMA_BEAMWIDTHS * beamwidth:
-            raise ScanError(f'scan at {begins:.1f} s: sigma of the offset {math.degrees(top.sigma.max()):.3g} deg, '
-                            f'must be below {MAX_SIGMA_BEAMWIDTHS:g} beamwidths')
+            raise CalibrationError(f'scan at {begins:.1f} s: sigma of the offset {math.degrees(top.sigma.max()):.3g} '
+                                   f'deg, must be below {MAX_SIGMA_BEAMWIDTHS:g} beamwidths')
         middle = slice(dwells[0].first, dwells[-1].last)
         found.append((begins, *np.degrees((*mean_direction(directions[middle]), *top.offset, *top.sigma))))
     table = np.array(found)

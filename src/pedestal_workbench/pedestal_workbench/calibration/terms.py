@@ -4,7 +4,7 @@ Convention: the sum of the terms is ADDED to the wanted direction to give the an
 System and katpoint have the same numbers and signs. The law of the control unit, with exact rotations, is
 pedestal_common.geometry.pointing_model.
 
-az, el   azimuth, clockwise from north, and elevation of the wanted direction [rad], each (n,)
+az, el   azimuth, clockwise from north, and elevation of the wanted direction [rad]
 """
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -15,19 +15,17 @@ from pedestal_common.quantities import Floats, Pairs
 
 
 class Term(NamedTuple):
-    """A term of the pointing model.
-
-    effect(az, el) returns the offsets of a term of 1: cross-elevation and elevation [rad] or [rad per rad].
-    """
+    """A term of the pointing model."""
     name: str       # P and its number in the VLBI Field System
     meaning: str    # cause of the term, as a noun
     tpoint: str     # its name in TPOINT, with the sign for the conversion
+    # of azimuth and elevation: offsets of a term of 1, cross-elevation and elevation [rad] or [rad per rad]
     effect: Callable[[Floats, Floats], tuple[float | Floats, float | Floats]]
     factor: bool = False    # True for a factor [-]; the other terms are angles
 
     @property
     def unit(self) -> str:
-        """Return the unit of the term: deg, or '' for a factor."""
+        """Unit of the term; '' for a factor."""
         return '' if self.factor else 'deg'
 
 
@@ -80,10 +78,8 @@ def chosen(text: str) -> tuple[str, ...]:
 
 
 def design(names: Sequence[str], directions: Pairs) -> Floats:
-    """Return the matrix (n, 2, p) of the offsets on the sky (cross-elevation, elevation) for p terms of 1.
-
-    directions: azimuth and elevation [deg]. Multiplied by the terms [deg, -], the matrix gives offsets [deg].
-    """
+    """Return the matrix (n, 2, p) of the offsets on the sky for p terms of 1 at directions [deg]. Multiplied by the
+    terms [deg, -], the matrix gives cross-elevation and elevation [deg]."""
     az, el = np.radians(directions).T
     matrix = np.empty((len(directions), 2, len(names)))
     for i, name in enumerate(names):

@@ -7,28 +7,22 @@
     192.3860283 77.34684 -167.27889 77.34754     azimuth and elevation on the sky, then those of the mount
     END
 
-Further numbers of an observation, such as the angle of a rotator, are ignored. The azimuth counts from north through
-east. Some observatories count it from south (east is 90 deg), and state it in a comment such as `South = 0`. Because
-both conventions fit equally well, the convention of a file is always stated with the result.
+Further numbers of an observation are ignored. The azimuth counts from north through east, or by a comment such as
+`South = 0` from south. Because both origins fit equally well, the origin is always stated with the result.
 """
 import datetime
 import math
 import pathlib
 import re
-from typing import TypeAlias
+from typing import NamedTuple
 
+from pedestal_common.quantities import Degrees
 from pedestal_common.text_files import csv_table
 from pedestal_common.text_files.csv_table import TableError
 
 AXIS_RANGE_DEG = (-540.0, 720.0)  # accepted azimuths [deg]
 MOUNT_ELEVATION_RANGE_DEG = (-10.0, 95.0)  # accepted elevations of the mount [deg]; those on the sky are at most 90
 MAX_DIFFERENCE_DEG = 5.0  # largest accepted offset on the sky [deg]
-
-OffsetRow: TypeAlias = tuple[int, float, float, float, float, float, float]
-"""Line in the file, azimuth and elevation, offsets in cross-elevation and elevation, their standard deviations [deg].
-
-A standard deviation is NaN if the file states none.
-"""
 
 _ALTAZ_OPTIONS = ('ALTAZ', 'AZALT')
 _MIN_DATE_NUMBERS = 6
@@ -40,8 +34,19 @@ _LATITUDE_PATTERN = re.compile(r'[-+]?\d{1,2}$')
 _NUMBERS_PATTERN = re.compile(r'[-+]?\.?\d')
 
 
+class OffsetRow(NamedTuple):
+    """Offset in a file, of any format. A standard deviation is NaN if the file states none."""
+    line: int
+    azimuth: Degrees
+    elevation: Degrees
+    across: Degrees         # offset in cross-elevation
+    up: Degrees             # offset in elevation
+    across_sigma: Degrees
+    up_sigma: Degrees
+
+
 def is_tpoint(text: str) -> bool:
-    """Return True for a text of TPOINT: a line of it begins with : (an option) or with ! (a comment)."""
+    """Return True for a text of TPOINT, in which a line begins with : (an option) or with ! (a comment)."""
     return any(line.lstrip().startswith((':', '!')) or line.strip().upper() in _ALTAZ_OPTIONS
                for line in text.splitlines())
 
@@ -74,8 +79,7 @@ def date(text: str) -> str:
 
 
 def origin(path: str | pathlib.Path, text: str) -> tuple[str, int]:
-    """Return (`north` or `south`, line of the comment that states it, 0 without one). Raises TableError for comments
-    that contradict each other."""
+    """Return (`north` or `south`, line of the comment that states it, 0 without one). Raises TableError."""
     stated: dict[str, int] = {}
     for line, content in enumerate(text.splitlines(), start=1):
         match = _ORIGIN_PATTERN.search(content.partition('!')[2])
@@ -89,10 +93,7 @@ def origin(path: str | pathlib.Path, text: str) -> tuple[str, int]:
 
 
 def rows(path: str | pathlib.Path, text: str) -> list[OffsetRow]:
-    """Return the offsets of the file, without a standard deviation. Raises TableError.
-
-    The azimuth is in the turn of the wrap in which the mount was.
-    """
+    """Return the offsets of the file, in the turn of the wrap in which the mount was. Raises TableError."""
     numbers, options = _records(text)
     if not set(options) & set(_ALTAZ_OPTIONS):
         others = f'; options found: {", ".join(options)}' if options else ''
@@ -121,5 +122,5 @@ def rows(path: str | pathlib.Path, text: str) -> list[OffsetRow]:
             if abs(value) > MAX_DIFFERENCE_DEG:
                 raise TableError(f'{path}: line {line}: {name} of the mount minus that on the sky = {value:g} deg: '
                                  f'must be {-MAX_DIFFERENCE_DEG:g} to {MAX_DIFFERENCE_DEG:g}')
-        found.append((line, az, el, *offset, math.nan, math.nan))
+        found.append(OffsetRow(line, az, el, *offset, math.nan, math.nan))
     return found

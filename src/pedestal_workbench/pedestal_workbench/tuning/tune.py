@@ -44,6 +44,7 @@ from pedestal_common.wire import records
 from pedestal_recording import configuration
 from pedestal_results.tracking import HANDOVER_SETTLING_S
 from pedestal_workbench.again import recompute, what_if
+from pedestal_workbench.again.feed import FedRecording
 from pedestal_workbench.tuning import identification, parameter_search
 
 HUBER_LIMIT_SIGMAS = 4.0  # size above which an innovation is an outlier [standard deviations]
@@ -121,7 +122,7 @@ class RecordedSource:
     criterion_name, unit, kept = 'negative log-likelihood of an error', '', 'on the reserved pieces'
 
     def __init__(self, path: pathlib.Path) -> None:
-        self.recording = recompute.FedRecording(path)
+        self.recording = FedRecording(path)
         params = recompute.parameters_of(self.recording, 'acu')
         assert isinstance(params, AcuParameters)
         self.params = params

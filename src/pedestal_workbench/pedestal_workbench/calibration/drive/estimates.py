@@ -1,7 +1,6 @@
-"""Estimates of an axis from its Motion: friction, lash, bias, encoder.
+"""Estimates of an axis from its Motion: friction, lash, bias, encoder. No estimate: the motions do not show it.
 
-Each estimate has an interval by the jackknife over parts of the data (results.intervals). The function of an estimate
-returns {} for a property that the motions do not show.
+The intervals are by the jackknife over parts of the data (results.intervals).
 """
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -44,7 +43,7 @@ def interleaved(rows: Floats) -> list[Floats]:
 
 
 def jackknife(names: Sequence[str], parts: list[_Part], statistic: Callable[[list[_Part]], ArrayLike]) -> Estimates:
-    """Return the estimates of a vector statistic(parts) -> (len(names),) over parts."""
+    """Return the estimates of a vector of statistics over parts."""
     whole = np.asarray(statistic(parts))
     values = pseudo_values(parts, lambda kept: np.asarray(statistic(kept)))
     found = {}
@@ -55,12 +54,8 @@ def jackknife(names: Sequence[str], parts: list[_Part], statistic: Callable[[lis
 
 
 def plateaus(motion: Motion, torque: Floats) -> Vectors3:
-    """Return mean rate [rad/s], torque [Nm] and angle [rad] of the pieces of constant rate of a motion.
-
-    torque (n,): torque on the load [Nm].
-    """
-    period = float(np.median(np.diff(motion.t)))
-    size, settling = round(PLATEAU_S / period), round(PLATEAU_SETTLING_S / period)
+    """Return mean rate [rad/s], torque on the load [Nm] and angle [rad] of the pieces of constant rate."""
+    size, settling = round(PLATEAU_S / motion.period), round(PLATEAU_SETTLING_S / motion.period)
     slow = np.convolve(motion.v, np.ones(size) / size, 'same')
     steady = (np.abs(motion.v - slow) < PLATEAU_CHANGE * np.abs(slow) + 1e-4) & (np.abs(slow) > 2e-4)
     pieces = []
@@ -74,9 +69,7 @@ def plateaus(motion: Motion, torque: Floats) -> Vectors3:
 def friction_torque(v: Floats, coulomb: NewtonMeters, breakaway: NewtonMeters, stribeck_rate: RadiansPerSecond,
                     viscous: float) -> Floats:
     """Return the friction torque [Nm] of the load at constant rates v [rad/s]: Coulomb, Stribeck and viscous parts.
-
-    viscous [Nms/rad]. Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419, at a constant rate.
-    """
+    Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419, at a constant rate."""
     static = (breakaway - coulomb) * np.exp(-(v / stribeck_rate)**2)
     return np.sign(v) * (coulomb + static) + viscous * v
 
@@ -85,11 +78,8 @@ FRICTION_NAMES = 'coulomb', 'breakaway', 'stribeck_rate', 'viscous', 'unbalance'
 
 
 def friction(pieces: Vectors3, gravity: bool) -> Estimates:
-    """Return the estimates FRICTION_NAMES from pieces of constant rate; raise ValueError for too few of them.
-
-    gravity: True if a torque of gravity at angle 0, `unbalance`, is fitted. `offset` is a torque that does not depend
-    on the rate, such as that of the wind.
-    """
+    """Return the estimates FRICTION_NAMES from pieces of constant rate. Raises ValueError for too few of them.
+    `unbalance` is the torque of gravity at angle 0, `offset` a torque that does not depend on the rate, as by wind."""
     rates = np.unique(np.round(np.log10(np.abs(pieces[:, 0])), 1)) if len(pieces) else ()
     if len(pieces) < MIN_PLATEAUS or len(rates) < MIN_RATES:
         raise ValueError(f'{len(pieces)} pieces of constant rate at {len(rates)} rates, must be at least '
@@ -97,7 +87,7 @@ def friction(pieces: Vectors3, gravity: bool) -> Estimates:
     if not (pieces[:, 0].min() < 0.0 < pieces[:, 0].max()):
         raise ValueError('all rates have one sign; the motions must go both ways')
 
-    def statistic(parts: list[Floats]) -> tuple[float, ...]:
+    def statistic(parts: list[Floats]) -> Floats:
         rows = np.concatenate(parts)
         v, torque, theta = rows.T
         level = np.abs(torque).mean()
@@ -110,7 +100,7 @@ def friction(pieces: Vectors3, gravity: bool) -> Estimates:
 
         begin = np.array([level, 0.3 * level, math.log(2e-3), 0.0, 0.0, 0.0])
         x = least_squares(residual, begin, x_scale=np.array([level, level, 1.0, level, level, level])).x
-        return x[0], x[0] + abs(x[1]), math.exp(x[2]), x[3], x[4], x[5]
+        return np.array((x[0], x[0] + abs(x[1]), math.exp(x[2]), *x[3:]))
 
     found = jackknife(FRICTION_NAMES, [pieces[k::PART_COUNT] for k in range(PART_COUNT)], statistic)
     # Without slow rates, or without a static part, the data do not show the Stribeck rate.
@@ -127,14 +117,13 @@ def lash(parts: Iterable[tuple[Motion, Pairs]], ratio: float) -> Estimates:
 
         theta_i / N - theta = z_i + lash / 2 sign(T_i) + N T_i / k
 
-    parts: motion and torques T of the motors on the gear [Nm] of each recording; ratio: N.
-    theta_i: angle of motor i; z_i: zero of its encoder; k: stiffness. A motor shows the lash only in a recording in
-    which its torque changes the sign: without bias torque, or at an acceleration above it. Then the teeth touch with
-    both flanks.
+    parts: motion and torques T of the motors on the gear [Nm] of each recording; N: ratio; theta_i: angle of motor i;
+    z_i: zero of its encoder; k: stiffness. A motor shows the lash only if its torque changes the sign, without bias
+    torque or at an acceleration above it. Then the teeth touch with both flanks.
     """
     rows, times, before = [], [], 0
     for motion, torque in parts:
-        contact = np.ones(2 * round(CONTACT_TIME_S / float(np.median(np.diff(motion.t)))) + 1)
+        contact = np.ones(2 * round(CONTACT_TIME_S / motion.period) + 1)
         for i in range(2):
             T = torque[:, i]
             least = STRONG_TORQUE_SHARE * np.percentile(np.abs(T), 99.5)
@@ -165,10 +154,8 @@ def lash(parts: Iterable[tuple[Motion, Pairs]], ratio: float) -> Estimates:
 
 
 def bias(motion: Motion, hold: NewtonMeters) -> Estimates:
-    """Return the estimate `torque` of the bias [Nm]: half the difference of the motors at a small common torque.
-
-    hold: torque demand per motor up to which the bias is full.
-    """
+    """Return the estimate `torque` of the bias [Nm]: half the difference of the motors at a small common torque. hold:
+    torque demand per motor up to which the bias is full."""
     common = np.abs(motion.motor_torque.mean(1))
     small = np.flatnonzero(common < 0.5 * hold)
     if small.size < PART_COUNT:
@@ -181,10 +168,8 @@ def bias(motion: Motion, hold: NewtonMeters) -> Estimates:
 def encoder(motion: Motion, pinion_ratio: float) -> tuple[Estimates, Pairs]:
     """Return (estimates, table) of the error of the load encoder against the motors, over a turn.
 
-    The estimates are eccentricity_sin and eccentricity_cos [rad]. The table holds angle [rad] and error [rad] at every
-    5 deg. This error is the mean of both directions, less the mean over the turn. The error of the pinions, once per
-    turn of them, is removed with pinion_ratio (bull gear to pinion). Without a turn both ways, the result is ({},
-    empty table).
+    The table holds angle and error [rad] at every 5 deg: the mean of both directions, less the mean over the turn.
+    Without a turn both ways, both are empty. pinion_ratio (bull gear to pinion) removes the error of the pinions.
     """
     forth, back = _turn(motion, 1.0), _turn(motion, -1.0)
     if forth is None or back is None:
@@ -206,11 +191,9 @@ def encoder(motion: Motion, pinion_ratio: float) -> tuple[Estimates, Pairs]:
 
 
 def _turn(motion: Motion, sign: float) -> slice | None:
-    """Return the slice of the longest stretch in one direction, of at least MIN_TURN_RAD; None if there is none.
-
-    The accelerations at its ends are left out, because their torques twist the gears.
-    """
-    longest, settling = None, round(TURN_SETTLING_S / float(np.median(np.diff(motion.t))))
+    """Return the longest stretch in one direction, of at least MIN_TURN_RAD, without the accelerations at its ends.
+    The torques of accelerations twist the gears."""
+    longest, settling = None, round(TURN_SETTLING_S / motion.period)
     for first, last in tracking.stretches(sign * motion.v > 1e-2):
         rate = sign * motion.v[first:last]
         fast = first + np.flatnonzero(rate > TURN_RATE_SHARE * np.median(rate))

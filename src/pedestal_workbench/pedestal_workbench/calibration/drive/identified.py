@@ -1,15 +1,16 @@
 """`pedestal calibrate drive`: properties of both axes from safe motions, for the control unit and the simulated plant.
 
-The result is a table with nominal and identified values, rows for --json, a page, and a ROS 2 parameter file with
-acu.AXIS.feedforward.* and adu.AXIS.*. The twin with these values must reproduce the torques of the recording.
+The twin with these values must reproduce the torques of the recording.
 """
 import dataclasses
 import math
 import pathlib
 import shlex
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import ClassVar
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from drive_law.params import AduParameters
 from pedestal_bringup.loop import memory_recording
@@ -20,17 +21,19 @@ from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import as_dict, build, defaults
 from pedestal_common.quantities import Json, Pairs, Row
 from pedestal_common.text_files import parameter_file
-from pedestal_common.text_files.text_table import TextTable
+from pedestal_common.text_files.text_table import Cell, TextTable
 from pedestal_recording import bag as bags
 from pedestal_recording import recording as recordings
 from pedestal_results import intervals
 from pedestal_results.intervals import estimated, row
-from pedestal_workbench.calibration import output_files
-from pedestal_workbench.calibration.drive import estimates, identified_page, motion_data, motions, twin
+from pedestal_results.report import figures
+from pedestal_results.report.figures import FILTERED_COLOUR, RAW_COLOUR, TRUTH_COLOUR, Spec, new_panels, thin
+from pedestal_workbench.calibration.calibration import Calibration, named
+from pedestal_workbench.calibration.drive import estimates, motions, twin
 from pedestal_workbench.calibration.drive.estimates import Estimates
 from pedestal_workbench.calibration.drive.twin import Errors
 
-CASE_NAME, TORQUE_TARGET = 'drive', '< 10'  # case of the rows, and target of the torque error of the twin [%]
+TORQUE_TARGET = '< 10'  # target of the torque error of the twin [%]
 VALUE_DIGITS, ERROR_DIGITS = 6, 3
 """Significant digits in a parameter file, and decimal digits of torque errors that are compared."""
 DIRECT_NAMES = 'bias', 'eccentricity_sin', 'eccentricity_cos'  # estimates that the sum of the torques does not show
@@ -48,9 +51,10 @@ QUANTITIES = {
 
 
 @dataclasses.dataclass(frozen=True)
-class Identified:
-    """Result of a calibration of the drive. The dictionaries have the names of the axes as keys, except `changes`."""
-    source: str                         # names of the recordings
+class Identified(Calibration):
+    """Calibration of a drive. The dictionaries have the names of the axes as keys, except `changes`."""
+    STEP = 'drive'
+
     recordings: Sequence[twin.DriveRecording]
     first: dict[str, Estimates]         # before the correction by the twin
     found: dict[str, Estimates]         # in the order of QUANTITIES
@@ -61,9 +65,137 @@ class Identified:
     identified: Errors                  # of the twin with all identified values
     after: Errors                       # of the twin with `changes`
 
+    @property
+    def verified(self) -> bool:
+        """True if the twin reproduces the recorded torques."""
+        return not any(map(intervals.missed, self.rows()))
+
+    def rows(self) -> list[Row]:
+        """Return the estimates and the torque errors of the twin."""
+        listed = []
+        for name, found in self.found.items():
+            listed += [estimated(self.STEP, f'{name}_{key}', estimate, QUANTITIES[key][0], estimates.PART_COUNT)
+                       for key, estimate in found.items()]
+            listed += [row(self.STEP, f'{name}_torque_error_before_percent', 100.0 * self.before[name], '%'),
+                       row(self.STEP, f'{name}_torque_error_identified_percent', 100.0 * self.identified[name], '%'),
+                       row(self.STEP, f'{name}_torque_error_percent', 100.0 * self.after[name], '%',
+                           target=TORQUE_TARGET)]
+        return listed
+
+    def details(self) -> dict[str, Json]:
+        """Return remarks, maps of the encoders and parameters of the --json file."""
+        return {'verified': self.verified, 'remarks': {name: self.remarks(name) for name in self.found},
+                'encoder_map_deg': {name: np.degrees(table).tolist() for name, table in self.maps.items()},
+                'kept': {name: sorted(kept) for name, kept in self.kept.items()}, 'parameters': self.parameters()}
+
+    def lines(self) -> list[str]:
+        """Return the table of each axis, with the torque errors and remarks."""
+        drive = as_dict(self.recordings[0].drive)
+        listed = [f'drive of {self.source}, {len(self.recordings)} recordings', '']
+        for name, found in self.found.items():
+            cells: list[Sequence[Cell]] = []
+            for key, (value, low, high) in found.items():
+                parameter = twin.PARAMETER_NAMES.get(key)
+                nominal = f'{drive[f"{name}.{parameter}"]:.5g}' if parameter else ''
+                interval = f'{low:.5g} to {high:.5g}' if math.isfinite(low) else ''
+                cells.append((f'  {key}', nominal, value, interval, *QUANTITIES[key]))
+            listed += TextTable(((name, '<17'), ('nominal', '>11'), ('identified', '>11.5g'),
+                                 ('95 % interval', '<26'), ('unit', '<8'), 'meaning'), cells).lines()
+            chosen = f', {100.0 * self.after[name]:.1f} % with the chosen values' if self.kept[name] else ''
+            listed += [f'  torque of the twin is off by {100.0 * self.before[name]:.1f} % rms with nominal values, '
+                       f'{100.0 * self.identified[name]:.1f} % with identified values{chosen} '
+                       f'(must be {TORQUE_TARGET} %)',
+                       *(f'  {sentence}' for sentence in self.remarks(name)), '']
+        listed.append('verified: the twin reproduces the recorded torques' if self.verified else
+                      'NOT VERIFIED: the twin does not reproduce the recorded torques; the drive has a property that '
+                      'its model lacks, or wrong data of the motors, the gear ratio or the control loops')
+        return listed
+
+    def remarks(self, name: str) -> list[str]:
+        """Return sentences on the kept values of an axis, and on its properties that the motions do not show."""
+        found, missing = self.found[name], []
+        if self.kept[name]:
+            missing.append('nominal values kept: the twin fits the recording at least as well with them')
+        if 'lash' not in found:
+            off = any(getattr(recording.drive, name).bias.schedule == 'off' for recording in self.recordings)
+            missing.append('lash: not shown, because no motor changes the sign of a firm torque'
+                           + ('' if off else f'; add a run with adu.{name}.bias.schedule=off'))
+        if 'frequency' not in found:
+            missing.append('structure: no mode between 2 and 30 Hz shows in the torque, or a rigid twin shows it too')
+        if 'stribeck_rate' not in found:
+            missing.append('static friction: not shown, because it is too small or no motion is slow enough')
+        if 'eccentricity_sin' not in found:
+            missing.append('encoder: not shown, because the axis made no turn of 300 deg both ways')
+        return missing
+
+    def parameters(self) -> dict[str, dict[str, Json]]:
+        """Return the changes of the simulated drive, and inertia and friction for the control unit.
+
+        The inertia is that of load and motors, the friction that of the load. The friction of the motors rises over a
+        wider range of rates than the feed-forward knows. With it, the following error of a slow pass doubled, so the
+        integral of the speed loop takes it.
+        """
+        values, extra = {}, twin.extra_inertia(self.recordings)
+        for name in self.found:
+            axis = getattr(self.recordings[0].drive, name)
+            ratio, motors = axis.gear_train.ratio, (axis.motor_1, axis.motor_2)
+            if f'{name}.load.inertia' in self.changes:
+                values[f'{name}.feedforward.inertia'] = _rounded(
+                    self.changes[f'{name}.load.inertia'] + extra[name]
+                    + ratio**2 * sum(motor.inertia for motor in motors))
+            values[f'{name}.feedforward.friction'] = self.changes[f'{name}.friction.coulomb']
+        return {'acu': values, 'adu': self.changes}
+
+    def friction_plot(self) -> Figure:
+        """Draw the torque at constant rates over the rate, and the fitted friction."""
+        figure, panels = new_panels(1, 2, height=2.8, x=[f'{name} rate [rad/s]' for name in self.found],
+                                    y='torque on the load [Nm]')
+        for axes, (name, found) in zip(panels.flat, self.found.items()):
+            recording, first = self.recordings[0], self.first[name]
+            motion = recording.motions[name]
+            pieces = twin.constant_rates(motion, motion.load_torque(getattr(recording.drive, name)), first)
+            known = {key: found[key][0] for key in ('coulomb', 'breakaway', 'stribeck_rate', 'viscous')
+                     if key in found}
+            known = {'breakaway': known['coulomb'], 'stribeck_rate': 1.0, **known}
+            gravity = first['unbalance'][0] * np.cos(pieces[:, 2]) if 'unbalance' in first else 0.0
+            torque = pieces[:, 1] - (first['offset'][0] + gravity)
+            axes.semilogx(np.abs(pieces[:, 0]), np.sign(pieces[:, 0]) * torque, '.', color=RAW_COLOUR)
+            low, high = np.quantile(np.abs(pieces[:, 0]), (0.0, 1.0))
+            rates = np.geomspace(low, high, 100)
+            axes.semilogx(rates, estimates.friction_torque(rates, **known), color=FILTERED_COLOUR)
+            axes.margins(0.05)
+        return figure
+
+    def torque_plot(self) -> Figure:
+        """Draw the torque of the motors in the recording and in the twin, of both axes."""
+        figure, panels = new_panels(len(self.found), y=[f'{name}\nmotor torque [Nm]' for name in self.found])
+        twins = twin.replayed(self.recordings[0], self.changes)
+        for axes, (name, true) in zip(panels.flat, self.recordings[0].motions.items()):
+            for motion, colour, label in ((true, TRUTH_COLOUR, 'recording'), (twins[name], FILTERED_COLOUR, 'twin')):
+                axes.plot(*thin(motion.t, motion.motor_torque.sum(1)), color=colour, label=label)
+        return figures.outside_legend(figure, panels[0, 0])
+
+    def encoder_plot(self) -> Figure:
+        """Draw the error of the load encoders over the angle; the axes without a turn stay empty."""
+        figure, panels = new_panels(1, 2, height=2.6, x=[f'{name} [deg]' for name in self.maps],
+                                    y='load encoder less motors [mdeg]')
+        for axes, table in zip(panels.flat, self.maps.values()):
+            axes.plot(np.degrees(table[:, 0]), 1e3 * np.degrees(table[:, 1]), '.-', color=FILTERED_COLOUR)
+            axes.margins(0.05)
+        return figure
+
+    FIGURES: ClassVar = (
+        Spec('friction', 'Friction', 'Points: torque on the load at constant rates, in the direction of the motion, '
+             'less the torques of inertia, gravity and wind. Line: identified friction. At the slowest rates some '
+             'points lie below the line, because the bristles of the friction still bend there.', (), friction_plot),
+        Spec('torques', 'Torques', 'Sum of the torques of both motors of an axis. Orange: recording. Blue: twin with '
+             'the values of the parameter file, which receives the same commands.', (), torque_plot),
+        Spec('encoder', 'Error of the load encoders', 'Load encoder less the mean of the motor encoders, mean of both '
+             'directions. The first second of a turn is left out. Empty without a turn.', (), encoder_plot))
+
 
 def calibrate(recordings: Sequence[twin.DriveRecording], source: str) -> Identified:
-    """Return the result of a calibration; source: names of the recordings. Raises ValueError."""
+    """Return the calibration by recordings; source: their names. Raises ValueError."""
     found, maps = {}, {}
     first, corrected = twin.estimated(recordings)
     for name in AXES:
@@ -113,93 +245,7 @@ def _rounded(value: float) -> float:
     return float(f'{value:.{VALUE_DIGITS}g}')
 
 
-def rows(result: Identified) -> list[Row]:
-    """Return the rows for --json."""
-    listed = []
-    for name, found in result.found.items():
-        listed += [estimated(CASE_NAME, f'{name}_{key}', estimate, QUANTITIES[key][0], estimates.PART_COUNT)
-                   for key, estimate in found.items()]
-        listed += [row(CASE_NAME, f'{name}_torque_error_before_percent', 100.0 * result.before[name], '%'),
-                   row(CASE_NAME, f'{name}_torque_error_identified_percent', 100.0 * result.identified[name], '%'),
-                   row(CASE_NAME, f'{name}_torque_error_percent', 100.0 * result.after[name], '%',
-                       target=TORQUE_TARGET)]
-    return listed
-
-
-def passed(result: Identified) -> bool:
-    """Return True if the twin reproduces the recorded torques."""
-    return not any(intervals.missed(item) for item in rows(result))
-
-
-def lines(result: Identified) -> list[str]:
-    """Return the lines of the table, with the torque errors and remarks."""
-    drive, listed = as_dict(result.recordings[0].drive), []
-    for name, found in result.found.items():
-        cells = []
-        for key, (value, low, high) in found.items():
-            parameter = twin.PARAMETER_NAMES.get(key)
-            nominal = f'{drive[f"{name}.{parameter}"]:.5g}' if parameter else ''
-            interval = f'{low:.5g} to {high:.5g}' if math.isfinite(low) else ''
-            cells.append((f'  {key}', nominal, value, interval, *QUANTITIES[key]))
-        listed += TextTable(((name, '<17'), ('nominal', '>11'), ('identified', '>11.5g'), ('95 % interval', '<26'),
-                             ('unit', '<8'), 'meaning'), cells).lines()
-        chosen = f', {100.0 * result.after[name]:.1f} % with the chosen values' if result.kept[name] else ''
-        listed += [f'  torque of the twin is off by {100.0 * result.before[name]:.1f} % rms with nominal values, '
-                   f'{100.0 * result.identified[name]:.1f} % with identified values{chosen} '
-                   f'(must be {TORQUE_TARGET} %)',
-                   *(f'  {sentence}' for sentence in remarks(result, name)), '']
-    listed.append('verified: the twin reproduces the recorded torques' if passed(result) else
-                  'NOT VERIFIED: the twin does not reproduce the recorded torques; the drive has a property that its '
-                  'model lacks, or wrong data of the motors, the gear ratio or the control loops')
-    return listed
-
-
-def remarks(result: Identified, name: str) -> list[str]:
-    """Return sentences on the kept values of an axis, and on its properties that the motions do not show."""
-    found, kept = result.found[name], result.kept[name]
-    missing = []
-    if kept:
-        missing.append('nominal values kept: the twin fits the recording at least as well with them')
-    if 'lash' not in found:
-        off = any(getattr(recording.drive, name).bias.schedule == 'off' for recording in result.recordings)
-        missing.append('lash: not shown, because no motor changes the sign of a firm torque'
-                       + ('' if off else f'; add a run with adu.{name}.bias.schedule=off'))
-    if 'frequency' not in found:
-        missing.append('structure: no mode between 2 and 30 Hz shows in the torque, or a rigid twin shows it too')
-    if 'stribeck_rate' not in found:
-        missing.append('static friction: not shown, because it is too small or no motion is slow enough')
-    if 'eccentricity_sin' not in found:
-        missing.append('encoder: not shown, because the axis made no turn of 300 deg both ways')
-    return missing
-
-
-def acu_parameters(result: Identified) -> dict[str, float]:
-    """Return the parameters {name: value} of acu: inertia of load and motors, friction of the load.
-
-    The friction of the motors rises over a wider range of rates than the feed-forward knows. With it, the following
-    error of a slow pass doubled, so the integral of the speed loop takes it.
-    """
-    values, extra = {}, twin.extra_inertia(result.recordings)
-    for name in result.found:
-        axis = getattr(result.recordings[0].drive, name)
-        ratio, motors = axis.gear_train.ratio, (axis.motor_1, axis.motor_2)
-        if f'{name}.load.inertia' in result.changes:
-            values[f'{name}.feedforward.inertia'] = _rounded(result.changes[f'{name}.load.inertia'] + extra[name]
-                                                             + ratio**2 * sum(motor.inertia for motor in motors))
-        values[f'{name}.feedforward.friction'] = result.changes[f'{name}.friction.coulomb']
-    return values
-
-
-def content(result: Identified) -> dict[str, Json]:
-    """Return the content of the --json file."""
-    return {'name': 'calibrate drive', 'rows': rows(result), 'source': result.source, 'verified': passed(result),
-            'remarks': {name: remarks(result, name) for name in result.found},
-            'encoder_map_deg': {name: np.degrees(table).tolist() for name, table in result.maps.items()},
-            'kept': {name: sorted(kept) for name, kept in result.kept.items()},
-            'parameters': {'acu': acu_parameters(result), 'adu': result.changes}}
-
-
-def plan_parameters(chosen: Scenario) -> tuple[motions.Plan, dict[str, dict[str, Json]]]:
+def plan_parameters(chosen: Scenario) -> tuple[motions.MotionPlan, dict[str, dict[str, Json]]]:
     """Return (plan, {node: {parameter: value}}) that let a scenario make the motions."""
     plan = motions.plan(chosen.node_parameters('acu'))
     start = dict(zip(AXES, plan.start))
@@ -210,10 +256,8 @@ def plan_parameters(chosen: Scenario) -> tuple[motions.Plan, dict[str, dict[str,
 
 
 def write_plan(chosen: Scenario, given: str, path: pathlib.Path) -> list[str]:
-    """Write the motions for the antenna of a scenario to a new parameter file. Return lines for the user.
-
-    given: name or path of the scenario, as the user gave it.
-    """
+    """Write the motions for the antenna of a scenario to a new parameter file. Return lines for the user. given: name
+    or path of the scenario, as the user gave it."""
     run = shlex.join(('pedestal', 'run', given, '--params-file', str(path)))
     plan, sections = plan_parameters(chosen)
     stated = [f'motions of {motions.time_text(plan.duration)} for the antenna of {chosen.name}, within', *plan.limits]
@@ -223,12 +267,9 @@ def write_plan(chosen: Scenario, given: str, path: pathlib.Path) -> list[str]:
             f'    {run} --param adu.azimuth.bias.schedule=off --param adu.elevation.bias.schedule=off --bag drive_2']
 
 
-def in_memory(name: str, overrides: Sequence[str]) -> list[twin.DriveRecording]:
-    """Return two runs of a scenario in memory, the second without bias torque.
-
-    name: of the scenario; overrides: changed parameters 'node.key=value', the true values of the simulated drive.
-    The nominal values are those of the scenario itself.
-    """
+def _in_memory(name: str, overrides: Sequence[str]) -> list[twin.DriveRecording]:
+    """Return two runs of a scenario in memory, the second without bias torque. overrides: changed parameters
+    'node.key=value', the true values of the simulated drive. The nominal values are those of the scenario itself."""
     chosen = scenarios.load(name, overrides)
     nominal = scenarios.load(name).node_parameters('adu')
     _, plan = plan_parameters(chosen)
@@ -243,7 +284,7 @@ def in_memory(name: str, overrides: Sequence[str]) -> list[twin.DriveRecording]:
     return found
 
 
-def of_bags(paths: Iterable[pathlib.Path]) -> list[twin.DriveRecording]:
+def _of_bags(paths: Iterable[pathlib.Path]) -> list[twin.DriveRecording]:
     """Return what a calibration takes from recordings. Raises ValueError for recordings of different drives."""
     found, first = [], None
     for path in paths:
@@ -260,27 +301,14 @@ def of_bags(paths: Iterable[pathlib.Path]) -> list[twin.DriveRecording]:
         if changed:
             raise ValueError(f'--bag {path}: adu.{changed[0]} = {axes[changed[0]]} differs from the first recording, '
                              f'{first[changed[0]]}; only the bias may differ')
-        try:
+        with named(f'--bag {path}'):
             found.append(twin.read(bag, drive))
-        except motion_data.MotionError as error:
-            raise ValueError(f'--bag {path}: {error}') from None
     return found
 
 
-def main(bags: Sequence[pathlib.Path], scenario_name: str, changes: Sequence[str],
-         files: output_files.ResultFiles) -> tuple[list[str], dict[str, Json], bool]:
-    """Calibrate recordings, or without them a scenario; write the files and return (lines, content, verified).
-
-    changes: texts 'node.key=value' of --params-file and --param. Raises ValueError.
-    """
-    source = ', '.join(str(path) for path in bags) or scenario_name
-    try:
-        recordings = of_bags(bags) if bags else in_memory(scenario_name, changes)
-        result = calibrate(recordings, source)
-    except motion_data.MotionError as error:
-        raise ValueError(f'{source}: {error}') from None
-    printed = [f'drive of {source}, {len(recordings)} recordings', '', *lines(result)]
-    printed += output_files.write(files, printed, {'acu': acu_parameters(result), 'adu': result.changes},
-                                  lambda: identified_page.page(result, lines(result), files.command),
-                                  verified=passed(result))
-    return printed, content(result), passed(result)
+def calibrated(paths: Sequence[pathlib.Path], scenario_name: str, changes: Sequence[str]) -> Identified:
+    """Return the calibration by recordings, or without them by a scenario. Raises ValueError. changes: texts
+    'node.key=value' of --params-file and --param."""
+    source = ', '.join(str(path) for path in paths) or scenario_name
+    with named(source):
+        return calibrate(_of_bags(paths) if paths else _in_memory(scenario_name, changes), source)

@@ -47,10 +47,8 @@ def identify(parts: Iterable[tuple[Motion, Floats]], friction: Estimates, gravit
              flexible: bool = True) -> Estimates:
     """Return the estimates `inertia` [kg m2], and with a mode `dish_inertia` [kg m2], `frequency` [Hz] and `damping`.
 
-    parts      motion and torque on the load [Nm] of each recording
-    friction   estimates.friction, whose torque at constant rate is subtracted
-    gravity    True if the torque of gravity depends on the angle
-    flexible   False for a structure without a mode
+    parts: motion and torque on the load [Nm] of each recording; friction: estimates.friction, whose torque at constant
+    rate is subtracted; gravity: True if the torque of gravity depends on the angle.
     """
     known = {name: found[0] for name, found in friction.items()}
     data = [_rows(motion, torque, known, gravity) for motion, torque in parts]
@@ -83,16 +81,15 @@ def _rigid(rows: Floats) -> Estimates:
 
 
 def inertia_torque(motion: Motion, found: Estimates) -> Floats:
-    """Return the torque (n,) [Nm] that accelerates base and dish of a motion; found: estimates of `identify`."""
+    """Return the torque (n,) [Nm] that accelerates base and dish; found: estimates of `identify`."""
     if 'frequency' not in found:
         return found['inertia'][0] * motion.a if 'inertia' in found else np.zeros_like(motion.a)
     J, J_d, f, zeta = (found[name][0] for name in ('inertia', 'dish_inertia', 'frequency', 'damping'))
-    period = float(np.median(np.diff(motion.t)))
-    return (J - J_d) * motion.a + J_d * _swing(period, motion.a, slice(None), 2.0 * math.pi * f, zeta)
+    return (J - J_d) * motion.a + J_d * _swing(motion.period, motion.a, slice(None), 2.0 * math.pi * f, zeta)
 
 
 def _flexible(rows: Floats, dish: Callable[[float, float], Floats], w: RadiansPerSecond, zeta: float) -> Estimates:
-    """Return the estimates of a flexible structure near w, zeta; dish(w, zeta): acceleration of the dish."""
+    """Return the estimates of a structure near w, zeta; dish(w, zeta): acceleration of the dish."""
     # Around the optimum the cost of each part is a parabola over the frequency, so each part gives its frequency.
     around = [interleaved(np.column_stack((dish(w * math.exp(k * FREQUENCY_STEP), zeta), rows)))
               for k in (-1, 0, 1)]
@@ -111,11 +108,9 @@ def _flexible(rows: Floats, dish: Callable[[float, float], Floats], w: RadiansPe
 
 def _rows(motion: Motion, torque: Floats, known: Mapping[str, float],
           gravity: bool) -> tuple[Seconds, Floats, Ints, Floats]:
-    """Return (period, acceleration (n,), indices of the used steps (k,), rows (k, 4)) of a recording.
-
-    Columns of the rows: acceleration, sign of the rate, rate, torque less friction.
-    """
-    v, period = motion.v, float(np.median(np.diff(motion.t)))
+    """Return (period, acceleration (n,), used steps, their rows (k, 4): acceleration, sign of the rate, rate, torque
+    less friction)."""
+    v, period = motion.v, motion.period
     kinds = {'coulomb': known['coulomb'], 'breakaway': known.get('breakaway', known['coulomb']),
              'stribeck_rate': known.get('stribeck_rate', 2e-3), 'viscous': known['viscous']}
     rest = torque - friction_torque(v, **kinds) - known['offset']
@@ -155,6 +150,5 @@ def _solved(rows: Floats, dish: Floats | None = None) -> Floats:
 
 
 def _cost(rows: Floats, dish: Floats | None = None) -> float:
-    """Return the sum of the squared residuals of rows."""
     _, right, whole = _normal(rows, dish)
     return max(whole - float(right @ _solved(rows, dish)), 0.0)

@@ -1,14 +1,7 @@
 """Plan of safe motions that show the properties of a drive: a schedule of `preset` commands for the control unit.
 
-Each axis moves alone, about the middle of its travel, in this order:
-
-    rates        constant rates both ways, from 0.5 mrad/s to half the rate of the shaper: friction
-    reversals    of half the largest rate: inertia, and lash in a run without bias torque
-    pulses       small steps on a constant rate: first mode of the structure. At this rate the friction is constant
-    turn         a turn both ways, if the travel allows a turn: encoder
-
-The motions stay inside the limits of the control unit: MAX_RATE_SHARE of the shaper's rate, the shaper's acceleration,
-and the travel less MARGIN_SHARE at each end. The elevation stays above the highest point of the floor.
+Each axis moves alone about the middle of its travel: constant rates, reversals, pulses, and a turn both ways if the
+travel allows a turn. docs/how-to/calibrate.md states the purpose and the limits of each motion.
 """
 import dataclasses
 import math
@@ -38,7 +31,7 @@ LONG_TIME_S, MAX_TIME_S = 3600.0, 86400.0  # duration that is remarked, and long
 
 
 @dataclasses.dataclass(frozen=True)
-class Plan:
+class MotionPlan:
     """Motions of a calibration of the drive."""
     commands: str           # text for the parameter acu.commands
     start: tuple[Radians, ...]      # azimuth, elevation
@@ -58,7 +51,7 @@ class _Schedule:
 
     def command(self, i: int, angle: Radians, wait: Seconds, rate: RadiansPerSecond = 0.0,
                 moves: Seconds = 0.0) -> None:
-        """Command axis i to an angle, from which it moves at a rate for the time `moves`; then wait."""
+        """Command axis i to an angle, move from there at a rate for the time `moves`, and wait."""
         self.angles[i] = angle
         text = f'{self.t:.3f} preset ' + ' '.join(f'{name}={at:.6f}' for name, at in zip(AXES, self.angles))
         if rate:
@@ -79,7 +72,7 @@ class _Schedule:
 
 
 def _range(acu: AcuParameters, name: str) -> tuple[Radians, Radians]:
-    """Return the lowest and highest angle of the motions of an axis. Raises ValueError for a too short travel."""
+    """Return the range of the motions of an axis. Raises ValueError for a too short travel."""
     limits, cause = getattr(acu, name).limits, f'acu.{name}.limits'
     low, high = limits.low, limits.high
     _, heights = floor.points(acu.floor)
@@ -100,7 +93,7 @@ def time_text(seconds: Seconds) -> str:
     return f'{hours} h {minutes} min'
 
 
-def plan(acu: AcuParameters) -> Plan:
+def plan(acu: AcuParameters) -> MotionPlan:
     """Return the plan for the limits of a control unit. Raises ValueError for a short travel or too long motions."""
     schedule, limits, times = _Schedule(acu), [], {}
     for i, (name, axis) in enumerate(zip(AXES, (acu.azimuth, acu.elevation))):
@@ -126,12 +119,11 @@ def plan(acu: AcuParameters) -> Plan:
             raise ValueError(f'{reason}{time_text(times[slow])} for the motions; a run has at most '
                              f'{time_text(MAX_TIME_S)}')
         limits.append(f'{reason}{time_text(times[slow])} of it; a larger rate shortens the motions')
-    return Plan('; '.join(schedule.parts), schedule.start, math.ceil(schedule.t + 1.0), tuple(limits))
+    return MotionPlan('; '.join(schedule.parts), schedule.start, math.ceil(schedule.t + 1.0), tuple(limits))
 
 
 def _rates(schedule: _Schedule, i: int, middle: Radians, travel: Radians, largest: RadiansPerSecond,
            acceleration: RadiansPerSecond2) -> None:
-    """Add constant rates both ways about the middle."""
     for rate in (*(rate for rate in SLOW_RATES_RAD_S if rate < 0.8 * largest), largest):
         time = min(max(RATE_TIME_S, SLOWEST_TRAVEL_RAD / rate), travel / rate)
         schedule.slew(i, middle - 0.5 * rate * time)
@@ -150,7 +142,6 @@ def _reversals(schedule: _Schedule, i: int, middle: Radians, rate: RadiansPerSec
 
 def _pulses(schedule: _Schedule, i: int, middle: Radians, rate: RadiansPerSecond,
             acceleration: RadiansPerSecond2) -> None:
-    """Add small steps on a constant rate about the middle."""
     # A step of this size keeps the sign of the rate, and takes about PULSE_TIME_S.
     step = min(acceleration * (0.5 * PULSE_TIME_S)**2, 0.25 * rate * rate / acceleration)
     begin = middle - 0.5 * rate * PULSES_TIME_S

@@ -1,10 +1,9 @@
 """Twin of a drive: the simulated drive with estimated parameters, driven by the recorded commands.
 
-The drive reports its torque once per step. Between two steps the torque follows the staircase of the rate commands, so
-the reported torque differs from its mean, and an inertia from it is too small by some tens of percent. The twin has
-the same loops and the same staircase. Each estimate is therefore corrected by its ratio, or its difference, to the
-same estimate from the twin, until both agree (indirect inference: Gourieroux, Monfort and Renault,
-J. Applied Econometrics 8 (1993) S85).
+Between two reports the torque follows the staircase of the rate commands, so an inertia from the reported torque is
+too small by some tens of percent. The twin has the same loops and the same staircase. Each estimate is therefore
+corrected by its ratio, or its difference, to the same estimate from the twin, until both agree (indirect inference:
+Gourieroux, Monfort and Renault, J. Applied Econometrics 8 (1993) S85).
 """
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -19,6 +18,7 @@ from pedestal_common.parameters import as_dict, build
 from pedestal_common.quantities import Estimate, Floats, Json, KilogramMeters2, Pair, Pairs, Radians, Vectors3
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
+from pedestal_workbench.calibration.calibration import CalibrationError
 from pedestal_workbench.calibration.drive import estimates, mode, motion_data
 from pedestal_workbench.calibration.drive.estimates import Estimates
 from pedestal_workbench.calibration.drive.motion_data import Motion
@@ -54,13 +54,13 @@ class DriveRecording:
 
 
 def read(bag: Recording, drive: AduParameters) -> DriveRecording:
-    """Return what a calibration takes from a recording of one beam. Raises MotionError."""
+    """Return the data of a recording of one beam. Raises CalibrationError."""
     if 'ship/imu/data' in bag.topics:
-        raise motion_data.MotionError('the recording is of a ship, whose motion moves the axes too')
+        raise CalibrationError('the recording is of a ship, whose motion moves the axes too')
     states = bag.table('adu/state')['data'] if 'adu/state' in bag.topics else ()
     wrong = [text for text in states if text != 'enabled']
     if wrong:
-        raise motion_data.MotionError(f'the drive was not enabled all the time; it reported {wrong[0]!r}')
+        raise CalibrationError(f'the drive was not enabled all the time; it reported {wrong[0]!r}')
     motions = {name: motion_data.read(bag, name, getattr(drive, name)) for name in AXES}
     joints = bag.table('joint_states')
     columns = [f'{name}.{kind}' for kind in ('velocity', 'effort') for name in AXES]
@@ -71,7 +71,7 @@ def read(bag: Recording, drive: AduParameters) -> DriveRecording:
 
 
 def replayed(recording: DriveRecording, changes: Mapping[str, float]) -> dict[str, Motion]:
-    """Return {axis: motion} of the twin of a recording; changes: {parameter: value} of adu that replace its values."""
+    """Return {axis: motion} of the twin of a recording; changes: {parameter: value} of adu."""
     drive = changed(recording.drive, changes)
     zero = np.array([getattr(drive, name).encoder.error.zero for name in AXES])
     at = dict(zip(('initial_azimuth', 'initial_elevation'), (recording.start - zero).tolist()))
@@ -97,20 +97,13 @@ def load_inertia_change(drive: AduParameters, elevation: Radians) -> KilogramMet
 
 
 def constant_rates(motion: Motion, load: Floats, found: Estimates) -> Vectors3:
-    """Return the estimates.plateaus of a motion, without the torques that accelerate its base and dish.
-
-    load (n,): torque on the load [Nm]; found: estimates of mode.identify.
-    """
+    """Return estimates.plateaus without the torques that accelerate base and dish; load: torque on the load [Nm]."""
     return estimates.plateaus(motion, load - mode.inertia_torque(motion, found))
 
 
 def estimate(recordings: Sequence[DriveRecording], motions: Sequence[Motion], name: str,
              flexible: bool = True) -> Estimates:
-    """Return the estimates of an axis. Raises ValueError, which names too few motions.
-
-    recordings: their parameters are used; motions: of each recording, recorded or replayed; flexible: False for a
-    rigid structure.
-    """
+    """Return the estimates of an axis from the recorded or replayed motion of each recording. Raises ValueError."""
     axes = [getattr(recording.drive, name) for recording in recordings]
     gravity = name == 'elevation'
     loads = [motion.load_torque(axis) for motion, axis in zip(motions, axes)]
@@ -172,10 +165,7 @@ def extra_inertia(recordings: Sequence[DriveRecording]) -> dict[str, KilogramMet
 
 def _moved(value: float, first: float, low: float, high: float, rattling: bool) -> Estimate:
     """Return the estimate `value` with the width of the interval of a first estimate, scaled if the value is larger.
-
-    rattling: True for an estimate of a mesh. Teeth that rattle make its correction by the twin uncertain, so the
-    interval also covers the first estimate.
-    """
+    Teeth that rattle make the correction of a mesh uncertain, so its interval also covers the first estimate."""
     scale, more = max(1.0, abs(value / first)) if first else 1.0, abs(value - first) if rattling else 0.0
     return value, value + scale * (low - first) - more, value + scale * (high - first) + more
 
@@ -198,10 +188,7 @@ def parameters(recordings: Sequence[DriveRecording], values: Mapping[str, Mappin
 
 
 def torque_errors(recordings: Sequence[DriveRecording], changes: Mapping[str, float]) -> Errors:
-    """Return the rms difference of the torques of recording and twin, over the rms torque of the recording.
-
-    changes: {parameter: value} of adu for the twin. Only moving steps count.
-    """
+    """Return the rms difference of the torques of recording and twin, over the rms torque of the moving steps."""
     squares: dict[str, list[list[float]]] = {name: [] for name in AXES}
     for recording in recordings:
         twins = replayed(recording, changes)

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from pedestal_common.quantities import Complexes, Floats, Pairs
+from pedestal_workbench.calibration.calibration import CalibrationError
 from pedestal_workbench.calibration.receiver import matrix
 
 MAX_INTERVAL_SHARE = 0.5
@@ -23,13 +24,13 @@ PHASE_OFF_DEG, REVERSED_DEG = 10.0, 135.0
 
 
 def fit(offsets: Pairs, ratios: Complexes) -> matrix.ComplexSlopes:
-    """Return the slopes of complex ratios (n, 2) over k_m at offsets [beamwidths]. Raises MatrixError."""
+    """Return the slopes of complex ratios (n, 2) over k_m at offsets [beamwidths]. Raises CalibrationError."""
     found = matrix.least_squares(offsets, ratios)
     smallest = np.linalg.svd(found.C, compute_uv=False)[-1]
     if not found.half.max() <= MAX_INTERVAL_SHARE * smallest:
-        raise matrix.MatrixError('the ratios of difference and sum hardly follow the offsets: smallest slope '
-                                 f'{smallest:.3g} +- {found.half.max():.2g} k_m; a difference channel may be missing, '
-                                 'or contain the signal of the other')
+        raise CalibrationError('the ratios of difference and sum hardly follow the offsets: smallest slope '
+                               f'{smallest:.3g} +- {found.half.max():.2g} k_m; a difference channel may be missing, '
+                               'or contain the signal of the other')
     return found
 
 
@@ -40,17 +41,13 @@ def half_of_inverse(slopes: matrix.ComplexSlopes) -> Floats:
 
 
 def phase_half(values: Complexes, half: Floats) -> Floats:
-    """Return half of the confidence interval of the phases of complex values [rad], pi if a phase is unknown.
-
-    half: half of the interval of their real or imaginary part.
-    """
+    """Return half of the interval of the phases of values [rad], pi if a phase is unknown; half: of their parts."""
     share = half / np.maximum(np.abs(values), np.finfo(float).tiny)
     return np.where(share < 1.0, np.arcsin(np.minimum(share, 1.0)), math.pi)
 
 
 def faults(slopes: matrix.ComplexSlopes, in_force: Complexes) -> list[str]:
-    """Return sentences that name the faults of a receiver with slopes and the matrix in force (2, 2): exchanged
-    channels, reversed signs, wrong phases, turned axes, weak slopes."""
+    """Return sentences that name the faults of a receiver with slopes and the matrix in force (2, 2)."""
     E, exchanged = matrix.unexchanged(in_force @ slopes.C)
     found = []
     if exchanged:

@@ -9,10 +9,10 @@ The errors of the receiver follow the offsets of the beacon:
     n   error at m = 0: null of the receiver off the assumed place of the beacon [beamwidths]
     C   ((C_xx, C_xe), (C_ex, C_ee)): slopes on the diagonal, cross-talk off the diagonal [-]
 
-Least squares give C and n. Each point has the weight 1 / |m|^2, because the relative errors of a curved slope matter
-alike at all offsets. The control unit multiplies the errors with M = C^-1 (acu.tracker.matrix). The published
-errors are real: a phase error phi of a channel multiplies its row of C with cos(phi). Steps: S. M. Sherman and D. K.
-Barton, Monopulse Principles and Techniques, 2nd ed., chapters 7 and 9.
+Each point has the weight 1 / |m|^2, because the relative errors of a curved slope matter alike at all offsets. The
+control unit multiplies the errors with M = C^-1 (acu.tracker.matrix). The published errors are real: a phase error phi
+of a channel multiplies its row of C with cos(phi). Steps: S. M. Sherman and D. K. Barton, Monopulse Principles and
+Techniques, 2nd ed., chapters 7 and 9.
 """
 import dataclasses
 import itertools
@@ -25,6 +25,7 @@ from scipy.special import stdtrit
 
 from pedestal_common.quantities import Complexes, Decibels, Floats, Pair, Pairs, Radians
 from pedestal_results.intervals import CONFIDENCE_LEVEL
+from pedestal_workbench.calibration.calibration import CalibrationError
 
 SMALLEST_OFFSET_BEAMWIDTHS = 0.05  # offset below which the weight of a point does not grow further [beamwidths]
 MIN_SLOPE = 0.2  # least root of the determinant of C [-]. Below it the receiver hardly measures the offsets.
@@ -43,10 +44,6 @@ REVERSED_SIGN_TEXT = 'reversed sign: the slope of {} is negative'
 """Sentences on the faults of both signs and of one sign."""
 
 
-class MatrixError(ValueError):
-    """Error of offsets from which no matrix can be computed. Its text is one line."""
-
-
 _Number = TypeVar('_Number', np.float64, np.complex128)
 
 
@@ -60,12 +57,12 @@ class Slopes(Generic[_Number]):
 
     @property
     def matrix(self) -> NDArray[_Number]:
-        """Return M = C^-1 (2, 2) [-], with which the control unit multiplies the errors."""
+        """M = C^-1 (2, 2) [-], with which the control unit multiplies the errors."""
         return np.asarray(np.linalg.inv(self.C), self.C.dtype)
 
     @property
     def gain(self) -> float:
-        """Return the root of the size of the determinant of C, the mean slope [-]."""
+        """Mean slope [-]: root of the size of the determinant of C."""
         return math.sqrt(abs(np.linalg.det(self.C)))
 
 
@@ -74,13 +71,12 @@ ComplexSlopes: TypeAlias = Slopes[np.complex128]
 
 
 def least_squares(offsets: Pairs, errors: NDArray[_Number]) -> Slopes[_Number]:
-    """Return the slopes of real or complex errors (n, 2) at offsets, both [beamwidths]. Raises MatrixError for offsets
-    on one line."""
+    """Return the slopes of real or complex errors (n, 2) at offsets [beamwidths]. Raises CalibrationError."""
     size = np.maximum(np.hypot(*offsets.T), SMALLEST_OFFSET_BEAMWIDTHS)[:, np.newaxis]
     A = np.column_stack((offsets, np.ones(len(offsets)))) / size
     solution, _, rank, _ = np.linalg.lstsq(A, errors / size, rcond=None)
     if rank < A.shape[1]:
-        raise MatrixError('the offsets are on one line, and cannot tell slope and cross-talk apart')
+        raise CalibrationError('the offsets are on one line, and cannot tell slope and cross-talk apart')
     residuals = errors / size - A @ solution
     # A complex number counts as two real numbers, with the same variance.
     degrees = max(len(offsets) - A.shape[1], 1) * (2 if np.iscomplexobj(errors) else 1)
@@ -91,12 +87,12 @@ def least_squares(offsets: Pairs, errors: NDArray[_Number]) -> Slopes[_Number]:
 
 
 def fit(offsets: Pairs, errors: Pairs) -> RealSlopes:
-    """Return the slopes of errors at offsets, both [beamwidths]. Raises MatrixError."""
+    """Return the slopes of errors at offsets, both [beamwidths]. Raises CalibrationError."""
     found = least_squares(offsets, errors)
     if found.gain < MIN_SLOPE:
-        raise MatrixError(f'the errors hardly follow the offsets: mean slope {found.gain:.3g}, must be at least '
-                          f'{MIN_SLOPE:g}; the phase of both channels may be off by 90 deg, or the receiver follows '
-                          'another signal')
+        raise CalibrationError(f'the errors hardly follow the offsets: mean slope {found.gain:.3g}, must be at least '
+                               f'{MIN_SLOPE:g}; the phase of both channels may be off by 90 deg, or the receiver '
+                               'follows another signal')
     return found
 
 
@@ -116,8 +112,8 @@ def unexchanged(C: Complexes) -> tuple[Complexes, bool]:
 def explained(C: Floats) -> Explanation:
     """Return the likeliest faults of channels, signs and axes of a real C.
 
-    Several faults have the same effect: axes turned by 90 deg, and exchanged channels with one reversed sign. The
-    explanation with the fewest faults is taken; a turn counts by TURN_OF_A_FAULT_RAD.
+    Axes turned by 90 deg have the effect of exchanged channels with one reversed sign. The explanation with the fewest
+    faults is taken; a turn counts by TURN_OF_A_FAULT_RAD.
     """
     def cost(case: Explanation) -> float:
         exchanged, signs, angle = case
@@ -132,21 +128,16 @@ def explained(C: Floats) -> Explanation:
     return min(cases, key=cost)
 
 
-def turn(C: Floats) -> Radians:
-    """Return the angle by which a matrix C turns the axes of the errors, after signs and channels are right."""
-    return explained(C).angle
-
-
 def turned_axes(C: Floats) -> list[str]:
-    """Return a list with the sentence on the turn of a matrix C, empty up to TURNED_AXES_DEG."""
-    angle = math.degrees(turn(C))
+    """Return the sentence on the turn of a matrix C, none up to TURNED_AXES_DEG."""
+    angle = math.degrees(explained(C).angle)
     if not abs(angle) > TURNED_AXES_DEG:
         return []
     return [f'turned axes: the axes of the errors are turned by {angle:.1f} deg']
 
 
 def faults(slopes: RealSlopes) -> list[str]:
-    """Return sentences that name the faults of slopes: exchanged channels, signs, turned axes, weak slopes."""
+    """Return sentences that name the faults of slopes."""
     exchanged, signs, _ = explained(slopes.C)
     found = []
     if exchanged:
@@ -175,15 +166,12 @@ class Verification:
 
     @property
     def cross_talk_db(self) -> Decibels:
-        """Return the cross-talk, at least -100 dB."""
+        """Cross-talk, at least -100 dB."""
         return 20.0 * math.log10(max(self.cross_talk, 1e-5))
 
 
 def verify(matrix: Floats, null: Pair, offsets: Pairs, errors: Pairs) -> Verification:
-    """Return the quality of a matrix (2, 2) at points of the circle [beamwidths].
-
-    null: error at the offset 0 [beamwidths].
-    """
+    """Return the quality of a matrix (2, 2) at points of the circle; null: error at the offset 0 [beamwidths]."""
     corrected = (errors - null) @ matrix.T
     radius = float(np.hypot(*offsets.T).mean())
     A = np.column_stack((offsets, np.ones(len(offsets))))

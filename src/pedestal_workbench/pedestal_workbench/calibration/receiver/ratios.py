@@ -1,12 +1,10 @@
 """Complex ratios of difference and sum at the points of a recording, from the I/Q samples of its run.
 
-The samples go through the unit of the monopulse receiver, as in `pedestal recompute --iq`. In each step the unit
-integrates sum S and differences D. The ratio of a point is
+In each step the unit of the monopulse receiver integrates sum S and differences D. The ratio of a point is
 
     sum of D conj(S) / (sum of |S|^2 - noise power)
 
-over the integrals of the point. The noise of the channels is independent, so it has no effect on the mean of the
-numerator. The noise power of the unit removes its effect on the denominator.
+over its integrals. The noise of the channels is independent, so it has no effect on the mean of the numerator.
 """
 import dataclasses
 
@@ -19,7 +17,8 @@ from pedestal_hardware.monopulse.front_end import Status
 from pedestal_hardware.monopulse.params import MonopulseParameters
 from pedestal_hardware.monopulse.unit import MonopulseReceiver
 from pedestal_workbench.again import iq
-from pedestal_workbench.calibration.receiver import offsets
+from pedestal_workbench.calibration.calibration import CalibrationError
+from pedestal_workbench.calibration.receiver import beacon_offsets
 
 SMALLEST_POWER_OVER_NOISE = 1e-3  # smallest power of the sum of a point, over its noise power, for a ratio [-]
 
@@ -55,10 +54,7 @@ class _Sums:
 
 
 def at_points(samples: Samples, spans: Pairs) -> Complexes:
-    """Return the ratios (n, 2) of the points with first and last times spans [s]: D_x / S, D_e / S.
-
-    Raises OffsetError for a point without samples or without lock.
-    """
+    """Return the ratios (n, 2) of the points with first and last times spans [s]. Raises CalibrationError."""
     unit = iq.unit_of(samples.parameters)
     sums = [_Sums() for _ in spans]
     ends: tuple[Nanoseconds, Nanoseconds] | None = None
@@ -74,16 +70,15 @@ def at_points(samples: Samples, spans: Pairs) -> Complexes:
 
 
 def _check(found: _Sums, span: Pair, samples: Samples, ends: tuple[Nanoseconds, Nanoseconds] | None) -> None:
-    """Raise OffsetError for the sums of a point without samples or lock. ends: UTC of the first and the last step of
-    the samples, None without a step."""
+    """Raise CalibrationError for a point without samples or lock; ends: UTC of the first and the last step."""
     place, expected = f'{span[0]:.1f} to {span[1]:.1f} s', (span[1] - span[0]) / samples.parameters.period
-    if found.steps < (1.0 - offsets.MAX_MISSING_SHARE) * expected:
+    if found.steps < (1.0 - beacon_offsets.MAX_MISSING_SHARE) * expected:
         covered = ('holds no whole step' if ends is None else
                    f'holds samples from {sigmf.text_of(ends[0])} to {sigmf.text_of(ends[1])}')
-        raise offsets.OffsetError(f'samples are missing at {place}: {samples.file.meta} {covered}, and time 0 of the '
-                                  f'recording is {sigmf.text_of(samples.epoch)}; both must be of the same run')
-    if found.unlocked > offsets.MAX_MISSING_SHARE * found.steps:
-        raise offsets.OffsetError(f'receiver not locked at {place}: {found.unlocked} of {found.steps} steps of '
-                                  f'{samples.file.meta} have no lock; each offset needs a locked receiver')
+        raise CalibrationError(f'samples are missing at {place}: {samples.file.meta} {covered}, and time 0 of the '
+                               f'recording is {sigmf.text_of(samples.epoch)}; both must be of the same run')
+    if found.unlocked > beacon_offsets.MAX_MISSING_SHARE * found.steps:
+        raise CalibrationError(f'receiver not locked at {place}: {found.unlocked} of {found.steps} steps of '
+                               f'{samples.file.meta} have no lock; each offset needs a locked receiver')
     if found.power - found.noise < SMALLEST_POWER_OVER_NOISE * found.noise:
-        raise offsets.OffsetError(f'the sum channel of {samples.file.meta} holds only noise at {place}')
+        raise CalibrationError(f'the sum channel of {samples.file.meta} holds only noise at {place}')

@@ -9,8 +9,7 @@
     u_j, v_j    n points that fill the disk of the source evenly [deg]
 
 A real beam is no Gaussian far out, so only power above MIN_SHARE of the highest is fitted. P_0 comes from the levels
-off the source. A / P_0 = (Y - 1) L: Y is the Y factor on axis, and L the correction for a source that is not small
-against the beam. For W below b, L = 1 + 0.38 (W / b)^2 (ITU-R S.733); this fit also holds for a wide source.
+off the source. A / P_0 = (Y - 1) L: Y is the Y factor on axis, and L the correction for the size of the source.
 
 The G/T of a receiver with one polarisation, from a source with a flux density S in random polarisation, is
 
@@ -27,7 +26,8 @@ from scipy.special import stdtrit
 
 from pedestal_common.quantities import Bools, Decibels, Degrees, Floats, Hertz, Pair, Pairs
 from pedestal_results.intervals import CONFIDENCE_LEVEL
-from pedestal_workbench.calibration.sensitivity.levels import LevelError, Levels
+from pedestal_workbench.calibration.calibration import CalibrationError
+from pedestal_workbench.calibration.sensitivity.levels import Levels
 
 MIN_SHARE = 0.25  # least power above P_0 that is fitted, as a share of the highest [-]
 MIN_LEVELS = 7  # smallest number of fitted levels: two more than the unknowns
@@ -53,7 +53,7 @@ class Beam:
 
     @property
     def correction(self) -> float:
-        """Return L, the correction for the size of the source [-]."""
+        """L, the correction for the size of the source [-]."""
         return self.amplitude / self.peak
 
 
@@ -77,7 +77,7 @@ def pattern(offsets: Pairs, place: Pair, width: Pair, points: Pairs) -> Floats:
 
 
 def fit(levels: Levels, diameter: Degrees) -> Beam:
-    """Return the beam of levels about a source of a diameter. Raises LevelError."""
+    """Return the beam of levels about a source of a diameter. Raises CalibrationError."""
     points, offsets = disk(diameter), levels.offsets
     floor = 0.0 if levels.of_source else float(levels.power.min())
     found = _fit(offsets, levels.power, floor, points)
@@ -86,8 +86,8 @@ def fit(levels: Levels, diameter: Degrees) -> Beam:
     width = max(found.width)
     off = np.hypot(*(offsets - found.place).T) > OFF_BEAMWIDTHS * width + 0.5 * diameter
     if not off.any():
-        raise LevelError(f'no level off the source, must be at least 1 further than '
-                         f'{OFF_BEAMWIDTHS * width + 0.5 * diameter:.3g} deg from it')
+        raise CalibrationError('no level off the source, must be at least 1 further than '
+                               f'{OFF_BEAMWIDTHS * width + 0.5 * diameter:.3g} deg from it')
     return _fit(offsets, levels.power, float(levels.power[off].mean()), points)
 
 
@@ -96,15 +96,15 @@ def _fit(offsets: Pairs, power: Floats, floor: float, points: Pairs) -> Beam:
     above = power - floor
     used = above > MIN_SHARE * above.max()
     if floor and above.max() < (10.0**(0.1 * MIN_Y_DB) - 1.0) * floor:
-        raise LevelError(f'Y factor {10.0 * math.log10(power.max() / floor):.2g} dB, must be at least '
-                         f'{MIN_Y_DB:g} dB')
+        raise CalibrationError(f'Y factor {10.0 * math.log10(power.max() / floor):.2g} dB, must be at least '
+                               f'{MIN_Y_DB:g} dB')
     if used.sum() < MIN_LEVELS or min(np.ptp(offsets[used], axis=0)) == 0.0:
-        raise LevelError(f'{used.sum()} levels above {MIN_SHARE:g} of the highest, must be at least {MIN_LEVELS}, '
-                         'with offsets on both axes')
+        raise CalibrationError(f'{used.sum()} levels above {MIN_SHARE:g} of the highest, must be at least '
+                               f'{MIN_LEVELS}, with offsets on both axes')
     x, P = offsets[used], above[used]
     low, high, top = x.min(0), x.max(0), x[np.argmax(P)]
     if not ((low < top) & (top < high)).all():
-        raise LevelError('the highest level is at the edge of the scanned area; scan a wider one')
+        raise CalibrationError('the highest level is at the edge of the scanned area; scan a wider one')
     middle = (x * P[:, np.newaxis]).sum(0) / P.sum()
     spread = np.sqrt((((x - middle)**2) * P[:, np.newaxis]).sum(0) / P.sum())
     begin = np.concatenate(((math.log(P.max()),), middle, np.log(2.0 * spread)))
@@ -115,7 +115,7 @@ def _fit(offsets: Pairs, power: Floats, floor: float, points: Pairs) -> Beam:
     solved = least_squares(residual, begin, x_scale=np.concatenate(((1.0,), spread, (1.0, 1.0))))
     A, place, width = math.exp(solved.x[0]), solved.x[1:3], np.exp(solved.x[3:])
     if not ((low <= place) & (place <= high)).all():
-        raise LevelError('the highest level is not inside the scanned area; scan a wider one')
+        raise CalibrationError('the highest level is not inside the scanned area; scan a wider one')
     degrees = max(P.size - 5, 1)
     sigma = math.sqrt(float((solved.fun**2).sum()) / degrees)
     spread = np.sqrt(np.diag(np.linalg.pinv(solved.jac.T @ solved.jac))) * sigma
@@ -125,10 +125,8 @@ def _fit(offsets: Pairs, power: Floats, floor: float, points: Pairs) -> Beam:
 
 
 def null(levels: Levels, place: Pair, width: Pair) -> Pair | None:
-    """Return the offset [deg] at which both errors of the receiver are 0; None without enough errors.
-
-    A linear fit to the errors of the levels within half a beamwidth of the highest power.
-    """
+    """Return the offset [deg] at which both errors of the receiver are 0, by a linear fit to those near the highest
+    power; None without enough errors."""
     near = (np.hypot(*((levels.offsets - place) / width).T) < 0.6) & np.isfinite(levels.errors).all(1)
     if near.sum() < 5:
         return None
@@ -140,11 +138,7 @@ def null(levels: Levels, place: Pair, width: Pair) -> Pair | None:
 
 
 def g_over_t_db(ratio: float, flux_sfu: float, frequency_hz: Hertz, attenuation_db: Decibels = 0.0) -> float:
-    """Return G/T [dB/K] from ratio = (Y - 1) L.
-
-    flux_sfu: flux density of the source [1e-22 W/m2/Hz], in random polarisation; attenuation_db: of the atmosphere
-    between source and antenna.
-    """
+    """Return G/T [dB/K] from ratio = (Y - 1) L; flux_sfu: flux density [1e-22 W/m2/Hz], in random polarisation."""
     S = flux_sfu * FLUX_UNIT_W_M2_HZ * 10.0**(-0.1 * attenuation_db)
     wavelength = LIGHT_SPEED_M_S / frequency_hz
     return 10.0 * math.log10(8.0 * math.pi * BOLTZMANN_J_K * ratio / (S * wavelength**2))

@@ -1,10 +1,7 @@
-"""Levels at offsets about a source, from a CSV file or from a recording.
+"""Levels at offsets about a source, from a CSV file or from a recording (docs/how-to/calibrate.md).
 
-A file has the columns cross_elevation_deg, elevation_deg and level_db; or az_deg, el_deg and level_db, of which az_deg
-is an offset in azimuth. Its level is the total power, of source and system noise, in dB.
-
-In a recording the commands `offset` of the control unit move the antenna about the table that it follows. The level of
-the receiver is a C/N0 in dB-Hz: the power of the source alone over the noise power in 1 Hz.
+The level of a file is the total power, of source and system noise, in dB. The level of a recording is a C/N0 in dB-Hz:
+the power of the source alone over the noise power in 1 Hz.
 """
 import csv
 import dataclasses
@@ -19,6 +16,7 @@ from pedestal_common.text_files import columns, csv_table
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_workbench.calibration import scan
+from pedestal_workbench.calibration.calibration import CalibrationError
 
 OFFSET_RANGE_DEG, LEVEL_RANGE_DB = (-30.0, 30.0), (-300.0, 300.0)  # ranges of the offsets and of the levels in a file
 MAX_FOLLOWING_BEAMWIDTHS = 0.1  # largest following error of an antenna at rest [beamwidths]
@@ -27,10 +25,6 @@ _OFFSETS = (columns.Quantity('elevation_deg', {'elevation': '', 'el': ''}, 'deg'
             columns.Quantity('az_deg', {'az': '', 'azimuth': ''}, 'deg'))
 _LEVEL = columns.Quantity('level_db', {'level': ''}, 'db')
 NOISE_KINDS = 'sun', 'moon'  # kinds of simulated targets that are sources of noise
-
-
-class LevelError(ValueError):
-    """Error of levels from which no beam can be computed. Its text is one line."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,10 +40,8 @@ class Levels:
 
 
 def read(path: pathlib.Path, elevation: Degrees | None = None) -> Levels:
-    """Return the levels of a CSV file. Raises TableError and LevelError.
-
-    elevation: of the source, with which an offset in azimuth becomes one in cross-elevation.
-    """
+    """Return the levels of a CSV file. Raises TableError and CalibrationError. elevation: of the source, with which an
+    offset in azimuth becomes an offset in cross-elevation."""
     try:
         table = csv_table.Table(path, csv_table.text(path))
         up = table.column(_OFFSETS[0])
@@ -62,24 +54,24 @@ def read(path: pathlib.Path, elevation: Degrees | None = None) -> Levels:
     except csv.Error as error:
         raise csv_table.TableError(f'{path}: not a CSV text file: {error}') from None
     if not rows:
-        raise LevelError('0 levels, must be at least 1')
+        raise CalibrationError('0 levels, must be at least 1')
     x, y, level = np.array(rows).T
     if in_azimuth:
         if elevation is None:
-            raise LevelError('the offsets are in azimuth; --elevation must state the elevation of the source')
+            raise CalibrationError('the offsets are in azimuth; --elevation must state the elevation of the source')
         x = x * math.cos(math.radians(elevation))
     elif elevation is not None:
-        raise LevelError('--elevation: has no effect, because the offsets are in cross-elevation')
+        raise CalibrationError('--elevation: has no effect, because the offsets are in cross-elevation')
     return Levels(np.column_stack((x, y)), 10.0**(0.1 * level), False, np.full((x.size, 2), np.nan), math.nan,
                   math.nan, str(path))
 
 
 def of_recording(bag: Recording, source: str) -> Levels:
-    """Return the levels of a recording of one beam; source: its name. Raises LevelError."""
+    """Return the levels of a recording of one beam; source: its name. Raises CalibrationError."""
     if 'ship/imu/data' in bag.topics:
-        raise LevelError('the recording is of a ship; its offsets contain the attitude of the deck')
+        raise CalibrationError('the recording is of a ship; its offsets contain the attitude of the deck')
     if missing := recordings.missing(bag, 'joint_states', 'tracking_receiver/angle_error', 'acu/reference'):
-        raise LevelError(f'the recording holds no {missing}')
+        raise CalibrationError(f'the recording holds no {missing}')
     joints, axes = bag.table('joint_states'), ('azimuth.position', 'elevation.position')
     t = joints['t']
     angles = np.column_stack([joints[name] for name in axes])
@@ -98,8 +90,8 @@ def of_recording(bag: Recording, source: str) -> Levels:
         power = np.nanmean(10.0**(0.1 * measured[part, 2]))
         found.append((*np.degrees(off), power, *np.degrees(error)))
     if not found:
-        raise LevelError('no command `offset` in a mode that follows a table, with '
-                         f'{scan.MIN_DWELL_S:g} s at rest after it')
+        raise CalibrationError('no command `offset` in a mode that follows a table, with '
+                               f'{scan.MIN_DWELL_S:g} s at rest after it')
     rows = np.array(found)
     receiver = recordings.parameters(bag, 'tracking_receiver')
     # The level of a carrier has no noise bandwidth.

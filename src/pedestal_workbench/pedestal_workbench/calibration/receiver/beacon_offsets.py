@@ -1,17 +1,14 @@
 """Offsets about a beacon from a recording: where the beam stands still, its offset and the mean error of the receiver.
 
-The control unit moves the beam off the beacon in steps (scenario receiver_phasing) and waits after each step. A point
-is one such wait: the mean of the errors of the receiver, and the offset of the beacon from the beam. The offset comes
-from the encoders, through the pointing model in force. In `preset` the beacon is in the middle of the points; in
-`program` it is where the program track is without the offset of the operator. A constant error of this place changes
-only the null of the errors, and not their slopes.
-
-A point of the circle belongs to MIN_CIRCLE_POINTS or more consecutive points with the radius CIRCLE_BEAMWIDTHS. The
-matrix is fitted to all other points, and verified on the circle.
+The offset is by the encoders, through the pointing model in force. In `preset` the beacon is in the middle of the
+points; in `program` it is where the program track is without the offset of the operator. A constant error of this
+place changes only the null of the errors, and not their slopes. The matrix is fitted to the points off the circle,
+and verified on the circle.
 """
 import dataclasses
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +17,7 @@ from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
 from pedestal_results import directions, mode_pointing, tracking
 from pedestal_workbench.calibration import predicted
+from pedestal_workbench.calibration.calibration import CalibrationError
 
 CIRCLE_BEAMWIDTHS, CIRCLE_TOLERANCE_BEAMWIDTHS = 0.2, 0.03
 """Radius of the circle on which the matrix is verified, and its tolerance [beamwidths]."""
@@ -31,10 +29,6 @@ STILL_WINDOW_S, SETTLING_TIME_S, MIN_POINT_S = 0.25, 0.5, 1.0
 MAX_MOTION_BEAMWIDTHS = 0.01  # largest motion of a still beam within STILL_WINDOW_S [beamwidths]
 MAX_MISSING_SHARE = 0.05  # largest share of a point without an error of the receiver [-]
 COLUMNS = 'azimuth.position', 'elevation.position'
-
-
-class OffsetError(ValueError):
-    """Error of a recording that allows no calibration of the receiver. Its text is one line."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,24 +43,24 @@ class Points:
 
     @property
     def times(self) -> Times:
-        """Return the middle of each point."""
+        """Middle of each point."""
         return self.spans.mean(1)
 
     @property
     def fitted(self) -> Bools:
-        """Return the mask (n,) of the points to which the matrix is fitted."""
+        """Mask (n,) of the points to which the matrix is fitted."""
         return ~self.circle & (np.hypot(*self.offsets.T) <= MAX_OFFSET_BEAMWIDTHS)
 
 
 def read(bag: Recording) -> Points:
-    """Return the points of a recording of one beam. Raises OffsetError."""
+    """Return the points of a recording of one beam. Raises CalibrationError."""
     if missing := recordings.missing(bag, 'joint_states', 'tracking_receiver/angle_error'):
-        raise OffsetError(f'the recording holds no {missing}')
+        raise CalibrationError(f'the recording holds no {missing}')
     if 'ship/imu/data' in bag.topics:
-        raise OffsetError('the recording is of a ship; its offsets contain the attitude of the deck')
+        raise CalibrationError('the recording is of a ship; its offsets contain the attitude of the deck')
     beamwidth = recordings.beamwidth(bag)
     if not beamwidth > 0.0:
-        raise OffsetError(f'beamwidth = {beamwidth:g} rad: the recording must state a beamwidth above 0')
+        raise CalibrationError(f'beamwidth = {beamwidth:g} rad: the recording must state a beamwidth above 0')
     joints = bag.table('joint_states')
     t = joints['t']
     beam = directions.on_sky(bag, t, np.column_stack([joints[column] for column in COLUMNS]))
@@ -75,8 +69,8 @@ def read(bag: Recording) -> Points:
     found = [_point(t[first:last], offsets[first:last] / beamwidth, errors[first:last], beamwidth)
              for first, last in _still(t, offsets, beamwidth)]
     if not found:
-        raise OffsetError(f'no part in the modes preset or program with a still beam of {MIN_POINT_S:g} s; program '
-                          'hands over to autotrack unless acu.tracker.handover = false')
+        raise CalibrationError(f'no part in the modes preset or program with a still beam of {MIN_POINT_S:g} s; '
+                               'program hands over to autotrack unless acu.tracker.handover = false')
     spans, means, errors, sigma, level = map(np.array, zip(*found))
     if plain:
         # The middle of the points is the beacon: most points of a cross have the offset 0 on one of the axes.
@@ -86,14 +80,12 @@ def read(bag: Recording) -> Points:
 
 
 def _from_beacon(bag: Recording, t: Times, beam: Pairs) -> tuple[Pairs, bool]:
-    """Return (offsets [rad] of the beacon from the beam, True if the place of the beacon is not known yet).
-
-    The offsets are NaN outside the modes preset and program; beam: directions [rad].
-    """
+    """Return (offsets [rad] of the beacon from the beam, NaN outside preset and program; True if the place of the
+    beacon is not known yet)."""
     modes = recordings.modes(bag, t)
     usable = (modes == 'preset') | (modes == 'program')
     if not usable.any():
-        raise OffsetError('the recording holds neither the mode preset nor the mode program')
+        raise CalibrationError('the recording holds neither the mode preset nor the mode program')
     plain = (modes == 'preset').sum() >= (modes == 'program').sum()
     usable = modes == ('preset' if plain else 'program')
     beacon = np.full_like(beam, np.nan)
@@ -102,7 +94,7 @@ def _from_beacon(bag: Recording, t: Times, beam: Pairs) -> tuple[Pairs, bool]:
     else:
         tracks = predicted.programs(bag)
         if not tracks:
-            raise OffsetError('the recording holds no program track, which predicts the directions')
+            raise CalibrationError('the recording holds no program track, which predicts the directions')
         beacon[usable] = predicted.of_programs(tracks, t)[usable]
     offsets = np.empty_like(beam)
     mode_pointing.fill_offsets(np.ascontiguousarray(beam), beacon, offsets)
@@ -123,21 +115,25 @@ def _still(t: Times, offsets: Pairs, beamwidth: Radians) -> Iterator[tuple[int, 
             yield first + settling, last
 
 
-def _point(t: Times, offsets: Pairs, errors: Vectors3,
-           beamwidth: Radians) -> tuple[tuple[Seconds, Seconds], Pair, Pair, Pair, DecibelHertz]:
-    """Return ((first, last time), mean offset, mean error, its standard deviation, C/N0) of a point.
+class _Point(NamedTuple):
+    span: tuple[Seconds, Seconds]
+    offset: Pair
+    error: Pair
+    sigma: Pair
+    level: DecibelHertz
 
-    Raises OffsetError. offsets [beamwidths], errors [rad, rad, dB-Hz]: rows of the point.
-    """
+
+def _point(t: Times, offsets: Pairs, errors: Vectors3, beamwidth: Radians) -> _Point:
+    """Return the means of offsets [beamwidths] and errors [rad, rad, dB-Hz]. Raises CalibrationError."""
     known = np.isfinite(errors[:, :2]).all(1)
     if (~known).mean() > MAX_MISSING_SHARE:
         level = errors[:, 2][np.isfinite(errors[:, 2])]
         stated = f'C/N0 {level.mean():.1f} dB-Hz' if level.size else 'no C/N0'
-        raise OffsetError(f'receiver not locked at {t[0]:.1f} to {t[-1]:.1f} s: {100.0 * (~known).mean():.0f} % of '
-                          f'its errors are NaN or missing ({stated}); each offset needs a locked receiver')
+        raise CalibrationError(f'receiver not locked at {t[0]:.1f} to {t[-1]:.1f} s: {100.0 * (~known).mean():.0f} '
+                               f'% of its errors are NaN or missing ({stated}); each offset needs a locked receiver')
     values = errors[known, :2] / beamwidth
-    return ((t[0], t[-1]), offsets.mean(0), values.mean(0), values.std(0) / math.sqrt(len(values)),
-            float(np.mean(errors[known, 2])))
+    return _Point((t[0], t[-1]), offsets.mean(0), values.mean(0), values.std(0) / math.sqrt(len(values)),
+                  float(np.mean(errors[known, 2])))
 
 
 def _circle(radius: Floats) -> Bools:
@@ -150,17 +146,16 @@ def _circle(radius: Floats) -> Bools:
 
 
 def _checked(points: Points) -> Points:
-    """Return points that suffice for fit and verification. Raises OffsetError."""
     fitted = points.offsets[points.fitted]
     if len(fitted) < MIN_FITTED_POINTS:
-        raise OffsetError(f'{len(fitted)} offsets outside the circle, must be at least {MIN_FITTED_POINTS}: to both '
-                          'sides on both axes (scenario receiver_phasing)')
+        raise CalibrationError(f'{len(fitted)} offsets outside the circle, must be at least {MIN_FITTED_POINTS}: to '
+                               'both sides on both axes (scenario receiver_phasing)')
     for axis, name in enumerate(('cross-elevation', 'elevation')):
         span = np.ptp(fitted[:, axis])
         if span < MIN_SPAN_BEAMWIDTHS:
-            raise OffsetError(f'offsets in {name} span {span:.3g} beamwidths, must be at least '
-                              f'{MIN_SPAN_BEAMWIDTHS:g}')
+            raise CalibrationError(f'offsets in {name} span {span:.3g} beamwidths, must be at least '
+                                   f'{MIN_SPAN_BEAMWIDTHS:g}')
     if points.circle.sum() < MIN_CIRCLE_POINTS:
-        raise OffsetError(f'{points.circle.sum()} consecutive offsets on the circle of {CIRCLE_BEAMWIDTHS:g} '
-                          f'beamwidths, must be at least {MIN_CIRCLE_POINTS} for the verification')
+        raise CalibrationError(f'{points.circle.sum()} consecutive offsets on the circle of {CIRCLE_BEAMWIDTHS:g} '
+                               f'beamwidths, must be at least {MIN_CIRCLE_POINTS} for the verification')
     return points
