@@ -6,14 +6,14 @@ of the target and the conditions for autotrack. `gap` is the time without a sign
 import math
 from typing import TYPE_CHECKING
 
+from acu_tracker import signals
 from acu_tracker.estimation import monitors, target
 from acu_tracker.estimation.filters import target_filter
-from acu_tracker.geometry import attitude, deck_reference, history
-from acu_tracker.geometry.vector import LineOfSight, Vector, rotated
+from acu_tracker.geometry import attitude, frames, history
+from acu_tracker.geometry.vector import ZERO_VECTOR, LineOfSight, Vector, rotated
 from acu_tracker.modes import Reason
 from acu_tracker.pointing import model
 from acu_tracker.pointing.params import PointingParameters
-from acu_tracker.search import place
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
@@ -23,6 +23,7 @@ from pedestal_common.record import Record
 if TYPE_CHECKING:
     from acu_tracker.control_unit import Constants
     from acu_tracker.mode.interruptions import Outage
+    from acu_tracker.params import SharedParameters
 
 
 class Tracking(Record):
@@ -118,7 +119,7 @@ def coast_over(since: Seconds, coast_time: Seconds, sigma: Radians, beamwidth: R
 @compiled
 def sight(tracking: Tracking, constants: 'Constants', t: Seconds) -> LineOfSight:
     """Return the line of sight (ENU) of the estimate at t."""
-    return target.earth_outlook(tracking.target, constants.target, t)
+    return frames.to_earth(tracking.target.frame, target.outlook(tracking.target, constants.target, t))
 
 
 @compiled
@@ -127,7 +128,7 @@ def beam(tracking: Tracking, constants: 'Constants', t: Seconds) -> tuple[Vector
     _, at = history.encoders_at(tracking.encoders, t)
     at = model.to_sky(tracking.pointing.model, at)
     _, deck = attitude.at(tracking.attitude, constants.p, t)
-    return rotated(deck.mat, Vector(*pointing.direction(at.A, at.E))), place.ZERO_VECTOR
+    return rotated(deck.mat, Vector(*pointing.direction(at.A, at.E))), ZERO_VECTOR
 
 
 @compiled
@@ -144,7 +145,7 @@ def deck_rates(tracking: Tracking, constants: 'Constants', t: Seconds, A: Radian
         known, deck = attitude.at(tracking.attitude, constants.p, t)
         if known:
             at = model.to_sky(tracking.pointing.model, history.Pointing(A, E, 0.0, 0.0))
-            return deck_reference.fixed_rates(deck.w, at.A, at.E)
+            return frames.fixed_rates(deck.w, at.A, at.E)
     return 0.0, 0.0
 
 
@@ -163,3 +164,29 @@ def write_outputs(tracking: Tracking, constants: 'Constants', t: Seconds, output
             outputs.estimate[i, 0], outputs.estimate[i, 1], outputs.estimate[i, 2] = estimate.motion[i]
             outputs.covariance[i, 0], outputs.covariance[i, 1], outputs.covariance[i, 2] = estimate.variances[i]
         target_filter.probabilities(filtered.filter, constants.target.filter, outputs.probability)
+
+
+@compiled
+def take_encoders(encoders: history.Encoders, inputs: Inputs) -> int:
+    """Take the encoder angles of this step. Return signals.Flag.ENCODER if they are invalid, else 0."""
+    taken = inputs.encoder_valid and history.take_encoders(encoders, inputs.stamp, inputs.position, inputs.velocity)
+    return 0 if taken else signals.Flag.ENCODER
+
+
+@compiled
+def take_attitude(deck: attitude.DeckAttitude, params: 'SharedParameters', inputs: Inputs) -> tuple[int, bool]:
+    """Take the attitude of this step, and the statistics of its error that the INS publishes.
+
+    Return (flags of invalid values, True if the attitude is a new one).
+    """
+    if not inputs.stabilised:
+        return 0, False
+    flags = 0
+    if inputs.attitude_error_came and not attitude.take_statistics(deck.error, inputs.attitude_noise,
+                                                                   inputs.attitude_walk):
+        flags = signals.Flag.ATTITUDE_ERROR
+    if not inputs.attitude_valid:
+        return flags | signals.Flag.ATTITUDE, False
+    outcome = attitude.take(deck, params, inputs.stamp, inputs.attitude_stamp, inputs.quaternion, inputs.deck_rate,
+                            inputs.aligning)
+    return flags | (signals.Flag.ATTITUDE if outcome == attitude.SAMPLE_INVALID else 0), outcome == attitude.SAMPLE_NEW

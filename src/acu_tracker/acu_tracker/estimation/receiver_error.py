@@ -26,11 +26,11 @@ from acu_tracker.estimation.filters.measurement import (
 )
 from acu_tracker.estimation.params import ErrorMatrixParameters, ReceiverModelParameters, TrackerParameters
 from acu_tracker.estimation.target import Target
-from acu_tracker.geometry import attitude, deck_reference, estimate_frame, history, lever_arm
+from acu_tracker.geometry import attitude, frames, history, lever_arm
 from acu_tracker.geometry.azimuth_wrap import MAX_OFFSET_BEAMWIDTHS
-from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
+from acu_tracker.geometry.frames import Attitude
 from acu_tracker.geometry.history import Pointing
-from acu_tracker.geometry.vector import Rotation, Vector, rotated, rotation
+from acu_tracker.geometry.vector import ZERO_VECTOR, Rotation, Vector, rotated, rotation
 from acu_tracker.pointing import model
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled, separate
@@ -170,7 +170,7 @@ def _measure(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, at: P
     # walk_cross, walk_elevation: growth of these variances by the random walk of the attitude error [rad2/s].
     walk_cross = walk_elevation = 0.0
     if deck.stabilised:
-        verticals = estimate_frame.verticals(state.frame, azimuth, elevation)
+        verticals = frames.verticals(state.frame, azimuth, elevation)
         noise, walk = attitude.expected_error(deck.error, params.attitude)
         cross, along = attitude_variances(verticals, *noise)
         R_cross, R_elevation = R_cross + cross, R_elevation + along
@@ -199,8 +199,8 @@ def _measured_direction(state: Target, params: 'SharedParameters', mat_ed: Rotat
     azimuth, elevation = pointing.earth_angles(v.x, v.y, v.z)
     if not state.running:
         e, n, u = pointing.earth_direction(azimuth, elevation)
-        estimate_frame.lay(state.frame, Vector(e, n, u), ZERO_VECTOR)
-    return estimate_frame.direction_to_frame(state.frame, azimuth, elevation)
+        frames.lay(state.frame, Vector(e, n, u), ZERO_VECTOR)
+    return frames.direction_to_frame(state.frame, azimuth, elevation)
 
 
 @compiled
@@ -214,7 +214,7 @@ def _measured_rates(state: Target, deck: Attitude, inputs: Inputs,
     n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, inputs.cross_elevation, inputs.elevation,
                                   inputs.error_rate[0], inputs.error_rate[1])
     v, dv = lever_arm.to_ins(state.lever_arm, Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]))
-    return deck_reference.earth_rates(estimate_frame.of_deck(state.frame, deck), v, dv)
+    return frames.earth_rates(frames.of_deck(state.frame, deck), v, dv)
 
 
 @separate
@@ -317,11 +317,11 @@ def _converged(state: target_filter.Filter, constants: target_filter.Constants, 
 def _follow_with_frame(state: Target, constants: target.Constants) -> None:
     """Lay the frame along the motion of a target that is too far off its equator, and turn the filter with it."""
     motion = target.outlook(state, constants, state.stamp)
-    if abs(motion.elevation.angle) <= estimate_frame.MAX_FRAME_ELEVATION_RAD:
+    if abs(motion.elevation.angle) <= frames.MAX_FRAME_ELEVATION_RAD:
         return
-    before, sight = rotation(state.frame.mat), estimate_frame.to_earth(state.frame, motion)
-    estimate_frame.lay(state.frame, sight.u, sight.du)
-    target_filter.turn(state.filter, constants.filter, estimate_frame.from_earth(state.frame, before))
+    before, sight = rotation(state.frame.mat), frames.to_earth(state.frame, motion)
+    frames.lay(state.frame, sight.u, sight.du)
+    target_filter.turn(state.filter, constants.filter, frames.from_earth(state.frame, before))
 
 
 @compiled

@@ -25,10 +25,10 @@ by the attitude follows the decay so slowly that the operator can check the new 
 import math
 from typing import TYPE_CHECKING, Annotated
 
-from acu_tracker.geometry import deck_reference
-from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
+from acu_tracker.geometry import frames
+from acu_tracker.geometry.frames import Attitude
 from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, push
-from acu_tracker.geometry.vector import Motion, Rotation, Vector, angles, line_of_sight, turn
+from acu_tracker.geometry.vector import ZERO_VECTOR, Motion, Rotation, Vector, angles, line_of_sight, turn
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 from pedestal_common.geometry.quaternion import product
@@ -121,12 +121,6 @@ def conjugate(q: Xyzw) -> Xyzw:
 def _half_angle(q: Xyzw | Quaternion) -> Radians:
     """Return half of the angle of a unit quaternion, 0 to pi / 2."""
     return math.atan2(math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]), abs(q[3]))
-
-
-@compiled
-def clear_jump(jump: AttitudeJump) -> None:
-    """Discard c: the measured attitude is used without a correction."""
-    jump.apart = 0
 
 
 @compiled
@@ -305,7 +299,7 @@ def take(deck: DeckAttitude, params: 'SharedParameters', t_k: Seconds, stamp: Se
     if T <= params.attitude_timeout and deck.aligned and not aligning:
         _correct_jump(deck, row, last, T)
     else:
-        clear_jump(deck.jump)
+        deck.jump.apart = 0
     deck.aligned = not aligning
     return SAMPLE_NEW
 
@@ -350,5 +344,5 @@ def on_deck(deck: DeckAttitude, params: 'SharedParameters', t: Seconds, motion: 
     """
     known, now = at(deck, params, t)
     if deck.stabilised and known:
-        return angles(deck_reference.on_deck(now, line_of_sight(motion)))
+        return angles(frames.on_deck(now, line_of_sight(motion)))
     return motion

@@ -12,6 +12,7 @@ from the INS.
 import math
 
 from acu_tracker.geometry.vector import (
+    ZERO_VECTOR,
     AxisMotion,
     LineOfSight,
     Motion,
@@ -81,7 +82,7 @@ def to_ins(state: LeverArm, u: Vector, du: Vector) -> tuple[Vector, Vector]:
 
     u, du: unit vector from the antenna to the target and its rate [1/s], FLU.
     """
-    sight = normalised(Vector(u.x + state.arm[0], u.y + state.arm[1], u.z + state.arm[2]), du, Vector(0.0, 0.0, 0.0))
+    sight = normalised(Vector(u.x + state.arm[0], u.y + state.arm[1], u.z + state.arm[2]), du, ZERO_VECTOR)
     return sight.u, sight.du
 
 

@@ -22,6 +22,9 @@ class Vector(NamedTuple):
     z: float
 
 
+ZERO_VECTOR = Vector(0.0, 0.0, 0.0)
+
+
 class Rotation(NamedTuple):
     """Matrix of a rotation: its rows."""
     x: Vector

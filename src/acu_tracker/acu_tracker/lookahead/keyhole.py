@@ -71,7 +71,7 @@ def _fit(slew: Slew, passage: Passage, turn: float, t1: Seconds) -> bool:
     """
     path, limits = passage.path, passage.limits
     A1, v1 = paths.azimuth_at(path, t1, limits.rate)
-    early, late, v = passage.after, paths.end(path), math.inf
+    early, late, v = passage.after, path.t0 + (len(path.rows) - 1) * path.h, math.inf
     for i in range(BISECTION_COUNT):
         t2 = late if i == 0 else early if i == 1 else 0.5 * (early + late)
         A2, v2 = paths.azimuth_at(path, t2, limits.rate)

@@ -114,8 +114,3 @@ def azimuth_at(path: Path, t: Seconds, rate: RadiansPerSecond) -> tuple[Radians,
     dA = (u.y * du.x - u.x * du.y) / max(u.x * u.x + u.y * u.y, MIN_ZENITH_DISTANCE_SQUARED)
     return math.atan2(-u.y, u.x), min(max(dA, -rate), rate)
 
-
-@compiled
-def end(path: Path) -> Seconds:
-    """Return the time of the last row."""
-    return path.t0 + (len(path.rows) - 1) * path.h

@@ -6,13 +6,14 @@ Without a program the path is the great circle of the estimate. A plan is renewe
 begins. Because the antenna still follows the target then, a renewal moves no axis. A planned slew keeps the levelled
 deck on which it was planned last.
 """
+import dataclasses
 import math
 from collections.abc import MutableSequence
 from typing import TYPE_CHECKING, Annotated
 
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.geometry.vector import AxisMotion, Motion, Vector
-from acu_tracker.lookahead import keyhole, levelled_deck
+from acu_tracker.lookahead import keyhole
 from acu_tracker.lookahead import path as paths
 from acu_tracker.lookahead import slew as slews
 from acu_tracker.program import program_track
@@ -20,12 +21,82 @@ from acu_tracker.program.bridge import Way
 from acu_tracker.program.program_track import ProgramTrack
 from pedestal_common.compiled import assign, compiled
 from pedestal_common.geometry import blockage, pointing_model
-from pedestal_common.geometry.line_of_sight import angles, rotation
-from pedestal_common.quantities import Floats, Matrix3, Pair, Radians, Records, Seconds, Vectors3
+from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE, angles, rotation
+from pedestal_common.parameters import Parameters, parameter
+from pedestal_common.quantities import (
+    Bit,
+    Floats,
+    Matrix3,
+    Pair,
+    Quaternion,
+    Radians,
+    Radians2,
+    Records,
+    Seconds,
+    Vectors3,
+)
 from pedestal_common.record import Record
 
 if TYPE_CHECKING:
     from acu_tracker.params import AcuParameters
+
+
+@dataclasses.dataclass(frozen=True)
+class KeyholeParameters(Parameters):
+    """Parameters of the search of keyholes, and of the slews through them."""
+
+    horizon: float = parameter(60.0, 1.0, 1000.0, 's', 'time ahead that is searched for a keyhole; longer than a slew')
+    notice: float = parameter(20.0, 0.0, 1000.0, 's', 'time before a slew begins at which its plan is announced')
+    share: float = parameter(0.95, 0.1, 1.0, '', "share of the shaper's limits that a plan uses")
+    elevation_margin: float = parameter(0.01, 0.0, 0.5, 'rad', 'distance of a plan below elevation.limits.high')
+    mean_time: float = parameter(60.0, 1.0, 3600.0, 's', 'averaging time of the attitude of the levelled deck')
+
+
+class LevelledDeck(Record):
+    """Mean attitude."""
+    mean: Quaternion    # levelled deck -> earth
+    spread: Radians2    # mean square of the tilt of the deck from the levelled deck, about both horizontal axes
+    since: Seconds      # stamp of the first attitude in the mean
+    latest: Seconds     # stamp of the last attitude in the mean; -inf: no attitude yet
+
+
+@compiled
+def take_attitude(deck: LevelledDeck, stamp: Seconds, q: Quaternion, mean_time: Seconds, restart: Bit) -> None:
+    """Add an attitude to the mean, which is an average over about mean_time.
+
+    q        deck -> earth
+    restart  1 if the mean shall begin with this attitude
+
+    A mean begins as a horizontal deck with the heading of its first attitude.
+    """
+    mean = deck.mean
+    if restart or not deck.latest > -math.inf:
+        deck.since = stamp
+        # The part (z, w) of the quaternion is its rotation about the vertical.
+        length = math.hypot(q[2], q[3])
+        mean[0] = mean[1] = 0.0
+        mean[2], mean[3] = q[2] / length, q[3] / length
+        deck.spread = 0.0
+    else:
+        T = stamp - deck.latest
+        share = T / (mean_time + T)
+        dot = 0.0
+        for i in range(4):
+            dot += mean[i] * q[i]
+        norm = 0.0
+        # q and -q are the same attitude. The sign that is nearer to the mean is used.
+        for i in range(4):
+            mean[i] += share * (math.copysign(1.0, dot) * q[i] - mean[i])
+            norm += mean[i] * mean[i]
+        for i in range(4):
+            mean[i] /= math.sqrt(norm)
+        # x, y: horizontal components of the difference of the vertical axes of the deck and the levelled deck.
+        x = 2.0 * (q[0] * q[2] - q[3] * q[1] - mean[0] * mean[2] + mean[3] * mean[1])
+        y = 2.0 * (q[1] * q[2] + q[3] * q[0] - mean[1] * mean[2] - mean[3] * mean[0])
+        # Until mean_time has passed, all attitudes have the same weight in the spread.
+        deck.spread += T / (min(stamp - deck.since, mean_time) + T) * (x * x + y * y - deck.spread)
+    deck.latest = stamp
+
 
 LOOK_AHEAD_PERIOD_S = 1.0  # time between two look-aheads [s]. For this time before a slew begins, its plan is final.
 MAX_UNANNOUNCED_TIME_S, MAX_UNANNOUNCED_LOSS_S = 0.5, 0.1
@@ -38,7 +109,7 @@ FORECAST_NONE, FORECAST_KEYHOLE, FORECAST_NO_WRAP = range(len(FORECAST_TEXTS))
 
 class Planner(Record):
     """State of the planner."""
-    deck: levelled_deck.LevelledDeck    # mean attitude of the ship
+    deck: LevelledDeck    # mean attitude of the ship
     looked: Seconds             # time of the last look-ahead
     forecast: int               # index in FORECAST_TEXTS
     forecasts: int              # number of announced forecasts so far
@@ -80,8 +151,8 @@ def constants(params: 'AcuParameters') -> Records:
 
 
 def initialise(planner: Records) -> None:
-    """Start without a plan."""
-    levelled_deck.initialise(planner['deck'])
+    """Start without a plan, ashore, before any attitude of a ship."""
+    planner['deck']['mean'], planner['deck']['latest'] = ASHORE_ATTITUDE, -math.inf
     planner['looked'], planner['hidden'] = -math.inf, math.nan
 
 

@@ -11,9 +11,9 @@ from acu_tracker.geometry import attitude, azimuth_wrap
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.pointing import model
-from acu_tracker.program import program_track, tables
+from acu_tracker.program import program_track
 from acu_tracker.program.program_track import ProgramTrack
-from acu_tracker.servo import floor
+from acu_tracker.servo import travel
 from acu_tracker.signals import Inputs
 from acu_tracker.tracking import Tracking
 from pedestal_common.compiled import compiled
@@ -33,7 +33,7 @@ def outside(constants: 'Constants', A: Radians, E: Radians) -> int:
     """
     a, e = constants.axis[0].p.limits, constants.axis[1].p.limits
     inside = a.low <= A <= a.high and e.low <= E <= e.high
-    return Reason.NONE if inside and not floor.above(constants.floor, A, E) else Reason.OUTSIDE_LIMITS
+    return Reason.NONE if inside and not travel.above(constants.floor, A, E) else Reason.OUTSIDE_LIMITS
 
 
 @compiled
@@ -66,17 +66,17 @@ def _judge_track(tracking: Tracking, constants: 'Constants', track: ProgramTrack
 
 
 @compiled
-def judge_table(tracking: Tracking, constants: 'Constants', inputs: Inputs, mode: int, all_tables: tables.Tables,
-                t: Seconds, azimuth: Radians) -> tuple[int, int]:
+def judge_table(tracking: Tracking, constants: 'Constants', inputs: Inputs, mode: int,
+                all_tables: program_track.Tables, t: Seconds, azimuth: Radians) -> tuple[int, int]:
     """Return (NONE or the reason why the table of a mode cannot be followed at t, signals.Flag.PROGRAM or 0).
 
     azimuth: azimuth of the last reference as it was before the shaper limited it; the azimuth wrap is chosen near it.
 
     The flag marks a table with an angle that is not finite.
     """
-    track = tables.of_mode(all_tables, mode)
+    track = program_track.of_mode(all_tables, mode)
     if mode != Mode.PROGRAM:
-        unpredicted = inputs.unpredicted[tables.TABLE_INDEX[mode]]
+        unpredicted = inputs.unpredicted[program_track.TABLE_INDEX[mode]]
         if unpredicted != Reason.NONE:
             return unpredicted, 0
         if (program_track.status(track, t) == Reason.NONE

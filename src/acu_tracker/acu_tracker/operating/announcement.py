@@ -7,7 +7,7 @@ import numpy as np
 
 from acu_tracker import modes
 from acu_tracker.lookahead import planner
-from acu_tracker.program import tables
+from acu_tracker.program import program_track
 from pedestal_common.quantities import AnyRecord, Degrees, Floats, Radians
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def overtravel(unit: 'Acu') -> str:
     """
     state, limits = unit.parts['state'], unit.parameters.azimuth.limits
     now, when = state['stamp'], ''
-    track = unit.memory.tables[tables.TABLE_INDEX[state['mode']['table']]]
+    track = unit.memory.tables[program_track.TABLE_INDEX[state['mode']['table']]]
     ahead = track.times > now
     if ahead.any() and not unit.parts['inputs']['stabilised']:
         azimuth = np.unwrap(np.concatenate(([state['guidance']['azimuth']], track.angles[ahead, 0])))

@@ -10,7 +10,7 @@ import numpy as np
 
 from acu_tracker.geometry import direction
 from acu_tracker.modes import Mode, Reason
-from acu_tracker.program import segments, tables
+from acu_tracker.program import program_track, segments
 from acu_tracker.program.air import Air
 from acu_tracker.program.prediction import Predicted, Predictor
 from acu_tracker.program.program_track import ProgramTrack
@@ -43,7 +43,7 @@ class Followed:
     slave      the Slave; set only to restore it
     """
     def __init__(self, parameters: 'AcuParameters') -> None:
-        self.tables = tables.NO_TABLES
+        self.tables = program_track.NO_TABLES
         self._refraction = parameters.refraction
         self.segments = segments.Segments([(axis.limits.rate, axis.limits.acceleration)
                                            for axis in (parameters.azimuth, parameters.elevation)])
@@ -112,7 +112,7 @@ class Followed:
         """
         inputs, t = parts['inputs'], stamp * 1e-9
         self.air.update(t)
-        for place, row in enumerate(tables.TABLE_MODES):
+        for place, row in enumerate(program_track.TABLE_MODES):
             known = self._predicted.get(row.name)
             if row.predicted and (known is None or not known.since <= t < known.until):
                 known = self._predicted[row.name] = getattr(self.predictor, row.predicted)(t)
@@ -120,10 +120,10 @@ class Followed:
         piece, inputs['gap'], ends = self.segments.at(t - self._offset[0])
         until = min(ends + self._offset[0], self.air.due, *(known.until for known in self._predicted.values()))
         self._valid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE_NS
-        self.tables = tables.Tables(*(
-            tables.shifted(self._apparent_track(row, self._predicted[row.name].track if row.predicted else piece),
-                           self._offset)
-            for row in tables.TABLE_MODES))
+        self.tables = program_track.Tables(*(
+            program_track.shifted(
+                self._apparent_track(row, self._predicted[row.name].track if row.predicted else piece), self._offset)
+            for row in program_track.TABLE_MODES))
 
     def _apparent_track(self, row: ModeRow, track: ProgramTrack) -> ProgramTrack:
         """Return the table of a row of TABLE_MODES with apparent elevations; the last result is kept.

@@ -60,11 +60,12 @@ class Segments:
         # A single row gives no path.
         kept = [rows for rows in (_rows(piece, now, new.times[0]) for piece in self._pieces) if len(rows.times) >= 2]
         if kept:
+            last = kept[-1]
             if followed:
-                self._check_turnaround(kept[-1], new)
-            interval = min(_last_interval(kept[-1]), new.times[1] - new.times[0])
-            if new.times[0] - kept[-1].times[-1] <= MAX_GAP_INTERVALS * interval:
-                last = kept.pop()
+                self._check_turnaround(last, new)
+            interval = min(last.times[-1] - last.times[-2], new.times[1] - new.times[0])
+            if new.times[0] - last.times[-1] <= MAX_GAP_INTERVALS * interval:
+                kept.pop()
                 new = checked(np.append(last.times, new.times), np.vstack((last.angles, new.angles)))
         self._pieces = [*kept, new]
 
@@ -122,10 +123,6 @@ def _rows(piece: ProgramTrack, begin: Seconds, end: Seconds) -> ProgramTrack:
     first = max(min(int(np.searchsorted(piece.times, begin)), len(piece.times)) - 3, 0)
     last = int(np.searchsorted(piece.times, end))
     return ProgramTrack(piece.times[first:last], piece.angles[first:last])
-
-
-def _last_interval(piece: ProgramTrack) -> Seconds:
-    return piece.times[-1] - piece.times[-2]
 
 
 def _rate(piece: ProgramTrack, row: int, i: int) -> RadiansPerSecond:

@@ -19,13 +19,29 @@ three thresholds above m:
 The threshold loss is at least m + 2 sqrt(V). With a lower threshold the noise alone would count as a target after the
 target is lost.
 """
+import dataclasses
 import math
 from typing import NamedTuple
 
-from acu_tracker.search.params import AcquisitionParameters
 from pedestal_common.compiled import compiled
+from pedestal_common.parameters import Parameters, parameter
 from pedestal_common.quantities import Bit, DecibelHertz, Seconds
 from pedestal_common.record import Record
+
+
+@dataclasses.dataclass(frozen=True)
+class AcquisitionParameters(Parameters):
+    """Parameters of the way from a level above the noise to autotrack."""
+
+    learn_time: float = parameter(2.0, 0.1, 60.0, 's', 'time over which the noise is learnt off target')
+    acquire_time: float = parameter(0.2, 0.0, 10.0, 's', 'time above its threshold after which a signal counts')
+    loss_time: float = parameter(0.3, 0.0, 10.0, 's', 'time below the loss threshold after which the target is lost')
+    timeout: float = parameter(30.0, 1.0, 600.0, 's', 'time after which acquire gives up')
+    time_constant: float = parameter(0.1, 1e-3, 10.0, 's', "time constant of the receiver's level")
+    expected_dbhz: float = parameter(0.0, 0.0, 120.0, 'dB-Hz', 'level on the axis at reference_range; 0: unknown, '
+                                     'acquire looks around for a main lobe')
+    reference_range: float = parameter(500e3, 1.0, 1e10, 'm', 'range at which expected_dbhz holds')
+    range_exponent: float = parameter(2.0, 0.0, 4.0, '1', 'power of a measured range with which the level falls')
 
 
 class Level(Record):

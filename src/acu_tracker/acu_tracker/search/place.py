@@ -12,6 +12,7 @@ a Singer model (Singer 1970). In the time T the target has moved by the angle
 import math
 
 from acu_tracker.geometry.vector import (
+    ZERO_VECTOR,
     AxisMotion,
     LineOfSight,
     Motion,
@@ -37,7 +38,6 @@ class Place(Record):
     stamp: Seconds
 
 
-ZERO_VECTOR = Vector(0.0, 0.0, 0.0)  # vector of length 0
 RATE_FADE_TIME_S = 10.0  # time constant with which the expected rate fades [s]
 
 

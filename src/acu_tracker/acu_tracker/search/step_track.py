@@ -14,12 +14,27 @@ The place moves towards the peak, by one step at most. If theta0 is within the d
 comparison: the antenna controller GD 7200 has a step of 8 % of the beamwidth, a cycle of 2 min, and a deadband as
 large as the step.
 """
+import dataclasses
 import math
 
-from acu_tracker.search.params import StepTrackParameters
 from pedestal_common.compiled import compiled
+from pedestal_common.parameters import Parameters, parameter
 from pedestal_common.quantities import Bit, DecibelHertz, Pair, Radians, Seconds
 from pedestal_common.record import Record
+
+
+@dataclasses.dataclass(frozen=True)
+class StepTrackParameters(Parameters):
+    """Parameters of the mode steptrack.
+
+    The step is that of the antenna controller GD 7200. The cycle is shorter, for faster targets; the deadband is
+    smaller.
+    """
+
+    cycle: float = parameter(20.0, 1.0, 3600.0, 's', 'period of the climbs; 120 s in the GD 7200')
+    step: float = parameter(0.08, 0.01, 0.3, 'beamwidths', 'step of the beam to either side')
+    deadband: float = parameter(0.02, 0.0, 0.3, 'beamwidths', 'distance of the peak up to which the beam stays')
+    dwell: float = parameter(1.0, 0.01, 60.0, 's', 'averaging time of the level at each place')
 
 
 class StepTrack(Record):

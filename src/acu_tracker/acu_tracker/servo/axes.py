@@ -2,7 +2,7 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 from acu_tracker.geometry.vector import Motion
-from acu_tracker.servo import floor, position_loop, reference
+from acu_tracker.servo import position_loop, reference, travel
 from acu_tracker.servo.position_loop import Command, Feedback, Instants
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled
@@ -51,7 +51,7 @@ def start_from_actual(axis: BothAxes[position_loop.AxisLoop], constants: 'Consta
 def follow(axis: BothAxes[position_loop.AxisLoop], constants: 'Constants', inputs: Inputs, outputs: Outputs,
            motion: Motion, now: Instants, beam: BeamInputs) -> None:
     """Run the position loops of both axes towards a reference motion."""
-    now_ends = floor.ends(constants, inputs, motion.azimuth.angle)
+    now_ends = travel.ends(constants, inputs, motion.azimuth.angle)
     for i in range(2):
         feedback = Feedback(y=inputs.position[i], dy=inputs.velocity[i], error=beam.error[i], V=beam.deck_rates[i],
                             closed=beam.closed, ends=now_ends[i])

@@ -86,8 +86,8 @@ Notch filter of second order in the feedback of the position loop, against a res
 The discrete filter follows by the bilinear transformation, prewarped so that its centre is exactly at w.
 """
 import math
+from typing import TYPE_CHECKING, NamedTuple
 
-from acu_tracker.servo.params import FeedforwardParameters, PidParameters
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
     Floats,
@@ -101,9 +101,12 @@ from pedestal_common.quantities import (
     Xyz,
 )
 
+if TYPE_CHECKING:
+    from acu_tracker.servo.params import FeedforwardParameters, PidParameters
+
 
 @compiled
-def pid_gains(params: PidParameters | FeedforwardParameters) -> tuple[float, float]:
+def pid_gains(params: 'PidParameters | FeedforwardParameters') -> tuple[float, float]:
     """Return (K_p [1/s], K_i [1/s2]).
 
     Because K_i = integral K_p^2, the parameter `integral` alone sets the damping.
@@ -131,12 +134,6 @@ def derivative(D: RadiansPerSecond, e: Radians, e_before: Radians, dt: Seconds,
 
 
 @compiled
-def pid_rate(e: Radians, integral: RadiansPerSecond, D: RadiansPerSecond, K_p: float, K_d: float) -> RadiansPerSecond:
-    """Return the rate command u; e: error; integral: I; D, K_p, K_d: as in the module."""
-    return K_p * e + integral + K_d * D
-
-
-@compiled
 def fed(v: RadiansPerSecond, a: RadiansPerSecond2, k_v: float, k_a: Seconds) -> RadiansPerSecond:
     """Return the part of the rate command that is fed forward.
 
@@ -156,7 +153,7 @@ def feedforward_rate(e: Radians, integral: RadiansPerSecond, fed_forward: Radian
 
 
 @compiled
-def torque(v: RadiansPerSecond, a: RadiansPerSecond2, params: FeedforwardParameters) -> NewtonMeters:
+def torque(v: RadiansPerSecond, a: RadiansPerSecond2, params: 'FeedforwardParameters') -> NewtonMeters:
     """Return the load torque J a + Tc tanh(v / v_s) for a reference with rate v and acceleration a."""
     return params.inertia * a + params.friction * math.tanh(v / params.friction_rate)
 
@@ -214,20 +211,25 @@ def adrc_rate(z: Vector3, v1: Radians, v2: RadiansPerSecond, v2_m: RadiansPerSec
     return v2_m + (z[1] - v2) + (feedback - z[2]) / w_s
 
 
-def notch_coefficients(frequency: Hertz, width: float, depth: float,
-                 period: Seconds) -> tuple[float, float, float, float, float]:
-    """Return the coefficients (b0, b1, b2, a1, a2) of the discrete filter, for steps of a period.
+class Notch(NamedTuple):
+    """Coefficients of the discrete notch filter: y_k = b0 x_k + b1 x_k-1 + b2 x_k-2 - a1 y_k-1 - a2 y_k-2."""
+    b0: float
+    b1: float
+    b2: float
+    a1: float
+    a2: float
 
-    y_k = b0 x_k + b1 x_k-1 + b2 x_k-2 - a1 y_k-1 - a2 y_k-2. frequency: centre, below 0.5 / period; 0: no notch.
-    """
+
+def notch_coefficients(frequency: Hertz, width: float, depth: float, period: Seconds) -> Notch:
+    """Return the Notch for steps of a period; frequency: centre, below 0.5 / period, 0: no notch."""
     if frequency == 0.0:
-        return 1.0, 0.0, 0.0, 0.0, 0.0
+        return Notch(1.0, 0.0, 0.0, 0.0, 0.0)
     w = 2.0 * math.pi * frequency
     K = w / math.tan(0.5 * w * period)
     damped, cut = 2.0 * width * w * K, 2.0 * depth * width * w * K
     a0 = K * K + damped + w * w
     b1 = 2.0 * (w * w - K * K) / a0
-    return (K * K + cut + w * w) / a0, b1, (K * K - cut + w * w) / a0, b1, (K * K - damped + w * w) / a0
+    return Notch((K * K + cut + w * w) / a0, b1, (K * K - cut + w * w) / a0, b1, (K * K - damped + w * w) / a0)
 
 
 @compiled
@@ -240,3 +242,44 @@ def notch_removed(x: float, memory: Floats, coefficients: Floats) -> float:
     y = b0 * x + b1 * memory[0] + b2 * memory[1] - a1 * memory[2] - a2 * memory[3]
     memory[0], memory[1], memory[2], memory[3] = x, memory[0], y, memory[2]
     return x - y
+
+
+LOOP_FORMS = ('tracked', 'type_1', 'type_2')
+"""Names of the forms of the loop; the docstring of the module explains them."""
+FORM_TRACKED, FORM_TYPE_1, FORM_TYPE_2 = range(len(LOOP_FORMS))
+
+
+@compiled
+def type_1(R: Radians, v: RadiansPerSecond, error: Radians, alpha: float, beta: float, T: Seconds,
+           compensation: RadiansPerSecond) -> tuple[Radians, RadiansPerSecond]:
+    """Return (angle R(k/k) of the beam, its rate v).
+
+    R, v          angle and rate of the beam in the step before, T ago
+    error         error of the receiver
+    alpha, beta   gains on the angle and on the rate [-]
+    compensation  delta V
+    """
+    nu = error - v * T
+    return R + v * T + alpha * nu + compensation * T, v + beta / T * nu
+
+
+@compiled
+def type_2(R: Radians, v: RadiansPerSecond, error: Radians, alpha: float, beta: float, T: Seconds,
+           compensation: RadiansPerSecond) -> tuple[Radians, RadiansPerSecond]:
+    """Return (angle R(k+1/k) of the beam, its rate v); the arguments are those of type_1."""
+    v += beta / T * error
+    return R + alpha * error + v * T + compensation * T, v
+
+
+@compiled
+def beam_step(form: int, R: Radians, v: RadiansPerSecond, error: Radians, alpha: float, beta: float, T: Seconds,
+         compensation: RadiansPerSecond) -> tuple[Radians, RadiansPerSecond]:
+    """Return (angle of the beam, its rate) after a step.
+
+    form: FORM_TYPE_1 or FORM_TYPE_2; error: NaN without an error of the receiver; the other arguments as in type_1.
+    """
+    if math.isnan(error):
+        return R + v * T + compensation * T, v
+    if form == FORM_TYPE_1:
+        return type_1(R, v, error, alpha, beta, T, compensation)
+    return type_2(R, v, error, alpha, beta, T, compensation)

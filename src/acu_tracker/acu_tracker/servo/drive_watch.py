@@ -54,13 +54,6 @@ def _restart_frozen(state: Frozen, t: Seconds) -> None:
 
 
 @compiled
-def release_frozen(state: Frozen, t: Seconds) -> None:
-    """Reset the detected fault at t; the test begins again."""
-    state.frozen = 0
-    _restart_frozen(state, t)
-
-
-@compiled
 def watch_frozen(state: Frozen, inputs: Inputs, hold: Seconds, restart: bool) -> bool:
     """Take the measurements of a step; return True if the drive is frozen.
 
@@ -123,17 +116,10 @@ def initialise(record: Records) -> None:
 
 
 @compiled
-def _restart_envelope(envelope: Envelope, t: Seconds) -> None:
-    """Restart the detection at t, with no command in force."""
-    envelope.since, envelope.beyond = t, t
-    envelope.high[:] = 0.0
-    envelope.low[:] = 0.0
-
-
-@compiled
-def release_motion(envelope: Envelope) -> None:
-    """Reset the detected uncommanded motion."""
-    envelope.moves = 0
+def release(envelope: Envelope, frozen: Frozen, t: Seconds) -> None:
+    """Reset both detected faults at t; the test for a frozen drive begins again."""
+    envelope.moves = frozen.frozen = 0
+    _restart_frozen(frozen, t)
 
 
 @compiled
@@ -146,7 +132,9 @@ def watch_motion(envelope: Envelope, t: Seconds, velocity: Pair, threshold: Radi
     restart    True if no earlier command is in force
     """
     if restart or not math.isfinite(envelope.since):
-        _restart_envelope(envelope, t)
+        envelope.since, envelope.beyond = t, t
+        envelope.high[:] = 0.0
+        envelope.low[:] = 0.0
     outside = False
     for i in range(2):
         allowed = threshold + ENVELOPE_OVERSHOOT_SHARE * (envelope.high[i] - envelope.low[i])

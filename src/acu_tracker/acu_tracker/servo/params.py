@@ -2,7 +2,7 @@
 import dataclasses
 import math
 
-from acu_tracker.servo.beam_loop import LOOP_FORMS
+from acu_tracker.servo.controllers import LOOP_FORMS
 from pedestal_common.parameters import ParameterError, Parameters, choice, parameter
 from pedestal_common.quantities import RadiansPerSecond2
 

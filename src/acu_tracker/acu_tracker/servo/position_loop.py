@@ -14,9 +14,9 @@ t_k: stamp of the step [s]; t_m: middle of the interval in which the command of 
 import dataclasses
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
-from acu_tracker.estimation.filters import constant_gain
+from acu_tracker.estimation.filters import kalman
 from acu_tracker.geometry.vector import AxisMotion
-from acu_tracker.servo import beam_loop, controllers, ends, reference
+from acu_tracker.servo import controllers, reference, travel
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
     Floats,
@@ -64,7 +64,7 @@ class Feedback(NamedTuple):
     error: Radians          # receiver error of this axis, as a deck angle; NaN: no error in this step
     V: RadiansPerSecond     # rate at which the motion of the deck moves the deck angle of a fixed target
     closed: bool            # True if a beam closes its own loop on the receiver error
-    ends: ends.Ends         # present ends of the travel
+    ends: travel.Ends         # present ends of the travel
 
 
 class Command(NamedTuple):
@@ -188,13 +188,13 @@ def _steer(axis: AxisLoop, params: 'AxisParameters', target: AxisMotion, feedbac
     T: time since the step before.
     """
     b, r = params.beam, axis.reference
-    beta, compensation = constant_gain.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
+    beta, compensation = kalman.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
     axis.controller = CONTROLLER_BEAM
     r.acceleration = 0.0
-    if not feedback.closed or int(b.form) == beam_loop.FORM_TRACKED:
+    if not feedback.closed or int(b.form) == controllers.FORM_TRACKED:
         reference.put(r, target)
     else:
-        r.angle, r.rate = beam_loop.step(int(b.form), r.angle, r.rate, feedback.error, b.alpha, beta, T,
+        r.angle, r.rate = controllers.beam_step(int(b.form), r.angle, r.rate, feedback.error, b.alpha, beta, T,
                                          compensation)
     low, high = feedback.ends
     angle_limited = not low <= r.angle <= high
@@ -234,14 +234,14 @@ def _step(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedba
         _update(axis, p, e, y, now)
     u, fed = _control_law(axis, p, e, v)
     u -= controllers.notch_removed(u - fed, axis.notch, constants.notch)
-    kept = ends.inside(u, y, feedback.ends, constants.braking, constants.reaction)
+    kept = travel.inside(u, y, feedback.ends, constants.braking, constants.reaction)
     axis.command, rate_cut, acceleration_cut = limited(kept, axis.command, now.dt, p.limits.rate,
                                                        p.limits.acceleration)
     reference.commanded(r, axis.command)
     if (axis.command - u) * e < 0.0:
         axis.integral = integral
-    # Far from the ends `ends.inside` allows a higher rate than limits.rate. There a reduced command counts as limited
-    # in rate, not in angle.
+    # Far from the ends `travel.inside` allows a higher rate than limits.rate. There a reduced command counts as
+    # limited in rate, not in angle.
     angle_limited |= kept != u and abs(kept) < p.limits.rate
     return Command(axis.command, torque, v, angle_limited, rate_limited or rate_cut,
                    acceleration_limited or acceleration_cut)
@@ -269,7 +269,7 @@ def _control_law(axis: AxisLoop, params: 'AxisParameters', e: Radians,
     controller = int(params.controller)
     if controller == CONTROLLER_PID:
         gains = params.pid
-        return controllers.pid_rate(e, axis.integral, axis.derivative, gains.bandwidth, gains.derivative), 0.0
+        return gains.bandwidth * e + axis.integral + gains.derivative * axis.derivative, 0.0
     r = axis.reference
     if controller == CONTROLLER_FEEDFORWARD:
         k = params.feedforward

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, interpolated, push
 from acu_tracker.geometry.vector import AxisMotion
 from acu_tracker.servo import shaper
-from acu_tracker.servo.ends import Ends
+from acu_tracker.servo.travel import Ends
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Floats, Radians, RadiansPerSecond, RadiansPerSecond2, Seconds
 from pedestal_common.record import Record

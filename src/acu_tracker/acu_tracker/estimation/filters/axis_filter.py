@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from acu_tracker.estimation.filters import constant_gain, imm, kalman, motion_models
+from acu_tracker.estimation.filters import imm, kalman, motion_models
 from acu_tracker.estimation.filters.kalman import Gaussian, PreviousAngle, Symmetric
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasurement, AxisVariances
@@ -300,7 +300,7 @@ def correct(state: Filter, constants: Constants, measurement: AxisMeasurement) -
         # A filter of constant gain uses alpha only where the Kalman gain p11 / S is below alpha. After a start or a
         # gap the Kalman gain is larger, and is used.
         if g.P.p11 < constants.alpha * S:
-            K = constant_gain.gain(constants.alpha, constants.beta, constants.gamma, state.T)
+            K = kalman.constant_gain(constants.alpha, constants.beta, constants.gamma, state.T)
             g = kalman.update_with_gain(g, nu, measurement.variance, K)
         elif rho > 0.0:
             g = kalman.update_correlated(g, o, rho, nu, S)

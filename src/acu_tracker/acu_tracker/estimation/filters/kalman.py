@@ -153,3 +153,24 @@ def update_with_gain(gaussian: Gaussian, nu: Radians, R: Radians2, K: Xyz) -> Ga
 def log_likelihood(nu: float, S: float) -> float:
     """Return the logarithm of the normal density of an innovation nu of variance S, without the constant term."""
     return -0.5 * (nu * nu / S + math.log(S))
+
+
+@compiled
+def benedict_bordner(alpha: float) -> float:
+    """Return beta of the alpha-beta filter with the best compromise between noise and the transient after a ramp
+    (Benedict, Bordner 1962)."""
+    return alpha * alpha / (2.0 - alpha)
+
+
+@compiled
+def kalata(alpha: float) -> tuple[float, float]:
+    """Return (beta, gamma) of the alpha-beta-gamma filter: the steady Kalman filter of a constant acceleration that
+    takes an independent step at every measurement (Kalata 1984)."""
+    beta = 2.0 * (2.0 - alpha) - 4.0 * math.sqrt(1.0 - alpha)
+    return beta, beta * beta / alpha
+
+
+@compiled
+def constant_gain(alpha: float, beta: float, gamma: float, T: Seconds) -> Xyz:
+    """Return (k1 [-], k2 [1/s], k3 [1/s2]), the gains on angle, rate and acceleration for measurements T apart."""
+    return (alpha, beta / T, gamma / (2.0 * T * T))

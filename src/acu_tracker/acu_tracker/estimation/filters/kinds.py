@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from acu_tracker.estimation.filters import constant_gain, motion_models
+from acu_tracker.estimation.filters import kalman, motion_models
 from acu_tracker.estimation.filters.motion_models import MODEL_NAMES, MODEL_ROWS
 from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import Records, Seconds, Xyz
@@ -39,13 +39,13 @@ class Kind(NamedTuple):
 def _bank_of_alpha_beta(params: 'FilterParameters') -> Bank:
     alpha = params.alpha_beta.alpha
     return Bank(motion_models.constants('cv', params.cv, noise=0.0),
-                gains=(alpha, constant_gain.benedict_bordner(alpha), 0.0))
+                gains=(alpha, kalman.benedict_bordner(alpha), 0.0))
 
 
 def _bank_of_alpha_beta_gamma(params: 'FilterParameters') -> Bank:
     alpha = params.alpha_beta_gamma.alpha
     return Bank(motion_models.constants('ca', params.ca, noise=0.0, initial_sigma=UNKNOWN_ACCELERATION_RAD_S2),
-                gains=(alpha, *constant_gain.kalata(alpha)))
+                gains=(alpha, *kalman.kalata(alpha)))
 
 
 def _bank_of_one(name: str, params: 'FilterParameters') -> Bank:

@@ -1,34 +1,70 @@
-"""The frame of the target filter: a frame whose equator passes through the target, along its motion.
-
-In azimuth and elevation of the earth, a target that flies straight has an acceleration and a jerk that grow towards
-the zenith. On the equator of this frame a great circle is an azimuth of constant rate. Therefore the filter needs less
-process noise, and no direction is singular.
-
-The frame is laid when the filter starts, and again when the target is more than MAX_FRAME_ELEVATION_RAD off the
-equator. Between these instants the frame is fixed to the earth.
-"""
+"""acu_tracker.geometry.frames."""
 import math
+from typing import NamedTuple
 
-from acu_tracker.geometry.deck_reference import Attitude
 from acu_tracker.geometry.vector import (
+    ZERO_VECTOR,
     LineOfSight,
     Motion,
     Rotation,
     Vector,
+    angles,
     cross,
     dot,
     earth_angles,
     line_of_sight,
+    minus,
     rotated,
     rotated_back,
     rotation,
+    times,
     transposed,
     turned,
 )
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import earth_direction
-from pedestal_common.quantities import Matrix3, Radians
+from pedestal_common.geometry import line_of_sight as pointing
+from pedestal_common.quantities import Matrix3, Radians, RadiansPerSecond
 from pedestal_common.record import Record
+
+
+class Attitude(NamedTuple):
+    """Attitude of the deck and its motion."""
+    mat: Rotation   # M, from the deck to the frame in which the target is given
+    w: Vector       # angular rate of the deck, FLU [rad/s]
+    dw: Vector      # its angular acceleration, FLU [rad/s2]
+
+
+@compiled
+def on_deck(attitude: Attitude, sight: LineOfSight) -> LineOfSight:
+    """Return a LineOfSight on the deck (FLU); sight: the LineOfSight in the frame to which attitude.mat rotates."""
+    u, du, ddu = turned(transposed(attitude.mat), sight)
+    wu, dwu = cross(attitude.w, u), cross(attitude.dw, u)
+    return LineOfSight(u, minus(du, wu), minus(minus(ddu, cross(attitude.w, minus(times(2.0, du), wu))), dwu))
+
+
+@compiled
+def fixed_rates(w: Vector, A: Radians, E: Radians) -> tuple[RadiansPerSecond, RadiansPerSecond]:
+    """Return the rates (dA, dE) of the deck angles of an earth-fixed direction.
+
+    A, E: its deck angles now; w: rate of the deck [rad/s], FLU.
+    """
+    u = Vector(*pointing.direction(A, E))
+    motion = angles(LineOfSight(u, times(-1.0, cross(w, u)), ZERO_VECTOR))
+    return motion.azimuth.rate, motion.elevation.rate
+
+
+@compiled
+def earth_rates(attitude: Attitude, u: Vector, du: Vector) -> tuple[RadiansPerSecond, RadiansPerSecond]:
+    """Return the rates (dA, dE) of the earth angles of a direction that is measured on the deck.
+
+    u, du: unit vector (FLU) of the direction and its rate on the deck [1/s]. The rate of the unit vector in the earth
+    frame is M (du + w x u). Where attitude.mat rotates to the frame of the filter, the rates are those in that frame.
+    """
+    wu = cross(attitude.w, u)
+    du = Vector(du.x + wu.x, du.y + wu.y, du.z + wu.z)
+    motion = earth_angles(LineOfSight(rotated(attitude.mat, u), rotated(attitude.mat, du), ZERO_VECTOR))
+    return motion.azimuth.rate, motion.elevation.rate
+
 
 MAX_FRAME_ELEVATION_RAD = math.radians(20.0)
 """Largest angle [rad] of the target off the equator. At this angle the acceleration of a great circle reaches 0.36 of
@@ -66,15 +102,9 @@ def to_earth(frame: Frame, motion: Motion) -> LineOfSight:
 
 
 @compiled
-def to_frame(frame: Frame, sight: LineOfSight) -> Motion:
-    """Return the Motion in the frame; sight: the LineOfSight in ENU. The function is the inverse of to_earth."""
-    return earth_angles(turned(transposed(rotation(frame.mat)), sight))
-
-
-@compiled
 def direction_to_frame(frame: Frame, azimuth: Radians, elevation: Radians) -> tuple[Radians, Radians]:
     """Return (azimuth, elevation) of a direction in the frame; azimuth, elevation: its earth angles."""
-    e, n, u = earth_direction(azimuth, elevation)
+    e, n, u = pointing.earth_direction(azimuth, elevation)
     v = rotated_back(rotation(frame.mat), Vector(e, n, u))
     return math.atan2(v.x, v.y), math.atan2(v.z, math.hypot(v.x, v.y))
 

@@ -1,25 +1,64 @@
-"""The floor: the lowest elevation that the antenna may have at each azimuth, in every mode.
-
-The floor keeps the dish clear of structures around the antenna. A table of points, joined by straight lines, defines
-the floor. Where the floor rises, the azimuth waits until the elevation is above the floor ahead.
-
-A, E: azimuth and elevation in encoder angles.
-"""
+"""acu_tracker.servo.travel."""
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
-from acu_tracker.servo.ends import Ends, braking_distance
 from acu_tracker.servo.params import LimitsParameters
 from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
-from pedestal_common.quantities import Bit, Floats, Radians, Records
+from pedestal_common.quantities import Bit, Floats, Radians, RadiansPerSecond, RadiansPerSecond2, Records, Seconds
 from pedestal_common.record import Record
 
 if TYPE_CHECKING:
     from acu_tracker.control_unit import Constants
+
+
+class Ends(NamedTuple):
+    """Angles between which an axis may be at present: its limits, or the floor."""
+    low: Radians
+    high: Radians
+
+
+@compiled
+def braking_distance(v: RadiansPerSecond, a: RadiansPerSecond2, t: Seconds) -> Radians:
+    """Return the distance in which an axis at a rate v >= 0 stops."""
+    return v * v / (2.0 * a) + v * t
+
+
+@compiled
+def stopping_rate(d: Radians, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSecond:
+    """Return the largest rate towards an end d ahead from which an axis stops before the end.
+
+    The rate is 0 if the axis is beyond the end (d <= 0).
+    """
+    if d <= 0.0:
+        return 0.0
+    return math.sqrt(a * t * (a * t) + 2.0 * a * d) - a * t
+
+
+@compiled
+def inside(u: RadiansPerSecond, y: Radians, ends: Ends, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSecond:
+    """Return a rate command u limited so that an axis at y stops between its Ends.
+
+    Beyond an end only motion back inside is left.
+    """
+    return min(max(u, -stopping_rate(y - ends.low, a, t)), stopping_rate(ends.high - y, a, t))
+
+
+@compiled
+def time_to(y: Radians, dy: RadiansPerSecond, ends: Ends) -> Seconds:
+    """Return the time until an axis at y reaches an end if it keeps its rate dy.
+
+    The time is 0 beyond an end, and inf if the axis is at rest.
+    """
+    if y > ends.high or y < ends.low:
+        return 0.0
+    if dy > 0.0:
+        return (ends.high - y) / dy
+    return (ends.low - y) / dy if dy < 0.0 else math.inf
+
 
 MAX_FLOOR_POINTS = 64  # largest number of points of a floor
 FLOOR_DOC = ("floor of the elevation over the azimuth, at most 64 points: 'azimuth elevation; ...' [rad] on the deck, "
@@ -49,7 +88,7 @@ of the encoder.
 """
 
 
-def points(text: str) -> tuple[tuple[Radians, ...], tuple[Radians, ...]]:
+def floor_points(text: str) -> tuple[tuple[Radians, ...], tuple[Radians, ...]]:
     """Return (azimuths, elevations) of the points in a text as in FLOOR_DOC; ((), ()) for an empty text.
 
     Raise ParameterError for a wrong text.
@@ -70,18 +109,18 @@ def points(text: str) -> tuple[tuple[Radians, ...], tuple[Radians, ...]]:
     return A, f
 
 
-def at(text: str, A: Radians) -> Radians:
+def floor_at(text: str, A: Radians) -> Radians:
     """Return the floor at an azimuth A, of a text as in FLOOR_DOC; -inf if there is no floor."""
-    azimuths, elevations = points(text)
+    azimuths, elevations = floor_points(text)
     return np.interp(A, azimuths, elevations, period=2.0 * math.pi) if azimuths else -math.inf
 
 
-def table(text: str) -> Records:
+def floor_table(text: str) -> Records:
     """Return the Floor (1,) of a text as in FLOOR_DOC.
 
     The value of a cell is the highest value of the floor at its two ends and at the points of the table inside it.
     """
-    A, f = points(text)
+    A, f = floor_points(text)
     floor = Floor.zeros()
     if A:
         edges = np.interp(CELL_WIDTH_RAD * np.arange(CELL_COUNT + 1), A, f, period=2.0 * math.pi)
