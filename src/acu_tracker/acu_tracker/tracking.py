@@ -1,8 +1,4 @@
-"""Tracking of the target by the receiver: histories of beam and deck, target filter, and monitors of the errors.
-
-`control_unit` and `guidance` call this module. The functions take each error of the receiver, and return the estimate
-of the target and the conditions for autotrack. `gap` is the time without a signal of the receiver.
-"""
+"""Tracking of the target by the receiver: histories of beam and deck, target filter, and monitors of the errors."""
 import math
 from typing import TYPE_CHECKING
 
@@ -69,10 +65,8 @@ def unstable(tracking: Tracking, constants: 'Constants', inputs: Inputs, t: Seco
 @compiled
 def conditions(tracking: Tracking, constants: 'Constants', t: Seconds, gap: 'Outage',
                closed: bool) -> tuple[int, int, int]:
-    """Return (lock, slope, track) of modes.Conditions at t.
-
-    closed: True if the loop is closed in autotrack, and the axes follow their commands.
-    """
+    """Return (lock, slope, track) of modes.Conditions at t. closed: True if the loop is closed in autotrack, and the
+    axes follow their commands."""
     # unexplained: no keyhole, turn or hidden sector explains the outage; lost: autotrack must end.
     p, unexplained, running = constants.p.tracker, not gap.permitted, tracking.target.running
     spread_now = spread(tracking, constants, t) if running and unexplained and gap.coasting else 0.0
@@ -108,11 +102,8 @@ def sigma_across(azimuth_variance: Radians2, elevation_variance: Radians2, eleva
 
 @compiled
 def coast_over(since: Seconds, coast_time: Seconds, sigma: Radians, beamwidth: Radians) -> bool:
-    """Return True if coasting ends: after coast_time, or with a sigma above half a beamwidth.
-
-    since, coast_time: age of the last accepted measurement and its limit; sigma: standard deviation across the line of
-    sight.
-    """
+    """Return True if coasting ends: after coast_time, or with a sigma (across the line of sight) above half a
+    beamwidth."""
     return since > coast_time or sigma > 0.5 * beamwidth
 
 
@@ -134,11 +125,8 @@ def beam(tracking: Tracking, constants: 'Constants', t: Seconds) -> tuple[Vector
 @compiled
 def deck_rates(tracking: Tracking, constants: 'Constants', t: Seconds, A: Radians,
                E: Radians) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return the rates at which the motion of the deck moves the deck angles of an earth-fixed direction.
-
-    A, E: encoder angles of the direction at t. The rates are 0 if no axis uses them
-    (beam.rate_compensation).
-    """
+    """Return the rates at which the motion of the deck moves the deck angles of an earth-fixed direction at t; 0 if no
+    axis uses them (beam.rate_compensation). A, E: encoder angles of the direction."""
     azimuth, elevation = constants.axis[0].p.beam, constants.axis[1].p.beam
     compensated = azimuth.rate_compensation != 0.0 or elevation.rate_compensation != 0.0
     if compensated and tracking.attitude.stabilised:
@@ -151,10 +139,7 @@ def deck_rates(tracking: Tracking, constants: 'Constants', t: Seconds, A: Radian
 
 @compiled
 def write_outputs(tracking: Tracking, constants: 'Constants', t: Seconds, outputs: Outputs) -> None:
-    """Write the counts of gated measurements and the estimate at t to the outputs.
-
-    The estimate is in earth angles, as seen from the antenna.
-    """
+    """Write the counts of gated measurements and the estimate at t, in earth angles as seen from the antenna."""
     filtered = tracking.target
     outputs.gated, outputs.rates_gated = filtered.gated, filtered.rates_gated
     outputs.ranges_gated = filtered.ranges_gated
@@ -175,10 +160,8 @@ def take_encoders(encoders: history.Encoders, inputs: Inputs) -> int:
 
 @compiled
 def take_attitude(deck: attitude.DeckAttitude, params: 'SharedParameters', inputs: Inputs) -> tuple[int, bool]:
-    """Take the attitude of this step, and the statistics of its error that the INS publishes.
-
-    Return (flags of invalid values, True if the attitude is a new one).
-    """
+    """Take the attitude of this step, and the statistics of its error that the INS publishes. Return (flags of invalid
+    values, True if the attitude is a new one)."""
     if not inputs.stabilised:
         return 0, False
     flags = 0

@@ -1,6 +1,6 @@
 """The target: its estimate by the filter, in the frame of the filter, in earth angles and in deck angles.
 
-The equator of the filter's frame passes through the target (`estimate_frame`). With a measured range the filter
+The equator of the filter's frame passes through the target (`geometry.frames`). With a measured range the filter
 estimates the line of sight from the INS, otherwise the one from the antenna (`lever_arm`). Between accepted
 measurements the filter stays at the stamp of the last one; `outlook` and `read` predict from there.
 """
@@ -100,23 +100,16 @@ def reset_accepted_count(target: Target) -> None:
 
 @compiled
 def locked(target: Target, params: TrackerParameters, since_accepted: Seconds) -> Bit:
-    """Return True if autotrack can begin.
-
-    Three conditions make lock: lock_count consecutive measurements were accepted, the last of them is at most
-    coast_after old, and the filter has converged.
-
-    since_accepted: age of the last accepted measurement, less the receiver's latency.
-    """
+    """Return True if autotrack can begin: lock_count consecutive measurements were accepted, the last of them is at
+    most coast_after old, and the filter has converged. since_accepted: its age, less the receiver's latency."""
     return (target.running and target.accepted_in_a_row >= params.lock_count and target.converged
             and since_accepted <= params.coast_after)
 
 
 @compiled
 def outlook(target: Target, constants: Constants, t: Seconds) -> Motion:
-    """Return the Motion that the filter predicts for t, in its frame.
-
-    For a time before the last accepted measurement, return the Motion at that measurement.
-    """
+    """Return the Motion that the filter predicts for t, in its frame; before the last accepted measurement, the Motion
+    there."""
     return target_filter.outlook(target.filter, constants.filter, max(t - target.stamp, 0.0))
 
 
@@ -134,10 +127,7 @@ def on_deck(target: Target, params: 'SharedParameters', deck: DeckAttitude, t: S
 
 @compiled
 def on_levelled_deck(target: Target, level: Rotation, source: Source) -> Motion:
-    """Return the Motion of a source in deck angles of a levelled deck at rest.
-
-    level: rotation from this deck to the earth.
-    """
+    """Return the Motion of a source in deck angles of a levelled deck at rest; level: this deck -> earth."""
     still = Attitude(level, ZERO_VECTOR, ZERO_VECTOR)
     if source.framed:
         still = frames.of_deck(target.frame, still)

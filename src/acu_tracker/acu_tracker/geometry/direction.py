@@ -1,8 +1,5 @@
-"""A commanded direction, from an operator, a program or another antenna,
-extrapolated by its rates for a limited time.
-
-The modes preset (deck angles) and slave (earth angles) follow such directions.
-"""
+"""A commanded direction, extrapolated by its rates for a limited time: of the modes preset (deck angles) and slave
+(earth angles)."""
 import math
 
 import numpy as np
@@ -43,11 +40,8 @@ def moved(record: Records, times: Times) -> Pairs:
 
 
 def set_chord(record: Records, axis: int, begins: Seconds, ends: Seconds, angles: Floats) -> None:
-    """Move an axis along a straight line: its angles are `angles` (2,) [rad] at the times `begins` and
-    `ends`.
-
-    axis: 0 azimuth, 1 elevation. Both times lie at or after the stamp.
-    """
+    """Move an axis (0 azimuth, 1 elevation) along a straight line from angles[0] [rad] at `begins` to angles[1] at
+    `ends`. Both times lie at or after the stamp."""
     at, until = np.minimum((begins - record['stamp'], ends - record['stamp']), record['moves'])
     rate = (angles[1] - angles[0]) / (until - at) if until > at else 0.0
     record['angle'][axis], record['rate'][axis] = angles[0] - rate * at, rate

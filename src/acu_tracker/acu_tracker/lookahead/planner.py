@@ -1,10 +1,10 @@
 """The planner of the look-ahead: it forecasts keyholes and hidden sectors on the path of the target.
 
-The planner runs every LOOK_AHEAD_PERIOD_S, and considers the next `horizon` seconds of the path on the levelled deck,
-the mean attitude of the ship. The path is the program track, which in autotrack is rotated to begin at the estimate.
-Without a program the path is the great circle of the estimate. A plan is renewed in each look-ahead until its slew
-begins. Because the antenna still follows the target then, a renewal moves no axis. A planned slew keeps the levelled
-deck on which it was planned last.
+The planner runs every LOOK_AHEAD_PERIOD_S, and considers the next `horizon` seconds of the path on the levelled deck.
+Because the future attitude of a rolling ship is not known, this is its mean attitude. The path is the program track,
+which in autotrack is rotated to begin at the estimate. Without a program the path is the great circle of the estimate.
+A plan is renewed in each look-ahead until its slew begins. Because the antenna still follows the target then, a
+renewal moves no axis. A planned slew keeps the levelled deck on which it was planned last.
 """
 import dataclasses
 import math
@@ -62,13 +62,8 @@ class LevelledDeck(Record):
 
 @compiled
 def take_attitude(deck: LevelledDeck, stamp: Seconds, q: Quaternion, mean_time: Seconds, restart: Bit) -> None:
-    """Add an attitude to the mean, which is an average over about mean_time.
-
-    q        deck -> earth
-    restart  1 if the mean shall begin with this attitude
-
-    A mean begins as a horizontal deck with the heading of its first attitude.
-    """
+    """Add an attitude q (deck -> earth) to the mean, an average over about mean_time; restart: the mean begins with
+    it, as a horizontal deck with its heading."""
     mean = deck.mean
     if restart or not deck.latest > -math.inf:
         deck.since = stamp
@@ -102,8 +97,7 @@ LOOK_AHEAD_PERIOD_S = 1.0  # time between two look-aheads [s]. For this time bef
 MAX_UNANNOUNCED_TIME_S, MAX_UNANNOUNCED_LOSS_S = 0.5, 0.1
 """Largest changes of a plan that are not announced: of begin or end of its slew, and of the expected loss [s]."""
 
-FORECAST_TEXTS = ('none', 'keyhole', 'no turn')
-"""Names of the forecasts: no keyhole; a keyhole with a planned slew; a keyhole for which no slew fits the limits."""
+FORECAST_TEXTS = ('none', 'keyhole', 'no turn')  # the last: no slew fits the limits
 FORECAST_NONE, FORECAST_KEYHOLE, FORECAST_NO_WRAP = range(len(FORECAST_TEXTS))
 
 
@@ -166,10 +160,8 @@ def clear_plan(planner: Planner) -> None:
 
 @compiled
 def another_program(planner: Planner, program: ProgramTrack) -> bool:
-    """Keep the key of the program; return True if it differs from the key of the previous call.
-
-    Two programs are taken as equal if their numbers of rows, their first rows and their last rows are equal.
-    """
+    """Keep the key of the program; return True if it differs from the key of the previous call. Two programs are taken
+    as equal if their numbers of rows, their first rows and their last rows are equal."""
     last = len(program.times) - 1
     same = planner.program[0] == last
     planner.program[0] = last
@@ -183,11 +175,8 @@ def another_program(planner: Planner, program: ProgramTrack) -> bool:
 
 @compiled
 def due(planner: Planner, t: Seconds) -> bool:
-    """Return True if a look-ahead is due at t.
-
-    A look-ahead is due LOOK_AHEAD_PERIOD_S after the last one, but not from LOOK_AHEAD_PERIOD_S before the begin of a
-    planned slew to its end.
-    """
+    """Return True if a look-ahead is due at t: LOOK_AHEAD_PERIOD_S after the last one, but not from
+    LOOK_AHEAD_PERIOD_S before the begin of a planned slew to its end."""
     final = planner.forecast == FORECAST_KEYHOLE and planner.slew.t1 - LOOK_AHEAD_PERIOD_S < t <= planner.slew.t2
     return t - planner.looked >= LOOK_AHEAD_PERIOD_S and not final
 
@@ -207,10 +196,8 @@ def look_along_program(planner: Planner, constants: Constants, model: pointing_m
 @compiled
 def look_along_great_circle(planner: Planner, constants: Constants, model: pointing_model.PointingModel, t: Seconds,
                             azimuth: Radians, u: Vector, du: Vector) -> None:
-    """Search the great circle of the target from t on for a keyhole and hidden sectors.
-
-    azimuth: encoder angle at t; u, du: ENU unit vector of the target at t and its rate [1/s].
-    """
+    """Search the great circle of the target from t on for a keyhole and hidden sectors. azimuth: encoder angle at t;
+    u, du: ENU unit vector of the target at t and its rate [1/s]."""
     path = _begin(planner, constants, t)
     count = paths.along_great_circle(path, planner.next_level, u, du)
     _search(planner, constants, model, path, count, azimuth, Travel(0.0, 0.0))
@@ -228,11 +215,9 @@ def _begin(planner: Planner, constants: Constants, t: Seconds) -> paths.Path:
 @compiled
 def _search(planner: Planner, constants: Constants, model: pointing_model.PointingModel, path: paths.Path, count: int,
             azimuth: Radians, travel: Travel) -> None:
-    """Search the first `count` rows of a Path for a keyhole and hidden sectors.
-
-    travel: of the azimuth after these rows. A plan is announced when its slew begins within `notice`. A keyhole
-    without a fitting azimuth wrap is forecast at once, except if there is a plan whose slew has not begun.
-    """
+    """Search the first `count` rows of a Path for a keyhole and hidden sectors; travel: of the azimuth after these
+    rows. A plan is announced when its slew begins within `notice`. A keyhole without a fitting azimuth wrap is
+    forecast at once, except if there is a plan whose slew has not begun."""
     if count < MIN_PATH_ROW_COUNT:
         return
     path = paths.Path(path.rows[:count], path.t0, path.h)
@@ -266,7 +251,6 @@ def _differ(slew: slews.Slew, announced: slews.Slew) -> bool:
 
 @compiled
 def _announce(planner: Planner, forecast: int) -> None:
-    """Set the forecast, and announce it together with the planned slew."""
     planner.forecast = planner.announced_forecast = forecast
     planner.announced = planner.slew
     planner.forecasts += 1
@@ -274,10 +258,8 @@ def _announce(planner: Planner, forecast: int) -> None:
 
 @compiled
 def _find_sectors(planner: Planner, sectors: Vectors3, path: paths.Path) -> None:
-    """Find the first time in which a sector hides the target.
-
-    A time that begins after the end of the previous one counts as a new blockage.
-    """
+    """Find the first time in which a sector hides the target. A time that begins after the end of the previous one
+    counts as a new blockage."""
     first = last = -1
     for i in range(len(path.rows)):
         A, E = angles(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])
@@ -304,8 +286,5 @@ def slewing(planner: Planner, t: Seconds) -> bool:
 @compiled
 def motion_at(planner: Planner, constants: Constants, t: Seconds, target: Motion,
               level: AxisMotion) -> tuple[Motion, Radians]:
-    """Return (motion of the axes at t, pointing offset) of the planned slew.
-
-    target, level: as in slew.motion_at.
-    """
+    """Return (motion of the axes at t, pointing offset) of the planned slew; target, level: as in slew.motion_at."""
     return slews.motion_at(planner.slew, t, target, level, constants.limits.highest)

@@ -1,7 +1,8 @@
 """A program track: a table of times, azimuths and elevations (earth angles), and its interpolation to any instant.
+Tables: the program track and the predicted tables of a satellite and the sun, which have the same type.
 
 The interpolation is cubic (Hermite). The slope at a row is that of a parabola through the row and its neighbours.
-Therefore the rate is continuous. The predicted tables of a satellite and the sun have the same type.
+Therefore the rate is continuous.
 """
 import math
 from typing import NamedTuple
@@ -19,8 +20,7 @@ from pedestal_common.geometry.line_of_sight import earth_direction, wrap
 from pedestal_common.quantities import Pairs, Radians, RadiansPerSecond, Seconds, Times
 
 MAX_PROGRAM_ROWS = 100_000  # largest number of rows of a program
-STEEP_ELEVATION_RAD = math.radians(80.0)
-"""Elevation above which the unit vector is interpolated instead of the angles [rad]."""
+STEEP_ELEVATION_RAD = math.radians(80.0)  # above it the unit vector is interpolated, not the angles
 
 
 class ProgramTrack(NamedTuple):
@@ -37,10 +37,8 @@ class ProgramTrackError(ValueError):
 
 
 def checked(times: ArrayLike, angles: ArrayLike) -> ProgramTrack:
-    """Return the ProgramTrack of times [s] and angles (n, 2), azimuth and elevation [rad].
-
-    Raise ProgramTrackError for a table that cannot be followed.
-    """
+    """Return the ProgramTrack of times [s] and angles (n, 2) [rad]. Raise ProgramTrackError for a table that cannot be
+    followed."""
     times, angles = np.array(times, float), np.array(angles, float)
     if times.ndim != 1 or angles.shape != (len(times), 2):
         raise ProgramTrackError(f'program track: times {times.shape}, angles {angles.shape}; must be (n,), (n, 2)')
@@ -72,20 +70,16 @@ def status(program: ProgramTrack, t: Seconds) -> int:
 
 @compiled
 def _difference(program: ProgramTrack, i: int, axis: int) -> Radians:
-    """Return the change of an angle from row i to the next row; axis: 0 azimuth, 1 elevation.
-
-    The azimuth changes the short way round.
-    """
+    """Return the change of an angle (0 azimuth, 1 elevation) from row i to the next; the azimuth changes the short way
+    round."""
     difference = program.angles[i + 1, axis] - program.angles[i, axis]
     return wrap(difference) if axis == 0 else difference
 
 
 @compiled
 def _slope(program: ProgramTrack, i: int, axis: int) -> RadiansPerSecond:
-    """Return the rate of an angle at row i, from the parabola through this row and its neighbours.
-
-    At the first and the last row it is the parabola through the nearest three rows.
-    """
+    """Return the rate of an angle at row i, from the parabola through this row and its neighbours, or through the
+    nearest three rows."""
     times = program.times
     if len(times) == 2:
         return _difference(program, 0, axis) / (times[1] - times[0])
@@ -98,12 +92,8 @@ def _slope(program: ProgramTrack, i: int, axis: int) -> RadiansPerSecond:
 
 @compiled
 def _hermite(y0: float, d: float, m0: float, m1: float, x: float, T: Seconds) -> AxisMotion:
-    """Return the motion of the cubic polynomial on an interval of T.
-
-    y0, d   value at the begin of the interval, and its change to the end
-    m0, m1  slopes at the begin and at the end, times T
-    x       place in the interval, 0 at its begin, 1 at its end
-    """
+    """Return the motion of the cubic polynomial on an interval of T. y0, d: value at its begin, and its change; m0,
+    m1: slopes at begin and end, times T; x: place in it, from 0 to 1."""
     c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
     return AxisMotion(y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
                       (2.0 * c2 + 6.0 * x * c3) / (T * T))
@@ -111,7 +101,7 @@ def _hermite(y0: float, d: float, m0: float, m1: float, x: float, T: Seconds) ->
 
 @compiled
 def interpolated(program: ProgramTrack, t: Seconds, axis: int) -> AxisMotion:
-    """Return the motion of one axis at t, interpolated; axis: 0 azimuth, 1 elevation."""
+    """Return the motion of one axis (0 azimuth, 1 elevation) at t, interpolated."""
     times = program.times
     i = interval(times, t)
     T = times[i + 1] - times[i]
@@ -121,7 +111,7 @@ def interpolated(program: ProgramTrack, t: Seconds, axis: int) -> AxisMotion:
 
 @compiled
 def _component(program: ProgramTrack, i: int, axis: int) -> float:
-    """Return a component of the unit vector at row i; axis: 0 east, 1 north, 2 up."""
+    """Return a component (0 east, 1 north, 2 up) of the unit vector at row i."""
     return earth_direction(program.angles[i, 0], program.angles[i, 1])[axis]
 
 
@@ -149,11 +139,8 @@ def _interpolated_component(program: ProgramTrack, i: int, t: Seconds, axis: int
 
 @separate
 def motion_at(program: ProgramTrack, t: Seconds) -> Motion:
-    """Return the motion in earth angles at t.
-
-    Between two rows above STEEP_ELEVATION_RAD the unit vector is interpolated, not the angles. The reason is that near
-    the zenith the azimuth may change by any amount from row to row.
-    """
+    """Return the motion in earth angles at t. Between two rows above STEEP_ELEVATION_RAD the unit vector is
+    interpolated, because near the zenith the azimuth may change by any amount from row to row."""
     i = interval(program.times, t)
     if min(program.angles[i, 1], program.angles[i + 1, 1]) < STEEP_ELEVATION_RAD or len(program.times) < 3:
         return Motion(interpolated(program, t, 0), interpolated(program, t, 1))
@@ -184,8 +171,7 @@ def azimuth_travel(program: ProgramTrack, t: Seconds) -> Travel:
     return Travel(below, above)
 
 
-TABLE_MODES = tuple(row for row in modes.MODE_ROWS if row.table)
-"""Rows of modes.MODE_ROWS of the modes that follow a table."""
+TABLE_MODES = tuple(row for row in modes.MODE_ROWS if row.table)  # rows of the modes that follow a table
 
 
 class Tables(NamedTuple):
@@ -202,10 +188,8 @@ TABLE_INDEX = tuple(TABLE_MODES.index(row) if row.table else 0 for row in modes.
 
 
 def shifted(track: ProgramTrack, offset: tuple[Seconds, Radians, Radians]) -> ProgramTrack:
-    """Return a ProgramTrack with an offset (time, azimuth, elevation) added to each row.
-
-    The shifted elevations are limited to the zenith.
-    """
+    """Return a ProgramTrack with an offset (time, azimuth, elevation) added to each row. The shifted elevations are
+    limited to the zenith."""
     if not any(offset):
         return track
     time, *angles = offset

@@ -39,10 +39,8 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class SearchParameters(Parameters):
-    """Parameters of the mode search: the beam waits at the last place, covers a small area, then the full area.
-
-    Small and full area are repeated for a number of rounds.
-    """
+    """Mode search: the beam waits at the last place, covers a small area, then the full area, for a number of
+    rounds."""
 
     pattern: str = choice('spiral', SEARCH_PATTERNS, 'search path; square and raster lie along the track')
     wait: float = parameter(2.5, 0.0, 600.0, 's', 'time at the last place, in which the noise is learnt')
@@ -64,7 +62,7 @@ Phase = codes(ACQUISITION_PHASES)
 
 
 class Acquisition(Record):
-    """State of search and acquire."""
+    """State of the modes that use the signal level."""
     level: level.Level
     slopes: judgement.Slopes
     step_track: step_track.StepTrack
@@ -107,11 +105,8 @@ PEAK_OFFSETS_BEAMWIDTHS = ((0.0, 0.0), (PEAK_STEP_BEAMWIDTHS, 0.0), (-PEAK_STEP_
 """Offsets of the places of the phase `peak` from the centre: cross-elevation, elevation [beamwidths]."""
 
 SIDE_LOBE_TIME_S = 0.3
-"""Time for which the level must be that of a side lobe before autotrack ends [s].
-
-The time may begin in the mode program, before autotrack. Because the filter diverges within 0.4 s on the slopes of a
-side lobe, the time is shorter.
-"""
+"""Time for which the level must be that of a side lobe before autotrack ends [s]. The time may begin in the mode
+program. Because the filter diverges within 0.4 s on the slopes of a side lobe, the time is shorter."""
 
 
 def initialise(record: Records) -> None:
@@ -128,11 +123,9 @@ def remember(state: Acquisition, t: Seconds, u: Vector, du: Vector) -> None:
 
 @compiled
 def expected(state: Acquisition, way: bridge.Way, t: Seconds) -> Motion:
-    """Return the motion in earth angles of the expected place of the target at t.
-
-    The place follows the program, rotated to where the target was last tracked. Without a program it is the last
-    place, moved on with a rate that fades.
-    """
+    """Return the motion in earth angles of the expected place of the target at t. The place follows the program,
+    rotated to where the target was last tracked. Without a program it is the last place, moved on with a rate that
+    fades."""
     if program_track.status(way.program, t) != Reason.NONE:
         return place.motion_at(state.place, t)
     return bridge.motion_at(way, t)
@@ -147,10 +140,7 @@ def source(state: Acquisition, mode: int, constants: 'Constants', way: bridge.Wa
 
 @compiled
 def _offset(state: Acquisition, mode: int, constants: 'Constants', t: Seconds, motion: Motion) -> Point:
-    """Return the offset of the beam from the expected place at t, in cross-elevation and elevation.
-
-    motion: of the expected place in earth angles.
-    """
+    """Return the offset of the beam at t from the expected place of this motion, in cross-elevation and elevation."""
     beamwidth = constants.p.tracker.receiver.beamwidth
     if mode == Mode.SEARCH:
         p, _ = searched(state, constants.p.search, constants.p.acquisition.time_constant, beamwidth, t)
@@ -162,10 +152,8 @@ def _offset(state: Acquisition, mode: int, constants: 'Constants', t: Seconds, m
 
 @compiled
 def begin(state: Acquisition, mode: int, constants: 'Constants', t: Seconds, spread: Radians) -> None:
-    """Enter a mode that uses the signal level at t.
-
-    spread: standard deviation of the expected place, across the line of sight; NaN if it is not known.
-    """
+    """Enter a mode that uses the signal level at t. spread: standard deviation of the expected place, across the line
+    of sight; NaN if it is not known."""
     level.restart_times(state.level)
     if mode == Mode.SEARCH:
         begin_search(state, constants.p.search, constants.p.tracker.receiver.beamwidth, t, spread)
@@ -177,11 +165,8 @@ def begin(state: Acquisition, mode: int, constants: 'Constants', t: Seconds, spr
 
 @compiled
 def begin_search(state: Acquisition, params: SearchParameters, beamwidth: Radians, t: Seconds, sigma: Radians) -> None:
-    """Start a search at t.
-
-    sigma: standard deviation of the expected place, NaN if it is not known. The radius of the small area is at least
-    2 sigma.
-    """
+    """Start a search at t. The radius of the small area is at least 2 sigma, the standard deviation of the expected
+    place."""
     state.began = t
     state.radius = params.small * beamwidth
     if 2.0 * sigma > state.radius:
@@ -206,10 +191,8 @@ def _enter(state: Acquisition, phase: int, t: Seconds) -> None:
 @compiled
 def advance(state: Acquisition, mode: int, constants: 'Constants', inputs: Inputs, way: bridge.Way) -> bool:
     """Take the level of a step and advance the running mode. Return True if acquire has found a slope of wrong sign.
-
     mode: the mode of the previous step. While the beam is off the target, the level is noise alone; the function then
-    learns the statistics of the noise.
-    """
+    learns the statistics of the noise."""
     p, beamwidth = constants.p.acquisition, constants.p.tracker.receiver.beamwidth
     new = inputs.error_stamp > state.level.stamp and math.isfinite(inputs.cn0_dbhz)
     waiting = mode == Mode.SEARCH and inputs.stamp < state.began + constants.p.search.wait
@@ -241,7 +224,8 @@ def advance(state: Acquisition, mode: int, constants: 'Constants', inputs: Input
 
 @compiled
 def found(state: Acquisition, mode: int, constants: 'Constants') -> bool:
-    """Return True if the mode search may hand over to acquire, or the mode acquire to autotrack."""
+    """Return True if the mode search may hand over to acquire, or the mode acquire to autotrack. Search hands over if
+    there is a signal and the beam has passed its peak, or has had the signal for MAX_RISE_TIME_S."""
     if mode == Mode.SEARCH:
         passed = state.level.z < state.peak - PEAK_DROP_DB or state.level.above_detect > MAX_RISE_TIME_S
         return level.detected(state.level, constants.p.acquisition) and passed
@@ -272,7 +256,7 @@ def in_side_lobe(state: Acquisition, constants: 'Constants', t: Seconds) -> bool
 
 @compiled
 def area(state: Acquisition, params: SearchParameters, tau: Seconds, beamwidth: Radians, full: bool) -> Area:
-    """Return the small area, or the full area if `full` is True; tau: time constant of the level."""
+    """Return the small or the full area; tau: time constant of the level."""
     radius = params.full * beamwidth if full else state.radius
     return Area(int(params.pattern), radius, params.across * radius, params.pitch * beamwidth,
                 pattern.highest_speed(beamwidth, tau, params.speed))
@@ -281,10 +265,7 @@ def area(state: Acquisition, params: SearchParameters, tau: Seconds, beamwidth: 
 @compiled
 def searched(state: Acquisition, params: SearchParameters, tau: Seconds, beamwidth: Radians,
              t: Seconds) -> tuple[Point, bool]:
-    """Return (offset of the beam at t, along and across the track of the target; True if all rounds are over).
-
-    tau: time constant of the level.
-    """
+    """Return (offset of the beam at t, along and across the track of the target; True if all rounds are over)."""
     small, full = area(state, params, tau, beamwidth, False), area(state, params, tau, beamwidth, True)
     T_small, T_full = pattern.duration(small), pattern.duration(full)
     t -= state.began + params.wait
@@ -393,11 +374,8 @@ def acquired(state: Acquisition, beamwidth: Radians, t: Seconds) -> Point:
 
 @compiled
 def take_error(state: Acquisition, expected: tuple[Radians, Radians], error: tuple[Radians, Radians]) -> None:
-    """Take an error of the receiver during the slope check.
-
-    expected  offset of the expected place of the target from the beam when the error was measured
-    error     the error; both are (cross-elevation, elevation)
-    """
+    """Take an error of the receiver during the slope check; expected: offset of the expected place from the beam then.
+    Both are (cross-elevation, elevation)."""
     if state.phase == Phase.CHECK:
         judgement.take_slopes(state.slopes, expected, error)
 

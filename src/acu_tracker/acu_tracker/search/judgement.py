@@ -1,4 +1,21 @@
-"""acu_tracker.search.judgement."""
+"""Judgement of a signal before autotrack closes the loop on it: main lobe or side lobe, slopes of the errors.
+
+The first side lobe of a dish is 18 to 25 dB below the main lobe, at 1.5 to 2 b from its axis (b: beamwidth). In the
+side lobe the difference channels of the receiver have a false null, which an antenna can track as long as the signal
+lasts. A side lobe is detected by its level: it is far below the level that range and gain give. If range and gain are
+unknown, the beam looks around: it visits six places 1.2 b off. If the beam was in a side lobe, one of these places is
+within the main lobe.
+
+For the slopes the mode acquire moves the beam on a small circle about the expected place of the target. The measured
+errors should follow the offset of this place one for one. The matrix K of their slopes comes from a least-squares fit:
+
+    K = S_ed S_dd^-1,    S_ed = sum (e - e') (d - d')^T,    S_dd = sum (d - d') (d - d')^T
+
+d: offset of the expected place from the beam, e: error of the receiver, d', e': their means over the samples [rad];
+each is (cross-elevation, elevation). The diagonal of K is 1 without a fault, negative if a sign is wrong, and
+cos(beta) if the axes of the errors are turned by beta. A constant error of the expected place changes only the means,
+and not K.
+"""
 import math
 from typing import Annotated
 
@@ -14,12 +31,8 @@ MIN_IMPROVEMENT_DB = 2.0  # least increase of the level for which the beam moves
 
 @compiled
 def expected_level(cn0_dbhz: DecibelHertz, reference_range: Meters, exponent: float, distance: Meters) -> DecibelHertz:
-    """Return the level that is expected on the axis of the beam.
-
-    cn0_dbhz   level at the reference range
-    reference_range, distance  ranges of the target; distance NaN: unknown, the result is cn0_dbhz
-    exponent   power of the range with which the level falls [-]
-    """
+    """Return the level that is expected on the axis of the beam; distance: NaN if it is unknown, the result is then
+    cn0_dbhz, the level at the reference range; exponent: power of the range with which the level falls [-]."""
     if math.isnan(distance) or distance <= 0.0:
         return cn0_dbhz
     return cn0_dbhz - 10.0 * exponent * math.log10(distance / reference_range)
@@ -33,10 +46,7 @@ def suspected(z: DecibelHertz, level: DecibelHertz) -> bool:
 
 @compiled
 def look_around_place(i: int, beamwidth: Radians) -> tuple[Radians, Radians]:
-    """Return the offset (cross-elevation, elevation) of place i of a look-around.
-
-    Place 0 is the centre; the places 1 to LOOK_AROUND_PLACES are around it.
-    """
+    """Return the offset (cross-elevation, elevation) of place i of a look-around; place 0 is the centre."""
     if i == 0:
         return 0.0, 0.0
     angle = 2.0 * math.pi * (i - 1) / LOOK_AROUND_PLACES
@@ -45,10 +55,8 @@ def look_around_place(i: int, beamwidth: Radians) -> tuple[Radians, Radians]:
 
 @compiled
 def best_place(levels: Floats) -> int:
-    """Return the number of the place with the highest level; levels: of all 1 + LOOK_AROUND_PLACES places [dB-Hz].
-
-    Return 0 if no place is better than the centre by more than MIN_IMPROVEMENT_DB.
-    """
+    """Return the number of the place with the highest level [dB-Hz]; 0 if none is better than the centre by more than
+    MIN_IMPROVEMENT_DB."""
     highest = 0
     for i in range(1, 1 + LOOK_AROUND_PLACES):
         if levels[i] > levels[highest]:
@@ -66,10 +74,8 @@ class Slopes(Record):
 
 
 MIN_SLOPE = 0.5
-"""Slope below which autotrack does not begin [-].
-
-Axes that are turned by 60 deg have this slope. Such a turn uses up the phase margin of the loop.
-"""
+"""Slope below which autotrack does not begin [-]. Axes that are turned by 60 deg have this slope. Such a turn uses up
+the phase margin of the loop."""
 
 VERDICT_UNKNOWN, VERDICT_RIGHT, VERDICT_WRONG = range(3)  # verdicts of the check
 
@@ -104,10 +110,7 @@ def take_slopes(state: Slopes, d: tuple[Radians, Radians], e: tuple[Radians, Rad
 
 @compiled
 def slopes(state: Slopes) -> tuple[float, float]:
-    """Return the slopes (K_xx, K_ee) of cross-elevation and elevation [-].
-
-    Both slopes are NaN until the beam has moved on both axes.
-    """
+    """Return the slopes (K_xx, K_ee) [-]; both are NaN until the beam has moved on both axes."""
     det = state.dd[0] * state.dd[2] - state.dd[1] * state.dd[1]
     return ((state.ed[0, 0] * state.dd[2] - state.ed[0, 1] * state.dd[1]) / det,
             (state.ed[1, 1] * state.dd[0] - state.ed[1, 0] * state.dd[1]) / det)

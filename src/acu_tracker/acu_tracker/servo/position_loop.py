@@ -1,15 +1,13 @@
 """The position loop of one axis: it runs the selected controller, changes it without a bump, and keeps the limits.
 
 The input is the raw target: the angle, rate and acceleration that guidance requests, before the shaper. The output is
-the rate command. There are four controllers:
+the rate command. There are four controllers (`controllers`):
 
 pid          acts on the raw target at t_k
 feedforward  acts on the shaped reference at t_k, and feeds rate, acceleration and torque of t_m forward
 adrc         as feedforward, with an observer of the disturbance
-beam         steers an electronic beam, which has no dynamics. Its command is the raw target at t_m. In autotrack with
-             the forms type_1 and type_2 it is the beam of `beam_loop`, which acts on the receiver's error
-
-t_k: stamp of the step [s]; t_m: middle of the interval in which the command of the step is in force [s].
+beam         steers an electronic beam, which has no dynamics, to the raw target at t_m. In autotrack with the forms
+             type_1 and type_2 its law acts on the receiver's error
 """
 import dataclasses
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -77,15 +75,12 @@ class Command(NamedTuple):
     acceleration_limited: bool
 
 
-MAX_DELAY_PHASE_RAD = 0.5
-"""Largest product of bandwidth and delay of the command [rad]: the loss of phase margin by the delay."""
+MAX_DELAY_PHASE_RAD = 0.5  # largest bandwidth times delay of the command: the lost phase margin
 
 
 def slowed(params: 'AxisParameters', delay: Seconds) -> 'AxisParameters':
-    """Return AxisParameters whose loops are stable with a delay of the command.
-
-    The bandwidth of each controller is reduced to MAX_DELAY_PHASE_RAD / delay, if it is higher.
-    """
+    """Return AxisParameters whose loops are stable with a delay of the command: no bandwidth above MAX_DELAY_PHASE_RAD
+    / delay."""
     if delay == 0.0:
         return params
     loops = {name: getattr(params, name) for name in ('pid', 'feedforward', 'adrc')}
@@ -97,13 +92,8 @@ def slowed(params: 'AxisParameters', delay: Seconds) -> 'AxisParameters':
 @compiled
 def limited(wanted: RadiansPerSecond, before: RadiansPerSecond, dt: Seconds, rate: RadiansPerSecond,
             acceleration: RadiansPerSecond2) -> tuple[RadiansPerSecond, bool, bool]:
-    """Return (rate command, True if the rate was limited, True if the acceleration was limited).
-
-    wanted        rate command before the limits
-    before        rate command of the step before, dt ago
-    rate          largest absolute value of the command
-    acceleration  largest change of the command over time
-    """
+    """Return (rate command, True if the rate was limited, True if the acceleration was limited). wanted, before: rate
+    commands before the limits and dt ago; rate, acceleration: largest absolute values."""
     u = min(max(wanted, -rate), rate)
     rate_limited = u != wanted
     step = acceleration * dt
@@ -113,26 +103,22 @@ def limited(wanted: RadiansPerSecond, before: RadiansPerSecond, dt: Seconds, rat
 
 @compiled
 def realised(command: RadiansPerSecond, dy: RadiansPerSecond) -> RadiansPerSecond:
-    """Return the part of a rate command that an axis realises while it moves at the rate dy.
-
-    The part is 0 if the axis moves against the command, the command if the axis is faster, and else dy.
-    """
+    """Return the part of a rate command that an axis realises while it moves at the rate dy: 0 if the axis moves
+    against the command, the command if the axis is faster, and else dy."""
     return min(max(dy, min(command, 0.0)), max(command, 0.0))
 
 
 @compiled
 def replace_command(axis: AxisLoop, rate: RadiansPerSecond) -> None:
-    """Replace the rate command of the last step by another one, with which the next step begins."""
+    """Replace the rate command of the last step, with which the next step begins."""
     axis.command = rate
 
 
 @compiled
 def initialise(axis: AxisLoop, params: 'AxisParameters', t_k: Seconds, y: Radians, dy: RadiansPerSecond) -> None:
-    """Start the controller from the angle y and the rate dy of the encoder at t_k.
-
-    A beam keeps its last command. Because the measured beam lags the command by the delay, each start from the
-    measured beam would move the command back by this lag.
-    """
+    """Start the controller from the angle y and the rate dy of the encoder at t_k. A beam keeps its last command.
+    Because the measured beam lags the command by the delay, each start from the measured beam would move the command
+    back by this lag."""
     axis.controller = int(params.controller)
     if axis.controller == CONTROLLER_BEAM and axis.reference.planned.count > 0:
         axis.reference.rate = 0.0
@@ -145,7 +131,6 @@ def initialise(axis: AxisLoop, params: 'AxisParameters', t_k: Seconds, y: Radian
 
 @compiled
 def _initialise_feedback(axis: AxisLoop, t_k: Seconds, y: Radians, dy: RadiansPerSecond) -> None:
-    """Reset the integral and the observer: they start without a disturbance, at y and dy."""
     axis.integral = 0.0
     axis.z[0], axis.z[1], axis.z[2] = y, dy, 0.0
     axis.observed = t_k
@@ -153,10 +138,8 @@ def _initialise_feedback(axis: AxisLoop, t_k: Seconds, y: Radians, dy: RadiansPe
 
 @compiled
 def stop(axis: AxisLoop, params: 'AxisParameters', dt: Seconds) -> Command:
-    """Return the Command that brings the rate to zero within the acceleration limit; reset the integral.
-
-    dt: time since the last command.
-    """
+    """Return the Command that brings the rate to zero within the acceleration limit; reset the integral. dt: time
+    since the last command."""
     axis.command, _, acceleration_limited = limited(0.0, axis.command, dt, params.limits.rate,
                                                     params.limits.acceleration)
     axis.integral = 0.0
@@ -172,10 +155,7 @@ def instant(params: 'AxisParameters', t_k: Seconds, t_m: Seconds) -> Seconds:
 @compiled
 def follow(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedback: Feedback,
            now: Instants) -> Command:
-    """Return the Command of one step.
-
-    target: the raw target at `instant`.
-    """
+    """Return the Command of one step; target: the raw target at `instant`."""
     if int(constants.p.controller) == CONTROLLER_BEAM:
         return _steer(axis, constants.p, target, feedback, now.dt)
     return _step(axis, constants, target, feedback, now)
@@ -183,10 +163,7 @@ def follow(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedb
 
 @compiled
 def _steer(axis: AxisLoop, params: 'AxisParameters', target: AxisMotion, feedback: Feedback, T: Seconds) -> Command:
-    """Return the Command of an electronic beam: the raw target at t_m, or the beam that `beam_loop` computes.
-
-    T: time since the step before.
-    """
+    """Return the Command of an electronic beam: the raw target at t_m, or the beam of its own loop."""
     b, r = params.beam, axis.reference
     beta, compensation = kalman.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
     axis.controller = CONTROLLER_BEAM
@@ -207,11 +184,9 @@ def _steer(axis: AxisLoop, params: 'AxisParameters', target: AxisMotion, feedbac
 @compiled
 def _step(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedback: Feedback,
           now: Instants) -> Command:
-    """Return the Command of one step of an axis with motors.
-
-    Anti-windup: if the limits change the command in the direction opposite to the error, the integral keeps its value.
-    The observer of adrc receives the limited command.
-    """
+    """Return the Command of one step of an axis with motors. Anti-windup: if the limits change the command in the
+    direction opposite to the error, the integral keeps its value. The observer of adrc receives the limited
+    command."""
     p, r, y, dy = constants.p, axis.reference, feedback.y, feedback.dy
     controller = int(p.controller)
     handover = axis.controller != controller
@@ -249,10 +224,7 @@ def _step(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedba
 
 @compiled
 def _held_inside(target: AxisMotion, low: Radians, high: Radians) -> tuple[AxisMotion, bool]:
-    """Return (AxisMotion of the raw target, put on the end of travel if it is beyond; True if it was put there).
-
-    low, high: ends of travel.
-    """
+    """Return (AxisMotion of the raw target, put on the end of travel if it is beyond; True if it was put there)."""
     held = not low <= target.angle <= high
     if held:
         return AxisMotion(min(max(target.angle, low), high), 0.0, 0.0), held
@@ -262,10 +234,7 @@ def _held_inside(target: AxisMotion, low: Radians, high: Radians) -> tuple[AxisM
 @compiled
 def _control_law(axis: AxisLoop, params: 'AxisParameters', e: Radians,
                  v: AxisMotion) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return (rate command before notch and limits, the part of it that is fed forward).
-
-    v: reference at t_k; e: v.angle minus the encoder angle.
-    """
+    """Return (rate command before notch and limits, the part of it that is fed forward); v: reference at t_k."""
     controller = int(params.controller)
     if controller == CONTROLLER_PID:
         gains = params.pid
@@ -282,11 +251,9 @@ def _control_law(axis: AxisLoop, params: 'AxisParameters', e: Radians,
 @compiled
 def _transfer(axis: AxisLoop, params: 'AxisParameters', e: Radians, v: AxisMotion, feedback: Feedback,
               t_k: Seconds) -> None:
-    """Start another controller so that its first command equals the last command of the controller before.
-
-    The integral takes up the difference of both commands, or the disturbance z3 of adrc. The notch starts in its
-    steady state. The arguments are those of _control_law; t_k: stamp of the step.
-    """
+    """Start another controller so that its first command equals the last command of the controller before. The
+    integral takes up the difference of both commands, or the disturbance z3 of adrc. The notch starts in its steady
+    state."""
     axis.controller = int(params.controller)
     axis.error, axis.derivative = e, v.rate - feedback.dy
     _initialise_feedback(axis, t_k, feedback.y, feedback.dy)
@@ -300,10 +267,7 @@ def _transfer(axis: AxisLoop, params: 'AxisParameters', e: Radians, v: AxisMotio
 
 @compiled
 def _update(axis: AxisLoop, params: 'AxisParameters', e: Radians, y: Radians, now: Instants) -> None:
-    """Advance the observer, or the integral and the derivative, of the running controller to t_k.
-
-    e: error; y: encoder angle.
-    """
+    """Advance the observer, or the integral and the derivative, of the running controller to t_k."""
     controller = int(params.controller)
     if controller == CONTROLLER_ADRC:
         h = now.t_k - axis.observed

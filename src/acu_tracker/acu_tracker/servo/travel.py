@@ -1,4 +1,15 @@
-"""acu_tracker.servo.travel."""
+"""The travel of an axis: its ends, the largest rate towards an end, and the floor of the elevation.
+
+    v^2 / (2 a) + v t = d
+
+v is the largest rate from which the axis stops within the distance d to the end, with the deceleration a and the
+reaction time t (AcuParameters.reaction). The slope dv/dd is at most 1 / t. Therefore a command that is late by t / e
+(e: Euler's number) causes no overshoot.
+
+The floor is the lowest elevation that the antenna may have at each azimuth, in every mode. It keeps the dish clear of
+structures around the antenna. A table of points, joined by straight lines, defines it. Where the floor rises, the
+azimuth waits until the elevation is above the floor ahead. A, E: azimuth and elevation in encoder angles.
+"""
 import math
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -29,10 +40,8 @@ def braking_distance(v: RadiansPerSecond, a: RadiansPerSecond2, t: Seconds) -> R
 
 @compiled
 def stopping_rate(d: Radians, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSecond:
-    """Return the largest rate towards an end d ahead from which an axis stops before the end.
-
-    The rate is 0 if the axis is beyond the end (d <= 0).
-    """
+    """Return the largest rate towards an end d ahead from which an axis stops before the end; 0 beyond the end (d <=
+    0)."""
     if d <= 0.0:
         return 0.0
     return math.sqrt(a * t * (a * t) + 2.0 * a * d) - a * t
@@ -40,19 +49,15 @@ def stopping_rate(d: Radians, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSec
 
 @compiled
 def inside(u: RadiansPerSecond, y: Radians, ends: Ends, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSecond:
-    """Return a rate command u limited so that an axis at y stops between its Ends.
-
-    Beyond an end only motion back inside is left.
-    """
+    """Return a rate command u limited so that an axis at y stops between its Ends. Beyond an end only motion back
+    inside is left."""
     return min(max(u, -stopping_rate(y - ends.low, a, t)), stopping_rate(ends.high - y, a, t))
 
 
 @compiled
 def time_to(y: Radians, dy: RadiansPerSecond, ends: Ends) -> Seconds:
-    """Return the time until an axis at y reaches an end if it keeps its rate dy.
-
-    The time is 0 beyond an end, and inf if the axis is at rest.
-    """
+    """Return the time until an axis at y reaches an end at its rate dy: 0 beyond an end, inf if the axis is at
+    rest."""
     if y > ends.high or y < ends.low:
         return 0.0
     if dy > 0.0:
@@ -75,24 +80,15 @@ class Floor(Record):
 
 
 MAX_AZIMUTH_RAD = 1e3
-"""Azimuth beyond the travel of every axis [rad].
-
-A larger azimuth is replaced by it, because an infinite azimuth has no cell number.
-"""
+"""Azimuth beyond the travel of every axis [rad]. It replaces a larger one, because an infinite azimuth has no cell."""
 
 FLOOR_CLEARANCE_RAD = 1e-3
-"""Least elevation above the floor to which the elevation is sent [rad].
-
-The azimuth waits until the elevation is above the floor. Because of the clearance it does not wait for the last step
-of the encoder.
-"""
+"""Least elevation above the floor to which the elevation is sent [rad]. The azimuth waits until the elevation is above
+the floor. Because of the clearance it does not wait for the last step of the encoder."""
 
 
 def floor_points(text: str) -> tuple[tuple[Radians, ...], tuple[Radians, ...]]:
-    """Return (azimuths, elevations) of the points in a text as in FLOOR_DOC; ((), ()) for an empty text.
-
-    Raise ParameterError for a wrong text.
-    """
+    """Return (azimuths, elevations) of the points in a text as in FLOOR_DOC. Raise ParameterError for a wrong text."""
     parts = [part.split() for part in text.split(';') if part.strip()]
     if len(parts) > MAX_FLOOR_POINTS:
         raise ParameterError(f'floor = {text!r}: {len(parts)} points; must be at most {MAX_FLOOR_POINTS}')
@@ -116,10 +112,8 @@ def floor_at(text: str, A: Radians) -> Radians:
 
 
 def floor_table(text: str) -> Records:
-    """Return the Floor (1,) of a text as in FLOOR_DOC.
-
-    The value of a cell is the highest value of the floor at its two ends and at the points of the table inside it.
-    """
+    """Return the Floor (1,) of a text as in FLOOR_DOC: the highest floor at both ends of a cell and at the points
+    inside it."""
     A, f = floor_points(text)
     floor = Floor.zeros()
     if A:
@@ -155,9 +149,7 @@ def above(floor: Floor, A: Radians, E: Radians) -> bool:
 @compiled
 def of_azimuth(floor: Floor, limits: LimitsParameters, A: Radians, E: Radians) -> Ends:
     """Return the Ends of the azimuth, now at A: its limits, or the places where the floor rises above the elevation E.
-
-    If the floor at A is above E already, the azimuth may leave: its Ends are then the limits.
-    """
+    If the floor at A is above E already, the azimuth may leave: its Ends are then the limits."""
     if not floor.given or above(floor, A, E):
         return Ends(limits.low, limits.high)
     # first, last: outermost cells up to which the floor is not above E; CELL_COUNT cells are a whole turn.
@@ -175,10 +167,8 @@ def of_azimuth(floor: Floor, limits: LimitsParameters, A: Radians, E: Radians) -
 
 @compiled
 def of_elevation(floor: Floor, limits: LimitsParameters, A: Radians, ahead: Radians, target: Radians) -> Ends:
-    """Return the Ends of the elevation: above the floor on the whole way of the azimuth.
-
-    A: azimuth now; ahead: azimuth at which the axis can stop; target: azimuth to which the axis goes.
-    """
+    """Return the Ends of the elevation: above the floor on the whole way of the azimuth. A: azimuth now; ahead:
+    azimuth at which the axis can stop; target: azimuth to which the axis goes."""
     if not floor.given:
         return Ends(limits.low, limits.high)
     top = max(highest(floor, A, ahead), highest(floor, A, target)) + FLOOR_CLEARANCE_RAD
@@ -195,11 +185,8 @@ def ends(constants: 'Constants', inputs: Inputs, azimuth: Radians) -> tuple[Ends
 
 @compiled
 def by_hand(constants: 'Constants', inputs: Inputs, azimuth: Radians) -> tuple[Ends, Ends]:
-    """Return (Ends of the azimuth, Ends of the elevation) of a point that an operator moves by hand.
-
-    azimuth: azimuth of the point. The result differs from `ends` in one respect: the azimuth of the point goes on
-    wherever the elevation can rise above the floor.
-    """
+    """Return (Ends of the azimuth, Ends of the elevation) of a point at `azimuth` that an operator moves by hand: as
+    `ends`, but the azimuth of the point goes on wherever the elevation can rise above the floor."""
     _, of_elevation_now = ends(constants, inputs, azimuth)
     azimuth_limits, highest_elevation = constants.axis[0].p.limits, constants.axis[1].p.limits.high
     return of_azimuth(constants.floor, azimuth_limits, inputs.position[0], highest_elevation), of_elevation_now

@@ -1,7 +1,4 @@
-"""The table of filter kinds, which the parameter acu.AXIS.filter.kind selects.
-
-Each row defines the bank: the motion models of the filter of one axis, and its gains.
-"""
+"""The table of filter kinds, which the parameter acu.AXIS.filter.kind selects. A kind makes the bank of an axis."""
 import functools
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
@@ -71,10 +68,8 @@ FILTER_KINDS = {
 
 
 def named_models(names: str) -> tuple[str, ...]:
-    """Return the names of the models in a text such as 'cv ca', in the order of MODEL_NAMES.
-
-    Raise ParameterError for a wrong text.
-    """
+    """Return the names of the models in a text such as 'cv ca', in the order of MODEL_NAMES. Raise ParameterError for
+    a wrong text."""
     models = names.split()
     if not (2 <= len(models) == len(set(models)) and set(models) <= set(MODEL_NAMES)):
         raise ParameterError(f"models = '{names}': must be two or more of {', '.join(MODEL_NAMES)}, each once")
