@@ -207,7 +207,8 @@ def _observe(state: State, constants: Constants, inputs: Inputs, outputs: Output
     flags = signals.Flag.STEP_GAP if silence else 0
     flags |= tracking.take_encoders(state.tracking.encoders, inputs) | _take_attitude(state, constants, inputs)
     flags |= _take_receiver(state, constants, inputs, outputs, way)
-    flags |= direction.take_preset(state.guidance.preset, inputs)
+    if inputs.preset_valid and not direction.put(state.guidance.preset, inputs.preset):
+        flags |= signals.Flag.PRESET
     drive_watch.watch_motion(state.unasked, state.stamp, inputs.velocity, constants.p.unasked_rate,
                              silence or not inputs.drive_ready)
     if int(constants.axis[0].p.controller) != position_loop.CONTROLLER_BEAM:

@@ -1,22 +1,23 @@
 """The monitors that detect wrong errors of the receiver: divergence, roughness, repetition, sign of the slope.
 
-Divergence: the estimate moves away from the target, and the antenna follows the estimate. The mean
+Divergence: the estimate moves away from the target, and the antenna follows the estimate. The mean m is 1 while the
+innovations nu of both angles are as large as the filter expects by their variances S:
 
     m = mean over the last errors of (nu_A^2 / S_A + nu_E^2 / S_E) / 2
 
-is 1 while the innovations nu of both angles are as large as the filter expects by their variances S. An error signal
-with the wrong sign, with rotated axes or with a gain three times too high drives the antenna away from its target.
-Then m becomes large before the beam leaves the target, and it is still large when the signal is lost. In this case
-autotrack must not coast on the wrong estimate.
+An error signal with the wrong sign, with rotated axes or with a gain three times too high drives the antenna away from
+its target. Then m becomes large before the beam leaves the target, and it is still large when the signal is lost. In
+this case autotrack must not coast on the wrong estimate.
 
-Roughness: errors that are only noise change far more from one to the next than the model expects. The mean
+Roughness: errors that are only noise change far more from one to the next than the model expects. The mean q of both
+axes is 1 for white noise of the variance R by the model of the receiver:
 
     q = mean over the last errors of (nu_k - nu_k-1)^2 / 2R
 
-of both axes is 1 for white noise of the variance R by the model of the receiver (von Neumann, Distribution of the
-ratio of the mean square successive difference to the variance, Annals of Mathematical Statistics 12 (1941) 367). Slow
-changes cancel in the difference: a target that turns, a slope of the wrong sign, a bias. The gate of `receiver_error`
-rejects all errors while q is above it, because some noisy errors would pass the gate alone and mislead the filter.
+Slow changes cancel in the difference: a target that turns, a slope of the wrong sign, a bias. The gate of
+`receiver_error` rejects all errors while q is above it, because some noisy errors would pass the gate alone and
+mislead the filter. Source: von Neumann, Distribution of the ratio of the mean square successive difference to the
+variance, Annals of Mathematical Statistics 12 (1941) 367.
 
 Repetition: measured errors have noise and change with the direction of the beam. Errors that stay equal while the beam
 moves are therefore repeated, and the filter must not use them.
@@ -249,9 +250,8 @@ def _reversed(J: Pair, other: Pair) -> bool:
 @compiled
 def take_slope(state: SlopeSign, t: Seconds, beam: Beam, error: tuple[Radians, Radians], variance: Radians2,
          gap: Seconds) -> bool:
-    """Take an error (cross-elevation, elevation) of variance R; return True if the slope of an axis is reversed. t,
-    beam: time and direction at which the error was measured; gap: time without errors after which the lines
-    restart."""
+    """Take an error (cross-elevation, elevation) of variance R, measured at t with the beam; return True if the slope
+    of an axis is reversed. The lines restart after the time `gap` without errors."""
     T = t - state.stamp
     if T <= 0.0:
         return False

@@ -176,8 +176,8 @@ def _measured_direction(state: Target, params: 'SharedParameters', mat_ed: Rotat
 @compiled
 def _measured_rates(state: Target, deck: Attitude, inputs: Inputs,
                     at: Pointing) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return (azimuth rate, elevation rate) of the target in the frame of the filter: rates of the antenna plus those
-    of the receiver error, with the deck and the antenna `at` the instant of the error."""
+    """Return (azimuth rate, elevation rate) of the target in the frame of the filter. They are the sum of the rates of
+    the antenna and of the receiver error; deck, at: when the error was measured."""
     n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, inputs.cross_elevation, inputs.elevation,
                                   inputs.error_rate[0], inputs.error_rate[1])
     v, dv = lever_arm.to_ins(state.lever_arm, Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]))

@@ -5,9 +5,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from acu_tracker import signals
 from acu_tracker.geometry.vector import AxisMotion, Motion
-from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Floats, Pair, Pairs, Records, Seconds, Times
 from pedestal_common.record import Record
@@ -48,6 +46,15 @@ def set_chord(record: Records, axis: int, begins: Seconds, ends: Seconds, angles
 
 
 @compiled
+def put(direction: Direction, angle: Pair) -> bool:
+    """Replace the direction by angles [rad] that do not move; return False, without a change, if one is not finite."""
+    if not math.isfinite(angle[0] + angle[1]):
+        return False
+    direction.angle[0], direction.angle[1], direction.moves = angle[0], angle[1], 0.0
+    return True
+
+
+@compiled
 def valid_at(direction: Direction, t: Seconds) -> bool:
     """Return True if the direction is valid at t."""
     return t - direction.stamp <= direction.holds
@@ -61,14 +68,3 @@ def motion_at(direction: Direction, t: Seconds) -> Motion:
     moving = 1.0 if since < direction.moves else 0.0
     return Motion(AxisMotion(direction.angle[0] + direction.rate[0] * moved, direction.rate[0] * moving, 0.0),
                   AxisMotion(direction.angle[1] + direction.rate[1] * moved, direction.rate[1] * moving, 0.0))
-
-
-@compiled
-def take_preset(preset: Direction, inputs: Inputs) -> int:
-    """Take a new preset, if one has come. Return signals.Flag.PRESET if it is not finite, else 0."""
-    if not inputs.preset_valid:
-        return 0
-    if not math.isfinite(inputs.preset[0] + inputs.preset[1]):
-        return signals.Flag.PRESET
-    preset.angle[0], preset.angle[1], preset.moves = inputs.preset[0], inputs.preset[1], 0.0
-    return 0

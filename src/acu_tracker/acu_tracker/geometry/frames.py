@@ -67,8 +67,11 @@ def fixed_rates(w: Vector, A: Radians, E: Radians) -> tuple[RadiansPerSecond, Ra
 @compiled
 def earth_rates(attitude: Attitude, u: Vector, du: Vector) -> tuple[RadiansPerSecond, RadiansPerSecond]:
     """Return the rates (dA, dE), in the frame to which attitude.mat rotates, of a direction that is measured on the
-    deck. u, du: unit vector (FLU) of the direction and its rate on the deck [1/s]. The rate of the unit vector in the
-    earth frame is M (du + w x u)."""
+    deck.
+
+    u, du: unit vector (FLU) of the direction and its rate on the deck [1/s]. In the earth frame the latter is M (du +
+    w x u).
+    """
     wu = cross(attitude.w, u)
     du = Vector(du.x + wu.x, du.y + wu.y, du.z + wu.z)
     motion = earth_angles(LineOfSight(rotated(attitude.mat, u), rotated(attitude.mat, du), ZERO_VECTOR))

@@ -2,8 +2,8 @@
 range.
 
 Because the antenna of a rolling ship moves, a near target appears to move by the angle |r| / range. Seen from the INS
-the target does not move so. With a measured range the filter uses the line of sight from the INS: R = |rho u + r|, for
-the ranges R from the INS and rho from the antenna, and the unit vector u from the antenna to the target.
+the target does not move so. With a measured range the filter uses the line of sight from the INS. The ranges R from
+the INS and rho from the antenna follow R = |rho u + r|; u: unit vector from the antenna to the target.
 """
 import math
 

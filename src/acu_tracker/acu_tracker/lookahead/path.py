@@ -17,8 +17,8 @@ from pedestal_common.quantities import Floats, Matrix3, Radians, RadiansPerSecon
 PATH_ROW_COUNT, PATH_COLUMN_COUNT = 1025, 6  # largest number of rows of a path, and number of its columns
 
 UP_COLUMN, AZIMUTH_COLUMN, LEAST_AZIMUTH_COLUMN, LARGEST_AZIMUTH_COLUMN = range(2, PATH_COLUMN_COUNT)
-"""Columns of a path: upward component of the unit vector [-]; azimuth, without jumps of a turn [rad]; least and
-largest azimuth from this row to the end of the path, or to the end of the program [rad]."""
+"""Columns of a path: upward component of the unit vector [-]; azimuth, without jumps of a turn [rad]. The last two are
+the least and largest azimuth from this row to the end of the path, or to the end of the program."""
 
 
 class Path(NamedTuple):

@@ -118,8 +118,10 @@ def motion_at(slew: Slew, t: Seconds, target: Motion, level: AxisMotion, highest
 @compiled
 def peak_rate(D: Radians, T: Seconds, v1: RadiansPerSecond, v2: RadiansPerSecond,
               a: RadiansPerSecond2) -> RadiansPerSecond:
-    """Return the peak rate v of a slew through D in T, from v1 to v2; inf if T is too short. v is the smaller root of
-    D = v T - (v - v1)^2 / (2 a) - (v - v2)^2 / (2 a)"""
+    """Return the peak rate v of a slew through D in T, from v1 to v2; inf if T is too short. It is the smaller root of
+
+        D = v T - (v - v1)^2 / (2 a) - (v - v2)^2 / (2 a)
+    """
     half = 0.5 * (v1 + v2 + a * T)
     root = half * half - 0.5 * (v1 * v1 + v2 * v2) - a * D
     return half - math.sqrt(root) if root >= 0.0 else math.inf

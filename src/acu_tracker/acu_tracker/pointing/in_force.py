@@ -16,9 +16,11 @@ if TYPE_CHECKING:
 
 
 class ModelInForce:
-    """The model in force, or the one that will be when its change is complete. refused: the reason why the model of
-    the parameters is not in force; '' if it is. reports: of acu/pointing, by the number `report` of
-    model.PointingRecord, the `record` of the law in the methods."""
+    """The model in force, or the one that will be when its change is complete.
+
+    refused: the reason why the model of the parameters is not in force; '' if it is. The `reports` of acu/pointing are
+    in the order of the number `report` of model.PointingRecord, the `record` in the methods.
+    """
 
     def __init__(self, parameters: 'AcuParameters') -> None:
         self._antenna, self._model, self.refused = parameters.antenna, parameters.pointing, ''

@@ -71,9 +71,11 @@ class Reading(NamedTuple):
 
 
 class Air:
-    """The air by RefractionParameters and by readings. on: directions are corrected; due: stamp from which on `update`
-    may change the weather, inf before the first reading; revision: number of the changes of the weather; dropped:
-    number of dropped readings by (topic, reason)."""
+    """The air by RefractionParameters and by readings.
+
+    on: directions are corrected; due: stamp from which on `update` may change the weather, inf before the first
+    reading; revision: number of the changes of the weather. The dropped readings are counted by (topic, reason).
+    """
 
     def __init__(self, parameters: RefractionParameters) -> None:
         self.parameters, self.on = parameters, parameters.kind != 'none'

@@ -60,8 +60,8 @@ def way(bridge: Bridge, program: ProgramTrack) -> Way:
 
 @compiled
 def _rotated(path: Way, v: Vector) -> Vector:
-    """Return an ENU vector v of the program after the rotation, by the formula of Rodrigues: v cos + a x v + a (a.v) /
-    (1 + cos), for an axis a with the sine of the angle as its length."""
+    """Return an ENU vector v of the program after the rotation v cos + a x v + a (a.v) / (1 + cos) (formula of
+    Rodrigues). The length of the axis a is the sine of the angle."""
     axis = path.axis
     d = cross(axis, v)
     k = dot(axis, v) / (1.0 + path.cos)

@@ -92,8 +92,8 @@ def _slope(program: ProgramTrack, i: int, axis: int) -> RadiansPerSecond:
 
 @compiled
 def _hermite(y0: float, d: float, m0: float, m1: float, x: float, T: Seconds) -> AxisMotion:
-    """Return the motion of the cubic polynomial on an interval of T. y0, d: value at its begin, and its change; m0,
-    m1: slopes at begin and end, times T; x: place in it, from 0 to 1."""
+    """Return the motion of the cubic polynomial from y0 to y0 + d in T, at the place x from 0 to 1; m0, m1: slopes at
+    its ends, times T."""
     c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
     return AxisMotion(y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
                       (2.0 * c2 + 6.0 * x * c3) / (T * T))

@@ -31,8 +31,8 @@ MIN_IMPROVEMENT_DB = 2.0  # least increase of the level for which the beam moves
 
 @compiled
 def expected_level(cn0_dbhz: DecibelHertz, reference_range: Meters, exponent: float, distance: Meters) -> DecibelHertz:
-    """Return the level that is expected on the axis of the beam; distance: NaN if it is unknown, the result is then
-    cn0_dbhz, the level at the reference range; exponent: power of the range with which the level falls [-]."""
+    """Return the level that is expected on the axis of the beam. It falls with the power `exponent` of the range from
+    cn0_dbhz at reference_range; without a distance (NaN) it is cn0_dbhz."""
     if math.isnan(distance) or distance <= 0.0:
         return cn0_dbhz
     return cn0_dbhz - 10.0 * exponent * math.log10(distance / reference_range)

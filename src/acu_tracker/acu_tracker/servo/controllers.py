@@ -65,7 +65,7 @@ Therefore error = v T, whatever alpha, delay and smoothing are.
 
 In `type_2` the beam points at R(k+1/k), the prediction for the next step. The error itself is then the innovation, and
 on a ramp the error is 0. The form `tracked` needs no law of its own: the target filter takes y = beam in force +
-error, and the beam is the prediction of this filter for the middle of the interval in which the beam will be in force.
+error. The beam is the prediction of this filter for the middle of the interval in which the beam will be in force.
 
 notch: a filter of second order in the feedback, against a resonance of the structure; depth: its gain at w, the
 centre; width: damping ratio of the denominator. The discrete filter follows by the bilinear transformation, prewarped

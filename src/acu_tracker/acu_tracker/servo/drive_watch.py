@@ -135,8 +135,10 @@ def motion_beyond(envelope: Envelope, t: Seconds) -> bool:
 @compiled
 def command_motion(envelope: Envelope, i: int, rate: RadiansPerSecond, t: Seconds, dt: Seconds, hold: Seconds) -> None:
     """Take the rate command of axis i at t into the envelope; hold: longest time for which a command stays in force.
-    dt: time by which the envelope shrinks; at most a period, because a control unit that was late does not make up the
-    missed steps."""
+
+    The envelope shrinks for dt, at most a period, because a control unit that was late does not make up the missed
+    steps.
+    """
     a = min(dt / ENVELOPE_TIME_CONSTANT_S, 1.0)
     if rate >= envelope.high[i]:
         envelope.high[i], envelope.high_at[i] = rate, t

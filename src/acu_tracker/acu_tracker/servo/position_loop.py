@@ -103,8 +103,8 @@ def limited(wanted: RadiansPerSecond, before: RadiansPerSecond, dt: Seconds, rat
 
 @compiled
 def realised(command: RadiansPerSecond, dy: RadiansPerSecond) -> RadiansPerSecond:
-    """Return the part of a rate command that an axis realises while it moves at the rate dy: 0 if the axis moves
-    against the command, the command if the axis is faster, and else dy."""
+    """Return the part of a rate command that an axis realises while it moves at the rate dy. The part is 0 if the axis
+    moves against the command, the command if the axis is faster, and else dy."""
     return min(max(dy, min(command, 0.0)), max(command, 0.0))
 
 

@@ -185,8 +185,8 @@ def ends(constants: 'Constants', inputs: Inputs, azimuth: Radians) -> tuple[Ends
 
 @compiled
 def by_hand(constants: 'Constants', inputs: Inputs, azimuth: Radians) -> tuple[Ends, Ends]:
-    """Return (Ends of the azimuth, Ends of the elevation) of a point at `azimuth` that an operator moves by hand: as
-    `ends`, but the azimuth of the point goes on wherever the elevation can rise above the floor."""
+    """Return (Ends of the azimuth, Ends of the elevation) of a point that an operator moves by hand. In contrast to
+    `ends`, its azimuth goes on wherever the elevation can rise above the floor."""
     _, of_elevation_now = ends(constants, inputs, azimuth)
     azimuth_limits, highest_elevation = constants.axis[0].p.limits, constants.axis[1].p.limits.high
     return of_azimuth(constants.floor, azimuth_limits, inputs.position[0], highest_elevation), of_elevation_now

@@ -1,11 +1,10 @@
 """Motion models of a target: how its angle, rate and acceleration on one axis change until the next measurement.
 
-Each model gives the matrices F (transition over T) and Q (process noise) of the Kalman filter. alpha is the reciprocal
-of the duration of an acceleration [1/s], x = alpha T; abar and sigma_a are the mean of the acceleration and its
-standard deviation [rad/s2]. In the model cv the acceleration stays 0. The model current_statistical is that of paper
-000, eq. 2, 4, 5. Several models ca with growing noise form a ladder; each of these models is a rung.
-
-docs/extending.md lists what another model needs.
+Each model gives the matrices F (transition over T) and Q (process noise) of the Kalman filter. The reciprocal of the
+duration of an acceleration is alpha [1/s], and x = alpha T. The mean of the acceleration is abar, its standard
+deviation sigma_a [rad/s2]. In the model cv the acceleration stays 0. The model current_statistical is that of paper
+000, eq. 2, 4, 5. Several models ca with growing noise form a ladder; each of these models is a rung. docs/extending.md
+lists what another model needs.
 
 The print of paper 000 has two errors, which are corrected here. Its factor of q22 is 1/(2 alpha^2); correct is 1/(2
 alpha^3). Its sigma_a^2 (eq. 5) contains a_max - abar; correct is the square (a_max - abar)^2.

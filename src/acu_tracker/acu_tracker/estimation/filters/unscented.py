@@ -101,9 +101,11 @@ def constants(params: 'UkfParameters') -> Records:
 
 @compiled
 def _spread(p: Floats, along: Vector, onward: Vector, variances: AxisVariances) -> None:
-    """Add the variances of one coordinate (azimuth, elevation or range) and of its rate to the covariance p. along:
-    change of the position per unit of the coordinate, and of the velocity per unit of its rate; onward: change of the
-    velocity per unit of the coordinate."""
+    """Add the variances of one coordinate (azimuth, elevation or range) and of its rate to the covariance p.
+
+    along: change of the position per unit of the coordinate; onward: change of the velocity per unit of the
+    coordinate.
+    """
     s11, s12, s22 = variances
     for i in range(3):
         for j in range(3):
