@@ -102,8 +102,7 @@ def sigma_across(azimuth_variance: Radians2, elevation_variance: Radians2, eleva
 
 @compiled
 def coast_over(since: Seconds, coast_time: Seconds, sigma: Radians, beamwidth: Radians) -> bool:
-    """Return True if coasting ends: after coast_time, or with a sigma (across the line of sight) above half a
-    beamwidth."""
+    """Return True if coasting ends: after coast_time, or with a sigma above half a beamwidth."""
     return since > coast_time or sigma > 0.5 * beamwidth
 
 

@@ -108,8 +108,8 @@ def locked(target: Target, params: TrackerParameters, since_accepted: Seconds) -
 
 @compiled
 def outlook(target: Target, constants: Constants, t: Seconds) -> Motion:
-    """Return the Motion that the filter predicts for t, in its frame; before the last accepted measurement, the Motion
-    there."""
+    """Return the Motion in the frame of the filter predicted for t, at the earliest for the last accepted
+    measurement."""
     return target_filter.outlook(target.filter, constants.filter, max(t - target.stamp, 0.0))
 
 

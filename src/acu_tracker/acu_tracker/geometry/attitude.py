@@ -189,8 +189,7 @@ def rotation_angle(w: RadiansPerSecond, dw: RadiansPerSecond2, T: Seconds) -> Ra
 
 @compiled
 def rotated(q: Xyzw | Quaternion, r: Xyz) -> Xyzw:
-    """Return q (x) exp(r/2), the quaternion of a deck that had the attitude q and rotated by the vector r [rad],
-    FLU."""
+    """Return q (x) exp(r/2): a deck of attitude q after a rotation by the vector r [rad], FLU."""
     rx, ry, rz = r
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
     k = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
@@ -199,8 +198,7 @@ def rotated(q: Xyzw | Quaternion, r: Xyz) -> Xyzw:
 
 @compiled
 def _repeats(deck: DeckAttitude, q: Quaternion, w: Vector3) -> bool:
-    """Keep a sample of the INS. Return True if it equals the previous one although its rates show a turning deck: such
-    an INS repeats its last message."""
+    """Keep a sample; return True if it repeats the previous one although its rates show a turning deck."""
     same, turns = True, False
     for i in range(7):
         x = q[i] if i < 4 else w[i - 4]
@@ -298,8 +296,7 @@ def at(deck: DeckAttitude, params: 'SharedParameters', t: Seconds) -> tuple[bool
 
 @compiled
 def on_deck(deck: DeckAttitude, params: 'SharedParameters', t: Seconds, motion: Motion) -> Motion:
-    """Return the Motion in deck angles at t of a Motion in earth angles; unchanged ashore, or without a known
-    attitude."""
+    """Return the Motion in deck angles at t of one in earth angles; unchanged ashore or without an attitude."""
     known, now = at(deck, params, t)
     if deck.stabilised and known:
         return angles(frames.on_deck(now, line_of_sight(motion)))

@@ -1,5 +1,5 @@
-"""A commanded direction, extrapolated by its rates for a limited time: of the modes preset (deck angles) and slave
-(earth angles)."""
+"""A commanded direction, extrapolated by its rates for a limited time: of preset (deck angles) or slave (earth
+angles)."""
 import math
 
 import numpy as np

@@ -57,8 +57,7 @@ def on_deck(attitude: Attitude, sight: LineOfSight) -> LineOfSight:
 
 @compiled
 def fixed_rates(w: Vector, A: Radians, E: Radians) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return the rates (dA, dE) of the deck angles A, E of an earth-fixed direction; w: rate of the deck [rad/s],
-    FLU."""
+    """Return the rates (dA, dE) of the deck angles A, E of an earth-fixed direction; w: rate of the deck, FLU."""
     u = Vector(*pointing.direction(A, E))
     motion = angles(LineOfSight(u, times(-1.0, cross(w, u)), ZERO_VECTOR))
     return motion.azimuth.rate, motion.elevation.rate

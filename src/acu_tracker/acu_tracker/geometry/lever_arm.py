@@ -62,8 +62,7 @@ def from_ins(state: LeverArm, arm: LeverArmParameters, measured: Meters, running
 
 @compiled
 def to_antenna(state: LeverArm, sight: LineOfSight) -> LineOfSight:
-    """Return the LineOfSight from the antenna of one from the INS, both FLU. r / R is subtracted, with R taken as
-    constant."""
+    """Return the LineOfSight from the antenna of one from the INS, both FLU: minus r / R, with R taken as constant."""
     return normalised(minus(sight.u, vector(state.arm)), sight.du, sight.ddu)
 
 

@@ -136,8 +136,7 @@ def line_of_sight(motion: Motion) -> LineOfSight:
 
 @compiled
 def north_west_up(v: Vector) -> Vector:
-    """Return the north-west-up components of an ENU vector. A vector that line_of_sight made of deck angles becomes
-    one in FLU."""
+    """Return the north-west-up components of an ENU vector; FLU of one that line_of_sight made of deck angles."""
     return Vector(v.y, -v.x, v.z)
 
 
@@ -176,8 +175,7 @@ def normalised(v: Vector, dv: Vector, ddv: Vector) -> LineOfSight:
 
 @compiled
 def motion_of_position(p: Vector, v: Vector, a: Vector) -> Motion:
-    """Return the Motion in earth angles of a point at p [m] (ENU) with the velocity v [m/s] and the acceleration a
-    [m/s2]."""
+    """Return the Motion in earth angles of a point at p (ENU) with the velocity v and the acceleration a."""
     r = math.sqrt(dot(p, p))
     u = Vector(p.x / r, p.y / r, p.z / r)
     dr = dot(u, v)

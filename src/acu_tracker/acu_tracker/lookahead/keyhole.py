@@ -144,8 +144,8 @@ def _evaluate(slew: Slew, passage: Passage, samples: int) -> None:
 
 @compiled
 def _attempt(slew: Slew, passage: Passage, turn: float, t1: Seconds, samples: int) -> tuple[bool, Seconds]:
-    """Fit, unwrap and evaluate a slew that leaves the target at t1. Return (True if there is one, its cost: inf
-    outside the limits of the azimuth)."""
+    """Fit, unwrap and evaluate a slew that leaves the target at t1. Return (feasible, cost: inf outside the
+    limits)."""
     if t1 < passage.path.t0 or not _fit(slew, passage, turn, t1):
         return False, math.inf
     _unwrap(slew, passage.path, passage.azimuth)
@@ -172,6 +172,32 @@ def find(path: Path, rate: RadiansPerSecond, acceleration: RadiansPerSecond2) ->
 
 
 @compiled
+def _best_of_direction(trial: Slew, passage: Passage, turn: float, t_in: Seconds,
+                       width: Seconds) -> tuple[bool, Seconds]:
+    """Set `trial` to the best slew of a direction with t1 <= t_in; return (True if it is feasible, its cost).
+
+    A slew that meets the target before the path ends is feasible, even outside the limits. The first level covers the
+    whole interval, the next levels are finer about the best t1 so far. The last level repeats the best slew with more
+    samples.
+    """
+    feasible, centre, cost, step = False, t_in - 0.5 * SLEW_CANDIDATE_COUNT * width, math.inf, width
+    for level in range(REFINEMENT_COUNT + 1):
+        around = 0 if level == REFINEMENT_COUNT else SLEW_CANDIDATE_COUNT // 2 if level == 0 else 4
+        middle = centre
+        for k in range(-around, around + 1):
+            t1 = min(middle + k * step, t_in)
+            samples = SLEW_SAMPLE_COUNT if around > 0 else 10 * SLEW_SAMPLE_COUNT
+            possible, here = _attempt(trial, passage, turn, t1, samples)
+            feasible |= possible
+            if here < cost:
+                centre, cost = t1, here
+        if cost == math.inf:
+            break
+        step *= 0.25
+    return feasible, cost
+
+
+@compiled
 def plan(work: MutableSequence[Slew], path: Path, azimuth: Radians, limits: SlewLimits, tilt: Radians, previous: Slew,
          planned: bool) -> int:
     """Find the keyhole of a completed Path and the best slew through it; return one of the outcomes PLAN_.
@@ -194,28 +220,12 @@ def plan(work: MutableSequence[Slew], path: Path, azimuth: Radians, limits: Slew
     # t1 is searched from t_in back by the time of a whole revolution, because an earlier t1 has no advantage.
     width = min(t_in - path.t0, 2.0 * math.pi / limits.rate) / SLEW_CANDIDATE_COUNT
     # Side 0 is the direction in which the target itself turns. least: cost of the better direction; other: cost of the
-    # other direction; feasible: True if a slew on side 0 meets the target before the path ends, even outside the
-    # limits.
-    feasible, least, other = False, math.inf, math.inf
+    # other direction.
+    least, other = math.inf, math.inf
     for side in range(2):
         turn = math.copysign(1.0, own_travel) * (1.0 - 2.0 * side)
-        centre, cost, step = t_in - 0.5 * SLEW_CANDIDATE_COUNT * width, math.inf, width
-        for level in range(REFINEMENT_COUNT + 1):
-            # The first level covers the whole interval, the next levels are finer about the best t1 so far. The last
-            # level repeats the best slew with more samples. `trial` is then the best slew of this direction.
-            around = 0 if level == REFINEMENT_COUNT else SLEW_CANDIDATE_COUNT // 2 if level == 0 else 4
-            middle = centre
-            for k in range(-around, around + 1):
-                t1 = min(middle + k * step, t_in)
-                samples = SLEW_SAMPLE_COUNT if around > 0 else 10 * SLEW_SAMPLE_COUNT
-                possible, here = _attempt(trial, passage, turn, t1, samples)
-                feasible |= possible and side == 0
-                if here < cost:
-                    centre, cost = t1, here
-            if cost == math.inf:
-                break
-            step *= 0.25
-        if not feasible:
+        feasible, cost = _best_of_direction(trial, passage, turn, t_in, width)
+        if side == 0 and not feasible:
             return PLAN_BEYOND_PATH
         if cost < math.inf:
             other = max(least, cost)

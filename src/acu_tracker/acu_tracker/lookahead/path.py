@@ -36,8 +36,7 @@ MIN_ZENITH_DISTANCE_SQUARED = 1e-12
 
 @compiled
 def along_program(path: Path, mat: Matrix3, way: bridge.Way) -> int:
-    """Write the unit vectors of the path of a Way; return the number of rows that the program covers. mat: levelled
-    deck -> earth."""
+    """Write the unit vectors of a Way; return the number of rows that it covers. mat: levelled deck -> earth."""
     level = rotation(mat)
     for i in range(len(path.rows)):
         t = path.t0 + i * path.h

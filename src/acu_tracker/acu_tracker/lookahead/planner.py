@@ -258,8 +258,7 @@ def _announce(planner: Planner, forecast: int) -> None:
 
 @compiled
 def _find_sectors(planner: Planner, sectors: Vectors3, path: paths.Path) -> None:
-    """Find the first time in which a sector hides the target. A time that begins after the end of the previous one
-    counts as a new blockage."""
+    """Find the first time in which a sector hides the target; one after the previous one counts as a new blockage."""
     first = last = -1
     for i in range(len(path.rows)):
         A, E = angles(path.rows[i, 0], path.rows[i, 1], path.rows[i, 2])

@@ -12,7 +12,7 @@ from pedestal_common.record import Record
 
 
 class Slew(Record):
-    """A planned slew. The index 1 marks its begin, where it leaves the target; the index 2 its end, where it meets the
+    """A planned slew, from its begin (index 1), where it leaves the target, to its end (2), where it meets the
     target."""
     t1: Seconds
     t2: Seconds
@@ -34,8 +34,7 @@ class Slew(Record):
 
 @compiled
 def azimuth_at(slew: Slew, t: Seconds) -> AxisMotion:
-    """Return the motion of the azimuth at t1 <= t <= t2: it accelerates to its peak rate, keeps this rate, and
-    decelerates."""
+    """Return the motion of the azimuth at t1 <= t <= t2: it accelerates to the peak, keeps it, decelerates."""
     # begun, left: time since t1 and until t2; rise, fall: duration of the acceleration and of the deceleration.
     sign = math.copysign(1.0, slew.peak)
     a = sign * slew.acceleration

@@ -42,8 +42,7 @@ class ModelInForce:
 
     def replace(self, record: np.void, arguments: Mapping[str, Value], now: Nanoseconds,
                 utc: datetime.datetime | None) -> Reply:
-        """Take another model, its fields by name, gradually, and return the Reply. Raise ValueError if it is
-        refused."""
+        """Take another model, its fields by name, gradually. Raise ValueError if it is refused."""
         taken = PointingParameters(**arguments)
         taken.check_antenna(self._antenna)
         taken.check_date(utc)

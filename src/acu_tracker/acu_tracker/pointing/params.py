@@ -11,8 +11,8 @@ from pedestal_common.quantities import Floats, Seconds
 
 @dataclasses.dataclass(frozen=True)
 class PointingParameters(Parameters):
-    """Pointing model: the terms are added to the wanted direction and give the angles of the encoders, as in
-    pedestal_common.geometry.pointing_model."""
+    """Pointing model: terms that turn the wanted direction into encoder angles
+    (pedestal_common.geometry.pointing_model)."""
     p1: float = parameter(0.0, -10.0, 10.0, 'deg', 'zero of the azimuth encoder minus zero of the azimuth')
     p3: float = parameter(0.0, -6.0, 6.0, 'deg', 'deviation of the two axes from 90 deg')
     p4: float = parameter(0.0, -6.0, 6.0, 'deg', 'beam to the normal of the elevation axis, collimation')
@@ -78,7 +78,7 @@ class PointingParameters(Parameters):
                                  'the model belongs to another antenna')
 
     def unchecked(self, antenna: str) -> str:
-        """Return a text that the antenna of the model is not checked, because `antenna`, this one, has no name; ''
+        """Return a warning that the antenna of the model is not checked, because this one has no name; ''
         otherwise."""
         if not self.antenna or antenna:
             return ''

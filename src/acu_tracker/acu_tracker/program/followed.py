@@ -130,8 +130,7 @@ class Followed:
         return apparent
 
     def bend(self, parts: np.void, slave: AnyRecord) -> None:
-        """Add the refraction to a commanded direction of the mode slave (None: no direction), now and every
-        BEND_INTERVAL_S."""
+        """Add the refraction to a direction of the mode slave (None: none), now and every BEND_INTERVAL_S."""
         self.slave = Slave(slave, NEVER_DUE_NS)
         if (slave is not None and math.isfinite(slave['stamp']) and self.air.on
                 and self._refraction.slave == 'geometric'):

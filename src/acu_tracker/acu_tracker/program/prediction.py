@@ -200,8 +200,7 @@ class Predictor:
         return self.air.raised(times, self._sun_angles(times))
 
     def _table(self, angles_at: Callable[[Times], Pairs], stamp: Seconds, interval: Seconds) -> Predicted:
-        """Return the Predicted for a stamp; angles_at: returns azimuth and true elevation; interval: time between two
-        rows."""
+        """Return the Predicted for a stamp; angles_at: azimuth and true elevation; interval: of the rows."""
         times = np.floor(stamp) - TABLE_LEAD_TIME_S + interval * np.arange(TABLE_ROW_COUNT)
         try:
             angles = angles_at(times)
@@ -216,8 +215,7 @@ class Predictor:
                          float(times[down[-1] if down.size else late[-1]]))
 
     def _next_rise(self, angles_at: Callable[[Times], Pairs], stamp: Seconds) -> Seconds:
-        """Return the stamp at which the target next rises, accurate to a second; NaN without a rise within
-        RISE_SEARCH_SPAN_S."""
+        """Return the stamp of the next rise, accurate to a second; NaN without one within RISE_SEARCH_SPAN_S."""
         times = stamp + np.arange(0.0, RISE_SEARCH_SPAN_S, RISE_SEARCH_STEP_S)
         try:
             elevation = self.air.raised(times, angles_at(times))[:, 1]

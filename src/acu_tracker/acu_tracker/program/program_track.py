@@ -37,8 +37,7 @@ class ProgramTrackError(ValueError):
 
 
 def checked(times: ArrayLike, angles: ArrayLike) -> ProgramTrack:
-    """Return the ProgramTrack of times [s] and angles (n, 2) [rad]. Raise ProgramTrackError for a table that cannot be
-    followed."""
+    """Return the ProgramTrack of times and angles (n, 2) [rad]; raise ProgramTrackError if it cannot be followed."""
     times, angles = np.array(times, float), np.array(angles, float)
     if times.ndim != 1 or angles.shape != (len(times), 2):
         raise ProgramTrackError(f'program track: times {times.shape}, angles {angles.shape}; must be (n,), (n, 2)')
@@ -70,16 +69,14 @@ def status(program: ProgramTrack, t: Seconds) -> int:
 
 @compiled
 def _difference(program: ProgramTrack, i: int, axis: int) -> Radians:
-    """Return the change of an angle (0 azimuth, 1 elevation) from row i to the next; the azimuth changes the short way
-    round."""
+    """Return the change of an angle (0 azimuth, the short way round, 1 elevation) from row i to the next."""
     difference = program.angles[i + 1, axis] - program.angles[i, axis]
     return wrap(difference) if axis == 0 else difference
 
 
 @compiled
 def _slope(program: ProgramTrack, i: int, axis: int) -> RadiansPerSecond:
-    """Return the rate of an angle at row i, from the parabola through this row and its neighbours, or through the
-    nearest three rows."""
+    """Return the rate of an angle at row i, from the parabola through the three rows about it or nearest to it."""
     times = program.times
     if len(times) == 2:
         return _difference(program, 0, axis) / (times[1] - times[0])
@@ -188,8 +185,7 @@ TABLE_INDEX = tuple(TABLE_MODES.index(row) if row.table else 0 for row in modes.
 
 
 def shifted(track: ProgramTrack, offset: tuple[Seconds, Radians, Radians]) -> ProgramTrack:
-    """Return a ProgramTrack with an offset (time, azimuth, elevation) added to each row. The shifted elevations are
-    limited to the zenith."""
+    """Return a ProgramTrack with an offset (time, azimuth, elevation) added; elevations are limited to the zenith."""
     if not any(offset):
         return track
     time, *angles = offset

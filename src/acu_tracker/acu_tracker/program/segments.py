@@ -62,8 +62,7 @@ class Segments:
         self._pieces = [*kept, new]
 
     def _check_turnaround(self, before: ProgramTrack, after: ProgramTrack) -> None:
-        """Raise TurnaroundError if the mean rate or the mean acceleration of an axis from one segment to the next
-        exceeds its limit."""
+        """Raise TurnaroundError if the mean rate or acceleration of an axis on the way exceeds its limit."""
         time = after.times[0] - before.times[-1]
         for i, axis in enumerate(AXES):
             max_rate, max_acceleration = self._limits[i]
@@ -88,8 +87,7 @@ class Segments:
 
 
 def rows(message: Message) -> tuple[Times, Pairs]:
-    """Return (times since the stamp of the message, azimuth and elevation [rad]) of a JointTrajectory. Raise
-    ValueError if an axis or a position is missing."""
+    """Return (times since the stamp, angles) of a JointTrajectory; raise ValueError for a missing axis or position."""
     if not set(AXES) <= set(message.joint_names):
         raise ValueError(f'joint_names {message.joint_names}: must hold {" and ".join(AXES)}')
     columns = [message.joint_names.index(axis) for axis in AXES]

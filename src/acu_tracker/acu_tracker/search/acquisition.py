@@ -39,8 +39,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class SearchParameters(Parameters):
-    """Mode search: the beam waits at the last place, covers a small area, then the full area, for a number of
-    rounds."""
+    """Mode search: rounds of the small and the full area, after a wait at the last place."""
 
     pattern: str = choice('spiral', SEARCH_PATTERNS, 'search path; square and raster lie along the track')
     wait: float = parameter(2.5, 0.0, 600.0, 's', 'time at the last place, in which the noise is learnt')
@@ -165,8 +164,7 @@ def begin(state: Acquisition, mode: int, constants: 'Constants', t: Seconds, spr
 
 @compiled
 def begin_search(state: Acquisition, params: SearchParameters, beamwidth: Radians, t: Seconds, sigma: Radians) -> None:
-    """Start a search at t. The radius of the small area is at least 2 sigma, the standard deviation of the expected
-    place."""
+    """Start a search at t; the radius of the small area is at least 2 sigma (of the expected place)."""
     state.began = t
     state.radius = params.small * beamwidth
     if 2.0 * sigma > state.radius:

@@ -55,8 +55,7 @@ def look_around_place(i: int, beamwidth: Radians) -> tuple[Radians, Radians]:
 
 @compiled
 def best_place(levels: Floats) -> int:
-    """Return the number of the place with the highest level [dB-Hz]; 0 if none is better than the centre by more than
-    MIN_IMPROVEMENT_DB."""
+    """Return the number of the place with the highest level; 0 unless it gains more than MIN_IMPROVEMENT_DB."""
     highest = 0
     for i in range(1, 1 + LOOK_AROUND_PLACES):
         if levels[i] > levels[highest]:

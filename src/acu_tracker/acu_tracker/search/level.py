@@ -84,8 +84,7 @@ def thresholds(state: Level) -> Thresholds:
 
 @compiled
 def learn(state: Level, params: AcquisitionParameters, z: DecibelHertz, T: Seconds) -> None:
-    """Take a level z that was measured off the target, T after the last one. A level above the known noise is
-    ignored."""
+    """Take a level z off the target, T after the last one; a level above the known noise is ignored."""
     if known(state, params) and z > thresholds(state).detect:
         return
     state.samples += 1

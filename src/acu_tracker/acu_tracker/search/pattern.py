@@ -105,8 +105,7 @@ def spiral_length(theta: Radians, pitch: Radians) -> Radians:
 
 @compiled
 def _on_spiral(area: Area, t: Seconds) -> Point:
-    """Return the Point of the spiral at t. The length of the path grows with the speed v. Newton's method finds the
-    angle theta that belongs to the length."""
+    """Return the Point of the spiral at t: Newton's method finds the angle theta of its length, which grows with v."""
     v, k, end = area.speed, 0.5 * area.pitch / math.pi, _turn_of(area)
     length, rate = v * (t - 0.5 * SPEED_RISE_TIME_S), v
     if t < SPEED_RISE_TIME_S:
@@ -168,8 +167,7 @@ def _leg_length(area: Area, i: int) -> Radians:
 
 @compiled
 def _leg_time(area: Area, i: int) -> Seconds:
-    """Return the time from corner i - 1 to corner i, from rest to rest, with the acceleration v /
-    SPEED_RISE_TIME_S."""
+    """Return the time of the leg to corner i, from rest to rest, with the acceleration v / SPEED_RISE_TIME_S."""
     L, v = _leg_length(area, i), area.speed
     return L / v + SPEED_RISE_TIME_S if L > v * SPEED_RISE_TIME_S else 2.0 * math.sqrt(L * SPEED_RISE_TIME_S / v)
 

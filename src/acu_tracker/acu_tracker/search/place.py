@@ -66,8 +66,7 @@ def track(motion: Motion) -> Radians:
 
 @compiled
 def displaced(motion: Motion, offset: Point) -> Motion:
-    """Return the Motion of a beam at an offset (cross-elevation, elevation) from a direction with this Motion. The
-    accelerations of the pattern are neglected."""
+    """Return the Motion of a beam at an offset from a direction; the accelerations of the pattern are neglected."""
     n = line_of_sight.displaced_motion(motion.azimuth.angle, motion.elevation.angle, motion.azimuth.rate,
                                        motion.elevation.rate, offset.x, offset.y, offset.dx, offset.dy)
     beam = angles(LineOfSight(Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]), ZERO_VECTOR))

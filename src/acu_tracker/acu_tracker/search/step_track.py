@@ -21,8 +21,7 @@ from pedestal_common.record import Record
 
 @dataclasses.dataclass(frozen=True)
 class StepTrackParameters(Parameters):
-    """Parameters of the mode steptrack: the step of the GD 7200, a shorter cycle for faster targets, a smaller
-    deadband."""
+    """Mode steptrack: the step of the GD 7200, a shorter cycle for faster targets, a smaller deadband."""
 
     cycle: float = parameter(20.0, 1.0, 3600.0, 's', 'period of the climbs; 120 s in the GD 7200')
     step: float = parameter(0.08, 0.01, 0.3, 'beamwidths', 'step of the beam to either side')

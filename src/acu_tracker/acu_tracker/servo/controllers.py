@@ -95,8 +95,7 @@ if TYPE_CHECKING:
 
 @compiled
 def pid_gains(params: 'PidParameters | FeedforwardParameters') -> tuple[float, float]:
-    """Return (K_p [1/s], K_i [1/s2]). Because K_i = integral K_p^2, the parameter `integral` alone sets the
-    damping."""
+    """Return (K_p, K_i). Because K_i = integral K_p^2, the parameter `integral` alone sets the damping."""
     return params.bandwidth, params.integral * (params.bandwidth * params.bandwidth)
 
 

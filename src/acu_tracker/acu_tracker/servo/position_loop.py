@@ -79,8 +79,7 @@ MAX_DELAY_PHASE_RAD = 0.5  # largest bandwidth times delay of the command: the l
 
 
 def slowed(params: 'AxisParameters', delay: Seconds) -> 'AxisParameters':
-    """Return AxisParameters whose loops are stable with a delay of the command: no bandwidth above MAX_DELAY_PHASE_RAD
-    / delay."""
+    """Return AxisParameters with no bandwidth above MAX_DELAY_PHASE_RAD / delay, so that the loops are stable."""
     if delay == 0.0:
         return params
     loops = {name: getattr(params, name) for name in ('pid', 'feedforward', 'adrc')}
@@ -138,8 +137,7 @@ def _initialise_feedback(axis: AxisLoop, t_k: Seconds, y: Radians, dy: RadiansPe
 
 @compiled
 def stop(axis: AxisLoop, params: 'AxisParameters', dt: Seconds) -> Command:
-    """Return the Command that brings the rate to zero within the acceleration limit; reset the integral. dt: time
-    since the last command."""
+    """Return the Command that brings the rate to zero within the acceleration limit; reset the integral."""
     axis.command, _, acceleration_limited = limited(0.0, axis.command, dt, params.limits.rate,
                                                     params.limits.acceleration)
     axis.integral = 0.0

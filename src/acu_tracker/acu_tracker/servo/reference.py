@@ -95,8 +95,7 @@ def _around(history: History, t: Seconds) -> tuple[int, int, float]:
 
 @compiled
 def planned(reference: Reference, t: Seconds) -> AxisMotion:
-    """Return the AxisMotion that was planned for t: the angle by a cubic Hermite polynomial, rate and acceleration
-    linearly."""
+    """Return the AxisMotion planned for t: the angle by a cubic Hermite polynomial, rate and acceleration linearly."""
     i, j, f = rows = _around(reference.planned, t)
     a, b = reference.planned.sample[i], reference.planned.sample[j]
     T = reference.planned.stamp[j] - reference.planned.stamp[i]

@@ -40,8 +40,7 @@ def braking_distance(v: RadiansPerSecond, a: RadiansPerSecond2, t: Seconds) -> R
 
 @compiled
 def stopping_rate(d: Radians, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSecond:
-    """Return the largest rate towards an end d ahead from which an axis stops before the end; 0 beyond the end (d <=
-    0)."""
+    """Return the largest rate from which an axis stops before an end d ahead; 0 beyond the end (d <= 0)."""
     if d <= 0.0:
         return 0.0
     return math.sqrt(a * t * (a * t) + 2.0 * a * d) - a * t
@@ -49,15 +48,13 @@ def stopping_rate(d: Radians, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSec
 
 @compiled
 def inside(u: RadiansPerSecond, y: Radians, ends: Ends, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSecond:
-    """Return a rate command u limited so that an axis at y stops between its Ends. Beyond an end only motion back
-    inside is left."""
+    """Return a rate command u with which an axis at y stops between its Ends; beyond one it may only move back."""
     return min(max(u, -stopping_rate(y - ends.low, a, t)), stopping_rate(ends.high - y, a, t))
 
 
 @compiled
 def time_to(y: Radians, dy: RadiansPerSecond, ends: Ends) -> Seconds:
-    """Return the time until an axis at y reaches an end at its rate dy: 0 beyond an end, inf if the axis is at
-    rest."""
+    """Return the time until an axis at y reaches an end at its rate dy: 0 beyond an end, inf at rest."""
     if y > ends.high or y < ends.low:
         return 0.0
     if dy > 0.0:
@@ -112,8 +109,7 @@ def floor_at(text: str, A: Radians) -> Radians:
 
 
 def floor_table(text: str) -> Records:
-    """Return the Floor (1,) of a text as in FLOOR_DOC: the highest floor at both ends of a cell and at the points
-    inside it."""
+    """Return the Floor (1,) of a text: in each cell the highest of its ends and of the points inside it."""
     A, f = floor_points(text)
     floor = Floor.zeros()
     if A:

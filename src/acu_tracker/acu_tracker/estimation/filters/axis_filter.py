@@ -239,8 +239,7 @@ def _correlation(state: Filter, constants: Constants) -> float:
 
 @compiled
 def innovation(state: Filter, constants: Constants, measurement: AxisMeasurement) -> AxisInnovation:
-    """Return the innovation of a measurement against the prediction; that of the angle is the one of y_k - rho
-    y_k-1."""
+    """Return the innovation of a measurement; that of the angle is the one of y_k - rho y_k-1."""
     rho = _correlation(state, constants)
     x, P = expected(state)
     # u, U: mean and variance of the predicted difference y_k - rho y_k-1, without the noise of the angle; p12: its

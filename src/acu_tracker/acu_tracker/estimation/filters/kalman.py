@@ -71,8 +71,7 @@ def predicted_covariance(P: Symmetric, F: Transition, Q: Symmetric, T: Seconds) 
 
 @compiled
 def past(gaussian: Gaussian, F: Transition, T: Seconds) -> PreviousAngle:
-    """Return the PreviousAngle for a prediction over T from the Gaussian at the last measurement: (c1, c2, c3) = F P
-    H'."""
+    """Return the PreviousAngle for a prediction over T from the last Gaussian: (c1, c2, c3) = F P H'."""
     P = gaussian.P
     return PreviousAngle(gaussian.x.angle, P.p11, P.p11 + T * P.p12 + F.f13 * P.p13, P.p12 + F.f23 * P.p13,
                          F.f33 * P.p13)

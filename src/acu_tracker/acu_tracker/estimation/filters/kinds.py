@@ -68,8 +68,7 @@ FILTER_KINDS = {
 
 
 def named_models(names: str) -> tuple[str, ...]:
-    """Return the names of the models in a text such as 'cv ca', in the order of MODEL_NAMES. Raise ParameterError for
-    a wrong text."""
+    """Return the names of the models in a text such as 'cv ca', sorted; raise ParameterError for a wrong text."""
     models = names.split()
     if not (2 <= len(models) == len(set(models)) and set(models) <= set(MODEL_NAMES)):
         raise ParameterError(f"models = '{names}': must be two or more of {', '.join(MODEL_NAMES)}, each once")

@@ -28,8 +28,7 @@ class Measurement(NamedTuple):
 
 
 class AxisInnovation(NamedTuple):
-    """Innovation of an axis. Both chi_square and rate_chi_square follow a chi-square distribution of one degree of
-    freedom."""
+    """Innovation of an axis. Each NIS follows a chi-square distribution of one degree of freedom."""
     nu: Radians             # innovation of the angle
     S: Radians2             # its variance
     chi_square: float       # nu^2 / S: normalised innovation squared (NIS) of the angle [-]
@@ -64,8 +63,7 @@ NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)  # innovation of 
 @compiled
 def error_variance(cross_elevation: Radians, elevation: Radians, cn0_dbhz: DecibelHertz,
                    receiver: 'ReceiverModelParameters') -> Radians2:
-    """Return the variance of a receiver error at a C/N0: a floor plus thermal noise, which grows off the axis of the
-    beam."""
+    """Return the variance of a receiver error: a floor plus thermal noise, which grows off the axis of the beam."""
     # slope [1/rad]: monopulse slope; offset [-]: difference over sum of the receiver at this error. With equal and
     # independent noise in both channels, this ratio has the variance (1 + offset^2) / (2 C/N0 integration) to first
     # order. Its square root over the slope is the sigma of ReceiverModelParameters on the axis.

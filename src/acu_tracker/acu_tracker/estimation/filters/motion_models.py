@@ -66,7 +66,7 @@ COLUMN_NAMES = (*MODEL_NAMES, *(f'ca_{rung}' for rung in range(2, MAX_RUNG_COUNT
 
 
 class MotionModelRecord(Record):
-    """Constants of one model. The density is two-sided: the integral of E[w(t) w(s)] over s is noise^2 for white noise
+    """Constants of one model. Densities are two-sided: the integral of E[w(t) w(s)] over s is noise^2 for white noise
     w."""
     kind: int       # index in MODEL_NAMES
     column: int     # index in COLUMN_NAMES
@@ -81,8 +81,7 @@ class MotionModelRecord(Record):
 
 
 def constants(name: str, params: Parameters, **changes: float) -> Records:
-    """Return the constants (1,) of the model of this name with its parameters, or with the fields `changes`
-    instead."""
+    """Return the constants (1,) of the model of this name with its parameters; changes: fields to replace."""
     m, kind = MotionModelRecord.zeros(), MODEL_NAMES.index(name)
     m['kind'] = m['column'] = kind
     m['states'], m['initial_sigma'] = MODEL_ROWS[kind].states, MODEL_ROWS[kind].initial_sigma(params)
@@ -92,8 +91,7 @@ def constants(name: str, params: Parameters, **changes: float) -> Records:
 
 
 def ladder(params: 'CaParameters', rungs: int, ratio: float) -> Records:
-    """Return the constants (rungs,) of models ca; params: of the first; ratio: noise of a rung over that of the one
-    before."""
+    """Return the constants (rungs,) of models ca, the first with `params`; ratio: of the noise of successive rungs."""
     m = np.concatenate([constants('ca', dataclasses.replace(params, noise=params.noise * ratio**rung))
                         for rung in range(rungs)])
     m['column'][1:] = len(MODEL_NAMES) + np.arange(rungs - 1)

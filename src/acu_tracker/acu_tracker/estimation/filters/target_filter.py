@@ -59,8 +59,7 @@ class Filter(Record):
 
 
 def constants(ukf: 'UkfParameters', axes: 'Sequence[FilterParameters]', noise_bandwidth: Hertz) -> Records:
-    """Return the constants (1,); noise_bandwidth: of the measured angles, 0: white noise, which the Cartesian filter
-    always assumes."""
+    """Return the constants (1,); noise_bandwidth: as in axis_filter; the Cartesian filter assumes white noise."""
     c = Constants.zeros()
     c['axis'] = np.concatenate([axis_filter.constants(params, noise_bandwidth) for params in axes])
     c['cartesian'], c['range_share_2'] = unscented.constants(ukf), ukf.range_share**2
@@ -87,8 +86,7 @@ def walk(state: Filter, azimuth: float, elevation: float) -> None:
 
 @separate
 def predict(state: Filter, constants: Constants, T: Seconds) -> None:
-    """Predict by T >= 0 from the last measurement; the result is in the prior fields. A repeated call with the same T
-    does nothing."""
+    """Predict by T >= 0 from the last measurement into the prior fields; a repeated call does nothing."""
     if state.predicted == T:
         return
     state.predicted = T
@@ -106,8 +104,7 @@ def axes_azimuth(state: Filter) -> Radians:
 
 @compiled
 def innovation(state: Filter, constants: Constants, measurement: Measurement) -> Innovation:
-    """Return the innovation of a measurement against the prediction; rate_chi_square is always that of the axis
-    filter."""
+    """Return the innovation of a measurement; rate_chi_square is always that of the axis filter."""
     azimuth = axis_filter.innovation(state.axis[0], constants.axis[0], measurement.axis[0])
     elevation = axis_filter.innovation(state.axis[1], constants.axis[1], measurement.axis[1])
     if not state.running:
@@ -229,8 +226,7 @@ def _use_cartesian(state: Filter, constants: Constants) -> None:
 
 @compiled
 def _leave_cartesian(state: Filter, constants: Constants, azimuth: Bit, elevation: Bit) -> None:
-    """Stop using the Cartesian filter on the axes whose argument is 1; their axis filters continue from its estimate,
-    unless it is not finite."""
+    """Leave the Cartesian filter on axes whose argument is 1; a finite estimate of it goes to their axis filters."""
     if not (azimuth or elevation):
         return
     predict(state, constants, 0.0)

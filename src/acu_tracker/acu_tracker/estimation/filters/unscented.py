@@ -280,8 +280,7 @@ def innovation(state: State, measurement: Measurement) -> Innovation:
 
 @compiled
 def _compared(state: State, i: int, y: float) -> tuple[float, float]:
-    """Return (innovation nu, its variance S) of a measured number y against both modes together, with their spread. i:
-    0 azimuth, 1 elevation, 2 range."""
+    """Return (innovation nu, its variance S) of number i of a measurement, y, against both modes together."""
     d = state.z[1, i] - state.z[0, i]
     if i == 0:
         d = wrap(d)
@@ -334,8 +333,7 @@ def _corrected(state: State, j: int, azimuth: Radians, elevation: Radians, range
 
 @compiled
 def correct(state: State, measurement: Measurement) -> None:
-    """Correct the prediction with a measurement; `innovation` must have been called with it before. If the range is
-    NaN, only the angles are used."""
+    """Correct the prediction with a measurement, after `innovation` of it; of a NaN range only the angles are used."""
     for j in range(2):
         state.weights[j] = _corrected(state, j, measurement.axis[0].angle, measurement.axis[1].angle,
                                       measurement.range)
@@ -375,8 +373,7 @@ def expected(state: State) -> Motion:
 
 @compiled
 def _projected(p: Floats, g: Xyz, h: Xyz, v: Xyz) -> AxisVariances:
-    """Return the variances of a coordinate g x and its rate h x + v dx; x, dx: position and velocity with the
-    covariance p."""
+    """Return the variances of g x and of its rate h x + v dx; p: covariance of the position x and the velocity dx."""
     gg = gh = hh = 0.0
     for a in range(3):
         for b in range(3):
@@ -388,8 +385,8 @@ def _projected(p: Floats, g: Xyz, h: Xyz, v: Xyz) -> AxisVariances:
 
 @compiled
 def variances(state: State) -> tuple[tuple[AxisVariances, AxisVariances], float]:
-    """Return (variances of both axes, variance of the range [m2]) of the prediction, linearised, with the spread of
-    the modes."""
+    """Return (variances of both axes, of the range [m2]) of the prediction of both modes, linearised in the
+    position."""
     _mixed(state.x_prior, state.p_prior, state.mu_prior, state.mean, state.covariance)
     x, p = state.mean, state.covariance
     e, n, u, de, dn, du = x[0], x[1], x[2], x[3], x[4], x[5]
