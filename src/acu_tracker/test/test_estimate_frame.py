@@ -73,7 +73,7 @@ def test_variances_turn_with_the_frame():
     framed = np.column_stack((np.cos(E) * np.sin(A), np.cos(E) * np.cos(A), np.sin(E))) @ frame['mat'].T
     azimuth, elevation = np.arctan2(framed[:, 0], framed[:, 1]), np.arcsin(framed[:, 2])
     variances = frames.earth_variances(frame, standing(0.05, 0.02), standing(azimuth.mean(), elevation.mean()),
-                                               sigma[0]**2, sigma[1]**2)
+                                       sigma[0]**2, sigma[1]**2)
     np.testing.assert_allclose(variances, [azimuth.var(), elevation.var()], rtol=0.1)
 
 

@@ -37,8 +37,8 @@ def test_slopes_are_those_of_least_squares():
     (np.eye(2), judgement.VERDICT_RIGHT), (turned(0.5), judgement.VERDICT_RIGHT),
     (turned(1.2), judgement.VERDICT_WRONG),
     (np.diag([-1.0, 1.0]), judgement.VERDICT_WRONG), (np.diag([1.0, -1.0]), judgement.VERDICT_WRONG),
-    (-np.eye(2), judgement.VERDICT_WRONG), ([[0.0, 1.0], [1.0, 0.0]], judgement.VERDICT_WRONG), (np.zeros((2, 2)),
-                                                                                    judgement.VERDICT_WRONG)])
+    (-np.eye(2), judgement.VERDICT_WRONG), ([[0.0, 1.0], [1.0, 0.0]], judgement.VERDICT_WRONG),
+    (np.zeros((2, 2)), judgement.VERDICT_WRONG)])
 def test_verdict(K, verdict):
     s, *_ = checked(K)
     assert judgement.slope_verdict(s, 200) == verdict

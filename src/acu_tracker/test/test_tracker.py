@@ -255,4 +255,4 @@ def test_noise_of_the_attitude_moves_a_direction_as_rotations_do(elevation, alon
     turned = Rotation.from_rotvec(np.column_stack((*tilt, heading))).apply(u) @ f['mat']
     measured = np.arctan2(turned[:, 0], turned[:, 1]).var(), np.arcsin(turned[:, 2]).var()
     assert attitude_variances(frames.verticals(f, 0.0, 0.0), 2e-4**2, 5e-4**2) == pytest.approx(measured,
-                                                                                                      rel=0.03)
+                                                                                                rel=0.03)

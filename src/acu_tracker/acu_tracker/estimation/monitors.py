@@ -249,7 +249,7 @@ def _reversed(J: Pair, other: Pair) -> bool:
 
 @compiled
 def take_slope(state: SlopeSign, t: Seconds, beam: Beam, error: tuple[Radians, Radians], variance: Radians2,
-         gap: Seconds) -> bool:
+               gap: Seconds) -> bool:
     """Take an error (cross-elevation, elevation) of variance R, measured at t with the beam; return True if the slope
     of an axis is reversed. The lines restart after the time `gap` without errors."""
     T = t - state.stamp

@@ -68,7 +68,7 @@ def used_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, by_
 
 @compiled
 def _error_at(encoders: history.Encoders, receiver: ReceiverModelParameters, inputs: Inputs, uses_level: bool,
-             intended_offset: Radians) -> tuple[int, bool, Pointing]:
+              intended_offset: Radians) -> tuple[int, bool, Pointing]:
     """Return (flags of the receiver's message, True if its error is used, the Pointing of the encoders at the error).
 
     uses_level: True if the mode uses the signal level; intended_offset: angle by which the beam is off the target on

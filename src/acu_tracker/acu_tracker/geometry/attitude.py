@@ -74,7 +74,7 @@ def take_statistics(error: AttitudeError, noise: Vector3, walk: Vector3) -> bool
 
 @compiled
 def expected_error(error: AttitudeError,
-             model: 'AttitudeModelParameters') -> tuple[tuple[Radians2, Radians2], tuple[float, float]]:
+                   model: 'AttitudeModelParameters') -> tuple[tuple[Radians2, Radians2], tuple[float, float]]:
     """Return ((noise of tilt, of heading), (walk of tilt, of heading) [rad2/s]), by `model` if the INS published none.
     The slow errors of `model` are Gauss-Markov processes with the standard deviation sigma and the correlation time
     tau (wander_time). Their variance first grows by 2 sigma^2 / tau."""

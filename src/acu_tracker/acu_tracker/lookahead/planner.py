@@ -139,7 +139,7 @@ def constants(params: 'AcuParameters') -> Records:
     record, k, a = Constants.zeros(), params.keyhole, params.azimuth
     record['horizon'], record['notice'] = k.horizon, k.notice
     record['limits'] = (k.share * a.shaper.rate, k.share * a.shaper.acceleration, a.limits.low, a.limits.high,
-                   params.elevation.limits.high - k.elevation_margin, 0.5 * params.tracker.receiver.beamwidth)
+                        params.elevation.limits.high - k.elevation_margin, 0.5 * params.tracker.receiver.beamwidth)
     record['sectors'] = blockage.sectors(params.blockage)
     return record
 

@@ -163,7 +163,7 @@ def observed(z: Vector3, y: Radians, u: RadiansPerSecond, v3: RadiansPerSecond2,
 
 @compiled
 def adrc_rate(z: Vector3, v1: Radians, v2: RadiansPerSecond, v2_m: RadiansPerSecond, w_c: RadiansPerSecond,
-         w_s: RadiansPerSecond) -> RadiansPerSecond:
+              w_s: RadiansPerSecond) -> RadiansPerSecond:
     """Return the rate command; z, v1, v2: at t_k; v2_m: rate of the reference at t_m."""
     # u0 - v3 = feedback, so v3 cancels: u = (feedback + w_s z2 - z3) / w_s = z2 + (feedback - z3) / w_s. The command
     # acts at t_m. Therefore z2 is predicted to t_m: the rate of the reference there, plus the error z2 - v2 of t_k.
@@ -223,7 +223,7 @@ def type_2(R: Radians, v: RadiansPerSecond, error: Radians, alpha: float, beta: 
 
 @compiled
 def beam_step(form: int, R: Radians, v: RadiansPerSecond, error: Radians, alpha: float, beta: float, T: Seconds,
-         compensation: RadiansPerSecond) -> tuple[Radians, RadiansPerSecond]:
+              compensation: RadiansPerSecond) -> tuple[Radians, RadiansPerSecond]:
     """Return (angle of the beam, its rate) after a step; error: NaN without an error of the receiver."""
     if math.isnan(error):
         return R + v * T + compensation * T, v

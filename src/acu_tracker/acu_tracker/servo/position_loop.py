@@ -170,7 +170,7 @@ def _steer(axis: AxisLoop, params: 'AxisParameters', target: AxisMotion, feedbac
         reference.put(r, target)
     else:
         r.angle, r.rate = controllers.beam_step(int(b.form), r.angle, r.rate, feedback.error, b.alpha, beta, T,
-                                         compensation)
+                                                compensation)
     low, high = feedback.ends
     angle_limited = not low <= r.angle <= high
     if angle_limited:
@@ -273,7 +273,7 @@ def _update(axis: AxisLoop, params: 'AxisParameters', e: Radians, y: Radians, no
             # u, v3: command and acceleration that were in force since the last instant of the observer.
             u, v3 = reference.in_force(axis.reference, now.t_k - 0.5 * h)
             axis.z[0], axis.z[1], axis.z[2] = controllers.observed(axis.z, y, u, v3, params.adrc.observer_bandwidth,
-                                                            params.adrc.rate_bandwidth, h)
+                                                                   params.adrc.rate_bandwidth, h)
             axis.observed = now.t_k
     else:
         if controller == CONTROLLER_PID:
