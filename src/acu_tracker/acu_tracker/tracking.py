@@ -51,6 +51,30 @@ def take_place(tracking: Tracking, inputs: Inputs) -> bool:
 
 
 @compiled
+def take_encoders(encoders: history.Encoders, inputs: Inputs) -> int:
+    """Take the encoder angles of this step. Return signals.Flag.ENCODER if they are invalid, else 0."""
+    taken = inputs.encoder_valid and history.take_encoders(encoders, inputs.stamp, inputs.position, inputs.velocity)
+    return 0 if taken else signals.Flag.ENCODER
+
+
+@compiled
+def take_attitude(deck: attitude.DeckAttitude, params: 'SharedParameters', inputs: Inputs) -> tuple[int, bool]:
+    """Take the attitude of this step, and the statistics of its error that the INS publishes. Return (flags of invalid
+    values, True if the attitude is a new one)."""
+    if not inputs.stabilised:
+        return 0, False
+    flags = 0
+    if inputs.attitude_error_came and not attitude.take_statistics(deck.error, inputs.attitude_noise,
+                                                                   inputs.attitude_walk):
+        flags = signals.Flag.ATTITUDE_ERROR
+    if not inputs.attitude_valid:
+        return flags | signals.Flag.ATTITUDE, False
+    outcome = attitude.take(deck, params, inputs.stamp, inputs.attitude_stamp, inputs.quaternion, inputs.deck_rate,
+                            inputs.aligning)
+    return flags | (signals.Flag.ATTITUDE if outcome == attitude.SAMPLE_INVALID else 0), outcome == attitude.SAMPLE_NEW
+
+
+@compiled
 def unstable(tracking: Tracking, constants: 'Constants', inputs: Inputs, t: Seconds) -> int:
     """Return Reason.NONE, or why the attitude of the deck is not known at the time when the command of t acts."""
     if not tracking.attitude.stabilised:
@@ -148,27 +172,3 @@ def write_outputs(tracking: Tracking, constants: 'Constants', t: Seconds, output
             outputs.estimate[i, 0], outputs.estimate[i, 1], outputs.estimate[i, 2] = estimate.motion[i]
             outputs.covariance[i, 0], outputs.covariance[i, 1], outputs.covariance[i, 2] = estimate.variances[i]
         target_filter.probabilities(filtered.filter, constants.target.filter, outputs.probability)
-
-
-@compiled
-def take_encoders(encoders: history.Encoders, inputs: Inputs) -> int:
-    """Take the encoder angles of this step. Return signals.Flag.ENCODER if they are invalid, else 0."""
-    taken = inputs.encoder_valid and history.take_encoders(encoders, inputs.stamp, inputs.position, inputs.velocity)
-    return 0 if taken else signals.Flag.ENCODER
-
-
-@compiled
-def take_attitude(deck: attitude.DeckAttitude, params: 'SharedParameters', inputs: Inputs) -> tuple[int, bool]:
-    """Take the attitude of this step, and the statistics of its error that the INS publishes. Return (flags of invalid
-    values, True if the attitude is a new one)."""
-    if not inputs.stabilised:
-        return 0, False
-    flags = 0
-    if inputs.attitude_error_came and not attitude.take_statistics(deck.error, inputs.attitude_noise,
-                                                                   inputs.attitude_walk):
-        flags = signals.Flag.ATTITUDE_ERROR
-    if not inputs.attitude_valid:
-        return flags | signals.Flag.ATTITUDE, False
-    outcome = attitude.take(deck, params, inputs.stamp, inputs.attitude_stamp, inputs.quaternion, inputs.deck_rate,
-                            inputs.aligning)
-    return flags | (signals.Flag.ATTITUDE if outcome == attitude.SAMPLE_INVALID else 0), outcome == attitude.SAMPLE_NEW
