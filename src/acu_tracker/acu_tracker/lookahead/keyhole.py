@@ -172,16 +172,18 @@ def find(path: Path, rate: RadiansPerSecond, acceleration: RadiansPerSecond2) ->
 
 
 @compiled
-def _best_of_direction(trial: Slew, passage: Passage, turn: float, t_in: Seconds,
-                       width: Seconds) -> tuple[bool, Seconds]:
-    """Set `trial` to the best slew of a direction with t1 <= t_in; return (True if it is feasible, its cost).
+def _search(trial: Slew, passage: Passage, turn: float, t_in: Seconds) -> tuple[bool, Seconds]:
+    """Put the best slew of one direction into `trial`; t_in: instant at which the keyhole begins.
 
-    A slew that meets the target before the path ends is feasible, even outside the limits. The first level covers the
-    whole interval, the next levels are finer about the best t1 so far. The last level repeats the best slew with more
-    samples.
+    Return (True if a slew meets the target before the path ends, even outside the limits; the least cost). The cost is
+    inf if no slew is inside the limits.
     """
-    feasible, centre, cost, step = False, t_in - 0.5 * SLEW_CANDIDATE_COUNT * width, math.inf, width
+    # t1 is searched from t_in back by the time of a whole revolution, because an earlier t1 has no advantage.
+    step = min(t_in - passage.path.t0, 2.0 * math.pi / passage.limits.rate) / SLEW_CANDIDATE_COUNT
+    feasible, centre, cost = False, t_in - 0.5 * SLEW_CANDIDATE_COUNT * step, math.inf
     for level in range(REFINEMENT_COUNT + 1):
+        # The first level covers the whole interval, the next levels are finer about the best t1 so far. The last level
+        # repeats the best slew with more samples.
         around = 0 if level == REFINEMENT_COUNT else SLEW_CANDIDATE_COUNT // 2 if level == 0 else 4
         middle = centre
         for k in range(-around, around + 1):
@@ -198,33 +200,43 @@ def _best_of_direction(trial: Slew, passage: Passage, turn: float, t_in: Seconds
 
 
 @compiled
+def _set_culmination(slew: Slew, path: Path, keyhole: Keyhole) -> None:
+    top = keyhole.first
+    for i in range(keyhole.first, keyhole.last + 1):
+        top = i if path.rows[i, paths.UP_COLUMN] > path.rows[top, paths.UP_COLUMN] else top
+    slew.culmination = path.t0 + top * path.h
+    slew.highest = math.asin(min(path.rows[top, paths.UP_COLUMN], 1.0))
+
+
+@compiled
 def plan(work: MutableSequence[Slew], path: Path, azimuth: Radians, limits: SlewLimits, tilt: Radians, previous: Slew,
          planned: bool) -> int:
     """Find the keyhole of a completed Path and the best slew through it; return one of the outcomes PLAN_.
 
-    work: two slews, the first for the best slew, the second for trials; planned: `previous` is a plan whose slew has
-    not begun; azimuth, limits, tilt: as in Passage. Because slews with different t1 may cost the same, the previous t1
-    and direction stay in force until another slew costs less by MIN_GAIN_S.
+    work      two slews, the first for the best slew, the second for trials
+    previous  the previous plan, if planned is True
+    planned   True if there is a previous plan whose slew has not begun
+    The other arguments are those of Passage.
 
-    The effort is bounded. For each of the two directions the first level evaluates SLEW_CANDIDATE_COUNT + 1 slews of
-    SLEW_SAMPLE_COUNT samples. Each of the next REFINEMENT_COUNT - 1 levels evaluates 9 such slews. The last level
-    evaluates one slew with ten times as many samples.
+    Slews with different t1 may cost the same. The previous t1 and direction therefore stay in force until another slew
+    costs less by MIN_GAIN_S.
+
+    The effort is bounded. For each of the two directions the first level of _search evaluates SLEW_CANDIDATE_COUNT + 1
+    slews of SLEW_SAMPLE_COUNT samples. Each of the next REFINEMENT_COUNT - 1 levels evaluates 9 such slews. The last
+    level evaluates one slew with ten times as many samples.
     """
-    first, last, needed = find(path, limits.rate, limits.acceleration)
-    if first < 0:
+    keyhole = find(path, limits.rate, limits.acceleration)
+    if keyhole.first < 0:
         return PLAN_NO_KEYHOLE
     best, trial = work[0], work[1]
-    t_in, t_out = path.t0 + first * path.h, path.t0 + last * path.h
+    t_in, t_out = path.t0 + keyhole.first * path.h, path.t0 + keyhole.last * path.h
     passage = Passage(path, azimuth, limits, t_out, tilt)
-    own_travel = path.rows[last, paths.AZIMUTH_COLUMN] - path.rows[first, paths.AZIMUTH_COLUMN]
-    # t1 is searched from t_in back by the time of a whole revolution, because an earlier t1 has no advantage.
-    width = min(t_in - path.t0, 2.0 * math.pi / limits.rate) / SLEW_CANDIDATE_COUNT
+    own_travel = path.rows[keyhole.last, paths.AZIMUTH_COLUMN] - path.rows[keyhole.first, paths.AZIMUTH_COLUMN]
     # Side 0 is the direction in which the target itself turns. least: cost of the better direction; other: cost of the
     # other direction.
-    least, other = math.inf, math.inf
+    least = other = math.inf
     for side in range(2):
-        turn = math.copysign(1.0, own_travel) * (1.0 - 2.0 * side)
-        feasible, cost = _best_of_direction(trial, passage, turn, t_in, width)
+        feasible, cost = _search(trial, passage, math.copysign(1.0, own_travel) * (1.0 - 2.0 * side), t_in)
         if side == 0 and not feasible:
             return PLAN_BEYOND_PATH
         if cost < math.inf:
@@ -241,10 +253,6 @@ def plan(work: MutableSequence[Slew], path: Path, azimuth: Radians, limits: Slew
         trial.long_way = 1 if turn * own_travel < 0.0 else 0
         other = least if trial.long_way != best.long_way else other
         work[0] = trial
-    top = first
-    for i in range(first, last + 1):
-        top = i if path.rows[i, paths.UP_COLUMN] > path.rows[top, paths.UP_COLUMN] else top
-    best.culmination = path.t0 + top * path.h
-    best.highest = math.asin(min(path.rows[top, paths.UP_COLUMN], 1.0))
-    best.needed, best.other_cost = needed, other
+    _set_culmination(best, path, keyhole)
+    best.needed, best.other_cost = keyhole.needed, other
     return PLAN_SLEW
