@@ -8,21 +8,21 @@ from typing import Annotated
 
 import numpy as np
 
-from acu_tracker import measurements, modes, signals, tracking
+from acu_tracker import modes, signals, tracking
 from acu_tracker.alarms import annunciator, conditions
 from acu_tracker.estimation import monitors, receiver_error, target
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.geometry import attitude, direction, history
 from acu_tracker.guidance import guidance
-from acu_tracker.lookahead import levelled_deck, planner
+from acu_tracker.lookahead import planner
 from acu_tracker.mode import interruptions, reachability, stow
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.params import AcuParameters, AxisParameters, SharedParameters
 from acu_tracker.pointing import model
-from acu_tracker.program import bridge, tables
+from acu_tracker.program import bridge, program_track
 from acu_tracker.program.program_track import ProgramTrack
-from acu_tracker.search import level_modes
-from acu_tracker.servo import axes, controllers, drive_watch, ends, floor, position_loop
+from acu_tracker.search import acquisition
+from acu_tracker.servo import axes, controllers, drive_watch, position_loop, travel
 from acu_tracker.servo.position_loop import Instants
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled, separate
@@ -62,7 +62,7 @@ class Constants(Record):
     lead: Seconds       # t_m - t_k; t_m: middle of the interval in which the command of the step at t_k is in force
     target: target.Constants
     lookahead: planner.Constants
-    floor: floor.Floor
+    floor: travel.Floor
 
 
 def axis_constants(params: AxisParameters, period: Seconds, reaction: Seconds) -> Records:
@@ -81,7 +81,7 @@ def constants(params: AcuParameters) -> Records:
     made['lead'] = params.command_delay + 0.5 * params.period
     made['axis'] = np.concatenate([axis_constants(position_loop.slowed(axis, params.command_delay), params.period,
                                                   params.reaction) for axis in axes])
-    made['floor'] = floor.table(params.floor)
+    made['floor'] = travel.floor_table(params.floor)
     made['target'] = target.constants(params.tracker, [axis.filter for axis in axes])
     made['lookahead'] = planner.constants(params)
     return made
@@ -110,7 +110,7 @@ def latched(state: State) -> int:
 
 
 @compiled
-def request(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, all_tables: tables.Tables,
+def request(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, all_tables: program_track.Tables,
             mode: int) -> bool:
     """Request a mode (its code) between two steps; return True if the request is accepted.
 
@@ -122,7 +122,7 @@ def request(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
 
 
 @compiled
-def refusals(state: State, constants: Constants, inputs: Inputs, all_tables: tables.Tables, why: Ints) -> None:
+def refusals(state: State, constants: Constants, inputs: Inputs, all_tables: program_track.Tables, why: Ints) -> None:
     """Set why[mode] of each mode to Reason.NONE, or to the reason why `request` would refuse the mode now."""
     for mode in range(len(why)):
         now, _ = _situation(state, constants, inputs, all_tables, mode, _outage(state, constants))
@@ -142,8 +142,7 @@ def reset(state: State) -> int:
     cause = annunciator.persisting_alarm(alarms, interruptions.LATCHED_FAULT_BITS)
     if cause != annunciator.NO_ALARM:
         return cause
-    drive_watch.release_motion(state.unasked)
-    drive_watch.release_frozen(state.frozen, t)
+    drive_watch.release(state.unasked, state.frozen, t)
     monitors.release_divergence(state.tracking.divergence)
     if interruptions.reset_latched(alarms, t) or fault:
         modes.set_pending(state.mode, modes.NO_REQUEST)
@@ -152,7 +151,8 @@ def reset(state: State) -> int:
 
 
 @separate
-def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, all_tables: tables.Tables) -> None:
+def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs,
+         all_tables: program_track.Tables) -> None:
     """Run one drive step.
 
     A stamp that does not advance, or is NaN, changes nothing: the last command stays in force, and the flag `stamp` is
@@ -170,7 +170,7 @@ def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, a
         modes.continue_in(state.mode, interruptions.mode_after(state.resumption, state.mode.now, state.stamp,
                                                                inputs.stamp, constants.p.resume_time))
     state.stamp = inputs.stamp
-    flags = _observe(state, constants, inputs, outputs, tables.of_mode(all_tables, state.mode.table), silence)
+    flags = _observe(state, constants, inputs, outputs, program_track.of_mode(all_tables, state.mode.table), silence)
     # The axes have rested if they had no motion command before this step, or after a gap between the steps.
     rested = stow.commands_no_motion(state.stow, constants, inputs, state.mode.now) or dt > constants.p.step_gap
     no_signal = _outage(state, constants)
@@ -180,7 +180,7 @@ def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, a
     if history.encoders_taken(state.tracking.encoders, state.stamp):
         _start_from_actual(state, constants, inputs, rested, silence)
     # The table that was followed last: the program track, or the predicted track of satellite or sun.
-    program = tables.of_mode(all_tables, state.mode.table)
+    program = program_track.of_mode(all_tables, state.mode.table)
     _move(state, constants, inputs, outputs, program, no_signal, rested,
           constants.p.period if dt > constants.p.step_gap else dt)
     _write_outputs(state, constants, inputs, outputs, flags | of_tables)
@@ -198,14 +198,15 @@ def _observe(state: State, constants: Constants, inputs: Inputs, outputs: Output
     estimate = state.tracking.target
     target_filter.transfer(estimate.filter, constants.target.filter, estimate.running)
     flags = signals.Flag.STEP_GAP if silence else 0
-    flags |= measurements.take_encoders(state.tracking.encoders, inputs) | _take_attitude(state, constants, inputs)
+    flags |= tracking.take_encoders(state.tracking.encoders, inputs) | _take_attitude(state, constants, inputs)
     flags |= _take_receiver(state, constants, inputs, outputs, way)
-    flags |= measurements.take_preset(state.guidance.preset, inputs)
+    if inputs.preset_valid and not direction.put(state.guidance.preset, inputs.preset):
+        flags |= signals.Flag.PRESET
     drive_watch.watch_motion(state.unasked, state.stamp, inputs.velocity, constants.p.unasked_rate,
                              silence or not inputs.drive_ready)
     if int(constants.axis[0].p.controller) != position_loop.CONTROLLER_BEAM:
         drive_watch.watch_frozen(state.frozen, inputs, constants.p.step_gap + constants.p.command_delay, silence)
-    if level_modes.advance(state.guidance.acquisition, state.mode.now, constants, inputs, way):
+    if acquisition.advance(state.guidance.acquisition, state.mode.now, constants, inputs, way):
         monitors.latch_divergence(state.tracking.divergence)
     return flags
 
@@ -214,11 +215,11 @@ def _observe(state: State, constants: Constants, inputs: Inputs, outputs: Output
 def _take_attitude(state: State, constants: Constants, inputs: Inputs) -> int:
     if tracking.take_place(state.tracking, inputs):
         planner.clear_plan(state.guidance.lookahead)
-    flags, new = measurements.take_attitude(state.tracking.attitude, constants.p, inputs)
+    flags, new = tracking.take_attitude(state.tracking.attitude, constants.p, inputs)
     if new:
         # While the INS aligns, its heading is not known. The mean begins with the first attitude after the alignment.
-        levelled_deck.take(state.guidance.lookahead.deck, inputs.attitude_stamp,
-                           attitude.newest(state.tracking.attitude), constants.p.keyhole.mean_time, inputs.aligning)
+        planner.take_attitude(state.guidance.lookahead.deck, inputs.attitude_stamp,
+                              attitude.newest(state.tracking.attitude), constants.p.keyhole.mean_time, inputs.aligning)
     return flags
 
 
@@ -245,7 +246,7 @@ def _outage(state: State, constants: Constants) -> interruptions.Outage:
 
 
 @separate
-def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, all_tables: tables.Tables,
+def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, all_tables: program_track.Tables,
             request: int, no_signal: interruptions.Outage) -> tuple[int, int]:
     """Select the mode at the stamp of the step, and carry out the consequences of a change of mode.
 
@@ -268,7 +269,7 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
         if modes.USES_SIGNAL_LEVEL[mode]:
             if before == Mode.AUTOTRACK and not no_signal.coasting:
                 guidance.bridge_to(state.guidance, state.tracking, constants,
-                                   tables.of_mode(all_tables, state.mode.table), state.stamp)
+                                   program_track.of_mode(all_tables, state.mode.table), state.stamp)
             guidance.begin_by_level(state.guidance, state.tracking, constants, before, mode, state.stamp)
         if before == Mode.AUTOTRACK and now.conditions.track != Reason.NONE:
             target.stop(state.tracking.target)
@@ -277,7 +278,7 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
 
 
 @separate
-def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: tables.Tables, request: int,
+def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: program_track.Tables, request: int,
                no_signal: interruptions.Outage) -> tuple[modes.Situation, int]:
     """Return (Situation at the stamp of the step, flags of bad tables)."""
     mode, t = state.mode.now, state.stamp
@@ -285,7 +286,7 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
     pins = stow.obstacle(state.stow, constants, inputs)
     closed = mode == Mode.AUTOTRACK and interruptions.axes_follow_commands(state.supervision)
     lock, slope, track = tracking.conditions(state.tracking, constants, t, no_signal, closed)
-    if track == Reason.NONE and level_modes.in_side_lobe(state.guidance.acquisition, constants, t):
+    if track == Reason.NONE and acquisition.in_side_lobe(state.guidance.acquisition, constants, t):
         track = Reason.SIDE_LOBE
     # The fallback AUTOTRACK means coasting. Because a filter without an estimate cannot coast, the fallback is then
     # the program.
@@ -305,13 +306,13 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: t
                                             state.guidance.preset.angle[1]),
         direction=Reason.NONE if direction.valid_at(state.guidance.slave, t) else Reason.NO_DIRECTION,
         program=program, tle=tle, sun=sun, lock=lock, slope=slope, track=track,
-        level=level_modes.end(state.guidance.acquisition, mode, constants, t))
+        level=acquisition.end(state.guidance.acquisition, mode, constants, t))
     return modes.Situation(
         encoder_valid=history.encoders_taken(state.tracking.encoders, t), attitude=unstable, pins=pins,
         table=state.mode.table, chosen=chosen,
         drive=interruptions.drive_refusal(inputs.drive_ready, state.unasked.moves, state.frozen.frozen),
         conditions=why,
-        handover=(level_modes.found(state.guidance.acquisition, mode, constants)
+        handover=(acquisition.found(state.guidance.acquisition, mode, constants)
                   if modes.USES_SIGNAL_LEVEL[mode] else constants.p.tracker.handover != 0)), flags
 
 
@@ -340,7 +341,7 @@ def _move(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, 
     mode, t = state.mode.now, state.stamp
     actual = axes.now(state.axis)
     order = guidance.Order(mode, state.mode.begins or rested, actual.azimuth.angle, t)
-    by_hand = floor.by_hand(constants, inputs, state.guidance.manual.angle[0])
+    by_hand = travel.by_hand(constants, inputs, state.guidance.manual.angle[0])
     guidance.move_by_hand(state.guidance, constants, order, by_hand, actual, dt)
     if stow.commands_no_motion(state.stow, constants, inputs, mode):
         axes.rest(state.axis, constants, outputs, dt)
@@ -381,9 +382,9 @@ def _note_outage_reason(state: State, constants: Constants) -> bool:
 
 @compiled
 def _write_outputs(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, flags: int) -> None:
-    of_axes = floor.ends(constants, inputs, inputs.position[0])
+    of_axes = travel.ends(constants, inputs, inputs.position[0])
     for i in range(2):
-        outputs.time_to_limit[i] = ends.time_to(inputs.position[i], inputs.velocity[i], of_axes[i])
+        outputs.time_to_limit[i] = travel.time_to(inputs.position[i], inputs.velocity[i], of_axes[i])
     outputs.mode, outputs.reason, outputs.invalid_input = state.mode.now, state.mode.reason, flags
     outputs.pins = state.stow.requested
     outputs.pins_wrong = stow.misplaced_pins(state.stow, constants, inputs) if constants.p.stow_pins else 0

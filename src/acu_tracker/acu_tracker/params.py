@@ -5,13 +5,15 @@ import math
 from acu_tracker.command_table import ACU_COMMANDS, POINTS_DOC, points
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters
 from acu_tracker.geometry.history import MAX_DELAY_STEPS
-from acu_tracker.lookahead.params import KeyholeParameters
+from acu_tracker.lookahead.planner import KeyholeParameters
 from acu_tracker.modes import FALLBACK_MODES
 from acu_tracker.pointing.params import PointingParameters
 from acu_tracker.program.air import RefractionParameters
 from acu_tracker.program.prediction import PredictionParameters
-from acu_tracker.search.params import AcquisitionParameters, SearchParameters, StepTrackParameters
-from acu_tracker.servo import ends, floor
+from acu_tracker.search.acquisition import SearchParameters
+from acu_tracker.search.level import AcquisitionParameters
+from acu_tracker.search.step_track import StepTrackParameters
+from acu_tracker.servo import travel
 from acu_tracker.servo.params import (
     AdrcParameters,
     BeamParameters,
@@ -104,7 +106,7 @@ class SharedParameters(topic_flags(nodes.row('acu').reads)):  # type: ignore[mis
     pointing: PointingParameters = group(PointingParameters)
     lever_arm: LeverArm = group(LeverArm)
     blockage: str = text('', SECTORS_DOC)
-    floor: str = text('', floor.FLOOR_DOC)
+    floor: str = text('', travel.FLOOR_DOC)
     keyhole: KeyholeParameters = group(KeyholeParameters)
     tracker: TrackerParameters = group(TrackerParameters)
     acquisition: AcquisitionParameters = group(AcquisitionParameters)
@@ -145,14 +147,14 @@ class AcuParameters(SharedParameters):
         for name in ('azimuth', 'elevation'):
             axis = getattr(self, name)
             a = axis.limits.deceleration
-            d = ends.braking_distance(axis.shaper.rate, a, self.reaction)
+            d = travel.braking_distance(axis.shaper.rate, a, self.reaction)
             if 2.0 * d > axis.limits.high - axis.limits.low:
                 raise ParameterError(f'{name}.limits.braking = {a:g} rad/s2: from shaper.rate = '
                                      f'{axis.shaper.rate:g} rad/s the axis stops in {d:g} rad, must be at most half '
                                      f'its travel, {0.5 * (axis.limits.high - axis.limits.low):g} rad')
         for name in ('stow', 'preset'):
             A, E = getattr(self.azimuth, name), getattr(self.elevation, name)
-            lowest = floor.at(self.floor, A)
+            lowest = travel.floor_at(self.floor, A)
             if lowest > E:
                 raise ParameterError(f'elevation.{name} = {E:g} rad: is below the floor, {lowest:g} rad at '
                                      f'azimuth.{name} = {A:g} rad')

@@ -1,19 +1,15 @@
-"""Tracking of the target by the receiver: histories of beam and deck, target filter, and monitors of the errors.
-
-`control_unit` and `guidance` call this module. The functions take each error of the receiver, and return the estimate
-of the target and the conditions for autotrack. `gap` is the time without a signal of the receiver.
-"""
+"""Tracking of the target by the receiver: histories of beam and deck, target filter, and monitors of the errors."""
 import math
 from typing import TYPE_CHECKING
 
+from acu_tracker import signals
 from acu_tracker.estimation import monitors, target
 from acu_tracker.estimation.filters import target_filter
-from acu_tracker.geometry import attitude, deck_reference, history
-from acu_tracker.geometry.vector import LineOfSight, Vector, rotated
+from acu_tracker.geometry import attitude, frames, history
+from acu_tracker.geometry.vector import ZERO_VECTOR, LineOfSight, Vector, rotated
 from acu_tracker.modes import Reason
 from acu_tracker.pointing import model
 from acu_tracker.pointing.params import PointingParameters
-from acu_tracker.search import place
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
@@ -23,6 +19,7 @@ from pedestal_common.record import Record
 if TYPE_CHECKING:
     from acu_tracker.control_unit import Constants
     from acu_tracker.mode.interruptions import Outage
+    from acu_tracker.params import SharedParameters
 
 
 class Tracking(Record):
@@ -54,6 +51,30 @@ def take_place(tracking: Tracking, inputs: Inputs) -> bool:
 
 
 @compiled
+def take_encoders(encoders: history.Encoders, inputs: Inputs) -> int:
+    """Take the encoder angles of this step. Return signals.Flag.ENCODER if they are invalid, else 0."""
+    taken = inputs.encoder_valid and history.take_encoders(encoders, inputs.stamp, inputs.position, inputs.velocity)
+    return 0 if taken else signals.Flag.ENCODER
+
+
+@compiled
+def take_attitude(deck: attitude.DeckAttitude, params: 'SharedParameters', inputs: Inputs) -> tuple[int, bool]:
+    """Take the attitude of this step, and the statistics of its error that the INS publishes. Return (flags of invalid
+    values, True if the attitude is a new one)."""
+    if not inputs.stabilised:
+        return 0, False
+    flags = 0
+    if inputs.attitude_error_came and not attitude.take_statistics(deck.error, inputs.attitude_noise,
+                                                                   inputs.attitude_walk):
+        flags = signals.Flag.ATTITUDE_ERROR
+    if not inputs.attitude_valid:
+        return flags | signals.Flag.ATTITUDE, False
+    outcome = attitude.take(deck, params, inputs.stamp, inputs.attitude_stamp, inputs.quaternion, inputs.deck_rate,
+                            inputs.aligning)
+    return flags | (signals.Flag.ATTITUDE if outcome == attitude.SAMPLE_INVALID else 0), outcome == attitude.SAMPLE_NEW
+
+
+@compiled
 def unstable(tracking: Tracking, constants: 'Constants', inputs: Inputs, t: Seconds) -> int:
     """Return Reason.NONE, or why the attitude of the deck is not known at the time when the command of t acts."""
     if not tracking.attitude.stabilised:
@@ -68,10 +89,8 @@ def unstable(tracking: Tracking, constants: 'Constants', inputs: Inputs, t: Seco
 @compiled
 def conditions(tracking: Tracking, constants: 'Constants', t: Seconds, gap: 'Outage',
                closed: bool) -> tuple[int, int, int]:
-    """Return (lock, slope, track) of modes.Conditions at t.
-
-    closed: True if the loop is closed in autotrack, and the axes follow their commands.
-    """
+    """Return (lock, slope, track) of modes.Conditions at t. closed: True if the loop is closed in autotrack, and the
+    axes follow their commands."""
     # unexplained: no keyhole, turn or hidden sector explains the outage; lost: autotrack must end.
     p, unexplained, running = constants.p.tracker, not gap.permitted, tracking.target.running
     spread_now = spread(tracking, constants, t) if running and unexplained and gap.coasting else 0.0
@@ -107,18 +126,14 @@ def sigma_across(azimuth_variance: Radians2, elevation_variance: Radians2, eleva
 
 @compiled
 def coast_over(since: Seconds, coast_time: Seconds, sigma: Radians, beamwidth: Radians) -> bool:
-    """Return True if coasting ends: after coast_time, or with a sigma above half a beamwidth.
-
-    since, coast_time: age of the last accepted measurement and its limit; sigma: standard deviation across the line of
-    sight.
-    """
+    """Return True if coasting ends: after coast_time, or with a sigma above half a beamwidth."""
     return since > coast_time or sigma > 0.5 * beamwidth
 
 
 @compiled
 def sight(tracking: Tracking, constants: 'Constants', t: Seconds) -> LineOfSight:
     """Return the line of sight (ENU) of the estimate at t."""
-    return target.earth_outlook(tracking.target, constants.target, t)
+    return frames.to_earth(tracking.target.frame, target.outlook(tracking.target, constants.target, t))
 
 
 @compiled
@@ -127,33 +142,27 @@ def beam(tracking: Tracking, constants: 'Constants', t: Seconds) -> tuple[Vector
     _, at = history.encoders_at(tracking.encoders, t)
     at = model.to_sky(tracking.pointing.model, at)
     _, deck = attitude.at(tracking.attitude, constants.p, t)
-    return rotated(deck.mat, Vector(*pointing.direction(at.A, at.E))), place.ZERO_VECTOR
+    return rotated(deck.mat, Vector(*pointing.direction(at.A, at.E))), ZERO_VECTOR
 
 
 @compiled
 def deck_rates(tracking: Tracking, constants: 'Constants', t: Seconds, A: Radians,
                E: Radians) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return the rates at which the motion of the deck moves the deck angles of an earth-fixed direction.
-
-    A, E: encoder angles of the direction at t. The rates are 0 if no axis uses them
-    (beam.rate_compensation).
-    """
+    """Return the rates at which the motion of the deck moves the deck angles of an earth-fixed direction at t; 0 if no
+    axis uses them (beam.rate_compensation). A, E: encoder angles of the direction."""
     azimuth, elevation = constants.axis[0].p.beam, constants.axis[1].p.beam
     compensated = azimuth.rate_compensation != 0.0 or elevation.rate_compensation != 0.0
     if compensated and tracking.attitude.stabilised:
         known, deck = attitude.at(tracking.attitude, constants.p, t)
         if known:
             at = model.to_sky(tracking.pointing.model, history.Pointing(A, E, 0.0, 0.0))
-            return deck_reference.fixed_rates(deck.w, at.A, at.E)
+            return frames.fixed_rates(deck.w, at.A, at.E)
     return 0.0, 0.0
 
 
 @compiled
 def write_outputs(tracking: Tracking, constants: 'Constants', t: Seconds, outputs: Outputs) -> None:
-    """Write the counts of gated measurements and the estimate at t to the outputs.
-
-    The estimate is in earth angles, as seen from the antenna.
-    """
+    """Write the counts of gated measurements and the estimate at t, in earth angles as seen from the antenna."""
     filtered = tracking.target
     outputs.gated, outputs.rates_gated = filtered.gated, filtered.rates_gated
     outputs.ranges_gated = filtered.ranges_gated

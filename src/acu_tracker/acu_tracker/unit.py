@@ -17,7 +17,7 @@ from acu_tracker.modes import Mode, Reason
 from acu_tracker.operating import announcement, commands, diagnosis
 from acu_tracker.params import AcuParameters
 from acu_tracker.pointing.in_force import ModelInForce
-from acu_tracker.program import segments, tables
+from acu_tracker.program import program_track, segments
 from acu_tracker.program.air import WEATHER_QUANTITIES
 from acu_tracker.program.followed import Followed
 from acu_tracker.unit_law import (
@@ -76,7 +76,7 @@ class Acu(Unit):
 
     def __init__(self, parameters: AcuParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
-        self.memory = Memory(_initial(parameters).copy(), tables.NO_TABLES)
+        self.memory = Memory(_initial(parameters).copy(), program_track.NO_TABLES)
         self.parts['inputs']['stabilised'], self.parts['inputs']['drive_ready'] = ATTITUDE_TOPIC in self.reads, 1
         self.parts['outputs']['mode'], self.parts['outputs']['pins'] = Mode.STANDBY, topics.NO_TEXT_CODE
         signals.clear(self.parts['outputs'])

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from acu_tracker import control_unit, signals
 from acu_tracker.estimation import receiver_error
-from acu_tracker.program import tables
+from acu_tracker.program import program_track
 from pedestal_common.compiled import compiled
 from pedestal_common.graph import topics
 from pedestal_common.quantities import AnyRecord, Nanoseconds, Records, Stamps
@@ -39,7 +39,7 @@ class UnitRecord(Record):
 class Memory(NamedTuple):
     """Memory of the law."""
     record: Records     # a UnitRecord (1,)
-    tables: tables.Tables   # tables that the modes follow
+    tables: program_track.Tables   # tables that the modes follow
 
 
 _take = taking(signals.INPUT_TOPICS)

@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 from acu_tracker import control_unit, signals
 from acu_tracker.modes import REASONS
 from acu_tracker.params import AcuParameters
-from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
-from acu_tracker.program.tables import Tables
+from acu_tracker.program.program_track import NO_TRACK, ProgramTrack, Tables
 from acu_tracker.signals import INVALID_INPUTS
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight, pointing_model

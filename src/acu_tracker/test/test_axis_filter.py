@@ -6,7 +6,7 @@ from oracles import van_loan
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 from scipy.signal import lfilter
 
-from acu_tracker.estimation.filters import axis_filter, constant_gain
+from acu_tracker.estimation.filters import axis_filter, kalman
 from acu_tracker.estimation.filters.kalman import Symmetric
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisMeasurement
@@ -202,8 +202,8 @@ def test_variance_of_constant_gains_is_that_of_lyapunov(kind, alpha):
     t = T * np.arange(4000)
     out = run(t, noisy(0.0 * t), kind=kind, **{f'{kind}.alpha': alpha})
     n = 2 if kind == 'alpha_beta' else 3
-    gains = (constant_gain.benedict_bordner(alpha), 0.0) if n == 2 else constant_gain.kalata(alpha)
-    K = np.array(constant_gain.gain(alpha, *gains, T))[:n, None]
+    gains = (kalman.benedict_bordner(alpha), 0.0) if n == 2 else kalman.kalata(alpha)
+    K = np.array(kalman.constant_gain(alpha, *gains, T))[:n, None]
     F, H = np.array([[1, T, T * T / 2], [0, 1, T], [0, 0, 1]])[:n, :n], np.eye(n)[:1]
     P = solve_discrete_lyapunov((np.eye(n) - K @ H) @ F, SIGMA**2 * K @ K.T)
     np.testing.assert_allclose([out[-1][name] for name in ('variance', 'covariance', 'rate_variance')],

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from acu_tracker.estimation.filters import constant_gain
-from acu_tracker.geometry import attitude, deck_reference
+from acu_tracker.estimation.filters import kalman
+from acu_tracker.geometry import attitude, frames
 from acu_tracker.geometry.vector import Vector
-from acu_tracker.servo import beam_loop
+from acu_tracker.servo import controllers
 from pedestal_common.geometry import line_of_sight
 
 T = 0.01
@@ -16,7 +16,7 @@ T = 0.01
 
 def step_response(law, alpha, delay, steps):
     """Beam (steps,) that sees a step of 1 from the start on, a command in force `delay` periods late."""
-    beta = constant_gain.benedict_bordner(alpha)
+    beta = kalman.benedict_bordner(alpha)
     R, v, commands, beams = 0.0, 0.0, [0.0] * (delay + 1), []
     for _ in range(steps):
         beams.append(commands[-1 - delay])
@@ -28,14 +28,14 @@ def step_response(law, alpha, delay, steps):
 @pytest.mark.parametrize('alpha, delay', [(0.1, 0), (0.3, 0), (0.1, 4), (0.05, 10)])
 def test_step_responses_are_those_of_the_closed_transfer_functions(alpha, delay):
     """By hand from eq. (3): R = z^-1 (R + v T) + alpha nu, nu = e - T z^-1 v, and so on, e = 1 - z^-(1 + delay) R."""
-    beta = constant_gain.benedict_bordner(alpha)
+    beta = kalman.benedict_bordner(alpha)
     # v T (1 - z^-1 (1 - beta)) = beta e;  R (1 - z^-1) = (1 - alpha) z^-1 v T + alpha e
     one = np.polymul([1.0, -1.0], [1.0, beta - 1.0])
     type_1 = np.polyadd(alpha * np.array([1.0, beta - 1.0]), [(1.0 - alpha) * beta]), one
     # v T (1 - z^-1) = beta e;  R (1 - z^-1) = v T + alpha e
     two = np.polymul([1.0, -1.0], [1.0, -1.0])
     type_2 = [alpha + beta, -alpha], two
-    for law, (numerator, denominator) in ((beam_loop.type_1, type_1), (beam_loop.type_2, type_2)):
+    for law, (numerator, denominator) in ((controllers.type_1, type_1), (controllers.type_2, type_2)):
         numerator = np.polymul(numerator, [1.0, 0.0])
         late = np.polymul(denominator, [1.0] + [0.0] * (delay + 1))
         size = len(late)
@@ -44,7 +44,7 @@ def test_step_responses_are_those_of_the_closed_transfer_functions(alpha, delay)
         np.testing.assert_allclose(step_response(law, alpha, delay, 200), expected[:, 0], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize('law, lag', [(beam_loop.type_1, 0.2 * T), (beam_loop.type_2, 0.0)])
+@pytest.mark.parametrize('law, lag', [(controllers.type_1, 0.2 * T), (controllers.type_2, 0.0)])
 @pytest.mark.parametrize('delay', [0, 3])
 def test_a_ramp_is_met_late_by_one_period_or_not_at_all(law, lag, delay):
     """type_1: v T exactly, whatever alpha and delay; a compensation of the whole rate takes it away."""
@@ -52,7 +52,7 @@ def test_a_ramp_is_met_late_by_one_period_or_not_at_all(law, lag, delay):
         R, v, commands = 0.0, 0.0, [0.0] * (delay + 1)
         for k in range(4000):
             error = 0.2 * k * T - commands[-1 - delay]
-            R, v = law(R, v, error, 0.05, constant_gain.benedict_bordner(0.05), T, compensation)
+            R, v = law(R, v, error, 0.05, kalman.benedict_bordner(0.05), T, compensation)
             commands.append(R)
         assert error == pytest.approx(expected, abs=1e-11)
 
@@ -60,7 +60,7 @@ def test_a_ramp_is_met_late_by_one_period_or_not_at_all(law, lag, delay):
 def test_rates_of_a_fixed_direction_by_turning_the_deck():
     h, w = 1e-6, np.array([0.1, -0.05, 0.2])
     A, E = 0.7, 0.9
-    rates = deck_reference.fixed_rates(Vector(*w), A, E)
+    rates = frames.fixed_rates(Vector(*w), A, E)
     moved = []
     for sign in (-1.0, 1.0):
         mat = np.zeros((3, 3))

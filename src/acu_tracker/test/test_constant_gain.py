@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from scipy.optimize import minimize
 
-from acu_tracker.estimation.filters import constant_gain
+from acu_tracker.estimation.filters import kalman
 
 T, R = 0.02, 2.5e-7
 H = np.array([[1.0, 0.0, 0.0]])
@@ -16,14 +16,14 @@ PARABOLA = np.array([[1.0, T, T * T / 2], [0.0, 1.0, T], [0.0, 0.0, 1.0]])
 @pytest.mark.parametrize('alpha', [0.02, 0.15, 0.5, 0.9])
 def test_kalata_is_the_steady_kalman_filter_of_acceleration_steps(alpha):
     """The step that makes the Riccati equation give this alpha makes it give beta and gamma too."""
-    beta, gamma = constant_gain.kalata(alpha)
+    beta, gamma = kalman.kalata(alpha)
     step = gamma * math.sqrt(R / (1.0 - alpha)) / (2.0 * T * T)
     g = np.array([[T * T / 2], [T], [1.0]])
     scale = np.diag([1.0, T, T * T])
     F, G = scale @ PARABOLA @ np.linalg.inv(scale), scale @ g * step / math.sqrt(R)
     P = solve_discrete_are(F.T, H.T, G @ G.T, [[1.0]])
     K = np.linalg.solve(scale, P[:, 0] / (P[0, 0] + 1.0))
-    np.testing.assert_allclose(constant_gain.gain(alpha, beta, gamma, T), K, rtol=1e-4)
+    np.testing.assert_allclose(kalman.constant_gain(alpha, beta, gamma, T), K, rtol=1e-4)
 
 
 def noise_and_transient(gains):
@@ -47,4 +47,4 @@ def test_benedict_bordner_is_best_for_noise_and_transient(weight):
 
     alpha, beta = minimize(cost, (0.3, 0.05), method='Nelder-Mead', options={'xatol': 1e-9, 'fatol': 1e-15}).x
     print(f'weight {weight:g}: alpha {alpha:.4f}, beta {beta:.5f}')
-    assert beta == pytest.approx(constant_gain.benedict_bordner(alpha), rel=1e-4)
+    assert beta == pytest.approx(kalman.benedict_bordner(alpha), rel=1e-4)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker.lookahead import levelled_deck, planner
+from acu_tracker.lookahead import planner
 from acu_tracker.modes import Mode
 from acu_tracker.operating import announcement
 from acu_tracker.program.program_track import NO_TRACK
@@ -264,13 +264,14 @@ def test_the_lever_arm_moves_a_near_target(Rig, ranged):
 
 def test_the_levelled_deck_is_the_mean_of_its_attitudes():
     """Roll and pitch average out, the heading stays; the spread is the mean square of the tilt."""
-    h = levelled_deck.LevelledDeck.zeros()
-    levelled_deck.initialise(h)
+    state = planner.Planner.zeros()
+    planner.initialise(state)
+    h = state['deck']
     times = 0.05 * np.arange(2400)
     tilts = []
     for t in times:
         attitude = Rotation.from_euler('ZYX', [0.7, 0.03 * math.sin(0.9 * t), 0.05 * math.sin(0.6 * t)])
-        levelled_deck.take(h[0], t, attitude.as_quat() * (-1.0 if int(t) % 2 else 1.0), 60.0, False)
+        planner.take_attitude(h[0], t, attitude.as_quat() * (-1.0 if int(t) % 2 else 1.0), 60.0, False)
         tilts.append(math.acos(attitude.as_matrix()[2, 2]))
     difference = Rotation.from_quat(h['mean'][0]).inv() * Rotation.from_euler('Z', 0.7)
     assert difference.magnitude() < 3e-3

@@ -5,10 +5,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acu_tracker.geometry import attitude as deck_attitude
-from acu_tracker.geometry import deck_reference, lever_arm
+from acu_tracker.geometry import frames, lever_arm
 from acu_tracker.geometry.azimuth_wrap import Travel, nearest
-from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
+from acu_tracker.geometry.frames import Attitude
 from acu_tracker.geometry.vector import (
+    ZERO_VECTOR,
     AxisMotion,
     LineOfSight,
     Motion,
@@ -58,7 +59,7 @@ def test_deck_angles_rates_and_accelerations(t):
     w = body_rate(t)
     dw = (body_rate(t + 1e-3) - body_rate(t - 1e-3)) / 2e-3
     deck = Attitude(rotation(attitude(t).as_matrix()), Vector(*w), Vector(*dw))
-    got = np.array(angles(deck_reference.on_deck(deck, line_of_sight(earth_motion(t)))))
+    got = np.array(angles(frames.on_deck(deck, line_of_sight(earth_motion(t)))))
     h = 1e-3
     before, here, after = (deck_by_rotation(t + d) for d in (-h, 0.0, h))
     np.testing.assert_allclose(got[:, 0], here, atol=1e-13)
@@ -69,7 +70,7 @@ def test_deck_angles_rates_and_accelerations(t):
 def test_the_zenith_gives_finite_numbers():
     deck = Attitude(turn(0.0, 0.0, 0.0, 1.0), Vector(0.1, 0.1, 0.1), ZERO_VECTOR)
     zenith = Motion(AxisMotion(0.0, 0.01, 0.0), AxisMotion(0.5 * math.pi, 0.01, 0.0))
-    assert np.isfinite(angles(deck_reference.on_deck(deck, line_of_sight(zenith)))).all()
+    assert np.isfinite(angles(frames.on_deck(deck, line_of_sight(zenith)))).all()
     up = LineOfSight(Vector(0.0, 0.0, 1.0), Vector(0.1, 0.0, 0.0), Vector(0.0, 0.0, -0.01))
     assert np.isfinite(angles(up)).all()
 
@@ -120,7 +121,7 @@ def test_a_deck_rate_comes_back_to_earth(t):
                      for d in (-h, h) for A, E in [earth(t + d)])
     here = 0.5 * (before + after)
     deck = Attitude(rotation(attitude(t).as_matrix()), Vector(*body_rate(t)), ZERO_VECTOR)
-    got = deck_reference.earth_rates(deck, Vector(*here), Vector(*(after - before) / (2.0 * h)))
+    got = frames.earth_rates(deck, Vector(*here), Vector(*(after - before) / (2.0 * h)))
     assert got == pytest.approx((0.03 + 0.004 * t, 0.02 - 0.002 * t), abs=1e-7)
 
 

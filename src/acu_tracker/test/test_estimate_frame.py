@@ -8,9 +8,19 @@ from scipy.spatial.transform import Rotation
 from acu_tracker.estimation.filters import target_filter, unscented
 from acu_tracker.estimation.filters.measurement import AxisMeasurement, Measurement
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
-from acu_tracker.geometry import estimate_frame
-from acu_tracker.geometry.deck_reference import ZERO_VECTOR
-from acu_tracker.geometry.vector import AxisMotion, Motion, Vector, line_of_sight, rotated, rotation
+from acu_tracker.geometry import frames
+from acu_tracker.geometry.vector import (
+    ZERO_VECTOR,
+    AxisMotion,
+    Motion,
+    Vector,
+    earth_angles,
+    line_of_sight,
+    rotated,
+    rotation,
+    transposed,
+    turned,
+)
 from acu_tracker.program import bridge, program_track
 from acu_tracker.program.program_track import ProgramTrack
 
@@ -18,9 +28,14 @@ from acu_tracker.program.program_track import ProgramTrack
 def laid():
     """A frame on the way of a target near the zenith, and the LineOfSight of that target."""
     sight = line_of_sight(Motion(AxisMotion(0.4, 0.05, 0.0), AxisMotion(1.35, 0.01, 0.0)))
-    frame = estimate_frame.Frame.zeros()
-    estimate_frame.lay(frame[0], sight.u, sight.du)
+    frame = frames.Frame.zeros()
+    frames.lay(frame[0], sight.u, sight.du)
     return frame[0], sight
+
+
+def to_frame(frame, sight):
+    """The Motion in a frame of a LineOfSight in ENU."""
+    return earth_angles(turned(transposed(rotation(frame['mat'])), sight))
 
 
 def standing(A, E):
@@ -32,22 +47,21 @@ def test_the_target_runs_along_the_equator():
     frame, sight = laid()
     np.testing.assert_allclose(frame['mat'] @ frame['mat'].T, np.eye(3), atol=1e-15)
     assert np.linalg.det(frame['mat']) == pytest.approx(1.0)
-    (A, dA, _), (E, dE, _) = estimate_frame.to_frame(frame, sight)
+    (A, dA, _), (E, dE, _) = to_frame(frame, sight)
     assert (A, E, dE) == pytest.approx((0.0, 0.0, 0.0), abs=1e-15) and dA == pytest.approx(np.linalg.norm(sight.du))
-    assert estimate_frame.direction_to_frame(frame, 0.4, 1.35) == pytest.approx((0.0, 0.0), abs=1e-15)
+    assert frames.direction_to_frame(frame, 0.4, 1.35) == pytest.approx((0.0, 0.0), abs=1e-15)
 
 
 def test_there_and_back():
     frame, sight = laid()
     motion = Motion(AxisMotion(0.3, 0.02, 0.001), AxisMotion(-0.2, 0.01, -0.002))
-    np.testing.assert_allclose(estimate_frame.to_frame(frame, estimate_frame.to_earth(frame, motion)), motion,
-                               atol=1e-15)
-    still = estimate_frame.Frame.zeros()
+    np.testing.assert_allclose(to_frame(frame, frames.to_earth(frame, motion)), motion, atol=1e-15)
+    still = frames.Frame.zeros()
     for e, n, u in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.1, 0.2, 0.974)):
-        estimate_frame.lay(still[0], Vector(e, n, u), ZERO_VECTOR)
+        frames.lay(still[0], Vector(e, n, u), ZERO_VECTOR)
         np.testing.assert_allclose(still['mat'][0] @ still['mat'][0].T, np.eye(3), atol=2e-3)
         assert still['mat'][0, 2, 0] == 0.0     # Azimuth grows horizontally.
-    np.testing.assert_allclose(estimate_frame.to_frame(frame, sight).azimuth.angle, 0.0, atol=1e-15)
+    np.testing.assert_allclose(to_frame(frame, sight).azimuth.angle, 0.0, atol=1e-15)
 
 
 def test_variances_turn_with_the_frame():
@@ -58,19 +72,19 @@ def test_variances_turn_with_the_frame():
     A, E = 0.05 + sigma[0] * rng.normal(size=4000), 0.02 + sigma[1] * rng.normal(size=4000)
     framed = np.column_stack((np.cos(E) * np.sin(A), np.cos(E) * np.cos(A), np.sin(E))) @ frame['mat'].T
     azimuth, elevation = np.arctan2(framed[:, 0], framed[:, 1]), np.arcsin(framed[:, 2])
-    variances = estimate_frame.earth_variances(frame, standing(0.05, 0.02), standing(azimuth.mean(), elevation.mean()),
-                                               sigma[0]**2, sigma[1]**2)
+    variances = frames.earth_variances(frame, standing(0.05, 0.02), standing(azimuth.mean(), elevation.mean()),
+                                       sigma[0]**2, sigma[1]**2)
     np.testing.assert_allclose(variances, [azimuth.var(), elevation.var()], rtol=0.1)
 
 
 def test_a_filter_turns_with_its_frame():
     """The direction, its rate, and the variances in earth angles are the same in both frames, but for the part of the
     variances that a turn by 60 deg in the plane of the sky mixes; scipy turns the Cartesian covariance."""
-    before, after = laid()[0], estimate_frame.Frame.zeros()[0]
+    before, after = laid()[0], frames.Frame.zeros()[0]
     motion = Motion(AxisMotion(0.2, 0.01, 0.0), AxisMotion(0.35, -0.02, 0.0))
-    sight = estimate_frame.to_earth(before, motion)
-    estimate_frame.lay(after, sight.u, sight.du)
-    turn = estimate_frame.from_earth(after, rotation(before['mat']))
+    sight = frames.to_earth(before, motion)
+    frames.lay(after, sight.u, sight.du)
+    turn = frames.from_earth(after, rotation(before['mat']))
     np.testing.assert_allclose(np.array(turn), after['mat'].T @ before['mat'], atol=1e-15)
 
     params = FilterParameters(kind='ca')
@@ -90,7 +104,7 @@ def test_a_filter_turns_with_its_frame():
 
     target_filter.predict(f, c, 0.0)
     turned = target_filter.read_axes(f)
-    np.testing.assert_allclose(np.ravel(estimate_frame.to_earth(after, turned.motion)), np.ravel(sight), atol=1e-14)
+    np.testing.assert_allclose(np.ravel(frames.to_earth(after, turned.motion)), np.ravel(sight), atol=1e-14)
     # Against samples of the errors in both old axes, projected on both new axes.
     a, b = np.random.default_rng(3).normal(size=(2, 20_000)) * [[2e-4 * math.cos(0.35)], [1e-4]]
     across, up = (rotated(turn, v) for v in (

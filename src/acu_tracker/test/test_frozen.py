@@ -35,7 +35,7 @@ def test_numbers_that_stand_while_it_is_sent_on_a_way(watch, rate):
     steps = next(k for k in range(1, 1000) if watch.step(rate))
     assert steps * T == pytest.approx(HOLD + drive_watch.FROZEN_TEST_TRAVEL_RAD / abs(rate), abs=2.1 * T)
     assert watch.step(0.0, position=0.5)                # until it is reset
-    drive_watch.release_frozen(watch.s, watch.k * T)
+    drive_watch.release(drive_watch.Envelope.zeros()[0], watch.s, watch.k * T)
     assert not any(watch.step(0.0, position=0.5) for _ in range(1000))
 
 

@@ -8,9 +8,9 @@ from acu_tracker import control_unit
 from acu_tracker.geometry.vector import AxisMotion
 from acu_tracker.params import AxisParameters
 from acu_tracker.servo import controllers, position_loop
-from acu_tracker.servo.ends import Ends
 from acu_tracker.servo.params import FeedforwardParameters
 from acu_tracker.servo.position_loop import Feedback, Instants
+from acu_tracker.servo.travel import Ends
 from pedestal_common.parameters import build, record
 
 T = 0.005

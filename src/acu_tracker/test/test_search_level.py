@@ -6,7 +6,7 @@ import pytest
 from scipy.signal import lfilter
 
 from acu_tracker.search import level
-from acu_tracker.search.params import AcquisitionParameters
+from acu_tracker.search.level import AcquisitionParameters
 from pedestal_common.parameters import record
 
 T = 0.005

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker.geometry.vector import AxisMotion, Motion, Vector
+from acu_tracker.geometry.vector import ZERO_VECTOR, AxisMotion, Motion, Vector
 from acu_tracker.search import place
 from acu_tracker.search.pattern import Point
 from pedestal_common.geometry import line_of_sight
@@ -45,7 +45,7 @@ def test_rates_and_accelerations_are_the_derivatives(remembered, t):
 
 def test_what_was_at_rest_stays(remembered):
     s, u, _ = remembered
-    place.remember(s, 10.0, Vector(*u), place.ZERO_VECTOR)
+    place.remember(s, 10.0, Vector(*u), ZERO_VECTOR)
     assert angles(s, 500.0) == pytest.approx(line_of_sight.earth_angles(*u), abs=1e-12)
 
 

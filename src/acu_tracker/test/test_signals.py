@@ -2,7 +2,7 @@
 import numpy as np
 
 from acu_tracker import signals
-from acu_tracker.program import tables
+from acu_tracker.program import program_track
 from pedestal_common.wire import inputs
 
 
@@ -14,4 +14,4 @@ def test_the_inputs_begin_with_the_numbers_of_the_topics():
 
 
 def test_each_mode_that_follows_a_table_has_one():
-    assert tables.Tables._fields == tuple(row.name for row in tables.TABLE_MODES)
+    assert program_track.Tables._fields == tuple(row.name for row in program_track.TABLE_MODES)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from acu_tracker.search import step_track
-from acu_tracker.search.params import StepTrackParameters
+from acu_tracker.search.step_track import StepTrackParameters
 from pedestal_common.parameters import record
 
 B, T, TAU = 0.0175, 0.005, 0.1

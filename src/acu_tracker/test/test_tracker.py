@@ -17,9 +17,8 @@ from acu_tracker.estimation.filters.measurement import (
     nis,
 )
 from acu_tracker.estimation.params import FilterParameters, ReceiverModelParameters, TrackerParameters
-from acu_tracker.geometry import estimate_frame
-from acu_tracker.geometry.deck_reference import ZERO_VECTOR
-from acu_tracker.geometry.vector import Vector
+from acu_tracker.geometry import frames
+from acu_tracker.geometry.vector import ZERO_VECTOR, Vector
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.parameters import build, record
 
@@ -248,12 +247,12 @@ def test_receiver_law():
 def test_noise_of_the_attitude_moves_a_direction_as_rotations_do(elevation, along):
     """Oracle: scipy turns the direction by 20,000 small rotations about deck axes and the vertical; in the frame it
     moves along the axes of that. The frame is laid horizontally, or along a climb to the north-east."""
-    f = estimate_frame.Frame.zeros()[0]
+    f = frames.Frame.zeros()[0]
     u = Vector(*line_of_sight.earth_direction(0.3, elevation))
-    estimate_frame.lay(f, u, ZERO_VECTOR if along is None else Vector(*np.cross(u, along)))
+    frames.lay(f, u, ZERO_VECTOR if along is None else Vector(*np.cross(u, along)))
     generator = np.random.default_rng(1)
     tilt, heading = 2e-4 * generator.standard_normal((2, 20_000)), 5e-4 * generator.standard_normal(20_000)
     turned = Rotation.from_rotvec(np.column_stack((*tilt, heading))).apply(u) @ f['mat']
     measured = np.arctan2(turned[:, 0], turned[:, 1]).var(), np.arcsin(turned[:, 2]).var()
-    assert attitude_variances(estimate_frame.verticals(f, 0.0, 0.0), 2e-4**2, 5e-4**2) == pytest.approx(measured,
-                                                                                                      rel=0.03)
+    assert attitude_variances(frames.verticals(f, 0.0, 0.0), 2e-4**2, 5e-4**2) == pytest.approx(measured,
+                                                                                                rel=0.03)

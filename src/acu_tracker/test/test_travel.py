@@ -7,8 +7,8 @@ import pytest
 from acu_tracker.alarms import machine, table
 from acu_tracker.modes import REASONS, Mode
 from acu_tracker.params import AcuParameters
-from acu_tracker.servo import ends, floor
-from acu_tracker.servo.ends import Ends
+from acu_tracker.servo import travel
+from acu_tracker.servo.travel import Ends
 from pedestal_common.parameters import ParameterError, build
 
 MECHANICAL = ('pid', 'feedforward', 'adrc')
@@ -18,22 +18,22 @@ HILL = '0.5 -0.05; 0.8 0.4; 1.0 0.4; 1.3 -0.05'
 
 @pytest.mark.parametrize(('v', 'a', 't'), ((2.45, 20.0, 0.01), (0.1, 20.0, 0.0), (1.5, 3.0, 0.3)))
 def test_the_stopping_rate_is_the_one_whose_braking_distance_is_left(v, a, t):
-    d = ends.braking_distance(v, a, t)
-    assert ends.stopping_rate(d, a, t) == pytest.approx(v, rel=1e-12)
-    assert ends.stopping_rate(0.0, a, t) == ends.stopping_rate(-1.0, a, t) == 0.0
+    d = travel.braking_distance(v, a, t)
+    assert travel.stopping_rate(d, a, t) == pytest.approx(v, rel=1e-12)
+    assert travel.stopping_rate(0.0, a, t) == travel.stopping_rate(-1.0, a, t) == 0.0
 
 
 def test_behind_an_end_a_command_only_leads_back():
     span = Ends(-1.0, 1.0)
-    assert ends.inside(0.5, 1.1, span, 20.0, 0.01) == 0.0 and ends.inside(-0.5, 1.1, span, 20.0, 0.01) == -0.5
-    assert ends.inside(-0.5, -1.1, span, 20.0, 0.01) == 0.0 and ends.inside(0.5, -1.1, span, 20.0, 0.01) == 0.5
-    assert ends.inside(0.5, 0.0, span, 20.0, 0.01) == 0.5
+    assert travel.inside(0.5, 1.1, span, 20.0, 0.01) == 0.0 and travel.inside(-0.5, 1.1, span, 20.0, 0.01) == -0.5
+    assert travel.inside(-0.5, -1.1, span, 20.0, 0.01) == 0.0 and travel.inside(0.5, -1.1, span, 20.0, 0.01) == 0.5
+    assert travel.inside(0.5, 0.0, span, 20.0, 0.01) == 0.5
 
 
 @pytest.mark.parametrize(('y', 'dy', 'expected'), ((0.0, 0.5, 2.0), (0.0, -0.25, 4.0), (0.5, 0.0, math.inf),
                                                    (1.5, -0.1, 0.0), (-1.5, 0.0, 0.0)))
 def test_time_to_an_end(y, dy, expected):
-    assert ends.time_to(y, dy, Ends(-1.0, 1.0)) == expected
+    assert travel.time_to(y, dy, Ends(-1.0, 1.0)) == expected
 
 
 @pytest.mark.parametrize('controller', MECHANICAL)
@@ -76,7 +76,7 @@ def heights(rig, steps):
     above = []
     for _ in range(steps):
         rig.step()
-        above.append(rig.angle[1] - floor.at(rig.params.floor, rig.angle[0]))
+        above.append(rig.angle[1] - travel.floor_at(rig.params.floor, rig.angle[0]))
     return np.array(above)
 
 
@@ -110,12 +110,12 @@ def test_a_place_below_the_floor_is_refused(Rig):
 
 
 def test_the_floor_is_the_higher_end_of_a_cell_and_goes_round():
-    cells = floor.table(HILL)[0]
+    cells = travel.floor_table(HILL)[0]
     for A in np.linspace(-7.0, 7.0, 1001):
-        assert floor.highest(cells, A, A) >= floor.at(HILL, A) - 1e-12
-        assert floor.highest(cells, A, A) <= floor.at(HILL, A) + 1.6 * floor.CELL_WIDTH_RAD
-    assert floor.highest(cells, 0.0, 0.9) == floor.highest(cells, 2.0 * math.pi, 2.0 * math.pi + 0.9) == 0.4
-    assert not floor.table('')[0]['given']
+        assert travel.highest(cells, A, A) >= travel.floor_at(HILL, A) - 1e-12
+        assert travel.highest(cells, A, A) <= travel.floor_at(HILL, A) + 1.6 * travel.CELL_WIDTH_RAD
+    assert travel.highest(cells, 0.0, 0.9) == travel.highest(cells, 2.0 * math.pi, 2.0 * math.pi + 0.9) == 0.4
+    assert not travel.floor_table('')[0]['given']
 
 
 @pytest.mark.parametrize(('values', 'said'), (
@@ -133,5 +133,5 @@ def test_parameters_are_checked(values, said):
 
 def test_an_azimuth_beyond_every_travel_has_a_cell():
     """The floor between here and an infinite stop is the highest of the turn; the search for it ends."""
-    table = floor.table(HILL)[0]
-    assert floor.highest(table, 0.0, math.inf) == floor.highest(table, -math.inf, 0.0) == 0.4
+    table = travel.floor_table(HILL)[0]
+    assert travel.highest(table, 0.0, math.inf) == travel.highest(table, -math.inf, 0.0) == 0.4

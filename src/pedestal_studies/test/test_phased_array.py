@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from acu_tracker.estimation.filters.constant_gain import benedict_bordner
+from acu_tracker.estimation.filters.kalman import benedict_bordner
 from pedestal_results import intervals, tracking
 from pedestal_studies import metrics
 from pedestal_studies.p002_jia import phased_array

@@ -1,63 +1,37 @@
 """The monitors that detect wrong errors of the receiver: divergence, roughness, repetition, sign of the slope.
 
-Divergence
-----------
-Detection of divergence in autotrack: the estimate moves away from the target, and the antenna follows the estimate.
+Divergence: the estimate moves away from the target, and the antenna follows the estimate. The mean m is 1 while the
+innovations nu of both angles are as large as the filter expects by their variances S:
 
     m = mean over the last errors of (nu_A^2 / S_A + nu_E^2 / S_E) / 2
-
-    nu, S   innovation of an angle [rad] and its variance [rad2] as the filter predicts it
-    A, E    azimuth and elevation
-    m       is 1 while the innovations are as large as the filter expects [-]
 
 An error signal with the wrong sign, with rotated axes or with a gain three times too high drives the antenna away from
 its target. Then m becomes large before the beam leaves the target, and it is still large when the signal is lost. In
 this case autotrack must not coast on the wrong estimate.
 
-The detected divergence is latched: it stays until a reset.
-
-Roughness
----------
-Detection of receiver errors that are only noise: they change far more from one to the next than the model expects.
+Roughness: errors that are only noise change far more from one to the next than the model expects. The mean q of both
+axes is 1 for white noise of the variance R by the model of the receiver:
 
     q = mean over the last errors of (nu_k - nu_k-1)^2 / 2R
 
-    nu_k   innovation of error k [rad]
-    R      variance of an error by the model of the receiver [rad2]
-    q      mean of both axes [-]; 1 for white noise of the variance R
-
 Slow changes cancel in the difference: a target that turns, a slope of the wrong sign, a bias. The gate of
-`receiver_error` rejects all errors while q is above it. Some noisy errors would pass the gate alone, and would mislead
-the filter.
+`receiver_error` rejects all errors while q is above it, because some noisy errors would pass the gate alone and
+mislead the filter. Source: von Neumann, Distribution of the ratio of the mean square successive difference to the
+variance, Annals of Mathematical Statistics 12 (1941) 367.
 
-Source: von Neumann, Distribution of the ratio of the mean square successive difference to the variance, Annals of
-Mathematical Statistics 12 (1941) 367.
+Repetition: measured errors have noise and change with the direction of the beam. Errors that stay equal while the beam
+moves are therefore repeated, and the filter must not use them.
 
-Repetition
-----------
-Detection of a receiver that repeats its message while the beam moves.
-
-Measured errors have noise and change with the direction of the beam. Errors that stay equal while the beam moves are
-therefore repeated, and the filter must not use them.
-
-SlopeSign
----------
-Detection of receiver errors with the wrong sign (a reversed slope) in autotrack.
-
-The direction of a real target is smooth. The test computes the direction of the target with either sign of the error,
-and compares which of the two directions is smoother:
+SlopeSign: the direction of a real target is smooth. The test computes it with either sign of the error, and compares
+which of the two directions is smoother:
 
     b, e    measured direction of the beam and measured error, on one axis [rad]
     z+      b + e: direction of the target if the slope is right
     z-      b - e: direction of the target if the slope is reversed
 
-A straight line is fitted to the last values of b and of e. The squared innovations are averaged:
+A straight line is fitted to the last values of b and of e. The squared innovations nu of both lines are averaged:
 
     J+ = mean of (nu_b + nu_e)^2 / R,    J- = mean of (nu_b - nu_e)^2 / R
-
-    nu_b, nu_e   innovations of the lines of b and of e [rad]
-    R            variance of e [rad2]
-    J+, J-       roughness of z+ and of z- [-]
 
 Right slope: the beam is H z+, so that z- = (2 H - 1) z+. H is the transfer function of the closed loop, which follows
 a constant rate without error (type II). Except while H lags, z- is at least as rough as z+, however the target turns.
@@ -88,23 +62,17 @@ class Divergence(Record):
     diverged: Bit   # 1 from the detection of a divergence until its reset
 
 
-DIVERGENCE_ERROR_COUNT = 100
-"""Number of errors in the mean m; they take half a second. Without a fault m stays below 1.25."""
+DIVERGENCE_ERROR_COUNT = 100  # number of errors in m: half a second. Without a fault m stays below 1.25.
 
 MAX_COUNTED_ERROR = 12.5
-"""Largest contribution of one error to m [-]: half the default gate.
-
-This avoids an alarm after a few errors with interference.
-"""
+"""Largest contribution of one error to m [-]: half the default gate. This avoids an alarm after a few errors with
+interference."""
 
 DIVERGENCE_LIMIT = 7.0
-"""Largest m of a filter that still follows its target [-].
+"""Largest m of a filter that still follows its target [-]. A filter without an acceleration state reaches 6.1 on a
+target that reverses its motion, and keeps it in the beam."""
 
-A filter without an acceleration state reaches 6.1 on a target that reverses its motion, and keeps it in the beam.
-"""
-
-COASTING_DIVERGENCE_LIMIT = 2.0
-"""Largest m with which the filter may coast after a loss of the signal without a known cause [-]."""
+COASTING_DIVERGENCE_LIMIT = 2.0  # largest m [-] with which the filter may coast after a loss without a known cause
 
 
 @compiled
@@ -115,7 +83,7 @@ def restart_divergence(state: Divergence) -> None:
 
 @compiled
 def take_divergence(state: Divergence, innovation: Innovation) -> None:
-    """Add the innovation of an error to the mean m; one of NaN (nothing was predicted) is ignored."""
+    """Add the innovation of an error to the mean m; an innovation of NaN is ignored."""
     # The comparison of x with itself is False for NaN.
     x = 0.5 * (innovation.axis[0].chi_square + innovation.axis[1].chi_square)
     if x == x:
@@ -124,10 +92,7 @@ def take_divergence(state: Divergence, innovation: Innovation) -> None:
 
 @compiled
 def diverges(state: Divergence, without_signal: Bit) -> bool:
-    """Return True if the filter has diverged.
-
-    without_signal: True if the filter coasts, and no known cause explains the loss of the signal.
-    """
+    """Return True if the filter has diverged; without_signal: it coasts without a known cause of the loss."""
     return state.m > (COASTING_DIVERGENCE_LIMIT if without_signal else DIVERGENCE_LIMIT)
 
 
@@ -152,11 +117,8 @@ class Roughness(Record):
 ROUGHNESS_ERROR_COUNT = 10  # number of errors in the mean q
 
 MAX_COUNTED_DIFFERENCE = 100.0
-"""Largest contribution of one difference to q [-].
-
-One outlier makes two large differences. The limit keeps q below the default gate of 25 after one outlier, so that the
-gate alone decides on it.
-"""
+"""Largest contribution of one difference to q [-]. One outlier makes two large differences. The limit keeps q below
+the default gate of 25 after one outlier, so that the gate alone decides on it."""
 
 
 @compiled
@@ -191,10 +153,7 @@ REPETITION_TRAVEL_RAD = 3e-3  # travel of the beam within which the message must
 
 @compiled
 def take_repetition(state: Repetition, inputs: Inputs, at: Pointing) -> bool:
-    """Take an error of the receiver; return True if it is repeated.
-
-    at: direction of the beam at the error.
-    """
+    """Take an error of the receiver, with the beam `at`; return True if it is repeated."""
     last = state.message
     if inputs.cross_elevation != last[0] or inputs.elevation != last[1] or inputs.cn0_dbhz != last[2]:
         last[0], last[1], last[2] = inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz
@@ -213,19 +172,14 @@ class SlopeSign(Record):
 
 
 LINE_ERROR_COUNT = 200
-"""Number of errors in the memory of a line.
+"""Number of errors in the memory of a line. With a longer memory the test depends more on how far the beam travels,
+and less on how fast."""
 
-With a longer memory the test depends more on how far the beam travels, and less on how fast.
-"""
-
-SLOPE_ERROR_COUNT = 100
-"""Number of errors in the means J+ and J-. A real target reverses its motion in a shorter time."""
+SLOPE_ERROR_COUNT = 100  # number of errors in J+ and J-. A real target reverses its motion in a shorter time.
 
 MIN_ERROR_COUNT = 60
-"""Number of errors before the first verdict, counted from the begin of autotrack or the return of the signal.
-
-The means of fewer errors have no useful ratio.
-"""
+"""Number of errors before the first verdict, counted from the begin of autotrack or the return of the signal. The
+means of fewer errors have no useful ratio."""
 
 MAX_ERROR_BEAMWIDTHS = 0.5  # largest error that is used [beamwidths]
 
@@ -235,11 +189,9 @@ CROSS_AXIS_LEAKAGE (J+ + J- of the other axis).
 
 The ratio: with a right slope J+ is larger than J- for a while after the target has reversed its motion. In 30 closed
 loops of the scenario uav_flyby with a reversal of 11 deg/s2, J+ reached 2.8 J-. Without noise J+ reaches 2.9 J- at a
-bandwidth of 20 rad/s, and 4.6 J- at 10 rad/s.
-
-The leakage: the axes of the beam turn while the beam moves. Therefore a part of the means of one axis appears in those
-of the other axis. Without noise this part is 0.0015, for a beam of 1 deg that starts half a beamwidth off on a rolling
-deck.
+bandwidth of 20 rad/s, and 4.6 J- at 10 rad/s. The leakage: because the axes of the beam turn while the beam moves, a
+part of the means of one axis appears in those of the other axis. Without noise this part is 0.0015, for a beam of 1
+deg that starts half a beamwidth off on a rolling deck.
 """
 
 
@@ -272,10 +224,7 @@ def restart_slope(state: SlopeSign) -> None:
 
 @compiled
 def _innovation(state: SlopeSign, i: int, y: float, T: Seconds, alpha: float, beta: float) -> float:
-    """Update line i with a value y; return the innovation of y.
-
-    T: time since the previous value; alpha, beta: gains of the line on value and rate [-].
-    """
+    """Update line i with a value y, T after the last one; return the innovation of y. alpha, beta: gains [-]."""
     expected = state.line[i, 0] + T * state.line[i, 1]
     nu = y - expected
     state.line[i, 0] = expected + alpha * nu
@@ -285,7 +234,6 @@ def _innovation(state: SlopeSign, i: int, y: float, T: Seconds, alpha: float, be
 
 @compiled
 def _begin(state: SlopeSign, u: Vector, error: tuple[Radians, Radians]) -> None:
-    """Begin the lines at the first error; u: unit vector along the beam."""
     state.n = 1
     state.J[0, 0] = state.J[0, 1] = state.J[1, 0] = state.J[1, 1] = 0.0
     for i, y in enumerate((u.x, u.y, u.z, error[0], error[1])):
@@ -294,22 +242,16 @@ def _begin(state: SlopeSign, u: Vector, error: tuple[Radians, Radians]) -> None:
 
 @compiled
 def _reversed(J: Pair, other: Pair) -> bool:
-    """Return True if an axis has a reversed slope. J: (J+, J-) of the axis; other: (J+, J-) of the other axis."""
+    """Return True if an axis has a reversed slope; J, other: (J+, J-) of this axis and of the other one."""
     least = J[1] + REVERSED_SLOPE_MARGIN + CROSS_AXIS_LEAKAGE * (other[0] + other[1])
     return J[0] > REVERSED_SLOPE_RATIO * J[1] and J[0] > least
 
 
 @compiled
 def take_slope(state: SlopeSign, t: Seconds, beam: Beam, error: tuple[Radians, Radians], variance: Radians2,
-         gap: Seconds) -> bool:
-    """Take an error of the receiver; return True if the slope of an axis is reversed.
-
-    t         time at which the error was measured
-    beam      direction of the beam at t
-    error     (cross-elevation, elevation)
-    variance  R
-    gap       time without errors after which the lines restart
-    """
+               gap: Seconds) -> bool:
+    """Take an error (cross-elevation, elevation) of variance R, measured at t with the beam; return True if the slope
+    of an axis is reversed. The lines restart after the time `gap` without errors."""
     T = t - state.stamp
     if T <= 0.0:
         return False

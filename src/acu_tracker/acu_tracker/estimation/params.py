@@ -57,11 +57,9 @@ class CurrentStatisticalParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class ImmParameters(Parameters):
-    """Several interacting models, each with its own parameters.
-
-    The defaults form a ladder: a satellite that stands still, and models of constant acceleration with growing white
-    jerk, the last for a target that reverses. The probabilities of the models adapt Q to the innovations.
-    """
+    """Several interacting models, each with its own parameters. The defaults form a ladder: a satellite that stands
+    still, and models of constant acceleration with growing white jerk, the last for a target that reverses. The
+    probabilities of the models adapt Q to the innovations."""
 
     models: str = text('cv ca', 'models in use: two or more of cv, ca, singer, current_statistical')
     rungs: int = parameter(6, 1, MAX_RUNG_COUNT, '', 'number of models ca, each with more white jerk than '
@@ -75,8 +73,7 @@ class ImmParameters(Parameters):
                                                               a_max=0.6 * _DEG)
 
     def check(self) -> None:
-        """Raise ParameterError unless `models` names two or more models, each once, and the last rung is in the range
-        of a white jerk."""
+        """Raise ParameterError for wrong `models`, or if the white jerk of the last rung is out of range."""
         named_models(self.models)
         last = self.ca.noise * self.rung_ratio**(self.rungs - 1)
         if last > MAX_WHITE_JERK:
@@ -134,10 +131,8 @@ class ReceiverModelParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class ErrorMatrixParameters(Parameters):
-    """Matrix that the errors of the receiver are multiplied with: the inverse of its slopes and cross-talk.
-
-    `pedestal calibrate receiver` measures it. Without a calibration it is the identity.
-    """
+    """Matrix that the errors of the receiver are multiplied with: the inverse of its slopes and cross-talk, measured
+    by `pedestal calibrate receiver`; the identity without a calibration."""
 
     xx: float = parameter(1.0, -10.0, 10.0, '', 'corrected cross-elevation error per measured cross-elevation error')
     xe: float = parameter(0.0, -10.0, 10.0, '', 'corrected cross-elevation error per measured elevation error')
@@ -153,11 +148,9 @@ class ErrorMatrixParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class AttitudeModelParameters(Parameters):
-    """Error model of an INS, for a ship whose INS does not publish the statistics of its error.
-
-    The noise changes from sample to sample and is added to every measurement. The slow error cancels, because
-    measurement and pointing use the same attitude. Changes of the slow error look like a motion of the target.
-    """
+    """Error model of an INS that does not publish the statistics of its error. The noise changes from sample to sample
+    and is added to every measurement. The slow error cancels, because measurement and pointing use the same attitude.
+    Changes of the slow error look like a motion of the target."""
 
     tilt_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of roll and pitch, per sample')
     heading_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of heading, per sample')

@@ -1,11 +1,8 @@
 """An error of the receiver on its way into the target filter: measure, gate, filter, monitor.
 
-    measure   the error and the beam at its instant give the direction of the target, in the frame of the filter
-    gate      a measurement that differs too much from its prediction is rejected
-    filter    `filters.target_filter` takes an accepted measurement, or starts at it
-    monitor   `monitors` detect wrong errors
-
-`correct_error`, `used_error` and `take_error` are called in this order in each step.
+The error and the beam at its instant give the direction of the target, in the frame of the filter. A measurement that
+differs too much from its prediction is rejected. `correct_error`, `used_error` and `take_error` are called in this
+order in each step.
 """
 import math
 from typing import TYPE_CHECKING
@@ -26,11 +23,11 @@ from acu_tracker.estimation.filters.measurement import (
 )
 from acu_tracker.estimation.params import ErrorMatrixParameters, ReceiverModelParameters, TrackerParameters
 from acu_tracker.estimation.target import Target
-from acu_tracker.geometry import attitude, deck_reference, estimate_frame, history, lever_arm
+from acu_tracker.geometry import attitude, frames, history, lever_arm
 from acu_tracker.geometry.azimuth_wrap import MAX_OFFSET_BEAMWIDTHS
-from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
+from acu_tracker.geometry.frames import Attitude
 from acu_tracker.geometry.history import Pointing
-from acu_tracker.geometry.vector import Rotation, Vector, rotated, rotation
+from acu_tracker.geometry.vector import ZERO_VECTOR, Rotation, Vector, rotated, rotation
 from acu_tracker.pointing import model
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled, separate
@@ -45,23 +42,14 @@ if TYPE_CHECKING:
 UNKNOWN_POINTING = Pointing(math.nan, math.nan, math.nan, math.nan)  # of the beam, if no error is used
 
 OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY, OUTCOME_NO_ATTITUDE = range(6)
-"""Outcomes of a measurement.
-
-STARTED      it starts the filter
-ACCEPTED     the filter uses it
-GATED        the gate rejects it
-STALE        it is not newer than the last one
-NOISY        it is only noise
-NO_ATTITUDE  the attitude of the deck is not known at its instant
-"""
+"""Outcomes of a measurement: it starts the filter, is used, is rejected by the gate, is not newer than the last one,
+is only noise, has no known attitude of the deck at its instant."""
 
 
 @compiled
 def correct_error(matrix: ErrorMatrixParameters, inputs: Inputs) -> None:
-    """Multiply the error of a new message of the receiver with the matrix of its calibration.
-
-    The rates of the error come from a tachometer, and stay as they are.
-    """
+    """Multiply the error of a new message of the receiver with the matrix of its calibration. The rates of the error
+    come from a tachometer, and stay as they are."""
     if inputs.error_came:
         x, e = inputs.cross_elevation, inputs.elevation
         inputs.cross_elevation, inputs.elevation = matrix.xx * x + matrix.xe * e, matrix.ex * x + matrix.ee * e
@@ -70,11 +58,8 @@ def correct_error(matrix: ErrorMatrixParameters, inputs: Inputs) -> None:
 @compiled
 def used_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, by_level: bool,
                offset: Radians) -> tuple[int, bool, Pointing]:
-    """Return (flags of the receiver's message, True if its error is used, the Pointing of the beam at the error).
-
-    The Pointing is on the sky. A repeated error is not used. by_level, offset: uses_level and intended_offset of
-    _error_at.
-    """
+    """Return (flags of the receiver's message, True if its error is used, the Pointing of the beam on the sky at the
+    error). by_level, offset: uses_level and intended_offset of _error_at."""
     tracking.error[0] = tracking.error[1] = math.nan
     flags, used, at = _error_at(tracking.encoders, constants.p.tracker.receiver, inputs, by_level, offset)
     used = used and not monitors.take_repetition(tracking.repetition, inputs, at)
@@ -83,17 +68,17 @@ def used_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, by_
 
 @compiled
 def _error_at(encoders: history.Encoders, receiver: ReceiverModelParameters, inputs: Inputs, uses_level: bool,
-             intended_offset: Radians) -> tuple[int, bool, Pointing]:
-    """Return (flags of the receiver's message, True if its error is used, the Pointing of the beam at the error).
+              intended_offset: Radians) -> tuple[int, bool, Pointing]:
+    """Return (flags of the receiver's message, True if its error is used, the Pointing of the encoders at the error).
 
-    uses_level       True if the mode uses the signal level
-    intended_offset  angle by which the beam is off the target on purpose; no error is used if it is too large
+    uses_level: True if the mode uses the signal level; intended_offset: angle by which the beam is off the target on
+    purpose, with which no error is used if it is too large.
 
     The receiver error is a weighted mean of samples; each sample is target minus beam. The mean of the target belongs
-    to the instant receiver.age before the stamp of the error. The mean of the beam belongs to the instant
-    receiver.beam_age before this stamp. The two ages may differ, because an electronic beam jumps from step to step
-    (docs/graph.md, Age of the error). The pointing between two steps is interpolated linearly. For an axis of constant
-    rate this is exact, whatever the weights of the samples are.
+    to the instant receiver.age before the stamp of the error, that of the beam to receiver.beam_age before this stamp.
+    The two ages may differ, because an electronic beam jumps from step to step (docs/graph.md, Age of the error). The
+    pointing between two steps is interpolated linearly. For an axis of constant rate this is exact, whatever the
+    weights are.
     """
     wrong = _wrong_level(encoders, inputs) if uses_level else 0
     if wrong or not inputs.error_valid:
@@ -108,10 +93,8 @@ def _error_at(encoders: history.Encoders, receiver: ReceiverModelParameters, inp
 
 @compiled
 def _wrong_level(encoders: history.Encoders, inputs: Inputs) -> int:
-    """Return the flag of a message of the receiver with an invalid signal level or stamp, else 0.
-
-    The modes that use the signal level use it also while the receiver is not locked.
-    """
+    """Return the flag of a message with an invalid signal level or stamp, else 0. The modes that use the signal level
+    use it also while the receiver is not locked."""
     if not inputs.error_came:
         return 0
     if not math.isfinite(inputs.cn0_dbhz):
@@ -125,12 +108,9 @@ def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, out
                restart_gap: Seconds, closed: bool, follows: bool) -> int:
     """Filter an error of the receiver and run the monitors. Return a flag if the error is not accepted, else 0.
 
-    The filter receives the direction of the beam when the error was measured, displaced by the error.
-
-    at           the beam when the error was measured
-    restart_gap  time without accepted errors after which the filter restarts
-    closed       True if the loop is closed on the errors (autotrack), and no limit holds the beam off the target
-    follows      True if the axes follow their commands, and no limit holds the beam off the target
+    at: the beam when the error was measured; restart_gap: time without accepted errors after which the filter
+    restarts; closed: the loop is closed on the errors (autotrack); follows: the axes follow their commands. While a
+    limit holds the beam off the target, both are False.
     """
     receiver, params = constants.p.tracker.receiver, constants.p.tracker
     measured = pointing.displaced(at.A, at.E, inputs.cross_elevation, inputs.elevation)
@@ -152,12 +132,8 @@ def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, out
 @compiled
 def _measure(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, at: Pointing,
              measured: tuple[Radians, Radians], now: Attitude) -> Measurement:
-    """Return the Measurement of an error. Also set the random walk that the filter assumes for it.
-
-    at        direction of the antenna when the error was measured
-    measured  deck angles (azimuth, elevation) of the target: those of the antenna, displaced by the error
-    now       attitude of the deck when the error was measured
-    """
+    """Return the Measurement of an error. Also set the random walk that the filter assumes for it. at, now: antenna
+    and attitude of the deck when the error was measured; measured: deck angles of the target."""
     state, deck, params = tracking.target, tracking.attitude, constants.p.tracker
     azimuth, elevation = _measured_direction(state, constants.p, now.mat,
                                              inputs.range if deck.stabilised else math.nan, measured)
@@ -170,7 +146,7 @@ def _measure(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, at: P
     # walk_cross, walk_elevation: growth of these variances by the random walk of the attitude error [rad2/s].
     walk_cross = walk_elevation = 0.0
     if deck.stabilised:
-        verticals = estimate_frame.verticals(state.frame, azimuth, elevation)
+        verticals = frames.verticals(state.frame, azimuth, elevation)
         noise, walk = attitude.expected_error(deck.error, params.attitude)
         cross, along = attitude_variances(verticals, *noise)
         R_cross, R_elevation = R_cross + cross, R_elevation + along
@@ -185,36 +161,27 @@ def _measure(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, at: P
 @compiled
 def _measured_direction(state: Target, params: 'SharedParameters', mat_ed: Rotation, distance: Meters,
                         measured: tuple[Radians, Radians]) -> tuple[Radians, Radians]:
-    """Return (azimuth, elevation) of a measured direction in the frame of the filter.
-
-    mat_ed    rotation deck -> earth
-    distance  measured range; NaN: no range
-    measured  deck angles (azimuth, elevation) of the direction
-
-    For a filter that does not run yet the frame is laid at this direction first.
-    """
+    """Return (azimuth, elevation) in the frame of the filter of a direction `measured` in deck angles; distance:
+    range, NaN without one. For a filter that does not run yet the frame is laid at this direction first."""
     x, y, z = pointing.direction(*measured)
     v = lever_arm.from_ins(state.lever_arm, params.lever_arm, distance, state.running, Vector(x, y, z))
     v = rotated(mat_ed, v)
     azimuth, elevation = pointing.earth_angles(v.x, v.y, v.z)
     if not state.running:
         e, n, u = pointing.earth_direction(azimuth, elevation)
-        estimate_frame.lay(state.frame, Vector(e, n, u), ZERO_VECTOR)
-    return estimate_frame.direction_to_frame(state.frame, azimuth, elevation)
+        frames.lay(state.frame, Vector(e, n, u), ZERO_VECTOR)
+    return frames.direction_to_frame(state.frame, azimuth, elevation)
 
 
 @compiled
 def _measured_rates(state: Target, deck: Attitude, inputs: Inputs,
                     at: Pointing) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return (azimuth rate, elevation rate) of the target in the frame of the filter.
-
-    The rates are the sum of the rates of the antenna and of the receiver error. deck, at: attitude of the deck and
-    direction of the antenna when the error was measured.
-    """
+    """Return (azimuth rate, elevation rate) of the target in the frame of the filter. They are the sum of the rates of
+    the antenna and of the receiver error; deck, at: when the error was measured."""
     n = pointing.displaced_motion(at.A, at.E, at.dA, at.dE, inputs.cross_elevation, inputs.elevation,
                                   inputs.error_rate[0], inputs.error_rate[1])
     v, dv = lever_arm.to_ins(state.lever_arm, Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]))
-    return deck_reference.earth_rates(estimate_frame.of_deck(state.frame, deck), v, dv)
+    return frames.earth_rates(frames.of_deck(state.frame, deck), v, dv)
 
 
 @separate
@@ -272,11 +239,10 @@ def _accepted_rate(state: Target, params: TrackerParameters, constants: target.C
                    rate: RadiansPerSecond, chi_square: float) -> RadiansPerSecond:
     """Return the measured rate of axis i if it is accepted, else NaN.
 
-    chi_square: squared innovation of the rate over its variance, after the angle was used.
-
-    Only a rate that is estimated from angles alone can show that a measured rate is wrong. Therefore a measured rate
-    is used only after lock_count consecutive measured rates have agreed with the estimated rate. This avoids a new
-    filter that follows a stuck or biased sensor.
+    chi_square: squared innovation of the rate over its variance, after the angle was used. Only a rate that is
+    estimated from angles alone can show that a measured rate is wrong. Therefore a measured rate is used only after
+    lock_count consecutive measured rates have agreed with the estimated rate. This avoids a new filter that follows a
+    stuck or biased sensor.
     """
     if math.isnan(chi_square):
         return math.nan
@@ -291,7 +257,6 @@ def _accepted_rate(state: Target, params: TrackerParameters, constants: target.C
 @compiled
 def _with_accepted_rates(state: Target, params: TrackerParameters, constants: target.Constants,
                          measurement: Measurement, innovation: Innovation) -> Measurement:
-    """Return the measurement with only the rates that pass their own gates."""
     (a, e), (i_a, i_e) = measurement.axis, innovation.axis
     a = with_rate(a, _accepted_rate(state, params, constants, 0, a.rate, i_a.rate_chi_square))
     e = with_rate(e, _accepted_rate(state, params, constants, 1, e.rate, i_e.rate_chi_square))
@@ -317,20 +282,17 @@ def _converged(state: target_filter.Filter, constants: target_filter.Constants, 
 def _follow_with_frame(state: Target, constants: target.Constants) -> None:
     """Lay the frame along the motion of a target that is too far off its equator, and turn the filter with it."""
     motion = target.outlook(state, constants, state.stamp)
-    if abs(motion.elevation.angle) <= estimate_frame.MAX_FRAME_ELEVATION_RAD:
+    if abs(motion.elevation.angle) <= frames.MAX_FRAME_ELEVATION_RAD:
         return
-    before, sight = rotation(state.frame.mat), estimate_frame.to_earth(state.frame, motion)
-    estimate_frame.lay(state.frame, sight.u, sight.du)
-    target_filter.turn(state.filter, constants.filter, estimate_frame.from_earth(state.frame, before))
+    before, sight = rotation(state.frame.mat), frames.to_earth(state.frame, motion)
+    frames.lay(state.frame, sight.u, sight.du)
+    target_filter.turn(state.filter, constants.filter, frames.from_earth(state.frame, before))
 
 
 @compiled
 def _watch_slope(tracking: 'Tracking', params: TrackerParameters, inputs: Inputs, at: Pointing,
                  mat_ed: Rotation) -> None:
-    """Test the sign of the slope with an error, and latch the divergence if the sign is reversed.
-
-    at: the beam when the error was measured; mat_ed: rotation deck -> earth at this time.
-    """
+    """Test the sign of the slope with an error and its beam; latch the divergence if the sign is reversed."""
     error, beam = (inputs.cross_elevation, inputs.elevation), monitors.slope_beam(mat_ed, at.A, at.E)
     variance = error_variance(inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz, params.receiver)
     if monitors.take_slope(tracking.slope_sign, inputs.error_stamp - params.receiver.age, beam, error, variance,

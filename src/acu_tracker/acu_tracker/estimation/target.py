@@ -1,6 +1,6 @@
 """The target: its estimate by the filter, in the frame of the filter, in earth angles and in deck angles.
 
-The equator of the filter's frame passes through the target (`estimate_frame`). With a measured range the filter
+The equator of the filter's frame passes through the target (`geometry.frames`). With a measured range the filter
 estimates the line of sight from the INS, otherwise the one from the antenna (`lever_arm`). Between accepted
 measurements the filter stays at the stamp of the last one; `outlook` and `read` predict from there.
 """
@@ -14,10 +14,10 @@ from acu_tracker.estimation import monitors
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.estimation.filters.measurement import AxisVariances, Estimate
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters
-from acu_tracker.geometry import attitude, deck_reference, estimate_frame, lever_arm
+from acu_tracker.geometry import attitude, frames, lever_arm
 from acu_tracker.geometry.attitude import DeckAttitude
-from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
-from acu_tracker.geometry.vector import LineOfSight, Motion, Rotation, angles, earth_angles, line_of_sight
+from acu_tracker.geometry.frames import Attitude
+from acu_tracker.geometry.vector import ZERO_VECTOR, Motion, Rotation, angles, earth_angles, line_of_sight
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Bit, Ints, Pair, Records, Seconds
 from pedestal_common.record import Record
@@ -47,7 +47,7 @@ class Target(Record):
     gated: int              # number of rejected directions since the start
     rates_gated: int        # number of rejected rates since the start
     ranges_gated: int       # number of rejected ranges since the start
-    frame: estimate_frame.Frame     # the frame of the filter
+    frame: frames.Frame     # the frame of the filter
     lever_arm: lever_arm.LeverArm   # from the INS to the antenna
 
 
@@ -100,30 +100,17 @@ def reset_accepted_count(target: Target) -> None:
 
 @compiled
 def locked(target: Target, params: TrackerParameters, since_accepted: Seconds) -> Bit:
-    """Return True if autotrack can begin.
-
-    Three conditions make lock: lock_count consecutive measurements were accepted, the last of them is at most
-    coast_after old, and the filter has converged.
-
-    since_accepted: age of the last accepted measurement, less the receiver's latency.
-    """
+    """Return True if autotrack can begin: lock_count consecutive measurements were accepted, the last of them is at
+    most coast_after old, and the filter has converged. since_accepted: its age, less the receiver's latency."""
     return (target.running and target.accepted_in_a_row >= params.lock_count and target.converged
             and since_accepted <= params.coast_after)
 
 
 @compiled
 def outlook(target: Target, constants: Constants, t: Seconds) -> Motion:
-    """Return the Motion that the filter predicts for t, in its frame.
-
-    For a time before the last accepted measurement, return the Motion at that measurement.
-    """
+    """Return the Motion in the frame of the filter predicted for t, at the earliest for the last accepted
+    measurement."""
     return target_filter.outlook(target.filter, constants.filter, max(t - target.stamp, 0.0))
-
-
-@compiled
-def earth_outlook(target: Target, constants: Constants, t: Seconds) -> LineOfSight:
-    """Return the LineOfSight in ENU that the filter predicts for t."""
-    return estimate_frame.to_earth(target.frame, outlook(target, constants, t))
 
 
 @compiled
@@ -131,23 +118,20 @@ def on_deck(target: Target, params: 'SharedParameters', deck: DeckAttitude, t: S
     """Return the Motion in deck angles at t."""
     if not source.framed:
         return attitude.on_deck(deck, params, t, source.motion)
-    sight = estimate_frame.to_earth(target.frame, source.motion)
+    sight = frames.to_earth(target.frame, source.motion)
     known, now = attitude.at(deck, params, t)
     if not known:
         return earth_angles(sight)      # As attitude.on_deck does.
-    return angles(lever_arm.to_antenna(target.lever_arm, deck_reference.on_deck(now, sight)))
+    return angles(lever_arm.to_antenna(target.lever_arm, frames.on_deck(now, sight)))
 
 
 @compiled
 def on_levelled_deck(target: Target, level: Rotation, source: Source) -> Motion:
-    """Return the Motion of a source in deck angles of a levelled deck at rest.
-
-    level: rotation from this deck to the earth.
-    """
+    """Return the Motion of a source in deck angles of a levelled deck at rest; level: this deck -> earth."""
     still = Attitude(level, ZERO_VECTOR, ZERO_VECTOR)
     if source.framed:
-        still = estimate_frame.of_deck(target.frame, still)
-    return angles(deck_reference.on_deck(still, line_of_sight(source.motion)))
+        still = frames.of_deck(target.frame, still)
+    return angles(frames.on_deck(still, line_of_sight(source.motion)))
 
 
 @compiled
@@ -157,10 +141,10 @@ def read(target: Target, params: 'SharedParameters', constants: Constants, deck:
     target_filter.predict(target.filter, constants.filter, max(t - target.stamp, 0.0))
     framed, variances = target_filter.read(target.filter)
     azimuth, elevation = variances
-    motion = earth_angles(estimate_frame.to_earth(target.frame, framed))
-    A11, E11 = estimate_frame.earth_variances(target.frame, framed, motion, azimuth.p11, elevation.p11)
-    A12, E12 = estimate_frame.earth_variances(target.frame, framed, motion, azimuth.p12, elevation.p12)
-    A22, E22 = estimate_frame.earth_variances(target.frame, framed, motion, azimuth.p22, elevation.p22)
+    motion = earth_angles(frames.to_earth(target.frame, framed))
+    A11, E11 = frames.earth_variances(target.frame, framed, motion, azimuth.p11, elevation.p11)
+    A12, E12 = frames.earth_variances(target.frame, framed, motion, azimuth.p12, elevation.p12)
+    A22, E22 = frames.earth_variances(target.frame, framed, motion, azimuth.p22, elevation.p22)
     azimuth, elevation = AxisVariances(A11, A12, A22), AxisVariances(E11, E12, E22)
     if target.lever_arm.range > 0.0:
         known, now = attitude.at(deck, params, t)

@@ -1,34 +1,30 @@
 """The attitude of the deck: its history, the correction of its jumps, and the statistics of its error.
 
-DeckAttitude interpolates or extrapolates the last measurements of the INS to any instant near them.
+DeckAttitude interpolates or extrapolates the last measurements of the INS to any instant near them. w, dw: angular
+rate [rad/s] and angular acceleration [rad/s2] of the deck, FLU; T: time between two samples, or since the last one.
 
-w, dw: angular rate [rad/s] and angular acceleration [rad/s2] of the deck, FLU; T: time between two samples, or
-since the last sample.
+AttitudeError: noise and slow random walk of tilt (roll or pitch) and heading. The INS may publish these statistics on
+ins/error; otherwise parameters define them. `receiver_error` adds the noise to the variance of each measured
+direction.
 
-AttitudeError: statistics of the error of the measured attitude, which are noise and slow random walk of tilt and
-heading. The INS may publish these statistics on ins/error; otherwise parameters define the statistics.
-`receiver_error` adds the noise to the variance of each measured direction. Tilt stands for roll and for pitch.
-
-AttitudeJump: correction of jumps in the attitude of the INS, which are changes that the measured rates of the deck do
-not explain. A rotation c keeps the corrected attitude continuous at a jump. Afterwards the angle of c decays slowly to
-0, so that the corrected attitude returns to the measured one.
+AttitudeJump: jumps in the attitude of the INS are changes that the measured rates of the deck do not explain. A
+rotation c keeps the corrected attitude continuous at a jump, and then decays slowly:
 
     p_k = b_k-1 (x) exp(w T / 2)    attitude of sample k, predicted by the rate w from b_k-1
     b_k = c (x) q_k                 corrected attitude; q_k: measured by the INS; c = 1 before any jump
     c = p_k (x) q_k*                set at a jump: the angle between b_k and p_k exceeds MAX_UNEXPLAINED_ANGLE_RAD
 
-(x) is the product of quaternions, q* the inverse of q, w the rate of the deck [rad/s], T the time between two samples
-[s]. The quaternions rotate deck -> earth, so that c turns about axes of the earth. The angle of c decays at
-JUMP_DECAY_RATE_RAD_S. Neither a jump of any size nor this decay disturbs tracking by the receiver. A mode that points
-by the attitude follows the decay so slowly that the operator can check the new attitude.
+(x) is the product of quaternions, q* the inverse of q. The quaternions rotate deck -> earth, so that c turns about
+axes of the earth. Neither a jump of any size nor the decay disturbs tracking by the receiver. A mode that points by
+the attitude follows the decay so slowly that the operator can check the new attitude.
 """
 import math
 from typing import TYPE_CHECKING, Annotated
 
-from acu_tracker.geometry import deck_reference
-from acu_tracker.geometry.deck_reference import ZERO_VECTOR, Attitude
+from acu_tracker.geometry import frames
+from acu_tracker.geometry.frames import Attitude
 from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, push
-from acu_tracker.geometry.vector import Motion, Rotation, Vector, angles, line_of_sight, turn
+from acu_tracker.geometry.vector import ZERO_VECTOR, Motion, Rotation, Vector, angles, line_of_sight, turn
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE
 from pedestal_common.geometry.quaternion import product
@@ -65,11 +61,8 @@ MAX_ATTITUDE_NOISE = 0.5  # largest accepted 1-sigma of the noise [rad] and of t
 
 @compiled
 def take_statistics(error: AttitudeError, noise: Vector3, walk: Vector3) -> bool:
-    """Adopt the statistics that the INS published; return False, without a change, if a number is out of range.
-
-    noise  1-sigma of the noise of roll, pitch and heading [rad]
-    walk   1-sigma of their random walk [rad/sqrt(s)]
-    """
+    """Adopt the statistics that the INS published; return False, without a change, if a number is out of range. noise,
+    walk: 1-sigma of roll, pitch and heading [rad], and of their random walk [rad/sqrt(s)]."""
     for i in range(3):
         if not (0.0 <= noise[i] <= MAX_ATTITUDE_NOISE and 0.0 <= walk[i] <= MAX_ATTITUDE_NOISE):
             return False
@@ -81,13 +74,10 @@ def take_statistics(error: AttitudeError, noise: Vector3, walk: Vector3) -> bool
 
 @compiled
 def expected_error(error: AttitudeError,
-             model: 'AttitudeModelParameters') -> tuple[tuple[Radians2, Radians2], tuple[float, float]]:
-    """Return ((noise of tilt, of heading), (walk of tilt, of heading) [rad2/s]).
-
-    The parameters `model` are used if the INS published no statistics. The slow errors of these parameters are
-    Gauss-Markov processes with the standard deviation sigma (tilt_wander, heading_wander) and the correlation time tau
-    (wander_time). Their variance first grows by 2 sigma^2 / tau [rad2/s].
-    """
+                   model: 'AttitudeModelParameters') -> tuple[tuple[Radians2, Radians2], tuple[float, float]]:
+    """Return ((noise of tilt, of heading), (walk of tilt, of heading) [rad2/s]), by `model` if the INS published none.
+    The slow errors of `model` are Gauss-Markov processes with the standard deviation sigma and the correlation time
+    tau (wander_time). Their variance first grows by 2 sigma^2 / tau."""
     if error.published:
         return (error.noise[0], error.noise[1]), (error.walk[0], error.walk[1])
     k = 2.0 / model.wander_time
@@ -102,13 +92,10 @@ class AttitudeJump(Record):
 
 
 MAX_UNEXPLAINED_ANGLE_RAD = 3e-3
-"""Largest angle between measured and predicted attitude that is not a jump [rad].
+"""Largest angle between measured and predicted attitude that is not a jump [rad]: a hundred times the noise of an INS.
+In a step of 5 ms a rate with an error of 0.5 rad/s gives this angle."""
 
-The angle is a hundred times the noise of an INS. In a step of 5 ms a rate with an error of 0.5 rad/s gives this angle.
-"""
-
-JUMP_DECAY_RATE_RAD_S = 1e-3
-"""Rate at which the angle of c decays, and with which the corrected attitude returns to the measured one [rad/s]."""
+JUMP_DECAY_RATE_RAD_S = 1e-3  # rate at which the angle of c decays [rad/s]
 
 
 @compiled
@@ -119,19 +106,11 @@ def conjugate(q: Xyzw) -> Xyzw:
 
 @compiled
 def _half_angle(q: Xyzw | Quaternion) -> Radians:
-    """Return half of the angle of a unit quaternion, 0 to pi / 2."""
     return math.atan2(math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]), abs(q[3]))
 
 
 @compiled
-def clear_jump(jump: AttitudeJump) -> None:
-    """Discard c: the measured attitude is used without a correction."""
-    jump.apart = 0
-
-
-@compiled
 def _decay(jump: AttitudeJump, T: Seconds) -> None:
-    """Reduce the angle of c by JUMP_DECAY_RATE_RAD_S for T."""
     half = _half_angle(jump.c)
     left = half - 0.5 * JUMP_DECAY_RATE_RAD_S * T
     if left <= 0.0:
@@ -143,10 +122,7 @@ def _decay(jump: AttitudeJump, T: Seconds) -> None:
 
 @compiled
 def jump_corrected(jump: AttitudeJump, predicted: Xyzw, measured: Xyzw, T: Seconds) -> Xyzw:
-    """Return the corrected quaternion b_k of a measured quaternion q_k.
-
-    predicted: p_k; measured: q_k; T: time since the sample before.
-    """
+    """Return the corrected quaternion b_k; predicted: p_k; measured: q_k; T: time since the sample before."""
     q = measured
     if jump.apart:
         _decay(jump, T)
@@ -174,11 +150,9 @@ class DeckAttitude(Record):
     error: AttitudeError
 
 
-RATE_COLUMN, ACCELERATION_COLUMN = 4, 7
-"""First columns of w and of dw in a sample of the history; the quaternion is in columns 0 to 3."""
+RATE_COLUMN, ACCELERATION_COLUMN = 4, 7  # first columns of w and of dw in a sample
 
-MIN_TURN_RATE_RAD_S = 1e-6
-"""Rate of the deck [rad/s] above which its attitude must change from one measurement to the next."""
+MIN_TURN_RATE_RAD_S = 1e-6  # rate of the deck above which its attitude must change from one measurement to the next
 
 UNKNOWN_VECTOR = Vector(math.nan, math.nan, math.nan)  # vector without a value
 
@@ -203,12 +177,7 @@ def newest(deck: DeckAttitude) -> Floats:
 @compiled
 def smoothed_acceleration(before: RadiansPerSecond2, w: RadiansPerSecond, w_before: RadiansPerSecond, T: Seconds,
                           tau: Seconds) -> RadiansPerSecond2:
-    """Return one component of dw, the low-passed difference of two rates.
-
-    before       smoothed acceleration T ago
-    w, w_before  rate now and T ago
-    tau          time constant of the low-pass
-    """
+    """Return one component of dw, the difference of two rates T apart, low-passed by tau; before: its value T ago."""
     return before + T / (tau + T) * ((w - w_before) / T - before)
 
 
@@ -220,10 +189,7 @@ def rotation_angle(w: RadiansPerSecond, dw: RadiansPerSecond2, T: Seconds) -> Ra
 
 @compiled
 def rotated(q: Xyzw | Quaternion, r: Xyz) -> Xyzw:
-    """Return the quaternion (x, y, z, w) of a deck that had the attitude q and rotated by the vector r [rad].
-
-    r is in FLU. The result is q (x) exp(r/2); (x) is the product of quaternions.
-    """
+    """Return q (x) exp(r/2): a deck of attitude q after a rotation by the vector r [rad], FLU."""
     rx, ry, rz = r
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
     k = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
@@ -232,11 +198,7 @@ def rotated(q: Xyzw | Quaternion, r: Xyz) -> Xyzw:
 
 @compiled
 def _repeats(deck: DeckAttitude, q: Quaternion, w: Vector3) -> bool:
-    """Keep a sample of the INS: quaternion q and rate w.
-
-    Return True if the sample equals the previous one although its rates show a turning deck. Such an INS repeats its
-    last message.
-    """
+    """Keep a sample; return True if it repeats the previous one although its rates show a turning deck."""
     same, turns = True, False
     for i in range(7):
         x = q[i] if i < 4 else w[i - 4]
@@ -248,16 +210,13 @@ def _repeats(deck: DeckAttitude, q: Quaternion, w: Vector3) -> bool:
 
 @compiled
 def _vector(sample: Floats, column: int) -> Vector:
-    """Return the Vector in three columns of a sample, the first of which is `column`."""
     return Vector(sample[column], sample[column + 1], sample[column + 2])
 
 
 @compiled
 def _correct_jump(deck: DeckAttitude, row: int, last: int, T: Seconds) -> None:
-    """Correct the quaternion in a row of the history for a jump; row `last` holds the sample T before it.
-
-    The mean of the rates of both samples predicts the quaternion.
-    """
+    """Correct the quaternion in a row of the history for a jump; row `last` holds the sample T before it. The mean of
+    the rates of both samples predicts the quaternion."""
     a, b = deck.history.sample[last], deck.history.sample[row]
     w_a, w_b = _vector(a, RATE_COLUMN), _vector(b, RATE_COLUMN)
     predicted = rotated(a, (0.5 * T * (w_a.x + w_b.x), 0.5 * T * (w_a.y + w_b.y), 0.5 * T * (w_a.z + w_b.z)))
@@ -267,16 +226,11 @@ def _correct_jump(deck: DeckAttitude, row: int, last: int, T: Seconds) -> None:
 @compiled
 def take(deck: DeckAttitude, params: 'SharedParameters', t_k: Seconds, stamp: Seconds, q: Quaternion, w: Vector3,
          aligning: Bit) -> int:
-    """Take a measured quaternion q and rate w [rad/s] into the history; return SAMPLE_INVALID, SAMPLE_REPEATED or
-    SAMPLE_NEW.
+    """Take a measured quaternion q and rate w into the history at the step t_k; return one of SAMPLE_.
 
     A sample is invalid if it is not finite, or its quaternion has not the length 1. A sample older than the last one
-    or later than the step is invalid as well. So is a sample that equals the last one while the deck turns. A sample
-    with the stamp of the last one is a repeated sample.
-
-    t_k       stamp of the step
-    stamp     stamp of the sample
-    aligning  True while the INS aligns; its attitude may then jump
+    or later than the step is invalid as well. So is a sample that equals the last one while the deck turns. While the
+    INS is `aligning`, its attitude may jump.
     """
     norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     if not (abs(norm - 1.0) < 0.01 and math.isfinite(w[0] + w[1] + w[2])):
@@ -305,18 +259,16 @@ def take(deck: DeckAttitude, params: 'SharedParameters', t_k: Seconds, stamp: Se
     if T <= params.attitude_timeout and deck.aligned and not aligning:
         _correct_jump(deck, row, last, T)
     else:
-        clear_jump(deck.jump)
+        deck.jump.apart = 0
     deck.aligned = not aligning
     return SAMPLE_NEW
 
 
 @compiled
 def at(deck: DeckAttitude, params: 'SharedParameters', t: Seconds) -> tuple[bool, Attitude]:
-    """Return (True if the attitude at t is known, the Attitude deck -> earth, of NaN if it is unknown).
-
-    The attitude is interpolated between two samples, or predicted from the last sample for at most attitude_timeout.
-    Ashore it is constant and always known.
-    """
+    """Return (True if the attitude at t is known, the Attitude deck -> earth, of NaN if it is unknown). The attitude
+    is interpolated between two samples, or predicted from the last sample for at most attitude_timeout. Ashore it is
+    constant and always known."""
     if not deck.stabilised:
         return True, Attitude(turn(ASHORE_ATTITUDE[0], ASHORE_ATTITUDE[1], ASHORE_ATTITUDE[2], ASHORE_ATTITUDE[3]),
                               ZERO_VECTOR, ZERO_VECTOR)
@@ -344,11 +296,8 @@ def at(deck: DeckAttitude, params: 'SharedParameters', t: Seconds) -> tuple[bool
 
 @compiled
 def on_deck(deck: DeckAttitude, params: 'SharedParameters', t: Seconds, motion: Motion) -> Motion:
-    """Return the Motion in deck angles at t of a Motion in earth angles.
-
-    Ashore, or without a known attitude, return the Motion unchanged.
-    """
+    """Return the Motion in deck angles at t of one in earth angles; unchanged ashore or without an attitude."""
     known, now = at(deck, params, t)
     if deck.stabilised and known:
-        return angles(deck_reference.on_deck(now, line_of_sight(motion)))
+        return angles(frames.on_deck(now, line_of_sight(motion)))
     return motion

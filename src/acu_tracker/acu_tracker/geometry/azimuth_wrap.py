@@ -1,12 +1,9 @@
 """The azimuth wrap: of the azimuths that point in the same direction, the one to which the axis goes.
 
 The choice matters for an axis with more than one revolution of travel. At a limit of its travel the axis turns: it
-goes round to another azimuth wrap of its target.
-
-During the turn the beam is off the target on purpose. Errors of the receiver that belong to this time are not used,
-and the outage of the receiver counts as explained. The turn ends when the reference of the axis is near the azimuth of
-the target at the same instant. An axis with less than one revolution of travel waits at its limit, and turns as soon
-as the target is inside the travel again.
+goes round to another azimuth wrap of its target. During the turn the beam is off the target on purpose. Errors of the
+receiver that belong to this time are not used, and the outage of the receiver counts as explained. An axis with less
+than one revolution of travel waits at its limit, and turns as soon as the target is inside the travel again.
 """
 import math
 from typing import NamedTuple
@@ -25,11 +22,9 @@ class Travel(NamedTuple):
 
 @compiled
 def nearest(azimuth: Radians, near: Radians, low: Radians, high: Radians, travel: Travel) -> Radians:
-    """Return the wrap of an azimuth that suits the limits low to high best.
-
-    The first choice is the wrap nearest to `near` from which the Travel stays inside the limits. The second choice is
-    the nearest wrap that is inside the limits itself. The last choice is the nearest wrap.
-    """
+    """Return the wrap of an azimuth that suits the limits low to high best. The first choice is the wrap nearest to
+    `near` from which the Travel stays inside the limits. The second choice is the nearest wrap that is inside the
+    limits itself. The last choice is the nearest wrap."""
     # Two penalties, far above every distance, rank the wraps: 2e6 for a wrap outside the limits, 1e6 for a wrap whose
     # travel leaves the limits.
     closest = near + wrap(azimuth - near)
@@ -53,8 +48,7 @@ class Turn(Record):
     over: Seconds       # last instant at which this turn was under way; -inf: no turn yet
 
 
-MAX_OFFSET_BEAMWIDTHS = 0.5
-"""Largest intended angle between beam and target [beamwidths] at which the receiver's error is still used."""
+MAX_OFFSET_BEAMWIDTHS = 0.5  # largest intended angle between beam and target at which an error is used
 
 
 def initialise_turn(record: Records) -> None:
@@ -77,13 +71,8 @@ def stop_turn(turn: Turn) -> None:
 
 @compiled
 def watch_turn(turn: Turn, axis: Radians, target: tuple[Radians, Radians], beamwidth: Radians, t: Seconds) -> None:
-    """End the turn at t if the azimuth of the axis is within half a beamwidth of the target.
-
-    axis    azimuth of the reference of the axis
-    target  encoder angles (azimuth, elevation) of the target
-
-    Both azimuths count revolutions: they are not reduced to one turn.
-    """
+    """End the turn at t if the azimuth of the axis is within half a beamwidth of the target. axis: azimuth of its
+    reference; target: encoder angles (azimuth, elevation). Both azimuths count revolutions."""
     if turn.under_way:
         azimuth, elevation = target
         turn.over, left = t, abs(azimuth - axis)

@@ -1,8 +1,5 @@
-"""A commanded direction, from an operator, a program or another antenna,
-extrapolated by its rates for a limited time.
-
-The modes preset (deck angles) and slave (earth angles) follow such directions.
-"""
+"""A commanded direction, extrapolated by its rates for a limited time: of preset (deck angles) or slave (earth
+angles)."""
 import math
 
 import numpy as np
@@ -41,20 +38,20 @@ def moved(record: Records, times: Times) -> Pairs:
 
 
 def set_chord(record: Records, axis: int, begins: Seconds, ends: Seconds, angles: Floats) -> None:
-    """Move an axis along a straight line: its angles are `angles` (2,) [rad] at the times `begins` and
-    `ends`.
-
-    axis: 0 azimuth, 1 elevation. Both times lie at or after the stamp.
-    """
+    """Move an axis (0 azimuth, 1 elevation) along a straight line from angles[0] [rad] at `begins` to angles[1] at
+    `ends`. Both times lie at or after the stamp."""
     at, until = np.minimum((begins - record['stamp'], ends - record['stamp']), record['moves'])
     rate = (angles[1] - angles[0]) / (until - at) if until > at else 0.0
     record['angle'][axis], record['rate'][axis] = angles[0] - rate * at, rate
 
 
 @compiled
-def put(direction: Direction, angle: Pair) -> None:
-    """Replace the direction by angles [rad] that do not move."""
+def put(direction: Direction, angle: Pair) -> bool:
+    """Replace the direction by angles [rad] that do not move; return False, without a change, if one is not finite."""
+    if not math.isfinite(angle[0] + angle[1]):
+        return False
     direction.angle[0], direction.angle[1], direction.moves = angle[0], angle[1], 0.0
+    return True
 
 
 @compiled

@@ -1,5 +1,4 @@
-"""Stamped samples of the last steps, interpolated to any instant among these steps; and those of the load encoders.
-"""
+"""Stamped samples of the last steps, interpolated to any instant among these steps; and those of the load encoders."""
 import math
 from typing import Annotated, NamedTuple
 
@@ -33,10 +32,8 @@ def push(history: History, stamp: Seconds) -> int:
 
 @compiled
 def bracket(history: History, t: Seconds) -> tuple[int, int, float]:
-    """Return (older row, newer row, fraction) of the samples around the instant t.
-
-    The fraction runs from 0 at the older row to 1 at the newer row. Both rows are -1 if t is outside the history.
-    """
+    """Return (older row, newer row, fraction) of the samples around t; both rows are -1 if t is outside the history.
+    The fraction runs from 0 at the older row to 1 at the newer row."""
     newer = history.newest
     if history.count == 0 or not t <= history.stamp[newer]:
         return -1, -1, 0.0
@@ -52,7 +49,7 @@ def bracket(history: History, t: Seconds) -> tuple[int, int, float]:
 
 @compiled
 def interpolated(history: History, rows: tuple[int, int, float], column: int) -> float:
-    """Return the number in a column, interpolated linearly; rows: a result of `bracket` with valid rows."""
+    """Return the number in a column, interpolated linearly; rows: a valid result of `bracket`."""
     i, j, f = rows
     a, b = history.sample[i, column], history.sample[j, column]
     return a + f * (b - a)

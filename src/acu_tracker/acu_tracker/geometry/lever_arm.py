@@ -1,17 +1,14 @@
-"""The lever arm r, the vector from the INS to the antenna; it shifts the direction of a target of measured range.
+"""The lever arm r, the vector (FLU) from the INS to the antenna; it shifts the direction of a target of measured
+range.
 
-The antenna of a rolling ship moves. Seen from the antenna, a near target therefore appears to move by the angle
-|r| / range. Seen from the INS the target does not move so. With a measured range the filter uses the line of sight
-from the INS.
-
-    R = |rho u + r|
-
-    R, rho   range of the target from the INS and from the antenna   [m]
-    u        unit vector from the antenna to the target, FLU         [-]
+Because the antenna of a rolling ship moves, a near target appears to move by the angle |r| / range. Seen from the INS
+the target does not move so. With a measured range the filter uses the line of sight from the INS. The ranges R from
+the INS and rho from the antenna follow R = |rho u + r|; u: unit vector from the antenna to the target.
 """
 import math
 
 from acu_tracker.geometry.vector import (
+    ZERO_VECTOR,
     AxisMotion,
     LineOfSight,
     Motion,
@@ -40,15 +37,12 @@ RANGE_SMOOTHING_SHARE = 0.05  # share of each new measurement in the smoothed ra
 
 @compiled
 def from_ins(state: LeverArm, arm: LeverArmParameters, measured: Meters, running: Bit, v: Vector) -> Vector:
-    """Return the direction of the target from the INS, a vector (FLU) of length about 1.
+    """Return the direction of the target from the INS, a vector (FLU) of length about 1; v: unit vector from the
+    antenna.
 
-    v         unit vector (FLU) from the antenna to the target
-    arm       lever arm
-    measured  range of the target from the antenna; NaN: no range
-    running   True if the filter of the target runs
-
-    For a filter that started with a range the function smooths R and adds the lever arm to rho v. For another filter
-    the function returns v. This avoids an estimate that mixes the lines of sight from the INS and from the antenna.
+    measured: range from the antenna; NaN: no range; running: True if the filter of the target runs. For a filter that
+    started with a range the function smooths R and adds the lever arm to rho v. For another filter it returns v. This
+    avoids an estimate that mixes the lines of sight from the INS and from the antenna.
     """
     along, r2 = v.x * arm.x + v.y * arm.y + v.z * arm.z, arm.x * arm.x + arm.y * arm.y + arm.z * arm.z
     known = measured > 0.0
@@ -68,30 +62,21 @@ def from_ins(state: LeverArm, arm: LeverArmParameters, measured: Meters, running
 
 @compiled
 def to_antenna(state: LeverArm, sight: LineOfSight) -> LineOfSight:
-    """Return the LineOfSight from the antenna; sight: the LineOfSight from the INS, both FLU.
-
-    The vector r / R is subtracted, with R taken as constant.
-    """
+    """Return the LineOfSight from the antenna of one from the INS, both FLU: minus r / R, with R taken as constant."""
     return normalised(minus(sight.u, vector(state.arm)), sight.du, sight.ddu)
 
 
 @compiled
 def to_ins(state: LeverArm, u: Vector, du: Vector) -> tuple[Vector, Vector]:
-    """Return (unit vector from the INS to the target, its rate [1/s]), both FLU.
-
-    u, du: unit vector from the antenna to the target and its rate [1/s], FLU.
-    """
-    sight = normalised(Vector(u.x + state.arm[0], u.y + state.arm[1], u.z + state.arm[2]), du, Vector(0.0, 0.0, 0.0))
+    """Return (unit vector from the INS to the target, its rate [1/s]) of those from the antenna, all FLU."""
+    sight = normalised(Vector(u.x + state.arm[0], u.y + state.arm[1], u.z + state.arm[2]), du, ZERO_VECTOR)
     return sight.u, sight.du
 
 
 @compiled
 def earth_angles_to_antenna(state: LeverArm, mat_ed: Rotation, motion: Motion) -> Motion:
-    """Return the Motion of the target in earth angles, as seen from the antenna.
-
-    mat_ed: Rotation deck -> earth; motion: the Motion as seen from the INS. Only the angles differ; the rates and the
-    accelerations stay as they are.
-    """
+    """Return the Motion in earth angles as seen from the antenna; motion: as seen from the INS. Only the angles
+    differ; the rates and the accelerations stay as they are."""
     A, E = motion.azimuth.angle, motion.elevation.angle
     e, n, u = earth_direction(A, E)
     r = rotated(mat_ed, vector(state.arm))

@@ -1,11 +1,8 @@
 """Vectors of three components, and the motion of a direction, for compiled functions.
 
-A motion is azimuth and elevation, or a unit vector, with their first and second time derivatives. Azimuth is
-clockwise: from north in the earth frame, from the bow on the deck. FLU on the deck and the axes north, west and up of
-the earth therefore have the same formulas. Because earth vectors are ENU in the other modules, `north_west_up`
-converts them.
-
-M': the transpose of a Rotation M, which is its inverse.
+Azimuth is clockwise: from north in the earth frame, from the bow on the deck. FLU on the deck and the axes north, west
+and up of the earth therefore have the same formulas. Because earth vectors are ENU in the other modules,
+`north_west_up` converts them. M' is the transpose of a Rotation M, which is its inverse.
 """
 import math
 from typing import NamedTuple
@@ -16,10 +13,13 @@ from pedestal_common.quantities import Matrix3, Radians, RadiansPerSecond, Radia
 
 
 class Vector(NamedTuple):
-    """Components of a vector along the axes of a frame. The docstring of the function that uses it names the frame."""
+    """Components of a vector along the axes of a frame, which the function that uses it names."""
     x: float
     y: float
     z: float
+
+
+ZERO_VECTOR = Vector(0.0, 0.0, 0.0)
 
 
 class Rotation(NamedTuple):
@@ -57,7 +57,7 @@ def minus(a: Vector, b: Vector) -> Vector:
 
 @compiled
 def times(k: float, a: Vector) -> Vector:
-    """Return the Vector a times the number k."""
+    """Return k a."""
     return Vector(k * a.x, k * a.y, k * a.z)
 
 
@@ -75,20 +75,20 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 @compiled
 def transposed(mat: Rotation) -> Rotation:
-    """Return M', the transpose of a Rotation M."""
+    """Return M'."""
     return Rotation(Vector(mat.x.x, mat.y.x, mat.z.x), Vector(mat.x.y, mat.y.y, mat.z.y),
                     Vector(mat.x.z, mat.y.z, mat.z.z))
 
 
 @compiled
 def rotated(mat: Rotation, a: Vector) -> Vector:
-    """Return M a, the Vector a rotated by M."""
+    """Return M a."""
     return Vector(dot(mat.x, a), dot(mat.y, a), dot(mat.z, a))
 
 
 @compiled
 def rotated_back(mat: Rotation, a: Vector) -> Vector:
-    """Return M' a, the Vector a rotated by the inverse of M."""
+    """Return M' a."""
     return rotated(transposed(mat), a)
 
 
@@ -114,7 +114,7 @@ class LineOfSight(NamedTuple):
 
 @compiled
 def turned(mat: Rotation, sight: LineOfSight) -> LineOfSight:
-    """Return a LineOfSight after the rotation by a Rotation."""
+    """Return a LineOfSight after a rotation."""
     return LineOfSight(rotated(mat, sight.u), rotated(mat, sight.du), rotated(mat, sight.ddu))
 
 
@@ -136,19 +136,14 @@ def line_of_sight(motion: Motion) -> LineOfSight:
 
 @compiled
 def north_west_up(v: Vector) -> Vector:
-    """Return the north-west-up components of an ENU vector.
-
-    A vector that line_of_sight made of deck angles becomes one in FLU.
-    """
+    """Return the north-west-up components of an ENU vector; FLU of one that line_of_sight made of deck angles."""
     return Vector(v.y, -v.x, v.z)
 
 
 @compiled
 def angles(sight: LineOfSight) -> Motion:
-    """Return the Motion of a LineOfSight in FLU or north-west-up.
-
-    The azimuth is singular at the zenith. Within 1e-6 rad of the zenith the rates are therefore those at 1e-6 rad.
-    """
+    """Return the Motion of a LineOfSight in FLU or north-west-up. The azimuth is singular at the zenith. Within 1e-6
+    rad of the zenith the rates are therefore those at 1e-6 rad."""
     u, du, ddu = sight
     rho2 = max(u.x * u.x + u.y * u.y, 1e-12)
     rho = math.sqrt(rho2)
@@ -167,10 +162,8 @@ def earth_angles(sight: LineOfSight) -> Motion:
 
 @compiled
 def normalised(v: Vector, dv: Vector, ddv: Vector) -> LineOfSight:
-    """Return the LineOfSight along a vector v of any length; dv, ddv: its time derivatives, in the unit of v.
-
-    n = v / |v|, n' = (v' - n (n.v')) / |v|; n: unit vector, ': time derivative, a point: scalar product.
-    """
+    """Return the LineOfSight along a vector v of any length; dv, ddv: its time derivatives, in the unit of v. n = v /
+    |v|, n' = (v' - n (n.v')) / |v|; n: unit vector, ': time derivative, a point: scalar product."""
     k = 1.0 / math.sqrt(dot(v, v))
     n, dv, ddv = times(k, v), times(k, dv), times(k, ddv)
     along = dot(n, dv)
@@ -182,10 +175,7 @@ def normalised(v: Vector, dv: Vector, ddv: Vector) -> LineOfSight:
 
 @compiled
 def motion_of_position(p: Vector, v: Vector, a: Vector) -> Motion:
-    """Return the Motion in earth angles of a point as seen from the origin.
-
-    p, v, a: position [m], velocity [m/s] and acceleration [m/s2] of the point, ENU.
-    """
+    """Return the Motion in earth angles of a point at p (ENU) with the velocity v and the acceleration a."""
     r = math.sqrt(dot(p, p))
     u = Vector(p.x / r, p.y / r, p.z / r)
     dr = dot(u, v)

@@ -24,9 +24,9 @@ from acu_tracker.modes import Mode, Reason
 from acu_tracker.pointing import model
 from acu_tracker.program import bridge, program_track
 from acu_tracker.program.program_track import ProgramTrack
-from acu_tracker.search import acquisition, level_modes
+from acu_tracker.search import acquisition
 from acu_tracker.servo import position_loop
-from acu_tracker.servo.ends import Ends
+from acu_tracker.servo.travel import Ends
 from acu_tracker.signals import Inputs
 from acu_tracker.tracking import Tracking
 from pedestal_common.compiled import compiled, separate
@@ -159,7 +159,7 @@ def _source(guidance: Guidance, tracking: Tracking, constants: 'Constants', mode
     if modes.FOLLOWS_TABLE[mode]:
         return target.Source(0, program_track.motion_at(way.program, t))
     if modes.USES_SIGNAL_LEVEL[mode]:
-        return level_modes.source(guidance.acquisition, mode, constants, way, t)
+        return acquisition.source(guidance.acquisition, mode, constants, way, t)
     if way.valid and gap.coasting and gap.permitted and program_track.status(way.program, t) == Reason.NONE:
         return target.Source(0, bridge.motion_at(way, t))
     return target.Source(1, target.outlook(tracking.target, constants.target, t))
@@ -238,12 +238,12 @@ def begin_by_level(guidance: Guidance, tracking: Tracking, constants: 'Constants
     tracked = before == Mode.AUTOTRACK
     if tracked:
         sight = target_tracking.sight(tracking, constants, t)
-        level_modes.remember(guidance.acquisition, t, sight.u, sight.du)
+        acquisition.remember(guidance.acquisition, t, sight.u, sight.du)
     elif not modes.USES_SIGNAL_LEVEL[before]:
         u, du = target_tracking.beam(tracking, constants, t)
-        level_modes.remember(guidance.acquisition, t, u, du)
+        acquisition.remember(guidance.acquisition, t, u, du)
     spread = target_tracking.spread(tracking, constants, t) if tracked and mode == Mode.SEARCH else np.nan
-    level_modes.begin(guidance.acquisition, mode, constants, t, spread)
+    acquisition.begin(guidance.acquisition, mode, constants, t, spread)
 
 
 @compiled
@@ -251,7 +251,7 @@ def check_slope(guidance: Guidance, tracking: Tracking, constants: 'Constants', 
                 way: bridge.Way) -> None:
     """Compare an error of the receiver, measured with the beam `at`, with the expected place of the target."""
     t = inputs.error_stamp - constants.p.tracker.receiver.age
-    expected = level_modes.expected(guidance.acquisition, way, t)
+    expected = acquisition.expected(guidance.acquisition, way, t)
     motion = attitude.on_deck(tracking.attitude, constants.p, t, expected)
     x, y, z = pointing.direction(motion.azimuth.angle, motion.elevation.angle)
     acquisition.take_error(guidance.acquisition, pointing.offsets(at.A, at.E, x, y, z),
@@ -298,6 +298,6 @@ def _plan(guidance: Guidance, tracking: Tracking, constants: 'Constants', mode: 
     if way.valid and program_track.status(program, t) == Reason.NONE:
         planner.look_along_program(lookahead, constants.lookahead, terms, t, azimuth, way)
         return
-    sight = (line_of_sight(level_modes.expected(guidance.acquisition, way, t))
+    sight = (line_of_sight(acquisition.expected(guidance.acquisition, way, t))
              if modes.USES_SIGNAL_LEVEL[mode] else target_tracking.sight(tracking, constants, t))
     planner.look_along_great_circle(lookahead, constants.lookahead, terms, t, azimuth, sight.u, sight.du)

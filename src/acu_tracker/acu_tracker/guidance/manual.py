@@ -8,8 +8,8 @@ import math
 from collections.abc import Sequence
 
 from acu_tracker.geometry.vector import AxisMotion, Motion
-from acu_tracker.servo.ends import Ends
 from acu_tracker.servo.params import ShaperParameters
+from acu_tracker.servo.travel import Ends
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Pair, RadiansPerSecond, Records, Seconds
 from pedestal_common.record import Record

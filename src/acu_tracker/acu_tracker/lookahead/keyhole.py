@@ -1,11 +1,9 @@
 """The keyhole: search of a pass near the zenith that the azimuth cannot follow, and the best slew through it.
 
 A target that passes near the zenith of the deck needs the azimuth rate W / cos E0, which the axis does not have. W:
-rate of the target along its great circle [rad/s]; E0: the highest elevation of the target [rad].
-
-The axis therefore leaves the target at t1, slews at its limits, and meets the target again at t2 on the other side.
-The slew may turn clockwise or counter-clockwise. For each direction t1 is chosen for the least loss of signal, and t2
-is the earliest possible time.
+rate of the target along its great circle [rad/s]; E0: the highest elevation of the target [rad]. The axis therefore
+leaves the target at t1, slews at its limits, and meets the target again at t2 on the other side, in either direction
+of turn. For each direction t1 is chosen for the least loss of signal, and t2 is the earliest possible time.
 """
 import math
 from collections.abc import MutableSequence
@@ -35,8 +33,7 @@ SLEW_CANDIDATE_COUNT, REFINEMENT_COUNT, SLEW_SAMPLE_COUNT, BISECTION_COUNT = 48,
 """Effort of a plan: number of candidates for t1, of refinements of t1, of samples in which a slew is evaluated, and of
 bisections for t2."""
 
-MIN_GAIN_S = 0.02
-"""Least decrease of the cost for which a renewed plan replaces begin and direction of the previous plan [s]."""
+MIN_GAIN_S = 0.02  # least gain [s] for which a renewed plan replaces begin and direction of the previous one
 
 PLAN_NO_KEYHOLE, PLAN_SLEW, PLAN_NO_WRAP, PLAN_BEYOND_PATH = range(4)
 """Outcomes of `plan`: no keyhole; a planned slew; no azimuth wrap inside the limits; a keyhole that ends beyond the
@@ -63,15 +60,15 @@ class Keyhole(NamedTuple):
 
 @compiled
 def _fit(slew: Slew, passage: Passage, turn: float, t1: Seconds) -> bool:
-    """Fit a slew that leaves the target at t1 and meets it as early as possible; return False if there is none.
+    """Fit a slew that leaves the target at t1 and meets it as early as possible after passage.after; return False if
+    there is none. turn: 1 clockwise, -1 counter-clockwise.
 
-    turn: 1 clockwise, -1 counter-clockwise. The slew meets the target not before passage.after. The function tries t2
-    at the end of the path, then at passage.after. Then it bisects between `early`, which is too early, and `late`,
-    which is possible. The azimuth at t1 is set within +-pi.
+    The function tries t2 at the end of the path, then at passage.after. Then it bisects between `early`, which is too
+    early, and `late`, which is possible. The azimuth at t1 is set within +-pi.
     """
     path, limits = passage.path, passage.limits
     A1, v1 = paths.azimuth_at(path, t1, limits.rate)
-    early, late, v = passage.after, paths.end(path), math.inf
+    early, late, v = passage.after, path.t0 + (len(path.rows) - 1) * path.h, math.inf
     for i in range(BISECTION_COUNT):
         t2 = late if i == 0 else early if i == 1 else 0.5 * (early + late)
         A2, v2 = paths.azimuth_at(path, t2, limits.rate)
@@ -119,10 +116,9 @@ def _fits(slew: Slew, path: Path, low: Radians, high: Radians) -> bool:
 def _evaluate(slew: Slew, passage: Passage, samples: int) -> None:
     """Set the fields cost, loss and worst of a fitted slew; samples: number of instants at which it is evaluated.
 
-    cost   integral of x^8 / (1 + x^8) over the time of the slew [s]; x: pointing offset in half beamwidths. This
-           smooth form of the loss also ranks slews without a loss
-    loss   integral of the probability that the target is more than half a beamwidth off the beam [s]
-    worst  largest pointing offset [rad]
+        cost   integral of x^8 / (1 + x^8) over the slew [s]; x: pointing offset in half beamwidths. This smooth form
+               of the loss also ranks slews without a loss
+        loss   integral of the probability that the target is more than half a beamwidth off the beam [s]
 
     The slew follows only the share `true_deck_share` of the tilt of the deck. The rest of the tilt is a normally
     distributed offset, which adds to the pointing offset. Therefore loss contains the error function of a distance
@@ -148,10 +144,8 @@ def _evaluate(slew: Slew, passage: Passage, samples: int) -> None:
 
 @compiled
 def _attempt(slew: Slew, passage: Passage, turn: float, t1: Seconds, samples: int) -> tuple[bool, Seconds]:
-    """Fit, unwrap and evaluate a slew that leaves the target at t1. Return (True if there is one, its cost).
-
-    The cost is inf for a slew outside the limits of the azimuth. turn, samples: as in _fit and _evaluate.
-    """
+    """Fit, unwrap and evaluate a slew that leaves the target at t1. Return (feasible, cost: inf outside the
+    limits)."""
     if t1 < passage.path.t0 or not _fit(slew, passage, turn, t1):
         return False, math.inf
     _unwrap(slew, passage.path, passage.azimuth)
@@ -163,10 +157,8 @@ def _attempt(slew: Slew, passage: Passage, turn: float, t1: Seconds, samples: in
 
 @compiled
 def find(path: Path, rate: RadiansPerSecond, acceleration: RadiansPerSecond2) -> Keyhole:
-    """Return the first Keyhole of a path, where the target exceeds the azimuth rate or acceleration.
-
-    Two excesses belong to two keyholes if the time between them is longer than the time of half a revolution.
-    """
+    """Return the first Keyhole of a path, where the target exceeds the azimuth rate or acceleration. Two excesses
+    belong to two keyholes if the time between them is longer than the time of half a revolution."""
     first, last, needed, before = -1, -1, 0.0, 0.0
     for i in range(1, len(path.rows)):
         dA = (path.rows[i, paths.AZIMUTH_COLUMN] - path.rows[i - 1, paths.AZIMUTH_COLUMN]) / path.h

@@ -1,7 +1,7 @@
 """The path of the target on the levelled deck for the next seconds, as a table with constant time step.
 
-The path follows the program track, or the great circle on which the target moves. `keyhole` and `planner` search it.
-The rows are directions on the sky first; `to_encoders` converts them to encoder angles, by which the axes move.
+The path follows the program track, or the great circle on which the target moves. The rows are directions on the sky
+first; `to_encoders` converts them to encoder angles, by which the axes move.
 """
 import math
 from typing import NamedTuple
@@ -17,12 +17,8 @@ from pedestal_common.quantities import Floats, Matrix3, Radians, RadiansPerSecon
 PATH_ROW_COUNT, PATH_COLUMN_COUNT = 1025, 6  # largest number of rows of a path, and number of its columns
 
 UP_COLUMN, AZIMUTH_COLUMN, LEAST_AZIMUTH_COLUMN, LARGEST_AZIMUTH_COLUMN = range(2, PATH_COLUMN_COUNT)
-"""Columns of a path.
-
-UP              upward component of the unit vector [-]
-AZIMUTH         azimuth, without jumps of a turn [rad]
-LEAST, LARGEST  least and largest azimuth from this row to the end of the path, or to the end of the program [rad]
-"""
+"""Columns of a path: upward component of the unit vector [-]; azimuth, without jumps of a turn [rad]. The last two are
+the least and largest azimuth from this row to the end of the path, or to the end of the program."""
 
 
 class Path(NamedTuple):
@@ -35,18 +31,12 @@ class Path(NamedTuple):
 
 
 MIN_ZENITH_DISTANCE_SQUARED = 1e-12
-"""Square of the horizontal part of a unit vector below which its azimuth rate is computed with this value instead [-].
-
-This avoids a division by zero at the zenith.
-"""
+"""Least squared horizontal part of a unit vector [-]. This avoids a division by zero at the zenith."""
 
 
 @compiled
 def along_program(path: Path, mat: Matrix3, way: bridge.Way) -> int:
-    """Write the unit vectors of the path of a Way; return the number of rows that the program covers.
-
-    mat: rotation levelled deck -> earth.
-    """
+    """Write the unit vectors of a Way; return the number of rows that it covers. mat: levelled deck -> earth."""
     level = rotation(mat)
     for i in range(len(path.rows)):
         t = path.t0 + i * path.h
@@ -58,10 +48,8 @@ def along_program(path: Path, mat: Matrix3, way: bridge.Way) -> int:
 
 @compiled
 def along_great_circle(path: Path, mat: Matrix3, u: Vector, du: Vector) -> int:
-    """Write the unit vectors of the path along a great circle; return the number of rows.
-
-    mat: rotation levelled deck -> earth; u, du: ENU unit vector of the target at t0 and its rate [1/s].
-    """
+    """Write the unit vectors of the path along a great circle; return the number of rows. mat: levelled deck -> earth;
+    u, du: ENU unit vector of the target at t0 and its rate [1/s]."""
     W, level = math.sqrt(dot(du, du)), rotation(mat)
     for i in range(len(path.rows)):
         path.rows[i, 0], path.rows[i, 1], path.rows[i, 2] = rotated_back(level, turned_along(u, du, W, W * i * path.h))
@@ -114,8 +102,3 @@ def azimuth_at(path: Path, t: Seconds, rate: RadiansPerSecond) -> tuple[Radians,
     dA = (u.y * du.x - u.x * du.y) / max(u.x * u.x + u.y * u.y, MIN_ZENITH_DISTANCE_SQUARED)
     return math.atan2(-u.y, u.x), min(max(dA, -rate), rate)
 
-
-@compiled
-def end(path: Path) -> Seconds:
-    """Return the time of the last row."""
-    return path.t0 + (len(path.rows) - 1) * path.h

@@ -12,7 +12,7 @@ from pedestal_common.record import Record
 
 
 class Slew(Record):
-    """A planned slew. The index 1 marks its begin, where it leaves the target; the index 2 its end, where it meets the
+    """A planned slew, from its begin (index 1), where it leaves the target, to its end (2), where it meets the
     target."""
     t1: Seconds
     t2: Seconds
@@ -34,10 +34,7 @@ class Slew(Record):
 
 @compiled
 def azimuth_at(slew: Slew, t: Seconds) -> AxisMotion:
-    """Return the motion of the azimuth at t1 <= t <= t2.
-
-    The azimuth accelerates to its peak rate, keeps this rate, and decelerates.
-    """
+    """Return the motion of the azimuth at t1 <= t <= t2: it accelerates to the peak, keeps it, decelerates."""
     # begun, left: time since t1 and until t2; rise, fall: duration of the acceleration and of the deceleration.
     sign = math.copysign(1.0, slew.peak)
     a = sign * slew.acceleration
@@ -66,13 +63,11 @@ def true_deck_share(slew: Slew, t: Seconds) -> AxisMotion:
 
 @compiled
 def best_elevation(azimuth: AxisMotion, sight: LineOfSight) -> AxisMotion:
-    """Return the motion of the elevation at which the beam is closest to the target.
-
-    azimuth: of the beam; sight: to the target, FLU. An elevation above pi/2 is past the zenith.
+    """Return the motion of the elevation at which a beam at an azimuth a is closest to the target; sight: to it, FLU.
 
         E = atan2(z, b),  b = x cos a - y sin a,  c = db/da
 
-    E is the elevation, a the azimuth, x, y, z the direction of the target, b its part along the azimuth of the beam.
+    x, y, z: direction of the target; b: its part along the azimuth. An elevation above pi/2 is past the zenith.
     """
     a, da, dda = azimuth
     u, du, ddu = sight
@@ -87,10 +82,8 @@ def best_elevation(azimuth: AxisMotion, sight: LineOfSight) -> AxisMotion:
 
 @compiled
 def pointing_offset(azimuth: Radians, u: Vector, highest: Radians) -> Radians:
-    """Return the angle between the target and a beam at a deck azimuth and the best possible elevation.
-
-    u: unit vector of the target, FLU; highest: largest elevation.
-    """
+    """Return the angle between the target and a beam at a deck azimuth and the best possible elevation. u: unit vector
+    of the target, FLU; highest: largest elevation."""
     sa, ca = math.sin(azimuth), math.cos(azimuth)
     # b, c: horizontal parts of u along and across the beam; p, q: parts of u along the beam at `highest`, and across
     # it in the vertical plane.
@@ -104,14 +97,9 @@ def pointing_offset(azimuth: Radians, u: Vector, highest: Radians) -> Radians:
 
 @compiled
 def motion_at(slew: Slew, t: Seconds, target: Motion, level: AxisMotion, highest: Radians) -> tuple[Motion, Radians]:
-    """Return (motion of the axes at t on a slew, pointing offset from the target).
-
-    target   of the target on the true deck
-    level    azimuth of the target on the levelled deck of the plan
-    highest  largest elevation
-
-    At its ends the slew meets the target on the true deck. In its middle it is the planned slew on the levelled deck.
-    """
+    """Return (motion of the axes at t on a slew, pointing offset from the target). target: on the true deck; level:
+    azimuth of the target on the levelled deck of the plan; highest: largest elevation. At its ends the slew meets the
+    target on the true deck. In its middle it is the planned slew on the levelled deck."""
     # D: azimuth of the target on the true deck minus that on the levelled deck.
     azimuth, share = azimuth_at(slew, t), true_deck_share(slew, t)
     D = wrap(target.azimuth.angle - level.angle)
@@ -129,9 +117,7 @@ def motion_at(slew: Slew, t: Seconds, target: Motion, level: AxisMotion, highest
 @compiled
 def peak_rate(D: Radians, T: Seconds, v1: RadiansPerSecond, v2: RadiansPerSecond,
               a: RadiansPerSecond2) -> RadiansPerSecond:
-    """Return the peak rate v of a slew through D in T; inf if T is too short.
-
-    v1, v2: rates at begin and end; a: acceleration and deceleration. v is the smaller root of
+    """Return the peak rate v of a slew through D in T, from v1 to v2; inf if T is too short. It is the smaller root of
 
         D = v T - (v - v1)^2 / (2 a) - (v - v2)^2 / (2 a)
     """

@@ -10,9 +10,9 @@ from acu_tracker.geometry import attitude, azimuth_wrap
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.modes import Mode, Reason
 from acu_tracker.pointing import model
-from acu_tracker.program import program_track, tables
+from acu_tracker.program import program_track
 from acu_tracker.program.program_track import ProgramTrack
-from acu_tracker.servo import floor
+from acu_tracker.servo import travel
 from acu_tracker.signals import Inputs
 from acu_tracker.tracking import Tracking
 from pedestal_common.compiled import compiled
@@ -28,7 +28,7 @@ def outside(constants: 'Constants', A: Radians, E: Radians) -> int:
     """Return OUTSIDE_LIMITS if the encoder angles A and E cannot be reached, else NONE. NaN counts as outside."""
     a, e = constants.axis[0].p.limits, constants.axis[1].p.limits
     inside = a.low <= A <= a.high and e.low <= E <= e.high
-    return Reason.NONE if inside and not floor.above(constants.floor, A, E) else Reason.OUTSIDE_LIMITS
+    return Reason.NONE if inside and not travel.above(constants.floor, A, E) else Reason.OUTSIDE_LIMITS
 
 
 @compiled
@@ -60,15 +60,15 @@ def _judge_track(tracking: Tracking, constants: 'Constants', track: ProgramTrack
 
 
 @compiled
-def _judge_table(tracking: Tracking, constants: 'Constants', inputs: Inputs, mode: int, all_tables: tables.Tables,
-                 t: Seconds, azimuth: Radians) -> tuple[int, int]:
+def _judge_table(tracking: Tracking, constants: 'Constants', inputs: Inputs, mode: int,
+                 all_tables: program_track.Tables, t: Seconds, azimuth: Radians) -> tuple[int, int]:
     """Return (NONE or the reason why the table of a mode cannot be followed at t, signals.Flag.PROGRAM or 0).
 
     The flag marks a table with an angle that is not finite.
     """
-    track = tables.of_mode(all_tables, mode)
+    track = program_track.of_mode(all_tables, mode)
     if mode != Mode.PROGRAM:
-        unpredicted = inputs.unpredicted[tables.TABLE_INDEX[mode]]
+        unpredicted = inputs.unpredicted[program_track.TABLE_INDEX[mode]]
         if unpredicted != Reason.NONE:
             return unpredicted, 0
         if (program_track.status(track, t) == Reason.NONE
@@ -83,7 +83,7 @@ def _judge_table(tracking: Tracking, constants: 'Constants', inputs: Inputs, mod
 
 @compiled
 def judge_tables(tracking: Tracking, constants: 'Constants', inputs: Inputs, wanted: tuple[int, int, int, int],
-                 all_tables: tables.Tables, t: Seconds, azimuth: Radians) -> tuple[int, int, int, int]:
+                 all_tables: program_track.Tables, t: Seconds, azimuth: Radians) -> tuple[int, int, int, int]:
     """Return (program, tle, sun of modes.Conditions at t, flags of bad tables).
 
     wanted   modes whose table is evaluated; another table counts as good, to save time

@@ -6,7 +6,7 @@ import numpy as np
 
 from acu_tracker import modes
 from acu_tracker.lookahead import planner
-from acu_tracker.program import tables
+from acu_tracker.program import program_track
 from pedestal_common.quantities import AnyRecord, Degrees, Radians
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def overtravel(unit: 'Acu') -> str:
     """
     state, limits = unit.parts['state'], unit.parameters.azimuth.limits
     now, when = state['stamp'], ''
-    track = unit.memory.tables[tables.TABLE_INDEX[state['mode']['table']]]
+    track = unit.memory.tables[program_track.TABLE_INDEX[state['mode']['table']]]
     ahead = track.times > now
     if ahead.any() and not unit.parts['inputs']['stabilised']:
         azimuth = np.unwrap(np.concatenate(([state['guidance']['azimuth']], track.angles[ahead, 0])))

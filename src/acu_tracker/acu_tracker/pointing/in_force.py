@@ -18,10 +18,8 @@ if TYPE_CHECKING:
 class ModelInForce:
     """The model in force, or the one that will be when its change is complete.
 
-    refused  the reason why the model of the parameters is not in force; '' if it is
-    reports  of acu/pointing, by the number `report` of model.PointingRecord
-
-    The argument `record` of the methods is the model.PointingRecord of the law.
+    refused: the reason why the model of the parameters is not in force; '' if it is. The `reports` of acu/pointing are
+    in the order of the number `report` of model.PointingRecord, the `record` in the methods.
     """
 
     def __init__(self, parameters: 'AcuParameters') -> None:
@@ -34,10 +32,8 @@ class ModelInForce:
         self.reports = [self._model.report()]
 
     def check_date(self, record: np.void, utc: datetime.datetime | None) -> None:
-        """Discard a model of the parameters whose date is later than now; the pedestal then counts as ideal.
-
-        The date can be judged in realtime only, before the first step, when the epoch of the stamps is known.
-        """
+        """Discard a model of the parameters whose date is later than now; the pedestal then counts as ideal. The date
+        can be judged in realtime only, before the first step, when the epoch of the stamps is known."""
         try:
             self._model.check_date(utc)
         except ValueError as error:
@@ -46,10 +42,7 @@ class ModelInForce:
 
     def replace(self, record: np.void, arguments: Mapping[str, Value], now: Nanoseconds,
                 utc: datetime.datetime | None) -> Reply:
-        """Take another model, gradually, and return the Reply. Raise ValueError if it is refused.
-
-        arguments: by name of a field of PointingParameters.
-        """
+        """Take another model, its fields by name, gradually. Raise ValueError if it is refused."""
         taken = PointingParameters(**arguments)
         taken.check_antenna(self._antenna)
         taken.check_date(utc)

@@ -1,12 +1,10 @@
 """The pointing model in force: it converts directions to the angles of the encoders, and back.
 
 A direction is a pair of deck angles on the sky. The encoders of a real pedestal show other angles, which
-pedestal_common.geometry.pointing_model computes. The receiver's errors are added to the direction of the beam, and
-the reference of the axes is computed from a direction. In autotrack both conversions cancel each other: where the beam
-points then depends on the receiver alone. Hence no hand-over between modes causes a jump.
-
-A new model takes effect gradually: the terms go from the old to the new values along a smooth curve. This avoids a
-jump of the antenna.
+pedestal_common.geometry.pointing_model computes. The receiver's errors are added to the direction of the beam, and the
+reference of the axes is computed from a direction. In autotrack both conversions cancel each other: where the beam
+points then depends on the receiver alone. Hence no hand-over between modes causes a jump. A new model takes effect
+gradually, because this avoids a jump of the antenna.
 """
 import math
 from typing import Annotated
@@ -44,20 +42,14 @@ SMOOTHSTEP_PEAK = 1.5  # largest slope of the curve of put_between [-]
 
 
 def initialise(record: np.void, terms: Floats, named: bool) -> None:
-    """Begin with the terms (20,) [rad, -].
-
-    named: True if the model has an antenna, a file or a date. Such a model is reported although all terms may be 0.
-    """
+    """Begin with the terms (20,) [rad, -]. A `named` model is reported although all terms may be 0."""
     pointing_model.put(record['model'], terms)
     record['changing'], record['report'] = 0, 0 if named or np.any(terms) else topics.NO_TEXT_CODE
 
 
 def replace(record: np.void, terms: Floats, stamp: Seconds) -> Seconds:
-    """Begin the change to other terms (20,) at a stamp; return the time until it is complete.
-
-    The time follows from MAX_CHANGE_RATE_RAD_S and the sum of the changes of all terms, as if all terms pulled in the
-    same direction.
-    """
+    """Begin the change to other terms (20,) at a stamp; return the time until it is complete. The time follows from
+    MAX_CHANGE_RATE_RAD_S and the sum of the changes of all terms, as if all terms pulled in the same direction."""
     now = record['model']['terms'].copy()
     reach = np.array([math.pi if name in FACTORS else 1.0 for name in TERMS])
     duration = max(SMOOTHSTEP_PEAK * float(np.abs(terms - now) @ reach) / MAX_CHANGE_RATE_RAD_S, MIN_CHANGE_TIME_S)
@@ -81,7 +73,7 @@ def step(pointing: PointingRecord, t: Seconds) -> None:
 
 @compiled
 def to_sky(model: PointingModel, at: Pointing) -> Pointing:
-    """Return the direction of the beam on the sky; at: that of the encoders."""
+    """Return the direction of the beam on the sky of that of the encoders."""
     if model.exact:
         return at
     angles, rates = pointing_model.direction_motion(model, at.A, at.E, at.dA, at.dE)
@@ -90,10 +82,8 @@ def to_sky(model: PointingModel, at: Pointing) -> Pointing:
 
 @compiled
 def to_encoders(model: PointingModel, motion: Motion) -> tuple[Motion, bool]:
-    """Return (the Motion of the encoders that keeps the beam on a direction, True if the beam reaches the direction).
-
-    motion: Motion of the direction in deck angles. The azimuth of the encoder is the one nearest to its azimuth.
-    """
+    """Return (the Motion of the encoders that keeps the beam on a direction in deck angles, True if the beam reaches
+    it). The azimuth of the encoder is the one nearest to that of the direction."""
     if model.exact:
         return motion, True
     sight = line_of_sight(motion)
@@ -105,11 +95,9 @@ def to_encoders(model: PointingModel, motion: Motion) -> tuple[Motion, bool]:
 
 @compiled
 def in_turn(model: PointingModel, motion: Motion, azimuth: Radians, wrapped: Radians) -> Radians:
-    """Return the angle of the azimuth encoder in the turn of the azimuth wrap.
-
-    motion: Motion of the direction in deck angles; azimuth: angle of its encoder, in any turn; wrapped: the same angle
-    plus the whole turns of the azimuth wrap. Only the factor P12 makes a difference between the turns.
-    """
+    """Return the angle of the azimuth encoder in the turn of the azimuth wrap. azimuth: angle of the encoder, in any
+    turn; wrapped: the same angle plus the whole turns of the azimuth wrap. Only the factor P12 makes a difference
+    between the turns."""
     if model.p.p12 == 0.0 or wrapped == azimuth:
         return wrapped
     A, _, _ = pointing_model.encoder_of(model, motion.azimuth.angle + (wrapped - azimuth), motion.elevation.angle)

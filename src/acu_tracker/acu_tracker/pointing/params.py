@@ -11,10 +11,8 @@ from pedestal_common.quantities import Floats, Seconds
 
 @dataclasses.dataclass(frozen=True)
 class PointingParameters(Parameters):
-    """Pointing model: the terms are added to the wanted direction and give the angles of the encoders.
-
-    pedestal_common.geometry.pointing_model defines the terms and their signs, those of katpoint.
-    """
+    """Pointing model: terms that turn the wanted direction into encoder angles
+    (pedestal_common.geometry.pointing_model)."""
     p1: float = parameter(0.0, -10.0, 10.0, 'deg', 'zero of the azimuth encoder minus zero of the azimuth')
     p3: float = parameter(0.0, -6.0, 6.0, 'deg', 'deviation of the two axes from 90 deg')
     p4: float = parameter(0.0, -6.0, 6.0, 'deg', 'beam to the normal of the elevation axis, collimation')
@@ -69,10 +67,7 @@ class PointingParameters(Parameters):
         return bool(self.antenna or self.file or self.date)
 
     def report(self, before: Floats | None = None, begins_s: Seconds = 0.0, ends_s: Seconds = 0.0) -> Report:
-        """Return the report of the model.
-
-        before: terms (20,) [rad, -] from which a change begins; None: without a change.
-        """
+        """Return the report of the model; before: terms (20,) [rad, -] from which a change begins."""
         return Report(self.antenna, self.file, self.date, self.rms, in_degrees(self.terms),
                       {} if before is None else in_degrees(before), begins_s, ends_s, self.residuals)
 
@@ -83,8 +78,8 @@ class PointingParameters(Parameters):
                                  'the model belongs to another antenna')
 
     def unchecked(self, antenna: str) -> str:
-        """Return a text that the antenna of the model has not been checked, because this antenna has no name; ''
-        otherwise. antenna: name of this antenna."""
+        """Return a warning that the antenna of the model is not checked, because this one has no name; ''
+        otherwise."""
         if not self.antenna or antenna:
             return ''
         return f'antenna {self.antenna!r} of the pointing model is not checked, because the parameter antenna is empty'

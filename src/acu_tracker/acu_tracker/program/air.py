@@ -3,9 +3,7 @@
 A weather station publishes pressure, temperature and humidity, each on a topic of its own. Air raises the elevations
 of a table of geometric directions by the refraction, with the weather at the time of each row. A new weather takes
 effect as a ramp of CHANGE_TIME_S, at most one ramp at a time, so the antenna follows without a bump. A stale reading
-is replaced by its parameter, with a ramp too.
-
-All times are stamps. Numbers of the weather have the order of WEATHER_QUANTITIES.
+is replaced by its parameter, with a ramp too. Numbers of the weather have the order of WEATHER_QUANTITIES.
 """
 import collections
 import dataclasses
@@ -21,8 +19,7 @@ from pedestal_common.quantities import Floats, Message, Pairs, Seconds, Times, V
 
 CHANGE_TIME_S = 60.0  # duration of the ramp from one weather to the next [s]
 
-MIN_CHANGE_N = 0.1
-"""Change of the refractivity from which on a new weather is used [N]. It moves a target at 5 deg by 6e-5 deg."""
+MIN_CHANGE_N = 0.1  # least change of the refractivity that counts [N]: 6e-5 deg at an elevation of 5 deg
 
 MAX_DELAY_S = 3600.0  # longest delay of a weather in a table with rare rows [s]
 MAX_KNOTS = 400  # number of kept begins and ends of ramps; those of more than MAX_DELAY_S
@@ -38,12 +35,11 @@ class Quantity(NamedTuple):
     unit: str       # of the message
 
 
-WEATHER_QUANTITIES = {
+WEATHER_QUANTITIES = {  # by topic; the arguments of refraction.of_weather, in their order
     'weather/pressure': Quantity('pressure_hpa', refraction.PRESSURE_RANGE_HPA, 'fluid_pressure', 100.0, 'Pa'),
     'weather/temperature': Quantity('temperature_celsius', refraction.TEMPERATURE_RANGE_CELSIUS, 'temperature', 1.0,
                                     'deg C'),
     'weather/humidity': Quantity('humidity', refraction.HUMIDITY_RANGE, 'relative_humidity', 1.0, '(0 to 1)')}
-"""{topic: Quantity}; the numbers are the arguments of refraction.of_weather, in their order."""
 
 DROP_UNSTAMPED, DROP_RANGE, DROP_STALE, DROP_FUTURE = 'without stamp', 'out of range', 'stale', 'future'
 """Reasons to drop a reading."""
@@ -77,10 +73,8 @@ class Reading(NamedTuple):
 class Air:
     """The air by RefractionParameters and by readings.
 
-    on        True if directions are corrected
-    due       stamp from which on `update` may change the weather; inf: before the first reading
-    revision  number of the changes of the weather
-    dropped   number of dropped readings by (topic, reason)
+    on: directions are corrected; due: stamp from which on `update` may change the weather, inf before the first
+    reading; revision: number of the changes of the weather. The dropped readings are counted by (topic, reason).
     """
 
     def __init__(self, parameters: RefractionParameters) -> None:
@@ -97,10 +91,8 @@ class Air:
         self._weather = [self._of_parameters]
 
     def take(self, topic: str, stamp: Seconds | None, message: Message, now: Seconds | None) -> None:
-        """Take the message of a weather topic. A reading that cannot be used is counted, named and dropped.
-
-        stamp: of the message, None without one; now: stamp of the last step, None before the first.
-        """
+        """Take the message of a weather topic. A reading that cannot be used is counted, named and dropped. stamp: of
+        the message, None without one; now: stamp of the last step, None before the first."""
         quantity = WEATHER_QUANTITIES[topic]
         value, (low, high) = float(getattr(message, quantity.field)), quantity.limits
         refused = ''
@@ -145,11 +137,9 @@ class Air:
         return np.column_stack([np.interp(times, self._times, column) for column in zip(*self._weather)])
 
     def raised(self, times: Times, angles: Pairs) -> Pairs:
-        """Return angles at times, azimuth and true elevation, with apparent elevations.
-
-        The rows have the weather of two row intervals before. Because two rows after the present one have a share in
-        the interpolated direction, a change of the weather thus begins behind them, without a step.
-        """
+        """Return angles at times, azimuth and true elevation, with apparent elevations. The rows have the weather of
+        two row intervals before. Because two rows after the present one have a share in the interpolated direction, a
+        change of the weather thus begins behind them, without a step."""
         if not self.on:
             return angles
         interval = float(np.max(np.diff(times))) if len(times) > 1 else 0.0
@@ -178,11 +168,8 @@ class Air:
         return [*(f'{topic}: dropped {text}' for topic, text in self._refused.items()), *stale]
 
     def diagnostic_values(self, now: Seconds) -> list[tuple[str, str]]:
-        """Return the values for the diagnostics [(key, text)]; [] if nothing is corrected.
-
-        The values are the refractivity in use, and for each quantity its last value with its origin and the counts of
-        dropped readings.
-        """
+        """Return [(key, text)] for the diagnostics, [] if nothing is corrected: the refractivity, the last value of
+        each quantity with its origin, and the counts of dropped readings."""
         if not self.on:
             return []
         values = [('refractivity', f'{refraction.of_weather(*self._weather_at(np.array([now]))[0]).N:.1f}')]

@@ -31,16 +31,13 @@ class Way(NamedTuple):
     cos: float      # as in Bridge
 
 
-MIN_PROGRAM_COSINE = math.cos(math.radians(3.0))
-"""Cosine of the largest angle between program and estimate for which the program is rotated [-]: 3 deg."""
+MIN_PROGRAM_COSINE = math.cos(math.radians(3.0))  # the program is rotated by 3 deg at most
 
 
 @compiled
 def begin(bridge: Bridge, program: ProgramTrack, t: Seconds, u: Vector) -> None:
-    """Find the rotation that turns the direction of the program at t to the ENU unit vector u.
-
-    The rotation is not valid if its angle is too large (MIN_PROGRAM_COSINE), or if the program does not cover t.
-    """
+    """Find the rotation that turns the direction of the program at t to the ENU unit vector u. It is not valid if its
+    angle is too large, or if the program does not cover t."""
     bridge.valid = 0
     if program_track.status(program, t) == Reason.NONE:
         v = program_track.direction(program, t)
@@ -63,11 +60,8 @@ def way(bridge: Bridge, program: ProgramTrack) -> Way:
 
 @compiled
 def _rotated(path: Way, v: Vector) -> Vector:
-    """Return an ENU vector v of the program after the rotation.
-
-    The formula of Rodrigues gives v cos + a x v + a (a.v) / (1 + cos), for an axis a with the sine of the angle as its
-    length.
-    """
+    """Return an ENU vector v of the program after the rotation v cos + a x v + a (a.v) / (1 + cos) (formula of
+    Rodrigues). The length of the axis a is the sine of the angle."""
     axis = path.axis
     d = cross(axis, v)
     k = dot(axis, v) / (1.0 + path.cos)

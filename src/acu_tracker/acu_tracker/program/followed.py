@@ -10,7 +10,7 @@ import numpy as np
 
 from acu_tracker.geometry import direction
 from acu_tracker.modes import Mode, Reason
-from acu_tracker.program import segments, tables
+from acu_tracker.program import program_track, segments
 from acu_tracker.program.air import Air
 from acu_tracker.program.prediction import Predicted, Predictor
 from acu_tracker.program.program_track import ProgramTrack
@@ -34,16 +34,10 @@ class Slave(NamedTuple):
 
 
 class Followed:
-    """Segments of the program track, predictions of satellite and sun, and the direction of the mode slave.
-
-    tables     the Tables of the last `update`
-    segments   of the program track
-    air        weather and refraction
-    predictor  of satellite and sun
-    slave      the Slave; set only to restore it
-    """
+    """Segments of the program track, predictions of satellite and sun, and the direction of the mode slave, which is
+    set only to restore it. tables: the Tables of the last `update`."""
     def __init__(self, parameters: 'AcuParameters') -> None:
-        self.tables = tables.NO_TABLES
+        self.tables = program_track.NO_TABLES
         self._refraction = parameters.refraction
         self.segments = segments.Segments([(axis.limits.rate, axis.limits.acceleration)
                                            for axis in (parameters.azimuth, parameters.elevation)])
@@ -77,10 +71,7 @@ class Followed:
             self.expire()
 
     def append(self, parts: np.void, times: Times, angles: Pairs) -> None:
-        """Append a segment to the program track; raise ValueError if it is refused.
-
-        times: stamps of its rows; angles: azimuth and elevation [rad].
-        """
+        """Append a segment (stamps; azimuth and elevation) to the program track; raise ValueError if it is refused."""
         state, inputs = parts['state'], parts['inputs']
         followed = state['mode']['now'] == Mode.PROGRAM
         try:
@@ -105,14 +96,12 @@ class Followed:
             self._bend(parts, int(stamp) * 1e-9)
 
     def update(self, parts: np.void, stamp: Nanoseconds) -> None:
-        """Bring the tables to a stamp.
-
-        The tables are the piece of the program track that is due, and the predictions of satellite and sun. The
-        refraction is added to true directions. All are shifted by the offset that an operator has commanded.
-        """
+        """Bring the tables to a stamp: the piece of the program track that is due, and the predictions of satellite
+        and sun. The refraction is added to true directions. All are shifted by the offset that an operator has
+        commanded."""
         inputs, t = parts['inputs'], stamp * 1e-9
         self.air.update(t)
-        for place, row in enumerate(tables.TABLE_MODES):
+        for place, row in enumerate(program_track.TABLE_MODES):
             known = self._predicted.get(row.name)
             if row.predicted and (known is None or not known.since <= t < known.until):
                 known = self._predicted[row.name] = getattr(self.predictor, row.predicted)(t)
@@ -120,17 +109,15 @@ class Followed:
         piece, inputs['gap'], ends = self.segments.at(t - self._offset[0])
         until = min(ends + self._offset[0], self.air.due, *(known.until for known in self._predicted.values()))
         self._valid = stamp, max(math.ceil(until * 1e9), stamp + 1) if until < math.inf else NEVER_DUE_NS
-        self.tables = tables.Tables(*(
-            tables.shifted(self._apparent_track(row, self._predicted[row.name].track if row.predicted else piece),
-                           self._offset)
-            for row in tables.TABLE_MODES))
+        self.tables = program_track.Tables(*(
+            program_track.shifted(
+                self._apparent_track(row, self._predicted[row.name].track if row.predicted else piece), self._offset)
+            for row in program_track.TABLE_MODES))
 
     def _apparent_track(self, row: ModeRow, track: ProgramTrack) -> ProgramTrack:
-        """Return the table of a row of TABLE_MODES with apparent elevations; the last result is kept.
-
-        A new weather changes neither the first nor the last elevation of a table. The planner recognises a program by
-        these rows (planner.another_program), and a new program would restart the mode.
-        """
+        """Return the table of a row of TABLE_MODES with apparent elevations; the last result is kept. A new weather
+        changes neither the first nor the last elevation of a table. The planner recognises a program by these rows
+        (planner.another_program), and a new program would restart the mode."""
         if not self.air.on or not (row.predicted or self._refraction.program == 'geometric'):
             return track
         kept = self._apparent.get(row.name)
@@ -143,20 +130,15 @@ class Followed:
         return apparent
 
     def bend(self, parts: np.void, slave: AnyRecord) -> None:
-        """Add the refraction to a direction of the mode slave, from now on and again every BEND_INTERVAL_S.
-
-        slave: the commanded direction.Direction; None: there is no direction.
-        """
+        """Add the refraction to a direction of the mode slave (None: none), now and every BEND_INTERVAL_S."""
         self.slave = Slave(slave, NEVER_DUE_NS)
         if (slave is not None and math.isfinite(slave['stamp']) and self.air.on
                 and self._refraction.slave == 'geometric'):
             self._bend(parts, float(slave['stamp']))
 
     def _bend(self, parts: np.void, t: Seconds) -> None:
-        """Add the refraction to the direction of the mode slave for BEND_INTERVAL_S from t on.
-
-        Between both times the elevation moves on a straight line, which meets the next one without a step.
-        """
+        """Add the refraction to the direction of the mode slave for BEND_INTERVAL_S from t on. Between both times the
+        elevation moves on a straight line, which meets the next one without a step."""
         slave, ends = self.slave.direction, t + BEND_INTERVAL_S
         times = np.array((t, ends))
         elevations = self.air.bent(np.ascontiguousarray(direction.moved(slave, times)[:, 1]), times)

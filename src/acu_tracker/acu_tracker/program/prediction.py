@@ -1,11 +1,9 @@
 """Predicted tables for the modes tle and sun: earth angles over time of a satellite (by its elements) and of the sun.
 
-`unit.Acu` calls the Predictor and gives the tables to the law. A table begins shortly before the time at which it is
-made. The table is replaced in its second half, if possible while its target is below the horizon, because then no mode
-follows the table.
-
-The directions of a table are true ones, without refraction; `air` adds it to the rows later. They contain UT1 and the
-polar motion of a file (earth_orientation), and the travel time of the wave if a parameter requests it.
+A table begins shortly before the time at which it is made. It is replaced in its second half, if possible while its
+target is below the horizon, because then no mode follows the table. The directions are true ones, without refraction.
+They contain UT1 and the polar motion of a file (earth_orientation), and the travel time of the wave if a parameter
+requests it.
 
 Stamps [s] count from an epoch. In realtime the UTC of the epoch is known, in lockstep only by the parameter
 start_time.
@@ -72,13 +70,9 @@ class Predicted(NamedTuple):
 
 
 class Predictor:
-    """Predictions by PredictionParameters.
-
-    epoch  UTC of stamp 0; 0: unknown, then only the parameter start_time can give it
-    air    the air by which a target is above the horizon or not
-
-    Raise ParameterError for a file of the earth's orientation that cannot be read.
-    """
+    """Predictions by PredictionParameters. Raise ParameterError for a file of the earth's orientation that cannot be
+    read. epoch: UTC of stamp 0; 0: unknown, then only the parameter start_time can give it. air: decides whether a
+    target is above the horizon."""
 
     def __init__(self, parameters: PredictionParameters, epoch: Nanoseconds = 0, air: Air | None = None) -> None:
         self.parameters, self.epoch = parameters, epoch
@@ -124,18 +118,14 @@ class Predictor:
         return self._table(self._sun_angles, stamp, SUN_ROW_INTERVAL_S)
 
     def diagnostic_values(self, stamp: Seconds) -> list[tuple[str, str]]:
-        """Return the values for the diagnostics (key, text) at a stamp.
-
-        The values are azimuth and elevation of the sun, if UTC is known, the file of the earth's orientation and its
-        values, if any, and the elements of the satellite, if any.
-        """
+        """Return [(key, text)] for the diagnostics: azimuth and elevation of the sun, if UTC is known, values of the
+        earth's orientation, and the elements of the satellite, if any."""
         sun_now = np.degrees(self.sun_angles(np.array([stamp]))[0]) if self._utc_known else ()
         lines = () if self._satellite is None else ('omm',) if self.parameters.omm else ('line_1', 'line_2')
         return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),
                 *self._orientation_values(stamp), *((line, getattr(self.parameters, line)) for line in lines)]
 
     def _orientation_values(self, stamp: Seconds) -> list[tuple[str, str]]:
-        """Return the values of the earth's orientation for the diagnostics (key, text) at a stamp."""
         if self._orientation is None:
             return []
         if not self._utc_known:
@@ -182,12 +172,10 @@ class Predictor:
         return julian - self._satellite.jdsatepoch + fraction - self._satellite.jdsatepochF
 
     def _mjd(self, stamp: Seconds) -> float:
-        """Return the modified Julian date of a stamp."""
         julian, fraction = self._julian(stamp)
         return julian - MJD_ZERO_JULIAN_DATE + fraction
 
     def _to_fixed(self, julian: float, fractions: Floats) -> Floats:
-        """Return the rotations (n, 3, 3) of orbit.earth_fixed at the Julian dates julian + fractions."""
         if self._orientation is None:
             return orbit.earth_fixed(julian, fractions)
         return orbit.earth_fixed(julian, fractions, *self._orientation.at(julian - MJD_ZERO_JULIAN_DATE + fractions))
@@ -212,11 +200,7 @@ class Predictor:
         return self.air.raised(times, self._sun_angles(times))
 
     def _table(self, angles_at: Callable[[Times], Pairs], stamp: Seconds, interval: Seconds) -> Predicted:
-        """Return the Predicted for a stamp.
-
-        angles_at: function of times that returns the angles [rad], with the true elevation; interval: time between
-        two rows.
-        """
+        """Return the Predicted for a stamp; angles_at: azimuth and true elevation; interval: of the rows."""
         times = np.floor(stamp) - TABLE_LEAD_TIME_S + interval * np.arange(TABLE_ROW_COUNT)
         try:
             angles = angles_at(times)
@@ -231,10 +215,7 @@ class Predictor:
                          float(times[down[-1] if down.size else late[-1]]))
 
     def _next_rise(self, angles_at: Callable[[Times], Pairs], stamp: Seconds) -> Seconds:
-        """Return the stamp at which the target next rises after a stamp, accurate to a second.
-
-        The result is NaN without a rise within RISE_SEARCH_SPAN_S. angles_at: as in _table.
-        """
+        """Return the stamp of the next rise, accurate to a second; NaN without one within RISE_SEARCH_SPAN_S."""
         times = stamp + np.arange(0.0, RISE_SEARCH_SPAN_S, RISE_SEARCH_STEP_S)
         try:
             elevation = self.air.raised(times, angles_at(times))[:, 1]
@@ -248,6 +229,5 @@ class Predictor:
 
 
 def _angles(enu: Vectors3) -> Pairs:
-    """Return azimuth and elevation [rad] of ENU positions."""
     east, north, up = enu.T
     return np.stack((arctan2(east, north), arctan2(up, np.hypot(east, north))), axis=-1)

@@ -1,7 +1,8 @@
 """A program track: a table of times, azimuths and elevations (earth angles), and its interpolation to any instant.
+Tables: the program track and the predicted tables of a satellite and the sun, which have the same type.
 
 The interpolation is cubic (Hermite). The slope at a row is that of a parabola through the row and its neighbours.
-Therefore the rate is continuous. The predicted tables of a satellite and the sun have the same type.
+Therefore the rate is continuous.
 """
 import math
 from typing import NamedTuple
@@ -9,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from acu_tracker import modes
 from acu_tracker.geometry.azimuth_wrap import Travel
 from acu_tracker.geometry.vector import AxisMotion, Motion, Vector, angles, normalised, north_west_up
 from acu_tracker.modes import Reason
@@ -18,8 +20,7 @@ from pedestal_common.geometry.line_of_sight import earth_direction, wrap
 from pedestal_common.quantities import Pairs, Radians, RadiansPerSecond, Seconds, Times
 
 MAX_PROGRAM_ROWS = 100_000  # largest number of rows of a program
-STEEP_ELEVATION_RAD = math.radians(80.0)
-"""Elevation above which the unit vector is interpolated instead of the angles [rad]."""
+STEEP_ELEVATION_RAD = math.radians(80.0)  # above it the unit vector is interpolated, not the angles
 
 
 class ProgramTrack(NamedTuple):
@@ -36,10 +37,7 @@ class ProgramTrackError(ValueError):
 
 
 def checked(times: ArrayLike, angles: ArrayLike) -> ProgramTrack:
-    """Return the ProgramTrack of times [s] and angles (n, 2), azimuth and elevation [rad].
-
-    Raise ProgramTrackError for a table that cannot be followed.
-    """
+    """Return the ProgramTrack of times and angles (n, 2) [rad]; raise ProgramTrackError if it cannot be followed."""
     times, angles = np.array(times, float), np.array(angles, float)
     if times.ndim != 1 or angles.shape != (len(times), 2):
         raise ProgramTrackError(f'program track: times {times.shape}, angles {angles.shape}; must be (n,), (n, 2)')
@@ -71,20 +69,14 @@ def status(program: ProgramTrack, t: Seconds) -> int:
 
 @compiled
 def _difference(program: ProgramTrack, i: int, axis: int) -> Radians:
-    """Return the change of an angle from row i to the next row; axis: 0 azimuth, 1 elevation.
-
-    The azimuth changes the short way round.
-    """
+    """Return the change of an angle (0 azimuth, the short way round, 1 elevation) from row i to the next."""
     difference = program.angles[i + 1, axis] - program.angles[i, axis]
     return wrap(difference) if axis == 0 else difference
 
 
 @compiled
 def _slope(program: ProgramTrack, i: int, axis: int) -> RadiansPerSecond:
-    """Return the rate of an angle at row i, from the parabola through this row and its neighbours.
-
-    At the first and the last row it is the parabola through the nearest three rows.
-    """
+    """Return the rate of an angle at row i, from the parabola through the three rows about it or nearest to it."""
     times = program.times
     if len(times) == 2:
         return _difference(program, 0, axis) / (times[1] - times[0])
@@ -97,12 +89,8 @@ def _slope(program: ProgramTrack, i: int, axis: int) -> RadiansPerSecond:
 
 @compiled
 def _hermite(y0: float, d: float, m0: float, m1: float, x: float, T: Seconds) -> AxisMotion:
-    """Return the motion of the cubic polynomial on an interval of T.
-
-    y0, d   value at the begin of the interval, and its change to the end
-    m0, m1  slopes at the begin and at the end, times T
-    x       place in the interval, 0 at its begin, 1 at its end
-    """
+    """Return the motion of the cubic polynomial from y0 to y0 + d in T, at the place x from 0 to 1; m0, m1: slopes at
+    its ends, times T."""
     c2, c3 = 3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d
     return AxisMotion(y0 + x * (m0 + x * (c2 + x * c3)), (m0 + x * (2.0 * c2 + 3.0 * x * c3)) / T,
                       (2.0 * c2 + 6.0 * x * c3) / (T * T))
@@ -110,7 +98,7 @@ def _hermite(y0: float, d: float, m0: float, m1: float, x: float, T: Seconds) ->
 
 @compiled
 def interpolated(program: ProgramTrack, t: Seconds, axis: int) -> AxisMotion:
-    """Return the motion of one axis at t, interpolated; axis: 0 azimuth, 1 elevation."""
+    """Return the motion of one axis (0 azimuth, 1 elevation) at t, interpolated."""
     times = program.times
     i = interval(times, t)
     T = times[i + 1] - times[i]
@@ -120,7 +108,7 @@ def interpolated(program: ProgramTrack, t: Seconds, axis: int) -> AxisMotion:
 
 @compiled
 def _component(program: ProgramTrack, i: int, axis: int) -> float:
-    """Return a component of the unit vector at row i; axis: 0 east, 1 north, 2 up."""
+    """Return a component (0 east, 1 north, 2 up) of the unit vector at row i."""
     return earth_direction(program.angles[i, 0], program.angles[i, 1])[axis]
 
 
@@ -148,11 +136,8 @@ def _interpolated_component(program: ProgramTrack, i: int, t: Seconds, axis: int
 
 @separate
 def motion_at(program: ProgramTrack, t: Seconds) -> Motion:
-    """Return the motion in earth angles at t.
-
-    Between two rows above STEEP_ELEVATION_RAD the unit vector is interpolated, not the angles. The reason is that near
-    the zenith the azimuth may change by any amount from row to row.
-    """
+    """Return the motion in earth angles at t. Between two rows above STEEP_ELEVATION_RAD the unit vector is
+    interpolated, because near the zenith the azimuth may change by any amount from row to row."""
     i = interval(program.times, t)
     if min(program.angles[i, 1], program.angles[i + 1, 1]) < STEEP_ELEVATION_RAD or len(program.times) < 3:
         return Motion(interpolated(program, t, 0), interpolated(program, t, 1))
@@ -181,3 +166,35 @@ def azimuth_travel(program: ProgramTrack, t: Seconds) -> Travel:
         at += _difference(program, i, 0)
         below, above = min(below, at - here), max(above, at - here)
     return Travel(below, above)
+
+
+TABLE_MODES = tuple(row for row in modes.MODE_ROWS if row.table)  # rows of the modes that follow a table
+
+
+class Tables(NamedTuple):
+    """A table for each mode that follows one, in the order of TABLE_MODES."""
+    program: ProgramTrack
+    tle: ProgramTrack
+    sun: ProgramTrack
+
+
+NO_TABLES = Tables(*(NO_TRACK for _ in TABLE_MODES))  # tables without a row
+
+TABLE_INDEX = tuple(TABLE_MODES.index(row) if row.table else 0 for row in modes.MODE_ROWS)
+"""Index in Tables of the table of each mode; 0, the program, for a mode that follows none."""
+
+
+def shifted(track: ProgramTrack, offset: tuple[Seconds, Radians, Radians]) -> ProgramTrack:
+    """Return a ProgramTrack with an offset (time, azimuth, elevation) added; elevations are limited to the zenith."""
+    if not any(offset):
+        return track
+    time, *angles = offset
+    moved = track.angles + angles
+    moved[:, 1] = np.clip(moved[:, 1], -0.5 * math.pi, 0.5 * math.pi)
+    return ProgramTrack(track.times + time, moved)
+
+
+@compiled
+def of_mode(tables: Tables, mode: int) -> ProgramTrack:
+    """Return the table that a mode follows; for a mode that follows no table, return the program."""
+    return tables[TABLE_INDEX[mode]]

@@ -1,7 +1,7 @@
 """The program track in segments: messages that an operator sends one after the other while the track is followed.
 
-A segment is one table. Two segments without a gap between them are joined to one piece. A gap is a time in which rows
-are missing. A turnaround is the motion of the axes from the last row of one segment to the first row of the next.
+A segment is one table. Two segments without a gap, a time in which rows are missing, are joined to one piece. A
+turnaround is the motion of the axes from the last row of one segment to the first row of the next.
 """
 import math
 from collections.abc import Sequence
@@ -14,11 +14,8 @@ from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Message, Pairs, RadiansPerSecond, RadiansPerSecond2, Seconds, Times
 
 MAX_GAP_INTERVALS = 3.0
-"""Longest time between two segments that counts as no gap, in row intervals; the two segments are then joined.
-
-The row interval is the shorter of two times: between the last two rows of the earlier segment, and between the first
-two rows of the later one.
-"""
+"""Longest time between two segments that counts as no gap, in row intervals. The row interval is the shorter of two
+times: between the last two rows of the earlier segment, and between the first two rows of the later one."""
 
 
 class TurnaroundError(ProgramTrackError):
@@ -34,21 +31,16 @@ class DuePiece(NamedTuple):
 
 
 class Segments:
-    """The pieces of a program track, in order of time; inside a piece there is no gap.
-
-    limits: (rate, acceleration) of each axis, which a turnaround must not exceed.
-    """
+    """The pieces of a program track, in order of time; inside a piece there is no gap. limits: (rate, acceleration) of
+    each axis, which a turnaround must not exceed."""
 
     def __init__(self, limits: Sequence[tuple[RadiansPerSecond, RadiansPerSecond2]]) -> None:
         self._limits = limits
         self._pieces: list[ProgramTrack] = []
 
     def append(self, times: Times, angles: Pairs, now: Seconds, followed: bool) -> None:
-        """Take a segment; for a wrong one raise ProgramTrackError and change nothing.
-
-        times, angles  of the segment, as in program_track.checked
-        now            present stamp
-        followed       True if a mode follows the track; then turnarounds are checked
+        """Take a segment; for a wrong one raise ProgramTrackError and change nothing. If a mode follows the track
+        (followed), turnarounds are checked.
 
         A segment that begins at `now` or before is a new program and replaces all pieces. A later segment replaces the
         rows from its first row on. The later segment is joined to the rows before it unless there is a gap.
@@ -60,19 +52,17 @@ class Segments:
         # A single row gives no path.
         kept = [rows for rows in (_rows(piece, now, new.times[0]) for piece in self._pieces) if len(rows.times) >= 2]
         if kept:
+            last = kept[-1]
             if followed:
-                self._check_turnaround(kept[-1], new)
-            interval = min(_last_interval(kept[-1]), new.times[1] - new.times[0])
-            if new.times[0] - kept[-1].times[-1] <= MAX_GAP_INTERVALS * interval:
-                last = kept.pop()
+                self._check_turnaround(last, new)
+            interval = min(last.times[-1] - last.times[-2], new.times[1] - new.times[0])
+            if new.times[0] - last.times[-1] <= MAX_GAP_INTERVALS * interval:
+                kept.pop()
                 new = checked(np.append(last.times, new.times), np.vstack((last.angles, new.angles)))
         self._pieces = [*kept, new]
 
     def _check_turnaround(self, before: ProgramTrack, after: ProgramTrack) -> None:
-        """Raise TurnaroundError if an axis would exceed its limits on the way from one segment to the next.
-
-        The mean rate and the mean acceleration on this way are compared with the limits.
-        """
+        """Raise TurnaroundError if the mean rate or acceleration of an axis on the way exceeds its limit."""
         time = after.times[0] - before.times[-1]
         for i, axis in enumerate(AXES):
             max_rate, max_acceleration = self._limits[i]
@@ -97,10 +87,7 @@ class Segments:
 
 
 def rows(message: Message) -> tuple[Times, Pairs]:
-    """Return (times since the stamp of the message, azimuth and elevation [rad]) of a JointTrajectory.
-
-    Raise ValueError if an axis or a position is missing.
-    """
+    """Return (times since the stamp, angles) of a JointTrajectory; raise ValueError for a missing axis or position."""
     if not set(AXES) <= set(message.joint_names):
         raise ValueError(f'joint_names {message.joint_names}: must hold {" and ".join(AXES)}')
     columns = [message.joint_names.index(axis) for axis in AXES]
@@ -113,19 +100,12 @@ def rows(message: Message) -> tuple[Times, Pairs]:
 
 
 def _rows(piece: ProgramTrack, begin: Seconds, end: Seconds) -> ProgramTrack:
-    """Return the rows of a piece that are kept: from three rows before `begin` to the last row before `end`.
-
-    If the piece ends before `begin`, its last three rows are kept. The slope at a row follows from this row and its
-    two neighbours. Three rows before `begin` therefore keep the path at `begin` unchanged, and the last three rows of
-    a piece that has ended keep the slope at its end.
-    """
+    """Return the rows of a piece from three rows before `begin` to the last row before `end`; of an ended one the last
+    three. The slope at a row follows from this row and its two neighbours. Three rows before `begin` therefore keep
+    the path at `begin` unchanged, and the last three rows of a piece that has ended keep the slope at its end."""
     first = max(min(int(np.searchsorted(piece.times, begin)), len(piece.times)) - 3, 0)
     last = int(np.searchsorted(piece.times, end))
     return ProgramTrack(piece.times[first:last], piece.angles[first:last])
-
-
-def _last_interval(piece: ProgramTrack) -> Seconds:
-    return piece.times[-1] - piece.times[-2]
 
 
 def _rate(piece: ProgramTrack, row: int, i: int) -> RadiansPerSecond:

@@ -1,16 +1,12 @@
 """Detection of a target by the signal level: the noise is learnt, and the level is compared with thresholds above it.
 
-The level z is the C/N0 of the receiver [dB-Hz]. While the beam is off the target, z has a mean m and a variance V.
-Both are learnt over the last learn_time from samples:
+While the beam is off the target, the level z has a mean m and a variance V. Both are learnt over the last learn_time
+from samples, the n-th one T after the one before (Finch, Incremental calculation of weighted mean and variance, 2009,
+section 9):
 
     w = max(1/n, T / learn_time),    d = z - m,    m += w d,    V = (1 - w) (V + w d^2)
 
-    n   number of samples so far
-    T   time since the previous sample [s]
-    w   weight of the new sample [-]
-
-The formulas are those of Finch (Incremental calculation of weighted mean and variance, 2009, section 9). There are
-three thresholds above m:
+There are three thresholds above m:
 
     detect = m + 4 sqrt(V)    a level above it for acquire_time begins the mode acquire
     track  = detect + 1 dB    after a level above it for acquire_time, a target is present
@@ -19,13 +15,29 @@ three thresholds above m:
 The threshold loss is at least m + 2 sqrt(V). With a lower threshold the noise alone would count as a target after the
 target is lost.
 """
+import dataclasses
 import math
 from typing import NamedTuple
 
-from acu_tracker.search.params import AcquisitionParameters
 from pedestal_common.compiled import compiled
+from pedestal_common.parameters import Parameters, parameter
 from pedestal_common.quantities import Bit, DecibelHertz, Seconds
 from pedestal_common.record import Record
+
+
+@dataclasses.dataclass(frozen=True)
+class AcquisitionParameters(Parameters):
+    """Parameters of the way from a level above the noise to autotrack."""
+
+    learn_time: float = parameter(2.0, 0.1, 60.0, 's', 'time over which the noise is learnt off target')
+    acquire_time: float = parameter(0.2, 0.0, 10.0, 's', 'time above its threshold after which a signal counts')
+    loss_time: float = parameter(0.3, 0.0, 10.0, 's', 'time below the loss threshold after which the target is lost')
+    timeout: float = parameter(30.0, 1.0, 600.0, 's', 'time after which acquire gives up')
+    time_constant: float = parameter(0.1, 1e-3, 10.0, 's', "time constant of the receiver's level")
+    expected_dbhz: float = parameter(0.0, 0.0, 120.0, 'dB-Hz', 'level on the axis at reference_range; 0: unknown, '
+                                     'acquire looks around for a main lobe')
+    reference_range: float = parameter(500e3, 1.0, 1e10, 'm', 'range at which expected_dbhz holds')
+    range_exponent: float = parameter(2.0, 0.0, 4.0, '1', 'power of a measured range with which the level falls')
 
 
 class Level(Record):
@@ -52,8 +64,7 @@ class Thresholds(NamedTuple):
 DETECTION_SIGMAS = 4.0  # height of the detection threshold above the mean noise, in standard deviations of the noise
 MIN_LOSS_SIGMAS = 2.0  # least height of the loss threshold above the mean noise, in standard deviations of the noise
 
-TRACK_MARGIN_DB, LOSS_MARGIN_DB = 1.0, -2.0
-"""Heights of the thresholds track and loss relative to the threshold detect [dB]."""
+TRACK_MARGIN_DB, LOSS_MARGIN_DB = 1.0, -2.0  # heights of track and loss above detect [dB]
 
 
 @compiled
@@ -73,10 +84,7 @@ def thresholds(state: Level) -> Thresholds:
 
 @compiled
 def learn(state: Level, params: AcquisitionParameters, z: DecibelHertz, T: Seconds) -> None:
-    """Take a level z that was measured off the target, T after the last one.
-
-    A level above the known noise is ignored.
-    """
+    """Take a level z off the target, T after the last one; a level above the known noise is ignored."""
     if known(state, params) and z > thresholds(state).detect:
         return
     state.samples += 1
@@ -89,10 +97,8 @@ def learn(state: Level, params: AcquisitionParameters, z: DecibelHertz, T: Secon
 
 @compiled
 def take(state: Level, params: AcquisitionParameters, z: DecibelHertz, stamp: Seconds, locked: bool) -> None:
-    """Take the level z of a stamp; an older stamp has no effect, an equal stamp adds no time.
-
-    locked: True if the receiver measures angle errors. Until the noise is known, only the lock shows a target.
-    """
+    """Take the level z of a stamp; an older stamp has no effect, an equal stamp adds no time. locked: True if the
+    receiver measures angle errors. Until the noise is known, only the lock shows a target."""
     T = stamp - state.stamp if math.isfinite(state.stamp) else 0.0
     if not T >= 0.0 or not math.isfinite(z):
         return

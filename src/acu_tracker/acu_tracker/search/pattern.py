@@ -1,15 +1,8 @@
 """Search patterns: the path on which the beam covers an area around the expected place of the target.
 
-The path is a pure function of time. The path passes every place of the area within half a pitch; the pitch is the
-distance between neighbouring lines. Only the square passes a few places near its centre within 0.57 of a pitch. The
-beam moves along its path at a constant speed v:
-
-    v <= b / (4 tau)
-
-    b     beamwidth [rad]
-    tau   time constant with which the receiver smooths the level [s]
-
-The target is then within the beam for about four time constants of the level. After this time a smoothed level has
+The path is a pure function of time. It passes every place of the area within half a pitch. Only the square passes a
+few places near its centre within 0.57 of a pitch. The beam moves along its path at a constant speed v <= b / (4 tau).
+The target is then within the beam for about four time constants tau of the level. After this time a smoothed level has
 98 % of its final value.
 
 The beam reaches its speed in SPEED_RISE_TIME_S, and is at rest for an instant in each corner. Therefore offset and
@@ -23,14 +16,9 @@ from pedestal_common.quantities import Radians, RadiansPerSecond, Seconds
 
 SEARCH_PATTERNS = ('spiral', 'raster', 'square', 'sector')
 PATTERN_SPIRAL, PATTERN_RASTER, PATTERN_SQUARE, PATTERN_SECTOR = range(len(SEARCH_PATTERNS))
-"""Shapes of a pattern.
-
-    spiral      Archimedean
-    raster      lines along the track of the target, the middle line first, because a target that is early or late is
-                on its track
-    square      expanding, along the track and across
-    sector      lines from one edge of the area to the other
-"""
+"""Shapes of a pattern. The spiral is Archimedean. The lines of a raster lie along the track of the target, the middle
+line first, because a target that is early or late is on its track. The square expands. The lines of a sector go from
+one edge of the area to the other."""
 
 SPEED_RISE_TIME_S = 0.2  # time in which the beam reaches its speed, and in which it stops [s]
 
@@ -45,10 +33,8 @@ class Area(NamedTuple):
 
 
 class Point(NamedTuple):
-    """Offset of the beam from the expected place in two directions, and its rates.
-
-    The directions are along and across the track of the target, or cross-elevation and elevation.
-    """
+    """Offset of the beam from the expected place in two directions, and its rates. The directions are along and across
+    the track of the target, or cross-elevation and elevation."""
     x: Radians
     y: Radians
     dx: RadiansPerSecond
@@ -63,10 +49,7 @@ def highest_speed(beamwidth: Radians, time_constant: Seconds, share: float) -> R
 
 @compiled
 def rotated(point: Point, angle: Radians) -> Point:
-    """Return a point turned by an angle: from along and across the track to cross-elevation and elevation.
-
-    angle: place.track of the target.
-    """
+    """Return a point turned from along and across the track to cross-elevation and elevation; angle: place.track."""
     s, c = math.sin(angle), math.cos(angle)
     return Point(c * point.x - s * point.y, s * point.x + c * point.y,
                  c * point.dx - s * point.dy, s * point.dx + c * point.dy)
@@ -74,10 +57,8 @@ def rotated(point: Point, angle: Radians) -> Point:
 
 @compiled
 def circle(radius: Radians, period: Seconds, t: Seconds) -> Point:
-    """Return the Point at t of a circle; its radius grows from 0 to `radius` during the first period.
-
-    The circle is no search pattern. `acquisition` uses it to check the slopes of the receiver errors.
-    """
+    """Return the Point at t of a circle; its radius grows from 0 to `radius` during the first period. The circle is no
+    search pattern, but checks the slopes of the receiver errors."""
     w = 2.0 * math.pi / period
     r, dr = (radius * t / period, radius / period) if t < period else (radius, 0.0)
     s, c = math.sin(w * t), math.cos(w * t)
@@ -118,19 +99,13 @@ def _turn_of(area: Area) -> Radians:
 
 @compiled
 def spiral_length(theta: Radians, pitch: Radians) -> Radians:
-    """Return the length of the spiral r = k theta, k = pitch / (2 pi), from its centre to the angle theta.
-
-    The length is k/2 (theta sqrt(1 + theta^2) + asinh theta).
-    """
+    """Return the length k/2 (theta sqrt(1 + theta^2) + asinh theta) of the spiral r = k theta, k = pitch / (2 pi)."""
     return 0.25 * pitch / math.pi * (theta * math.sqrt(1.0 + theta * theta) + math.asinh(theta))
 
 
 @compiled
 def _on_spiral(area: Area, t: Seconds) -> Point:
-    """Return the Point of the spiral at t.
-
-    The length of the path grows with the speed v. Newton's method finds the angle theta that belongs to the length.
-    """
+    """Return the Point of the spiral at t: Newton's method finds the angle theta of its length, which grows with v."""
     v, k, end = area.speed, 0.5 * area.pitch / math.pi, _turn_of(area)
     length, rate = v * (t - 0.5 * SPEED_RISE_TIME_S), v
     if t < SPEED_RISE_TIME_S:
@@ -148,20 +123,16 @@ def _on_spiral(area: Area, t: Seconds) -> Point:
 
 @compiled
 def lines_aside(area: Area) -> int:
-    """Return the number of lines of a raster or a sector on one side of the middle line, at least 0.
-
-    The outermost line is at most half a pitch inside the edge of the area, so that the beam passes over the edge.
-    """
+    """Return the number of lines of a raster or a sector on one side of the middle line. The outermost line is at most
+    half a pitch inside the edge of the area, so that the beam passes over the edge."""
     return max(math.ceil(area.across / area.pitch - 0.5), 0)
 
 
 @compiled
 def vertices(area: Area) -> int:
-    """Return the number of corners of a pattern of straight legs; begin and end of the pattern count as corners.
-
-    A raster or a sector has the centre and the two ends of each of its 2 lines_aside + 1 lines. A square has the
-    centre and two corners for each length of leg; its outermost legs are at most half a pitch inside the edge.
-    """
+    """Return the number of corners of a pattern of straight legs; begin and end of the pattern count as corners. A
+    raster or a sector has the centre and the two ends of each of its lines. A square has the centre and two corners
+    for each length of leg; its outermost legs are at most half a pitch inside the edge."""
     if area.pattern == PATTERN_SQUARE:
         return 4 * max(math.ceil(area.radius / area.pitch - 0.5), 1) + 3
     return 4 * lines_aside(area) + 3
@@ -189,7 +160,6 @@ def _alternating(n: int) -> int:
 
 @compiled
 def _leg_length(area: Area, i: int) -> Radians:
-    """Return the distance from corner i - 1 to corner i."""
     x0, y0 = vertex(area, i - 1)
     x1, y1 = vertex(area, i)
     return math.hypot(x1 - x0, y1 - y0)
@@ -197,17 +167,13 @@ def _leg_length(area: Area, i: int) -> Radians:
 
 @compiled
 def _leg_time(area: Area, i: int) -> Seconds:
-    """Return the time from corner i - 1 to corner i, from rest to rest.
-
-    The acceleration is v / SPEED_RISE_TIME_S; v: speed of the beam along its path.
-    """
+    """Return the time of the leg to corner i, from rest to rest, with the acceleration v / SPEED_RISE_TIME_S."""
     L, v = _leg_length(area, i), area.speed
     return L / v + SPEED_RISE_TIME_S if L > v * SPEED_RISE_TIME_S else 2.0 * math.sqrt(L * SPEED_RISE_TIME_S / v)
 
 
 @compiled
 def _on_leg(area: Area, i: int, t: Seconds) -> Point:
-    """Return the Point of the leg to corner i, t after its begin."""
     x0, y0 = vertex(area, i - 1)
     x1, y1 = vertex(area, i)
     L, T, a = _leg_length(area, i), _leg_time(area, i), area.speed / SPEED_RISE_TIME_S

@@ -1,17 +1,13 @@
 """The expected place of a lost target without a program: it moves on along the great circle of the last estimate.
 
-The last known rate becomes less and less certain. The rate is therefore expected to fade, as the acceleration does in
-a Singer model (Singer 1970). In the time T the target has moved by the angle
-
-    W tau (1 - exp(-T / tau))
-
-    W     rate of the target along its great circle at the last measurement [rad/s]
-    T     time since the last measurement [s]
-    tau   RATE_FADE_TIME_S
+The last known rate W becomes less and less certain. The rate is therefore expected to fade, as the acceleration does
+in a Singer model (Singer 1970). In the time T the target has moved by the angle W tau (1 - exp(-T / tau)), tau =
+RATE_FADE_TIME_S.
 """
 import math
 
 from acu_tracker.geometry.vector import (
+    ZERO_VECTOR,
     AxisMotion,
     LineOfSight,
     Motion,
@@ -37,7 +33,6 @@ class Place(Record):
     stamp: Seconds
 
 
-ZERO_VECTOR = Vector(0.0, 0.0, 0.0)  # vector of length 0
 RATE_FADE_TIME_S = 10.0  # time constant with which the expected rate fades [s]
 
 
@@ -65,20 +60,13 @@ def motion_at(place: Place, t: Seconds) -> Motion:
 
 @compiled
 def track(motion: Motion) -> Radians:
-    """Return the direction in which a target with this Motion moves.
-
-    The direction is an angle from cross-elevation towards elevation; it is 0 for a target at rest.
-    """
+    """Return the angle from cross-elevation towards elevation in which a target moves; 0 for a target at rest."""
     return math.atan2(motion.elevation.rate, motion.azimuth.rate * math.cos(motion.elevation.angle))
 
 
 @compiled
 def displaced(motion: Motion, offset: Point) -> Motion:
-    """Return the Motion of a beam that is at an offset from a direction.
-
-    motion: Motion of the direction; offset: in cross-elevation and elevation. The accelerations of the pattern are
-    neglected.
-    """
+    """Return the Motion of a beam at an offset from a direction; the accelerations of the pattern are neglected."""
     n = line_of_sight.displaced_motion(motion.azimuth.angle, motion.elevation.angle, motion.azimuth.rate,
                                        motion.elevation.rate, offset.x, offset.y, offset.dx, offset.dy)
     beam = angles(LineOfSight(Vector(n[0], n[1], n[2]), Vector(n[3], n[4], n[5]), ZERO_VECTOR))

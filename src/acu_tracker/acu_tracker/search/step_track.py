@@ -1,25 +1,32 @@
 """The law of the mode steptrack: the beam follows the peak of the signal level, without angle errors of the receiver.
 
 Once a cycle the beam goes one step d to either side of its place, first in cross-elevation, then in elevation. On each
-side the level is averaged. In decibels the main lobe is a parabola, which is 12 (theta/b)^2 below its peak. Therefore
-the peak is at a distance theta0 from the place of the beam:
+side the level z is averaged. In decibels the main lobe is a parabola, which is 12 (theta/b)^2 below its peak at the
+angle theta. Therefore the peak is at a distance theta0 from the place of the beam:
 
     theta0 = (z+ - z-) b^2 / (48 d)
-
-    theta    angle from the axis of the beam [rad]
-    z+, z-   mean levels on the two sides [dB-Hz]
-    b, d     beamwidth and step [rad]
 
 The place moves towards the peak, by one step at most. If theta0 is within the deadband, the place does not move. For
 comparison: the antenna controller GD 7200 has a step of 8 % of the beamwidth, a cycle of 2 min, and a deadband as
 large as the step.
 """
+import dataclasses
 import math
 
-from acu_tracker.search.params import StepTrackParameters
 from pedestal_common.compiled import compiled
+from pedestal_common.parameters import Parameters, parameter
 from pedestal_common.quantities import Bit, DecibelHertz, Pair, Radians, Seconds
 from pedestal_common.record import Record
+
+
+@dataclasses.dataclass(frozen=True)
+class StepTrackParameters(Parameters):
+    """Mode steptrack: the step of the GD 7200, a shorter cycle for faster targets, a smaller deadband."""
+
+    cycle: float = parameter(20.0, 1.0, 3600.0, 's', 'period of the climbs; 120 s in the GD 7200')
+    step: float = parameter(0.08, 0.01, 0.3, 'beamwidths', 'step of the beam to either side')
+    deadband: float = parameter(0.02, 0.0, 0.3, 'beamwidths', 'distance of the peak up to which the beam stays')
+    dwell: float = parameter(1.0, 0.01, 60.0, 's', 'averaging time of the level at each place')
 
 
 class StepTrack(Record):
@@ -55,19 +62,15 @@ def _enter(state: StepTrack, phase: int, t: Seconds) -> None:
 
 @compiled
 def peak(z_plus: DecibelHertz, z_minus: DecibelHertz, step: Radians, beamwidth: Radians) -> Radians:
-    """Return theta0, the distance of the peak; z_plus, z_minus: levels one step to either side."""
+    """Return theta0; z_plus, z_minus: levels one step to either side."""
     return (z_plus - z_minus) * beamwidth * beamwidth / (48.0 * step)
 
 
 @compiled
 def step(state: StepTrack, params: StepTrackParameters, beamwidth: Radians, tau: Seconds, t: Seconds, z: DecibelHertz,
          present: Bit) -> tuple[Radians, Radians]:
-    """Advance to t and return the offset (cross-elevation, elevation) of the beam.
-
-    tau      time constant of the level
-    z        level that was measured since the last step; NaN: none
-    present  True if there is a signal
-    """
+    """Advance to t and return the offset (cross-elevation, elevation) of the beam; tau: time constant of the level; z:
+    level since the last step, NaN without one; present: there is a signal."""
     d = params.step * beamwidth
     if not present or (state.phase == REST_PHASE and t - state.began < params.cycle):
         if not present:

@@ -2,7 +2,7 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 from acu_tracker.geometry.vector import Motion
-from acu_tracker.servo import floor, position_loop, reference
+from acu_tracker.servo import position_loop, reference, travel
 from acu_tracker.servo.position_loop import Command, Feedback, Instants
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled
@@ -30,12 +30,8 @@ def start_from_actual(axis: BothAxes[position_loop.AxisLoop], constants: 'Consta
                       immobile: tuple[bool, bool], begins: bool, silence: bool) -> None:
     """Set the references to the actual angles: of both axes if they begin to move, and of an axis that cannot move.
 
-    For an axis that cannot move this is done in every step. This avoids a reference that runs ahead of the axis, which
-    the axis would chase as soon as it can move again.
-
-    immobile  True for each axis that does not follow its commands
-    begins    True if the axes begin to move
-    silence   True if the last command is too old to be in force
+    For an axis that cannot move (immobile) this is done in every step. This avoids a reference that runs ahead of the
+    axis, which the axis would chase as soon as it can move again. silence: the last command is too old to be in force.
     """
     for i in range(2):
         rate, powerless = inputs.velocity[i], immobile[i] and not begins
@@ -51,7 +47,7 @@ def start_from_actual(axis: BothAxes[position_loop.AxisLoop], constants: 'Consta
 def follow(axis: BothAxes[position_loop.AxisLoop], constants: 'Constants', inputs: Inputs, outputs: Outputs,
            motion: Motion, now: Instants, beam: BeamInputs) -> None:
     """Run the position loops of both axes towards a reference motion."""
-    now_ends = floor.ends(constants, inputs, motion.azimuth.angle)
+    now_ends = travel.ends(constants, inputs, motion.azimuth.angle)
     for i in range(2):
         feedback = Feedback(y=inputs.position[i], dy=inputs.velocity[i], error=beam.error[i], V=beam.deck_rates[i],
                             closed=beam.closed, ends=now_ends[i])
@@ -67,7 +63,6 @@ def rest(axis: BothAxes[position_loop.AxisLoop], constants: 'Constants', outputs
 
 @compiled
 def _write(outputs: Outputs, i: int, command: Command) -> None:
-    """Write the command of axis i to the outputs."""
     outputs.rate[i], outputs.torque[i] = command.rate, command.torque
     outputs.reference[i, 0], outputs.reference[i, 1], outputs.reference[i, 2] = command.reference
     outputs.angle_limited[i], outputs.rate_limited[i] = command.angle_limited, command.rate_limited

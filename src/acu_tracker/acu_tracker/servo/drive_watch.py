@@ -1,26 +1,19 @@
 """Detection of a drive that does not do what it is commanded: frozen, or in uncommanded motion.
 
-A frozen drive repeats its measurements while its axes are commanded to move.
+A frozen drive repeats its measurements while its axes are commanded to move. The rate commands u of an axis add up to
+the travel x:
 
     dx/dt = u    while every measurement equals that of the step before, else x = 0
-
-    u    rate command of an axis [rad/s]
-    x    travel that the commands have added up while the measurements repeat [rad]
 
 A drive that moves has noise in its currents and steps in its encoders. The measurements are therefore constant only at
 rest. If all measurements repeat while x grows, the motion is not measured, and the position loop is open.
 
-Uncommanded motion is a rate of an axis outside the envelope of its recent rate commands.
+Uncommanded motion is a rate of an axis outside the envelope l_k to h_k of its recent rate commands:
 
     h_k = max(u_k, h_k-1 + a (u_k - h_k-1)),    l_k = min(u_k, l_k-1 + a (u_k - l_k-1))
 
-    u_k        rate command of step k [rad/s]
-    h_k, l_k   upper and lower end of the envelope [rad/s]
-    a          share by which the envelope approaches u_k in a step of dt [s] [-]
-
 a is dt / ENVELOPE_TIME_CONSTANT_S, but 0 as long as the command that made the end of the envelope may be in force.
-
-An axis may lag behind its commands and overshoot them. Therefore every rate between 0 and the envelope is allowed. The
+Because an axis may lag behind its commands and overshoot them, every rate between 0 and the envelope is allowed. The
 rate may also exceed this range by a threshold and a share of the width of the envelope.
 """
 import math
@@ -41,32 +34,19 @@ class Frozen(Record):
 
 
 FROZEN_TEST_TRAVEL_RAD = 3e-3
-"""Travel within which a measurement must change [rad].
-
-The travel is ten times the lash of a gear, and a sixth of a beamwidth of one degree.
-"""
+"""Travel within which a measurement must change [rad]: ten times the lash of a gear, and a sixth of a beamwidth of one
+degree."""
 
 
 @compiled
 def _restart_frozen(state: Frozen, t: Seconds) -> None:
-    """Restart the test at t."""
     state.since, state.travel[0], state.travel[1] = t, 0.0, 0.0
 
 
 @compiled
-def release_frozen(state: Frozen, t: Seconds) -> None:
-    """Reset the detected fault at t; the test begins again."""
-    state.frozen = 0
-    _restart_frozen(state, t)
-
-
-@compiled
 def watch_frozen(state: Frozen, inputs: Inputs, hold: Seconds, restart: bool) -> bool:
-    """Take the measurements of a step; return True if the drive is frozen.
-
-    hold     longest time until a command has an effect on the measurements
-    restart  True if no earlier command is in force
-    """
+    """Take the measurements of a step; return True if the drive is frozen. hold: longest time until a command has an
+    effect on the measurements; restart: no earlier command is in force."""
     if restart:
         _restart_frozen(state, inputs.stamp)
     same = True
@@ -102,19 +82,14 @@ class Envelope(Record):
 
 
 ENVELOPE_TIME_CONSTANT_S = 0.2
-"""Time constant with which the envelope shrinks [s].
-
-A drive that receives no command ramps to rest faster than the envelope shrinks.
-"""
+"""Time constant with which the envelope shrinks [s]. A drive that receives no command ramps to rest faster."""
 
 ENVELOPE_OVERSHOOT_SHARE = 0.25  # share of the width of the envelope by which a rate may be outside it [-]
 RESTART_SETTLING_TIME_S = 0.3  # time without a test after a silence, or after the drive became ready [s]
 
 MIN_EXCESS_TIME_S = 0.014
-"""Shortest excess that counts [s]: three steps of 5 ms, less a margin of 1 ms.
-
-A gust of 4000 Nm on both axes causes a shorter excess.
-"""
+"""Shortest excess that counts [s]: three steps of 5 ms, less a margin of 1 ms. A gust of 4000 Nm on both axes causes a
+shorter one."""
 
 
 def initialise(record: Records) -> None:
@@ -123,30 +98,20 @@ def initialise(record: Records) -> None:
 
 
 @compiled
-def _restart_envelope(envelope: Envelope, t: Seconds) -> None:
-    """Restart the detection at t, with no command in force."""
-    envelope.since, envelope.beyond = t, t
-    envelope.high[:] = 0.0
-    envelope.low[:] = 0.0
-
-
-@compiled
-def release_motion(envelope: Envelope) -> None:
-    """Reset the detected uncommanded motion."""
-    envelope.moves = 0
+def release(envelope: Envelope, frozen: Frozen, t: Seconds) -> None:
+    """Reset both detected faults at t; the test for a frozen drive begins again."""
+    envelope.moves = frozen.frozen = 0
+    _restart_frozen(frozen, t)
 
 
 @compiled
 def watch_motion(envelope: Envelope, t: Seconds, velocity: Pair, threshold: RadiansPerSecond, restart: bool) -> bool:
-    """Take the measured rates of a step; return True if uncommanded motion is detected.
-
-    t          stamp of the step
-    velocity   measured rates, which follow the commands of earlier steps [rad/s]
-    threshold  part of the allowed excess that does not depend on the envelope
-    restart    True if no earlier command is in force
-    """
+    """Take the measured rates of a step; return True if uncommanded motion is detected. threshold: part of the allowed
+    excess that does not depend on the envelope; restart: no earlier command is in force."""
     if restart or not math.isfinite(envelope.since):
-        _restart_envelope(envelope, t)
+        envelope.since, envelope.beyond = t, t
+        envelope.high[:] = 0.0
+        envelope.low[:] = 0.0
     outside = False
     for i in range(2):
         allowed = threshold + ENVELOPE_OVERSHOOT_SHARE * (envelope.high[i] - envelope.low[i])
@@ -169,11 +134,10 @@ def motion_beyond(envelope: Envelope, t: Seconds) -> bool:
 
 @compiled
 def command_motion(envelope: Envelope, i: int, rate: RadiansPerSecond, t: Seconds, dt: Seconds, hold: Seconds) -> None:
-    """Take the rate command of axis i at t into the envelope.
+    """Take the rate command of axis i at t into the envelope; hold: longest time for which a command stays in force.
 
-    dt    time by which the envelope shrinks; at most a period, because a control unit that was late does not make
-          up the missed steps
-    hold  longest time for which a command stays in force
+    The envelope shrinks for dt, at most a period, because a control unit that was late does not make up the missed
+    steps.
     """
     a = min(dt / ENVELOPE_TIME_CONSTANT_S, 1.0)
     if rate >= envelope.high[i]:

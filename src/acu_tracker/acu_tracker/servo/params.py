@@ -2,7 +2,7 @@
 import dataclasses
 import math
 
-from acu_tracker.servo.beam_loop import LOOP_FORMS
+from acu_tracker.servo.controllers import LOOP_FORMS
 from pedestal_common.parameters import ParameterError, Parameters, choice, parameter
 from pedestal_common.quantities import RadiansPerSecond2
 
@@ -71,10 +71,8 @@ class ShaperParameters(Parameters):
     h0: float = parameter(0.02, 1e-4, 10.0, 's', "filter step of Han's fhan; a longer step is smoother, with more lag")
 
     def check(self) -> None:
-        """Raise ParameterError if h0 is too short for the jerk, because the end of a move would ring.
-
-        fhan removes the acceleration within about h0 [s]. The jerk limit needs the time acceleration / jerk to do so.
-        """
+        """Raise ParameterError if h0 is too short for the jerk, because the end of a move would ring. fhan removes the
+        acceleration within about h0 [s]. The jerk limit needs the time acceleration / jerk to do so."""
         if self.acceleration > 1.5 * self.jerk * self.h0:
             raise ParameterError(f'h0 = {self.h0:g} s: must be at least acceleration / (1.5 jerk) = '
                                  f'{self.acceleration / (1.5 * self.jerk):g} s, or the end of a move rings')

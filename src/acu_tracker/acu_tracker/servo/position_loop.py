@@ -1,22 +1,20 @@
 """The position loop of one axis: it runs the selected controller, changes it without a bump, and keeps the limits.
 
 The input is the raw target: the angle, rate and acceleration that guidance requests, before the shaper. The output is
-the rate command. There are four controllers:
+the rate command. There are four controllers (`controllers`):
 
 pid          acts on the raw target at t_k
 feedforward  acts on the shaped reference at t_k, and feeds rate, acceleration and torque of t_m forward
 adrc         as feedforward, with an observer of the disturbance
-beam         steers an electronic beam, which has no dynamics. Its command is the raw target at t_m. In autotrack with
-             the forms type_1 and type_2 it is the beam of `beam_loop`, which acts on the receiver's error
-
-t_k: stamp of the step [s]; t_m: middle of the interval in which the command of the step is in force [s].
+beam         steers an electronic beam, which has no dynamics, to the raw target at t_m. In autotrack with the forms
+             type_1 and type_2 its law acts on the receiver's error
 """
 import dataclasses
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
-from acu_tracker.estimation.filters import constant_gain
+from acu_tracker.estimation.filters import kalman
 from acu_tracker.geometry.vector import AxisMotion
-from acu_tracker.servo import beam_loop, controllers, ends, reference
+from acu_tracker.servo import controllers, reference, travel
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import (
     Floats,
@@ -64,7 +62,7 @@ class Feedback(NamedTuple):
     error: Radians          # receiver error of this axis, as a deck angle; NaN: no error in this step
     V: RadiansPerSecond     # rate at which the motion of the deck moves the deck angle of a fixed target
     closed: bool            # True if a beam closes its own loop on the receiver error
-    ends: ends.Ends         # present ends of the travel
+    ends: travel.Ends         # present ends of the travel
 
 
 class Command(NamedTuple):
@@ -77,15 +75,11 @@ class Command(NamedTuple):
     acceleration_limited: bool
 
 
-MAX_DELAY_PHASE_RAD = 0.5
-"""Largest product of bandwidth and delay of the command [rad]: the loss of phase margin by the delay."""
+MAX_DELAY_PHASE_RAD = 0.5  # largest bandwidth times delay of the command: the lost phase margin
 
 
 def slowed(params: 'AxisParameters', delay: Seconds) -> 'AxisParameters':
-    """Return AxisParameters whose loops are stable with a delay of the command.
-
-    The bandwidth of each controller is reduced to MAX_DELAY_PHASE_RAD / delay, if it is higher.
-    """
+    """Return AxisParameters with no bandwidth above MAX_DELAY_PHASE_RAD / delay, so that the loops are stable."""
     if delay == 0.0:
         return params
     loops = {name: getattr(params, name) for name in ('pid', 'feedforward', 'adrc')}
@@ -97,13 +91,8 @@ def slowed(params: 'AxisParameters', delay: Seconds) -> 'AxisParameters':
 @compiled
 def limited(wanted: RadiansPerSecond, before: RadiansPerSecond, dt: Seconds, rate: RadiansPerSecond,
             acceleration: RadiansPerSecond2) -> tuple[RadiansPerSecond, bool, bool]:
-    """Return (rate command, True if the rate was limited, True if the acceleration was limited).
-
-    wanted        rate command before the limits
-    before        rate command of the step before, dt ago
-    rate          largest absolute value of the command
-    acceleration  largest change of the command over time
-    """
+    """Return (rate command, True if the rate was limited, True if the acceleration was limited). wanted, before: rate
+    commands before the limits and dt ago; rate, acceleration: largest absolute values."""
     u = min(max(wanted, -rate), rate)
     rate_limited = u != wanted
     step = acceleration * dt
@@ -113,26 +102,22 @@ def limited(wanted: RadiansPerSecond, before: RadiansPerSecond, dt: Seconds, rat
 
 @compiled
 def realised(command: RadiansPerSecond, dy: RadiansPerSecond) -> RadiansPerSecond:
-    """Return the part of a rate command that an axis realises while it moves at the rate dy.
-
-    The part is 0 if the axis moves against the command, the command if the axis is faster, and else dy.
-    """
+    """Return the part of a rate command that an axis realises while it moves at the rate dy. The part is 0 if the axis
+    moves against the command, the command if the axis is faster, and else dy."""
     return min(max(dy, min(command, 0.0)), max(command, 0.0))
 
 
 @compiled
 def replace_command(axis: AxisLoop, rate: RadiansPerSecond) -> None:
-    """Replace the rate command of the last step by another one, with which the next step begins."""
+    """Replace the rate command of the last step, with which the next step begins."""
     axis.command = rate
 
 
 @compiled
 def initialise(axis: AxisLoop, params: 'AxisParameters', t_k: Seconds, y: Radians, dy: RadiansPerSecond) -> None:
-    """Start the controller from the angle y and the rate dy of the encoder at t_k.
-
-    A beam keeps its last command. Because the measured beam lags the command by the delay, each start from the
-    measured beam would move the command back by this lag.
-    """
+    """Start the controller from the angle y and the rate dy of the encoder at t_k. A beam keeps its last command.
+    Because the measured beam lags the command by the delay, each start from the measured beam would move the command
+    back by this lag."""
     axis.controller = int(params.controller)
     if axis.controller == CONTROLLER_BEAM and axis.reference.planned.count > 0:
         axis.reference.rate = 0.0
@@ -145,7 +130,6 @@ def initialise(axis: AxisLoop, params: 'AxisParameters', t_k: Seconds, y: Radian
 
 @compiled
 def _initialise_feedback(axis: AxisLoop, t_k: Seconds, y: Radians, dy: RadiansPerSecond) -> None:
-    """Reset the integral and the observer: they start without a disturbance, at y and dy."""
     axis.integral = 0.0
     axis.z[0], axis.z[1], axis.z[2] = y, dy, 0.0
     axis.observed = t_k
@@ -153,10 +137,7 @@ def _initialise_feedback(axis: AxisLoop, t_k: Seconds, y: Radians, dy: RadiansPe
 
 @compiled
 def stop(axis: AxisLoop, params: 'AxisParameters', dt: Seconds) -> Command:
-    """Return the Command that brings the rate to zero within the acceleration limit; reset the integral.
-
-    dt: time since the last command.
-    """
+    """Return the Command that brings the rate to zero within the acceleration limit; reset the integral."""
     axis.command, _, acceleration_limited = limited(0.0, axis.command, dt, params.limits.rate,
                                                     params.limits.acceleration)
     axis.integral = 0.0
@@ -172,10 +153,7 @@ def instant(params: 'AxisParameters', t_k: Seconds, t_m: Seconds) -> Seconds:
 @compiled
 def follow(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedback: Feedback,
            now: Instants) -> Command:
-    """Return the Command of one step.
-
-    target: the raw target at `instant`.
-    """
+    """Return the Command of one step; target: the raw target at `instant`."""
     if int(constants.p.controller) == CONTROLLER_BEAM:
         return _steer(axis, constants.p, target, feedback, now.dt)
     return _step(axis, constants, target, feedback, now)
@@ -183,19 +161,16 @@ def follow(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedb
 
 @compiled
 def _steer(axis: AxisLoop, params: 'AxisParameters', target: AxisMotion, feedback: Feedback, T: Seconds) -> Command:
-    """Return the Command of an electronic beam: the raw target at t_m, or the beam that `beam_loop` computes.
-
-    T: time since the step before.
-    """
+    """Return the Command of an electronic beam: the raw target at t_m, or the beam of its own loop."""
     b, r = params.beam, axis.reference
-    beta, compensation = constant_gain.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
+    beta, compensation = kalman.benedict_bordner(b.alpha), b.rate_compensation * feedback.V
     axis.controller = CONTROLLER_BEAM
     r.acceleration = 0.0
-    if not feedback.closed or int(b.form) == beam_loop.FORM_TRACKED:
+    if not feedback.closed or int(b.form) == controllers.FORM_TRACKED:
         reference.put(r, target)
     else:
-        r.angle, r.rate = beam_loop.step(int(b.form), r.angle, r.rate, feedback.error, b.alpha, beta, T,
-                                         compensation)
+        r.angle, r.rate = controllers.beam_step(int(b.form), r.angle, r.rate, feedback.error, b.alpha, beta, T,
+                                                compensation)
     low, high = feedback.ends
     angle_limited = not low <= r.angle <= high
     if angle_limited:
@@ -207,11 +182,9 @@ def _steer(axis: AxisLoop, params: 'AxisParameters', target: AxisMotion, feedbac
 @compiled
 def _step(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedback: Feedback,
           now: Instants) -> Command:
-    """Return the Command of one step of an axis with motors.
-
-    Anti-windup: if the limits change the command in the direction opposite to the error, the integral keeps its value.
-    The observer of adrc receives the limited command.
-    """
+    """Return the Command of one step of an axis with motors. Anti-windup: if the limits change the command in the
+    direction opposite to the error, the integral keeps its value. The observer of adrc receives the limited
+    command."""
     p, r, y, dy = constants.p, axis.reference, feedback.y, feedback.dy
     controller = int(p.controller)
     handover = axis.controller != controller
@@ -234,14 +207,14 @@ def _step(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedba
         _update(axis, p, e, y, now)
     u, fed = _control_law(axis, p, e, v)
     u -= controllers.notch_removed(u - fed, axis.notch, constants.notch)
-    kept = ends.inside(u, y, feedback.ends, constants.braking, constants.reaction)
+    kept = travel.inside(u, y, feedback.ends, constants.braking, constants.reaction)
     axis.command, rate_cut, acceleration_cut = limited(kept, axis.command, now.dt, p.limits.rate,
                                                        p.limits.acceleration)
     reference.commanded(r, axis.command)
     if (axis.command - u) * e < 0.0:
         axis.integral = integral
-    # Far from the ends `ends.inside` allows a higher rate than limits.rate. There a reduced command counts as limited
-    # in rate, not in angle.
+    # Far from the ends `travel.inside` allows a higher rate than limits.rate. There a reduced command counts as
+    # limited in rate, not in angle.
     angle_limited |= kept != u and abs(kept) < p.limits.rate
     return Command(axis.command, torque, v, angle_limited, rate_limited or rate_cut,
                    acceleration_limited or acceleration_cut)
@@ -249,10 +222,7 @@ def _step(axis: AxisLoop, constants: 'AxisConstants', target: AxisMotion, feedba
 
 @compiled
 def _held_inside(target: AxisMotion, low: Radians, high: Radians) -> tuple[AxisMotion, bool]:
-    """Return (AxisMotion of the raw target, put on the end of travel if it is beyond; True if it was put there).
-
-    low, high: ends of travel.
-    """
+    """Return (AxisMotion of the raw target, put on the end of travel if it is beyond; True if it was put there)."""
     held = not low <= target.angle <= high
     if held:
         return AxisMotion(min(max(target.angle, low), high), 0.0, 0.0), held
@@ -262,14 +232,11 @@ def _held_inside(target: AxisMotion, low: Radians, high: Radians) -> tuple[AxisM
 @compiled
 def _control_law(axis: AxisLoop, params: 'AxisParameters', e: Radians,
                  v: AxisMotion) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return (rate command before notch and limits, the part of it that is fed forward).
-
-    v: reference at t_k; e: v.angle minus the encoder angle.
-    """
+    """Return (rate command before notch and limits, the part of it that is fed forward); v: reference at t_k."""
     controller = int(params.controller)
     if controller == CONTROLLER_PID:
         gains = params.pid
-        return controllers.pid_rate(e, axis.integral, axis.derivative, gains.bandwidth, gains.derivative), 0.0
+        return gains.bandwidth * e + axis.integral + gains.derivative * axis.derivative, 0.0
     r = axis.reference
     if controller == CONTROLLER_FEEDFORWARD:
         k = params.feedforward
@@ -282,11 +249,9 @@ def _control_law(axis: AxisLoop, params: 'AxisParameters', e: Radians,
 @compiled
 def _transfer(axis: AxisLoop, params: 'AxisParameters', e: Radians, v: AxisMotion, feedback: Feedback,
               t_k: Seconds) -> None:
-    """Start another controller so that its first command equals the last command of the controller before.
-
-    The integral takes up the difference of both commands, or the disturbance z3 of adrc. The notch starts in its
-    steady state. The arguments are those of _control_law; t_k: stamp of the step.
-    """
+    """Start another controller so that its first command equals the last command of the controller before. The
+    integral takes up the difference of both commands, or the disturbance z3 of adrc. The notch starts in its steady
+    state."""
     axis.controller = int(params.controller)
     axis.error, axis.derivative = e, v.rate - feedback.dy
     _initialise_feedback(axis, t_k, feedback.y, feedback.dy)
@@ -300,10 +265,7 @@ def _transfer(axis: AxisLoop, params: 'AxisParameters', e: Radians, v: AxisMotio
 
 @compiled
 def _update(axis: AxisLoop, params: 'AxisParameters', e: Radians, y: Radians, now: Instants) -> None:
-    """Advance the observer, or the integral and the derivative, of the running controller to t_k.
-
-    e: error; y: encoder angle.
-    """
+    """Advance the observer, or the integral and the derivative, of the running controller to t_k."""
     controller = int(params.controller)
     if controller == CONTROLLER_ADRC:
         h = now.t_k - axis.observed
@@ -311,7 +273,7 @@ def _update(axis: AxisLoop, params: 'AxisParameters', e: Radians, y: Radians, no
             # u, v3: command and acceleration that were in force since the last instant of the observer.
             u, v3 = reference.in_force(axis.reference, now.t_k - 0.5 * h)
             axis.z[0], axis.z[1], axis.z[2] = controllers.observed(axis.z, y, u, v3, params.adrc.observer_bandwidth,
-                                                            params.adrc.rate_bandwidth, h)
+                                                                   params.adrc.rate_bandwidth, h)
             axis.observed = now.t_k
     else:
         if controller == CONTROLLER_PID:

@@ -1,17 +1,16 @@
 """The shaped reference of one axis and its history.
 
 The shaper computes the reference for t_m, the middle of the interval in which the command of the step is in force. The
-history keeps the reference until the encoder reports this instant, so that both are compared at the same instant.
-
-The controller pid uses no shaped reference. The reference is then kept at the angle and rate of the axis, so that
-another controller can begin there.
+history keeps the reference until the encoder reports this instant, so that both are compared at the same instant. The
+controller pid uses no shaped reference. The reference is then kept at the angle and rate of the axis, so that another
+controller can begin there.
 """
 from typing import TYPE_CHECKING, Annotated
 
 from acu_tracker.geometry.history import HISTORY_LENGTH, History, bracket, interpolated, push
 from acu_tracker.geometry.vector import AxisMotion
 from acu_tracker.servo import shaper
-from acu_tracker.servo.ends import Ends
+from acu_tracker.servo.travel import Ends
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Floats, Radians, RadiansPerSecond, RadiansPerSecond2, Seconds
 from pedestal_common.record import Record
@@ -33,8 +32,7 @@ class Reference(Record):
     planned: Planned
 
 
-ANGLE_COLUMN, RATE_COLUMN, ACCELERATION_COLUMN, COMMAND_COLUMN = range(4)
-"""Columns of the history: angle, rate, acceleration of the reference; rate command."""
+ANGLE_COLUMN, RATE_COLUMN, ACCELERATION_COLUMN, COMMAND_COLUMN = range(4)  # of the history
 
 
 @compiled
@@ -51,10 +49,6 @@ def put(reference: Reference, motion: AxisMotion) -> None:
 
 @compiled
 def _plan(reference: Reference, stamp: Seconds, command: RadiansPerSecond) -> None:
-    """Put the reference into the history.
-
-    stamp: instant for which the reference is planned; command: rate command.
-    """
     row = reference.planned.sample[push(reference.planned, stamp)]
     row[ANGLE_COLUMN], row[RATE_COLUMN] = reference.angle, reference.rate
     row[ACCELERATION_COLUMN], row[COMMAND_COLUMN] = reference.acceleration, command
@@ -63,10 +57,7 @@ def _plan(reference: Reference, stamp: Seconds, command: RadiansPerSecond) -> No
 @compiled
 def initialise(reference: Reference, stamp: Seconds, y: Radians, dy: RadiansPerSecond,
                command: RadiansPerSecond) -> None:
-    """Restart the reference at an angle y and a rate dy at a stamp; clear the history.
-
-    command: rate command in force.
-    """
+    """Restart the reference at an angle y and a rate dy at a stamp; clear the history. command: in force."""
     reference.planned.count = 0
     put(reference, AxisMotion(y, dy, 0.0))
     _plan(reference, stamp, command)
@@ -75,13 +66,8 @@ def initialise(reference: Reference, stamp: Seconds, y: Radians, dy: RadiansPerS
 @compiled
 def follow(reference: Reference, params: 'AxisParameters', target: AxisMotion, stamp: Seconds,
            command: RadiansPerSecond, ends: Ends) -> tuple[bool, bool, bool]:
-    """Advance the shaped reference towards a target. Return (angle limited, rate limited, acceleration limited).
-
-    target   raw target at the stamp
-    stamp    instant for which the reference is planned
-    command  rate command of the step before; `commanded` replaces it in the history
-    ends     present ends of the axis
-    """
+    """Advance the shaped reference towards the raw target at a stamp. Return (angle, rate, acceleration limited).
+    command: rate command of the step before; `commanded` replaces it in the history."""
     k = params.shaper
     dt = stamp - reference.planned.stamp[reference.planned.newest]
     target, angle_limited = shaper.held_inside(target, ends.low, ends.high, k.acceleration,
@@ -109,10 +95,7 @@ def _around(history: History, t: Seconds) -> tuple[int, int, float]:
 
 @compiled
 def planned(reference: Reference, t: Seconds) -> AxisMotion:
-    """Return the AxisMotion that was planned for t.
-
-    The angle is interpolated by a cubic Hermite polynomial, rate and acceleration linearly.
-    """
+    """Return the AxisMotion planned for t: the angle by a cubic Hermite polynomial, rate and acceleration linearly."""
     i, j, f = rows = _around(reference.planned, t)
     a, b = reference.planned.sample[i], reference.planned.sample[j]
     T = reference.planned.stamp[j] - reference.planned.stamp[i]

@@ -20,8 +20,7 @@ SUB_STEP_COUNT = 4  # number of sub-steps in which the shaper computes a step of
 def toward_rate_limit(gap: RadiansPerSecond, h: Seconds, jerk: RadiansPerSecond3) -> RadiansPerSecond2:
     """Return the largest acceleration a with which the rate still stays inside its limit.
 
-    gap: distance of the rate from its limit; h: sub-step; jerk: largest jerk j. The jerk must reduce a to 0 before the
-    rate has grown by gap:
+    The jerk j must reduce a to 0 before the rate has grown by gap, its distance from the limit, in sub-steps h:
 
         a^2/(2 j) + a h/2 + j h^2/8 = gap
 
@@ -37,14 +36,8 @@ def toward_rate_limit(gap: RadiansPerSecond, h: Seconds, jerk: RadiansPerSecond3
 @compiled
 def held_inside(raw: AxisMotion, low: Radians, high: Radians, braking: RadiansPerSecond2,
                 lag: Seconds) -> tuple[AxisMotion, bool]:
-    """Return (AxisMotion of the raw target, put on a limit if necessary; True if it was put there).
-
-    A raw target is put on a limit if it is beyond the limit, or if it could not stop before the limit.
-
-    low, high  limits
-    braking    deceleration
-    lag        time until the braking begins
-    """
+    """Return (AxisMotion of the raw target, put on a limit if it is beyond or could not stop before it; True if put
+    there). lag: time until the braking begins."""
     stop = raw.angle + raw.rate * (abs(raw.rate) / (2.0 * braking) + lag)
     if raw.angle > high or (raw.rate > 0.0 and stop > high):
         return AxisMotion(high, 0.0, 0.0), True
@@ -55,11 +48,8 @@ def held_inside(raw: AxisMotion, low: Radians, high: Radians, braking: RadiansPe
 
 @compiled
 def shape(before: AxisMotion, raw: AxisMotion, dt: Seconds, limits: ShaperParameters) -> tuple[AxisMotion, bool, bool]:
-    """Return (shaped reference, True if its rate was limited, True if its acceleration was limited).
-
-    before  shaped reference dt ago
-    raw     raw target now, at the end of dt
-    """
+    """Return (shaped reference, True if its rate was limited, True if its acceleration was limited). before: shaped
+    reference dt ago; raw: raw target now, at the end of dt."""
     p, v, a = before
     h = dt / SUB_STEP_COUNT
     # p, v, a: shaped angle, rate, acceleration; e, de: shaped minus raw; back: time from a sub-step to the end of dt.

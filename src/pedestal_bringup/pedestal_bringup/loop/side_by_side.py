@@ -12,8 +12,7 @@ import numpy as np
 
 from acu_tracker import unit as acu_unit
 from acu_tracker import unit_law
-from acu_tracker.program.program_track import ProgramTrack
-from acu_tracker.program.tables import Tables
+from acu_tracker.program.program_track import ProgramTrack, Tables
 from adu_drive import lanes
 from adu_drive import unit as drive_unit
 from pedestal_bringup.loop.closed_loop import STEP_DTYPE, Forecast, Loop, Run, Truth

@@ -21,11 +21,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acu_tracker.estimation.filters import axis_filter, constant_gain
+from acu_tracker.estimation.filters import axis_filter, kalman
 from acu_tracker.estimation.filters.measurement import AxisMeasurement
 from acu_tracker.estimation.params import CaParameters, FilterParameters
 from acu_tracker.geometry import attitude as attitudes
-from acu_tracker.servo import beam_loop
+from acu_tracker.servo import controllers
 from adu_drive.array import electronic_beam
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Floats, Radians, Radians2, Records, Seconds
@@ -77,7 +77,7 @@ class Receiver(NamedTuple):
 
 class PaperLoopConstants(NamedTuple):
     """Constants of a PaperLoop."""
-    form: int           # code of beam_loop.LOOP_FORMS
+    form: int           # code of controllers.LOOP_FORMS
     alpha: float        # gain [-]
     period: int         # time between two updates, in samples
     delta: float        # share of the carrier's rate that is compensated [-]
@@ -101,7 +101,7 @@ class PaperLoop:
     period: int = 10        # time between two updates of the loop, in samples of the grid
     delay: int = 0          # time from a command to its effect, in samples
     smoothing: str = 'S1'   # key of SMOOTHING_CODES
-    form: str = 'type_1'    # one of beam_loop.LOOP_FORMS
+    form: str = 'type_1'    # one of controllers.LOOP_FORMS
     delta: float = 0.0      # share of the carrier's rate that is compensated [-]
     slope: float = 1.0      # as in Receiver, here and below
     beamwidth: Radians = 0.0
@@ -113,7 +113,7 @@ class PaperLoop:
         rate: rate of the target due to the carrier [rad/s]. noise: noise of the samples [rad]. None for zeros.
         """
         zeros, beam, errors = np.zeros(len(target)), np.zeros(len(target)), np.zeros(len(target))
-        constants = PaperLoopConstants(beam_loop.LOOP_FORMS.index(self.form), self.alpha, self.period, self.delta,
+        constants = PaperLoopConstants(controllers.LOOP_FORMS.index(self.form), self.alpha, self.period, self.delta,
                                        SMOOTHING_CODES[self.smoothing])
         _paper_loop(constants, Receiver(self.slope, self.beamwidth, self.lost_power_ratio),
                     Target(np.asarray(target), zeros, zeros if rate is None else rate,
@@ -206,7 +206,7 @@ def _paper_loop(constants: PaperLoopConstants, receiver: Receiver, target: Targe
                 beam: Floats, errors: Floats) -> None:
     """Run paper 002's loop over a target into beam and errors [rad]."""
     form, alpha, period, delta, kind = constants
-    s, beta, T = smoothers[0].error, constant_gain.benedict_bordner(alpha), period * GRID_STEP_S
+    s, beta, T = smoothers[0].error, kalman.benedict_bordner(alpha), period * GRID_STEP_S
     R = v = error = 0.0
     for i in range(len(target.angle)):
         beam[i] = plant.outputs[0].position[0]
@@ -216,7 +216,7 @@ def _paper_loop(constants: PaperLoopConstants, receiver: Receiver, target: Targe
             smoothing.put(s, sample, 1.0 / SMOOTHING_SAMPLES)
         if i % period == 0:
             error = math.nan if math.isnan(sample) else smoothing.smoothed(s, kind, 1, SMOOTHING_SAMPLES)
-            R, v = beam_loop.step(form, R, v, error, alpha, beta, T, delta * target.rate[i])
+            R, v = controllers.beam_step(form, R, v, error, alpha, beta, T, delta * target.rate[i])
         errors[i] = error
         command(plant.inputs[0], i, i % period == 0, R)
         electronic_beam.step(plant.state[0], plant.constants[0], plant.inputs[0], plant.outputs[0])
@@ -298,7 +298,7 @@ def spectral_radius(loop: PaperLoop) -> float:
 
     The right sides have the old values of V and C_k. The lines of V and C_k+1 have the new value of E.
     """
-    M, beta, n = loop.period, constant_gain.benedict_bordner(loop.alpha), SMOOTHING_SAMPLES
+    M, beta, n = loop.period, kalman.benedict_bordner(loop.alpha), SMOOTHING_SAMPLES
     first = {'S0': M, 'S1': 1, 'S2': M - n + 1}[loop.smoothing]
     ages = [-((j - 1 - loop.delay) // M) for j in range(first, M + 1)]
     V, E, C = 0, 1, 2

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from scipy.stats import beta
 
 from acu_tracker.modes import Mode
-from acu_tracker.search.params import SearchParameters
+from acu_tracker.search.acquisition import SearchParameters
 from acu_tracker.search.pattern import PATTERN_SPIRAL, PATTERN_SQUARE, SEARCH_PATTERNS
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_common.quantities import Floats, Pairs, Radians, Row, Seconds

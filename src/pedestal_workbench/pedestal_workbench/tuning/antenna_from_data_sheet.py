@@ -23,7 +23,7 @@ import shlex
 import typing
 from collections.abc import Iterable, Iterator, Mapping
 
-from acu_tracker.servo import ends
+from acu_tracker.servo import travel
 from drive_law.axis_params import PLANT_PERIOD_S, MotorParameters, mesh_inertia
 from drive_law.params import AduParameters
 from pedestal_bringup.scenario import files, scenario
@@ -129,7 +129,7 @@ def attainable(sheet: DataSheet) -> tuple[DataSheet, list[str]]:
         plant = _plant(sheet, name, {**values, 'limits.rate': min(asked, RATE_SHARE * turning)})
         limits = getattr(acu, name).limits
         braking = dataclasses.replace(limits, acceleration=loops.rate_slope(plant)).deceleration
-        stopping = ends.stopping_rate(0.5 * (limits.high - limits.low), braking, acu.reaction)
+        stopping = travel.stopping_rate(0.5 * (limits.high - limits.low), braking, acu.reaction)
         stopping /= loops.SHAPER_RATE_SHARE
         if asked > min(turning, stopping):
             reached = math.degrees(min(turning, stopping))

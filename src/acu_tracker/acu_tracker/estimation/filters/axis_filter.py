@@ -1,16 +1,12 @@
 """The target filter of one axis: it estimates the angle, the rate and the acceleration of the target on this axis.
 
 A kind of kinds.FILTER_KINDS defines the filter. Each kind is a bank: one or more Kalman filters with different motion
-models, which run side by side.
-
-The state stays at the last accepted measurement; `predict` and `outlook` extrapolate from there. `predict` writes its
-result into the prior fields; `expected`, `innovation` and `correct` use these fields.
+models, which run side by side; j is the number of a model in the bank. The state stays at the last accepted
+measurement. `predict` writes its result into the prior fields, which `expected`, `innovation` and `correct` use.
 
 The noise of the angle may be coloured by a first-order lag. The filter then uses the differences y_k - rho y_k-1,
 whose noise is white (Bryson, Henrikson 1968; kalman.update_correlated). Here y_k is the angle of measurement k, and
 rho is the correlation of the noise of two successive angles.
-
-j: number of a model in the bank.
 """
 import math
 from collections.abc import Sequence
@@ -18,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from acu_tracker.estimation.filters import constant_gain, imm, kalman, motion_models
+from acu_tracker.estimation.filters import imm, kalman, motion_models
 from acu_tracker.estimation.filters.kalman import Gaussian, PreviousAngle, Symmetric
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, AxisMeasurement, AxisVariances
@@ -44,8 +40,7 @@ if TYPE_CHECKING:
 
 BANK_SIZE = len(COLUMN_NAMES)  # largest number of models in a bank
 
-P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index('p33')
-"""Columns of the variances of angle and acceleration in a row of `p`."""
+P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index('p33')  # columns in `p`
 
 
 class Constants(Record):
@@ -89,10 +84,7 @@ FILTER_TYPE = Filter.dtype  # a law cannot call Filter.zeros
 
 
 class Estimate(Record):
-    """One row of the result of `estimates`.
-
-    The innovations and nis are NaN if nothing was measured.
-    """
+    """One row of the result of `estimates`. The innovations and nis are NaN if nothing was measured."""
     angle: Radians
     rate: RadiansPerSecond
     acceleration: RadiansPerSecond2
@@ -106,10 +98,7 @@ class Estimate(Record):
 
 
 def constants(params: 'FilterParameters', noise_bandwidth: Hertz = 0.0) -> Records:
-    """Return the constants (1,).
-
-    noise_bandwidth: bandwidth of the noise of the measured angle; 0: white noise.
-    """
+    """Return the constants (1,); noise_bandwidth: of the measured angle, 0: white noise."""
     c, bank = Constants.zeros(), FILTER_KINDS[params.kind].bank(params)
     c['count'] = len(bank.models)
     c['models'][0, :len(bank.models)] = bank.models
@@ -121,7 +110,6 @@ def constants(params: 'FilterParameters', noise_bandwidth: Hertz = 0.0) -> Recor
 
 @compiled
 def _put(x: Floats, p: Floats, j: int, gaussian: Gaussian) -> None:
-    """Write a Gaussian to row j of x (n, 3) and of p (n, 6)."""
     x[j, 0], x[j, 1], x[j, 2] = gaussian.x
     P = gaussian.P
     p[j, 0], p[j, 1], p[j, 2], p[j, 3], p[j, 4], p[j, 5] = P.p11, P.p12, P.p13, P.p22, P.p23, P.p33
@@ -129,13 +117,11 @@ def _put(x: Floats, p: Floats, j: int, gaussian: Gaussian) -> None:
 
 @compiled
 def _gaussian(x: Floats, p: Floats) -> Gaussian:
-    """Return the Gaussian of a row of `x` and a row of `p`."""
     return Gaussian(AxisMotion(x[0], x[1], x[2]), Symmetric(p[0], p[1], p[2], p[3], p[4], p[5]))
 
 
 @compiled
 def _previous_angle(row: Floats) -> PreviousAngle:
-    """Return the PreviousAngle of a row of `past`."""
     return PreviousAngle(row[0], row[1], row[2], row[3], row[4])
 
 
@@ -150,17 +136,13 @@ def _fill(state: Filter, constants: Constants, gaussian: Gaussian) -> None:
 
 @compiled
 def _reset_acceleration_variance(state: Filter, constants: Constants) -> None:
-    """Set the variance of the acceleration of every model to that at its start."""
     for j in range(constants.count):
         state.p[j, P33_COLUMN] = constants.models[j].initial_sigma * constants.models[j].initial_sigma
 
 
 @compiled
 def start(state: Filter, constants: Constants, y: Radians, R: Radians2, rate_sigma: RadiansPerSecond) -> None:
-    """Start at a measured angle y of variance R.
-
-    rate_sigma: standard deviation of the unknown rate.
-    """
+    """Start at a measured angle y of variance R; rate_sigma: standard deviation of the unknown rate."""
     _fill(state, constants, Gaussian(AxisMotion(y, 0.0, 0.0),
                                      Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
     _reset_acceleration_variance(state, constants)
@@ -169,10 +151,8 @@ def start(state: Filter, constants: Constants, y: Radians, R: Radians2, rate_sig
 
 @compiled
 def transfer(state: Filter, constants: Constants) -> None:
-    """If the bank has changed, start its models from the combined estimate and covariance of the old bank.
-
-    An acceleration that the old bank did not estimate gets the variance of a `start`.
-    """
+    """If the bank has changed, start its models from the combined estimate and covariance of the old bank. An
+    acceleration that the old bank did not estimate gets the variance of a `start`."""
     if state.bank != constants.bank:
         unknown = state.states == 2
         _fill(state, constants, corrected(state))
@@ -182,11 +162,9 @@ def transfer(state: Filter, constants: Constants) -> None:
 
 @compiled
 def move(state: Filter, constants: Constants, motion: AxisMotion) -> None:
-    """Shift the models so that together they estimate this motion; their covariances stay.
-
-    Because the last measured angle belongs to the old frame, the noise of the next angle counts as uncorrelated.
-    Models without an acceleration state ignore the acceleration.
-    """
+    """Shift the models so that together they estimate this motion; their covariances stay. Because the last measured
+    angle belongs to the old frame, the noise of the next angle counts as uncorrelated. Models without an acceleration
+    state ignore the acceleration."""
     x = outlook(state, constants, 0.0)
     state.correlated = 0
     for j in range(constants.count):
@@ -198,10 +176,8 @@ def move(state: Filter, constants: Constants, motion: AxisMotion) -> None:
 
 @compiled
 def blend(state: Filter, constants: Constants, own: float, share: float, other: Symmetric) -> None:
-    """Set the covariance of every model to `own` of itself plus `share` of `other`.
-
-    Of a model without an acceleration state only angle and rate have a covariance.
-    """
+    """Set the covariance of every model to `own` of itself plus `share` of `other`. Of a model without an acceleration
+    state only angle and rate have a covariance."""
     for j in range(constants.count):
         x, P = _gaussian(state.x[j], state.p[j])
         of_acceleration = share if constants.models[j].states > 2 else 0.0
@@ -238,7 +214,7 @@ def predict(state: Filter, constants: Constants, T: Seconds) -> None:
 
 @compiled
 def expected(state: Filter) -> Gaussian:
-    """Return the Gaussian of the prediction: mean and covariance of the whole bank."""
+    """Return the Gaussian of the prediction of the whole bank."""
     return imm.combine(state.mu_prior, state.x_prior, state.p_prior, state.count)
 
 
@@ -256,17 +232,14 @@ def variances(gaussian: Gaussian) -> AxisVariances:
 
 @compiled
 def _correlation(state: Filter, constants: Constants) -> float:
-    """Return rho, the correlation of the noise of the present angle with that of the last angle; 0 for white noise."""
+    """Return rho; 0 for white noise."""
     coloured = constants.noise_bandwidth > 0.0 and state.correlated
     return math.exp(-constants.noise_bandwidth * state.T) if coloured else 0.0
 
 
 @compiled
 def innovation(state: Filter, constants: Constants, measurement: AxisMeasurement) -> AxisInnovation:
-    """Return the innovation of a measurement against the prediction.
-
-    The innovation of the angle is that of the difference y_k - rho y_k-1; see the module.
-    """
+    """Return the innovation of a measurement; that of the angle is the one of y_k - rho y_k-1."""
     rho = _correlation(state, constants)
     x, P = expected(state)
     # u, U: mean and variance of the predicted difference y_k - rho y_k-1, without the noise of the angle; p12: its
@@ -300,7 +273,7 @@ def correct(state: Filter, constants: Constants, measurement: AxisMeasurement) -
         # A filter of constant gain uses alpha only where the Kalman gain p11 / S is below alpha. After a start or a
         # gap the Kalman gain is larger, and is used.
         if g.P.p11 < constants.alpha * S:
-            K = constant_gain.gain(constants.alpha, constants.beta, constants.gamma, state.T)
+            K = kalman.constant_gain(constants.alpha, constants.beta, constants.gamma, state.T)
             g = kalman.update_with_gain(g, nu, measurement.variance, K)
         elif rho > 0.0:
             g = kalman.update_correlated(g, o, rho, nu, S)
@@ -317,10 +290,8 @@ def correct(state: Filter, constants: Constants, measurement: AxisMeasurement) -
 
 @compiled
 def outlook(state: Filter, constants: Constants, T: Seconds) -> AxisMotion:
-    """Return the AxisMotion that `predict` would give for T >= 0 after the last measurement.
-
-    The prior fields do not change. Because no covariance is computed, this is faster than `predict`.
-    """
+    """Return the AxisMotion that `predict` would give for T >= 0 after the last measurement. The prior fields do not
+    change. Because no covariance is computed, this is faster than `predict`."""
     angle = rate = acceleration = 0.0
     stay, switch = imm.switching(T, constants.dwell, constants.count)
     for j in range(constants.count):
@@ -346,12 +317,8 @@ def estimates(constants: Records, t: Times, y: Floats, R: Floats, y_rate: Floats
               initial_rate: RadiansPerSecond, out: Records) -> None:
     """Filter whole arrays (n,) of measurements, for tests and studies.
 
-    constants        (1,) of Constants
-    t                stamps
-    y, R             angles [rad] and their variances [rad2]
-    y_rate, R_rate   rates [rad/s] and their variances [rad2/s2]
-    initial_rate     standard deviation of the rate at the start
-    out              (n,) of Estimate; row k is the estimate after measurement k
+    constants: (1,); t: stamps; y, y_rate: angles [rad] and rates [rad/s]; R, R_rate: their variances; initial_rate:
+    standard deviation of the rate at the start; out: (n,) of Estimate, row k after measurement k.
 
     The filter starts at the first angle; earlier rows are NaN. The filter ignores an angle that is NaN or whose stamp
     does not advance. The row of such an angle is the prediction from the last accepted angle.

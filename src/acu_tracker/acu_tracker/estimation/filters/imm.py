@@ -1,19 +1,15 @@
 """Interacting multiple models (IMM): probabilities and mixing of a bank of filters (Blom, Bar-Shalom 1988).
 
 Each filter of the bank has another motion model. Before a prediction the estimates of the filters are mixed. After a
-measurement the likelihood of the measurement changes the probability of each model. The estimate of the bank is the
-mean of all filters, weighted with these probabilities. `axis_filter` and `unscented` use this module.
+measurement the likelihood of the measurement changes the probability mu of each model. The estimate of the bank is the
+mean of all filters, weighted with these probabilities.
 
 The equations are those of paper 003, eq. 5 to 11, with two corrections. The paper omits the mixing before the
 prediction. In its eq. 11 the second factor has a reversed sign, which would subtract the spread of the models. Here
-the weights in eq. 11 are the probabilities, and the spread is added.
+the weights in eq. 11 are the probabilities, and the spread is added. The likelihoods are kept as logarithms, so that
+even a measurement far from all models ranks the models.
 
-The likelihoods are kept as logarithms. Therefore even a measurement far from all models ranks the models.
-
-mu      probabilities (n,) of the models [-]
-cbar_j  probability of model j before the measurement [-]
-count   number n of models in use
-x, p    estimates (n, 3) of the models, and covariances (n, 6) as in kalman.Symmetric
+x, p: estimates (n, 3) of the models, and covariances (n, 6) as in kalman.Symmetric; count: number of models in use.
 """
 import math
 
@@ -25,15 +21,9 @@ from pedestal_common.quantities import Floats, Seconds
 
 @compiled
 def switching(T: Seconds, dwell: Seconds, count: int) -> tuple[float, float]:
-    """Return (stay, switch), the probabilities of a change of model within T.
-
-    stay    probability that the same model holds after T
-    switch  probability that a given other model holds after T
-    dwell   mean time for which one model holds
-
-    The models form a Markov chain in continuous time. After one model each other model follows with equal probability.
-    The probability `stay` is near exp(-T / dwell) for short T, and near 1 / count for long T.
-    """
+    """Return (probability that the same model holds after T, that of a given other model); dwell: mean time of one
+    model. The models form a Markov chain in continuous time. After one model each other model follows with equal
+    probability. The first probability is near exp(-T / dwell) for short T, and near 1 / count for long T."""
     if count == 1:
         return 1.0, 0.0
     switch = -math.expm1(-T * count / ((count - 1) * dwell)) / count
@@ -42,10 +32,8 @@ def switching(T: Seconds, dwell: Seconds, count: int) -> tuple[float, float]:
 
 @inlined
 def mix(mu: Floats, count: int, stay: float, switch: float, j: int, weights: Floats) -> float:
-    """Set weights[i] to the probability that model i held before, if model j holds now. Return cbar_j.
-
-    stay, switch: result of `switching`. If cbar_j is 0, model j gets the weight 1 and so keeps its own state.
-    """
+    """Set weights[i] to the probability that model i held before, if model j holds now. Return cbar_j, the probability
+    of model j before the measurement. If cbar_j is 0, model j gets the weight 1 and so keeps its own state."""
     total = 0.0
     for i in range(count):
         weights[i] = mu[i] * (stay if i == j else switch)
@@ -96,10 +84,7 @@ def combine(weights: Floats, x: Floats, p: Floats, count: int) -> Gaussian:
 
 @compiled
 def weigh(mu_prior: Floats, log_likelihoods: Floats, count: int, mu: Floats) -> None:
-    """Set mu[j] to the probability of model j after the measurement (eq. 9).
-
-    mu_prior: probabilities before the measurement; log_likelihoods: logarithm of the likelihood of each model.
-    """
+    """Set mu[j] to the probability of model j after the measurement (eq. 9); mu_prior: before it."""
     # The largest logarithm is subtracted. Otherwise all exponentials might underflow to 0.
     best = -math.inf
     for j in range(count):

@@ -1,17 +1,14 @@
-"""Laws of a Kalman filter with three states: angle, rate and acceleration of the target on one axis.
+"""Laws of a filter with three states: angle, rate and acceleration of the target on one axis. Kalman, or constant
+gain.
 
 The angle is measured, and the rate if a sensor measures it. Two measurements of one instant are taken one after the
-other, which is exact because their errors are independent.
+other, which is exact because their errors are independent. The covariance P is kept as its upper triangle, so that P
+is always symmetric. Every product of 3 x 3 matrices is written out.
 
-The covariance P is kept as its upper triangle, so that P is always symmetric. Every product of 3 x 3 matrices is
-written out.
-
-    x, P    estimate and its covariance
     F, Q    transition over T [s], covariance of the process noise
     H       row that selects the measured state
-    nu, S   innovation and its variance
-    R       variance of the measurement
-    K       gain (k1, k2, k3) on angle, rate and acceleration
+    nu, S   innovation and its variance; R: variance of the measurement
+    K       gain (k1, k2, k3) on angle, rate and acceleration [-, 1/s, 1/s2]
 """
 import math
 from typing import NamedTuple
@@ -55,7 +52,7 @@ class PreviousAngle(NamedTuple):
 
 @compiled
 def predicted_mean(x: AxisMotion, F: Transition, T: Seconds) -> AxisMotion:
-    """Return F x, the motion T after x; F: transition over T."""
+    """Return F x, the motion T after x."""
     return AxisMotion(x.angle + T * x.rate + F.f13 * x.acceleration, x.rate + F.f23 * x.acceleration,
                       F.f33 * x.acceleration)
 
@@ -74,10 +71,7 @@ def predicted_covariance(P: Symmetric, F: Transition, Q: Symmetric, T: Seconds) 
 
 @compiled
 def past(gaussian: Gaussian, F: Transition, T: Seconds) -> PreviousAngle:
-    """Return the PreviousAngle for a prediction over T: (c1, c2, c3) = F P H'.
-
-    gaussian: estimate at the last measurement; F: transition over T.
-    """
+    """Return the PreviousAngle for a prediction over T from the last Gaussian: (c1, c2, c3) = F P H'."""
     P = gaussian.P
     return PreviousAngle(gaussian.x.angle, P.p11, P.p11 + T * P.p12 + F.f13 * P.p13, P.p12 + F.f23 * P.p13,
                          F.f33 * P.p13)
@@ -85,17 +79,14 @@ def past(gaussian: Gaussian, F: Transition, T: Seconds) -> PreviousAngle:
 
 @compiled
 def _corrected(x: AxisMotion, k1: float, k2: float, k3: float, nu: float) -> AxisMotion:
-    """Return x + K nu."""
     return AxisMotion(x.angle + k1 * nu, x.rate + k2 * nu, x.acceleration + k3 * nu)
 
 
 @compiled
 def update(gaussian: Gaussian, nu: Radians, R: Radians2) -> Gaussian:
-    """Return the Gaussian after a measured angle of variance R with the innovation nu.
-
-    H = [1 0 0], K = P H' / S (paper 000, eq. 8, 9, 10). The first row of the new P is p1j - k1 p1j. The equal form kj
-    R is used, because it loses no digits in a difference.
-    """
+    """Return the Gaussian after a measured angle of variance R with the innovation nu. H = [1 0 0], K = P H' / S
+    (paper 000, eq. 8, 9, 10). The first row of the new P is p1j - k1 p1j. The equal form kj R is used, because it
+    loses no digits in a difference."""
     P, S = gaussian.P, gaussian.P.p11 + R
     k1, k2, k3 = P.p11 / S, P.p12 / S, P.p13 / S
     return Gaussian(_corrected(gaussian.x, k1, k2, k3, nu),
@@ -107,11 +98,8 @@ def update_correlated(gaussian: Gaussian, previous: PreviousAngle, rho: float, n
     """Return the Gaussian after a measured angle whose noise is correlated with that of the last angle.
 
     The noise is rho times the noise of the last angle, plus independent noise. The difference y_k - rho y_k-1 of the
-    measured angles is therefore H X_k - rho H X_k-1 plus the independent noise (Bryson, Henrikson 1968).
-
-    nu, S: innovation of the difference and its variance; c: (c1, c2, c3) of the previous angle.
-
-    K = (P H' - rho c) / S, P -= K S K'.
+    measured angles is therefore H X_k - rho H X_k-1 plus the independent noise (Bryson, Henrikson 1968). nu, S:
+    innovation of the difference and its variance. K = (P H' - rho c) / S, P -= K S K'.
     """
     P = gaussian.P
     k1, k2, k3 = (P.p11 - rho * previous.c1) / S, (P.p12 - rho * previous.c2) / S, (P.p13 - rho * previous.c3) / S
@@ -122,10 +110,7 @@ def update_correlated(gaussian: Gaussian, previous: PreviousAngle, rho: float, n
 
 @compiled
 def update_rate(gaussian: Gaussian, nu: RadiansPerSecond, R: float) -> Gaussian:
-    """Return the Gaussian after a measured rate of variance R [rad2/s2] with the innovation nu.
-
-    H = [0 1 0] (paper 004, eq. 34).
-    """
+    """Return the Gaussian after a measured rate of variance R [rad2/s2]: H = [0 1 0] (paper 004, eq. 34)."""
     P, S = gaussian.P, gaussian.P.p22 + R
     k1, k2, k3 = P.p12 / S, P.p22 / S, P.p23 / S
     return Gaussian(_corrected(gaussian.x, k1, k2, k3, nu),
@@ -134,10 +119,8 @@ def update_rate(gaussian: Gaussian, nu: RadiansPerSecond, R: float) -> Gaussian:
 
 @compiled
 def update_with_gain(gaussian: Gaussian, nu: Radians, R: Radians2, K: Xyz) -> Gaussian:
-    """Return the Gaussian after a measured angle of variance R with the innovation nu, by a given gain K.
-
-    K = (k1, k2, k3) [-, 1/s, 1/s2]. The new P is (1 - K H) P (1 - K H)' + K R K' (form of Joseph), written out.
-    """
+    """Return the Gaussian after a measured angle of variance R with the innovation nu, by a given gain K. The new P is
+    (1 - K H) P (1 - K H)' + K R K' (form of Joseph), written out."""
     P, S = gaussian.P, gaussian.P.p11 + R
     k1, k2, k3 = K
     return Gaussian(_corrected(gaussian.x, k1, k2, k3, nu),
@@ -153,3 +136,24 @@ def update_with_gain(gaussian: Gaussian, nu: Radians, R: Radians2, K: Xyz) -> Ga
 def log_likelihood(nu: float, S: float) -> float:
     """Return the logarithm of the normal density of an innovation nu of variance S, without the constant term."""
     return -0.5 * (nu * nu / S + math.log(S))
+
+
+@compiled
+def benedict_bordner(alpha: float) -> float:
+    """Return beta of the alpha-beta filter with the best compromise between noise and the transient after a ramp
+    (Benedict, Bordner 1962)."""
+    return alpha * alpha / (2.0 - alpha)
+
+
+@compiled
+def kalata(alpha: float) -> tuple[float, float]:
+    """Return (beta, gamma) of the alpha-beta-gamma filter: the steady Kalman filter of a constant acceleration that
+    takes an independent step at every measurement (Kalata 1984)."""
+    beta = 2.0 * (2.0 - alpha) - 4.0 * math.sqrt(1.0 - alpha)
+    return beta, beta * beta / alpha
+
+
+@compiled
+def constant_gain(alpha: float, beta: float, gamma: float, T: Seconds) -> Xyz:
+    """Return K of a filter of constant gain for measurements T apart: (alpha, beta / T, gamma / (2 T^2))."""
+    return (alpha, beta / T, gamma / (2.0 * T * T))

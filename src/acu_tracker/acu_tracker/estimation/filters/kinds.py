@@ -1,14 +1,11 @@
-"""The table of filter kinds, which the parameter acu.AXIS.filter.kind selects.
-
-Each row defines the bank: the motion models of the filter of one axis, and its gains.
-"""
+"""The table of filter kinds, which the parameter acu.AXIS.filter.kind selects. A kind makes the bank of an axis."""
 import functools
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from acu_tracker.estimation.filters import constant_gain, motion_models
+from acu_tracker.estimation.filters import kalman, motion_models
 from acu_tracker.estimation.filters.motion_models import MODEL_NAMES, MODEL_ROWS
 from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import Records, Seconds, Xyz
@@ -39,13 +36,13 @@ class Kind(NamedTuple):
 def _bank_of_alpha_beta(params: 'FilterParameters') -> Bank:
     alpha = params.alpha_beta.alpha
     return Bank(motion_models.constants('cv', params.cv, noise=0.0),
-                gains=(alpha, constant_gain.benedict_bordner(alpha), 0.0))
+                gains=(alpha, kalman.benedict_bordner(alpha), 0.0))
 
 
 def _bank_of_alpha_beta_gamma(params: 'FilterParameters') -> Bank:
     alpha = params.alpha_beta_gamma.alpha
     return Bank(motion_models.constants('ca', params.ca, noise=0.0, initial_sigma=UNKNOWN_ACCELERATION_RAD_S2),
-                gains=(alpha, *constant_gain.kalata(alpha)))
+                gains=(alpha, *kalman.kalata(alpha)))
 
 
 def _bank_of_one(name: str, params: 'FilterParameters') -> Bank:
@@ -71,10 +68,7 @@ FILTER_KINDS = {
 
 
 def named_models(names: str) -> tuple[str, ...]:
-    """Return the names of the models in a text such as 'cv ca', in the order of MODEL_NAMES.
-
-    Raise ParameterError for a wrong text.
-    """
+    """Return the names of the models in a text such as 'cv ca', sorted; raise ParameterError for a wrong text."""
     models = names.split()
     if not (2 <= len(models) == len(set(models)) and set(models) <= set(MODEL_NAMES)):
         raise ParameterError(f"models = '{names}': must be two or more of {', '.join(MODEL_NAMES)}, each once")

@@ -1,8 +1,4 @@
-"""Inputs and outputs of a target filter: measurement, innovation, estimate.
-
-The angles are those of the frame of the filter. In each pair of axes index 0 is azimuth, index 1 elevation. nu, S:
-innovation and its variance, or its covariance for several numbers.
-"""
+"""Inputs and outputs of a target filter, in the angles of its frame; index 0 of a pair is azimuth, 1 elevation."""
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -32,10 +28,7 @@ class Measurement(NamedTuple):
 
 
 class AxisInnovation(NamedTuple):
-    """Innovation of an axis.
-
-    Both chi_square and rate_chi_square follow a chi-square distribution of one degree of freedom.
-    """
+    """Innovation of an axis. Each NIS follows a chi-square distribution of one degree of freedom."""
     nu: Radians             # innovation of the angle
     S: Radians2             # its variance
     chi_square: float       # nu^2 / S: normalised innovation squared (NIS) of the angle [-]
@@ -70,10 +63,7 @@ NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)  # innovation of 
 @compiled
 def error_variance(cross_elevation: Radians, elevation: Radians, cn0_dbhz: DecibelHertz,
                    receiver: 'ReceiverModelParameters') -> Radians2:
-    """Return the variance of a receiver error (cross_elevation, elevation) at a C/N0.
-
-    The variance is the sum of a floor and of thermal noise, which grows with the distance from the axis of the beam.
-    """
+    """Return the variance of a receiver error: a floor plus thermal noise, which grows off the axis of the beam."""
     # slope [1/rad]: monopulse slope; offset [-]: difference over sum of the receiver at this error. With equal and
     # independent noise in both channels, this ratio has the variance (1 + offset^2) / (2 C/N0 integration) to first
     # order. Its square root over the slope is the sigma of ReceiverModelParameters on the axis.
@@ -88,11 +78,10 @@ def attitude_variances(verticals: tuple[float, float], tilt: float, heading: flo
     """Return (variance across, variance along) of a measured direction that errors of the attitude cause.
 
         across, along    unit vectors at a right angle to the direction: towards growing azimuth, growing elevation
-        verticals        components of across and of along on the earth's vertical, from estimate_frame.verticals
+        verticals        components of across and of along on the earth's vertical, from frames.verticals
         tilt, heading    variances of the attitude about each horizontal axis, and about the vertical
 
-    The result has the unit of tilt and heading. A turn about `along` moves the direction across, and a turn about
-    `across` moves it along.
+    A turn about `along` moves the direction across, and a turn about `across` moves it along.
     """
     across, along = verticals
     return tilt + along * along * (heading - tilt), tilt + across * across * (heading - tilt)

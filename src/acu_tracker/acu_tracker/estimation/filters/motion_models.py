@@ -1,20 +1,13 @@
 """Motion models of a target: how its angle, rate and acceleration on one axis change until the next measurement.
 
-Each model gives the matrices F and Q of the Kalman filter for the state X = (angle, rate, acceleration):
+Each model gives the matrices F (transition over T) and Q (process noise) of the Kalman filter. The reciprocal of the
+duration of an acceleration is alpha [1/s], and x = alpha T. The mean of the acceleration is abar, its standard
+deviation sigma_a [rad/s2]. In the model cv the acceleration stays 0. The model current_statistical is that of paper
+000, eq. 2, 4, 5. Several models ca with growing noise form a ladder; each of these models is a rung. docs/extending.md
+lists what another model needs.
 
-    F = [[1, T, f13], [0, 1, f23], [0, 0, f33]]    transition over T [s]; a Transition is its third column
-    Q                                              process noise over T: covariance that is added to F P F'
-    alpha                                          reciprocal of the duration of an acceleration [1/s]; x = alpha T
-    abar, sigma_a                                  mean of the acceleration, and its standard deviation [rad/s2]
-
-In the model cv the acceleration stays 0. The model current_statistical is that of paper 000, eq. 2, 4, 5. Several
-models ca with growing noise form a ladder; each of these models is a rung.
-
-Another model needs a row of MODEL_ROWS, a law that `discretised` selects, and its group in params.py. If its name is
-in topics.MOTION_MODELS, its probability is a column of acu/filter.
-
-The print of paper 000 has two errors, which are corrected here. Its factor of q22 is 1/(2 alpha^2); correct is
-1/(2 alpha^3). Its sigma_a^2 (eq. 5) contains a_max - abar; correct is the square (a_max - abar)^2.
+The print of paper 000 has two errors, which are corrected here. Its factor of q22 is 1/(2 alpha^2); correct is 1/(2
+alpha^3). Its sigma_a^2 (eq. 5) contains a_max - abar; correct is the square (a_max - abar)^2.
 
 The models with an acceleration of limited duration have Q = 2 alpha sigma_a^2 q. For small x the closed forms of q
 lose all digits: q11 is of size x^5, but is a difference of terms of about 1. For x below MAX_SERIES_ARGUMENT the power
@@ -52,8 +45,9 @@ WHITE_JERK_TIME_S = 10.0
 """Time in which the white jerk of the model ca changes the acceleration by its standard deviation at the start.
 
 Each model starts with the standard deviation of the acceleration that the model itself expects. With a larger value a
-model with little noise would predict a steady target as badly as a model with much noise. The bank would then regard
-a target that moves steadily as one that stands still (Lindley's paradox)."""
+model with little noise would predict a steady target as badly as a model with much noise. The bank would then regard a
+target that moves steadily as one that stands still (Lindley's paradox).
+"""
 
 MODEL_ROWS = (
     MotionModel('cv', 'constant rate, disturbed by white acceleration', 2, lambda params: 0.0),
@@ -72,10 +66,8 @@ COLUMN_NAMES = (*MODEL_NAMES, *(f'ca_{rung}' for rung in range(2, MAX_RUNG_COUNT
 
 
 class MotionModelRecord(Record):
-    """Constants of one model.
-
-    The density is two-sided: the integral of E[w(t) w(s)] over s is noise^2 for white noise w.
-    """
+    """Constants of one model. Densities are two-sided: the integral of E[w(t) w(s)] over s is noise^2 for white noise
+    w."""
     kind: int       # index in MODEL_NAMES
     column: int     # index in COLUMN_NAMES
     states: int     # number of states, as in the row of the model
@@ -89,8 +81,7 @@ class MotionModelRecord(Record):
 
 
 def constants(name: str, params: Parameters, **changes: float) -> Records:
-    """Return the constants (1,) of the model of this name with its parameters; changes: fields of MotionModelRecord
-    with other values."""
+    """Return the constants (1,) of the model of this name with its parameters; changes: fields to replace."""
     m, kind = MotionModelRecord.zeros(), MODEL_NAMES.index(name)
     m['kind'] = m['column'] = kind
     m['states'], m['initial_sigma'] = MODEL_ROWS[kind].states, MODEL_ROWS[kind].initial_sigma(params)
@@ -100,10 +91,7 @@ def constants(name: str, params: Parameters, **changes: float) -> Records:
 
 
 def ladder(params: 'CaParameters', rungs: int, ratio: float) -> Records:
-    """Return the constants (rungs,) of a ladder of models ca.
-
-    params: of the first rung; ratio: noise of a rung over the noise of the rung before.
-    """
+    """Return the constants (rungs,) of models ca, the first with `params`; ratio: of the noise of successive rungs."""
     m = np.concatenate([constants('ca', dataclasses.replace(params, noise=params.noise * ratio**rung))
                         for rung in range(rungs)])
     m['column'][1:] = len(MODEL_NAMES) + np.arange(rungs - 1)
@@ -145,7 +133,6 @@ _Q33 = _coefficients(0, lambda n: 2**n)  # coefficients of the elements of q
 
 @compiled
 def _series(coefficients: tuple[float, ...], x: float) -> float:
-    """Return the sum of c_k (-x)^k."""
     total = 0.0
     for k in range(len(coefficients) - 1, -1, -1):
         total = coefficients[k] - x * total
@@ -185,12 +172,9 @@ def fading_noise(alpha: float, T: Seconds) -> Symmetric:
 
 @compiled
 def acceleration_variance(abar: RadiansPerSecond2, a_max: RadiansPerSecond2, floor: float) -> float:
-    """Return sigma_a^2 [rad2/s4] for a mean acceleration abar (paper 000, eq. 5, with the square).
-
-    a_max: largest acceleration; floor: least sigma_a over a_max [-]. The result is the variance of the modified
-    Rayleigh density. At abar = a_max this variance is zero, and the filter would ignore its measurements. Therefore
-    sigma_a is at least floor a_max.
-    """
+    """Return sigma_a^2 [rad2/s4] for a mean acceleration abar (paper 000, eq. 5, with the square): the variance of the
+    modified Rayleigh density. At abar = a_max this variance is zero, and the filter would ignore its measurements.
+    Therefore sigma_a is at least floor a_max."""
     return max((4.0 - math.pi) / math.pi * max(a_max - abs(abar), 0.0)**2, (floor * a_max)**2)
 
 
@@ -206,14 +190,14 @@ def mean_transition(model: MotionModelRecord, T: Seconds) -> Transition:
 
 @inlined
 def cv(model: MotionModelRecord, T: Seconds) -> Discrete:
-    """Return the Discrete of the model cv (constant rate) over T."""
+    """Return the Discrete of constant rate over T."""
     F, k = mean_transition(model, T), model.noise * model.noise
     return Discrete(F, F, Symmetric(k * T * T * T / 3.0, k * T * T / 2.0, 0.0, k * T, 0.0, 0.0))
 
 
 @inlined
 def ca(model: MotionModelRecord, T: Seconds) -> Discrete:
-    """Return the Discrete of the model ca (constant acceleration) over T."""
+    """Return the Discrete of constant acceleration over T."""
     F, k, T2 = mean_transition(model, T), model.noise * model.noise, T * T
     return Discrete(F, F, Symmetric(k * T2 * T2 * T / 20.0, k * T2 * T2 / 8.0, k * T2 * T / 6.0, k * T2 * T / 3.0,
                                     k * T2 / 2.0, k * T))
@@ -228,7 +212,7 @@ def _fading_acceleration(alpha: float, variance: float, T: Seconds) -> tuple[Tra
 
 @inlined
 def singer(model: MotionModelRecord, T: Seconds) -> Discrete:
-    """Return the Discrete of the model singer (acceleration of mean 0) over T."""
+    """Return the Discrete of an acceleration of mean 0 over T."""
     F, Q = _fading_acceleration(model.alpha, model.sigma * model.sigma, T)
     return Discrete(F, F, Q)
 

@@ -1,7 +1,7 @@
 """The target filter: it holds the filters of both axes and the Cartesian filter, and selects which of them is used.
 
-A filter of each axis (`axis_filter`) always runs. The Cartesian filter (`unscented`) runs if the kind of the filter
-is imm_ukf and the receiver measures the range:
+A filter of each axis (`axis_filter`) always runs. The Cartesian filter (`unscented`) runs if the kind of the filter is
+imm_ukf and the receiver measures the range:
 
 1. The Cartesian filter starts from the estimate of the axis filters, when the standard deviation of a measured range
    is at most ukf.range_share of the range.
@@ -59,12 +59,7 @@ class Filter(Record):
 
 
 def constants(ukf: 'UkfParameters', axes: 'Sequence[FilterParameters]', noise_bandwidth: Hertz) -> Records:
-    """Return the constants (1,).
-
-    axes             parameters of the filters of both axes
-    noise_bandwidth  bandwidth of the noise of the measured angles; 0: white noise. The Cartesian filter always assumes
-                     white noise
-    """
+    """Return the constants (1,); noise_bandwidth: as in axis_filter; the Cartesian filter assumes white noise."""
     c = Constants.zeros()
     c['axis'] = np.concatenate([axis_filter.constants(params, noise_bandwidth) for params in axes])
     c['cartesian'], c['range_share_2'] = unscented.constants(ukf), ukf.range_share**2
@@ -84,19 +79,14 @@ def start(state: Filter, constants: Constants, measurement: Measurement, rate_si
 
 @compiled
 def walk(state: Filter, azimuth: float, elevation: float) -> None:
-    """Set the random walk of the error of the measured azimuth and elevation: variances per second [rad2/s].
-
-    An INS with a slowly changing error causes this walk. The Cartesian filter neglects it.
-    """
+    """Set the random walk of the error of the measured azimuth and elevation: variances per second [rad2/s]. An INS
+    with a slowly changing error causes this walk. The Cartesian filter neglects it."""
     state.axis[0].drift_variance_rate, state.axis[1].drift_variance_rate = azimuth, elevation
 
 
 @separate
 def predict(state: Filter, constants: Constants, T: Seconds) -> None:
-    """Predict by T >= 0 from the last measurement; the result is in the prior fields.
-
-    A repeated call with the same T does nothing.
-    """
+    """Predict by T >= 0 from the last measurement into the prior fields; a repeated call does nothing."""
     if state.predicted == T:
         return
     state.predicted = T
@@ -108,16 +98,13 @@ def predict(state: Filter, constants: Constants, T: Seconds) -> None:
 
 @compiled
 def axes_azimuth(state: Filter) -> Radians:
-    """Return the azimuth that the axis filter predicted; measured azimuths are put on the wrap nearest to it."""
+    """Return the predicted azimuth of the axis filter; measured azimuths are put on the wrap nearest to it."""
     return axis_filter.expected_motion(state.axis[0]).angle
 
 
 @compiled
 def innovation(state: Filter, constants: Constants, measurement: Measurement) -> Innovation:
-    """Return the innovation of a measurement against the prediction.
-
-    rate_chi_square is always that of the axis filter.
-    """
+    """Return the innovation of a measurement; rate_chi_square is always that of the axis filter."""
     azimuth = axis_filter.innovation(state.axis[0], constants.axis[0], measurement.axis[0])
     elevation = axis_filter.innovation(state.axis[1], constants.axis[1], measurement.axis[1])
     if not state.running:
@@ -130,7 +117,6 @@ def innovation(state: Filter, constants: Constants, measurement: Measurement) ->
 
 @compiled
 def _chosen_innovation(used: Bit, own: AxisInnovation, cartesian: AxisInnovation) -> AxisInnovation:
-    """Return the innovation of the Cartesian filter if it is used, otherwise that of the axis filter (own)."""
     if not used:
         return own
     # The NaN is the innovation of the rate, because the Cartesian filter uses no measured rate.
@@ -162,10 +148,8 @@ def expected(state: Filter) -> Motion:
 
 @separate
 def outlook(state: Filter, constants: Constants, T: Seconds) -> Motion:
-    """Return the predicted Motion T >= 0 after the last measurement.
-
-    The result equals that of `expected` after `predict`. If only the axis filters are used, no covariance is computed.
-    """
+    """Return the Motion T >= 0 after the last measurement, equal to `expected` after `predict`. If only the axis
+    filters are used, no covariance is computed."""
     if state.predicted == T or state.used[0] or state.used[1]:
         predict(state, constants, T)
         return expected(state)
@@ -186,7 +170,7 @@ def read(state: Filter) -> Estimate:
 
 @compiled
 def read_axes(state: Filter) -> Estimate:
-    """Return the Estimate of the filters of the axes alone, at the instant of their last `predict`."""
+    """Return the Estimate of the axis filters alone, at the instant of their last `predict`."""
     azimuth, elevation = axis_filter.expected(state.axis[0]), axis_filter.expected(state.axis[1])
     return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(azimuth), axis_filter.variances(elevation)))
 
@@ -242,10 +226,7 @@ def _use_cartesian(state: Filter, constants: Constants) -> None:
 
 @compiled
 def _leave_cartesian(state: Filter, constants: Constants, azimuth: Bit, elevation: Bit) -> None:
-    """Stop using the Cartesian filter on the axes whose argument is 1; their axis filters continue from its estimate.
-
-    An estimate that is not finite is not taken over.
-    """
+    """Leave the Cartesian filter on axes whose argument is 1; a finite estimate of it goes to their axis filters."""
     if not (azimuth or elevation):
         return
     predict(state, constants, 0.0)
@@ -260,10 +241,7 @@ def _leave_cartesian(state: Filter, constants: Constants, azimuth: Bit, elevatio
 
 @compiled
 def transfer(state: Filter, constants: Constants, running: Bit) -> None:
-    """Adopt constants that may have changed: a filter of a new kind continues from the estimate of the old filter.
-
-    running: 1 if there is an estimate.
-    """
+    """Adopt constants that may have changed: a filter of a new kind continues from the estimate, if one is running."""
     state.predicted = math.nan
     if running:
         for i in range(2):

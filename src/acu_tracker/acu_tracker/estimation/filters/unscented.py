@@ -1,9 +1,9 @@
 """The Cartesian target filter: it estimates the position of the target from measured azimuth, elevation and range.
 
-The filter is an IMM of two unscented Kalman filters, called modes: CV (constant velocity) and CA (constant
-acceleration). The state of each mode is X = (position, velocity, acceleration) [m, m/s, m/s2], relative to the
-antenna, in the frame of the filter (`estimate_frame`), whose axes take the place of east, north and up. CV keeps its
-acceleration at zero. Without a range only the angles are used, and the variance of the range grows.
+The filter is an IMM of two unscented Kalman filters, called modes (number j): 0 CV (constant velocity) and 1 CA
+(constant acceleration). The state of each mode is X = (position, velocity, acceleration) [m, m/s, m/s2], relative to
+the antenna, in the frame of the filter (`geometry.frames`), whose axes take the place of east, north and up. CV keeps
+its acceleration at zero. Without a range only the angles are used, and the variance of the range grows.
 
 An unscented filter evaluates the measurement at sigma points, states that represent mean and covariance of X (points
 of Merwe; Wan and Van der Merwe 2000). Here it has two simplifications:
@@ -16,8 +16,6 @@ of Merwe; Wan and Van der Merwe 2000). Here it has two simplifications:
 The angles of the points are relative to those of the centre point, so that the azimuth may wrap. With the parameters
 alpha = 1, kappa = 3 - n, beta = 2 of the points no weight of the seven is negative. The covariance S of the innovation
 is then positive for every geometry.
-
-j: number of the mode, 0 CV, 1 CA.
 """
 import math
 from typing import TYPE_CHECKING, Annotated
@@ -57,12 +55,10 @@ if TYPE_CHECKING:
     from acu_tracker.estimation.params import UkfParameters
 
 N = 9  # number of states n
-MODE_MODELS = motion_models.MODEL_CV, motion_models.MODEL_CA
-"""Motion models of mode 0 (CV, constant velocity) and mode 1 (CA, constant acceleration)."""
+MODE_MODELS = motion_models.MODEL_CV, motion_models.MODEL_CA  # of CV, CA
 ALPHA, BETA, KAPPA = 1.0, 2.0, 3.0 - N  # parameters alpha, beta, kappa of the sigma points [-]
 LAMBDA = ALPHA**2 * (N + KAPPA) - N  # parameter lambda of the sigma points, which follows from the others [-]
-SIGMA_POINT_SCALE = math.sqrt(N + LAMBDA)
-"""Distance of a sigma point from the centre point, as a multiple of the column L_k [-]."""
+SIGMA_POINT_SCALE = math.sqrt(N + LAMBDA)  # distance of a point from the centre point over the column L_k [-]
 SIGMA_POINT_WEIGHT = 0.5 / (N + LAMBDA)  # weight of each of the six points that move the position [-]
 CENTRE_COVARIANCE_WEIGHT = 1.0 - 6.0 * SIGMA_POINT_WEIGHT + 1.0 - ALPHA**2 + BETA
 """Weight in a covariance of the centre point, together with the twelve points that have its measurement [-]."""
@@ -107,9 +103,8 @@ def constants(params: 'UkfParameters') -> Records:
 def _spread(p: Floats, along: Vector, onward: Vector, variances: AxisVariances) -> None:
     """Add the variances of one coordinate (azimuth, elevation or range) and of its rate to the covariance p.
 
-    along      change of the position per unit of the coordinate, and of the velocity per unit of its rate
-    onward     change of the velocity per unit of the coordinate
-    variances  of the coordinate and its rate
+    along: change of the position per unit of the coordinate; onward: change of the velocity per unit of the
+    coordinate.
     """
     s11, s12, s22 = variances
     for i in range(3):
@@ -123,11 +118,9 @@ def _spread(p: Floats, along: Vector, onward: Vector, variances: AxisVariances) 
 
 @compiled
 def start(state: State, constants: Constants, estimate: Estimate, r: Meters, R_range: float) -> None:
-    """Start from an estimate of the angles and a first range r of variance R_range [m2].
+    """Start from an estimate of the angles and a first range r of variance R_range [m2]; `expected` then equals it.
 
-    The radial speed starts at 0 with the standard deviation constants.initial_speed. CA starts with the acceleration
-    of a target at constant range and the standard deviation constants.initial_acceleration; CV starts without an
-    acceleration. After the start `expected` equals this estimate.
+    The radial speed starts at 0. CA starts with the acceleration of a target at constant range; CV starts without one.
     """
     A, dA, _ = estimate.motion.azimuth
     E, dE, _ = estimate.motion.elevation
@@ -158,7 +151,6 @@ def start(state: State, constants: Constants, estimate: Estimate, r: Meters, R_r
 
 @compiled
 def _mixed(x: Floats, p: Floats, w: Pair, x_out: Floats, p_out: Floats) -> None:
-    """Write the mean and the covariance of both modes, with weights w, to x_out and p_out."""
     for a in range(N):
         x_out[a] = w[0] * x[0, a] + w[1] * x[1, a]
         for b in range(a, N):
@@ -168,10 +160,7 @@ def _mixed(x: Floats, p: Floats, w: Pair, x_out: Floats, p_out: Floats) -> None:
 
 @compiled
 def _moved(x: Floats, p: Floats, model: MotionModelRecord, T: Seconds) -> None:
-    """Set x = F x and p = F p F' + Q over T, in place.
-
-    The model is the same in the directions east, north and up.
-    """
+    """Set x = F x and p = F p F' + Q over T, in place; the model is the same in all three directions."""
     discrete = motion_models.discretised(model, 0.0, T)
     (f13, f23, f33), Q = discrete.F, discrete.Q
     for i in range(3):
@@ -211,8 +200,7 @@ def predict(state: State, constants: Constants, T: Seconds) -> None:
 
 @compiled
 def turn(state: State, rotation: Rotation) -> None:
-    """Turn the estimate and covariance of both modes into another frame; rotation: from the old frame into the new
-    one."""
+    """Turn the estimate and covariance of both modes into another frame; rotation: old frame -> new frame."""
     for j in range(2):
         x, p = state.x[j], state.p[j]
         for k in range(0, N, 3):
@@ -226,7 +214,6 @@ def turn(state: State, rotation: Rotation) -> None:
 
 @compiled
 def _measured(east: Meters, north: Meters, up: Meters) -> tuple[Radians, Radians, Meters]:
-    """Return (azimuth, elevation, range) of an ENU position."""
     azimuth, elevation = earth_angles(east, north, up)
     return azimuth, elevation, math.sqrt(east * east + north * north + up * up)
 
@@ -235,10 +222,9 @@ def _measured(east: Meters, north: Meters, up: Meters) -> tuple[Radians, Radians
 def _transformed(x: Floats, p: Floats, z: Vector3, s: Matrix3, g: Floats, d: Floats) -> None:
     """Compute the expected measurement of a mode from its prediction x, p by the unscented transform.
 
-    z  result: expected measurement: azimuth, elevation, range
-    s  result: its covariance (3, 3), without the noise of the measurement
-    g  result: its covariance (9, 3) with X
-    d  scratch: measurements (2, 3, 3) of the points at +L_k and -L_k, relative to that of the centre point
+        z, s  result: azimuth, elevation, range, and their covariance (3, 3) without the noise of the measurement
+        g     result: covariance (9, 3) of z with X
+        d     scratch: measurements (2, 3, 3) of the points at +L_k and -L_k, relative to that of the centre point
     """
     A, E, r = _measured(x[0], x[1], x[2])
     z[0] = z[1] = z[2] = 0.0
@@ -279,10 +265,8 @@ def _transformed(x: Floats, p: Floats, z: Vector3, s: Matrix3, g: Floats, d: Flo
 
 @compiled
 def innovation(state: State, measurement: Measurement) -> Innovation:
-    """Return the innovation of a measurement against the prediction of both modes together.
-
-    Rates are not used. Without a measured range (NaN) range_nu is NaN, and range_S contains no noise of a measurement.
-    """
+    """Return the innovation of a measurement against the prediction of both modes together. Rates are not used.
+    Without a range (NaN) range_nu is NaN, and range_S contains no noise of a measurement."""
     for j in range(2):
         _transformed(state.x_prior[j], state.p_prior[j], state.z[j], state.s[j], state.g[j], state.points)
         state.s[j, 0, 0] += measurement.axis[0].variance
@@ -296,10 +280,7 @@ def innovation(state: State, measurement: Measurement) -> Innovation:
 
 @compiled
 def _compared(state: State, i: int, y: float) -> tuple[float, float]:
-    """Return (innovation nu, its variance S) of a measured number y against both modes together.
-
-    i: 0 azimuth, 1 elevation, 2 range. S contains the spread of the modes.
-    """
+    """Return (innovation nu, its variance S) of number i of a measurement, y, against both modes together."""
     d = state.z[1, i] - state.z[0, i]
     if i == 0:
         d = wrap(d)
@@ -352,10 +333,7 @@ def _corrected(state: State, j: int, azimuth: Radians, elevation: Radians, range
 
 @compiled
 def correct(state: State, measurement: Measurement) -> None:
-    """Correct the prediction with a measurement; `innovation` must have been called with it before.
-
-    If the range is NaN, only the angles are used.
-    """
+    """Correct the prediction with a measurement, after `innovation` of it; of a NaN range only the angles are used."""
     for j in range(2):
         state.weights[j] = _corrected(state, j, measurement.axis[0].angle, measurement.axis[1].angle,
                                       measurement.range)
@@ -364,10 +342,7 @@ def correct(state: State, measurement: Measurement) -> None:
 
 @compiled
 def range_known(state: State, share_2: float) -> bool:
-    """Return True if, in both modes, the standard deviation of the range is at most a given share of the range.
-
-    share_2: square of this share [-].
-    """
+    """Return True if, in both modes, the standard deviation of the range is at most sqrt(share_2) of the range."""
     for j in range(2):
         x, p = state.x[j], state.p[j]
         spread = 0.0
@@ -398,10 +373,7 @@ def expected(state: State) -> Motion:
 
 @compiled
 def _projected(p: Floats, g: Xyz, h: Xyz, v: Xyz) -> AxisVariances:
-    """Return the variances of a coordinate and its rate, both linearised.
-
-    The coordinate is g x, its rate h x + v dx; x, dx: position and velocity with the covariance p.
-    """
+    """Return the variances of g x and of its rate h x + v dx; p: covariance of the position x and the velocity dx."""
     gg = gh = hh = 0.0
     for a in range(3):
         for b in range(3):
@@ -413,10 +385,8 @@ def _projected(p: Floats, g: Xyz, h: Xyz, v: Xyz) -> AxisVariances:
 
 @compiled
 def variances(state: State) -> tuple[tuple[AxisVariances, AxisVariances], float]:
-    """Return (variances of both axes, variance of the range [m2]) of the prediction of both modes together.
-
-    The angles and the range are linearised in the position. The covariance contains the spread of the modes.
-    """
+    """Return (variances of both axes, of the range [m2]) of the prediction of both modes, linearised in the
+    position."""
     _mixed(state.x_prior, state.p_prior, state.mu_prior, state.mean, state.covariance)
     x, p = state.mean, state.covariance
     e, n, u, de, dn, du = x[0], x[1], x[2], x[3], x[4], x[5]

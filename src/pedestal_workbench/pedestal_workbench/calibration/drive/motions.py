@@ -7,7 +7,7 @@ import dataclasses
 import math
 
 from acu_tracker.params import AcuParameters
-from acu_tracker.servo import floor
+from acu_tracker.servo import travel
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Radians, RadiansPerSecond, RadiansPerSecond2, Seconds
 
@@ -75,9 +75,9 @@ def _range(acu: AcuParameters, name: str) -> tuple[Radians, Radians]:
     """Return the range of the motions of an axis. Raises ValueError for a too short travel."""
     limits, cause = getattr(acu, name).limits, f'acu.{name}.limits'
     low, high = limits.low, limits.high
-    _, heights = floor.points(acu.floor)
-    if name == 'elevation' and heights and max(heights) + floor.FLOOR_CLEARANCE_RAD > low:
-        low, cause = max(heights) + floor.FLOOR_CLEARANCE_RAD, 'acu.floor'
+    _, heights = travel.floor_points(acu.floor)
+    if name == 'elevation' and heights and max(heights) + travel.FLOOR_CLEARANCE_RAD > low:
+        low, cause = max(heights) + travel.FLOOR_CLEARANCE_RAD, 'acu.floor'
     margin = MARGIN_SHARE * (high - low)
     if high - low - 2.0 * margin < MIN_TRAVEL_RAD:
         raise ValueError(f'{cause}: leaves {math.degrees(max(high - low - 2.0 * margin, 0.0)):.1f} deg of {name} for '

@@ -1,25 +1,66 @@
-"""The floor: the lowest elevation that the antenna may have at each azimuth, in every mode.
+"""The travel of an axis: its ends, the largest rate towards an end, and the floor of the elevation.
 
-The floor keeps the dish clear of structures around the antenna. A table of points, joined by straight lines, defines
-the floor. Where the floor rises, the azimuth waits until the elevation is above the floor ahead.
+    v^2 / (2 a) + v t = d
 
-A, E: azimuth and elevation in encoder angles.
+v is the largest rate from which the axis stops within the distance d to the end, with the deceleration a and the
+reaction time t (AcuParameters.reaction). The slope dv/dd is at most 1 / t. Therefore a command that is late by t / e
+(e: Euler's number) causes no overshoot.
+
+The floor is the lowest elevation that the antenna may have at each azimuth, in every mode. It keeps the dish clear of
+structures around the antenna. A table of points, joined by straight lines, defines it. Where the floor rises, the
+azimuth waits until the elevation is above the floor ahead. A, E: azimuth and elevation in encoder angles.
 """
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
-from acu_tracker.servo.ends import Ends, braking_distance
 from acu_tracker.servo.params import LimitsParameters
 from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled
 from pedestal_common.parameters import ParameterError
-from pedestal_common.quantities import Bit, Floats, Radians, Records
+from pedestal_common.quantities import Bit, Floats, Radians, RadiansPerSecond, RadiansPerSecond2, Records, Seconds
 from pedestal_common.record import Record
 
 if TYPE_CHECKING:
     from acu_tracker.control_unit import Constants
+
+
+class Ends(NamedTuple):
+    """Angles between which an axis may be at present: its limits, or the floor."""
+    low: Radians
+    high: Radians
+
+
+@compiled
+def braking_distance(v: RadiansPerSecond, a: RadiansPerSecond2, t: Seconds) -> Radians:
+    """Return the distance in which an axis at a rate v >= 0 stops."""
+    return v * v / (2.0 * a) + v * t
+
+
+@compiled
+def stopping_rate(d: Radians, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSecond:
+    """Return the largest rate from which an axis stops before an end d ahead; 0 beyond the end (d <= 0)."""
+    if d <= 0.0:
+        return 0.0
+    return math.sqrt(a * t * (a * t) + 2.0 * a * d) - a * t
+
+
+@compiled
+def inside(u: RadiansPerSecond, y: Radians, ends: Ends, a: RadiansPerSecond2, t: Seconds) -> RadiansPerSecond:
+    """Return a rate command u with which an axis at y stops between its Ends; beyond one it may only move back."""
+    return min(max(u, -stopping_rate(y - ends.low, a, t)), stopping_rate(ends.high - y, a, t))
+
+
+@compiled
+def time_to(y: Radians, dy: RadiansPerSecond, ends: Ends) -> Seconds:
+    """Return the time until an axis at y reaches an end at its rate dy: 0 beyond an end, inf at rest."""
+    if y > ends.high or y < ends.low:
+        return 0.0
+    if dy > 0.0:
+        return (ends.high - y) / dy
+    return (ends.low - y) / dy if dy < 0.0 else math.inf
+
 
 MAX_FLOOR_POINTS = 64  # largest number of points of a floor
 FLOOR_DOC = ("floor of the elevation over the azimuth, at most 64 points: 'azimuth elevation; ...' [rad] on the deck, "
@@ -36,24 +77,15 @@ class Floor(Record):
 
 
 MAX_AZIMUTH_RAD = 1e3
-"""Azimuth beyond the travel of every axis [rad].
-
-A larger azimuth is replaced by it, because an infinite azimuth has no cell number.
-"""
+"""Azimuth beyond the travel of every axis [rad]. It replaces a larger one, because an infinite azimuth has no cell."""
 
 FLOOR_CLEARANCE_RAD = 1e-3
-"""Least elevation above the floor to which the elevation is sent [rad].
-
-The azimuth waits until the elevation is above the floor. Because of the clearance it does not wait for the last step
-of the encoder.
-"""
+"""Least elevation above the floor to which the elevation is sent [rad]. The azimuth waits until the elevation is above
+the floor. Because of the clearance it does not wait for the last step of the encoder."""
 
 
-def points(text: str) -> tuple[tuple[Radians, ...], tuple[Radians, ...]]:
-    """Return (azimuths, elevations) of the points in a text as in FLOOR_DOC; ((), ()) for an empty text.
-
-    Raise ParameterError for a wrong text.
-    """
+def floor_points(text: str) -> tuple[tuple[Radians, ...], tuple[Radians, ...]]:
+    """Return (azimuths, elevations) of the points in a text as in FLOOR_DOC. Raise ParameterError for a wrong text."""
     parts = [part.split() for part in text.split(';') if part.strip()]
     if len(parts) > MAX_FLOOR_POINTS:
         raise ParameterError(f'floor = {text!r}: {len(parts)} points; must be at most {MAX_FLOOR_POINTS}')
@@ -70,18 +102,15 @@ def points(text: str) -> tuple[tuple[Radians, ...], tuple[Radians, ...]]:
     return A, f
 
 
-def at(text: str, A: Radians) -> Radians:
+def floor_at(text: str, A: Radians) -> Radians:
     """Return the floor at an azimuth A, of a text as in FLOOR_DOC; -inf if there is no floor."""
-    azimuths, elevations = points(text)
+    azimuths, elevations = floor_points(text)
     return np.interp(A, azimuths, elevations, period=2.0 * math.pi) if azimuths else -math.inf
 
 
-def table(text: str) -> Records:
-    """Return the Floor (1,) of a text as in FLOOR_DOC.
-
-    The value of a cell is the highest value of the floor at its two ends and at the points of the table inside it.
-    """
-    A, f = points(text)
+def floor_table(text: str) -> Records:
+    """Return the Floor (1,) of a text: in each cell the highest of its ends and of the points inside it."""
+    A, f = floor_points(text)
     floor = Floor.zeros()
     if A:
         edges = np.interp(CELL_WIDTH_RAD * np.arange(CELL_COUNT + 1), A, f, period=2.0 * math.pi)
@@ -116,9 +145,7 @@ def above(floor: Floor, A: Radians, E: Radians) -> bool:
 @compiled
 def of_azimuth(floor: Floor, limits: LimitsParameters, A: Radians, E: Radians) -> Ends:
     """Return the Ends of the azimuth, now at A: its limits, or the places where the floor rises above the elevation E.
-
-    If the floor at A is above E already, the azimuth may leave: its Ends are then the limits.
-    """
+    If the floor at A is above E already, the azimuth may leave: its Ends are then the limits."""
     if not floor.given or above(floor, A, E):
         return Ends(limits.low, limits.high)
     # first, last: outermost cells up to which the floor is not above E; CELL_COUNT cells are a whole turn.
@@ -136,10 +163,8 @@ def of_azimuth(floor: Floor, limits: LimitsParameters, A: Radians, E: Radians) -
 
 @compiled
 def of_elevation(floor: Floor, limits: LimitsParameters, A: Radians, ahead: Radians, target: Radians) -> Ends:
-    """Return the Ends of the elevation: above the floor on the whole way of the azimuth.
-
-    A: azimuth now; ahead: azimuth at which the axis can stop; target: azimuth to which the axis goes.
-    """
+    """Return the Ends of the elevation: above the floor on the whole way of the azimuth. A: azimuth now; ahead:
+    azimuth at which the axis can stop; target: azimuth to which the axis goes."""
     if not floor.given:
         return Ends(limits.low, limits.high)
     top = max(highest(floor, A, ahead), highest(floor, A, target)) + FLOOR_CLEARANCE_RAD
@@ -156,11 +181,8 @@ def ends(constants: 'Constants', inputs: Inputs, azimuth: Radians) -> tuple[Ends
 
 @compiled
 def by_hand(constants: 'Constants', inputs: Inputs, azimuth: Radians) -> tuple[Ends, Ends]:
-    """Return (Ends of the azimuth, Ends of the elevation) of a point that an operator moves by hand.
-
-    azimuth: azimuth of the point. The result differs from `ends` in one respect: the azimuth of the point goes on
-    wherever the elevation can rise above the floor.
-    """
+    """Return (Ends of the azimuth, Ends of the elevation) of a point that an operator moves by hand. In contrast to
+    `ends`, its azimuth goes on wherever the elevation can rise above the floor."""
     _, of_elevation_now = ends(constants, inputs, azimuth)
     azimuth_limits, highest_elevation = constants.axis[0].p.limits, constants.axis[1].p.limits.high
     return of_azimuth(constants.floor, azimuth_limits, inputs.position[0], highest_elevation), of_elevation_now
