@@ -199,7 +199,10 @@ REFERENCE_TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': sc
 
 
 def with_tables(text, rows):
-    """Return the text of a file in which every generated table is replaced by its present content.
+    """Return the text of a file in which every generated table and number is replaced by its present content.
+
+    A number of prose stands between <!-- number STUDY CASE METRIC FACTOR FORMAT --> and <!-- end -->: the value of that
+    row times the factor, for example <!-- number scenarios leo_pass pointing_rms_deg 1000 .2f -->2.38<!-- end -->.
 
     rows: published.Rows, the measured numbers of docs/rows.json. Raises KeyError for an unknown table.
     """
@@ -207,6 +210,11 @@ def with_tables(text, rows):
         name = match[1]
         found = TextTable(*published.TABLES[name](rows)) if name in published.TABLES else REFERENCE_TABLES[name]()
         return '\n'.join((f'<!-- table {name} -->', *found.markdown(), '<!-- end -->'))
+    def number(match: re.Match[str]) -> str:
+        study, case, metric, factor, form = match[1].split()
+        value = rows[study, case, metric]['value']
+        return f'<!-- number {match[1]} -->{float(factor) * value:{form}}<!-- end -->'
+    text = re.sub(r'<!-- number ([^>]+?) -->.*?<!-- end -->', number, text)
     return re.sub(r'<!-- table ([\w ]+) -->\n.*?<!-- end -->', table, text, flags=re.DOTALL)
 
 
