@@ -202,7 +202,7 @@ def with_tables(text, rows):
     """Return the text of a file in which every generated table and number is replaced by its present content.
 
     A number of prose stands between <!-- number STUDY CASE METRIC FACTOR FORMAT --> and <!-- end -->: the value of
-    that row times the factor, for example <!-- number scenarios leo_pass pointing_rms_deg 1000 .2f -->2.38<!-- end -->.
+    that row times the factor, as in <!-- number scenarios leo_pass pointing_rms_deg 1000 .2f -->2.38<!-- end -->.
 
     rows: published.Rows, the measured numbers of docs/rows.json. Raises KeyError for an unknown table.
     """
