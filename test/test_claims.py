@@ -37,8 +37,8 @@ def test_the_spread_of_the_motors():
 
 def stiffness(**changed):
     """Torque on the load over its deflection against the motors [Nm/rad], a step of 100 Nm on an axis at rest."""
-    case = servo.gust_case('best', **{'adu.wind.gust.azimuth': 100.0}, **changed)
-    record, ratio = case.run(), case.loaded().node_parameters('adu').azimuth.gear_train.ratio
+    variant = servo.gust_case('best', **{'adu.wind.gust.azimuth': 100.0}, **changed)
+    record, ratio = variant.run(), variant.load().node_parameters('adu').azimuth.gear_train.ratio
     wound = (record['adu/truth']['position'][:, 0]
              - record['adu/motor_states']['position'][:, :2].mean(axis=1) / ratio)
     before, after = record.t < servo.GUST_START_S, record.t > record.t[-1] - 0.1

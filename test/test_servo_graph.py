@@ -4,25 +4,25 @@ import json
 import numpy as np
 import pytest
 
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_recording import bag as bags
 from pedestal_studies.p000_ma import servo
-from pedestal_workbench.trials.cases import Case
 
 pytestmark = pytest.mark.thorough
 
 ALLOWED = 1e-6
 """Largest difference between a run of the nodes and the study [rad, rad/s]."""
 
-CASES = {'r1-step': Case('paper-r1', 'servo_step', servo.PAPER_R1_PARAMETERS),
-         'best-sine': Case('best', 'servo_sine', servo.BEST_PARAMETERS, 1.6)}
+CASES = {'r1-step': Variant('servo_step').with_(servo.PAPER_R1_PARAMETERS),
+         'best-sine': Variant('servo_sine', duration=1.6).with_(servo.BEST_PARAMETERS)}
 
 
 @pytest.fixture(scope='module')
 def runs(start_run):
     """Finished `pedestal run` of every case, side by side."""
     done = {}
-    for name, case in CASES.items():
-        _, _, scenario, *arguments = case.command().split()
+    for name, variant in CASES.items():
+        _, _, scenario, *arguments = variant.command().split()
         done[name] = start_run(scenario, *arguments)
     for run in done.values():
         result = run.finish()

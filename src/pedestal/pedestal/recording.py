@@ -7,20 +7,41 @@ from __future__ import annotations
 import functools
 import pathlib
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from pedestal.panels import draw
 from pedestal.scenario import Scenario
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import layouts
+from pedestal_common.parameters import did_you_mean
 from pedestal_recording import bag as bags
 from pedestal_results import results, tracking
 from pedestal_results.recorded_run import RecordedRun
+from pedestal_results.report import run_figures
 
 if typing.TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+class Panel(typing.NamedTuple):
+    """A figure that Run.plot draws."""
+    draw: Callable[[Axes, RecordedRun], None]
+    needs: tuple[str, ...]  # names of the required parts of RecordedRun
+    polar: bool = False     # True if the figure needs polar axes
+
+
+PANELS: dict[str, Panel] = {
+    'pointing cross-elevation': Panel(functools.partial(run_figures.draw_pointing, i=0), ('truth',)),
+    'pointing elevation': Panel(functools.partial(run_figures.draw_pointing, i=1), ('truth',)),
+    'error cross-elevation': Panel(functools.partial(run_figures.draw_errors, i=0), ('truth', 'lock')),
+    'error elevation': Panel(functools.partial(run_figures.draw_errors, i=1), ('truth', 'lock')),
+    'azimuth': Panel(run_figures.draw_azimuth, ('truth',)),
+    'torques azimuth': Panel(functools.partial(run_figures.draw_torques, axis='azimuth'), ('motors',)),
+    'torques elevation': Panel(functools.partial(run_figures.draw_torques, axis='elevation'), ('motors',)),
+    'carrier': Panel(run_figures.draw_carrier, ('receiver',)),
+    'sky': Panel(run_figures.draw_sky, ('truth',), polar=True),
+}
+"""Figures of Run.plot, {name: Panel}."""
 
 POINTING_UNITS = {'t': 's', 'cross_elevation': 'rad', 'elevation': 'rad', 'range': 'm'}
 """{column of Run.pointing: its unit}."""
@@ -123,7 +144,7 @@ class Run:
         return self._run.verdict.text
 
     def plot(self, figure: str, axes: Axes) -> None:
-        """Draw a figure of the report on axes of the caller; panels.PANELS lists the figures.
+        """Draw a figure of the report on axes of the caller; recording.PANELS lists the figures.
 
         Raises KeyError for an unknown figure, ValueError for wrong axes or for missing data in the run.
 
@@ -133,7 +154,15 @@ class Run:
         >>> axes.get_ylabel()
         'error [deg]'
         """
-        draw(figure, axes, self._run)
+        if figure not in PANELS:
+            raise KeyError(f'unknown figure {figure!r};{did_you_mean(figure, PANELS)} there are {", ".join(PANELS)}')
+        panel = PANELS[figure]
+        lack = self._run.lacks(panel.needs)
+        if lack:
+            raise ValueError(f'{figure}: {lack}')
+        if panel.polar != (axes.name == 'polar'):
+            raise ValueError(f'{figure}: axes are {axes.name}, must be {"polar" if panel.polar else "rectilinear"}')
+        panel.draw(axes, self._run)
 
 
 def run(scenario: Scenario, beam: str = '') -> Run:

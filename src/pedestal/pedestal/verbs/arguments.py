@@ -12,6 +12,7 @@ from pedestal import console
 from pedestal_common.parameters import option_of
 
 if typing.TYPE_CHECKING:
+    from pedestal_bringup.scenario.variant import Variant
     from pedestal_operator.remote_node import RemoteSession
     from pedestal_recording.recording import Recording
 
@@ -177,10 +178,12 @@ def add_params_file(parser: argparse.ArgumentParser) -> None:
                         'output of `pedestal tune`; may be repeated, the last value holds; --param replaces both')
 
 
-def changes(options: argparse.Namespace) -> list[str]:
-    """Return the texts 'node.key=value' of --params-file, then of --param. Raises ValueError."""
-    from pedestal_bringup.scenario import files as scenario_files
-    return [change for file in options.params_file for change in scenario_files.file_overrides(file)] + options.param
+def variant(options: argparse.Namespace) -> 'Variant':
+    """Return the scenario of the command line with its changes, as far as the verb has options for them."""
+    from pedestal_bringup.scenario.variant import Variant
+    given = vars(options)
+    return Variant(options.scenario, tuple(options.param), tuple(given.get('params_file', ())), given.get('seed'),
+                   given.get('duration'))
 
 
 def check_recording(options: argparse.Namespace) -> None:
@@ -199,8 +202,7 @@ def recording(options: argparse.Namespace) -> 'tuple[Recording, str]':
         from pedestal_recording import bag as bags
         return bags.read(options.bag, ''), str(options.bag)
     from pedestal_bringup.loop import memory_recording
-    from pedestal_bringup.scenario import scenario
-    chosen = scenario.load(options.scenario, changes(options))
+    chosen = variant(options).load()
     return memory_recording.record(chosen), chosen.name
 
 

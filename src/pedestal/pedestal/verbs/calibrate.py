@@ -108,7 +108,7 @@ def _receiver(options: argparse.Namespace) -> int:
         from pedestal_workbench.calibration.receiver import iq_phasing
         arguments.check_recording(options)
         printed, content, verified = iq_phasing.main(arguments.typed(iq_phasing.IqPhasingOptions, options),
-                                                      arguments.changes(options), _files(options))
+                                                      arguments.variant(options).overrides(), _files(options))
     else:
         from pedestal_workbench.calibration.receiver import phasing
         printed, content, verified = phasing.main(*arguments.recording(options), _files(options))
@@ -150,13 +150,12 @@ def _drive(options: argparse.Namespace) -> int:
         arguments.refuse_given(options, ('output', 'report', 'json'), 'has no effect with --plan')
     arguments.check_result_files(options, 'plan')
     arguments.check_recording(options)
-    changes = arguments.changes(options)
+    variant = arguments.variant(options)
     if options.plan:
-        from pedestal_bringup.scenario import scenario
-        chosen = scenario.load(options.scenario, changes)
-        print('\n'.join(identified.write_plan(chosen, options.scenario, options.plan)))
+        print('\n'.join(identified.write_plan(variant.load(), options.scenario, options.plan)))
         return 0
-    printed, content, verified = identified.main(options.bag or (), options.scenario, changes, _files(options))
+    printed, content, verified = identified.main(options.bag or (), options.scenario, variant.overrides(),
+                                                 _files(options))
     print('\n'.join(printed))
     console.write_json(options.json, content)
     return 0 if verified else console.EXIT_FAILED_RUN

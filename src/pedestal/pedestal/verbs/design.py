@@ -69,7 +69,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
     """All other values of the antenna are scaled from the antenna of the scenario leo_pass. A comment in the file
     explains each value. `pedestal tune FILE --loops` then tunes the loops and measures their margins.
     """
-    from pedestal_workbench.tuning.data_sheet_format import DataSheet
+    from pedestal_workbench.tuning.data_sheet import DataSheet
     parser.add_argument('file', type=pathlib.Path, metavar='FILE.yaml', help='new scenario file')
     for name, field in parameters.flatten(DataSheet):
         unit = field.metadata.get('unit')
@@ -84,7 +84,7 @@ def _new(options: argparse.Namespace) -> int:
     """Write the file. Return exit code 0. Raises ValueError for a wrong value, FileExistsError for an
     existing file."""
     from pedestal_workbench.tuning import antenna_from_data_sheet
-    from pedestal_workbench.tuning.data_sheet_format import DataSheet
+    from pedestal_workbench.tuning.data_sheet import DataSheet
     if options.file.suffix not in ('.yaml', '.yml'):
         raise ValueError(f'{options.file}: must end in .yaml or .yml')
     if options.file.exists():

@@ -262,9 +262,8 @@ def _start(plan: 'Plan', text: str | None) -> int | None:
 def _program(options: argparse.Namespace) -> int:
     """Send the program track. Return the exit code of watch.send_program."""
     from pedestal_bringup.graph import watch
-    from pedestal_bringup.scenario import scenario
     from pedestal_bringup.scenario.program import Plan
-    plan = Plan(scenario.load(options.scenario, options.param, duration=options.duration))
+    plan = Plan(arguments.variant(options).load())
     return watch.send_program(plan, _start(plan, options.start), arguments.ros_arguments(options))
 
 

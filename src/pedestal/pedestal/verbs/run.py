@@ -176,7 +176,7 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     from pedestal_bringup.scenario import scenario
     equipment = [f'scenario.{name}={value}' for name in ('drives', 'receiver')
                  if (value := getattr(options, name)) is not None]
-    changes = equipment + arguments.changes(options)
+    changes = equipment + arguments.variant(options).overrides()
     duration = options.duration
     arguments.check_elements(options)
     if options.tle is options.station is options.which is None:

@@ -33,9 +33,9 @@ def _drives(options: argparse.Namespace) -> int:
     from pedestal_bringup.scenario import scenario
     from pedestal_common.graph import nodes
     from pedestal_common.text_files import parameter_file
-    port = [] if options.port is None else [f'adu.bus.port={options.port}']
-    chosen = scenario.load(options.scenario or 'leo_pass',
-                           ['scenario.drives=simulated', *arguments.changes(options), *port], pacing='realtime')
+    changes = ['scenario.drives=simulated', *arguments.variant(options).overrides()]
+    changes += [] if options.port is None else [f'adu.bus.port={options.port}']
+    chosen = scenario.load(options.scenario or 'leo_pass', changes, pacing='realtime')
     name = nodes.SIMULATED_DRIVES.name
     from equipment_sim.drives import drives_node
     with tempfile.NamedTemporaryFile('w', suffix='.yaml') as file:
@@ -70,7 +70,7 @@ def _receiver(options: argparse.Namespace) -> int:
     own = [files.override(f'tracking_receiver.source.{key}', value) for key, value in
            (('kind', options.stream or 'sigmf'), ('address', options.output or options.address or ''))]
     from pedestal_bringup.loop import iq_run
-    loop, chosen = iq_run.scenarios(options.scenario, arguments.changes(options), own, options.duration)
+    loop, chosen = iq_run.scenarios(options.scenario, arguments.variant(options).overrides(), own, options.duration)
     with console.progress_of_run(chosen.header.duration) as progress:
         count = iq_run.run(loop, chosen, options.output is None, progress)
     print(f'{chosen.node_parameters("iq").source.url}: {count} samples of each channel')
@@ -119,12 +119,11 @@ def _add_ins(parser: argparse.ArgumentParser) -> None:
 def _ins(options: argparse.Namespace) -> int:
     """Send the sentences until Ctrl-C, and return the exit code. Raises ValueError."""
     from equipment_sim import ins as simulator
-    from pedestal_bringup.scenario import scenario
     if not 1 <= options.port <= 65535:
         raise ValueError(f'--port {options.port}: must be 1 to 65535')
     if not MIN_RATE_HZ <= options.rate <= MAX_RATE_HZ:
         raise ValueError(f'--rate {options.rate:g} Hz: must be {MIN_RATE_HZ:g} to {MAX_RATE_HZ:g}')
-    chosen = scenario.load(options.scenario, arguments.changes(options), pacing='realtime')
+    chosen = arguments.variant(options).load('realtime')
     if not chosen.header.ship:
         raise ValueError(f'--scenario {chosen.name}: has no ship; scenarios with a ship have scenario.ship = true')
     sink = simulator.SerialSink() if options.serial else simulator.UdpSink('127.0.0.1', options.port)

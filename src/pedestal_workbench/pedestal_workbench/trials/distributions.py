@@ -46,10 +46,6 @@ _TEXT_PATTERN = re.compile(r'(\w+)\((.*)\)(x?)')
 """Pattern of the text of a distribution: name, arguments, x for a factor."""
 
 
-class VaryError(ValueError):
-    """Error of an invalid --vary. Its text is one line that names the --vary."""
-
-
 class Distribution(NamedTuple):
     """The distribution of one parameter."""
     text: str       # as the user gave it
@@ -74,37 +70,37 @@ class Distribution(NamedTuple):
 
 
 def parse(text: str) -> Distribution:
-    """Return the distribution of a text such as 'normal(1, 0.1)x'. Raises VaryError."""
+    """Return the distribution of a text such as 'normal(1, 0.1)x'. Raises ValueError."""
     match = _TEXT_PATTERN.fullmatch(text.strip())
     usage = ', '.join(kind.usage for kind in DISTRIBUTION_KINDS.values())
     if not match:
-        raise VaryError(f'{text!r}: must be one of {usage}; a factor has an x at the end')
+        raise ValueError(f'{text!r}: must be one of {usage}; a factor has an x at the end')
     name, inside, factor = match[1], match[2], bool(match[3])
     if name not in DISTRIBUTION_KINDS:
-        raise VaryError(f'{text!r}:{did_you_mean(name, DISTRIBUTION_KINDS)} must be one of {usage}')
+        raise ValueError(f'{text!r}:{did_you_mean(name, DISTRIBUTION_KINDS)} must be one of {usage}')
     try:
         arguments = tuple(plain_yaml.parse(part) for part in inside.split(','))
     except yaml.YAMLError as error:
-        raise VaryError(f'{text!r}: {plain_yaml.problem(error)}') from None
+        raise ValueError(f'{text!r}: {plain_yaml.problem(error)}') from None
     expected = DISTRIBUTION_KINDS[name].arguments
     if None in arguments or expected not in (None, len(arguments)):
-        raise VaryError(f'{text!r}: must be {DISTRIBUTION_KINDS[name].usage}')
+        raise ValueError(f'{text!r}: must be {DISTRIBUTION_KINDS[name].usage}')
     if name != 'choice' or factor:
         arguments = tuple(_number(text, value) for value in arguments)
     if name == 'uniform' and not arguments[0] < arguments[1]:
-        raise VaryError(f'{text!r}: low must be below high')
+        raise ValueError(f'{text!r}: low must be below high')
     if name == 'normal' and not arguments[1] > 0.0:
-        raise VaryError(f'{text!r}: sigma must be above 0')
+        raise ValueError(f'{text!r}: sigma must be above 0')
     return Distribution(text.strip(), name, arguments, factor)
 
 
 def _number(text: str, value: Json) -> float:
-    """Return a value as a float. Raises VaryError if it is not a finite number. text: of the distribution, for the
+    """Return a value as a float. Raises ValueError if it is not a finite number. text: of the distribution, for the
     error."""
     try:
         number = float('nan' if isinstance(value, bool) else value)
     except (TypeError, ValueError):
         number = float('nan')
     if not np.isfinite(number):
-        raise VaryError(f'{text!r}: {value!r} must be a number')
+        raise ValueError(f'{text!r}: {value!r} must be a number')
     return number

@@ -40,10 +40,6 @@ its step (pedestal_common.node.unit.announced), this topic is in the list too.
 """
 
 
-class TrialError(ValueError):
-    """Error of a trial that cannot be run. Its text is one line that names the trial."""
-
-
 def open_table(plan: Plan, folder: str | pathlib.Path, name: str = 'trials') -> Table:
     """Return the table of the trials of a plan in a folder; `with` opens its files.
 
@@ -63,11 +59,11 @@ def _drawn(plan: Plan) -> Iterable[Sequence[Json]]:
 
 @contextlib.contextmanager
 def _trial(plan: Plan, i: int) -> Iterator[None]:
-    """Convert a ValueError to a TrialError that names trial i."""
+    """Name trial i in a ValueError."""
     try:
         yield
     except ValueError as error:
-        raise TrialError(f'{plan.command(i)}: {error}') from None
+        raise ValueError(f'{plan.command(i)}: {error}') from None
 
 
 @functools.lru_cache(maxsize=1)
@@ -117,7 +113,7 @@ def run_missing_trials(plans: Sequence[Plan], tables: Sequence[Table], pool: mon
     """Run the trials of plans that are missing in their tables, and append their rows to the tables.
 
     The batches of several plans alternate, so all plans advance together. progress(number of trials done, number of
-    all trials) is called after each batch. Raises TrialError.
+    all trials) is called after each batch. Raises ValueError.
     """
     pieces, size = [], min(map(_batch_size, plans))
     for first in range(0, max(plan.runs for plan in plans), size):

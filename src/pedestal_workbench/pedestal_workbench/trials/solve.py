@@ -27,7 +27,6 @@ from pedestal_common.quantities import Row
 from pedestal_results import intervals
 from pedestal_workbench.trials import ensemble, statistics
 from pedestal_workbench.trials import plan as plans
-from pedestal_workbench.trials.distributions import VaryError
 from pedestal_workbench.trials.monte_carlo import Pool
 from pedestal_workbench.trials.plan import Plan
 from pedestal_workbench.trials.table import Table
@@ -97,19 +96,19 @@ def goal(text: str, known: Iterable[str]) -> Goal:
 
 
 def search_range(text: str, chosen: Scenario) -> Range:
-    """Return the range of a text NODE.KEY=LOW:HIGH. Raises VaryError.
+    """Return the range of a text NODE.KEY=LOW:HIGH. Raises ValueError.
 
     The range of a text NODE.KEY is the range of the parameter.
     """
     key, equals, ends = text.partition('=')
     field = plans.field(chosen, key, '--solve')
     if field.type not in (int, float):
-        raise VaryError(f'--solve {key}: must be a parameter with a number')
+        raise ValueError(f'--solve {key}: must be a parameter with a number')
     low, high = (statistics.number(end) for end in ends.split(':', 1)) if ends.count(':') == 1 else (math.nan,) * 2
     if not equals:
         low, high = field.metadata.get('low', -math.inf), field.metadata.get('high', math.inf)
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise VaryError(f'--solve {text}: must be NODE.KEY=LOW:HIGH, LOW below HIGH')
+        raise ValueError(f'--solve {text}: must be NODE.KEY=LOW:HIGH, LOW below HIGH')
     return Range(key, float(low), float(high), field.type is int, field.metadata.get('unit', ''))
 
 

@@ -23,7 +23,7 @@ sensitivity  Dependence of a result on a varied parameter. For a parameter with 
 import collections
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +33,7 @@ from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
 from pedestal_common.quantities import Bools, Estimate, Floats, Ints, Json, Row
 from pedestal_results import intervals, results, verdict
+from pedestal_results.intervals import Target
 from pedestal_workbench.trials.table import Table
 
 PERCENTILES = (1, 5, 25, 50, 75, 95, 99)  # reported percentiles [%]
@@ -45,42 +46,34 @@ WHY = 'why'
 
 
 class Question(NamedTuple):
-    """A statement that is true or false for each trial.
+    """A statement on a result that is true or false for each trial; a trial without the result does not meet it."""
+    name: str
+    result: str
+    target: Target | None = None    # None: the trial has the result
 
-    A trial without the result has the value NaN, for which `holds` is False.
-    """
-    name: str           # of the statement
-    result: str         # name of the result that decides
-    holds: Callable[[Floats], Bools]    # holds(values of the result (n,)) is True where the statement is true
-    sentence: str       # the statement
+    @property
+    def text(self) -> str:
+        """The statement, such as 'loss_s < 1'."""
+        return f'{self.result} {self.target.text}' if self.target else self.result
 
-
-def _meeting(target: str) -> Callable[[Floats], Bools]:
-    return lambda values: np.array([intervals.meets(value, target) for value in values])
+    def holds(self, values: Floats) -> Bools:
+        """Return True where the statement is true for the values (n,) of the result."""
+        met = [self.target is None or self.target.meets(value) for value in values.tolist()]
+        return np.isfinite(values) & np.array(met, bool)
 
 
 TRIAL_QUESTIONS = (
-    Question('locked', 'lock_time_s', np.isfinite, 'The receiver locked.'),
-    Question('tracked', 'evaluated_time_s', lambda time: time > 0.0, 'The run reached settled autotrack.'),
-    Question('never_lost', 'loss_s', lambda loss: loss == 0.0,
-             'After the first evaluated step the target was never further than half a beamwidth off.'),
-    Question('aligned', 'aligned_s', np.isfinite, 'The INS reported `aligned`.'),
-    *(Question(f'{result.name}_met', result.name,
-               _meeting(result.target),
-               f'{result.name} is {result.target}.')
+    Question('locked', 'lock_time_s'),
+    Question('tracked', 'evaluated_time_s', Target.parse('> 0')),   # the run reached settled autotrack
+    Question('never_lost', 'loss_s', Target.parse('<= 0')),     # never further off than half a beamwidth
+    Question('aligned', 'aligned_s'),
+    *(Question(f'{result.name}_met', result.name, Target.parse(result.target))
       for result in results.RESULTS if result.target and result.part not in ('run', 'supervised')),
 )
 
 
-class Requirement(NamedTuple):
-    """Criterion of the user for a result (--require)."""
-    text: str       # the criterion
-    result: str     # name of the result
-    target: str     # for intervals.meets
-
-
 _REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')
-"""Pattern of the text of a Requirement: name of the result, sign, limit."""
+"""Pattern of the text of a criterion: name of the result, sign, limit."""
 
 
 def check_result(option: str, name: str, known: Iterable[str]) -> None:
@@ -93,8 +86,8 @@ def check_result(option: str, name: str, known: Iterable[str]) -> None:
                          '`pedestal run --all --explain` explains the results')
 
 
-def requirement(text: str, known: Iterable[str]) -> Requirement:
-    """Return the criterion of a text such as 'pointing_max_deg < 0.1'. Raises ValueError.
+def requirement(text: str, known: Iterable[str]) -> Question:
+    """Return the criterion of the user (--require) of a text such as 'pointing_max_deg < 0.1'. Raises ValueError.
 
     known: names of the results.
     """
@@ -106,7 +99,7 @@ def requirement(text: str, known: Iterable[str]) -> Requirement:
     check_result(f'--require {text!r}', name, known)
     if math.isnan(number(limit)):
         raise ValueError(usage)
-    return Requirement(f'{name} {sign} {limit}', name, f'{sign} {limit}')
+    return Question(f'require({name} {sign} {limit})', name, Target.parse(f'{sign} {limit}'))
 
 
 def number(text: str) -> float:
@@ -117,22 +110,24 @@ def number(text: str) -> float:
         return math.nan
 
 
-def of_requirements(case: str, table: Table, requirements: Iterable[Requirement]) -> list[Row]:
-    """Return the rows of --json: the rate at which trials meet each of some criteria.
+def of_all(case: str, table: Table, requirements: Iterable[Question] = ()) -> list[Row]:
+    """Return the rows of --json of a table of trials."""
+    return [*of_results(case, table), *of_requirements(case, table, requirements), *of_questions(case, table),
+            *of_sensitivity(case, table)]
 
-    A trial without the result does not meet its criterion. Each row also has the fields of coverage_fields.
-    """
-    found = []
-    for required in requirements:
-        for name in table.results:
-            own, metric = case_of(case, name)
-            if required.result in (name, metric):
-                values = table.column(name)
-                met = [bool(math.isfinite(value) and intervals.meets(value, required.target)) for value in values]
-                found.append({**intervals.estimated(own, f'require({required.text})/rate', rate(sum(met), len(met)),
-                                                    '%', len(met)),
-                              **coverage_fields(table, name, np.isfinite(values))})
-    return found
+
+def _share(question: Question, case: str, table: Table, name: str) -> Row:
+    """Return the row of the share of the trials for which a statement on the column `name` is true."""
+    holds = question.holds(table.column(name))
+    return intervals.estimated(case_of(case, name)[0], f'{question.name}/rate',
+                               rate(int(np.sum(holds)), len(holds)), '%', len(holds))
+
+
+def of_requirements(case: str, table: Table, requirements: Iterable[Question]) -> list[Row]:
+    """Return the rows of the rate at which trials meet each criterion, with the fields of coverage_fields."""
+    return [{**_share(required, case, table, name),
+             **coverage_fields(table, name, np.isfinite(table.column(name)))}
+            for required in requirements for name in table.results if required.result in (name, nodes.plain(name))]
 
 
 def percentile(values: Floats, share: float) -> Estimate:
@@ -263,19 +258,9 @@ def of_results(case: str, table: Table) -> list[Row]:
 
 
 def of_questions(case: str, table: Table) -> list[Row]:
-    """Return the rows of the rates of the statements TRIAL_QUESTIONS over all trials.
-
-    A statement is false for a trial without its result.
-    """
-    found = []
-    for name in table.measured_results:
-        own, metric = case_of(case, name)
-        for question in TRIAL_QUESTIONS:
-            if question.result == metric:
-                yes = question.holds(table.column(name))
-                found.append(intervals.estimated(own, f'{question.name}/rate', rate(int(np.sum(yes)), len(yes)), '%',
-                                                 len(yes)))
-    return found
+    """Return the rows of the rates of TRIAL_QUESTIONS over all trials."""
+    return [_share(question, case, table, name) for name in table.measured_results
+            for question in TRIAL_QUESTIONS if question.result == nodes.plain(name)]
 
 
 def of_sensitivity(case: str, table: Table) -> list[Row]:

@@ -11,7 +11,7 @@ motors of paper 000 and a load of 210 kg m2. The scaling keeps the resonance fre
     receiver    C/N0 of the scenario for the area of the mirror. The power of the satellite and the noise of the
                 receiver stay the same.
     wind        the diameter of the mirror
-    structure   the lowest frequency of the data sheet, or the average of antennas of this diameter (data_sheet_format)
+    structure   the lowest frequency of the data sheet, or the average of antennas of this diameter (data_sheet)
     loops       the design of tuning/loops.py. `pedestal tune --loops` then measures the loops.
 
 If an axis cannot reach the rate of the data sheet, the scenario has RATE_SHARE of the rate that the axis reaches.
@@ -29,12 +29,13 @@ from pedestal_bringup.scenario import files, scenario
 from pedestal_bringup.scenario.header import PROGRAM_ERRORS
 from pedestal_bringup.scenario.program import Plan
 from pedestal_bringup.scenario.sections import parameters_of
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import ParameterError, as_dict, build, flatten
 from pedestal_common.quantities import DecibelHertz, Json, Radians
 from pedestal_common.text_files import parameter_file
-from pedestal_workbench.tuning import data_sheet_limits
-from pedestal_workbench.tuning.data_sheet_format import DataSheet
+from pedestal_workbench.tuning import data_sheet
+from pedestal_workbench.tuning.data_sheet import DataSheet
 from tracking_receiver_sim.params import TrackingReceiverParameters
 
 if typing.TYPE_CHECKING:
@@ -102,7 +103,7 @@ def _softer(name: str, values: Mapping[str, float]) -> dict[str, float]:
 def _plant(sheet: DataSheet, name: str, values: Mapping[str, float]) -> 'Plant':
     """Return the plant of the axis `name` with parameters `values` {key: value}.
 
-    Raises ParameterError, LoopError.
+    Raises ValueError.
     """
     from pedestal_workbench.tuning import loops
     known = getattr(AduParameters(), name)
@@ -117,7 +118,7 @@ def attainable(sheet: DataSheet) -> tuple[DataSheet, list[str]]:
     """Return (data sheet with rates that its axes reach, line about each changed rate).
 
     Two limits apply to the rate of an axis. The motors must reach it with their voltage, and they must be able to stop
-    the axis from it within half of its travel. Raises ScenarioError, ParameterError, LoopError.
+    the axis from it within half of its travel. Raises ValueError.
     """
     from pedestal_workbench.tuning import loops
     acu, remarks = scenario.load(sheet.like).node_parameters('acu'), []
@@ -182,7 +183,7 @@ def _assumed(sheet: DataSheet) -> list[str]:
 def sections(sheet: DataSheet, title: str) -> dict[str, dict[str, Json]]:
     """Return {node: {key: value}} of the scenario; title: of the scenario.
 
-    Raises ScenarioError, ParameterError, LoopError.
+    Raises ValueError.
     """
     from pedestal_workbench.tuning import loops
     _, content = files.text(sheet.like)
@@ -241,24 +242,24 @@ def text(found: Mapping[str, Mapping[str, Json]], head: Iterable[str]) -> str:
 def new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
     """Return (text of the scenario file, line about each changed or assumed value).
 
-    name: name of the scenario; command: the command line, for the head of the file. Raises SheetError for values
+    name: name of the scenario; command: the command line, for the head of the file. Raises ValueError for values
     that contradict each other, which names the options of `pedestal new` to change.
     """
     try:
         return _new(sheet, name, command)
     except ValueError as error:
-        raise data_sheet_limits.refusal(sheet, error, lambda other: _new(other, name, command)) from None
+        raise data_sheet.refusal(sheet, error, lambda other: _new(other, name, command)) from None
 
 
 def _new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
-    """Return the values of `new`. Raises ScenarioError, ParameterError, LoopError for values that contradict each
+    """Return the values of `new`. Raises ValueError for values that contradict each
     other."""
     sheet, remarks = attainable(sheet)
     remarks += _assumed(sheet)
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
     found = sections(sheet, title)
     tune = shlex.join(('pedestal', 'tune', f'{name}.yaml', '--loops'))
-    run = shlex.join(('pedestal', 'run', f'{name}.yaml', '--params-file', f'{name}-loops.yaml'))
+    run = Variant(f'{name}.yaml', files=(f'{name}-loops.yaml',)).command()
     content = text(found, [*parameter_file.origin(command), 'Values that are not in the data sheet are scaled from '
                            'the antenna of the product: replace them by known values.',
                            f'Next: {tune}, then {run}', *remarks])

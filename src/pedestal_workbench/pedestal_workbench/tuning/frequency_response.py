@@ -21,7 +21,7 @@ this error, the current and the speed loop are measured with SUB_STEP_COUNT step
 """
 import dataclasses
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -29,6 +29,7 @@ import numpy as np
 from adu_drive import axis, drive_unit
 from adu_drive.params import SPEED_LOOP_PERIOD_S, AduParameters, AxisParameters
 from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import (
@@ -37,12 +38,10 @@ from pedestal_common.quantities import (
     Floats,
     Hertz,
     Ints,
-    Json,
     Pairs,
     RadiansPerSecond,
     Seconds,
 )
-from pedestal_workbench.trials.cases import Case
 
 MOTOR_FIELDS = ('motor_1', 'motor_2')  # names of both motors in the state of an axis
 SWEEP_START_ANGLES_RAD = (-2.0, 0.15)  # angles of azimuth and elevation at the beginning of a measurement [rad]
@@ -220,7 +219,7 @@ def _at_most(sweep: Sweep, *rates: RadiansPerSecond) -> Sweep:
     return dataclasses.replace(sweep, peak=min(sweep.peak, PEAK_SHARE * min(rates)))
 
 
-MOVING_CASE_PARAMETERS = {
+MOVING_PARAMETERS = {
     'acu.tracker.handover': False, 'scenario.program.time_offset': 0.0, 'scenario.program.interval': 1.0,
     'adu.initial_azimuth': SWEEP_START_ANGLES_RAD[0], 'adu.initial_elevation': SWEEP_START_ANGLES_RAD[1],
     'tracking_receiver.target.kind': 'ramp',
@@ -229,30 +228,30 @@ MOVING_CASE_PARAMETERS = {
 """Changed parameters of a scenario for a program track of constant rates on both axes; `position` sets the rates."""
 
 
-def case(name: str, scenario: str, parameters: Mapping[str, Json]) -> Case:
-    """Return the case for the measurement of position loops: a scenario with changed parameters, at constant rates."""
-    return Case(name, scenario, {**MOVING_CASE_PARAMETERS, **parameters})
+def moving(variant: Variant) -> Variant:
+    """Return a variant for the measurement of position loops, which moves at constant rates unless its own changes
+    state otherwise."""
+    return dataclasses.replace(variant, changes=()).with_(MOVING_PARAMETERS).with_(variant.changes)
 
 
-def _moving(case: Case) -> tuple[Case, list[RadiansPerSecond]]:
-    """Return (case whose target moves at the rates of the measurement, these rates of both axes)."""
-    loaded = case.loaded()
+def _at_rates(variant: Variant) -> tuple[Variant, list[RadiansPerSecond]]:
+    """Return (variant whose target moves at the rates of the measurement, these rates of both axes)."""
+    loaded = variant.load()
     drive, acu = (loaded.node_parameters(node) for node in ('adu', 'acu'))
     rates = [_rate(i, getattr(drive, name).limits.rate, getattr(acu, name).limits.rate,
                    getattr(acu, name).shaper.rate) for i, name in enumerate(AXES)]
     moved = {f'tracking_receiver.target.angle.{name}_rate': rate for name, rate in zip(AXES, rates)}
-    return dataclasses.replace(case, parameters={**case.parameters, **moved}), rates
+    return variant.with_(moved), rates
 
 
-def position(case: Case, axes: Collection[str] = AXES, sweep: Sweep = POSITION_SWEEP) -> dict[str, Response]:
-    """Return {'position/AXIS/CASE': response} of the position loops of a case of the function `case`."""
-    case, rates = _moving(case)
-    loaded = dataclasses.replace(case, duration=(sweep.dropped + sweep.kept) * sweep.period).loaded()
-    loop = closed_loop.Loop(loaded)
+def position(variant: Variant, axes: Collection[str] = AXES, sweep: Sweep = POSITION_SWEEP) -> dict[str, Response]:
+    """Return {'position/AXIS': response} of the position loops of a variant that `moving` returns."""
+    variant, rates = _at_rates(variant)
+    loop = closed_loop.Loop(variant.with_(duration=(sweep.dropped + sweep.kept) * sweep.period).load())
     added = np.zeros((loop.steps, 2))
     added[:-1] = _at_most(sweep, *rates).signal(loop.period_ns * 1e-9)[:, np.newaxis]
     commanded = loop.run(added)['acu/rate_command']['velocity']
-    return {f'position/{name}/{case.name}': response(sweep, (commanded + added)[:-1, i], -commanded[:-1, i])
+    return {f'position/{name}': response(sweep, (commanded + added)[:-1, i], -commanded[:-1, i])
             for i, name in enumerate(AXES) if name in axes}
 
 

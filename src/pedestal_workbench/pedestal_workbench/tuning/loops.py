@@ -44,7 +44,6 @@ parameters. The smallest margins count.
 import dataclasses
 import math
 import pathlib
-import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -52,7 +51,7 @@ import numpy as np
 
 from acu_tracker.estimation.params import FilterParameters, ImmParameters
 from adu_drive.params import SPEED_LOOP_PERIOD_S, AxisParameters
-from pedestal_bringup.scenario import files, scenario
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common import parameters
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import (
@@ -70,7 +69,6 @@ from pedestal_common.quantities import (
 )
 from pedestal_common.text_files import parameter_file
 from pedestal_recording import configuration
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.tuning import frequency_response as frequency
 from pedestal_workbench.tuning.frequency_response import Margins
 
@@ -115,10 +113,6 @@ STILL_AIR_PARAMETERS = {'scenario.ship': False, 'scenario.program.source': 'targ
 """Changed parameters of a scenario for the measurement of a plant: ashore, in still air, on a program track."""
 
 
-class LoopError(ValueError):
-    """Error of loops that cannot be designed, or not be closed with the required margins. Its text is one line."""
-
-
 @dataclasses.dataclass(frozen=True)
 class LoopRequirements:
     """Required properties of the loops."""
@@ -132,12 +126,12 @@ class LoopRequirements:
                                       ('phase_margin', 20.0, 80.0, 'deg'), ('gain_margin', 3.0, 20.0, 'dB')):
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise LoopError(f'{name} = {value:g} {unit}: must be {low:g} to {high:g}')
+                raise ValueError(f'{name} = {value:g} {unit}: must be {low:g} to {high:g}')
 
 
 @dataclasses.dataclass(frozen=True)
 class Plant:
-    """Plant of one axis for the design of its loops. Raises LoopError if the motors cannot move the axis."""
+    """Plant of one axis for the design of its loops. Raises ValueError if the motors cannot move the axis."""
     name: str       # of the axis
     axis: AxisParameters
     wind: NewtonMeters = 0.0        # mean wind torque at the load
@@ -147,7 +141,7 @@ class Plant:
 
     def __post_init__(self) -> None:
         if self.acceleration <= 0.0:
-            raise LoopError(f'adu.{self.name}: the motors cannot move the axis: friction, unbalance and wind need '
+            raise ValueError(f'adu.{self.name}: the motors cannot move the axis: friction, unbalance and wind need '
                             'more torque than both torque limits')
 
     @property
@@ -291,19 +285,18 @@ class LoopRow(NamedTuple):
 class Loops:
     """The loops of a scenario during their design.
 
-    source      name or path of the scenario
-    overrides   texts 'node.key=value' of changed parameters
+    variant     the scenario
     plants      {axis: its plant}
     gains       present gains, such as {'adu.azimuth.speed_loop.proportional': value}
 
-    Raises LoopError for a drive without motors.
+    Raises ValueError for a drive without motors.
     """
 
-    def __init__(self, source: str, overrides: Iterable[str] = ()) -> None:
-        chosen = scenario.load(source, overrides)
+    def __init__(self, variant: Variant) -> None:
+        chosen = variant.load()
         if chosen.header.beam:
-            raise LoopError(f'scenario {chosen.name}: an electronic beam has no loops to tune')
-        self.source, self.overrides, self.name = source, tuple(overrides), chosen.name
+            raise ValueError(f'scenario {chosen.name}: an electronic beam has no loops to tune')
+        self.variant, self.name = variant, chosen.name
         drive = chosen.node_parameters('adu')
         known = chosen.node_parameters('tracking_receiver')
         noise = receiver_noise(known.antenna.beamwidth, known.antenna.slope, known.receiver.cn0_dbhz)
@@ -322,15 +315,14 @@ class Loops:
             return self.gains[f'acu.{name}.feedforward.bandwidth']
         return self.gains[f'adu.{name}.speed_loop.proportional'] / self.plants[name].gear_inertia
 
-    def _case(self, corner: tuple[float, float] = (1.0, 1.0)) -> Case:
-        """Return the case of a measurement; corner: factors for axes with a structure, see PLANT_CORNERS."""
-        given = dict(text.split('=', 1) for text in self.overrides)
+    def _measured(self, corner: tuple[float, float] = (1.0, 1.0)) -> Variant:
+        """Return the variant of a measurement; corner: factors for axes with a structure, see PLANT_CORNERS."""
         changed: dict[str, float] = {}
         for name, plant in self.plants.items():
             if plant.mode and corner != (1.0, 1.0):
                 changed |= {f'adu.{name}.load.inertia': _allowed('load.inertia', corner[0] * plant.axis.load.inertia),
                             f'adu.{name}.structure.frequency': _allowed('structure.frequency', corner[1] * plant.mode)}
-        return frequency.case(self.name, self.source, {**given, **self.gains, **changed, **STILL_AIR_PARAMETERS})
+        return frequency.moving(self.variant).with_({**self.gains, **changed, **STILL_AIR_PARAMETERS})
 
     def _sweep(self, axis: AxisParameters, sweep: frequency.Sweep, period: Seconds) -> frequency.Sweep:
         """Return a sweep with limited peak and frequency; period: sampling period of the loop.
@@ -348,8 +340,8 @@ class Loops:
         loop: 'current', 'speed' or 'position'; corner: factors of the plant, see PLANT_CORNERS. For the current loop
         it is the response of the motor with the smaller phase margin.
         """
-        case = self._case(corner)
-        drive = case.loaded().node_parameters('adu')
+        variant = self._measured(corner)
+        drive = variant.load().node_parameters('adu')
         axis = getattr(drive, name)
         if loop == 'current':
             # frequency.current measures the azimuth, so this axis takes its place, with the travel of the azimuth.
@@ -361,7 +353,7 @@ class Loops:
             sweep = frequency.FLEXIBLE_SPEED_SWEEP if self.plants[name].mode else frequency.SPEED_SWEEP
             return frequency.speed(drive, self._sweep(axis, sweep, SPEED_LOOP_PERIOD_S), (name,))[f'speed/{name}']
         sweep = self._sweep(axis, frequency.POSITION_SWEEP, drive.period)
-        found = frequency.position(case, (name,), sweep)[f'position/{name}/{self.name}']
+        found = frequency.position(variant, (name,), sweep)[f'position/{name}']
         # A tripped drive returns no signal.
         return found if np.isfinite(found.open_loop).all() and found.open_loop.all() else None
 
@@ -377,7 +369,7 @@ class Loops:
         loop: 'speed' or 'position'; name: axis; set_to: function that sets the gains for a crossover; fastest: first
         tried crossover.
         rows: names of the loop and their margins. If a structure is declared, a second row has the smallest margins in
-        all PLANT_CORNERS. Raises LoopError if no tried loop meets the requirements.
+        all PLANT_CORNERS. Raises ValueError if no tried loop meets the requirements.
         """
         for w in fastest * SLOWDOWN_FACTOR**np.arange(MAX_SLOWDOWNS):
             set_to(w)
@@ -393,7 +385,7 @@ class Loops:
         if margins:
             phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
             found = f'it has {phase:.3g} deg and {gain:.3g} dB'
-        raise LoopError(f'{self.name}, {name}: the {loop} loop cannot be closed with {required.phase_margin:g} deg '
+        raise ValueError(f'{self.name}, {name}: the {loop} loop cannot be closed with {required.phase_margin:g} deg '
                         f'and {required.gain_margin:g} dB: at {w / (2.0 * math.pi):.3g} Hz {found}')
 
 
@@ -402,7 +394,7 @@ def design(loops: Loops, axes: Sequence[str], required: LoopRequirements,
     """Design the loops of some axes for the requirements; the gains are then in the loops.
 
     Return the rows of the table. progress(share of the work that is done, text) is called for each loop. Raises
-    LoopError.
+    ValueError.
     """
     speed_hz = required.speed or CROSSOVER_RATIO * (required.position or DEFAULT_SPEED_CROSSOVER_HZ / CROSSOVER_RATIO)
     wanted_s = 2.0 * math.pi * speed_hz
@@ -440,7 +432,7 @@ def design(loops: Loops, axes: Sequence[str], required: LoopRequirements,
 
 def refuse_outside(loops: Loops) -> None:
     """Raise ScenarioError if a gain is outside its range."""
-    scenario.load(loops.source, [*loops.overrides, *(files.override(*gain) for gain in loops.gains.items())])
+    loops.variant.with_(loops.gains).load()
 
 
 def table(rows: Iterable[LoopRow], required: LoopRequirements) -> list[str]:
@@ -498,13 +490,13 @@ class LoopOptions:
 def main(options: LoopOptions, required: LoopRequirements, progress: Callable[[float, str], object]) -> list[str]:
     """Design the loops, write the parameter file and return the lines to print.
 
-    progress: function, see `design`. Raises LoopError.
+    progress: function, see `design`. Raises ValueError.
     """
     axes = AXES if options.axis == 'both' else (options.axis,)
-    loops = Loops(options.source, options.param)
+    loops = Loops(Variant(options.source, tuple(options.param)))
     file = options.output or pathlib.Path(f'{loops.name}-loops.yaml')
     if file.exists() or not file.parent.is_dir():
-        raise LoopError(f'--output {file}: must be a new file in a directory that exists')
+        raise ValueError(f'--output {file}: must be a new file in a directory that exists')
     rows = design(loops, axes, required, progress)
     loops.gains = {key: value for key, value in loops.gains.items() if key.split('.')[1] in axes}
     refuse_outside(loops)
@@ -513,6 +505,5 @@ def main(options: LoopOptions, required: LoopRequirements, progress: Callable[[f
     sections = {node: {key.removeprefix(f'{node}.'): value for key, value in loops.gains.items()
                        if key.startswith(f'{node}.')} for node in ('adu', 'acu')}
     parameter_file.write_new(file, sections, [*made, *lines])
-    following = shlex.join(('pedestal', 'run', options.source, '--params-file', str(file)))
     return [*lines, '', *(f'{name:44} {value}' for name, value in loops.gains.items()),
-            f'written: {file}  ({following})']
+            f'written: {file}  ({Variant(options.source, files=(file,)).command()})']
