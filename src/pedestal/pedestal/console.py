@@ -45,12 +45,9 @@ MAX_JSON_MARK_BYTES = 100  # number of first bytes by which a file of JSON is re
 STDOUT_PATH = pathlib.Path('/dev/stdout')  # path of the option --json without a file name, or with the file name -
 
 MAX_NAME_COLUMNS, MAX_CELL_COLUMNS, MIN_SENTENCE_COLUMNS = 44, 24, 40
-"""Widths in a list of show_list [characters].
-
-They are the largest width of the names, the largest width of the other cells, and the smallest width of the sentences.
-A longer cell moves the rest of its row to the right. On a narrower terminal, the sentences are printed below the
-cells.
-"""
+"""Largest width of the names in a list of show_list, of the other cells, and smallest width of the sentences
+[characters]. A longer cell moves the rest of its row to the right. On a narrower terminal, the sentences are printed
+below the cells."""
 
 MIN_TABLE_COLUMNS = 150
 """Smallest width of a table of results on any terminal, so that a row stays one line [characters]."""
@@ -59,12 +56,7 @@ MIN_TABLE_COLUMNS = 150
 @contextlib.contextmanager
 def _bar(columns: Callable[[ModuleType], _Columns], advance: Callable[..., None], description: str,
          total: float | None = None, rate: str = '') -> Iterator[Callable[..., None]]:
-    """Yield a function of the progress: on a terminal it calls advance(bar, task, ...), in a pipe it does nothing.
-
-    columns                      function of the module rich.progress that returns the columns of the progress bar
-    advance                      advance(bar, task, ...) shows the new progress
-    description, total, rate     properties of the only task of the bar
-    """
+    """Yield a function of the progress: on a terminal it calls advance(bar, task, ...), in a pipe it does nothing."""
     if not sys.stderr.isatty():
         yield lambda *_: None
         return
@@ -74,10 +66,7 @@ def _bar(columns: Callable[[ModuleType], _Columns], advance: Callable[..., None]
 
 
 def progress_of_run(duration: Seconds) -> AbstractContextManager[Callable[..., None]]:
-    """Return a context with a function progress(time of the run): a bar on a terminal, nothing in a pipe.
-
-    duration: length of the run.
-    """
+    """Return a context with a function progress(time of the run): a bar on a terminal, nothing in a pipe."""
     def columns(rich: ModuleType) -> _Columns:
         return (rich.TextColumn('{task.description}'), rich.BarColumn(),
                 rich.TextColumn('{task.completed:.0f} / {task.total:.0f} s'), rich.TimeElapsedColumn())
@@ -88,10 +77,8 @@ def progress_of_run(duration: Seconds) -> AbstractContextManager[Callable[..., N
 
 
 def progress_of_share() -> AbstractContextManager[Callable[..., None]]:
-    """Return a context with a function progress(share of the work that is done [-], text of the next item).
-
-    It shows a bar on a terminal, and nothing in a pipe.
-    """
+    """Return a context with a function progress(share of the work that is done [-], text): a bar on a terminal,
+    nothing in a pipe."""
     def columns(rich: ModuleType) -> _Columns:
         return rich.BarColumn(), rich.TextColumn('{task.description}'), rich.TimeElapsedColumn()
 
@@ -101,10 +88,8 @@ def progress_of_share() -> AbstractContextManager[Callable[..., None]]:
 
 
 def progress_of_trials() -> AbstractContextManager[Callable[..., None]]:
-    """Return a context with a function progress(number of trials done, number of all trials).
-
-    It shows a bar with the rate of the trials and the remaining time on a terminal, and nothing in a pipe.
-    """
+    """Return a context with a function progress(trials done, all trials): a bar with the rate of the trials and the
+    remaining time on a terminal, nothing in a pipe."""
     def columns(rich: ModuleType) -> _Columns:
         return (rich.BarColumn(), rich.MofNCompleteColumn(), rich.TextColumn('trials, {task.fields[rate]}'),
                 rich.TimeElapsedColumn(), rich.TextColumn('left'), rich.TimeRemainingColumn())
@@ -142,10 +127,8 @@ def write_json(path: pathlib.Path | None, content: object) -> None:
 
 
 def show_list(rows: Iterable[Sequence[str]]) -> None:
-    """Print rows of texts in columns; the last text of a row is a sentence.
-
-    On a terminal the sentence is wrapped to the width of the terminal. In a pipe a row is one line.
-    """
+    """Print rows of texts in columns; the last text of a row is a sentence. On a terminal the sentence is wrapped to
+    its width. In a pipe a row is one line."""
     rows = list(rows)
     if not rows:
         return
@@ -178,8 +161,7 @@ def show_results(title: str, columns: Sequence[str], results: Sequence[Values], 
                  marks: Iterable[Mapping[str, str]] = ()) -> None:
     """Print the table of the results of a run.
 
-    columns   texts of the heads, one for each beam; '' for a single column
-    results   of each column
+    columns   heads, one for each beam; '' for a single column
     whole     results of the run as a whole
     marks     {name: note on a value that is not as expected} of each column
     """
@@ -242,11 +224,9 @@ def show_study(title: str, rows: Iterable[Row], missed: Callable[[Row], bool]) -
 
 
 def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None = None) -> None:
-    """Print the statistics of results over trials as a table.
-
-    rows: of trials.statistics and trials.comparison; metrics: names of the printed results in their order, None
-    for all rows. The rows of a comparison are printed for the first of these results only.
-    """
+    """Print the statistics of results over trials as a table. rows: of trials.statistics and trials.comparison;
+    metrics: names of the printed results in their order, None for all. The rows of a comparison are printed for the
+    first of these results only."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
@@ -280,9 +260,7 @@ def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None =
 
 
 def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:
-    """Print the values that a search has tried as a table, with the mean of the result at each.
-
-    key, unit: parameter 'node.key' of the search and its unit; tried: by rising value.
+    """Print the values that a search has tried, in rising order, with the mean of the result at each. key: parameter.
     """
     from rich.box import SIMPLE_HEAD
     from rich.console import Console

@@ -63,10 +63,8 @@ class Trials(Mapping[str, Floats]):
 
     @property
     def parameters(self) -> dict[str, Floats]:
-        """Varied parameters {'node.key': values (runs,)}.
-
-        A parameter with texts has the numbers 0, 1, ... of its texts, in the order of their first trial.
-        """
+        """Varied parameters {'node.key': values (runs,)}. A parameter with texts has the numbers 0, 1, ... of its
+        texts, in the order of their first trial."""
         return {name: self._table.column(name) for name in self._table.varied}
 
     @property
@@ -95,11 +93,8 @@ class Trials(Mapping[str, Floats]):
         return [self._plan.command(place) for place in places]
 
     def against(self, other: Trials, by: str = 'pointing_rms_deg') -> str:
-        """Return a sentence that compares a result of these trials with that of other trials.
-
-        by: name of the result. Trial i of both has the same seed, so the comparison is made in pairs. Raises
-        ValueError for different seeds.
-        """
+        """Return a sentence that compares a result of these trials with that of other trials. Trial i of both has the
+        same seed, so the comparison is made in pairs. Raises ValueError for different seeds."""
         if not np.array_equal(self.seeds, other.seeds):
             raise ValueError('the trials have different seeds and cannot be paired')
         name, other_name = comparison.names(self._plan, other._plan)

@@ -1,7 +1,5 @@
-"""Runs of the Python library: `pedestal.run` runs a scenario in memory, `pedestal.read_bag` reads a recording.
-
-Both return a Run, which gives the messages of every topic as named arrays, the results and the figures.
-"""
+"""Runs of the Python library: `pedestal.run` runs a scenario in memory, `pedestal.read_bag` reads a recording. Both
+return a Run."""
 from __future__ import annotations
 
 import functools
@@ -41,17 +39,13 @@ PANELS: dict[str, Panel] = {
     'carrier': Panel(run_figures.draw_carrier, ('receiver',)),
     'sky': Panel(run_figures.draw_sky, ('truth',), polar=True),
 }
-"""Figures of Run.plot, {name: Panel}."""
 
 POINTING_UNITS = {'t': 's', 'cross_elevation': 'rad', 'elevation': 'rad', 'range': 'm'}
-"""{column of Run.pointing: its unit}."""
 
 
 class Table(Mapping[str, np.ndarray]):
-    """Named arrays of equal length, {column: array (n,)}, with a row for each message.
-
-    units: {column: unit}, '' for none. Column 't' is the time of the measurement [s].
-    """
+    """Named arrays of equal length, {column: array (n,)}, with a row for each message. units: {column: unit}, '' for
+    none. Column 't' is the time of the measurement [s]."""
 
     def __init__(self, arrays: Mapping[str, np.ndarray], units: Mapping[str, str]) -> None:
         self._arrays, self.units = dict(arrays), dict(units)
@@ -71,11 +65,8 @@ class Table(Mapping[str, np.ndarray]):
 
 
 class Run:
-    """A run: run[topic] is the Table of a topic.
-
-    name: name of the scenario or of the recording; beam: name of the beam, '' for an antenna with a single beam, and
-    for the first beam of a recording.
-    """
+    """A run: run[topic] is the Table of a topic. name: of the scenario or of the recording; beam: '' for an antenna
+    with a single beam, and for the first beam of a recording."""
 
     def __init__(self, source: memory_recording.MemoryRecording | bags.Bag, name: str, beam: str = '') -> None:
         self._source, self.name, self.beam = source, name, beam
@@ -183,8 +174,6 @@ def run(scenario: Scenario, beam: str = '') -> Run:
 
 def read_bag(path: str | pathlib.Path, beam: str = '') -> Run:
     """Return the Run of a recording, a folder or an .mcap file. beam: name of a beam of several, '' for the first.
-
-    Raises ValueError with one line for an unreadable recording.
-    """
+    Raises ValueError with one line for an unreadable recording."""
     view = bags.read(path, beam)
     return Run(view, view.metadata.get('scenario', pathlib.Path(path).stem), beam)

@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph.topics import AXES
@@ -94,7 +95,7 @@ def servo_study(source: str, progress: Progress) -> Result:
     records = {}
     for i, (name, (changes, duration)) in enumerate(runs.items()):
         progress(i / len(runs), name)
-        records[name] = Variant(source, duration=duration).with_(changes).run()
+        records[name] = closed_loop.Loop(Variant(source, duration=duration).with_(changes).load()).run()
     return Result([row(f'{plant.name}/{name}', metric, value, unit) for i, name in enumerate(AXES)
                    for metric, value, unit in _metrics(records, i, torque[name])],
                   {name: functools.partial(_figure, name, records[name]) for name in runs})
@@ -109,7 +110,7 @@ def backlash_study(source: str, progress: Progress) -> Result:
                                             ('sine', SINE_PARAMETERS, SINE_PERIODS / SINE_FREQUENCY_HZ))}
     for done, (key, variant) in enumerate(runs.items()):
         progress(done / len(runs), ''.join(key))
-        records[key] = variant.run()
+        records[key] = closed_loop.Loop(variant.load()).run()
     rows = []
     for i, name in enumerate(AXES):
         lash = plant.plants[name].axis.gear_train.lash

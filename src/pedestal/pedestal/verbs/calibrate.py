@@ -16,7 +16,6 @@ UNUSED_WITH = {'offsets': ('scenario', 'points', 'collected'), 'bag': ('scenario
 
 
 def _files(options: argparse.Namespace) -> 'ResultFiles':
-    """Return the files that a step writes, by its options --output and --report."""
     from pedestal_workbench.calibration.output_files import ResultFiles
     return arguments.typed(ResultFiles, options)
 
@@ -59,7 +58,6 @@ def _add_pointing(parser: argparse.ArgumentParser) -> None:
 
 
 def _pointing(options: argparse.Namespace) -> int:
-    """Fit or plan, write the files and print the result. Return exit code 0."""
     from pedestal_workbench.calibration import plan, pointing
     source = next(name for name in UNUSED_WITH if getattr(options, name) is not None)
     arguments.refuse_given(options, UNUSED_WITH[source], f'has no effect with --{source}')
@@ -102,7 +100,7 @@ def _add_receiver(parser: argparse.ArgumentParser) -> None:
 
 
 def _receiver(options: argparse.Namespace) -> int:
-    """Calibrate, write the files and print the result. Return exit code 0, or EXIT_FAILED_RUN if not verified."""
+    """Calibrate and print the result. Return the exit code, EXIT_FAILED_RUN if not verified."""
     arguments.check_result_files(options)
     if options.iq is not None:
         from pedestal_workbench.calibration.receiver import iq_phasing
@@ -142,7 +140,6 @@ def _add_drive(parser: argparse.ArgumentParser) -> None:
 
 
 def _drive(options: argparse.Namespace) -> int:
-    """Plan or identify, write the files and print the result. Return exit code 0, or EXIT_FAILED_RUN."""
     from pedestal_workbench.calibration.drive import identified
     if options.bag:
         arguments.refuse_given(options, ('plan',), 'has no effect with --bag')
@@ -188,7 +185,6 @@ def _add_sensitivity(parser: argparse.ArgumentParser) -> None:
 
 
 def _sensitivity(options: argparse.Namespace) -> int:
-    """Measure, write the files and print the result. Return exit code 0."""
     from pedestal_workbench.calibration.sensitivity import sensitivity
     arguments.check_result_files(options)
     for name, other in (('attenuation', 'flux'), ('bandwidth', 'bag'), ('elevation', 'levels')):
@@ -211,7 +207,6 @@ STEPS = {
     'sensitivity': ('measure beamwidth, squint and G/T from levels at offsets about the sun or another source',
                     Verb(_add_sensitivity, _sensitivity)),
 }
-"""{name of a step: (first line of its help, its verb)}, in the order of the help."""
 
 
 def _add_calibrate(parser: argparse.ArgumentParser) -> None:

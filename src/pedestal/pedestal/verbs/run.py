@@ -167,7 +167,6 @@ def _cure(priority: int) -> str:
 
 
 def _some(values: dict[str, tuple[float, str]], names: Collection[str]) -> dict[str, tuple[float, str]]:
-    """Return the part of the results {name: (value, unit)} whose names are in `names`."""
     return {name: value for name, value in values.items() if name in names}
 
 

@@ -27,7 +27,6 @@ def _add_drives(parser: argparse.ArgumentParser) -> None:
 
 
 def _drives(options: argparse.Namespace) -> int:
-    """Serve the drives until Ctrl-C, and return the exit code. Raises ValueError."""
     import tempfile
 
     from pedestal_bringup.scenario import scenario
@@ -63,10 +62,9 @@ def _add_receiver(parser: argparse.ArgumentParser) -> None:
 
 
 def _receiver(options: argparse.Namespace) -> int:
-    """Write or send the samples of all channels, and return the exit code. Raises ValueError."""
     from pedestal_bringup.scenario import files
-    if options.output is not None and options.address is not None:
-        raise ValueError(f'--address {options.address}: has no effect with --output')
+    if options.output is not None:
+        arguments.refuse_given(options, ('address',), 'has no effect with --output', stated=True)
     own = [files.override(f'tracking_receiver.source.{key}', value) for key, value in
            (('kind', options.stream or 'sigmf'), ('address', options.output or options.address or ''))]
     from pedestal_bringup.loop import iq_run
@@ -88,7 +86,6 @@ def _add_rotator(parser: argparse.ArgumentParser) -> None:
 
 
 def _rotator(options: argparse.Namespace) -> int:
-    """Serve the rotator until Ctrl-C, and return the exit code. Raises ValueError."""
     from equipment_sim import rotator as simulator
     if not 0.0 < options.rate <= MAX_RATE_DEG_S:
         raise ValueError(f'--rate {options.rate:g}: must be above 0 and at most {MAX_RATE_DEG_S:g} deg/s')
@@ -117,7 +114,6 @@ def _add_ins(parser: argparse.ArgumentParser) -> None:
 
 
 def _ins(options: argparse.Namespace) -> int:
-    """Send the sentences until Ctrl-C, and return the exit code. Raises ValueError."""
     from equipment_sim import ins as simulator
     if not 1 <= options.port <= 65535:
         raise ValueError(f'--port {options.port}: must be 1 to 65535')
@@ -143,7 +139,6 @@ EQUIPMENT = {
     'ins': ('the INS of the ship of a scenario, which sends NMEA sentences in real time by UDP or on a pseudo '
             'terminal', Verb(_add_ins, _ins)),
 }
-"""{name of an equipment: (first line of its help, its verb)}, in the order of the help."""
 
 
 def _add_simulate(parser: argparse.ArgumentParser) -> None:

@@ -63,7 +63,6 @@ def _add_trials(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_questions(parser: argparse.ArgumentParser) -> None:
-    """Add sides of a comparison, criteria and search."""
     parser.add_argument('--side', action='append', nargs='+', default=[], metavar=('NAME', 'NODE.KEY=VALUE'),
                         help='side of a comparison: its name, then the parameters that it changes; may be repeated')
     parser.add_argument('--against', metavar='SCENARIO', help='scenario of the second side of a comparison')
@@ -80,7 +79,6 @@ def _add_questions(parser: argparse.ArgumentParser) -> None:
 
 
 def _trials(options: argparse.Namespace) -> int:
-    """Run the trials, print their statistics, write table, page and rows. Return exit code 0."""
     if bool(options.solve) != bool(options.until):
         raise ValueError(f'--{"solve" if options.solve else "until"}: needs --{"until" if options.solve else "solve"}')
     if options.solve:
@@ -95,7 +93,6 @@ def _folder(options: argparse.Namespace, name: str) -> pathlib.Path:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    """Run the trials of all sides. Return exit code 0."""
     from pedestal_results import results
     from pedestal_workbench.trials import monte_carlo, trials_page
     from pedestal_workbench.trials.experiment import Experiment
@@ -126,7 +123,6 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _solve(options: argparse.Namespace) -> int:
-    """Search for the parameter value that --solve and --until define. Return exit code 0."""
     from pedestal_workbench.trials import experiment, monte_carlo, solve
     from pedestal_workbench.trials.plan import plan
     variant = arguments.variant(options)
@@ -151,7 +147,6 @@ def _solve(options: argparse.Namespace) -> int:
 
 
 def _sides(options: argparse.Namespace) -> 'list[Side]':
-    """Return the trials and all other sides. Raises ValueError."""
     from pedestal_workbench.trials.experiment import Side
     from pedestal_workbench.trials.plan import plan
     first = plan(arguments.variant(options), options.runs, options.vary, options.sobol)

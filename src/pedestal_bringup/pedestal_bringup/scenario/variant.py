@@ -1,21 +1,15 @@
-"""Variant of a scenario: the scenario with the changes of one run, which can be loaded, changed further and run.
-
-Trials, tuning, studies and the command line describe their runs as variants.
-"""
+"""Variant of a scenario: the scenario with the changes of one run, by which trials, tuning, studies and the command
+line describe their runs."""
 from __future__ import annotations
 
 import dataclasses
 import pathlib
 import shlex
-import typing
 from collections.abc import Iterable, Mapping
 
 from pedestal_bringup.scenario import files, scenario
 from pedestal_bringup.scenario.scenario import Draft, Scenario
 from pedestal_common.quantities import Json, Seconds
-
-if typing.TYPE_CHECKING:
-    from pedestal_bringup.loop.closed_loop import Run
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,11 +39,6 @@ class Variant:
     def load(self, pacing: str | None = None) -> Scenario:
         """Return the checked scenario. Raises ValueError."""
         return scenario.checked(self.draft(), self.seed, self.duration, pacing)
-
-    def run(self) -> Run:
-        """Run the closed loop."""
-        from pedestal_bringup.loop import closed_loop  # imported late, because it imports the laws of all nodes
-        return closed_loop.Loop(self.load()).run()
 
     def command(self) -> str:
         """Return the command line that runs this variant with separate nodes."""

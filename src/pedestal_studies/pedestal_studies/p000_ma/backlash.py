@@ -21,6 +21,7 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
+from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Floats, Json, NewtonMeters, Radians, RadiansPerSecond, Row, Seconds, Times
@@ -179,7 +180,7 @@ def run(progress: Progress) -> Result:
     done = {}
     for i, (key, case) in enumerate(CASES.items()):
         progress(i / len(CASES), f'{key[0]}: {key[1]}')
-        done[key] = case.run()
+        done[key] = closed_loop.Loop(case.load()).run()
     return Result(rows(done), figures(done), remarks(rows(done)))
 
 

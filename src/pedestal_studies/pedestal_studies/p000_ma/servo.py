@@ -22,6 +22,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from adu_drive.params import AduParameters
+from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Floats, Json, Radians, RadiansPerSecond, Row, Seconds
@@ -198,7 +199,7 @@ def records(cases: Iterable[str], progress: Progress) -> Runs:
     for i, (name, kind) in enumerate(wanted):
         progress(i / len(wanted), f'{name}: {kind}')
         case = step_case(name) if kind == 'step' else gust_case(name) if kind == 'gust' else sine_case(name, kind)
-        done[name, kind] = case.run()
+        done[name, kind] = closed_loop.Loop(case.load()).run()
     return done
 
 

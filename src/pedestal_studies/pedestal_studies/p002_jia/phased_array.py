@@ -21,6 +21,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import (
     Decibels,
@@ -465,7 +466,7 @@ def graph_error(case: str, quiet: bool = False, seed: int | None = None) -> Pair
 
     Arguments as of `graph_case`.
     """
-    run = graph_case(case, quiet).with_(seed=seed).run()
+    run = closed_loop.Loop(graph_case(case, quiet).with_(seed=seed).load()).run()
     return run.truth['error'][run.t >= GRAPH_EVALUATION_START_S]
 
 
@@ -476,7 +477,7 @@ def graph_rows(jitters: Mapping[str, list[Degrees]]) -> list[Line]:
     """
     rows: list[Line] = []
     for case in GRAPH_CASES:
-        quiet = graph_case(case, quiet=True).run()
+        quiet = closed_loop.Loop(graph_case(case, quiet=True).load()).run()
         kept = quiet.t >= GRAPH_EVALUATION_START_S
         ends = quiet.truth['error'], interval_start_error(quiet['adu/truth']['position'], quiet.truth['error'])
         worst = max(peak(np.hypot(*error[kept].T)) for error in ends)

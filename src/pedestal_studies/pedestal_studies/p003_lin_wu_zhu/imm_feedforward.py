@@ -29,6 +29,7 @@ from matplotlib.figure import Figure
 from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
 from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.modes import Mode
+from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.parameters import as_dict
 from pedestal_common.quantities import Bools, Degrees, Floats, Pairs, RadiansPerSecond, Row, Times, Vectors3
@@ -138,7 +139,7 @@ def drive_error(case: DriveCase, seed: int) -> tuple[Times, Floats]:
 
     case: as `drive_case` returns. The errors are NaN if the run left autotrack.
     """
-    record = case.variant.with_(seed=seed).run()
+    record = closed_loop.Loop(case.variant.with_(seed=seed).load()).run()
     record = record.where(record.t >= DRIVE_EVALUATION_START_S)
     error = record.truth['error'][:, list(REVERSAL_S_BY_AXIS).index(case.axis)]
     return record.t, error if np.all(record['acu/mode'] == Mode.AUTOTRACK) else np.full_like(error, math.nan)

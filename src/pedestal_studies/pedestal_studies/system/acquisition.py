@@ -19,6 +19,7 @@ from scipy.stats import beta
 from acu_tracker.modes import Mode
 from acu_tracker.search.params import SearchParameters
 from acu_tracker.search.pattern import PATTERN_SPIRAL, PATTERN_SQUARE, SEARCH_PATTERNS
+from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Floats, Pairs, Radians, Row, Seconds
@@ -120,7 +121,7 @@ def batch(item: Item) -> Pairs:
     name, first, count = item
     values = []
     for seed in range(FIRST_SEED + first, FIRST_SEED + first + count):
-        run = case_of(name, seed).run()
+        run = closed_loop.Loop(case_of(name, seed).load()).run()
         off = off_axis(run)
         if name == 'steptrack_geo':
             settled = off[run.t > STEPTRACK_SETTLING_TIME_S]

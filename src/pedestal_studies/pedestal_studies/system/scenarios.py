@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.loop.memory_recording import MemoryRecording
 from pedestal_bringup.scenario.variant import Variant
@@ -108,7 +109,8 @@ def extra_results(values: Mapping[str, float], run: Run) -> dict[str, float]:
 
 def measured(variant: Variant) -> dict[str, float]:
     """Return {name: value} of one run of a variant."""
-    scenario, run = variant.load(), variant.run()
+    scenario = variant.load()
+    run = closed_loop.Loop(scenario).run()
     found = results.measured(RecordedRun(MemoryRecording(scenario, run)).parts)
     values = {name: value for name, (value, _) in found.items()}
     return {**values, **extra_results(values, run)}
@@ -147,8 +149,7 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) 
 def flyby_figure() -> Figure:
     """Draw paper 000's figures 7 to 11 for uav_flyby: error and angle before and after the filter, and the azimuth."""
     figure, axes = new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
-    variant = CASES['uav_flyby'].with_(seed=FIRST_SEED)
-    flown = tracking.read(MemoryRecording(variant.load(), variant.run()))
+    flown = tracking.read(memory_recording.record(CASES['uav_flyby'].with_(seed=FIRST_SEED).load()))
     middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5
     cross_elevations, elevation_errors = zip(*(errors.T for errors in (flown.measured, flown.filtered, flown.error)))
     # The measured elevation of the target is its true elevation plus the measured error minus the true error. The

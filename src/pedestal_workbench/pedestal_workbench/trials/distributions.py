@@ -1,9 +1,6 @@
-"""Distributions by which trials vary a parameter: `pedestal trials --vary NODE.KEY=KIND(numbers)`.
-
-NODE.KEY=KIND(numbers) draws the value of the parameter. With an x at the end, NODE.KEY=KIND(numbers)x, it draws a
-factor of the value in the scenario. Each draw is the quantile of a number u between 0 and 1. The number u is random,
-or a coordinate of a point of a Sobol sequence; the functions of this module serve both.
-"""
+"""Distributions by which trials vary a parameter: `pedestal trials --vary NODE.KEY=KIND(numbers)`. With an x at the
+end, NODE.KEY=KIND(numbers)x, a distribution draws a factor of the value in the scenario. Each draw is the quantile of
+a number u between 0 and 1, which is random or a coordinate of a point of a Sobol sequence."""
 import re
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
@@ -21,14 +18,11 @@ Values: TypeAlias = NDArray[Any]  # numbers, or the values of a `choice`, which 
 
 
 class Kind(NamedTuple):
-    """A kind of distribution: a row of DISTRIBUTION_KINDS.
-
-    extremes(arguments) returns values that must all be in the range of the parameter: low and high, or all options of
-    a `choice`. It returns None for a distribution without bounds.
-    """
+    """A kind of distribution: a row of DISTRIBUTION_KINDS."""
     usage: str                  # text of its syntax
     arguments: int | None       # their number, None for one or more
     quantile: Callable[[Floats, tuple[Json, ...]], Values]  # quantile(u (n,), arguments) returns values (n,)
+    # low and high, or all options of a `choice`, which must be in the range of the parameter; None without bounds
     extremes: Callable[[tuple[Json, ...]], tuple[Json, ...] | None]
 
 
@@ -40,10 +34,8 @@ DISTRIBUTION_KINDS: dict[str, Kind] = {
                    lambda u, options: np.array(options, object)[(u * len(options)).astype(int)],
                    lambda options: options),
 }
-"""{name of a distribution: its kind}."""
 
-_TEXT_PATTERN = re.compile(r'(\w+)\((.*)\)(x?)')
-"""Pattern of the text of a distribution: name, arguments, x for a factor."""
+_TEXT_PATTERN = re.compile(r'(\w+)\((.*)\)(x?)')  # name, arguments, x for a factor
 
 
 class Distribution(NamedTuple):
@@ -54,10 +46,8 @@ class Distribution(NamedTuple):
     factor: bool    # True if a draw is a factor of the value in the scenario
 
     def draw(self, u: Floats, whole: bool = False) -> Values:
-        """Return values (n,) at the numbers u (n,) between 0 and 1.
-
-        whole: True for an integer parameter. A uniform distribution then includes low and high.
-        """
+        """Return values (n,) at the numbers u (n,) between 0 and 1. whole: True for an integer parameter, for which a
+        uniform distribution includes low and high."""
         if whole and self.kind == 'uniform':
             low, high = self.arguments
             return np.floor(low + u * (high - low + 1.0))
@@ -95,8 +85,7 @@ def parse(text: str) -> Distribution:
 
 
 def _number(text: str, value: Json) -> float:
-    """Return a value as a float. Raises ValueError if it is not a finite number. text: of the distribution, for the
-    error."""
+    """Return a value as a finite float. text: of the distribution, for the ValueError."""
     try:
         number = float('nan' if isinstance(value, bool) else value)
     except (TypeError, ValueError):

@@ -1,8 +1,6 @@
 """Experiment: the trials of one variant of a scenario, or of several sides that are compared trial by trial, from
-their tables to the answers.
-
-`pedestal trials` prints the answers, the page of the trials draws them, and the Python library returns them.
-"""
+their tables to the answers. `pedestal trials` prints the answers, its page draws them, and the Python library returns
+them."""
 import contextlib
 import dataclasses
 import functools
@@ -31,11 +29,8 @@ class Side:
 
 
 class Experiment:
-    """Trials of some sides, whose tables are in a folder.
-
-    by: result that ranks the trials, None for the default; require: texts of criteria, such as 'loss_s < 1'. Raises
-    ValueError for an unknown result.
-    """
+    """Trials of some sides, whose tables are in a folder. by: result that ranks the trials, None for the default;
+    require: texts of criteria, such as 'loss_s < 1'. Raises ValueError for an unknown result."""
 
     def __init__(self, sides: Sequence[Side], folder: str | pathlib.Path, by: str | None = None,
                  require: Sequence[str] = ()) -> None:
@@ -52,10 +47,8 @@ class Experiment:
         return sum(table.count_in_file for table in self.tables), sum(side.plan.runs for side in self.sides)
 
     def run(self, pool: Pool, progress: Callable[[int, int], object] = lambda done, total: None) -> 'Found':
-        """Run the trials that are not yet in the tables, and return the answers. Raises ValueError.
-
-        progress: function, see ensemble.run_missing_trials.
-        """
+        """Run the trials that are not yet in the tables, and return the answers. Raises ValueError. progress: see
+        ensemble.run_missing_trials."""
         with contextlib.ExitStack() as stack:
             for table in self.tables:
                 stack.enter_context(table)
@@ -83,7 +76,6 @@ class Found:
 
     @functools.cached_property
     def _differences(self) -> tuple[str, ...]:
-        """Parameters in which the sides differ, as a text for each side."""
         return comparison.names(*(side.plan for side in self.sides))
 
     @property

@@ -28,10 +28,8 @@ from pedestal_workbench.trials.distributions import Distribution
 DEFAULT_RUNS = 100  # number of trials without a table of trials, unless the user gives another
 
 PLAN_HEADER_KEYS = ('seed', 'duration', 'pacing', 'beam', 'beams')
-"""Keys of the header of a scenario that trials cannot vary.
-
-Their values are equal for all trials, or follow from the number of the trial.
-"""
+"""Keys of the header of a scenario that trials cannot vary, because trials share them or derive them from their
+number."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,7 +41,7 @@ class Plan:
     seed: int       # of the first trial
     runs: int       # number of trials
     varied: dict[str, list[Json]]   # {node.key: values in the trials}
-    identity: dict[str, str]        # {name: text} that tells these trials from others, whatever their number
+    identity: dict[str, str]        # {name: text} that distinguishes these trials from others, whatever their number
 
     @property
     def name(self) -> str:
@@ -74,13 +72,11 @@ class Plan:
 
 
 def plan(variant: Variant, runs: int | None = None, vary: Sequence[str] = (), sobol: bool = False) -> Plan:
-    """Return the plan of trials of a variant, whose seed is that of the first trial.
+    """Return the plan of trials of a variant, whose seed is that of the first trial. Raises ValueError.
 
-    runs       number of trials; None: the number of rows of the tables in `vary`, or DEFAULT_RUNS without a table
+    runs       None: the number of rows of the tables in `vary`, or DEFAULT_RUNS without a table
     vary       texts 'node.key=distribution', or paths of .csv tables with parameters as columns and trials as rows
     sobol      True for the points of a Sobol sequence instead of independent draws
-
-    Raises ValueError if a trial could not be run.
     """
     name, content = scenario_files.text(variant.source)
     overrides, base = variant.overrides(), Draft(name, scenario_files.sections_of(name, content))
@@ -112,14 +108,12 @@ def plan(variant: Variant, runs: int | None = None, vary: Sequence[str] = (), so
 
 
 def _check_names(names: Sequence[str], vary: Sequence[str]) -> None:
-    """Raise ValueError for a parameter that is varied twice."""
     for column in names:
         if names.count(column) > 1 or sum(text.startswith(f'{column}=') for text in vary) > 1:
             raise ValueError(f'--vary {column}: the parameter is varied twice')
 
 
 def _count(runs: int | None, first: int, tables: Iterable[Mapping[str, Sequence[Json]]]) -> int:
-    """Return the number of trials from the seed `first` on. Raises ValueError."""
     if runs is None:
         runs = min((len(values) for table in tables for values in table.values()), default=DEFAULT_RUNS)
     if runs < 1:
@@ -130,7 +124,6 @@ def _count(runs: int | None, first: int, tables: Iterable[Mapping[str, Sequence[
 
 
 def _drawn(text: str) -> tuple[str, Distribution]:
-    """Return node.key and the distribution of the text of a --vary. Raises ValueError."""
     column, equals, distribution = text.partition('=')
     if not equals:
         raise ValueError(f'--vary {text!r}: must be NODE.KEY=DISTRIBUTION or the path of a .csv table')
@@ -141,7 +134,6 @@ def _drawn(text: str) -> tuple[str, Distribution]:
 
 
 def _table(path: str) -> dict[str, list[Json]]:
-    """Return {node.key: values in the trials} of a CSV file. Raises TableError."""
     with csv_table.opened(path) as reader:
         columns: dict[str, list[Json]] = {column: [] for column in reader.fieldnames or ()}
         for row in reader:
@@ -156,7 +148,7 @@ def _table(path: str) -> dict[str, list[Json]]:
 
 
 def _columns(nominal: Scenario, table: Mapping[str, list[Json]], runs: int) -> dict[str, list[Json]]:
-    """Return the columns of a table of trials, cut to the number of trials. Raises ValueError."""
+    """Return the columns of a table of trials, cut to the number of trials."""
     for column, values in table.items():
         field(nominal, column)
         if len(values) < runs:
@@ -174,10 +166,8 @@ def _points(first: int, runs: int, count: int, sobol: bool) -> Floats:
 
 
 def field(nominal: Scenario, column: str, option: str = '--vary') -> dataclasses.Field[Json]:
-    """Return the dataclass field of a parameter node.key, after a check that trials can vary it.
-
-    nominal: scenario of the unvaried trials; option: name of the option for the error. Raises ValueError.
-    """
+    """Return the dataclass field of a parameter node.key, after a check that trials can vary it. nominal: scenario of
+    the unvaried trials; option: for the text of the ValueError."""
     node, _, key = column.partition('.')
     parameters_of(node)
     if node == 'scenario' and key in PLAN_HEADER_KEYS:
@@ -203,7 +193,7 @@ def value_in(nominal: Scenario, column: str) -> Json:
 
 
 def _values(nominal: Scenario, column: str, distribution: Distribution, u: Floats) -> list[Json]:
-    """Return the values of a parameter in the trials, drawn from a distribution at the numbers u (runs,) in 0 to 1."""
+    """Return the values of a parameter in the trials, drawn at the numbers u (runs,) in 0 to 1."""
     whole = field(nominal, column).type is int
     if distribution.factor:
         value = value_in(nominal, column)
@@ -216,18 +206,14 @@ def _values(nominal: Scenario, column: str, distribution: Distribution, u: Float
 
 
 def _rounded(values: Iterable[Json], whole: bool) -> list[Json]:
-    """Return values, rounded if `whole` (for an integer parameter).
-
-    Texts stay unchanged, because the later check of the parameter refuses them.
-    """
+    """Return values, rounded for an integer parameter. Texts stay, because the later check of the parameter refuses
+    them."""
     return [round(value) if whole and isinstance(value, float) else value for value in values]
 
 
 def _check(nominal: Scenario, made: Plan, column: str, distribution: Distribution | None) -> None:
     """Raise ValueError unless each value of a varied parameter is allowed with the other parameters of the scenario.
-
-    nominal: scenario without the variation; distribution: None for a table.
-    """
+    distribution: None for a table."""
     values = made.varied[column]
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
     extremes = [min(values), max(values)] if numbers else list(dict.fromkeys(values))

@@ -1,11 +1,10 @@
-"""Search for the value of a parameter at which the mean of a result over trials reaches a limit.
+"""Search for the value of a parameter at which the mean of a result over trials reaches a limit: `pedestal trials
+--solve PARAMETER --until 'RESULT = LIMIT'`.
 
-This is `pedestal trials --solve PARAMETER --until 'RESULT = LIMIT'`. First the trials run at GRID_COUNT values that
-fill the range of the parameter. If the limit lies between the means at exactly one pair of neighbouring values, the
-search bisects this pair.
-
-Because a drive that trips has no result, it may hide the limit. A search without such a pair therefore bisects between
-the values with a result and their neighbours without a result.
+First the trials run at GRID_COUNT values that fill the range of the parameter. If the limit lies between the means at
+exactly one pair of neighbouring values, the search bisects this pair. Because a drive that trips has no result, it may
+hide the limit. A search without such a pair therefore bisects between the values with a result and their neighbours
+without a result.
 
 The trials at all values have equal seeds and draws. Therefore the mean is a smooth function of the value, except where
 the control law itself has a jump.
@@ -36,10 +35,8 @@ GRID_COUNT, MAX_BISECTIONS = 9, 12  # number of values that fill the range; larg
 BRACKET_TOLERANCE = 0.01
 """Distance of two neighbouring values, divided by the larger absolute value, below which the search ends [-]."""
 MAX_LINEAR_RATIO = 20.0
-"""Largest ratio of the ends of a positive range whose values have equal differences [-].
-
-The values of a wider range have equal ratios.
-"""
+"""Largest ratio of the ends of a positive range whose values have equal differences; a wider range has equal ratios
+[-]."""
 TRACKED_RESULT, MIN_TRACKED_PERCENT = 'tracked_percent', 99.0
 """Result that states the share of a run in autotrack; share below which the found value gets a warning [%]."""
 MIN_MEASURED_SHARE = 0.5
@@ -62,11 +59,8 @@ class Range(NamedTuple):
 
 
 class Tried(NamedTuple):
-    """Trials at one value of the parameter.
-
-    The row is that of the mean (intervals.estimated), with the field `tracked_percent`: mean share of the run in
-    autotrack [%], None where it is not measured.
-    """
+    """Trials at one value of the parameter. The row is that of the mean (intervals.estimated), with the field
+    `tracked_percent`: mean share of the run in autotrack [%], None where it is not measured."""
     value: float
     row: Row            # {} if the scenario refused the value
     why: str            # text of the refusal, or ''
@@ -96,9 +90,7 @@ def goal(text: str, known: Iterable[str]) -> Goal:
 
 
 def search_range(text: str, chosen: Scenario) -> Range:
-    """Return the range of a text NODE.KEY=LOW:HIGH. Raises ValueError.
-
-    The range of a text NODE.KEY is the range of the parameter.
+    """Return the range of a text NODE.KEY=LOW:HIGH, or that of the parameter for a text NODE.KEY. Raises ValueError.
     """
     key, equals, ends = text.partition('=')
     field = plans.field(chosen, key, '--solve')
@@ -118,12 +110,10 @@ def table_prefix(key: str) -> str:
 
 
 def _between(low: float, high: float, ratio: bool) -> float:
-    """Return the middle of two values: the geometric mean if `ratio` is True, else the arithmetic mean."""
     return math.sqrt(low * high) if ratio else 0.5 * (low + high)
 
 
 def _in_ratios(wanted: Range) -> bool:
-    """Return True if the values in a range have equal ratios, see MAX_LINEAR_RATIO."""
     return wanted.low > 0.0 and wanted.high / wanted.low > MAX_LINEAR_RATIO
 
 
@@ -136,12 +126,8 @@ def _grid(wanted: Range) -> list[float]:
 
 
 class Search:
-    """Search over a range for a goal.
-
-    make_plan   make_plan(overrides) returns the plan of the trials with these changed parameters
-    folder      folder of the tables of trials, one table for each value
-    progress    function, see ensemble.run_missing_trials
-    """
+    """Search over a range for a goal. make_plan(overrides) returns the plan of the trials with these changed
+    parameters. The folder gets one table for each value. progress: see ensemble.run_missing_trials."""
 
     def __init__(self, make_plan: Callable[[list[str]], Plan], wanted: Range, aim: Goal, folder: str | pathlib.Path,
                  pool: Pool, progress: Callable[[int, int], object] = lambda done, total: None) -> None:
@@ -150,7 +136,6 @@ class Search:
         self.tried: list[Tried] = []
 
     def _try(self, values: Iterable[float]) -> list[Tried]:
-        """Run the trials at several values at once."""
         made, refused = {}, {}
         for value in values:
             try:
@@ -203,18 +188,14 @@ class Search:
                         f'{statistics.coverage(low.row)} trials{_losses(low, high)}{self._gaps()}')
 
     def _crossings(self, tried: Sequence[Tried]) -> list[tuple[Tried, Tried]]:
-        """Return the pairs of neighbours whose means lie on different sides of the limit.
-
-        A mean equal to the limit counts as above the limit.
-        """
+        """Return the pairs of neighbours whose means lie on different sides of the limit; a mean at the limit counts
+        as above."""
         return [(a, b) for a, b in zip(tried, tried[1:]) if a.measured and b.measured
                 and (a.mean < self._aim.limit) != (b.mean < self._aim.limit)]
 
     def _at_edges(self) -> list[tuple[Tried, Tried]]:
-        """Bisect between each value with the result and a neighbouring value without the result.
-
-        Return the first pairs of `_crossings` that appear, [] if none appears.
-        """
+        """Bisect between each value with the result and a neighbouring value without the result. Return the first
+        pairs of `_crossings` that appear."""
         for a, b in [(a, b) for a, b in zip(self.tried, self.tried[1:]) if a.measured != b.measured]:
             while (middle := self._middle(a, b)) is not None:
                 one, = self._try([middle])
@@ -231,10 +212,8 @@ class Search:
         return None if near or not low.value < middle < high.value else middle
 
     def _bisected(self, low: Tried, high: Tried) -> tuple[Tried, Tried] | None:
-        """Return the narrowest pair around the limit, inside a pair of neighbours.
-
-        Return None if most trials at a value between them have no result.
-        """
+        """Return the narrowest pair around the limit, inside a pair of neighbours; None if most trials at a value
+        between them have no result."""
         for _ in range(MAX_BISECTIONS):
             middle = self._middle(low, high)
             if middle is None:
@@ -249,7 +228,6 @@ class Search:
         return low, high
 
     def _never(self, what: str) -> Solution:
-        """Return the outcome for a result that does not reach its limit."""
         wanted, known = self._wanted, [one for one in self.tried if one.measured]
         text = f'{what} is not reached for {wanted.key} from {wanted.low:g} to {wanted.high:g} {wanted.unit}'.rstrip()
         if known:
@@ -259,13 +237,11 @@ class Search:
 
     def _unsteady(self, what: str, crossings: Iterable[tuple[Tried, Tried]]) -> Solution:
         """Return the outcome for a result that reaches its limit at several values, or next to values without a
-        result.
-        """
+        result."""
         places = ', '.join(f'between {a.value:.4g} and {b.value:.4g}' for a, b in crossings)
         return Solution(math.nan, self.tried, f'{what} is not reached steadily: {places}{self._gaps()}')
 
     def _gaps(self) -> str:
-        """Return the text about the values at which most trials have no result, '' if there are none."""
         parts = []
         for measured, group in itertools.groupby(self.tried, key=lambda one: one.measured):
             values = [f'{one.value:.4g}' for one in group]
@@ -275,7 +251,6 @@ class Search:
 
 
 def _losses(low: Tried, high: Tried) -> str:
-    """Return a warning if the trials at one of two values have lost the target for a part of the time, else ''."""
     known = [one for one in (low, high) if one.row['tracked_percent'] is not None]
     worst = min(known, key=lambda one: one.row['tracked_percent'], default=None)
     if worst is None or worst.row['tracked_percent'] >= MIN_TRACKED_PERCENT:
@@ -284,8 +259,8 @@ def _losses(low: Tried, high: Tried) -> str:
 
 
 def _tracked(table: Table, name: str) -> float | None:
-    """Return the mean of tracked_percent [%] over the trials of a table, for the beam of the result `name`; None if
-    the trials do not measure it."""
+    """Return the mean of tracked_percent [%] for the beam of the result `name`; None if the trials do not measure it.
+    """
     column = f'{nodes.beam_of(name)}/{TRACKED_RESULT}'.lstrip('/')
     values = table.column(column) if column in table.results else np.full(1, math.nan)
     return float(np.nanmean(values)) if np.isfinite(values).any() else None

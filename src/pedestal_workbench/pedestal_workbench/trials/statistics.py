@@ -1,24 +1,16 @@
 """Statistics over trials: percentiles, rates and sensitivities of the results, each with its 95 % interval.
 
-percentile   Percentile of a result. The interval comes from order statistics (scipy.stats.quantile_test), and holds
-             for any distribution of the result.
-rate         Share of the trials for which a statement is true. The interval is that of Clopper and Pearson (Biometrika
-             26 (1934) 404).
+percentile   The interval comes from order statistics (scipy.stats.quantile_test), and holds for any distribution.
+rate         Share of the trials for which a statement is true, with the interval of Clopper and Pearson (Biometrika 26
+             (1934) 404).
 sensitivity  Dependence of a result on a varied parameter. For a parameter with numbers it is Spearman's rank
-             correlation r, from -1 to 1. Its interval is that of Bonett and Wright (Psychometrika 65 (2000) 23), for n
-             trials:
-
-                 tanh(artanh r -+ 1.96 sqrt((1 + r^2 / 2) / (n - 3)))
-
+             correlation r, from -1 to 1, with the interval of Bonett and Wright (Psychometrika 65 (2000) 23) for n
+             trials, tanh(artanh r -+ 1.96 sqrt((1 + r^2 / 2) / (n - 3))).
              A parameter whose values are texts has no order. Its sensitivity is eta squared, from 0 to 1: the share of
              the variance of the result's ranks that the texts explain (Tomczak, Tomczak, Trends in Sport Sciences 1
-             (2014) 19):
-
-                 (H - k + 1) / (n - k)
-
-             H is the statistic of Kruskal and Wallis, k the number of different texts, n the number of trials. The
-             interval is that of an analysis of variance of the ranks, by its noncentral F distribution (Steiger,
-             Psychological Methods 9 (2004) 164).
+             (2014) 19), (H - k + 1) / (n - k). H is the statistic of Kruskal and Wallis, k the number of different
+             texts. The interval is that of an analysis of variance of the ranks, by its noncentral F distribution
+             (Steiger, Psychological Methods 9 (2004) 164).
 """
 import collections
 import math
@@ -72,25 +64,20 @@ TRIAL_QUESTIONS = (
 )
 
 
-_REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')
-"""Pattern of the text of a criterion: name of the result, sign, limit."""
+_REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')  # name of the result, sign, limit
 
 
 def check_result(option: str, name: str, known: Iterable[str]) -> None:
     """Raise ValueError unless a name is in `known`, the names of the results, with or without the name of a beam.
-
-    option: option with its value, for the text of the error.
-    """
+    option: with its value, for the text of the error."""
     if name not in known and name not in map(nodes.plain, known):
         raise ValueError(f'{option}: no trial has a result {name!r};{did_you_mean(name, known)} '
                          '`pedestal run --all --explain` explains the results')
 
 
 def requirement(text: str, known: Iterable[str]) -> Question:
-    """Return the criterion of the user (--require) of a text such as 'pointing_max_deg < 0.1'. Raises ValueError.
-
-    known: names of the results.
-    """
+    """Return the criterion of the user (--require) of a text such as 'pointing_max_deg < 0.1'. Raises ValueError for a
+    result that is not `known`."""
     match = _REQUIRED.fullmatch(text)
     usage = f"--require {text!r}: must be RESULT < LIMIT, with <, <=, > or >=, such as 'pointing_max_deg < 0.1'"
     if not match:
@@ -117,7 +104,6 @@ def of_all(case: str, table: Table, requirements: Iterable[Question] = ()) -> li
 
 
 def _share(question: Question, case: str, table: Table, name: str) -> Row:
-    """Return the row of the share of the trials for which a statement on the column `name` is true."""
     holds = question.holds(table.column(name))
     return intervals.estimated(case_of(case, name)[0], f'{question.name}/rate',
                                rate(int(np.sum(holds)), len(holds)), '%', len(holds))
@@ -131,9 +117,7 @@ def of_requirements(case: str, table: Table, requirements: Iterable[Question]) -
 
 
 def percentile(values: Floats, share: float) -> Estimate:
-    """Return a percentile `share` [%] of values (n,), with its 95 % interval.
-
-    An end is NaN if n is too small for it.
+    """Return a percentile `share` [%] of values (n,), with its 95 % interval. An end is NaN if n is too small for it.
     """
     interval = stats.quantile_test(values, p=share / 100.0).confidence_interval(intervals.CONFIDENCE_LEVEL)
     return np.percentile(values, share), interval.low, interval.high
@@ -146,10 +130,8 @@ def rate(count: int, n: int) -> Estimate:
 
 
 def rank_correlation(x: Floats, y: Floats) -> Estimate:
-    """Return Spearman's rank correlation r of x and y (n,), with its 95 % interval.
-
-    All are NaN if x or y does not vary; the interval is NaN for n below four.
-    """
+    """Return Spearman's rank correlation r of x and y (n,), with its 95 % interval. All are NaN if x or y does not
+    vary; the interval is NaN for n below four."""
     n = len(x)
     if n < 2 or not (np.ptp(x) > 0.0 and np.ptp(y) > 0.0):
         return math.nan, math.nan, math.nan
@@ -161,11 +143,9 @@ def rank_correlation(x: Floats, y: Floats) -> Estimate:
 
 
 def eta_squared(x: Floats, y: Floats) -> Estimate:
-    """Return eta squared of the ranks of y (n,) over the categories x (n,), with its 95 % interval.
-
-    All are NaN if x or y does not vary, or if each trial has a category of its own; the interval is NaN if the
-    categories explain everything.
-    """
+    """Return eta squared of the ranks of y (n,) over the categories x (n,), with its 95 % interval. All are NaN if x
+    or y does not vary, or if each trial has a category of its own; the interval is NaN if the categories explain
+    everything."""
     n, kinds = len(x), np.unique(x)
     k = len(kinds)
     if not 1 < k < n or not np.ptp(y) > 0.0:
@@ -204,11 +184,8 @@ def case_of(case: str, name: str) -> tuple[str, str]:
 
 
 def coverage_fields(table: Table, name: str, known: Bools) -> dict[str, Json]:
-    """Return the fields `of` and `left_out` of a row of --json, which state how many trials have a result.
-
-    name: column of the result; known: mask (n,) of the trials with the result. `of` is the number of all trials.
-    `left_out` is {first word of the column `why`: number of trials}, for the trials without the result.
-    """
+    """Return the fields of a row of --json that state how many trials have a result. `of`: number of all trials;
+    `left_out`: {first word of the column `why`: number of trials}. known: mask (n,) of the trials with the result."""
     words = collections.Counter(why.partition(':')[0] or 'not measured'
                                 for why, is_known in zip(table.text(why_column(name)), known) if not is_known)
     return {'of': known.size, 'left_out': dict(words.most_common())}
@@ -236,10 +213,7 @@ def failures(table: Table) -> str:
 
 
 def of_results(case: str, table: Table) -> list[Row]:
-    """Return the rows of mean, smallest value, percentiles and largest value of each result.
-
-    Each row also has the fields of coverage_fields.
-    """
+    """Return the rows of mean, smallest value, percentiles and largest value of each result, with coverage_fields."""
     found = []
     for name in table.measured_results:
         values = table.column(name)
@@ -264,11 +238,8 @@ def of_questions(case: str, table: Table) -> list[Row]:
 
 
 def of_sensitivity(case: str, table: Table) -> list[Row]:
-    """Return the rows of the sensitivity of each result to each varied parameter.
-
-    The sensitivity is eta_squared for a parameter of texts, else rank_correlation. A result that does not vary has no
-    row.
-    """
+    """Return the rows of the sensitivity of each result to each varied parameter: eta_squared for a parameter of
+    texts, else rank_correlation. A result that does not vary has no row."""
     found = []
     varied = {name: (eta_squared if table.categories(name) else rank_correlation, table.column(name))
               for name in table.varied}
@@ -296,11 +267,9 @@ def ranking(name: str, values: Floats) -> Ints:
 
 
 def ranked_by(table: Table, result: str | None = None) -> str:
-    """Return the column of the result that ranks the trials.
-
-    It is the column of `result`, even if all its values are NaN. With None it is the rms pointing error, or, if no
-    trial has measured that, the rms following error in azimuth. Raises ValueError if no trial has the result.
-    """
+    """Return the column of the result that ranks the trials: that of `result`, even if all its values are NaN. With
+    None it is the rms pointing error, or, if no trial has measured that, the rms following error in azimuth. Raises
+    ValueError if no trial has the result."""
     for name in (result,) if result else ('pointing_rms_deg', 'azimuth_following_rms_deg'):
         for column in table.measured_results:
             if name in (column, nodes.plain(column)) and (result or np.isfinite(table.column(column)).any()):

@@ -37,7 +37,6 @@ def _label(name: str) -> str:
 
 
 def _varying(table: Table, names: Iterable[str]) -> list[tuple[str, Floats]]:
-    """Return [(name, values)] of the columns in names whose values vary."""
     found = [(name, table.column(name)) for name in names]
     return [(name, values) for name, values in found
             if np.isfinite(values).any() and np.ptp(values[np.isfinite(values)]) > 0.0]
@@ -80,11 +79,8 @@ def scatter(found: Found) -> Figure:
 
 
 def worst_and_median(found: Found) -> Figure:
-    """Return the figure with the pointing errors of the worst and of the median trial.
-
-    Without a pointing error it shows the following errors. Both trials run again, because the table does not hold
-    their signals.
-    """
+    """Return the figure with the pointing errors of the worst and of the median trial; without a pointing error, the
+    following errors. Both trials run again, because the table does not hold their signals."""
     # Trials without the result rank as the worst, so the median is that of the trials that have the result.
     known = [i for i in found.places if math.isfinite(found.table.column(found.ranking)[i])] or found.places
     beam = nodes.beam_of(found.ranking)
@@ -139,7 +135,6 @@ def _figures(found: Found) -> list[tuple[Spec, str]]:
 
 
 def _estimates(rows: Sequence[Row], head: Sequence[str]) -> str:
-    """Return an HTML table of rows of --json with their values and intervals; head: its header."""
     lines = [[row['case'], row['metric'], elements.number(row['value'] if row['value'] is not None else math.nan,
                                                           row['unit']),
               '' if row['ci_low'] is None and row['ci_high'] is None else

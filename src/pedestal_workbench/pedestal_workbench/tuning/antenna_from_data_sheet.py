@@ -42,10 +42,8 @@ if typing.TYPE_CHECKING:
     from pedestal_workbench.tuning.loops import Plant
 
 BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033, 0.24
-"""Shares of the phase voltage of a motor [-].
-
-They are the back-EMF at rated speed, and the voltages over resistance and inductance at rated torque.
-"""
+"""Shares of the phase voltage of a motor [-]: back-EMF at rated speed, voltages over resistance and inductance at
+rated torque."""
 
 KNOWN_MIRROR_M = 2.4  # diameter of the mirror for which the C/N0 of the scenarios holds [m] (AntennaParameters)
 RATE_SHARE = 0.9  # share of the rate that an axis reaches, which replaces an unreachable rate of the data sheet [-]
@@ -90,9 +88,7 @@ def axis(sheet: DataSheet, name: str) -> dict[str, float]:
 
 def _softer(name: str, values: Mapping[str, float]) -> dict[str, float]:
     """Return {key: value} of stiffness and damping of the gear meshes, limited for the step of the simulated plant.
-
-    Because the stiffness is scaled with the load, it is too large for small motors under a heavy load.
-    """
+    Because the stiffness is scaled with the load, it is too large for small motors under a heavy load."""
     known, h = getattr(AduParameters(), name), PLANT_PERIOD_S
     J, N = values['load.inertia'], values['gear_train.reducer_ratio'] * known.gear_train.pinion_ratio
     M = mesh_inertia(values['motor_1.inertia'], N, (1.0 - values.get('structure.inertia_share', 0.0)) * J)
@@ -101,10 +97,6 @@ def _softer(name: str, values: Mapping[str, float]) -> dict[str, float]:
 
 
 def _plant(sheet: DataSheet, name: str, values: Mapping[str, float]) -> 'Plant':
-    """Return the plant of the axis `name` with parameters `values` {key: value}.
-
-    Raises ValueError.
-    """
     from pedestal_workbench.tuning import loops
     known = getattr(AduParameters(), name)
     try:
@@ -115,11 +107,8 @@ def _plant(sheet: DataSheet, name: str, values: Mapping[str, float]) -> 'Plant':
 
 
 def attainable(sheet: DataSheet) -> tuple[DataSheet, list[str]]:
-    """Return (data sheet with rates that its axes reach, line about each changed rate).
-
-    Two limits apply to the rate of an axis. The motors must reach it with their voltage, and they must be able to stop
-    the axis from it within half of its travel. Raises ValueError.
-    """
+    """Return (data sheet with rates that its axes reach, line about each changed rate). Two limits apply: the motors
+    must reach the rate with their voltage, and stop the axis from it within half of its travel. Raises ValueError."""
     from pedestal_workbench.tuning import loops
     acu, remarks = scenario.load(sheet.like).node_parameters('acu'), []
     for name in AXES:
@@ -143,7 +132,6 @@ def attainable(sheet: DataSheet) -> tuple[DataSheet, list[str]]:
 
 
 def _motors(name: str, values: Mapping[str, float]) -> Iterator[MotorParameters]:
-    """Yield both motors of an axis by its name and its parameters {key: value}. Raises ParameterError."""
     known = getattr(AduParameters(), name)
     for number in (1, 2):
         own = {key.partition('.')[2]: value for key, value in values.items() if key.startswith(f'motor_{number}.')}
@@ -162,12 +150,10 @@ def cn0(sheet: DataSheet) -> DecibelHertz:
 
 @functools.cache
 def _receiver(name: str) -> TrackingReceiverParameters:
-    """Return the parameters of the receiver in the scenario of this name."""
     return scenario.load(name).node_parameters('tracking_receiver')
 
 
 def _assumed(sheet: DataSheet) -> list[str]:
-    """Return a line for each assumed value."""
     lines = []
     if not sheet.cn0:
         receiver = _receiver(sheet.like).receiver
@@ -181,10 +167,7 @@ def _assumed(sheet: DataSheet) -> list[str]:
 
 
 def sections(sheet: DataSheet, title: str) -> dict[str, dict[str, Json]]:
-    """Return {node: {key: value}} of the scenario; title: of the scenario.
-
-    Raises ValueError.
-    """
+    """Return {node: {key: value}} of the scenario. Raises ValueError."""
     from pedestal_workbench.tuning import loops
     _, content = files.text(sheet.like)
     found = files.by_node(parameter_file.parse(content))
@@ -210,11 +193,8 @@ def sections(sheet: DataSheet, title: str) -> dict[str, dict[str, Json]]:
 
 
 def _at_the_target(sheet: DataSheet, found: Mapping[str, Mapping[str, Json]]) -> dict[str, Radians]:
-    """Return {key of adu: initial angle}, three beamwidths from the predicted target.
-
-    A slow antenna then reaches the target soon. The angles of a wide beam end at the travel of the axis.
-    found: {node: {key: value}} of the scenario.
-    """
+    """Return {key of adu: initial angle}, three beamwidths from the predicted target, so that a slow antenna reaches
+    it soon. The angles of a wide beam end at the travel of the axis. found: {node: {key: value}} of the scenario."""
     chosen = scenario.parse(sheet.like, parameter_file.text(found))
     _, angles = Plan(chosen).tables['']
     travels = [getattr(chosen.node_parameters('adu'), name).limits for name in AXES]
@@ -223,10 +203,8 @@ def _at_the_target(sheet: DataSheet, found: Mapping[str, Mapping[str, Json]]) ->
 
 
 def text(found: Mapping[str, Mapping[str, Json]], head: Iterable[str]) -> str:
-    """Return the text of a scenario file from {node: {key: value}}; head: lines of comment at its beginning.
-
-    Each value has its unit and meaning in a comment.
-    """
+    """Return the text of a scenario file from {node: {key: value}}, with unit and meaning of each value in a comment.
+    head: lines of comment at its beginning."""
     lines = []
     for node, values in found.items():
         fields = dict(flatten(parameters_of(node)))
@@ -240,11 +218,9 @@ def text(found: Mapping[str, Mapping[str, Json]], head: Iterable[str]) -> str:
 
 
 def new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
-    """Return (text of the scenario file, line about each changed or assumed value).
-
-    name: name of the scenario; command: the command line, for the head of the file. Raises ValueError for values
-    that contradict each other, which names the options of `pedestal new` to change.
-    """
+    """Return (text of the scenario file, line about each changed or assumed value). command: the command line, for the
+    head of the file. Raises ValueError for values that contradict each other, which names the options of `pedestal
+    new` to change."""
     try:
         return _new(sheet, name, command)
     except ValueError as error:
@@ -252,8 +228,6 @@ def new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
 
 
 def _new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
-    """Return the values of `new`. Raises ValueError for values that contradict each
-    other."""
     sheet, remarks = attainable(sheet)
     remarks += _assumed(sheet)
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'

@@ -19,7 +19,6 @@ LIGHT_SPEED_M_GHZ = 0.299792458  # speed of light [m GHz]
 MIN_MODE_HZ, MAX_MODE_HZ = 1.0, 200.0  # smallest and largest structural frequency that the simulated plant allows [Hz]
 
 TEMPLATE_SCENARIOS = ('leo_pass', 'geo_station', 'uav_flyby', 'ship_pass', 'ship_uav')
-"""Scenarios from which a new scenario takes its target and its site."""
 
 GRID_COUNT, BISECTIONS, MAX_OPTIONS = 8, 10, 3
 """Number of tried values on each side of the refused value; number of bisections of an edge; largest number of options
@@ -55,7 +54,6 @@ class DataSheet(Parameters):
     like: str = choice('leo_pass', TEMPLATE_SCENARIOS, 'scenario that provides target and site')
 
     def __post_init__(self) -> None:
-        """Check all fields. The range of `mode` excludes the numbers between 0 and the smallest frequency."""
         if self.mode != 0.0 and not MIN_MODE_HZ <= self.mode <= MAX_MODE_HZ:
             raise ParameterError(f'mode = {self.mode:g} Hz: must be {MIN_MODE_HZ:g} to {MAX_MODE_HZ:g}, or 0 for the '
                                  'average of antennas of this diameter')
@@ -63,13 +61,10 @@ class DataSheet(Parameters):
 
     @property
     def structural_frequency(self) -> Hertz:
-        """Lowest frequency of the structure with locked motors.
-
-        Without `mode` it is the average of antennas of this diameter d [m], 20 Hz d^-0.7. Source: W. Gawronski,
-        Control and Pointing Challenges of Antennas and (Radio) Telescopes, IPN Progress Report 42-159 (JPL, 2004), and
-        Modeling and Control of Antennas and Telescopes (Springer, 2008). Because single antennas differ from the
-        average, a measured frequency takes precedence.
-        """
+        """Lowest frequency of the structure with locked motors. Without `mode` it is the average of antennas of this
+        diameter d [m], 20 Hz d^-0.7. Source: W. Gawronski, Control and Pointing Challenges of Antennas and (Radio)
+        Telescopes, IPN Progress Report 42-159 (JPL, 2004), and Modeling and Control of Antennas and Telescopes
+        (Springer, 2008). Because single antennas differ from the average, a measured frequency takes precedence."""
         return self.mode or 20.0 * self.mirror**-0.7
 
     @property
@@ -109,16 +104,13 @@ def refusal(sheet: DataSheet, error: ValueError, make: Callable[[DataSheet], obj
 
 
 def _axis(error: ValueError) -> str:
-    """Return the name of the axis in the text of an error, '' for none."""
     return next((name for name in AXES if f'{name}.' in str(error) or f'adu.{name}:' in str(error)), '')
 
 
 def _edges(name: str, value: float, meta: Mapping[str, Json],
            is_made: Callable[[str, float], bool]) -> tuple[float, float] | None:
-    """Return the lowest and highest accepted value next to a refused value of a field, None if there are none.
-
-    meta: metadata of the field; is_made(name, value) returns True for an accepted value.
-    """
+    """Return the lowest and highest accepted value next to a refused value of a field. meta: metadata of the field;
+    is_made(name, value) returns True for an accepted value."""
     for end in (meta['high'], meta['low'] or 1e-4 * meta['high']):
         refused, accepted, last = value, 0.0, 0.0   # 0: no value was accepted
         for tried in np.geomspace(value, end, GRID_COUNT + 1)[1:].tolist() if end != value else ():
@@ -138,7 +130,6 @@ def _edges(name: str, value: float, meta: Mapping[str, Json],
 
 
 def _bisected(accepted: float, refused: float, is_made: Callable[[float], bool]) -> float:
-    """Return the accepted value next to a refused value."""
     for _ in range(BISECTIONS):
         middle = math.sqrt(accepted * refused)
         accepted, refused = (middle, refused) if is_made(middle) else (accepted, middle)
@@ -146,6 +137,5 @@ def _bisected(accepted: float, refused: float, is_made: Callable[[float], bool])
 
 
 def _rounded(value: float, direction: Callable[[float], int]) -> float:
-    """Return a value with three digits; direction: math.ceil or math.floor."""
     size = 10.0**(math.floor(math.log10(value)) - 2)
     return float(f'{direction(value / size - 1e-9 if direction is math.ceil else value / size + 1e-9) * size:.3g}')

@@ -82,25 +82,18 @@ MAX_BEND_RAD, BEND_SHARE = 0.8e-3, 0.1
 """Largest bend of a structure by the acceleration of the shaper [rad]; its largest ratio to the beamwidth [-]."""
 
 CLOSED_TEETH_SHARE = 0.5
-"""Share of the torque limit that the shaper uses on a flexible structure [-].
-
-Above this torque (`bias.out`) no bias torque keeps the teeth in contact.
-"""
+"""Share of the torque limit that the shaper uses on a flexible structure [-]. Above this torque (`bias.out`) no bias
+torque keeps the teeth in contact."""
 
 MODE_H0, MODE_RATIO, FILTER_RATIO = 0.8, 3.0, 7.0
-"""MODE_H0: h0 of the shaper times the frequency of the structure [-].
-
-MODE_RATIO, FILTER_RATIO: smallest ratios of the frequency of the structure to the crossover of the position loop and
-to the bandwidth of the target filter [-].
-"""
+"""h0 of the shaper times the frequency of the structure; smallest ratios of this frequency to the crossover of the
+position loop and to the bandwidth of the target filter [-]."""
 
 PLANT_CORNERS = tuple((inertia, mode) for inertia in (0.7, 1.3) for mode in (0.8, 1.2))
 """Factors (of the load inertia, of the frequency of the structure) with which the loops must also have their margins
-[-].
-"""
+[-]."""
 
-WORST_SUFFIX = ', worst'
-"""Suffix of the name of a loop in the row of the table with its smallest margins in all PLANT_CORNERS."""
+WORST_SUFFIX = ', worst'  # of the name of a loop, in the row with its smallest margins in all PLANT_CORNERS
 
 NEAR_SHARE = 0.95  # share of a required crossover from which on a loop counts as fast enough [-]
 
@@ -167,10 +160,7 @@ class Plant:
 
     @property
     def gear_inertia(self) -> KilogramMeters2:
-        """Inertia J without the share of the dish.
-
-        One motor moves this inertia above the frequency of the structure.
-        """
+        """Inertia J without the share of the dish, which one motor moves above the frequency of the structure."""
         on_gear = (1.0 - self.axis.structure.inertia_share) * self.axis.load.inertia
         return self.motor_inertia + on_gear / (2.0 * self.ratio**2)
 
@@ -188,10 +178,8 @@ class Plant:
 
 
 def receiver_noise(beamwidth: Radians, slope: float, cn0_dbhz: DecibelHertz) -> float:
-    """Return the root density of the noise of a receiver's error on the beam axis [rad/sqrt(Hz)].
-
-    slope: monopulse slope [-].
-    """
+    """Return the root density of the noise of a receiver's error on the beam axis [rad/sqrt(Hz)]. slope: monopulse
+    slope."""
     return beamwidth / (slope * math.sqrt(2.0 * 10.0**(0.1 * cn0_dbhz)))
 
 
@@ -206,10 +194,8 @@ def filter_gains(plant: Plant) -> dict[str, int]:
 
 
 def rate_slope(plant: Plant) -> RadiansPerSecond2:
-    """Return the largest slope of the rate command (`limits.acceleration`).
-
-    It is 1.3 times the acceleration of the shaper of a rigid axis.
-    """
+    """Return the largest slope of the rate command (`limits.acceleration`): 1.3 times the acceleration of the shaper
+    of a rigid axis."""
     return 1.3 * TORQUE_SHARE * plant.acceleration
 
 
@@ -265,10 +251,8 @@ def smallest(every: Sequence[Margins]) -> Margins:
 
 
 def meets_margins(margins: Margins, required: LoopRequirements) -> bool:
-    """Return True if the margins of a loop meet the requirements.
-
-    A gain margin outside the measured band (NaN) meets its requirement. A loop whose gain is never above 1 has no
-    phase margin (NaN), and does not meet its requirement.
+    """Return True if the margins of a loop meet the requirements. A gain margin outside the measured band (NaN) meets
+    its requirement. A loop whose gain is never above 1 has no phase margin (NaN), and does not meet its requirement.
     """
     phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
     return phase >= required.phase_margin and not gain < required.gain_margin
@@ -283,14 +267,8 @@ class LoopRow(NamedTuple):
 
 
 class Loops:
-    """The loops of a scenario during their design.
-
-    variant     the scenario
-    plants      {axis: its plant}
-    gains       present gains, such as {'adu.azimuth.speed_loop.proportional': value}
-
-    Raises ValueError for a drive without motors.
-    """
+    """The loops of a scenario during their design: the plants {axis: Plant}, and the present gains, such as
+    {'adu.azimuth.speed_loop.proportional': value}. Raises ValueError for a drive without motors."""
 
     def __init__(self, variant: Variant) -> None:
         chosen = variant.load()
@@ -316,7 +294,6 @@ class Loops:
         return self.gains[f'adu.{name}.speed_loop.proportional'] / self.plants[name].gear_inertia
 
     def _measured(self, corner: tuple[float, float] = (1.0, 1.0)) -> Variant:
-        """Return the variant of a measurement; corner: factors for axes with a structure, see PLANT_CORNERS."""
         changed: dict[str, float] = {}
         for name, plant in self.plants.items():
             if plant.mode and corner != (1.0, 1.0):
@@ -325,21 +302,17 @@ class Loops:
         return frequency.moving(self.variant).with_({**self.gains, **changed, **STILL_AIR_PARAMETERS})
 
     def _sweep(self, axis: AxisParameters, sweep: frequency.Sweep, period: Seconds) -> frequency.Sweep:
-        """Return a sweep with limited peak and frequency; period: sampling period of the loop.
-
-        To keep the teeth in contact, the torque of the sweep stays below half of the bias torque. The highest
-        frequency stays below half of the sampling rate.
-        """
+        """Return a sweep with limited peak and frequency; period: sampling period of the loop. To keep the teeth in
+        contact, the torque of the sweep stays below half of the bias torque. The highest frequency stays below half of
+        the sampling rate."""
         peak = 0.5 * axis.bias.torque / max(axis.speed_loop.proportional * axis.gear_train.ratio, 1e-9)
         return dataclasses.replace(sweep, peak=min(sweep.peak, peak or sweep.peak),
                                    highest=min(sweep.highest, 0.475 / period))
 
     def response(self, loop: str, name: str, corner: tuple[float, float] = (1.0, 1.0)) -> frequency.Response | None:
-        """Return the response of a loop of the axis `name` with the present gains, None if the drive trips.
-
-        loop: 'current', 'speed' or 'position'; corner: factors of the plant, see PLANT_CORNERS. For the current loop
-        it is the response of the motor with the smaller phase margin.
-        """
+        """Return the response of a loop (current, speed, position) of the axis `name` with the present gains, None if
+        the drive trips. corner: factors of the plant, see PLANT_CORNERS. For the current loop it is the response of
+        the motor with the smaller phase margin."""
         variant = self._measured(corner)
         drive = variant.load().node_parameters('adu')
         axis = getattr(drive, name)
@@ -362,40 +335,40 @@ class Loops:
         found = self.response(loop, name, corner)
         return frequency.margins(found) if found is not None else None
 
+    def _with_every_plant(self, loop: str, name: str, required: LoopRequirements) -> tuple[list[Margins], str]:
+        """Return (margins with the plant and, for a structure, with all PLANT_CORNERS; text on the first of them that
+        miss the requirements, '' for none)."""
+        every: list[Margins] = []
+        for corner in ((1.0, 1.0), *(PLANT_CORNERS if self.plants[name].mode else ())):
+            margins = self.measured(loop, name, corner)
+            if margins is None:
+                return every, 'the drive trips'
+            if not meets_margins(margins, required):
+                phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
+                return every, f'it has {phase:.3g} deg and {gain:.3g} dB'
+            every.append(margins)
+        return every, ''
+
     def close(self, loop: str, name: str, required: LoopRequirements, set_to: Callable[[RadiansPerSecond], None],
               fastest: RadiansPerSecond) -> tuple[RadiansPerSecond, list[tuple[str, Margins]]]:
-        """Return (w, rows) of the fastest loop that meets the requirements; w: its crossover.
-
-        loop: 'speed' or 'position'; name: axis; set_to: function that sets the gains for a crossover; fastest: first
-        tried crossover.
-        rows: names of the loop and their margins. If a structure is declared, a second row has the smallest margins in
-        all PLANT_CORNERS. Raises ValueError if no tried loop meets the requirements.
-        """
+        """Return (crossover, rows) of the fastest loop, speed or position, that meets the requirements. set_to sets
+        the gains for a crossover; fastest: first tried crossover. A row is the name of the loop and its margins. For a
+        structure, a second row has the smallest margins in all PLANT_CORNERS. Raises ValueError if no tried loop meets
+        the requirements."""
         for w in fastest * SLOWDOWN_FACTOR**np.arange(MAX_SLOWDOWNS):
             set_to(w)
-            every: list[Margins] = []
-            for corner in ((1.0, 1.0), *(PLANT_CORNERS if self.plants[name].mode else ())):
-                margins = self.measured(loop, name, corner)
-                if not (margins and meets_margins(margins, required)):
-                    break
-                every.append(margins)
-            else:
-                return w, [(loop, every[0]), (f'{loop}{WORST_SUFFIX}', smallest(every))][:1 + (len(every) > 1)]
-        found = 'the drive trips'
-        if margins:
-            phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
-            found = f'it has {phase:.3g} deg and {gain:.3g} dB'
+            every, missed = self._with_every_plant(loop, name, required)
+            if not missed:
+                worst = [(f'{loop}{WORST_SUFFIX}', smallest(every))] if len(every) > 1 else []
+                return w, [(loop, every[0]), *worst]
         raise ValueError(f'{self.name}, {name}: the {loop} loop cannot be closed with {required.phase_margin:g} deg '
-                        f'and {required.gain_margin:g} dB: at {w / (2.0 * math.pi):.3g} Hz {found}')
+                         f'and {required.gain_margin:g} dB: at {w / (2.0 * math.pi):.3g} Hz {missed}')
 
 
 def design(loops: Loops, axes: Sequence[str], required: LoopRequirements,
            progress: Callable[[float, str], object]) -> list[LoopRow]:
-    """Design the loops of some axes for the requirements; the gains are then in the loops.
-
-    Return the rows of the table. progress(share of the work that is done, text) is called for each loop. Raises
-    ValueError.
-    """
+    """Design the loops of some axes, whose gains are then in `loops`, and return the rows of the table. Raises
+    ValueError."""
     speed_hz = required.speed or CROSSOVER_RATIO * (required.position or DEFAULT_SPEED_CROSSOVER_HZ / CROSSOVER_RATIO)
     wanted_s = 2.0 * math.pi * speed_hz
     rows, reached = [], {}
@@ -436,10 +409,7 @@ def refuse_outside(loops: Loops) -> None:
 
 
 def table(rows: Iterable[LoopRow], required: LoopRequirements) -> list[str]:
-    """Return the table of the loops as lines of text, with measured and required values.
-
-    rows: as of `design`.
-    """
+    """Return the table of the loops as lines of text, with measured and required values."""
     width = max(20, *(len(f'{name} {loop}') for loop, name, *_ in rows))
     lines = [f'{"loop":{width}} {"required":>9} {"crossover":>10} {"bandwidth":>10} {"phase margin":>21} '
              f'{"gain margin":>20}']
@@ -488,10 +458,7 @@ class LoopOptions:
 
 
 def main(options: LoopOptions, required: LoopRequirements, progress: Callable[[float, str], object]) -> list[str]:
-    """Design the loops, write the parameter file and return the lines to print.
-
-    progress: function, see `design`. Raises ValueError.
-    """
+    """Design the loops, write the parameter file and return the lines to print. Raises ValueError."""
     axes = AXES if options.axis == 'both' else (options.axis,)
     loops = Loops(Variant(options.source, tuple(options.param)))
     file = options.output or pathlib.Path(f'{loops.name}-loops.yaml')

@@ -1,20 +1,15 @@
-"""`pedestal tune`: tune the parameters of the target filter or the gains of the feed-forward of the control unit.
-
-The source is a recording or a scenario:
+"""`pedestal tune`: tune the parameters of the target filter or the gains of the feed-forward of the control unit. The
+source is a recording or a scenario:
 
 filter, from a recording   The unit of the control unit receives the recorded inputs again, as in `pedestal recompute`,
                            with changed parameters. The search maximises the mean log-density log N(nu; 0, S) of the
                            innovations nu of the angle, whose variance by the filter is S. This criterion prefers small
                            innovations and a correct S. To limit the weight of outliers, the log-density falls linearly
-                           beyond HUBER_LIMIT_SIGMAS. Every second piece of the recording, PIECE_LENGTH_S long, is
-                           reserved to validate the result.
+                           beyond HUBER_LIMIT_SIGMAS. Every second piece of the recording is reserved for validation.
 filter, from a scenario    The closed loop runs with given seeds. The search minimises the rms of the true pointing
-                           error of the axis (cross-elevation, elevation) in settled autotrack. A run with another seed
-                           validates the result.
+                           error of the axis in settled autotrack. A run with another seed validates the result.
 feed-forward               The rate loop of the drive is identified (identification.py), which gives the gains k_v of
                            the rate and k_a of the acceleration. The closed loop validates the gains.
-
-The search is that of parameter_search.py. The result is a ROS 2 parameter file for nodes and for `pedestal run`.
 """
 import dataclasses
 import math
@@ -51,7 +46,6 @@ CONVERGENCE_TIME_S, PIECE_LENGTH_S = 1.0, 0.5
 AXES = topics.AXES  # names of the axes
 DEFAULT_SEED_COUNT = 2  # default number of seeds with which a scenario runs for each tried set of parameters
 ESTIMATE_ERRORS = ('estimate_error_cross_elevation_rms_deg', 'estimate_error_elevation_rms_deg')
-"""Results that the table states for a recording."""
 TUNED_UKF_PARAMETERS = ('cv_noise', 'ca_noise', 'dwell')
 """Tuned parameters of tracker.ukf. The other parameters of tracker.ukf have an effect only at the start."""
 
@@ -85,10 +79,8 @@ class Score:
 
 
 def log_density(innovation: Pairs, sigma: Pairs) -> Pairs:
-    """Return the log-density log N(nu; 0, sigma^2) of innovations nu, without its constant.
-
-    sigma: standard deviations of the innovations. Beyond HUBER_LIMIT_SIGMAS the log-density is linear (Huber 1964).
-    """
+    """Return the log-density log N(nu; 0, sigma^2) of innovations nu, without its constant. Beyond HUBER_LIMIT_SIGMAS
+    it is linear (Huber 1964)."""
     z = np.abs(innovation / sigma)
     return -np.where(z <= HUBER_LIMIT_SIGMAS, 0.5 * z * z, HUBER_LIMIT_SIGMAS
                      * (z - 0.5 * HUBER_LIMIT_SIGMAS)) - np.log(sigma)
@@ -102,15 +94,12 @@ def _mean(values: Pairs) -> Pair:
 
 class RecordedSource:
     """A recording as the source of the tuning. The criterion is the negative mean log-density of the innovations.
+    Raises ValueError for too few receiver errors.
 
-    params      parameters of the recorded control unit
-    searched    mask (n,) of the steps in the pieces for the search
-    reserved    mask (n,) of the steps in the pieces for the validation
+    searched, reserved     masks (n,) of the steps in the pieces for the search, for the validation
     ranged      True if the recording has a measured range
     of_beams    True for an array with several beams. Its control units are the nodes `beam_1/acu` and so on. A
                 parameter file for `acu` then serves `pedestal run`, but not `ros2 run`.
-
-    Raises ValueError for too few receiver errors.
     """
 
     criterion_name, unit, kept = 'negative log-likelihood of an error', '', 'on the reserved pieces'
@@ -139,14 +128,10 @@ class RecordedSource:
                             f'{CONVERGENCE_TIME_S + 2.0 * PIECE_LENGTH_S:g} s')
 
     def _innovations(self, steps: Records) -> Floats:
-        """Return (3, n, 2): innovation [rad], its standard deviation [rad] and NIS [-] of both axes.
-
-        steps (n,): outputs of the control unit.
-        """
+        """Return (3, n, 2): innovation [rad], its standard deviation [rad] and NIS [-] of both axes, of n outputs."""
         return np.array([layouts.of_filter(steps, name) for name in ('innovation', 'innovation_sigma', 'nis')])
 
     def _run(self, params: AcuParameters) -> tuple[Unit, Records]:
-        """Return (unit of the control unit, its outputs at each step (n,))."""
         unit = recompute.unit_of(self.recording, 'acu', params)
         return unit, recompute.compute(self.recording, unit, self.feed, requests=self.requests)[0]
 
@@ -171,20 +156,14 @@ class RecordedSource:
 
 
 class SimulatedSource:
-    """A scenario as the source of the tuning. The criterion is the rms pointing error [deg] in the closed loop.
-
-    The criterion counts the steps in settled autotrack, or with any_mode in any mode except standby. The fields
-    params, ranged and of_beams are as in RecordedSource. Raises ValueError if the run is never in such a mode.
-    """
+    """A scenario as the source of the tuning. The criterion is the rms pointing error [deg] in the closed loop, in
+    settled autotrack, or with any_mode in any mode except standby. The fields params, ranged and of_beams are as in
+    RecordedSource. Raises ValueError if the run is never in such a mode."""
 
     criterion_name, unit, kept = 'pointing error rms', 'deg', 'on the reserved seed'
 
     def __init__(self, variant: Variant, runs: int, any_mode: bool) -> None:
-        """Load the scenarios, one for each seed from that of the variant on.
-
-        runs       number of seeds for the search; the next seed validates
-        any_mode   True for all modes except standby
-        """
+        """Load the scenarios, one for each seed from that of the variant on; the seed after `runs` seeds validates."""
         chosen = variant.load()
         self.any_mode = any_mode
         self.of_beams = chosen.prefixes != ('',)
@@ -198,10 +177,8 @@ class SimulatedSource:
             raise ValueError(f'scenario {chosen.name}: never {mode} for more than {HANDOVER_SETTLING_S:g} s')
 
     def runs(self, params: AcuParameters, seeds: Iterable[int]) -> tuple[Records, Records]:
-        """Return (steps, truth) of the settled parts of the runs with these parameters and seeds.
-
-        They are records of closed_loop.STEP and of closed_loop.TRUTH, of all runs one after the other.
-        """
+        """Return (steps, truth) of the settled parts of the runs with these parameters and seeds, all runs one after
+        the other: records of closed_loop.STEP and closed_loop.TRUTH."""
         parts = []
         for seed in seeds:
             run = closed_loop.Loop(self._scenarios[seed], changed={'acu': params}).run()
@@ -238,11 +215,8 @@ def _with_filter(params: AcuParameters, axis: str, changed: FilterParameters) ->
 
 def filters(source: Source, kind: str, axes: Sequence[str],
             progress: Callable[[float, str], object]) -> tuple[AcuParameters, dict[str, Json]]:
-    """Return (parameters with the tuned filter, {name: value} of the tuned parameters).
-
-    kind: kind of the filter; axes: names of the tuned axes; progress: progress(share of the work that is done, text).
-    Raises ValueError.
-    """
+    """Return (parameters with the tuned filter, {name: value} of the tuned parameters). progress(share of the work
+    that is done, text). Raises ValueError."""
     count = 0
 
     def counted(criterion: float, part: int) -> float:
@@ -288,17 +262,13 @@ def filters(source: Source, kind: str, axes: Sequence[str],
 
 
 def _rounded(params: _Params, names: Iterable[str]) -> _Params:
-    """Return parameters, in which those of some names are rounded to four digits."""
     values = parameters.as_dict(params)
     return parameters.build(type(params), {**values, **{name: float(f'{values[name]:.4g}') for name in names}})
 
 
 def feedforward(chosen: Scenario, source: Source, axes: Iterable[str],
                 progress: Callable[[float, str], object]) -> tuple[AcuParameters, dict[str, float]]:
-    """Return (parameters with identified feed-forward gains, {name: value} of the gains).
-
-    chosen: scenario whose drive is identified; axes: names of the tuned axes.
-    """
+    """Return (parameters with identified feed-forward gains, {name: value} of the gains)."""
     progress(0.1, 'identifying the rate loop')
     loops, params = identification.identify(chosen), source.params
     settings: dict[str, float] = {}
@@ -347,7 +317,6 @@ def main(options: TuneOptions, progress: Callable[[float, str], object]) -> list
 
 
 def _check(options: TuneOptions, is_bag: bool, file: pathlib.Path) -> None:
-    """Raise ValueError for options that do not fit together, or for an existing file."""
     if options.filter is not None and options.filter not in FILTER_KINDS:
         raise ValueError(f'--filter {options.filter}: must be one of {", ".join(FILTER_KINDS)}')
     if is_bag and options.feedforward:
@@ -364,7 +333,6 @@ def _check(options: TuneOptions, is_bag: bool, file: pathlib.Path) -> None:
 
 
 def _table(source: Source, old: Score, new: Score, axes: Collection[str]) -> list[str]:
-    """Return lines that compare the old with the new score."""
     rows = []
     for i, axis in enumerate(AXES):
         if axis in axes:
@@ -377,7 +345,6 @@ def _table(source: Source, old: Score, new: Score, axes: Collection[str]) -> lis
 
 
 def _remarks(source: Source, old: Score, new: Score, axes: Iterable[str], settings: Mapping[str, Json]) -> list[str]:
-    """Return lines with reasons to doubt the result."""
     doubts = []
     for axis in axes:
         i = AXES.index(axis)
