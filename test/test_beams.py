@@ -118,7 +118,7 @@ def test_a_beam_has_the_beamwidth_of_its_own_antenna(views):
 def test_a_node_of_another_beam_is_not_recomputed(runs):
     recording = recompute.FedRecording(runs['four'].bag, beam='beam_2')
     assert recompute.chosen(recording, ['beam_2/acu'], None) == ['acu']
-    with pytest.raises(recompute.RecomputeError, match='--node beam_3/acu: .* use --beam beam_3 --node acu'):
+    with pytest.raises(ValueError, match='--node beam_3/acu: .* use --beam beam_3 --node acu'):
         recompute.chosen(recording, ['beam_3/acu'], None)
 
 

@@ -71,7 +71,7 @@ def bode_study(source: str, progress: Progress) -> Result:
             found = plant.response(loop, name)
             if found is None:
                 raise ValueError(f'{plant.name}, {name}: the drive trips during the measurement of its {loop} '
-                                      'loop')
+                                 'loop')
             responses[f'{loop}/{name}'] = found
 
     def drawn(loop: str) -> Callable[[], Figure]:

@@ -19,10 +19,10 @@ from pedestal_workbench.again import recompute
 
 
 def parameters_of(recording: recompute.FedRecording) -> MonopulseParameters:
-    """Return the parameters of the receiver of a recording. Raises RecomputeError for another receiver."""
+    """Return the parameters of the receiver of a recording. Raises ValueError for another receiver."""
     if not recording.bag.iq:
-        raise recompute.RecomputeError(f'{recording.bag.path}: --iq: the receiver of this recording had no I/Q '
-                                       'samples')
+        raise ValueError(f'{recording.bag.path}: --iq: the receiver of this recording had no I/Q '
+                         'samples')
     parameters = recompute.parameters_of(recording, nodes.MONOPULSE_RECEIVER.name)
     assert isinstance(parameters, MonopulseParameters)
     return parameters
@@ -64,7 +64,7 @@ def main(bag: pathlib.Path, samples: pathlib.Path) -> tuple[list[str], list[Row]
     recording = recompute.FedRecording(bag)
     node = nodes.MONOPULSE_RECEIVER.name
     if not recording.has(ANGLE_ERROR_TOPIC):
-        raise recompute.RecomputeError(f'{bag}: no {ANGLE_ERROR_TOPIC} in the bag')
+        raise ValueError(f'{bag}: no {ANGLE_ERROR_TOPIC} in the bag')
     parameters = parameters_of(recording)
     file = sigmf.Recording(samples, parameters.feed.channels, parameters.source.rate)
     found, _ = angle_errors(file, parameters, recording.bag.start)

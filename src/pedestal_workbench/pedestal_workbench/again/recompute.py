@@ -53,10 +53,6 @@ def publishing_node(topic: str) -> nodes.Node:
     return next(node for node in nodes.NODES if topic in (*node.writes, node.replies))
 
 
-class RecomputeError(ValueError):
-    """Error of a bag without the data for a recomputation, or of an option that does not fit. Its text is one line."""
-
-
 Values: TypeAlias = Mapping[str, Mapping[str, Json]]    # parameters: {node: {dotted name: value}}
 Made: TypeAlias = dict[int, list[tuple[commands.Command, bool]]]    # {step: [(request, True if granted)]}
 # step that follows a message, its topic and index; no step waits for the message
@@ -108,23 +104,23 @@ class FedRecording:
         return rows.publish if 'pacing' in self.bag.metadata else (rows.chunk << 40) + rows.start
 
     def data(self, topic: str) -> list[bytes]:
-        """Return the CDR bytes of the messages of a topic. Raises RecomputeError for another type."""
+        """Return the CDR bytes of the messages of a topic. Raises ValueError for another type."""
         if topic not in self._data:
             wanted, source = topics.TOPIC_BY_NAME[topic].type, self.source(topic)
             if self.bag.topics[source] != wanted:
-                raise RecomputeError(f'{self.bag.path}: {source} is {self.bag.topics[source]}; must be {wanted}')
+                raise ValueError(f'{self.bag.path}: {source} is {self.bag.topics[source]}; must be {wanted}')
             self._data[topic] = [data for _, _, _, data in self.bag.raw(source)]
         return self._data[topic]
 
     def output(self, topic: str) -> difference.Output:
-        """Return the messages of a topic as an Output of numbers or texts. Raises RecomputeError."""
+        """Return the messages of a topic as an Output of numbers or texts. Raises ValueError."""
         if topic not in self._outputs:
             try:
                 output = difference.recorded(self.data(topic), self.rows(topic).log, topic)
                 self._outputs[topic] = dataclasses.replace(output, stamps=(
                     output.stamps - self.bag.start if output.texts is None else self.steps(topic)))
             except ValueError as error:
-                raise RecomputeError(f'{self.bag.path}: {topic}: {error}') from None
+                raise ValueError(f'{self.bag.path}: {topic}: {error}') from None
         return self._outputs[topic]
 
     def steps(self, topic: str) -> Stamps:
@@ -148,7 +144,7 @@ class FedRecording:
         """Return the commands in a topic of replies, by step.
 
         stamps: of the steps; a step is an index of them. Because the unit makes the commands of
-        schedules by itself, from its parameters, these are left out. Raises RecomputeError.
+        schedules by itself, from its parameters, these are left out. Raises ValueError.
         """
         found: dict[int, list[commands.Command]] = {}
         rows = np.searchsorted(stamps, self.steps(topic)).tolist() if self.has(topic) else ()
@@ -156,7 +152,7 @@ class FedRecording:
             try:
                 command, _ = commands.of_reply(messages.deserialize(data, topics.TOPIC_BY_NAME[topic].type))
             except ValueError as error:
-                raise RecomputeError(f'{self.bag.path}: {topic}: {error}') from None
+                raise ValueError(f'{self.bag.path}: {topic}: {error}') from None
             if command.who != commands.SCHEDULE_CLIENT:
                 found.setdefault(step, []).append(command)
         return found
@@ -189,7 +185,7 @@ def feed(recording: FedRecording, unit: Unit) -> Feed:
     """Return the Feed of a unit: the recorded inputs, matched to the steps of the unit.
 
     The drive makes the steps itself, at the stamps of the recorded clock. Without a recorded clock, the stamps of
-    joint_states take their place. Raises RecomputeError if an input is missing.
+    joint_states take their place. Raises ValueError if an input is missing.
     """
     paces = unit.trigger in unit.NODE.writes
     trigger = unit.NODE.writes[0] if paces and not recording.has(unit.trigger) else unit.trigger
@@ -197,7 +193,7 @@ def feed(recording: FedRecording, unit: Unit) -> Feed:
     names = [trigger, *latencies]
     for name in names:
         if not recording.feeds(name):
-            raise RecomputeError(f'{recording.bag.path}: no {name} in the bag, an input of the node')
+            raise ValueError(f'{recording.bag.path}: no {name} in the bag, an input of the node')
     parts = [recording.output(name).stamps for name in names]
     sources = np.concatenate([np.full(len(part), number) for number, part in enumerate(parts)])
     rows = np.concatenate([np.arange(len(part)) for part in parts])
@@ -399,20 +395,20 @@ def chosen(recording: FedRecording, names: Iterable[str], file_values: Values | 
 
     A recording allows a node if it contains parameters, inputs and outputs of the node; the ACU needs no outputs. A
     recording without any parameters allows the ACU only. file_values: parameters in place of the recorded ones.
-    Raises RecomputeError.
+    Raises ValueError.
     """
     names = [name.removeprefix(recording.bag.beam) for name in names]
     for name in names:
         if nodes.beam_of(name):
-            raise RecomputeError(f'--node {name}: only one beam can be recomputed at a time; use --beam '
-                                 f'{nodes.beam_of(name)} --node {nodes.plain(name)}')
+            raise ValueError(f'--node {name}: only one beam can be recomputed at a time; use --beam '
+                             f'{nodes.beam_of(name)} --node {nodes.plain(name)}')
         if name not in RECOMPUTABLE_NODES:
-            raise RecomputeError(f'--node {name}: must be one of {", ".join(RECOMPUTABLE_NODES)}')
+            raise ValueError(f'--node {name}: must be one of {", ".join(RECOMPUTABLE_NODES)}')
         if name == nodes.DRIVE_NODE and recording.bag.servo:
-            raise RecomputeError(f'--node {name}: the drives of this recording were on a bus, which is not recorded')
+            raise ValueError(f'--node {name}: the drives of this recording were on a bus, which is not recorded')
         if name == nodes.MONOPULSE_RECEIVER.name and recording.bag.iq:
-            raise RecomputeError(f'--node {name}: the I/Q samples of this recording are not in the bag; give their '
-                                 'file with --iq')
+            raise ValueError(f'--node {name}: the I/Q samples of this recording are not in the bag; give their '
+                             'file with --iq')
     known = file_values if file_values is not None else recording.bag.configuration['parameters']
 
     def able(name: str) -> bool:
@@ -424,8 +420,8 @@ def chosen(recording: FedRecording, names: Iterable[str], file_values: Values | 
         return begun and name in (known or ('acu',)) and (name == 'acu' or any(map(recording.has, row.writes)))
     selected = [name for name in RECOMPUTABLE_NODES if (name in names if names else able(name))]
     if not selected:
-        raise RecomputeError(f'{recording.bag.path}: the bag has the inputs of no node; its topics are '
-                             f'{", ".join(recording.bag.topics)}')
+        raise ValueError(f'{recording.bag.path}: the bag has the inputs of no node; its topics are '
+                         f'{", ".join(recording.bag.topics)}')
     return selected
 
 
@@ -446,7 +442,7 @@ def file_parameters(path: str | pathlib.Path, beam: str = '') -> Values:
 def overrides(texts: Iterable[str], names: Sequence[str]) -> dict[str, dict[str, Json]]:
     """Return the parameters in texts node.key=value; names: the recomputed nodes.
 
-    With only one node, a text may leave out its name. Raises RecomputeError.
+    With only one node, a text may leave out its name. Raises ValueError.
     """
     found: dict[str, dict[str, Json]] = {}
     for text in texts:
@@ -454,7 +450,7 @@ def overrides(texts: Iterable[str], names: Sequence[str]) -> dict[str, dict[str,
             text = f'{names[0]}.{text}'
         node, key, value = files.parse_override(text)
         if node not in names:
-            raise RecomputeError(f'--param {text}: {node} is not recomputed; must be one of {", ".join(names)}')
+            raise ValueError(f'--param {text}: {node} is not recomputed; must be one of {", ".join(names)}')
         found.setdefault(node, {})[key] = value
     return found
 
@@ -464,7 +460,7 @@ def parameters_of(recording: FedRecording, node: str, file_values: Values | None
     """Return the parameters of a node: those of the file or, without a file, the recorded ones.
 
     file_values: of the file; changes: {key: value} that replace them. A parameter
-    without a value has its default. Raises RecomputeError.
+    without a value has its default. Raises ValueError.
     """
     values = (file_values if file_values is not None else recording.bag.configuration['parameters']).get(node, {})
     values = {key: value for key, value in values.items() if not key.startswith('graph.')}
@@ -474,7 +470,7 @@ def parameters_of(recording: FedRecording, node: str, file_values: Values | None
         params.check_graph(recording.bag.beams, recording.bag.metadata.get('pacing') == 'lockstep')
         return params
     except parameters.ParameterError as error:
-        raise RecomputeError(f'{node}: {error}') from None
+        raise ValueError(f'{node}: {error}') from None
 
 
 def measure(path: str | pathlib.Path, node: str = 'acu') -> float:

@@ -59,10 +59,10 @@ def main(options: RecomputeOptions) -> tuple[list[str], list[Row], bool]:
     if changes:
         unchanged = [name for name in nodes if options.node and name not in changes]
         if unchanged:
-            raise recompute.RecomputeError(f'--node {unchanged[0]}: has no effect, because no --param is of it')
+            raise ValueError(f'--node {unchanged[0]}: has no effect, because no --param is of it')
         nodes = list(changes)
     if options.output and options.output.exists():
-        raise recompute.RecomputeError(f'--output {options.output} exists already; a recording is never overwritten')
+        raise ValueError(f'--output {options.output} exists already; a recording is never overwritten')
     reports = [_node_report(recording, node, given, changes.get(node), options) for node in nodes]
     lines: list[str] = []
     for report in reports:

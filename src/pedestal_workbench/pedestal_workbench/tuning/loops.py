@@ -135,7 +135,7 @@ class Plant:
     def __post_init__(self) -> None:
         if self.acceleration <= 0.0:
             raise ValueError(f'adu.{self.name}: the motors cannot move the axis: friction, unbalance and wind need '
-                            'more torque than both torque limits')
+                             'more torque than both torque limits')
 
     @property
     def motor_inertia(self) -> KilogramMeters2:

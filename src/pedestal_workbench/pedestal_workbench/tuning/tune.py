@@ -125,7 +125,7 @@ class RecordedSource:
         self.searched, self.reserved = counted & even, counted & ~even
         if not (self.searched.any() and self.reserved.any()):
             raise ValueError(f'{path}: receiver errors span {np.ptp(t[compared]):.3g} s; must be at least '
-                            f'{CONVERGENCE_TIME_S + 2.0 * PIECE_LENGTH_S:g} s')
+                             f'{CONVERGENCE_TIME_S + 2.0 * PIECE_LENGTH_S:g} s')
 
     def _innovations(self, steps: Records) -> Floats:
         """Return (3, n, 2): innovation [rad], its standard deviation [rad] and NIS [-] of both axes, of n outputs."""
@@ -233,7 +233,7 @@ def filters(source: Source, kind: str, axes: Sequence[str],
     if kind == 'imm_ukf':
         if not source.ranged:
             raise ValueError('--filter imm_ukf: needs a measured range (tracking_receiver.receiver.ranging.measured); '
-                            'without range the filter equals imm')
+                             'without range the filter equals imm')
         rows = [AXES.index(axis) for axis in axes]
 
         def with_ukf(ukf: UkfParameters) -> AcuParameters:
