@@ -20,7 +20,8 @@ if typing.TYPE_CHECKING:    # these imports are slow, and most verbs need none o
     from types import ModuleType
 
     from rich import progress
-    from rich.console import JustifyMethod
+    from rich.table import Table as RichTable
+    from rich.text import TextType
 
     from pedestal_common.quantities import Row, Seconds
     from pedestal_results.results import Result, Values
@@ -67,39 +68,34 @@ def _bar(columns: Callable[[ModuleType], _Columns], advance: Callable[..., None]
 
 def progress_of_run(duration: Seconds) -> AbstractContextManager[Callable[..., None]]:
     """Return a context with a function progress(time of the run): a bar on a terminal, nothing in a pipe."""
-    def columns(rich: ModuleType) -> _Columns:
-        return (rich.TextColumn('{task.description}'), rich.BarColumn(),
-                rich.TextColumn('{task.completed:.0f} / {task.total:.0f} s'), rich.TimeElapsedColumn())
-
     def advance(bar: progress.Progress, task: progress.TaskID, seconds: Seconds) -> None:
         bar.update(task, completed=seconds, description='running' if seconds > 0.0 else None)
-    return _bar(columns, advance, 'starting nodes (the first start compiles the laws)', duration)
+    return _bar(lambda rich: (rich.TextColumn('{task.description}'), rich.BarColumn(),
+                              rich.TextColumn('{task.completed:.0f} / {task.total:.0f} s'), rich.TimeElapsedColumn()),
+                advance, 'starting nodes (the first start compiles the laws)', duration)
 
 
 def progress_of_share() -> AbstractContextManager[Callable[..., None]]:
     """Return a context with a function progress(share of the work that is done [-], text): a bar on a terminal,
     nothing in a pipe."""
-    def columns(rich: ModuleType) -> _Columns:
-        return rich.BarColumn(), rich.TextColumn('{task.description}'), rich.TimeElapsedColumn()
-
     def advance(bar: progress.Progress, task: progress.TaskID, share: float, text: str) -> None:
         bar.update(task, completed=share, description=text)
-    return _bar(columns, advance, 'compiling the laws (first time only)', 1.0)
+    return _bar(lambda rich: (rich.BarColumn(), rich.TextColumn('{task.description}'), rich.TimeElapsedColumn()),
+                advance, 'compiling the laws (first time only)', 1.0)
 
 
 def progress_of_trials() -> AbstractContextManager[Callable[..., None]]:
     """Return a context with a function progress(trials done, all trials): a bar with the rate of the trials and the
     remaining time on a terminal, nothing in a pipe."""
-    def columns(rich: ModuleType) -> _Columns:
-        return (rich.BarColumn(), rich.MofNCompleteColumn(), rich.TextColumn('trials, {task.fields[rate]}'),
-                rich.TimeElapsedColumn(), rich.TextColumn('left'), rich.TimeRemainingColumn())
-
     def advance(bar: progress.Progress, task: progress.TaskID, done: int, total: int) -> None:
         speed = bar.tasks[0].speed
         bar.update(task, completed=done, total=total)
         if speed:
             bar.update(task, rate=f'{speed:.1f} a second')
-    return _bar(columns, advance, '', rate='compiling the laws (first time only)')
+    return _bar(lambda rich: (rich.BarColumn(), rich.MofNCompleteColumn(),
+                              rich.TextColumn('trials, {task.fields[rate]}'), rich.TimeElapsedColumn(),
+                              rich.TextColumn('left'), rich.TimeRemainingColumn()),
+                advance, '', rate='compiling the laws (first time only)')
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
@@ -206,30 +202,36 @@ def explain(table: Iterable[Result], names: Container[str]) -> None:
     show_list((row.name, row.sentence) for row in table if row.name in names)
 
 
-def show_study(title: str, rows: Iterable[Row], missed: Callable[[Row], bool]) -> None:
-    """Print the rows of a study as a table; missed: function that returns True for a row that misses its target."""
+def _table(title: TextType | None, heads: Iterable[str], left: Container[str]) -> RichTable:
+    """Return an empty table; left: heads of the columns that are not aligned to the right."""
     from rich.box import SIMPLE_HEAD
-    from rich.console import Console
     from rich.table import Table
     table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    heads: tuple[tuple[str, JustifyMethod], ...] = (
-        ('case', 'left'), ('metric', 'left'), ('paper', 'right'), ('ours', 'right'), ('95 % interval', 'right'),
-        ('target', 'left'), ('unit', 'left'), ('', 'left'))
-    for name, justify in heads:
-        table.add_column(name, justify=justify, no_wrap=True)
+    for name in heads:
+        table.add_column(name, justify='left' if name in left else 'right', no_wrap=True)
+    return table
+
+
+def _print(table: RichTable, more: int = 0) -> None:
+    """Print a table at least MIN_TABLE_COLUMNS wide; more: further columns."""
+    from rich.console import Console
+    Console(width=max(Console().width, MIN_TABLE_COLUMNS + more)).print(table)
+
+
+def show_study(title: str, rows: Iterable[Row], missed: Callable[[Row], bool]) -> None:
+    """Print the rows of a study as a table; missed: function that returns True for a row that misses its target."""
+    table = _table(title, ('case', 'metric', 'paper', 'ours', '95 % interval', 'target', 'unit', ''),
+                   left=('case', 'metric', 'target', 'unit', ''))
     for row in rows:
         table.add_row(row['case'], row['metric'], number(row['paper']), number(row['value']), interval(row),
                       row['target'] or '', row['unit'], 'MISSED' if missed(row) else '')
-    Console(width=max(Console().width, MIN_TABLE_COLUMNS)).print(table)
+    _print(table)
 
 
 def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None = None) -> None:
     """Print the statistics of results over trials as a table. rows: of trials.statistics and trials.comparison;
     metrics: names of the printed results in their order, None for all. The rows of a comparison are printed for the
     first of these results only."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
     from rich.text import Text
 
     from pedestal_workbench.trials.statistics import coverage
@@ -244,9 +246,8 @@ def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None =
         elif key in ('rate', 'difference', 'gain', 'wins') and (metrics is None or metric == metrics[0]):
             others.append(row)
     order = metrics or list(dict.fromkeys(metric for _, metric, _ in of_results))
-    table = Table(title=Text(title), title_justify='left', box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    for name in ('result', 'case', 'mean', '95 % interval', '5 %', 'median', '95 %', 'largest', 'trials', 'unit'):
-        table.add_column(name, justify='left' if name in ('case', 'result', 'unit') else 'right', no_wrap=True)
+    table = _table(Text(title), ('result', 'case', 'mean', '95 % interval', '5 %', 'median', '95 %', 'largest',
+                                 'trials', 'unit'), left=('case', 'result', 'unit'))
     for case, metric, unit in sorted(of_results, key=lambda key: order.index(key[1])):
         found = of_results[case, metric, unit]
         mean = found['mean']
@@ -255,22 +256,15 @@ def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None =
     for row in others:
         table.add_row(row['metric'], row['case'], number(row['value']), interval(row), '', '', '', '',
                       coverage(row), row['unit'])
-    longest = max((len(row['case']) for row in rows), default=0)
-    Console(width=max(Console().width, MIN_TABLE_COLUMNS + longest)).print(table)
+    _print(table, max((len(row['case']) for row in rows), default=0))
 
 
 def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:
     """Print the values that a search has tried, in rising order, with the mean of the result at each. key: parameter.
     """
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-
     from pedestal_workbench.trials.solve import reason
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    for name in (f'{key} {f"[{unit}]" if unit else ""}'.strip().replace('[', r'\['), 'mean', '95 % interval', 'unit',
-                 'tracked', 'trials'):
-        table.add_column(name, justify='left' if name in ('unit', 'trials') else 'right', no_wrap=True)
+    value = f'{key} {f"[{unit}]" if unit else ""}'.strip().replace('[', r'\[')
+    table = _table(None, (value, 'mean', '95 % interval', 'unit', 'tracked', 'trials'), left=('unit', 'trials'))
     for one in tried:
         cells = ('', '', '', '')
         if one.row:
@@ -278,4 +272,4 @@ def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:
             cells = (number(one.row['value']), interval(one.row), one.row['unit'],
                      '' if share is None else f'{share:.3g} %')
         table.add_row(f'{one.value:.6g}', *cells, reason(one))
-    Console(width=max(Console().width, MIN_TABLE_COLUMNS)).print(table)
+    _print(table)

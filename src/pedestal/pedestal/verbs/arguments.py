@@ -76,12 +76,6 @@ def add_beam(parser: argparse.ArgumentParser) -> None:
                         'for example beam_2; default: the first')
 
 
-def add_vector(parser: argparse.ArgumentParser) -> None:
-    """Add --vector FORMAT for a verb that draws figures."""
-    parser.add_argument('--vector', choices=('pdf', 'svg'), help='additional vector format in which each figure is '
-                        'written, for print')
-
-
 def add_new_bag(parser: argparse.ArgumentParser) -> None:
     """Add --bag DIR for the recording of a run."""
     parser.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='output directory of the new recording; '

@@ -131,7 +131,8 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
                         'studies/NAME')
     parser.add_argument('--runs', type=int, metavar='N', help='number of runs of each case; default: set by the '
                         'study')
-    arguments.add_vector(parser)
+    parser.add_argument('--vector', choices=('pdf', 'svg'), help='additional vector format in which each figure is '
+                        'written, for print')
     parser.add_argument('--scenario', metavar='SCENARIO', help='scenario (name or .yaml file) whose plant '
                         'replaces the plant of the paper, for studies servo, backlash and bode')
     arguments.add_workers(parser)

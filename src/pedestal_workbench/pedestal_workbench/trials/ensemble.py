@@ -7,7 +7,7 @@ ROS, which has the same data as the lockstep recording of the trial's command. T
 import contextlib
 import functools
 import pathlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -41,11 +41,7 @@ def open_table(plan: Plan, folder: str | pathlib.Path, name: str = 'trials') -> 
     heads = [f'{prefix}{result}' for prefix in prefixes for result in TRIAL_RESULTS]
     return Table(folder, name, {**plan.identity, 'sources': monte_carlo.sources()}, plan.varied, heads,
                  [f'{prefix}{WHY}' for prefix in prefixes],
-                 [[plan.seed + i, *own] for i, own in enumerate(_drawn(plan))])
-
-
-def _drawn(plan: Plan) -> Iterable[Sequence[Json]]:
-    return zip(*plan.varied.values()) if plan.varied else [()] * plan.runs
+                 [[plan.seed + i, *(values[i] for values in plan.varied.values())] for i in range(plan.runs)])
 
 
 @contextlib.contextmanager
@@ -90,16 +86,14 @@ def _batch(plan: Plan) -> list[list[Json]]:
     return [values + why for values, why in zip(found, whys)]
 
 
-def _batch_size(plan: Plan) -> int:
-    return max(MIN_BATCH_TRIALS, side_by_side.max_parallel_trials(plan.scenario(0), MEASURED_TOPICS))
-
-
 def run_missing_trials(plans: Sequence[Plan], tables: Sequence[Table], pool: monte_carlo.Pool,
                        progress: Callable[[int, int], object] = lambda done, total: None) -> None:
     """Run the trials of plans that are missing in their tables, and append their rows to the tables. The batches of
     several plans alternate, so all plans advance together. progress(trials done, all trials) is called after each
     batch. Raises ValueError that names a trial."""
-    pieces, size = [], min(map(_batch_size, plans))
+    pieces = []
+    size = max(MIN_BATCH_TRIALS, min(side_by_side.max_parallel_trials(plan.scenario(0), MEASURED_TOPICS)
+                                     for plan in plans))
     for first in range(0, max(plan.runs for plan in plans), size):
         for plan, table in zip(plans, tables):
             numbers = range(max(first, len(table.rows)), min(first + size, plan.runs))

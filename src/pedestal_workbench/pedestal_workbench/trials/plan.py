@@ -87,7 +87,10 @@ def plan(variant: Variant, runs: int | None = None, vary: Sequence[str] = (), so
     first = nominal.header.seed
     tables = [_table(path) for path in vary if path.endswith('.csv') and '=' not in path]
     drawn = dict(_drawn(text) for text in vary if '=' in text or not text.endswith('.csv'))
-    _check_names([*drawn, *(column for table in tables for column in table)], vary)
+    names = [*drawn, *(column for table in tables for column in table)]
+    for column in names:
+        if names.count(column) > 1 or sum(text.startswith(f'{column}=') for text in vary) > 1:
+            raise ValueError(f'--vary {column}: the parameter is varied twice')
     runs = _count(runs, first, tables)
     if sobol and not drawn:
         raise ValueError('--sobol: needs at least one --vary NODE.KEY=DISTRIBUTION')
@@ -105,12 +108,6 @@ def plan(variant: Variant, runs: int | None = None, vary: Sequence[str] = (), so
     for column in varied:
         _check(nominal, made, column, drawn.get(column))
     return made
-
-
-def _check_names(names: Sequence[str], vary: Sequence[str]) -> None:
-    for column in names:
-        if names.count(column) > 1 or sum(text.startswith(f'{column}=') for text in vary) > 1:
-            raise ValueError(f'--vary {column}: the parameter is varied twice')
 
 
 def _count(runs: int | None, first: int, tables: Iterable[Mapping[str, Sequence[Json]]]) -> int:

@@ -109,10 +109,6 @@ def table_prefix(key: str) -> str:
     return f'solve_{key.replace("/", "_")}_'
 
 
-def _between(low: float, high: float, ratio: bool) -> float:
-    return math.sqrt(low * high) if ratio else 0.5 * (low + high)
-
-
 def _in_ratios(wanted: Range) -> bool:
     return wanted.low > 0.0 and wanted.high / wanted.low > MAX_LINEAR_RATIO
 
@@ -144,16 +140,13 @@ class Search:
                 refused[value] = str(error)
         found = [Tried(value, {}, text, False) for value, text in refused.items()]
         with contextlib.ExitStack() as stack:
-            tables = [stack.enter_context(ensemble.open_table(plan, self._folder, self._name(value)))
-                      for value, plan in made.items()]
+            tables = [stack.enter_context(ensemble.open_table(
+                plan, self._folder, f'{table_prefix(self._wanted.key)}{value!r}')) for value, plan in made.items()]
             if tables:
                 ensemble.run_missing_trials(list(made.values()), tables, self._pool, self._progress)
         found += [self._tried(value, table) for value, table in zip(made, tables)]
         self.tried = sorted((*self.tried, *found), key=lambda one: one.value)
         return sorted(found, key=lambda one: one.value)
-
-    def _name(self, value: float) -> str:
-        return f'{table_prefix(self._wanted.key)}{value!r}'
 
     def _tried(self, value: float, table: Table) -> Tried:
         name = next(name for name in table.results if self._aim.result in (name, nodes.plain(name)))
@@ -206,7 +199,8 @@ class Search:
 
     def _middle(self, low: Tried, high: Tried) -> float | None:
         """Return the middle of two values, None if their distance is within BRACKET_TOLERANCE."""
-        middle = _between(low.value, high.value, _in_ratios(self._wanted))
+        ratios = _in_ratios(self._wanted)
+        middle = math.sqrt(low.value * high.value) if ratios else 0.5 * (low.value + high.value)
         middle = round(middle) if self._wanted.whole else float(f'{middle:.6g}')
         near = high.value - low.value <= BRACKET_TOLERANCE * max(abs(low.value), abs(high.value))
         return None if near or not low.value < middle < high.value else middle

@@ -241,10 +241,6 @@ def _allowed(key: str, value: float) -> float:
     return min(max(value, allowed['low']), allowed['high'])
 
 
-def _rounded(gains: Mapping[str, Json]) -> dict[str, Json]:
-    return {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in gains.items()}
-
-
 def smallest(every: Sequence[Margins]) -> Margins:
     """Return the smallest value of each metric in several results; NaN if none has the metric."""
     return {key: (np.fmin.reduce([margins[key][0] for margins in every]), unit) for key, (_, unit) in every[0].items()}
@@ -285,7 +281,8 @@ class Loops:
 
     def set(self, node: str, name: str, gains: Mapping[str, Json]) -> None:
         """Set gains {key: value} of a node for the axis `name`, rounded to four digits."""
-        self.gains |= {f'{node}.{name}.{key}': value for key, value in _rounded(gains).items()}
+        self.gains |= {f'{node}.{name}.{key}': float(f'{value:.4g}') if isinstance(value, float) else value
+                       for key, value in gains.items()}
 
     def designed(self, loop: str, name: str) -> RadiansPerSecond:
         """Return the crossover for which the gains of a loop, speed or position, were designed."""
@@ -403,11 +400,6 @@ def design(loops: Loops, axes: Sequence[str], required: LoopRequirements,
     return rows
 
 
-def refuse_outside(loops: Loops) -> None:
-    """Raise ScenarioError if a gain is outside its range."""
-    loops.variant.with_(loops.gains).load()
-
-
 def table(rows: Iterable[LoopRow], required: LoopRequirements) -> list[str]:
     """Return the table of the loops as lines of text, with measured and required values."""
     width = max(20, *(len(f'{name} {loop}') for loop, name, *_ in rows))
@@ -466,7 +458,7 @@ def main(options: LoopOptions, required: LoopRequirements, progress: Callable[[f
         raise ValueError(f'--output {file}: must be a new file in a directory that exists')
     rows = design(loops, axes, required, progress)
     loops.gains = {key: value for key, value in loops.gains.items() if key.split('.')[1] in axes}
-    refuse_outside(loops)
+    loops.variant.with_(loops.gains).load()     # raises ScenarioError for a gain outside its range
     lines = [*table(rows, required), *remarks(loops, rows)]
     made = parameter_file.origin(options.command, configuration.git_revision() or 'unknown')
     sections = {node: {key.removeprefix(f'{node}.'): value for key, value in loops.gains.items()
