@@ -3,10 +3,8 @@ import math
 
 import numpy as np
 import pytest
-import yaml
 from scipy import stats
 
-from pedestal_bringup.scenario.variant import Variant
 from pedestal_results import intervals, tracking
 from pedestal_studies import metrics
 from pedestal_studies.p001_zhou_yang_qin import alignment
@@ -116,19 +114,6 @@ def test_a_random_row_meets_its_target_with_its_whole_interval():
 def test_a_run_without_a_number_leaves_the_row_without_one():
     row = intervals.row('case', 'metric', np.array([1.0, math.nan]), 's', target='<= 4')
     assert row['value'] is None and intervals.missed(row)
-
-
-def test_a_variant_says_how_to_run_it_through_the_nodes():
-    variant = Variant('servo_step', duration=2.0).with_({'adu.azimuth.bias.torque': 3.0})
-    assert variant.command() == 'pedestal run servo_step --duration 2.0 --param adu.azimuth.bias.torque=3.0'
-    assert variant.load().node_parameters('adu').azimuth.bias.torque == 3.0
-
-
-def test_off_is_a_word():
-    """YAML 1.1 takes off for false; a schedule of that name must survive, also in the file the nodes read."""
-    loaded = Variant('servo_step').with_({'adu.azimuth.bias.schedule': 'off'}).load()
-    assert loaded.node_parameters('adu').azimuth.bias.schedule == 'off'
-    assert yaml.safe_load(loaded.as_yaml())['adu']['ros__parameters']['azimuth.bias.schedule'] == 'off'
 
 
 @pytest.mark.thorough

@@ -30,8 +30,7 @@ from pedestal_common.quantities import Complexes, Floats, Pairs, Records, Second
 SINE_FREQUENCIES_HZ = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 2.5])
 """Frequencies of the sines [Hz]. Each has a whole number of periods in COMMON_PERIOD_S."""
 COMMON_PERIOD_S = 4.0  # period of the sum of all sines [s]
-SETTLING_PERIODS, MEASURED_PERIODS = 1, 2
-"""Number of common periods before the measurement, and number of measured common periods."""
+SETTLING_PERIODS, MEASURED_PERIODS = 1, 2  # numbers of common periods
 SERIES_TERMS = 4  # number of terms of the series of 1 / W
 IDENTIFICATION_RATES_RAD_S = (0.1, 0.06)
 """Constant rates of azimuth and elevation [rad/s], larger than the sum of the sines, so the axis never turns back. A

@@ -14,32 +14,18 @@ loops are then measured on the simulated plant, with its gears, lash, friction, 
     T_b = 0.4 T_r                               bias torque of a motor [Nm]. It is full up to a motor torque of
                                                 0.47 T_r, and zero from 1.5 T_r on.
 
-    J_m, J_L   inertia of one motor, of the load [kg m2]
-    N          gear ratio from motor to load
-    w_s        crossover of the speed loop [rad/s]
-    T_max      torque limit of a motor [Nm]
-    T_r        rated torque of a motor [Nm]
-    T_load     sum of friction, unbalance and mean wind, at the load [Nm]
+    J_m, J_L    inertia of one motor, of the load; N: gear ratio from motor to load
+    w_s         crossover of the speed loop [rad/s]
+    T_max, T_r  torque limit and rated torque of a motor; a quarter of the torque is a reserve for a heavier load
+    T_load      sum of friction, unbalance and mean wind, at the load
 
 The feed-forward takes J_A and the friction of the load. A required crossover of the position loop takes the place of
-w_s / 8. A quarter of the torque is a reserve for a heavier load.
+w_s / 8.
 
-A declared structure (`adu.AXIS.structure`, inertia_share above 0) swings with the frequency f [Hz] on locked motors.
-The receiver sees this swing as a motion of the target, and the shaper must not excite it:
-
-    speed loop      J without the share of the dish, because the dish does not follow above f
-    position loop   w_p at most 2 pi f / 3
-    shaper          a bends the structure by a / (2 pi f)^2 [rad]. The bend is at most 0.8 mrad, and at most a tenth of
-                    the beamwidth. a needs at most half of the torque limit, up to which the bias torque keeps the
-                    teeth in contact. j = a f, so that the acceleration rises within one period of the swing and leaves
-                    no swing behind. h0 = 0.8 / f.
-    filter          of the default bank only the models ca whose bandwidth (q / r)^(1/3) is at most 2 pi f / 7, because
-                    a faster model would follow the swing. q: white jerk of the model [rad/s3/sqrt(Hz)], r: root
-                    density of the noise of the receiver [rad/sqrt(Hz)].
-
-Of the two designs the smaller value counts, of h0 the larger. The margins are then measured with the structure in the
-plant. They are measured again with the load inertia changed by 30 % and f by 20 %, within the ranges of these
-parameters. The smallest margins count.
+A declared structure swings with the frequency f on locked motors. The receiver sees this swing as a motion of the
+target, and the shaper must not excite it. docs/decisions/structure.md states the design for f and its reasons. Of both
+designs the smaller value counts, of h0 the larger. The margins are then measured with the structure in the plant, and
+again in all PLANT_CORNERS, within the ranges of these parameters. The smallest margins count.
 """
 import dataclasses
 import math
