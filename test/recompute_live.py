@@ -24,7 +24,7 @@ from rclpy.utilities import try_shutdown
 from std_srvs.srv import Trigger
 
 from pedestal_bringup.graph.operator_node import Operator
-from pedestal_bringup.graph.processes import RunError, command_line
+from pedestal_bringup.graph.processes import command_line
 from pedestal_common import parameters
 from pedestal_common.graph import domain, nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
@@ -87,11 +87,11 @@ class Feeder(Operator):
         return self.create_publisher(middleware.message_class(link.type), link.name, middleware.qos(link.rate))
 
     def announce_now(self, name: str, data: bytes) -> None:
-        """Publish a message for which no step waits, and wait for its acknowledgement. Raises RunError without it."""
+        """Publish a message for which no step waits, and wait for its acknowledgement, else raise RuntimeError."""
         publisher = self.input_publishers[name]
         publisher.publish(data)
         if not publisher.wait_for_all_acked(Duration(seconds=ANSWER_TIMEOUT_S)):
-            raise RunError(f'{self.node} did not acknowledge {name} within {ANSWER_TIMEOUT_S:g} s')
+            raise RuntimeError(f'{self.node} did not acknowledge {name} within {ANSWER_TIMEOUT_S:g} s')
 
 
 class Live:
@@ -108,19 +108,19 @@ class Live:
         """Spin the ROS nodes of the Feeder until condition() is true.
 
         limit: longest wait; missing: function that returns the name of the missing message, for the error.
-        Raises RunError if the node dies, or after the limit.
+        Raises RuntimeError if the node dies, or after the limit.
         """
         deadline = time.monotonic() + limit
         while not condition():
             if self.process.poll() not in (None, 0):     # 0: it ended as planned, and its last messages may follow
-                raise RunError(f'{self.feeder.node} exited with code {self.process.returncode}: '
-                               f'{" ".join(self.log.read_text(errors="replace").split())}')
+                raise RuntimeError(f'{self.feeder.node} exited with code {self.process.returncode}: '
+                                   f'{" ".join(self.log.read_text(errors="replace").split())}')
             if time.monotonic() > deadline:
-                raise RunError(f'{self.feeder.node}: no {missing()} within {limit:g} s')
+                raise RuntimeError(f'{self.feeder.node}: no {missing()} within {limit:g} s')
             self.executor.spin_once(timeout_sec=0.1)
 
     def send_command(self, command: commands.Command) -> None:
-        """Send a command by its service or by the command topic, and wait for the reply. Raises RunError."""
+        """Send a command by its service or by the command topic, and wait for the reply. Raises RuntimeError."""
         if command.verb not in self.services:
             before = len(self.feeder.replies)
             self.feeder.command_publisher.publish(messages.serialize(commands.message(command)))
@@ -139,7 +139,7 @@ def outputs(recording: FedRecording, done: recompute.Recomputed,
     """Return {topic: Output} of the process of a node that is fed with the inputs of the recomputation `done`.
 
     done: its outputs give the number of messages due at each step; params: parameters of the node.
-    Raises RunError if messages are missing. Steps of a recording in realtime may lack inputs.
+    Raises RuntimeError if messages are missing. Steps of a recording in realtime may lack inputs.
     """
     assert recording.lockstep
     with domain.of_run(), tempfile.TemporaryDirectory() as folder:

@@ -3,12 +3,13 @@ import numpy as np
 import pytest
 
 from acu_tracker.modes import Mode
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_studies.system import acquisition as study
-from pedestal_workbench.trials.cases import Case
 
 
 def run(name, seed, duration=None, **parameters):
-    return Case(name, name, parameters, duration, seed).run()
+    return closed_loop.Loop(Variant(name, seed=seed, duration=duration).with_(parameters).load()).run()
 
 
 def went_through(run):

@@ -9,6 +9,7 @@ from tools.numbers import claims, published
 from acu_tracker.estimation.filters import axis_filter
 from acu_tracker.estimation.params import FilterParameters
 from drive_law.params import AduParameters
+from pedestal_bringup.loop import closed_loop
 from pedestal_results.intervals import missed
 from pedestal_studies.p000_ma import backlash, servo
 from pedestal_studies.p001_zhou_yang_qin import alignment, methods
@@ -36,8 +37,9 @@ def test_the_spread_of_the_motors():
 
 def stiffness(**changed):
     """Torque on the load over its deflection against the motors [Nm/rad], a step of 100 Nm on an axis at rest."""
-    case = servo.gust_case('best', **{'adu.wind.gust.azimuth': 100.0}, **changed)
-    record, ratio = case.run(), case.loaded().node_parameters('adu').azimuth.gear_train.ratio
+    variant = servo.gust_case('best', **{'adu.wind.gust.azimuth': 100.0}, **changed)
+    chosen = variant.load()
+    record, ratio = closed_loop.Loop(chosen).run(), chosen.node_parameters('adu').azimuth.gear_train.ratio
     wound = (record['adu/truth']['position'][:, 0]
              - record['adu/motor_states']['position'][:, :2].mean(axis=1) / ratio)
     before, after = record.t < servo.GUST_START_S, record.t > record.t[-1] - 0.1
@@ -55,7 +57,8 @@ def test_two_motors_stiffen_the_drive():
 @pytest.mark.parametrize('name, sine, shown', [('paper-all', '0p4hz', '.4f'), ('paper-r1', '0p4hz', '.4f'),
                                                ('paper-r2', '0p4rads', '.3f')])
 def test_the_output_has_the_period_of_the_input(name, sine, shown):
-    period = servo.sine_metrics(servo.sine_case(name, sine).run(), sine)[f'sine_{sine}_period_s']
+    run = closed_loop.Loop(servo.sine_case(name, sine).load()).run()
+    period = servo.sine_metrics(run, sine)[f'sine_{sine}_period_s']
     assert period == pytest.approx(2.0 * math.pi / servo.SINE_FREQUENCIES_RAD_S[sine], rel=1e-5)
     assert f'{period:{shown}} s of' in reading('000', 'figure 6: the output')
 

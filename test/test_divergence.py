@@ -74,7 +74,7 @@ def test_a_reset_while_the_slope_is_still_wrong_is_followed_by_the_same_verdict(
 def test_a_target_that_reverses_is_no_reversed_slope(name):
     """Paper 003 through the product: 3.5 deg/s to and fro."""
     for seed in (1, 2):
-        done = imm_feedforward.DRIVE_CASES[name].with_seed(seed).run()
+        done = closed_loop.Loop(imm_feedforward.DRIVE_CASES[name].variant.with_(seed=seed).load()).run()
         state = done.units['acu'].parts['state']
         assert done['acu/mode'][-1] == Mode.AUTOTRACK and not state['tracking']['divergence']['diverged']
 

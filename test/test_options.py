@@ -6,7 +6,6 @@ import pytest
 
 from pedestal import cli
 from pedestal.verbs import arguments
-from pedestal_bringup.scenario import scenario
 
 REPOSITORY = pathlib.Path(__file__).parents[1]
 
@@ -26,9 +25,10 @@ def test_parameter_files_may_be_several(tmp_path):
         (tmp_path / f'{name}.yaml').write_text(f'acu: {{ros__parameters: {{{text}}}}}')
     files = [part for name in 'ab' for part in ('--params-file', str(tmp_path / f'{name}.yaml'))]
     options = cli._parser().parse_args(['run', 'leo_pass', *files, '--param', 'adu.period=0.01'])
-    assert arguments.changes(options) == ['acu.azimuth.stow=0.1', 'acu.azimuth.preset=0.2', 'acu.azimuth.stow=0.3',
-                                          'adu.period=0.01']
-    chosen = scenario.load('leo_pass', arguments.changes(options)).node_parameters('acu')
+    variant = arguments.variant(options)
+    assert variant.overrides() == ['acu.azimuth.stow=0.1', 'acu.azimuth.preset=0.2', 'acu.azimuth.stow=0.3',
+                                   'adu.period=0.01']
+    chosen = variant.load().node_parameters('acu')
     assert (chosen.azimuth.stow, chosen.azimuth.preset, chosen.period) == (0.3, 0.2, 0.01)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_workbench.trials import ensemble, monte_carlo
 from pedestal_workbench.trials.plan import plan
 
@@ -24,7 +25,7 @@ CASES = {
 @pytest.mark.parametrize('name', CASES)
 def test_the_graph_gives_the_numbers_of_the_trial(start_run, tmp_path, name):
     duration, period, vary = CASES[name]
-    made = plan(name, 2, vary, [f'adu.period={period}'], seed=11, duration=duration)
+    made = plan(Variant(name, (f'adu.period={period}',), seed=11, duration=duration), 2, vary)
     with ensemble.open_table(made, tmp_path) as table:
         ensemble.run_missing_trials([made], [table], monte_carlo.Pool(1))
     _, _, *arguments = shlex.split(made.command(1))

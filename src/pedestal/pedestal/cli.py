@@ -1,8 +1,5 @@
-"""Command line `pedestal`: the parser of the arguments, and the call of the verb that the user names.
-
-A verb, such as `run`, is a row of VERBS, and a row of VERBS in a module of the package `verbs`. Only the module of the
-named verb is imported.
-"""
+"""Command line `pedestal`: the parser of the arguments, and the call of the verb that the user names. A verb is a row
+of VERBS, and a row of VERBS in a module of the package `verbs`. Only the module of the named verb is imported."""
 from pedestal import stop  # first, because a signal during the imports below must end the process with its message
 
 # isort: split
@@ -61,10 +58,8 @@ def found(name: str) -> 'Verb':
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run a verb; without any argument print the help.
-
-    Return its exit code: 0; 1 with a line on stderr for an error; 2 for a wrong command line; 130 after a stop.
-    """
+    """Run a verb; without any argument print the help. Return its exit code: 0; 1 with a line on stderr for an error;
+    2 for a wrong command line; 130 after a stop."""
     given = sys.argv[1:] if args is None else args
     named = next((word for word in given if word in VERBS), None)
     parser = _parser(() if named is None else (named,))
@@ -99,10 +94,8 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 class Parser(argparse.ArgumentParser):
-    """Parser of options whose values may be any negative number.
-
-    The parser of argparse reads -1 and -0.5 as values, but -1e-2 and -33.9,18.4,10 as unknown options.
-    """
+    """Parser of options whose values may be any negative number. The parser of argparse reads -1 and -0.5 as values,
+    but -1e-2 and -33.9,18.4,10 as unknown options."""
 
     def parse_known_args(  # type: ignore[override]  # overloads of argparse accept other namespaces
             self, args: Sequence[str] | None = None,
@@ -142,8 +135,8 @@ class _Version(argparse.Action):
 
 
 def _parser(named: Container[str] = VERBS) -> argparse.ArgumentParser:
-    """Return the parser of the command line. Only the verbs in `named` get their arguments, because these import the
-    module of the verb."""
+    """Return the parser of the command line. Only the verbs in `named` get their arguments, which import their
+    modules."""
     parser: argparse.ArgumentParser = Parser(
         prog='pedestal', description='Run, record and analyse the control system of a tracking antenna.')
     parser.add_argument('--version', action=_Version, nargs=0, help="show program's version number and exit")

@@ -9,9 +9,9 @@ import numpy as np
 
 from pedestal.scenario import Scenario
 from pedestal_common.quantities import Floats, Ints, Row
-from pedestal_workbench.trials import comparison, ensemble, monte_carlo, statistics
-from pedestal_workbench.trials import plan as plans
-from pedestal_workbench.trials import table as tables
+from pedestal_workbench.trials import comparison, monte_carlo, statistics
+from pedestal_workbench.trials.experiment import Experiment, Found, Side
+from pedestal_workbench.trials.plan import plan
 
 
 def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None = None, *, sobol: bool = False,
@@ -34,19 +34,16 @@ def trials(scenario: Scenario, runs: int = 100, vary: Mapping[str, str] | None =
     >>> made['pointing_rms_deg'].shape, made.parameters['adu.azimuth.load.inertia'].shape
     ((3,), (3,))
     """
-    plan = plans.plan(scenario.source, runs, [f'{name}={text}' for name, text in (vary or {}).items()],
-                      scenario.overrides, scenario.given_seed, scenario.given_duration, sobol)
-    with tempfile.TemporaryDirectory() as temporary:
-        with ensemble.open_table(plan, folder or temporary) as table, monte_carlo.Pool(workers) as pool:
-            ensemble.run_missing_trials([plan], [table], pool)
-    return Trials(plan, table)
+    made = plan(scenario.variant, runs, [f'{name}={text}' for name, text in (vary or {}).items()], sobol)
+    with tempfile.TemporaryDirectory() as temporary, monte_carlo.Pool(workers) as pool:
+        return Trials(Experiment([Side(made)], folder or temporary).run(pool))
 
 
 class Trials(Mapping[str, Floats]):
     """Finished trials as a mapping {name of a result: its values (runs,)}, NaN for a trial without this result."""
 
-    def __init__(self, plan: plans.Plan, table: tables.Table) -> None:
-        self._plan, self._table = plan, table
+    def __init__(self, found: Found) -> None:
+        self._plan, self._table = found.plan, found.table
 
     def __getitem__(self, result: str) -> Floats:
         if result not in self._table.measured_results:
@@ -66,10 +63,8 @@ class Trials(Mapping[str, Floats]):
 
     @property
     def parameters(self) -> dict[str, Floats]:
-        """Varied parameters {'node.key': values (runs,)}.
-
-        A parameter with texts has the numbers 0, 1, ... of its texts, in the order of their first trial.
-        """
+        """Varied parameters {'node.key': values (runs,)}. A parameter with texts has the numbers 0, 1, ... of its
+        texts, in the order of their first trial."""
         return {name: self._table.column(name) for name in self._table.varied}
 
     @property
@@ -84,9 +79,7 @@ class Trials(Mapping[str, Floats]):
         >>> {row['metric']: row['value'] for row in rows}['tracked/rate']
         100.0
         """
-        case = self._plan.name
-        return [*statistics.of_results(case, self._table), *statistics.of_questions(case, self._table),
-                *statistics.of_sensitivity(case, self._table)]
+        return statistics.of_all(self._plan.name, self._table)
 
     def worst(self, by: str = 'pointing_rms_deg', count: int = 10) -> list[str]:
         """Return the `pedestal run` commands that repeat the worst trials with separate nodes, the worst first.
@@ -100,11 +93,8 @@ class Trials(Mapping[str, Floats]):
         return [self._plan.command(place) for place in places]
 
     def against(self, other: Trials, by: str = 'pointing_rms_deg') -> str:
-        """Return a sentence that compares a result of these trials with that of other trials.
-
-        by: name of the result. Trial i of both has the same seed, so the comparison is made in pairs. Raises
-        ValueError for different seeds.
-        """
+        """Return a sentence that compares a result of these trials with that of other trials. Trial i of both has the
+        same seed, so the comparison is made in pairs. Raises ValueError for different seeds."""
         if not np.array_equal(self.seeds, other.seeds):
             raise ValueError('the trials have different seeds and cannot be paired')
         name, other_name = comparison.names(self._plan, other._plan)

@@ -1,36 +1,51 @@
-"""Runs of the Python library: `pedestal.run` runs a scenario in memory, `pedestal.read_bag` reads a recording.
-
-Both return a Run, which gives the messages of every topic as named arrays, the results and the figures.
-"""
+"""Runs of the Python library: `pedestal.run` runs a scenario in memory, `pedestal.read_bag` reads a recording. Both
+return a Run."""
 from __future__ import annotations
 
 import functools
 import pathlib
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from pedestal.panels import draw
 from pedestal.scenario import Scenario
 from pedestal_bringup.loop import memory_recording
 from pedestal_common.graph import layouts
+from pedestal_common.parameters import did_you_mean
 from pedestal_recording import bag as bags
 from pedestal_results import results, tracking
 from pedestal_results.recorded_run import RecordedRun
+from pedestal_results.report import run_figures
 
 if typing.TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+class Panel(typing.NamedTuple):
+    """A figure that Run.plot draws."""
+    draw: Callable[[Axes, RecordedRun], None]
+    needs: tuple[str, ...]  # names of the required parts of RecordedRun
+    polar: bool = False     # True if the figure needs polar axes
+
+
+PANELS: dict[str, Panel] = {
+    'pointing cross-elevation': Panel(functools.partial(run_figures.draw_pointing, i=0), ('truth',)),
+    'pointing elevation': Panel(functools.partial(run_figures.draw_pointing, i=1), ('truth',)),
+    'error cross-elevation': Panel(functools.partial(run_figures.draw_errors, i=0), ('truth', 'lock')),
+    'error elevation': Panel(functools.partial(run_figures.draw_errors, i=1), ('truth', 'lock')),
+    'azimuth': Panel(run_figures.draw_azimuth, ('truth',)),
+    'torques azimuth': Panel(functools.partial(run_figures.draw_torques, axis='azimuth'), ('motors',)),
+    'torques elevation': Panel(functools.partial(run_figures.draw_torques, axis='elevation'), ('motors',)),
+    'carrier': Panel(run_figures.draw_carrier, ('receiver',)),
+    'sky': Panel(run_figures.draw_sky, ('truth',), polar=True),
+}
+
 POINTING_UNITS = {'t': 's', 'cross_elevation': 'rad', 'elevation': 'rad', 'range': 'm'}
-"""{column of Run.pointing: its unit}."""
 
 
 class Table(Mapping[str, np.ndarray]):
-    """Named arrays of equal length, {column: array (n,)}, with a row for each message.
-
-    units: {column: unit}, '' for none. Column 't' is the time of the measurement [s].
-    """
+    """Named arrays of equal length, {column: array (n,)}, with a row for each message. units: {column: unit}, '' for
+    none. Column 't' is the time of the measurement [s]."""
 
     def __init__(self, arrays: Mapping[str, np.ndarray], units: Mapping[str, str]) -> None:
         self._arrays, self.units = dict(arrays), dict(units)
@@ -50,11 +65,8 @@ class Table(Mapping[str, np.ndarray]):
 
 
 class Run:
-    """A run: run[topic] is the Table of a topic.
-
-    name: name of the scenario or of the recording; beam: name of the beam, '' for an antenna with a single beam, and
-    for the first beam of a recording.
-    """
+    """A run: run[topic] is the Table of a topic. name: of the scenario or of the recording; beam: '' for an antenna
+    with a single beam, and for the first beam of a recording."""
 
     def __init__(self, source: memory_recording.MemoryRecording | bags.Bag, name: str, beam: str = '') -> None:
         self._source, self.name, self.beam = source, name, beam
@@ -123,7 +135,7 @@ class Run:
         return self._run.verdict.text
 
     def plot(self, figure: str, axes: Axes) -> None:
-        """Draw a figure of the report on axes of the caller; panels.PANELS lists the figures.
+        """Draw a figure of the report on axes of the caller; recording.PANELS lists the figures.
 
         Raises KeyError for an unknown figure, ValueError for wrong axes or for missing data in the run.
 
@@ -133,7 +145,15 @@ class Run:
         >>> axes.get_ylabel()
         'error [deg]'
         """
-        draw(figure, axes, self._run)
+        if figure not in PANELS:
+            raise KeyError(f'unknown figure {figure!r};{did_you_mean(figure, PANELS)} there are {", ".join(PANELS)}')
+        panel = PANELS[figure]
+        lack = self._run.lacks(panel.needs)
+        if lack:
+            raise ValueError(f'{figure}: {lack}')
+        if panel.polar != (axes.name == 'polar'):
+            raise ValueError(f'{figure}: axes are {axes.name}, must be {"polar" if panel.polar else "rectilinear"}')
+        panel.draw(axes, self._run)
 
 
 def run(scenario: Scenario, beam: str = '') -> Run:
@@ -154,8 +174,6 @@ def run(scenario: Scenario, beam: str = '') -> Run:
 
 def read_bag(path: str | pathlib.Path, beam: str = '') -> Run:
     """Return the Run of a recording, a folder or an .mcap file. beam: name of a beam of several, '' for the first.
-
-    Raises ValueError with one line for an unreadable recording.
-    """
+    Raises ValueError with one line for an unreadable recording."""
     view = bags.read(path, beam)
     return Run(view, view.metadata.get('scenario', pathlib.Path(path).stem), beam)

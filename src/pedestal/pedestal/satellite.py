@@ -18,12 +18,9 @@ STATION_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height')
 
 
 def tle_changes(path: str | pathlib.Path, name: str, when: datetime.datetime) -> tuple[list[str], str]:
-    """Return (texts 'node.key=value', remark) for the satellite of a file of TLEs or OMMs. Raises TargetError.
-
-    TLE, OMM: formats of orbital elements, two-line elements and orbit mean-elements message. The texts set the
-    elements of the target and those of mode tle. name: of the satellite, '' if the file holds only one; when: time
-    (datetime, UTC). If the file holds several sets of elements of the satellite, the set nearest to this time is used.
-    """
+    """Return (texts 'node.key=value', remark) for a satellite of a file of TLEs (two-line elements) or OMMs (orbit
+    mean-elements messages). The texts set the elements of the target and those of mode tle. name: '' if the file holds
+    only one satellite; when: time (UTC), whose nearest set of elements is used. Raises TargetError."""
     chosen = elements.read(path, name, when)
     return [f'{node}.{key}={json.dumps(text)}' for node in ('tracking_receiver.target.leo_pass', 'acu.prediction')
             for key, text in chosen.values.items()], chosen.remark
@@ -42,10 +39,8 @@ def station_changes(text: str) -> list[str]:
 
 
 class PassSelection:
-    """Choice of a pass of the satellite over the station of a scenario.Draft at the time `now` (datetime, UTC).
-
-    Raises ValueError for a scenario whose target is no satellite.
-    """
+    """Choice of a pass of the satellite over the station of a draft at the time `now` (UTC). Raises ValueError for a
+    scenario whose target is no satellite."""
 
     def __init__(self, draft: 'Draft', now: datetime.datetime) -> None:
         if draft.header.graph_beams > 1:
@@ -73,10 +68,8 @@ class PassSelection:
                 print(f'pass {n}: {_extent(p)}; a run of it needs --duration: --pass UTC --duration S')
 
     def choose(self, which: str, duration: float | None = None) -> tuple[list[str], float, str]:
-        """Return (texts 'node.key=value', duration [s], line that describes the pass) of one pass. Raises TargetError.
-
-        which: value of --pass. duration [s]: length of the run, None for the time from rise to set.
-        """
+        """Return (texts 'node.key=value', duration [s], line that describes the pass) of one pass. which: value of
+        --pass; duration: None for the time from rise to set. Raises TargetError."""
         p = passes.chosen_pass(self.satellite, self.station, which, self.now)
         start, where = p.start.replace(microsecond=0), f'satellite {self.satellite.number} over {place(self.station)}'
         if p.duration > passes.MAX_RUN_S:
@@ -95,12 +88,10 @@ class PassSelection:
 
 
 def _azimuth(degrees: float) -> str:
-    """Return an azimuth [deg] as a text, '-' for NaN."""
     return '-' if math.isnan(degrees) else f'{round(degrees) % 360} deg'
 
 
 def _utc(when: datetime.datetime | None) -> str:
-    """Return a time (UTC) as a text, '-' for None."""
     return f'{when:%Y-%m-%d %H:%M:%S}' if when else '-'
 
 
@@ -111,13 +102,11 @@ def _times(p: passes.Pass) -> tuple[str, str]:
 
 
 def _ending(p: passes.Pass) -> str:
-    """Return the azimuth at the set and the duration of the pass as a text."""
     length = f'{p.duration:.0f} s' if math.isfinite(p.duration) else 'never sets' if p.set is None else 'longer'
     return f'{_azimuth(p.set_azimuth)}, {length}{", under way" if p.under_way else ""}'
 
 
 def _extent(p: passes.Pass) -> str:
-    """Return rise and set of a pass that is longer than a run, as a text."""
     if p.rise is None and p.set is None:
         return 'above the horizon throughout, the satellite never sets'
     rise, down = (f'{_utc(when)} UTC' if when else '' for when in (p.rise, p.set))

@@ -8,8 +8,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pedestal_bringup.scenario import files, shipped
 from pedestal_bringup.scenario import scenario as bringup
+from pedestal_bringup.scenario import shipped
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.parameters import Parameters, as_dict, flatten
 from pedestal_common.quantities import Seconds
 
@@ -56,7 +57,14 @@ class Scenario:
     @functools.cached_property
     def checked(self) -> bringup.Scenario:
         """Scenario of pedestal_bringup with all changes applied."""
-        return bringup.load(self.source, self.overrides, self.given_seed, self.given_duration)
+        return self.variant.load()
+
+    @functools.cached_property
+    def variant(self) -> Variant:
+        """Variant of pedestal_bringup that this scenario is."""
+        changes = {name: value.item() if isinstance(value, np.generic) else value
+                   for name, value in self.changes.items()}
+        return Variant(self.source, seed=self.given_seed, duration=self.given_duration).with_(changes)
 
     @property
     def overrides(self) -> list[str]:
@@ -65,8 +73,7 @@ class Scenario:
         >>> pedestal.load('leo_pass', {'acu.azimuth.filter.ca.noise': 0.05}).overrides
         ['acu.azimuth.filter.ca.noise=0.05']
         """
-        return [files.override(name, value.item() if isinstance(value, np.generic) else value)
-                for name, value in self.changes.items()]
+        return list(self.variant.changes)
 
     def changed(self, changes: Mapping[str, Value] | None = None, *, duration: float | None = None,
                 seed: int | None = None) -> Scenario:

@@ -1,9 +1,6 @@
-"""Stop of `pedestal` by Ctrl-C, SIGTERM or SIGHUP.
-
-The command line imports this module first, because the import of the rest takes up to a second. A signal during that
-import ends the process at once, with the usual message. Another program that imports this module keeps its own
-handlers of the signals.
-"""
+"""Stop of `pedestal` by Ctrl-C, SIGTERM or SIGHUP. The command line imports this module first, because the import of
+the rest takes up to a second. A signal during that import ends the process at once, with the usual message. Another
+program that imports this module keeps its own handlers of the signals."""
 import atexit
 import os
 import signal

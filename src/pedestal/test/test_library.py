@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import pedestal
-from pedestal import panels
+from pedestal import recording
 from pedestal_common.graph import topics
 from pedestal_recording import bag
 from pedestal_results import results
@@ -45,31 +45,31 @@ def test_every_public_name_has_an_example_and_types():
 
 @pytest.mark.parametrize('name', ['leo_pass', 'ship_pass'])
 def test_a_run_has_the_arrays_of_its_recording(name, tmp_path):
-    recording = pedestal.read_bag(REFERENCES / name)
+    recorded = pedestal.read_bag(REFERENCES / name)
     file = tmp_path / f'{name}.yaml'
     file.write_text(bag.read(REFERENCES / name).configuration['scenario'])
     again = pedestal.run(pedestal.load(file))
     stepped = {name for name in again.topics if topics.TOPIC_BY_NAME[name].rate == 'step'}
-    assert stepped == {name for name in recording.topics if topics.TOPIC_BY_NAME[name].rate == 'step'}
-    for topic in set(again.topics) & set(recording.topics):  # commands and their results are not in memory
-        ours, theirs = again[topic], recording[topic]
+    assert stepped == {name for name in recorded.topics if topics.TOPIC_BY_NAME[name].rate == 'step'}
+    for topic in set(again.topics) & set(recorded.topics):  # commands and their results are not in memory
+        ours, theirs = again[topic], recorded[topic]
         assert ours.keys() <= theirs.keys() and ours.units.items() <= theirs.units.items()
         assert all(np.isnan(theirs[column]).all() for column in theirs.keys() - ours.keys())
         for column in ours:
             numbers = ours[column].dtype.kind == 'f'
             assert np.array_equal(ours[column], theirs[column], equal_nan=numbers), (topic, column)
-    assert again.results == pytest.approx(recording.results, rel=0.0, abs=0.0, nan_ok=True)
+    assert again.results == pytest.approx(recorded.results, rel=0.0, abs=0.0, nan_ok=True)
     told = results.measured(RecordedRun(bag.read(REFERENCES / name)).parts)
-    assert recording.results == pytest.approx({key: value for key, (value, _) in told.items()}, rel=0.0, abs=0.0,
+    assert recorded.results == pytest.approx({key: value for key, (value, _) in told.items()}, rel=0.0, abs=0.0,
                                               nan_ok=True)
     for column in ('cross_elevation', 'elevation'):
-        assert np.array_equal(again.pointing[column], recording.pointing[column], equal_nan=True)
+        assert np.array_equal(again.pointing[column], recorded.pointing[column], equal_nan=True)
 
 
-@pytest.mark.parametrize('figure', panels.PANELS)
+@pytest.mark.parametrize('figure', recording.PANELS)
 def test_every_figure_is_drawn_on_the_callers_axes(figure):
     run = pedestal.run(pedestal.load('leo_pass', duration=4.0))
-    polar = panels.PANELS[figure].polar
+    polar = recording.PANELS[figure].polar
     axes, other = (matplotlib.figure.Figure().subplots(subplot_kw={'projection': kind})
                    for kind in (('polar', None) if polar else (None, 'polar')))
     run.plot(figure, axes)

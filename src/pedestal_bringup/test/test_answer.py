@@ -4,7 +4,6 @@ import types
 import pytest
 
 from pedestal_bringup.graph import watch
-from pedestal_bringup.graph.processes import RunError
 from pedestal_common.graph import nodes
 from pedestal_hardware.start import START_KEY
 
@@ -42,10 +41,10 @@ def test_the_start_is_that_of_the_node_of_the_equipment():
     ([(CHOOSER, 'no samples so far', {})], 'no samples so far'), ([], 'no diagnostics'),
     ([('acu', 'ready', {START_KEY: '1'})], 'no diagnostics')], ids=['no samples', 'silent', 'another node'])
 def test_equipment_without_an_answer_ends_the_run(statuses, text):
-    with pytest.raises(RunError, match=f'^{CHOOSER} has no answer of {PART} after 0.05 s: {text}$'):
+    with pytest.raises(RuntimeError, match=f'^{CHOOSER} has no answer of {PART} after 0.05 s: {text}$'):
         Rig(*statuses).start(0.05)
 
 
 def test_equipment_that_ends_is_named():
-    with pytest.raises(RunError, match=f'^{PART} ended with exit code 1$'):
+    with pytest.raises(RuntimeError, match=f'^{PART} ended with exit code 1$'):
         Rig(ended={PART: 1}).start(60.0)

@@ -66,7 +66,7 @@ def test_a_server_is_announced_when_it_serves(graph_of, capfd):
 
 def test_a_server_that_cannot_serve_ends_the_run(graph_of):
     with graph_of("""print('{"error": "port 1 is in use", "silent": []}'); raise SystemExit(1)""") as graph:
-        with pytest.raises(processes.RunError, match='^--rotctld: port 1 is in use$'):
+        with pytest.raises(RuntimeError, match='^--rotctld: port 1 is in use$'):
             graph.start_servers()
 
 

@@ -1,7 +1,7 @@
 """Rows of a --json file: results, their confidence intervals over independent runs, their targets, and their texts."""
 import math
 from collections.abc import Callable
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -79,24 +79,35 @@ def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def meets(value: float | None, target: str) -> bool:
-    """Return True if a value meets a target: '<= 1', '>= 1', '< 1', '> 1', '1 +- 0.1' or '1 to 2'.
+_COMPARISONS: dict[str, Callable[[float, float, float], bool]] = {
+    '<=': lambda value, first, last: value <= last, '>=': lambda value, first, last: value >= last,
+    '<': lambda value, first, last: value < last, '>': lambda value, first, last: value > last,
+    '+-': lambda value, first, last: abs(value - first) <= last,
+    'to': lambda value, first, last: first <= value <= last}
 
-    The value None meets no target.
-    """
-    if value is None:
-        return False
-    first, word, end = ('', *target.split()) if len(target.split()) == 2 else target.split()
-    last = float(end)
-    return {'<=': lambda: value <= last, '>=': lambda: value >= last, '<': lambda: value < last,
-            '>': lambda: value > last, '+-': lambda: abs(value - float(first)) <= last,
-            'to': lambda: float(first) <= value <= last}[word]()
+
+class Target(NamedTuple):
+    """Required value of a result."""
+    text: str       # '<= 1', '>= 1', '< 1', '> 1', '1 +- 0.1' or '1 to 2'
+    word: str       # key of _COMPARISONS
+    first: float    # number before the word, NaN for none
+    last: float     # number after the word
+
+    @classmethod
+    def parse(cls, text: str) -> 'Target':
+        """Return the target of a text."""
+        *first, word, last = text.split()
+        return cls(text, word, float(first[0]) if first else math.nan, float(last))
+
+    def meets(self, value: float | None) -> bool:
+        """Return True if a value meets the target; None does not."""
+        return value is not None and bool(_COMPARISONS[self.word](value, self.first, self.last))
 
 
 def missed(row: Row) -> bool:
     """Return True if a Row misses its target. Of a random value, the whole interval must meet the target."""
-    target, judged = row['target'], (row['ci_low'], row['ci_high']) if 'runs' in row else (row['value'],)
-    return target is not None and not all(meets(value, target) for value in judged)
+    judged = (row['ci_low'], row['ci_high']) if 'runs' in row else (row['value'],)
+    return row['target'] is not None and not all(map(Target.parse(row['target']).meets, judged))
 
 
 def number(value: float | None) -> str:

@@ -35,7 +35,7 @@ class Result(typing.NamedTuple):
     measure: Callable[..., float]   # measure(part) -> value, NaN if not measured
     sentence: str   # definition of the result
     label: str = ''     # name in the report, '' if the report does not show the result
-    target: str | None = None   # required value as a text for intervals.meets, such as '<= 0.4'
+    target: str | None = None   # text of an intervals.Target, such as '<= 0.4'
     mark: Callable[..., str] = lambda part: ''  # mark(part) -> note on a value that is not as expected, else ''
     brief: bool = False     # True for a result that a run prints by default
 

@@ -14,7 +14,7 @@ from pedestal_results.recorded_run import RecordedRun
 from pedestal_results.tracking import known_rms as rms
 from pedestal_workbench.again import what_if
 from pedestal_workbench.tuning import antenna_from_data_sheet
-from pedestal_workbench.tuning.data_sheet_format import DataSheet
+from pedestal_workbench.tuning.data_sheet import DataSheet
 
 EXACT_INS = [f'ins.{name}=0' for name in ('tilt_noise', 'heading_noise', 'rate_noise', 'tilt_wander',
                                           'heading_wander')]

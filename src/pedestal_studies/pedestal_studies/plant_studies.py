@@ -17,7 +17,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.loop.closed_loop import Run
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Floats, NewtonMeters, Times
 from pedestal_results import tracking
@@ -26,7 +28,6 @@ from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, TRUTH_C
 from pedestal_studies import metrics
 from pedestal_studies.p000_ma import bode
 from pedestal_studies.result import Result, legend
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Progress
 from pedestal_workbench.tuning import loops
 
@@ -62,15 +63,15 @@ SINE_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'acu.tracker.handover': False, 
 
 
 def bode_study(source: str, progress: Progress) -> Result:
-    """Run the study bode for a scenario, a name or a path. Raises LoopError, ScenarioError."""
-    plant, responses = loops.Loops(source), {}
+    """Run the study bode for a scenario, a name or a path. Raises ValueError."""
+    plant, responses = loops.Loops(Variant(source)), {}
     for i, name in enumerate(AXES):
         progress(i / len(AXES), f'{name}: current, speed and position loop')
         for loop in ('current', 'speed', 'position'):
             found = plant.response(loop, name)
             if found is None:
-                raise loops.LoopError(f'{plant.name}, {name}: the drive trips during the measurement of its {loop} '
-                                      'loop')
+                raise ValueError(f'{plant.name}, {name}: the drive trips during the measurement of its {loop} '
+                                 'loop')
             responses[f'{loop}/{name}'] = found
 
     def drawn(loop: str) -> Callable[[], Figure]:
@@ -83,8 +84,8 @@ def bode_study(source: str, progress: Progress) -> Result:
 
 
 def servo_study(source: str, progress: Progress) -> Result:
-    """Run the study servo for a scenario, a name or a path. Raises LoopError, ScenarioError."""
-    plant = loops.Loops(source)
+    """Run the study servo for a scenario, a name or a path. Raises ValueError."""
+    plant = loops.Loops(Variant(source))
     torque = {name: GUST_TORQUE_SHARE * (p.axis.motor_1.torque_limit + p.axis.motor_2.torque_limit) * p.ratio
               for name, p in plant.plants.items()}
     runs = {'step': (STEP_PARAMETERS, RUN_DURATION_S),
@@ -94,21 +95,22 @@ def servo_study(source: str, progress: Progress) -> Result:
     records = {}
     for i, (name, (changes, duration)) in enumerate(runs.items()):
         progress(i / len(runs), name)
-        records[name] = Case(name, source, changes, duration).run()
+        records[name] = closed_loop.Loop(Variant(source, duration=duration).with_(changes).load()).run()
     return Result([row(f'{plant.name}/{name}', metric, value, unit) for i, name in enumerate(AXES)
                    for metric, value, unit in _metrics(records, i, torque[name])],
                   {name: functools.partial(_figure, name, records[name]) for name in runs})
 
 
 def backlash_study(source: str, progress: Progress) -> Result:
-    """Run the study backlash for a scenario, a name or a path. Raises LoopError, ScenarioError."""
-    plant, records = loops.Loops(source), {}
-    runs = {(kind, end): Case(kind, source, {**changes, **bias}, duration) for end, bias in BIAS_PARAMETERS.items()
+    """Run the study backlash for a scenario, a name or a path. Raises ValueError."""
+    plant, records = loops.Loops(Variant(source)), {}
+    runs = {(kind, end): Variant(source, duration=duration).with_({**changes, **bias})
+            for end, bias in BIAS_PARAMETERS.items()
             for kind, changes, duration in (('standstill', STEP_PARAMETERS, RUN_DURATION_S),
                                             ('sine', SINE_PARAMETERS, SINE_PERIODS / SINE_FREQUENCY_HZ))}
-    for done, (key, case) in enumerate(runs.items()):
+    for done, (key, variant) in enumerate(runs.items()):
         progress(done / len(runs), ''.join(key))
-        records[key] = case.run()
+        records[key] = closed_loop.Loop(variant.load()).run()
     rows = []
     for i, name in enumerate(AXES):
         lash = plant.plants[name].axis.gear_train.lash

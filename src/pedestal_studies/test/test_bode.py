@@ -14,12 +14,13 @@ import pytest
 
 from drive_law.params import AduParameters
 from pedestal_bringup.scenario import files, scenario
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.parameters import as_dict, build
 from pedestal_results import tracking
 from pedestal_studies.p000_ma import bode
 from pedestal_workbench.tuning import antenna_from_data_sheet, loops
 from pedestal_workbench.tuning import frequency_response as frequency
-from pedestal_workbench.tuning.data_sheet_format import DataSheet
+from pedestal_workbench.tuning.data_sheet import DataSheet
 
 CURRENT_PERIOD, SPEED_PERIOD = 1e-4, 5e-4
 RUN_STEP, FINE_STEP = 0.5 * CURRENT_PERIOD, CURRENT_PERIOD / frequency.SUB_STEP_COUNT
@@ -216,10 +217,10 @@ QUICK = dataclasses.replace(frequency.POSITION_SWEEP, points=80)
 
 @pytest.mark.thorough
 def test_position_loops():
-    case, axes = bode.LOOP_CASES['feedforward']
-    loaded = case.loaded()
+    variant, axes = bode.LOOP_CASES['feedforward']
+    loaded = variant.load()
     drive, acu, T = loaded.node_parameters('adu'), loaded.node_parameters('acu'), 5e-3
-    measured = frequency.position(case, axes, QUICK)
+    measured = bode.position('feedforward', QUICK)
     assert set(measured) == {'position/azimuth/feedforward', 'position/elevation/feedforward'}
     for name in axes:
         loop = open_position_loop(getattr(drive, name), pi_controller(getattr(acu, name).feedforward, T), T)
@@ -230,13 +231,12 @@ def test_position_loops():
 
 @pytest.mark.thorough
 def test_position_loop_of_the_paper():
-    case, axes = bode.LOOP_CASES['paper-r1']
-    loaded = case.loaded()
+    loaded = bode.LOOP_CASES['paper-r1'][0].load()
     c, T = loaded.node_parameters('acu').azimuth.pid, 2e-3
     assert c.integral == 0.0
     loop = open_position_loop(loaded.node_parameters('adu').azimuth,
                               pd_controller(c.bandwidth, c.derivative, c.derivative_time, T), T)
-    measured = frequency.position(case, axes, QUICK)['position/azimuth/paper-r1']
+    measured = bode.position('paper-r1', QUICK)['position/azimuth/paper-r1']
     assert agrees(measured, loop, 0.5, 40.0, 0.02, 0.7, step=RUN_STEP)
     assert margins_agree(measured, loop, 0.25)
 
@@ -246,13 +246,12 @@ def test_flexible_structure_and_the_notch_against_it():
     """The resonance removes the margins, the notch restores them."""
     ours = {}
     for name in ('structure', 'structure-notch'):
-        case, axes = bode.LOOP_CASES[name]
-        loaded = case.loaded()
+        loaded = bode.LOOP_CASES[name][0].load()
         acu, T = loaded.node_parameters('acu').azimuth, 5e-3
         loop = open_position_loop(loaded.node_parameters('adu').azimuth, pi_controller(acu.feedforward, T), T)
         if acu.notch.frequency > 0.0:
             loop = loop * notch_filter(acu.notch, T)
-        measured = frequency.position(case, axes)[f'position/azimuth/{name}']
+        measured = bode.position(name)[f'position/azimuth/{name}']
         assert agrees(measured, loop, 0.25, 40.0, 0.04, 2.0, step=RUN_STEP)
         assert margins_agree(measured, loop, 0.25)
         ours[name] = {metric: value for metric, (value, _) in frequency.margins(measured).items()}
@@ -268,7 +267,7 @@ def test_loops_of_a_flexible_dish_hold_their_margins_with_another_inertia_and_fr
                       mode_share=0.4)
     file = tmp_path / 'a3.yaml'
     file.write_text(antenna_from_data_sheet.text(antenna_from_data_sheet.sections(sheet, 'a3'), []))
-    tuned = loops.Loops(file)
+    tuned = loops.Loops(Variant(file))
     loops.design(tuned, ('azimuth',), loops.LoopRequirements(), lambda share, text: None)
     changes = [files.override(*gain) for gain in tuned.gains.items()]
     for inertia, mode in ((1.0, 1.0), *loops.PLANT_CORNERS):

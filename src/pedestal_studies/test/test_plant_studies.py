@@ -5,6 +5,7 @@ import math
 
 import pytest
 
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_studies import plant_studies
 from pedestal_workbench.tuning import loops
 
@@ -30,7 +31,7 @@ def test_a_plant_steps_is_pushed_and_follows_a_sine(pedestal, tmp_path):
     code, output, errors = pedestal('study', 'servo', '--scenario', 'leo_station_7m', '--json', 'rows.json')
     assert (code, errors) == (0, '')
     found = values(tmp_path / 'rows.json')
-    plants = loops.Loops('leo_station_7m').plants
+    plants = loops.Loops(Variant('leo_station_7m')).plants
     for axis in loops.AXES:
         own = {metric: value for (case, metric), value in found.items() if case == f'leo_station_7m/{axis}'}
         assert own['step_overshoot_percent'] < 1.0 and 0.05 < own['step_settling_2percent_s'] < 1.0
@@ -48,7 +49,7 @@ def test_bias_takes_the_backlash_out_of_a_plant(pedestal, tmp_path):
     code, output, errors = pedestal('study', 'backlash', '--scenario', 'leo_station_7m', '--json', 'rows.json')
     assert (code, errors) == (0, '')
     found = values(tmp_path / 'rows.json')
-    plants = loops.Loops('leo_station_7m').plants
+    plants = loops.Loops(Variant('leo_station_7m')).plants
     for axis in loops.AXES:
         case, step = f'leo_station_7m/{axis}', 2.0 * math.pi / 2**plants[axis].axis.encoder.load_bits
         assert found[case, 'standstill_peak_to_peak_rad'] < 2.0 * step

@@ -5,13 +5,14 @@ import operator
 import numpy as np
 import pytest
 
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_studies.system import target_filters as study
 
 
 def test_the_default_is_a_scenario_without_a_filter_and_tuned_is_one_of_one_model():
     for target, (_, parameters) in study.TARGET_SCENARIOS.items():
-        assert study.CASES[f'{target}/default'].parameters == parameters
-        acu = study.loaded(study.CASES[f'{target}/tuned']).node_parameters('acu')
+        assert study.CASES[f'{target}/default'] == Variant(study.TARGET_SCENARIOS[target][0]).with_(parameters)
+        acu = study.loaded(f'{target}/tuned').node_parameters('acu')
         given = study.TUNED_FILTERS[target.partition('-ship')[0]]
         assert {key: operator.attrgetter(key)(acu) for key in given} == given
         assert acu.azimuth.filter.kind in ('cv', 'ca', 'singer')

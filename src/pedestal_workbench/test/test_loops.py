@@ -8,6 +8,7 @@ import pytest
 from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import files, scenario
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_results import results
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.tuning import loops
@@ -57,7 +58,7 @@ def test_a_loop_slower_than_required_and_one_without_a_gain_margin_are_named(ped
 @pytest.mark.thorough
 def test_a_soft_gear_makes_the_loop_slower_until_it_holds_its_margins():
     asked = loops.LoopRequirements()
-    stiff, soft = (loops.Loops('leo_pass', changes) for changes in ((), SOFT))
+    stiff, soft = (loops.Loops(Variant('leo_pass', tuple(changes))) for changes in ((), SOFT))
     key = 'acu.azimuth.feedforward.bandwidth'
     for each in (stiff, soft):
         rows = {(loop, axis): margins for loop, axis, _, margins in
@@ -69,7 +70,7 @@ def test_a_soft_gear_makes_the_loop_slower_until_it_holds_its_margins():
 @pytest.mark.thorough
 def test_what_is_asked_is_the_crossover_of_the_position_loop():
     for asked in (1.5, 3.0):
-        each = loops.Loops('leo_pass')
+        each = loops.Loops(Variant('leo_pass'))
         rows = {loop: margins for loop, _, _, margins in loops.design(
             each, ('azimuth',), loops.LoopRequirements(28.0, asked), lambda share, text: None)}
         assert rows['position']['crossover_hz'][0] == pytest.approx(asked, rel=0.12)
@@ -82,7 +83,7 @@ def test_an_axis_slower_than_the_rate_of_the_measurement():
     asked, slow = loops.LoopRequirements(), {'azimuth': math.radians(2.0), 'elevation': math.radians(1.0)}
     found = []
     for changes in ((), [f'adu.{axis}.limits.rate={rate}' for axis, rate in slow.items()]):
-        each = loops.Loops('leo_pass', changes)
+        each = loops.Loops(Variant('leo_pass', tuple(changes)))
         found.append([margins for *_, margins in loops.design(each, loops.AXES, asked, lambda share, text: None)])
         assert each.gains['acu.azimuth.feedforward.bandwidth'] == pytest.approx(22.0, rel=0.01)
     for fast, slow in zip(*found):
@@ -122,8 +123,8 @@ def test_a_flexible_dish_is_tracked_also_if_inertia_and_frequency_are_wrong(pede
 def test_the_shaper_of_a_flexible_dish_leaves_no_swing():
     """A dish on a spring, base accelerated to a with the jerk: after the rise it hangs back by a / w^2, and swings by
     nothing if its frequency is as declared, by a quarter of that if it is 20 % off."""
-    plant = loops.Loops('leo_pass', [f'adu.azimuth.structure.{key}' for key in ('inertia_share=0.4', 'frequency=4')]
-                        ).plants['azimuth']
+    declared = {'adu.azimuth.structure.inertia_share': 0.4, 'adu.azimuth.structure.frequency': 4.0}
+    plant = loops.Loops(Variant('leo_pass').with_(declared)).plants['azimuth']
     gains = loops.shaper_gains(plant, 176.0)
     a, bend = gains['acceleration'], gains['acceleration'] / (2.0 * math.pi * 4.0)**2
     assert bend == pytest.approx(0.8e-3) and gains['h0'] == pytest.approx(0.2)
@@ -142,7 +143,7 @@ def test_a_flexible_dish_gets_the_models_that_do_not_follow_its_swing():
     next above it. A rigid dish keeps all models."""
     noise = loops.receiver_noise(math.radians(1.0), 1.6, 46.4)
     assert math.degrees(noise) == pytest.approx(1.0 / (1.6 * math.sqrt(2.0 * 10**4.64)))
-    axis, bank = loops.Loops('leo_pass').plants['azimuth'].axis, FilterParameters().imm
+    axis, bank = loops.Loops(Variant('leo_pass')).plants['azimuth'].axis, FilterParameters().imm
     assert loops.filter_gains(loops.Plant('azimuth', axis, noise=noise)) == {}
     for frequency in (2.0, 4.0, 8.0):
         structure = dataclasses.replace(axis.structure, inertia_share=0.4, frequency=frequency)
@@ -155,7 +156,7 @@ def test_a_flexible_dish_gets_the_models_that_do_not_follow_its_swing():
 def test_the_models_of_a_scenario_count_with_its_own_white_jerk():
     """A first model with 5.2 times the default white jerk leaves room for one model fewer."""
     structure = [f'adu.azimuth.structure.{key}' for key in ('inertia_share=0.4', 'frequency=4.0')]
-    count = lambda *more: loops.filter_gains(loops.Loops('leo_pass', [*structure, *more]).plants[  # noqa: E731
+    count = lambda *more: loops.filter_gains(loops.Loops(Variant('leo_pass', (*structure, *more))).plants[  # noqa: E731
         'azimuth'])['filter.imm.rungs']
     noise = FilterParameters().imm.ca.noise
     assert count(f'acu.azimuth.filter.imm.ca.noise={5.2 * noise}') == count() - 1
@@ -164,7 +165,7 @@ def test_the_models_of_a_scenario_count_with_its_own_white_jerk():
 
 def test_the_design_is_that_of_a_rigid_drive():
     """J dw/dt = T for one motor and its half of the load: crossover of K_p / (J s) at w_s."""
-    plant = loops.Loops('leo_pass').plants['azimuth']
+    plant = loops.Loops(Variant('leo_pass')).plants['azimuth']
     half = 0.0085 + 210.0 / 64.0**2 / 2.0
     assert plant.inertia == pytest.approx(half)
     gains = loops.drive_gains(plant, 100.0)

@@ -19,12 +19,13 @@ from pedestal import cli
 from pedestal.verbs import arguments
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_results import results
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.trials import comparison, ensemble, monte_carlo, statistics
 from pedestal_workbench.trials.distributions import parse
 from pedestal_workbench.trials.plan import plan
-from pedestal_workbench.trials.table import Table, TableError
+from pedestal_workbench.trials.table import Table
 
 INERTIA, BANDWIDTH = 'adu.azimuth.load.inertia', 'acu.azimuth.feedforward.bandwidth'
 VARY = (f'{INERTIA}=normal(1, 0.1)x', f'{BANDWIDTH}=uniform(15, 25)')
@@ -46,24 +47,24 @@ def test_whole_numbers_and_choices_are_equally_likely():
 
 def test_a_trial_is_drawn_from_its_seed_and_a_longer_plan_begins_with_it():
     for sobol in (False, True):
-        few, many = (plan('leo_pass', runs, VARY, seed=7, sobol=sobol) for runs in (3, 8))
-        assert [few.changes(i) for i in range(3)] == [many.changes(i) for i in range(3)]
-    alone, among = plan('leo_pass', 1, VARY, seed=9), plan('leo_pass', 3, VARY, seed=7)
-    assert alone.changes(0) == among.changes(2) and alone.command(0) == among.command(2)
+        few, many = (plan(Variant('leo_pass', seed=7), runs, VARY, sobol) for runs in (3, 8))
+        assert [few.drawn(i) for i in range(3)] == [many.drawn(i) for i in range(3)]
+    alone, among = (plan(Variant('leo_pass', seed=seed), runs, VARY) for seed, runs in ((9, 1), (7, 3)))
+    assert alone.drawn(0) == among.drawn(2) and alone.command(0) == among.command(2)
     nominal = scenario.load('leo_pass').node_parameters('adu').azimuth.load.inertia
-    factors = np.array(plan('leo_pass', 500, VARY).varied[INERTIA]) / nominal
+    factors = np.array(plan(Variant('leo_pass'), 500, VARY).varied[INERTIA]) / nominal
     assert stats.kstest(factors, stats.norm(1.0, 0.1).cdf).pvalue > 0.01
 
 
 def test_sobol_points_fill_every_cell():
     """Of 16 points each of 16 stretches of either range holds one, which independent draws do not do."""
-    made = plan('leo_pass', 16, (f'{INERTIA}=uniform(100, 260)', f'{BANDWIDTH}=uniform(10, 26)'), sobol=True)
+    made = plan(Variant('leo_pass'), 16, (f'{INERTIA}=uniform(100, 260)', f'{BANDWIDTH}=uniform(10, 26)'), True)
     for name, low, width in ((INERTIA, 100.0, 10.0), (BANDWIDTH, 10.0, 1.0)):
         assert sorted(((np.array(made.varied[name]) - low) // width).tolist()) == list(range(16))
 
 
 def test_the_command_of_a_trial_says_what_the_trial_is():
-    made = plan('leo_pass', 3, VARY, ['acu.azimuth.filter.kind=ca'], seed=5, duration=6.0)
+    made = plan(Variant('leo_pass', ('acu.azimuth.filter.kind=ca',), seed=5, duration=6.0), 3, VARY)
     options = cli._parser().parse_args(made.command(2).split()[1:])
     assert made.scenario(2) == scenario.load(options.scenario, options.param, options.seed, options.duration)
     assert made.part(range(1, 3)).scenario(1) == made.scenario(2)
@@ -74,12 +75,12 @@ def test_the_command_of_a_trial_names_the_parameter_files(pedestal, tmp_path):
     file = tmp_path / 'my loops.yaml'
     file.write_text(f'acu:\n  ros__parameters:\n    {BANDWIDTH.partition(".")[2]}: 12.0\n'
                     '    azimuth.filter.kind: ca\n')
-    made = plan('leo_pass', 2, VARY[:1], ['acu.azimuth.filter.kind=cv'], seed=5, files=[file])
+    made = plan(Variant('leo_pass', ('acu.azimuth.filter.kind=cv',), (file,), seed=5), 2, VARY[:1])
     words = shlex.split(made.command(1))[1:]
     assert words[:5] == ['run', 'leo_pass', '--seed', '6', '--params-file'] and words[5] == str(file)
     assert words[6:8] == ['--param', 'acu.azimuth.filter.kind=cv'] and len(words) == 10
     options = cli._parser().parse_args(words)
-    assert made.scenario(1) == scenario.load(options.scenario, arguments.changes(options), options.seed)
+    assert made.scenario(1) == arguments.variant(options).load()
     code, output, errors = pedestal('trials', 'leo_pass', '--runs', 1, '--duration', 3, '--workers', 1,
                                     '--params-file', file, '--param', 'acu.azimuth.filter.kind=cv')
     assert (code, errors) == (0, '') and BANDWIDTH not in output
@@ -89,7 +90,7 @@ def test_the_command_of_a_trial_names_the_parameter_files(pedestal, tmp_path):
 def test_rows_of_a_file_are_trials(tmp_path, pedestal):
     file = tmp_path / 'rows.csv'
     file.write_text(f'{BANDWIDTH},acu.azimuth.filter.kind\n15,ca\n20.5,cv\n')
-    made = plan('leo_pass', vary=[str(file)])
+    made = plan(Variant('leo_pass'), vary=[str(file)])
     assert made.runs == 2 and made.varied == {BANDWIDTH: [15, 20.5], 'acu.azimuth.filter.kind': ['ca', 'cv']}
     file.write_text(f'{BANDWIDTH}\n15\n2000\n')
     code, _, errors = pedestal('trials', 'leo_pass', '--vary', file)
@@ -157,7 +158,7 @@ def test_a_table_continues_after_its_last_complete_row(tmp_path):
 
     with open_table() as table:
         table.append([[0, 1, 0.1 + 0.2, 1e-300, None], [1, 2, 0.5, math.nan, None]])
-        with pytest.raises(TableError, match='another process writes the file'):
+        with pytest.raises(ValueError, match='another process writes the file'):
             open_table().__enter__()
     with open(table.file, 'ab') as stream:
         stream.write(b'2,3,0.77')
@@ -166,7 +167,7 @@ def test_a_table_continues_after_its_last_complete_row(tmp_path):
         table.append([[2, 3, 0.7, 2.0, None]])
         assert np.array_equal(table.column('loss_s'), [1e-300, math.nan, 2.0], equal_nan=True)
     assert table.file.read_text().splitlines()[-2:] == ['1,2,0.5,nan,', '2,3,0.7,2.0,']
-    with pytest.raises(TableError, match='contains other trials \\(--seed 1, not 2\\)'):
+    with pytest.raises(ValueError, match='contains other trials \\(--seed 1, not 2\\)'):
         open_table({'--seed': '2'}).__enter__()
 
 
@@ -201,7 +202,7 @@ def test_a_damaged_row_is_named_and_not_read(tmp_path, case):
         rows[line][cell] = value
     before = '\n'.join([*map(','.join, rows), '']).encode(errors='surrogateescape')
     table.file.write_bytes(before)
-    with pytest.raises(TableError) as raised:
+    with pytest.raises(ValueError) as raised:
         open_table().__enter__()
     assert f'{table.file}: {expected}' in str(raised.value) and '\n' not in str(raised.value)
     assert table.file.read_bytes() == before
@@ -214,12 +215,12 @@ def test_a_table_that_a_spreadsheet_wrote_again_goes_on(tmp_path):
     file = tmp_path / 'trials.csv'
     content = file.read_bytes()
     file.write_bytes(b'\xef\xbb\xbf' + content.replace(b'\n', b'\r\n'))
-    made = plan('leo_pass', 2, duration=3.0)
+    made = plan(Variant('leo_pass', duration=3.0), 2)
     with ensemble.open_table(made, tmp_path) as table:
         assert len(table.rows) == 2
     name, cell = 'azimuth_following_rms_deg', str(table.column('azimuth_following_rms_deg')[1])
     file.write_bytes(content.replace(cell.encode(), b'abc'))
-    with pytest.raises(TableError, match=f"line 3: {name} = 'abc': must be a number"):
+    with pytest.raises(ValueError, match=f"line 3: {name} = 'abc': must be a number"):
         ensemble.open_table(made, tmp_path).__enter__()
 
 
@@ -231,7 +232,7 @@ def make(made, folder, pool):
 
 @pytest.mark.thorough
 def test_the_same_numbers_whoever_works_and_a_plan_that_goes_on(tmp_path):
-    made = plan('leo_pass', 6, VARY, duration=4.0)
+    made = plan(Variant('leo_pass', duration=4.0), 6, VARY)
     expected = make(made, tmp_path / 'one', monte_carlo.Pool(1))
     with monte_carlo.Pool(2) as pool:
         make(dataclasses.replace(made, runs=3), tmp_path / 'two', pool)
@@ -442,7 +443,7 @@ def test_a_table_of_a_ship_against_another_setting(pedestal, tmp_path):
 
 
 def test_every_beam_has_its_own_results(tmp_path):
-    made = plan('phased_array_four', 1, duration=3.0, overrides=['acu.tracker.lock_count=20'])
+    made = plan(Variant('phased_array_four', ('acu.tracker.lock_count=20',), duration=3.0), 1)
     table = make(made, tmp_path, monte_carlo.Pool(1))
     assert {name.partition('/')[0] for name in table.measured_results} == {f'beam_{i}' for i in range(1, 5)}
     cases = {row['case'] for row in statistics.of_results('four', table)}

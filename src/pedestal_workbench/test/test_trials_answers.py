@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_workbench.trials import comparison, plan, solve, statistics
 from pedestal_workbench.trials.table import Table
 
@@ -45,7 +46,7 @@ def test_sides_with_the_same_parameters_are_named_so(pedestal):
                                   '--against-param', f'{KIND}=imm')
     assert (code, errors) == (0, '')
     assert said.splitlines()[0] == f'Both sides have the same parameters: {KIND}=imm changes nothing.'
-    plans = [plan.plan('uav_flyby', 2, ['adu.azimuth.load.inertia=normal(1, 0.1)x'], overrides)
+    plans = [plan.plan(Variant('uav_flyby', overrides), 2, ['adu.azimuth.load.inertia=normal(1, 0.1)x'])
              for overrides in ((), (f'{KIND}=ca',), (f'{KIND}=ca', 'acu.initial_mode=program'))]
     assert comparison.unchanged(plans[0], plans[0]) == 'Both sides have the same parameters.'
     assert comparison.unchanged(plans[0], plans[1]) == ''

@@ -12,6 +12,7 @@ from pedestal import console
 from pedestal_common.parameters import option_of
 
 if typing.TYPE_CHECKING:
+    from pedestal_bringup.scenario.variant import Variant
     from pedestal_operator.remote_node import RemoteSession
     from pedestal_recording.recording import Recording
 
@@ -19,8 +20,8 @@ if typing.TYPE_CHECKING:
 
 
 class Verb(typing.NamedTuple):
-    """Verb of the command line, or step of a verb. The docstring of `add_arguments` is its help, below the line in the
-    table of the verbs."""
+    """Verb of the command line, or step of a verb. The docstring of `add_arguments` is its help, below its line in
+    VERBS."""
     add_arguments: Callable[[argparse.ArgumentParser], None]
     main: Callable[[argparse.Namespace], int] | None = None     # does the work and returns the exit code; None: a step
                                                                 # of the verb does
@@ -36,8 +37,7 @@ class Verb(typing.NamedTuple):
 
 
 def add_steps(parser: argparse.ArgumentParser, title: str, steps: Mapping[str, tuple[str, Verb]]) -> None:
-    """Add a subcommand for each step of a verb. title: noun for the help; steps: {name: (first line of its help,
-    step)}."""
+    """Add a subcommand for each step of a verb, {name: (first line of its help, step)}. title: noun for the help."""
     verbs = parser.add_subparsers(title=title, required=True, metavar=title.upper())
     for name, (line, step) in steps.items():
         step.add_to(verbs, name, line)
@@ -47,10 +47,7 @@ _Options = typing.TypeVar('_Options')
 
 
 def typed(kind: type[_Options], options: argparse.Namespace, **more: object) -> _Options:
-    """Return the options dataclass of a function, whose fields have the names of the options.
-
-    more: values of fields that are no options.
-    """
+    """Return the options dataclass of a function, whose fields have the names of the options or are in `more`."""
     given = {field.name: getattr(options, field.name)
              for field in dataclasses.fields(kind) if field.name not in more}   # type: ignore[arg-type]  # a dataclass
     return kind(**given, **more)
@@ -79,12 +76,6 @@ def add_beam(parser: argparse.ArgumentParser) -> None:
                         'for example beam_2; default: the first')
 
 
-def add_vector(parser: argparse.ArgumentParser) -> None:
-    """Add --vector FORMAT for a verb that draws figures."""
-    parser.add_argument('--vector', choices=('pdf', 'svg'), help='additional vector format in which each figure is '
-                        'written, for print')
-
-
 def add_new_bag(parser: argparse.ArgumentParser) -> None:
     """Add --bag DIR for the recording of a run."""
     parser.add_argument('--bag', type=pathlib.Path, metavar='DIR', help='output directory of the new recording; '
@@ -109,14 +100,13 @@ def add_elements(parser: argparse.ArgumentParser) -> None:
 
 def check_elements(options: argparse.Namespace) -> None:
     """Raise ValueError for --satellite without --tle."""
-    if options.satellite and not options.tle:
-        raise ValueError(f'--satellite {options.satellite}: needs --tle FILE, the file that holds it')
+    if not options.tle:
+        refuse_given(options, ('satellite',), 'needs --tle FILE, the file that holds it', stated=True)
 
 
 def elements(options: argparse.Namespace) -> dict[str, str]:
-    """Return the arguments of the commands `tle` and `elements` from the file of --tle, {} without --tle.
-
-    Raises ValueError."""
+    """Return the arguments of the commands `tle` and `elements` from the file of --tle, {} without it. Raises
+    ValueError."""
     check_elements(options)
     if not options.tle:
         return {}
@@ -177,10 +167,12 @@ def add_params_file(parser: argparse.ArgumentParser) -> None:
                         'output of `pedestal tune`; may be repeated, the last value holds; --param replaces both')
 
 
-def changes(options: argparse.Namespace) -> list[str]:
-    """Return the texts 'node.key=value' of --params-file, then of --param. Raises ValueError."""
-    from pedestal_bringup.scenario import files as scenario_files
-    return [change for file in options.params_file for change in scenario_files.file_overrides(file)] + options.param
+def variant(options: argparse.Namespace) -> 'Variant':
+    """Return the scenario of the command line with its changes, as far as the verb has options for them."""
+    from pedestal_bringup.scenario.variant import Variant
+    given = vars(options)
+    return Variant(options.scenario, tuple(options.param), tuple(given.get('params_file', ())), given.get('seed'),
+                   given.get('duration'))
 
 
 def check_recording(options: argparse.Namespace) -> None:
@@ -190,17 +182,13 @@ def check_recording(options: argparse.Namespace) -> None:
 
 
 def recording(options: argparse.Namespace) -> 'tuple[Recording, str]':
-    """Return (recording, name) of --bag, or of a run in memory of --scenario with --params-file and --param.
-
-    Raises ValueError.
-    """
+    """Return (recording, name) of --bag, or of a run in memory of --scenario with its changes. Raises ValueError."""
     check_recording(options)
     if options.bag is not None:
         from pedestal_recording import bag as bags
         return bags.read(options.bag, ''), str(options.bag)
     from pedestal_bringup.loop import memory_recording
-    from pedestal_bringup.scenario import scenario
-    chosen = scenario.load(options.scenario, changes(options))
+    chosen = variant(options).load()
     return memory_recording.record(chosen), chosen.name
 
 
@@ -211,12 +199,14 @@ def add_result_files(parser: argparse.ArgumentParser, output: str, report: str) 
     console.add_json(parser)
 
 
-def refuse_given(options: argparse.Namespace, names: Iterable[str], reason: str) -> None:
-    """Raise ValueError for a given option of some names, with the reason, such as 'has no effect with --bag'."""
+def refuse_given(options: argparse.Namespace, names: Iterable[str], reason: str, stated: bool = False) -> None:
+    """Raise ValueError for a given option of some names, with the reason, such as 'has no effect with --bag'. stated:
+    True if the text states the value of the option."""
     for name in names:
         value = getattr(options, name)
-        if not (value is None or value is False or value == []):
-            raise ValueError(f'{option_of(name)}: {reason}')
+        if not (value is None or value is False or value in ([], '')):
+            text = f' {value:g}' if isinstance(value, float) else f' {value}'
+            raise ValueError(f'{option_of(name)}{text if stated else ""}: {reason}')
 
 
 def check_result_files(options: argparse.Namespace, *more: str) -> None:

@@ -106,7 +106,7 @@ def _receiver(options: argparse.Namespace) -> int:
         from pedestal_workbench.calibration.receiver import iq_phasing
         arguments.check_recording(options)
         return _finish(options, iq_phasing.calibrated(arguments.typed(iq_phasing.IqPhasingOptions, options),
-                                                      arguments.changes(options)))
+                                                      arguments.variant(options).overrides()))
     from pedestal_workbench.calibration.receiver import phasing
     return _finish(options, phasing.calibrated(*arguments.recording(options)))
 
@@ -143,13 +143,11 @@ def _drive(options: argparse.Namespace) -> int:
         arguments.refuse_given(options, ('output', 'report', 'json'), 'has no effect with --plan')
     arguments.check_result_files(options, 'plan')
     arguments.check_recording(options)
-    changes = arguments.changes(options)
+    variant = arguments.variant(options)
     if options.plan:
-        from pedestal_bringup.scenario import scenario
-        chosen = scenario.load(options.scenario, changes)
-        print('\n'.join(identified.write_plan(chosen, options.scenario, options.plan)))
+        print('\n'.join(identified.write_plan(variant.load(), options.scenario, options.plan)))
         return 0
-    return _finish(options, identified.calibrated(options.bag or (), options.scenario, changes))
+    return _finish(options, identified.calibrated(options.bag or (), options.scenario, variant.overrides()))
 
 
 def _add_sensitivity(parser: argparse.ArgumentParser) -> None:
@@ -198,7 +196,6 @@ STEPS = {
     'sensitivity': ('measure beamwidth, squint and G/T from levels at offsets about the sun or another source',
                     Verb(_add_sensitivity, _sensitivity)),
 }
-"""{name of a step: (first line of its help, its verb)}, in the order of the help."""
 
 
 def _add_calibrate(parser: argparse.ArgumentParser) -> None:

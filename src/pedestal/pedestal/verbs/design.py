@@ -32,8 +32,7 @@ SAMPLE_FILES = {
 """{name of a file in the folder samples of this package: its content in a sentence}."""
 
 LOOP_REQUIREMENTS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'position', 'phase_margin': 'phase_margin',
-                     'gain_margin': 'gain_margin'}
-"""{option of `tune --loops`: field of LoopRequirements}."""
+                     'gain_margin': 'gain_margin'}  # option: field
 
 
 def _add_scenarios(parser: argparse.ArgumentParser) -> None:
@@ -41,7 +40,6 @@ def _add_scenarios(parser: argparse.ArgumentParser) -> None:
 
 
 def _scenarios(_options: argparse.Namespace) -> int:
-    """Print name and title of every scenario. Return exit code 0."""
     from pedestal_bringup.scenario import shipped
     console.show_list(shipped.available().items())
     return 0
@@ -54,7 +52,6 @@ def _add_samples(parser: argparse.ArgumentParser) -> None:
 
 
 def _samples(options: argparse.Namespace) -> int:
-    """Write the files and list them. Return exit code 0. Raises FileExistsError for an existing file."""
     options.folder.mkdir(parents=True, exist_ok=True)
     for name in SAMPLE_FILES:
         if (options.folder / name).exists():
@@ -69,7 +66,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
     """All other values of the antenna are scaled from the antenna of the scenario leo_pass. A comment in the file
     explains each value. `pedestal tune FILE --loops` then tunes the loops and measures their margins.
     """
-    from pedestal_workbench.tuning.data_sheet_format import DataSheet
+    from pedestal_workbench.tuning.data_sheet import DataSheet
     parser.add_argument('file', type=pathlib.Path, metavar='FILE.yaml', help='new scenario file')
     for name, field in parameters.flatten(DataSheet):
         unit = field.metadata.get('unit')
@@ -81,10 +78,8 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 
 
 def _new(options: argparse.Namespace) -> int:
-    """Write the file. Return exit code 0. Raises ValueError for a wrong value, FileExistsError for an
-    existing file."""
     from pedestal_workbench.tuning import antenna_from_data_sheet
-    from pedestal_workbench.tuning.data_sheet_format import DataSheet
+    from pedestal_workbench.tuning.data_sheet import DataSheet
     if options.file.suffix not in ('.yaml', '.yml'):
         raise ValueError(f'{options.file}: must end in .yaml or .yml')
     if options.file.exists():
@@ -109,7 +104,6 @@ def _add_parameters(parser: argparse.ArgumentParser) -> None:
 
 
 def _parameters(options: argparse.Namespace) -> int:
-    """Print a row for each parameter of the node and of the graph. Return exit code 0."""
     from pedestal_bringup.scenario.sections import parameters_of
     from pedestal_common.graph.graph_parameters import GraphParameters
     rows = []
@@ -137,17 +131,14 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
                         'studies/NAME')
     parser.add_argument('--runs', type=int, metavar='N', help='number of runs of each case; default: set by the '
                         'study')
-    arguments.add_vector(parser)
+    parser.add_argument('--vector', choices=('pdf', 'svg'), help='additional vector format in which each figure is '
+                        'written, for print')
     parser.add_argument('--scenario', metavar='SCENARIO', help='scenario (name or .yaml file) whose plant '
                         'replaces the plant of the paper, for studies servo, backlash and bode')
     arguments.add_workers(parser)
 
 
 def _study(options: argparse.Namespace) -> int:
-    """Run a study, print its table and remarks, draw its figures; without a name list the studies.
-
-    Return the exit code, 2 for an unknown study.
-    """
     import pedestal_studies
     if not options.name:
         arguments.refuse_given(options, ('json', 'output', 'runs', 'vector', 'scenario', 'workers', 'scheduler'),
@@ -184,7 +175,6 @@ def _study(options: argparse.Namespace) -> int:
 
 
 def _of_scenario(options: argparse.Namespace) -> 'Callable[..., Result]':
-    """Return the function(progress) that runs the study for the plant of --scenario."""
     from pedestal_studies import plant_studies
     if options.name not in plant_studies.PLANT_STUDIES:
         raise ValueError(f'--scenario: study {options.name} has the plant of the papers; must be one of '
@@ -197,13 +187,11 @@ def _of_scenario(options: argparse.Namespace) -> 'Callable[..., Result]':
 def _many_runs(options: argparse.Namespace, study: types.ModuleType,
                stack: contextlib.ExitStack) -> dict[str, object]:
     """Return the keyword arguments of a study of many runs, except its progress. The stack closes the pool."""
-    given = {name: getattr(options, name) for name in ('runs', 'workers', 'scheduler')}
     if 'runs' not in inspect.signature(study.run).parameters:
-        for name, value in given.items():
-            if value is not None:
-                raise ValueError(f'--{name} {value}: study {options.name} has one run of each case')
+        arguments.refuse_given(options, ('runs', 'workers', 'scheduler'),
+                               f'study {options.name} has one run of each case', stated=True)
         return {}
-    if given['runs'] is not None and given['runs'] < 1:
+    if options.runs is not None and options.runs < 1:
         raise ValueError(f'--runs {options.runs}: must be at least 1')
     from pedestal_workbench.trials import monte_carlo
     return {'runs': options.runs or study.DEFAULT_RUNS,
@@ -243,21 +231,20 @@ def _add_tune(parser: argparse.ArgumentParser) -> None:
 
 
 def _tune(options: argparse.Namespace) -> int:
-    """Tune, write the parameter file and print the comparison. Return exit code 0."""
     from pedestal_workbench.tuning import loops, tune
-    required = {name: getattr(options, name) for name in LOOP_REQUIREMENTS if getattr(options, name) is not None}
     if options.loops:
         arguments.refuse_given(options, ('filter', 'feedforward', 'runs', 'seed', 'duration'),
                                'cannot be combined with --loops, which measures the plant')
     elif bool(options.filter) == options.feedforward:
         raise ValueError('one of --filter KIND and --feedforward must be given')
-    elif required:
-        name, value = next(iter(required.items()))
-        raise ValueError(f'{option_of(name)} {value:g}: needs --loops')
+    else:
+        arguments.refuse_given(options, LOOP_REQUIREMENTS, 'needs --loops', stated=True)
     with console.progress_of_share() as progress:
         if options.loops:
-            lines = loops.main(arguments.typed(loops.LoopOptions, options), loops.LoopRequirements(
-                **{LOOP_REQUIREMENTS[name]: value for name, value in required.items()}), progress)
+            required = {field: value for name, field in LOOP_REQUIREMENTS.items()
+                        if (value := getattr(options, name)) is not None}
+            lines = loops.main(arguments.typed(loops.LoopOptions, options), loops.LoopRequirements(**required),
+                               progress)
         else:
             lines = tune.main(arguments.typed(tune.TuneOptions, options, filter=options.filter or None), progress)
     print('\n'.join(lines))
@@ -271,7 +258,6 @@ def _add_bench(parser: argparse.ArgumentParser) -> None:
 
 
 def _bench(options: argparse.Namespace) -> int:
-    """Run one benchmark or all, and write the rows. Return exit code 0."""
     from pedestal_studies import bench
     content: dict[str, Json] = {'name': 'bench', 'rows': []}
     for what in (options.what,) if options.what else bench.BENCH_MODULES:

@@ -30,7 +30,6 @@ def _add_status(parser: argparse.ArgumentParser) -> None:
 
 
 def _status(options: argparse.Namespace) -> int:
-    """Wait for the state of the control unit and print it. Return the exit code."""
     from pedestal_operator import state
     console.check_json(options.json)
     with arguments.remote(options) as session:
@@ -75,7 +74,6 @@ def _add_mode(parser: argparse.ArgumentParser) -> None:
 
 
 def _mode(options: argparse.Namespace) -> int:
-    """Send the command. Return the exit code."""
     angles = {'azimuth': options.az, 'elevation': options.el}
     numbers = [text for text in options.given if is_number(text)]
     given = with_elements(options, (text for text in options.given if text not in numbers))
@@ -127,7 +125,6 @@ def _add_ask(parser: argparse.ArgumentParser) -> None:
 
 
 def _ask(options: argparse.Namespace) -> int:
-    """Send the command. Return the exit code."""
     given = with_elements(options, options.given)
     if options.params_file is not None:
         if options.verb != 'pointing':
@@ -174,10 +171,8 @@ def with_elements(options: argparse.Namespace, texts: Iterable[str]) -> dict[str
 
 def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str | float], node: str = 'acu',
                  hold: float | None = None) -> int:
-    """Send a command to a node and print its reply. Return the exit code.
-
-    hold: time for which the command is repeated [s], None to send it once.
-    """
+    """Send a command to a node and print its reply. Return the exit code. hold: time for which the command is
+    repeated, None to send it once."""
     from pedestal_common.graph import nodes
     commanded = [row.name for row in nodes.NODES if row.obeys]
     if node not in commanded:
@@ -199,7 +194,6 @@ def _add_operate(parser: argparse.ArgumentParser) -> None:
 
 
 def _operate(options: argparse.Namespace) -> int:
-    """Run the console. Return exit code 0. Raises ValueError without a terminal."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise ValueError('operate needs a terminal; `pedestal mode` and `pedestal status` need none')
     from pedestal_operator import console as operators_console
@@ -222,7 +216,6 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
 
 
 def _live(options: argparse.Namespace) -> int:
-    """Serve until Ctrl-C, or write the files. Return the exit code. Raises FileExistsError for an existing folder."""
     if options.layouts:
         arguments.refuse_given(options, ('port', 'beams'), 'has no effect with --layouts, which serves nothing')
         from pedestal_operator.viewers.frames import VIEWER_FOLDER
@@ -260,11 +253,9 @@ def _start(plan: 'Plan', text: str | None) -> int | None:
 
 
 def _program(options: argparse.Namespace) -> int:
-    """Send the program track. Return the exit code of watch.send_program."""
     from pedestal_bringup.graph import watch
-    from pedestal_bringup.scenario import scenario
     from pedestal_bringup.scenario.program import Plan
-    plan = Plan(scenario.load(options.scenario, options.param, duration=options.duration))
+    plan = Plan(arguments.variant(options).load())
     return watch.send_program(plan, _start(plan, options.start), arguments.ros_arguments(options))
 
 

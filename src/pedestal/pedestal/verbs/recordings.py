@@ -16,7 +16,6 @@ def _add_verify(parser: argparse.ArgumentParser) -> None:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    """Print the check. Return the exit code, 1 for an incomplete bag."""
     from pedestal_recording.bag import load
     from pedestal_recording.verify import verify
     check = verify(load(options.bag))
@@ -30,7 +29,6 @@ def _add_recover(parser: argparse.ArgumentParser) -> None:
 
 
 def _recover(options: argparse.Namespace) -> int:
-    """Recover the bag and print a summary. Return exit code 0."""
     from pedestal_recording.recover import recover
     print('\n'.join(recover(options.bag, options.output).lines()))
     return 0
@@ -45,7 +43,6 @@ def _add_rerun(parser: argparse.ArgumentParser) -> None:
 
 
 def _rerun(options: argparse.Namespace) -> int:
-    """Repeat the run and print the comparison. Return the exit code, 1 if a message differs."""
     from pedestal_bringup.graph import graph
     from pedestal_bringup.scenario.program import Plan
     from pedestal_recording import bag
@@ -74,7 +71,6 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
 
 
 def _report(options: argparse.Namespace) -> int:
-    """Write the report and print its path. Return exit code 0."""
     from pedestal_results.report import page
     report = page.write(options.bag, options.output, options.png, options.beam, options.author, options.pdf)
     print(report)
@@ -100,7 +96,6 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    """Write the files and print a line for each. Return exit code 0."""
     if options.format == 'tdm':
         return _tracking_data(options)
     if options.rate is not None or options.participants:
@@ -116,12 +111,10 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _tracking_data(options: argparse.Namespace) -> int:
-    """Write the tracking data as a tracking data message (TDM). Return exit code 0."""
     import datetime
 
     from pedestal_results import tdm
-    if options.topics:
-        raise ValueError('--topics: a tdm is made of fixed topics, the option is for csv and parquet')
+    arguments.refuse_given(options, ('topics',), 'a tdm is made of fixed topics, the option is for csv and parquet')
     created = datetime.datetime.now(datetime.timezone.utc)
     rate = 10.0 if options.rate is None else options.rate
     for file, records in tdm.export(options.bag, created, options.output, rate, options.participants or (),
@@ -176,7 +169,6 @@ def _add_recompute(parser: argparse.ArgumentParser) -> None:
 
 
 def _recompute(options: argparse.Namespace) -> int:
-    """Recompute and print the comparison. Return the exit code, 1 for a failed comparison."""
     console.check_json(options.json)
     if options.iq is not None:
         arguments.refuse_given(options, ('node', 'param', 'params_file', 'pacing', 'absolute', 'relative', 'ignore',
@@ -224,7 +216,6 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
 
 
 def _replay(options: argparse.Namespace) -> int:
-    """Replay and print the outcome. Return exit code 0. Raises KeyboardInterrupt if the replay was stopped."""
     if options.page is not None:
         return _on_the_page(options)
     from pedestal_workbench.again.replay import ReplayOptions, replay
@@ -238,7 +229,6 @@ def _replay(options: argparse.Namespace) -> int:
 
 
 def _on_the_page(options: argparse.Namespace) -> int:
-    """Show the recording on the operator's page until Ctrl-C. Return exit code 0."""
     from pedestal_recording import bag
     from pedestal_workbench.again import replay, replay_page
     if options.node or options.topics or options.lockstep or options.duration is not None or (

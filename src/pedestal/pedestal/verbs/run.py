@@ -167,7 +167,6 @@ def _cure(priority: int) -> str:
 
 
 def _some(values: dict[str, tuple[float, str]], names: Collection[str]) -> dict[str, tuple[float, str]]:
-    """Return the part of the results {name: (value, unit)} whose names are in `names`."""
     return {name: value for name, value in values.items() if name in names}
 
 
@@ -176,7 +175,7 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     from pedestal_bringup.scenario import scenario
     equipment = [f'scenario.{name}={value}' for name in ('drives', 'receiver')
                  if (value := getattr(options, name)) is not None]
-    changes = equipment + arguments.changes(options)
+    changes = equipment + arguments.variant(options).overrides()
     duration = options.duration
     arguments.check_elements(options)
     if options.tle is options.station is options.which is None:

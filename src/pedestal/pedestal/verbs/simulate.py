@@ -27,15 +27,14 @@ def _add_drives(parser: argparse.ArgumentParser) -> None:
 
 
 def _drives(options: argparse.Namespace) -> int:
-    """Serve the drives until Ctrl-C, and return the exit code. Raises ValueError."""
     import tempfile
 
     from pedestal_bringup.scenario import scenario
     from pedestal_common.graph import nodes
     from pedestal_common.text_files import parameter_file
-    port = [] if options.port is None else [f'adu.bus.port={options.port}']
-    chosen = scenario.load(options.scenario or 'leo_pass',
-                           ['scenario.drives=simulated', *arguments.changes(options), *port], pacing='realtime')
+    changes = ['scenario.drives=simulated', *arguments.variant(options).overrides()]
+    changes += [] if options.port is None else [f'adu.bus.port={options.port}']
+    chosen = scenario.load(options.scenario or 'leo_pass', changes, pacing='realtime')
     name = nodes.SIMULATED_DRIVES.name
     from equipment_sim.drives import drives_node
     with tempfile.NamedTemporaryFile('w', suffix='.yaml') as file:
@@ -63,14 +62,13 @@ def _add_receiver(parser: argparse.ArgumentParser) -> None:
 
 
 def _receiver(options: argparse.Namespace) -> int:
-    """Write or send the samples of all channels, and return the exit code. Raises ValueError."""
     from pedestal_bringup.scenario import files
-    if options.output is not None and options.address is not None:
-        raise ValueError(f'--address {options.address}: has no effect with --output')
+    if options.output is not None:
+        arguments.refuse_given(options, ('address',), 'has no effect with --output', stated=True)
     own = [files.override(f'tracking_receiver.source.{key}', value) for key, value in
            (('kind', options.stream or 'sigmf'), ('address', options.output or options.address or ''))]
     from pedestal_bringup.loop import iq_run
-    loop, chosen = iq_run.scenarios(options.scenario, arguments.changes(options), own, options.duration)
+    loop, chosen = iq_run.scenarios(options.scenario, arguments.variant(options).overrides(), own, options.duration)
     with console.progress_of_run(chosen.header.duration) as progress:
         count = iq_run.run(loop, chosen, options.output is None, progress)
     print(f'{chosen.node_parameters("iq").source.url}: {count} samples of each channel')
@@ -88,7 +86,6 @@ def _add_rotator(parser: argparse.ArgumentParser) -> None:
 
 
 def _rotator(options: argparse.Namespace) -> int:
-    """Serve the rotator until Ctrl-C, and return the exit code. Raises ValueError."""
     from equipment_sim import rotator as simulator
     if not 0.0 < options.rate <= MAX_RATE_DEG_S:
         raise ValueError(f'--rate {options.rate:g}: must be above 0 and at most {MAX_RATE_DEG_S:g} deg/s')
@@ -117,14 +114,12 @@ def _add_ins(parser: argparse.ArgumentParser) -> None:
 
 
 def _ins(options: argparse.Namespace) -> int:
-    """Send the sentences until Ctrl-C, and return the exit code. Raises ValueError."""
     from equipment_sim import ins as simulator
-    from pedestal_bringup.scenario import scenario
     if not 1 <= options.port <= 65535:
         raise ValueError(f'--port {options.port}: must be 1 to 65535')
     if not MIN_RATE_HZ <= options.rate <= MAX_RATE_HZ:
         raise ValueError(f'--rate {options.rate:g} Hz: must be {MIN_RATE_HZ:g} to {MAX_RATE_HZ:g}')
-    chosen = scenario.load(options.scenario, arguments.changes(options), pacing='realtime')
+    chosen = arguments.variant(options).load('realtime')
     if not chosen.header.ship:
         raise ValueError(f'--scenario {chosen.name}: has no ship; scenarios with a ship have scenario.ship = true')
     sink = simulator.SerialSink() if options.serial else simulator.UdpSink('127.0.0.1', options.port)
@@ -144,7 +139,6 @@ EQUIPMENT = {
     'ins': ('the INS of the ship of a scenario, which sends NMEA sentences in real time by UDP or on a pseudo '
             'terminal', Verb(_add_ins, _ins)),
 }
-"""{name of an equipment: (first line of its help, its verb)}, in the order of the help."""
 
 
 def _add_simulate(parser: argparse.ArgumentParser) -> None:

@@ -53,8 +53,8 @@ def run(plan: 'Plan', bag: pathlib.Path, progress: AbstractContextManager[Callab
     """Run the scenario of a plan to its end, or until Ctrl-C, and return its Outcome.
 
     bag: folder for the recording. progress: its function is called during the run with the time of the run. servers:
-    {name: process} beside the nodes. Raises RunError if the run cannot continue. The recording up to that moment stays
-    readable. Raises GraphError if the domain of the user has another graph, see domain.of_run.
+    {name: process} beside the nodes. Raises RuntimeError if the run cannot continue. The recording up to that moment
+    stays readable. Raises GraphError if the domain of the user has another graph, see domain.of_run.
     """
     _, tracks = read_files(plan)
     with domain.of_run(), Graph(plan.scenario, bag, servers) as graph:

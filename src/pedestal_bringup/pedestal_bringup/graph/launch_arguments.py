@@ -94,7 +94,7 @@ def prepare(given: Mapping[str, str], chosen: scenario.Scenario) -> tuple[list[s
     logs. given: {argument: text}.
 
     Return (lines on the run, path of the ROS 2 parameter file of all nodes, path of the scenario file). Raises
-    ValueError, RunError.
+    ValueError, RuntimeError.
     """
     lines, _ = graph.read_files(Plan(chosen))
     bag = graph.new_bag(given['bag'], chosen.name)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from rclpy.executors import SingleThreadedExecutor
 
 from pedestal_bringup.graph.operator_node import Operator
-from pedestal_bringup.graph.processes import Graph, RunError, exit_description
+from pedestal_bringup.graph.processes import Graph, exit_description
 from pedestal_common.graph import nodes
 from pedestal_common.quantities import Message, Seconds
 
@@ -22,7 +22,7 @@ def watch(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
     """Watch the nodes from their start to their end.
 
     tracks: {topic: program track}, sent once all nodes that read them are present; progress: function of the drive's
-    time. Raises RunError.
+    time. Raises RuntimeError.
     """
     header = graph.scenario.header
     sent = False
@@ -49,8 +49,8 @@ def watch(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
 
 
 def failure(graph: Graph, stuck_nodes: Callable[[list[str]], list[str]],
-            without_diagnostics: str | None = None) -> RunError:
-    """Return the RunError of a run in which a node has ended too early, or is without diagnostics for too long.
+            without_diagnostics: str | None = None) -> RuntimeError:
+    """Return the RuntimeError of a run in which a node has ended too early, or is without diagnostics for too long.
 
     stuck_nodes: function that returns which of the named nodes do not answer a request. without_diagnostics: node
     whose diagnostics are too old, or None.
@@ -83,4 +83,4 @@ def failure(graph: Graph, stuck_nodes: Callable[[list[str]], list[str]],
     else:
         reason = f'ended before the run did, with exit code {early[culprit]}'
     others = ''.join(f'\n  {node}: {lines[node][-1]}' for node in early if node != culprit and lines[node])
-    return RunError(graph.exit_report(culprit, reason) + others)
+    return RuntimeError(graph.exit_report(culprit, reason) + others)

@@ -7,7 +7,6 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.executors import Executor
 from rclpy.task import Future
 
-from pedestal_bringup.graph.processes import RunError
 from pedestal_common import parameters
 from pedestal_common.graph import domain, nodes
 from pedestal_common.node.shell import Shell
@@ -99,12 +98,12 @@ class Operator(Shell):
 
     def graph_start(self, node: str, executor: Executor) -> Nanoseconds:
         """Return graph.start of a running node: the UTC at which its time is 0. executor: of this node. Raises
-        RunError if the node does not answer."""
+        RuntimeError if the node does not answer."""
         answers = self._get_parameters([node], GetParameters.Request(names=['graph.start']), executor)
         if node not in answers or not answers[node].values:
             domain_id = self.context.get_domain_id()
-            raise RunError(f'{node} on ROS_DOMAIN_ID {domain_id} does not answer with graph.start, the beginning of '
-                           f'its time: {domain.hint(domain_id)}')
+            raise RuntimeError(f'{node} on ROS_DOMAIN_ID {domain_id} does not answer with graph.start, the beginning '
+                               f'of its time: {domain.hint(domain_id)}')
         return answers[node].values[0].integer_value
 
     def _get_parameters(self, names: Sequence[str], request: Message, executor: Executor) -> dict[str, Message]:

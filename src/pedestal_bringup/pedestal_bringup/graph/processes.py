@@ -40,10 +40,6 @@ tokens."""
 _libc = ctypes.CDLL(None)
 
 
-class RunError(RuntimeError):
-    """Error of a run that ended too early; the message holds the node, the reason and its last log lines."""
-
-
 class ServerProcess(NamedTuple):
     """Process of a server beside the nodes (operator_servers)."""
     command: list[str]      # interpreter, '-m', module, arguments ...
@@ -89,7 +85,7 @@ class Graph:
 
     The folder BAG.log beside the bag (attribute `log`) holds NODE.log for each process, parameters.yaml, and
     NODE.state with the last angles of a drive. The logs and states of an earlier run of the same name are deleted.
-    Raises RunError if the folder cannot be written.
+    Raises RuntimeError if the folder cannot be written.
 
     bag: folder of the recording; servers: by name.
     """
@@ -113,11 +109,11 @@ class Graph:
 
     @contextlib.contextmanager
     def _disk_errors_named(self) -> Iterator[None]:
-        """Turn the OSErrors in this context into a RunError that names the bag and the file."""
+        """Turn the OSErrors in this context into a RuntimeError that names the bag and the file."""
         try:
             yield
         except OSError as error:
-            raise RunError(f'cannot record to {self.bag}: {error.filename}: {error.strerror}') from None
+            raise RuntimeError(f'cannot record to {self.bag}: {error.filename}: {error.strerror}') from None
 
     def __enter__(self) -> 'Graph':
         self._reaper = subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.graph.reaper'], stdin=subprocess.PIPE,
@@ -135,7 +131,7 @@ class Graph:
         self._reaper.wait()
 
     def start_servers(self) -> None:
-        """Start the servers, and wait until each has announced itself. Raises RunError for a server that ends instead.
+        """Start the servers, and wait until each has announced itself. Raises RuntimeError for one that ends instead.
 
         The announcement of a server are the lines `NAME: address` or `NAME, ...` in its log.
         """
@@ -148,9 +144,9 @@ class Graph:
             for name in sorted(self._unannounced):
                 code = self.processes[name].poll()
                 if code is not None:
-                    raise RunError(f'--{name}: {self.result(name).get("error", exit_description(code))}')
+                    raise RuntimeError(f'--{name}: {self.result(name).get("error", exit_description(code))}')
                 if time.monotonic() > deadline:
-                    raise RunError(f'--{name}: no announcement within {SERVER_START_TIMEOUT_S:g} s')
+                    raise RuntimeError(f'--{name}: no announcement within {SERVER_START_TIMEOUT_S:g} s')
 
     def announce(self) -> None:
         """Print the announcements of the servers that have announced themselves since the last call."""
@@ -255,10 +251,10 @@ class Graph:
         return {}
 
     def outcome(self, node: str) -> dict[str, Json]:
-        """Return the result of a node that has ended without error. Raises RunError if its log has no result."""
+        """Return the result of a node that has ended without error. Raises RuntimeError if its log has no result."""
         result = self.result(node)
         if not result:
-            raise RunError(f'{node} ended without its result; its log is {self._log_of(node)}')
+            raise RuntimeError(f'{node} ended without its result; its log is {self._log_of(node)}')
         return result
 
     def ended(self) -> dict[str, int]:

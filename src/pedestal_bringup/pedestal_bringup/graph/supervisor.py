@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from rclpy.executors import SingleThreadedExecutor
 
 from pedestal_bringup.graph.operator_node import Operator
-from pedestal_bringup.graph.processes import Graph, RunError, exit_description
+from pedestal_bringup.graph.processes import Graph, exit_description
 from pedestal_bringup.graph.restarts import Losses, Restarts, Silence
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.compiled import is_compiled
@@ -28,7 +28,7 @@ MAX_SILENCE_S = 5.0
 
 def prepare(scenario: Scenario) -> None:
     """Compile the laws of the nodes of a scenario that are not in the law cache, so that the nodes start without
-    delay. The laws of each node are compiled in a process of their own. Raises RunError."""
+    delay. The laws of each node are compiled in a process of their own. Raises RuntimeError."""
     units = {nodes.plain(node): node for node in scenario.nodes
              if scenario.row(node).unit and not is_compiled(scenario.unit(node))}
     processes = {node: subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.loop.prepare', node, scenario.name],
@@ -44,8 +44,8 @@ def prepare(scenario: Scenario) -> None:
             errors = process.stderr.read()
             if process.wait() != 0:
                 lines = errors.strip().splitlines()
-                raise RunError(f'the laws of {node} do not compile: the process '
-                               f'{exit_description(process.returncode)}' + (f'; {lines[-1]}' if lines else ''))
+                raise RuntimeError(f'the laws of {node} do not compile: the process '
+                                   f'{exit_description(process.returncode)}' + (f'; {lines[-1]}' if lines else ''))
     finally:
         for process in processes.values():
             if process.poll() is None:
@@ -77,7 +77,7 @@ class Supervisor:
     def watch(self, tracks: Mapping[str, Message], progress: Callable[[Seconds], object]) -> None:
         """Watch the nodes until the end of the run. The end is a UTC, and a restart does not move it.
 
-        tracks: {topic: program track}; progress: function of the time of the run. Raises RunError if a node has
+        tracks: {topic: program track}; progress: function of the time of the run. Raises RuntimeError if a node has
         died too often.
         """
         executor = SingleThreadedExecutor()
@@ -122,8 +122,8 @@ class Supervisor:
             self._graph.start(node)
 
     def _handle_exit(self, node: str, code: int, now: Seconds) -> None:
-        """Schedule the restart of a node or server that has died. Raises RunError, which ends the run, if a node has
-        died too often. A server that has died too often stays off. code: exit code; now: monotonic time.
+        """Schedule the restart of a node or server that has died. Raises RuntimeError, which ends the run, if a
+        node has died too often. A server that has died too often stays off. code: exit code; now: monotonic time.
         """
         limits = self._limits
         reason = ('was silent and was killed' if node in self._reported_silent and code == -signal.SIGKILL
@@ -140,8 +140,8 @@ class Supervisor:
                    f'{limits.within:g} s: it stays off')
             return
         if not number:
-            raise RunError(self._graph.exit_report(node, f'{reason}, after {limits.attempts} starts within '
-                                                f'{limits.within:g} s'))
+            raise RuntimeError(self._graph.exit_report(node, f'{reason}, after {limits.attempts} starts within '
+                                                       f'{limits.within:g} s'))
         report(f'{node} {reason}{self._graph.cause(node, code)}: starting it again, {number} of {limits.attempts} '
                f'within {limits.within:g} s')
 

@@ -15,7 +15,7 @@ from rclpy.utilities import try_shutdown
 
 from pedestal_bringup.graph import lockstep, supervisor
 from pedestal_bringup.graph.operator_node import Operator
-from pedestal_bringup.graph.processes import Graph, RunError, exit_description
+from pedestal_bringup.graph.processes import Graph, exit_description
 from pedestal_bringup.graph.start import LATEST_START_S, START_LEAD_TIME_S, Outcome, begins, parameters_of_all
 from pedestal_bringup.scenario.program import Plan
 from pedestal_bringup.scenario.scenario import Scenario
@@ -33,7 +33,7 @@ def run(graph: Graph, tracks: Mapping[str, Message], progress: Callable[[Seconds
     """Let the held nodes (child.Child) of a graph begin, watch the nodes to their end or until Ctrl-C, and return the
     Outcome.
 
-    tracks: {topic: program track}; progress: function of the time of the run. Raises RunError, and GraphError if
+    tracks: {topic: program track}; progress: function of the time of the run. Raises RuntimeError, and GraphError if
     another graph runs on the domain.
     """
     middleware.initialise([])
@@ -119,7 +119,7 @@ def _equipment_begun(graph: Graph, operator: Operator, changes: Changes) -> Nano
     """Let simulated equipment and its node begin, wait for the answer of the equipment, and return graph.start,
     which its node chooses then. If several are simulated, time 0 follows the answer of the drives.
 
-    changes: see parameters_of_all. Raises RunError.
+    changes: see parameters_of_all. Raises RuntimeError.
     """
     part = graph.scenario.header.simulated_parts[0]
     chooser = nodes.SIMULATED_PARTS[part]
@@ -140,7 +140,7 @@ def chosen_start(graph: Graph, operator: Operator, spin: Callable[..., object], 
     """Wait until the node of simulated equipment chooses time 0, and return it.
 
     spin: function spin(timeout_sec) that lets the operator take diagnostics; part: name
-    of the equipment; limit: longest wait. Raises RunError that names the node and what it awaits.
+    of the equipment; limit: longest wait. Raises RuntimeError that names the node and what it awaits.
     """
     chooser, heard = nodes.SIMULATED_PARTS[part], ['no diagnostics']
     chosen: list[Nanoseconds] = []
@@ -155,9 +155,9 @@ def chosen_start(graph: Graph, operator: Operator, spin: Callable[..., object], 
         spin(timeout_sec=0.1)
         for node, code in graph.ended().items():
             if node in (chooser, part):
-                raise RunError(graph.exit_report(node, exit_description(code)))
+                raise RuntimeError(graph.exit_report(node, exit_description(code)))
         if not chosen and time.monotonic() > end:
-            raise RunError(graph.exit_report(chooser, f'has no answer of {part} after {limit:g} s: {heard[0]}'))
+            raise RuntimeError(graph.exit_report(chooser, f'has no answer of {part} after {limit:g} s: {heard[0]}'))
     return chosen[0]
 
 

@@ -49,8 +49,8 @@ def sections_of(name: str, content: str) -> Sections:
 
 def by_node(sections: Sections, namespace: str = '') -> Sections:
     """Return {node or `scenario`: {dotted name: value}} of the sections of a parameter file, for a graph in a
-    namespace such as '/ship_1'. Raises ScenarioError for a section that is for no node of the graph; the caller adds
-    the name of the file."""
+    namespace such as '/ship_1'. Raises ScenarioError for a section of no node of the graph; the caller adds the name
+    of the file."""
     found: Sections = {}
     for section, values in sections.items():
         node = parameter_file.node_of(section, namespace)
@@ -62,8 +62,7 @@ def by_node(sections: Sections, namespace: str = '') -> Sections:
 
 
 def _not_of_the_graph(section: str, namespace: str) -> str:
-    """Return a text that states why a section is for no node of a graph, and which name of the section would be
-    correct."""
+    """Return the reason why a section is for no node of a graph, with the correct name of the section."""
     _, name = parameter_file.divided(section)
     if name == 'scenario' or is_node(name):
         graph = f'in the namespace {namespace}' if namespace else 'without a namespace'
@@ -72,8 +71,8 @@ def _not_of_the_graph(section: str, namespace: str) -> str:
 
 
 def _every_node(section: str, values: Mapping[str, Value]) -> tuple[str, ...]:
-    """Return the nodes of a section for every node, such as /**. Raises ScenarioError if the section has any parameter
-    other than those that every ROS 2 node has."""
+    """Return the nodes of a section such as /**. Raises ScenarioError if it has any parameter that not every ROS 2
+    node has."""
     for key in parameters.without_ros(values):
         owners = [node for node in SECTION_NODES if key in parameters.defaults(nodes.row(node).parameters_type())]
         sections = ' or '.join(parameter_file.ANY_NAMESPACE + node for node in owners)
@@ -83,8 +82,7 @@ def _every_node(section: str, values: Mapping[str, Value]) -> tuple[str, ...]:
 
 
 def parse_override(text: str) -> tuple[str, str, Value]:
-    """Return (node, key, value) of a text 'node.key=value' of the option --param; the value is read as YAML. Raises
-    ScenarioError."""
+    """Return (node, key, value) of a text 'node.key=value' of --param, read as YAML. Raises ScenarioError."""
     left, equals, right = text.partition('=')
     node, dot, key = left.partition('.')
     if not (equals and dot and key):
@@ -98,8 +96,8 @@ def parse_override(text: str) -> tuple[str, str, Value]:
 
 
 def override(name: str, value: Value) -> str:
-    """Return the text 'name=value', the inverse of parse_override; name: 'node.key'. A text stands without quotes if
-    YAML reads the same text from it."""
+    """Return the text 'name=value', the inverse of parse_override. A text stands without quotes if YAML reads it so.
+    """
     with contextlib.suppress(yaml.YAMLError):
         if isinstance(value, str) and plain_yaml.parse(value) == value:
             return f'{name}={value}'
@@ -107,16 +105,15 @@ def override(name: str, value: Value) -> str:
 
 
 def file_sections(path: str | pathlib.Path, namespace: str = '') -> Sections:
-    """Return {node or `scenario`: {dotted name: value}} of a ROS 2 parameter file, for a graph in a namespace. Raises
-    ParameterFileError, ScenarioError."""
+    """Return by_node of a ROS 2 parameter file, for a graph in a namespace. Raises ParameterFileError, ScenarioError.
+    """
     sections = parameter_file.read(path)
     with errors_named(f'--params-file {path}'):
         return by_node(sections, f'/{namespace.strip("/")}'.rstrip('/'))
 
 
 def file_overrides(path: str | pathlib.Path, namespace: str = '') -> list[str]:
-    """Return texts 'node.key=value' of a ROS 2 parameter file, for a graph in a namespace. Raises ParameterFileError,
-    ScenarioError."""
+    """Return texts 'node.key=value' of a ROS 2 parameter file. Raises ParameterFileError, ScenarioError."""
     sections = file_sections(path, namespace)
     for node, values in sections.items():
         with errors_named(f'--params-file {path}, {node}'):
@@ -142,7 +139,6 @@ def _check_each(node: str, values: Mapping[str, Value]) -> None:
 
 
 def _check_each_of_other_drives(values: Mapping[str, Value]) -> None:
-    """Raise ParameterError for the first value that is neither of an array nor of servo drives."""
     with contextlib.suppress(parameters.ParameterError):
         parameters.check_each(parameters_of(nodes.SIMULATED_DRIVES.name), values)
         return

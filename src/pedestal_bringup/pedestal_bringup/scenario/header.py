@@ -9,8 +9,7 @@ from pedestal_common.quantities import Value
 
 @dataclasses.dataclass(frozen=True)
 class ProgramParameters(parameters.Parameters):
-    """Parameters of the program track that the operator sends to the control unit (ACU) before the run: the predicted
-    target with the errors of the prediction."""
+    """Parameters of the program track that the operator sends to the control unit (ACU) before the run."""
     source: str = parameters.choice('target', ('target', 'none'), 'source of the program track; none: no track')
     interval: float = parameters.parameter(1.0, 0.002, 60.0, 's', 'time between two points')
     time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'delay of the prediction')
@@ -23,7 +22,6 @@ class ProgramParameters(parameters.Parameters):
 
 
 PROGRAM_ERRORS = {'program.time_offset': 's', 'program.azimuth_offset': 'rad', 'program.elevation_offset': 'rad'}
-"""{error of the prediction in the header of a scenario: its unit}."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,8 +18,7 @@ from tracking_receiver_sim.params import TargetParameters
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Scenario together with its targets and its program tracks, which are built once, at their
-    first use."""
+    """Scenario together with its targets and its program tracks, which are built once, at their first use."""
     scenario: Scenario
 
     @functools.cached_property
@@ -31,7 +30,6 @@ class Plan:
         return self.scenario.node_parameters(prefix + 'tracking_receiver').target
 
     def _built(self, prefix: str, parameters: TargetParameters) -> target.Target:
-        """Return the target for the run of this scenario."""
         mask = self.scenario.node_parameters(prefix + 'tracking_receiver').receiver.horizon_mask
         return target.build(parameters, self.scenario.header.duration, mask)
 
@@ -44,16 +42,13 @@ class Plan:
 
     @functools.cached_property
     def tables(self) -> dict[str, tuple[Times, Pairs]]:
-        """Predicted tables {prefix of the beam: (times, angles)}.
+        """Predicted tables {prefix of the beam: (times, angles)}. The times go from stamp 0 to two intervals after the
+        run, so that the end of the run is inside. They are equal to the last bit to those that the ACU reads from the
+        message. The angles are earth azimuth (unwrapped) and elevation.
 
-        times   from stamp 0 to two intervals after the run, so that the end of the run is inside; equal to the
-                last bit to the times that the ACU reads from the message
-        angles  earth azimuth (unwrapped), elevation [rad]
-
-        The prediction omits UT1 - UTC of the true target. It includes the travel time of the wave only if
-        `program.light_time` of the header is set, and refraction only if `program.refractivity` is above 0. `program`
-        may also add an intended error of time, azimuth and elevation. Before or after its known path the target stays
-        at the first or last known place.
+        The prediction omits UT1 - UTC of the true target. It includes the travel time of the wave and refraction only
+        if the header sets `program.light_time` and `program.refractivity`. Before or after its known path the target
+        stays at the first or last known place.
         """
         program, duration = self.scenario.header.program, self.scenario.header.duration
         nanoseconds = np.round(np.arange(0.0, duration + 2.0 * program.interval, program.interval) * 1e9)
@@ -88,19 +83,16 @@ class Plan:
 
     def announced(self) -> list[str]:
         """Return the lines that a user reads before the run: the notes of the scenario, the file of the ship motion,
-        and the targets.
-
-        The lines of a target describe a recorded flight, and state when the target is highest, rises and sets. Equal
-        lines of several beams appear once. Raises csv_table.TableError for a file that cannot be used.
-        """
+        and the targets (a recorded flight, when it is highest, rises and sets). Equal lines of several beams appear
+        once. Raises csv_table.TableError for a file that cannot be used."""
         lines = [*self.scenario.notes, *self.ship_summary]
         for prefix, built in self.targets.items():
             lines += [*built.summary, *_sky(built, self._parameters(prefix).kind, self.scenario.header.duration)]
         return list(dict.fromkeys(lines))
 
     def begins(self) -> Nanoseconds:
-        """Return the UTC at which the time of the run is 0, by the date of the first beam's target. Raises
-        ValueError if the target has no date."""
+        """Return the UTC of time 0 of the run, by the date of the first beam's target. Raises ValueError for a target
+        without a date."""
         start_time = self.targets[self.scenario.prefixes[0]].start_time
         if not start_time:
             raise ValueError(f'--start file: the target of {self.scenario.name} has no date; give a UTC instead')
@@ -109,11 +101,8 @@ class Plan:
 
 
 def _sky(built: target.Target, kind: str, duration: Seconds) -> tuple[str, ...]:
-    """Return lines on a target: its rise and its set or end if they are within the run, and its highest place
-    if it has a date and no summary. (The summary of a recorded flight already states the highest place.)
-
-    kind: name of its kind, as in target.kind; duration: length of the run.
-    """
+    """Return lines on a target: its rise and its set or end if they are within the run, and its highest place if it
+    has a date and no summary. (The summary of a recorded flight already states the highest place.)"""
     name = 'satellite' if kind == 'leo_pass' else 'target'
     times = np.linspace(0.0, duration, 1 + int(min(1e5, 10.0 * duration)))
     elevation = np.degrees(target.look_angles(built, times)[1])

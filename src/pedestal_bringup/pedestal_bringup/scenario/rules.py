@@ -40,13 +40,13 @@ SHARED_PARAMETERS = (
     *(('tracking_receiver', f'target.station.{name}', 'acu', f'prediction.station.{name}')
       for name in ('latitude_deg', 'longitude_deg', 'height')),
 )
-"""(node, parameter, second node, parameter): the second parameter takes the value of the first where the scenario does
-not set it."""
+"""(node, parameter, second node, parameter): the second takes the value of the first where the scenario does not set
+it."""
 
 MEASUREMENT_FLAGS = tuple((node.name, topic.measured, topic.flag) for node in nodes.NODES if node.name != 'acu'
                           for topic in map(topics.TOPIC_BY_NAME.__getitem__, node.writes) if topic.measured)
-"""(publisher, its parameter `measured`, the subscribers' parameter `flag`) of each optional topic. `measured` and
-`flag` stand for the names of two parameters. Both parameters are true if the topic exists (topics.Topic)."""
+"""(publisher, name of its parameter `measured`, name of the subscribers' parameter `flag`) of each optional topic.
+Both parameters are true if the topic exists (topics.Topic)."""
 
 SCANS_BEFORE_COAST = 2.5  # number of errors of a feed with one output that must be missing before autotrack coasts
 
@@ -56,8 +56,8 @@ SIMULATED_BUS = {'bus.interface': 'socketcand', 'bus.host': '127.0.0.1'}
 IQ_LATENCY_STEPS = 2  # latency of a receiver of I/Q samples for the control unit, in steps of the drive
 
 LIMIT_ENDS = (('low', 'lower', 1.0), ('high', 'upper', -1.0))
-"""The two ends of the travel of an axis: (name of the limit in the control unit, its name in the drive, sign of the
-direction into the travel)."""
+"""Ends of the travel of an axis: (name in the control unit, name in the drive, sign of the direction into the travel).
+"""
 
 
 def target_of(name: str, receiver_values: Mapping[str, Value],
@@ -89,10 +89,7 @@ def derive_from_flight(name: str, receiver_values: dict[str, Value],
 
 @dataclasses.dataclass(frozen=True)
 class _Rules:
-    """Rules for the sections of one scenario; each changes the sections.
-
-    name: of the scenario; seed: as of scenario.checked.
-    """
+    """Rules for the sections of one scenario; each changes the sections. seed: as of scenario.checked."""
     name: str
     sections: Sections
     header: ScenarioParameters
@@ -130,8 +127,7 @@ class _Rules:
             self.share(node, 'period', self.value_of('adu', 'period'))
 
     def share_flags(self) -> None:
-        """Share the flags of the optional topics. A flag is given to the subscribers if its topic exists. It is also
-        checked if the scenario itself sets it."""
+        """Share the flags of the optional topics that exist. A flag that the scenario itself sets is checked too."""
         sections = self.sections
         for owner, key, flag in MEASUREMENT_FLAGS:
             measured = ((self.header.ship or not nodes.row(owner).optional)
@@ -185,12 +181,8 @@ class _Rules:
 
 
 def share(name: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
-    """Give every node the parameters that several nodes share: duration of the run, period of a step, seeds, ship,
-    latencies, beam.
-
-    name: of the scenario; seed: as of scenario.checked. Raises ScenarioError if the section of a node has another
-    value.
-    """
+    """Give every node the parameters that several nodes share. seed: as of scenario.checked. Raises ScenarioError if
+    the section of a node has another value."""
     rules = _Rules(name, sections, header, seed)
     rules.share_run()
     rules.share_flags()
@@ -207,10 +199,7 @@ def share(name: str, sections: Sections, header: ScenarioParameters, seed: int |
 
 def _share_scan(name: str, receiver: 'MonopulseParameters', latency: Seconds, values: dict[str, Value]) -> None:
     """Give the section `acu` the parameters that follow from a feed with one output: the noise of its errors, and the
-    time between them.
-
-    latency: of the errors. Raises ScenarioError for a scan that is too slow.
-    """
+    time between them. latency: of the errors. Raises ScenarioError for a scan that is too slow."""
     # Imported late, because their laws take half a second to import.
     from acu_tracker.geometry.history import MAX_DELAY_STEPS
     from pedestal_hardware.monopulse import feed
@@ -245,10 +234,8 @@ def share_with_beam(name: str, node: str, sections: Sections, header: ScenarioPa
 
 def narrow(sections: Sections, header: ScenarioParameters) -> tuple[str, ...]:
     """Set each limit of travel of a control unit to that of the drive if the drive's limit is narrower. Return a line
-    for each limit changed.
-
-    Control unit and drive have equal default limits, so a scenario that sets no limit is not changed.
-    """
+    for each limit changed. Control unit and drive have equal defaults, so a scenario that sets no limit is not
+    changed."""
     if header.beam:
         return ()
     drive, notes = nodes.row('adu').parameters_type(), []

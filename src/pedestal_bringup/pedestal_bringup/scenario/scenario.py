@@ -1,5 +1,5 @@
-"""Scenarios: the description of a run as a ROS 2 parameter file, with one section per node and the header `scenario`.
-This module reads, checks and completes a scenario for `pedestal run`, the launch file and the closed loop.
+"""Scenarios: the description of a run as a ROS 2 parameter file, with one section per node and the header `scenario`,
+read, checked and completed.
 
 A single node also loads the file unchanged: `ros2 run PACKAGE EXECUTABLE --ros-args --params-file SCENARIO.yaml`. For
 a node in a namespace, name the sections /**/NODE. The node then lacks the parameters that it shares with other nodes
@@ -41,9 +41,8 @@ class Scenario:
     """Checked scenario: its header and, for each node that takes part, the values that differ from the defaults.
 
     With several beams the section `acu` applies to the control unit of every beam. The section of one beam, such as
-    `beam_2/acu`, replaces its values. The receivers have sections of the same form.
-
-    values: {node: {dotted name: value}}; notes: lines on limits that `checked` has changed.
+    `beam_2/acu`, replaces its values. The receivers have sections of the same form. notes: lines on limits that
+    `checked` has changed.
     """
     name: str
     header: ScenarioParameters
@@ -91,10 +90,7 @@ class Scenario:
 
 @dataclasses.dataclass(frozen=True)
 class Draft:
-    """Scenario whose values were read but not yet checked together; `checked` makes a Scenario of it.
-
-    sections: {node or `scenario`: {dotted name: value}}.
-    """
+    """Scenario whose values were read but not yet checked together; `checked` makes a Scenario of it."""
     name: str
     sections: Sections
 
@@ -135,30 +131,23 @@ def draft(name_or_path: str | pathlib.Path) -> Draft:
 
 def load(name_or_path: str | pathlib.Path, overrides: Iterable[str] = (), seed: int | None = None,
          duration: Seconds | None = None, pacing: str | None = None) -> Scenario:
-    """Return the Scenario of a name or of the path of a .yaml file. overrides: texts 'node.key=value'; for the other
-    arguments see `checked`."""
+    """Return the Scenario of a name or of the path of a .yaml file. overrides: texts 'node.key=value'; else see
+    `checked`."""
     return checked(draft(name_or_path).changed(overrides), seed, duration, pacing)
 
 
 def parse(name: str, content: str, overrides: Iterable[str] = (), seed: int | None = None,
           duration: Seconds | None = None, pacing: str | None = None) -> Scenario:
-    """Return the Scenario of a YAML text; parse(name, Scenario.as_yaml()) returns the same scenario.
-
-    overrides: texts 'node.key=value'; for the other arguments see `checked`.
-    """
+    """Return the Scenario of a YAML text, such as Scenario.as_yaml(). overrides: texts 'node.key=value'; else see
+    `checked`."""
     return checked(Draft(name, files.sections_of(name, content)).changed(overrides), seed, duration, pacing)
 
 
 def checked(new_draft: Draft, seed: int | None = None, duration: Seconds | None = None,
             pacing: str | None = None) -> Scenario:
     """Return the Scenario of a Draft: check each value, and add the parameters that follow from others. This call
-    changes the Draft, so use the Draft only once.
-
-    seed, duration [s], pacing: values that replace those of the header; None: no change. A given seed also replaces
-    the seeds of the nodes.
-
-    Raises ScenarioError for an unknown name or a value out of range.
-    """
+    changes the Draft, so use the Draft only once. seed, duration, pacing: replace those of the header; a given seed
+    also replaces the seeds of the nodes. Raises ScenarioError."""
     name, sections = new_draft.name, dict(new_draft.sections)
     header_values = sections.pop('scenario')
     for key, value in (('seed', seed), ('duration', duration), ('pacing', pacing)):

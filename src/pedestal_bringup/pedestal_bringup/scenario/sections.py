@@ -21,13 +21,11 @@ SECTION_NODES = tuple(node.name for node in nodes.NODES if node.module)  # nodes
 
 OPTIONAL_NODES = tuple(node.name for node in nodes.NODES if node.optional)  # nodes that take part only on a ship
 
-BEAM_NODES = tuple(node.name for node in nodes.NODES if node.of_beam)
-"""Nodes of which each beam of an array has its own."""
+BEAM_NODES = tuple(node.name for node in nodes.NODES if node.of_beam)  # of which each beam has its own
 
 
 class ScenarioError(ValueError):
-    """Error of a scenario that is unknown or has an invalid value. Its text is one line with file, node, key and
-    value."""
+    """Error of an unknown scenario or an invalid value. Its text is one line with file, node, key and value."""
 
 
 def row_of(node: str, header: ScenarioParameters) -> Node:
@@ -48,8 +46,8 @@ def is_node(name: str) -> bool:
 
 
 def parameters_of(node: str) -> type[parameters.Parameters]:
-    """Return the parameter dataclass of a node, of the header `scenario`, or of the array `beam_steering`. Raises
-    ScenarioError for any other name."""
+    """Return the parameter dataclass of a node, of the header `scenario`, or of `beam_steering`. Raises ScenarioError.
+    """
     if node in ('scenario', 'beam_steering'):
         return ScenarioParameters if node == 'scenario' else nodes.ARRAY_DRIVE.parameters_type()
     if not is_node(node):
@@ -79,8 +77,7 @@ def _built_once(parameters_type: type[_P], key: tuple[tuple[str, type, Value], .
 
 @contextlib.contextmanager
 def errors_named(origin: str) -> Iterator[None]:
-    """Turn the errors of a check into a ScenarioError that begins with their origin: the scenario or file, and the
-    section."""
+    """Turn the errors of a check into a ScenarioError that begins with their origin."""
     try:
         yield
     except (ScenarioError, parameters.ParameterError, parameter_file.ParameterFileError) as error:

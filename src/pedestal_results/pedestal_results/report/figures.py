@@ -52,7 +52,7 @@ class Spec(typing.NamedTuple):
     title: str
     caption: str    # below the title
     needs: tuple[str, ...]  # data that the figure needs: keys of recorded_run._NEEDS
-    draw: Callable[..., Figure]     # function of RecordedRun or of trials_page.Trials
+    draw: Callable[..., Figure]     # function of RecordedRun or of experiment.Found
     dpi: int = 150  # of its PNG
     timed: bool = False     # True for panels over time, which get the marks of the events
     paper: int = 0  # number of the same figure in the paper; 0: none

@@ -6,7 +6,8 @@ with a speed loop for each motor.
 
 Three cases have the controller of paper 000, as in the scenarios. The sine and the fast step run with the controller
 `best` of the study servo and with every schedule. `pedestal run servo_step|servo_sine --param ...` runs every case too
-(Case.command). The demand is the torque per motor that the speed loop commands. The schedules of the bias torque are:
+(Variant.command). The demand is the torque per motor that the speed loop commands. The schedules of the bias torque
+are:
 
     off         no bias torque
     constant    the same bias torque at every demand
@@ -20,7 +21,9 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
+from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.loop.closed_loop import Run
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Floats, Json, NewtonMeters, Radians, RadiansPerSecond, Row, Seconds, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import row
@@ -29,8 +32,6 @@ from pedestal_studies import metrics
 from pedestal_studies.p000_ma import servo
 from pedestal_studies.p000_ma.servo import Runs
 from pedestal_studies.result import Drawings, Metrics, Result, draw_torques, legend
-from pedestal_workbench.trials import cases
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Progress
 
 STANDSTILL_START_S = 2.0  # time after a step from which the standstill is evaluated [s]
@@ -78,12 +79,12 @@ METRIC_TARGETS = {
 """{(case, metric): target}."""
 
 
-def reversal_case(kind: str, name: str) -> Case:
-    """Return the Case of three periods of a sine.
+def reversal_case(kind: str, name: str) -> Variant:
+    """Return the variant of three periods of a sine.
 
     kind: key of REVERSAL_FREQUENCIES_RAD_S; name: key of PAPER_CASES.
     """
-    return cases.sine_case(Case(name, 'servo_sine', {
+    return servo.of_sine(Variant('servo_sine').with_({
         **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE_RAD}),
         REVERSAL_FREQUENCIES_RAD_S[kind], 3)
 
@@ -122,16 +123,16 @@ def synchronism_error(record: Run) -> Floats:
     return record['adu/motor_states']['velocity'][:, 0] - record['adu/motor_states']['velocity'][:, 1]
 
 
-CASES = {('standstill', name): Case(name, 'servo_step', changed, STANDSTILL_START_S + 1.0)
+CASES = {('standstill', name): Variant('servo_step', duration=STANDSTILL_START_S + 1.0).with_(changed)
          for name, changed in PAPER_CASES.items()}
 CASES |= {(kind, name): reversal_case(kind, name) for kind in REVERSAL_FREQUENCIES_RAD_S for name in PAPER_CASES}
-CASES |= {('sine', name): Case(name, 'servo_sine', {**servo.BEST_PARAMETERS, **changed})
+CASES |= {('sine', name): Variant('servo_sine').with_({**servo.BEST_PARAMETERS, **changed})
           for name, changed in BIAS_SCHEDULES.items()}
-CASES |= {('step', name): Case(name, 'servo_step', {**FAST_STEP_PARAMETERS, **changed})
+CASES |= {('step', name): Variant('servo_step').with_({**FAST_STEP_PARAMETERS, **changed})
           for name, changed in BIAS_SCHEDULES.items()}
-CASES |= {('structure', name): Case(name, 'servo_step', changed, STANDSTILL_START_S)
+CASES |= {('structure', name): Variant('servo_step', duration=STANDSTILL_START_S).with_(changed)
           for name, changed in SPEED_LOOP_STRUCTURES.items()}
-"""{(kind of run, case): Case}.
+"""{(kind of run, case): Variant}.
 
 The kinds are a step and the standstill after it, reversals, the sine of 0.4 Hz and the fast step with every schedule,
 and a step with each of SPEED_LOOP_STRUCTURES.
@@ -179,7 +180,7 @@ def run(progress: Progress) -> Result:
     done = {}
     for i, (key, case) in enumerate(CASES.items()):
         progress(i / len(CASES), f'{key[0]}: {key[1]}')
-        done[key] = case.run()
+        done[key] = closed_loop.Loop(case.load()).run()
     return Result(rows(done), figures(done), remarks(rows(done)))
 
 

@@ -20,13 +20,13 @@ from matplotlib.figure import Figure
 
 from acu_tracker.params import AcuParameters
 from drive_law.params import AduParameters
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Complexes, Floats, Row
+from pedestal_common.quantities import Complexes, Floats, Json, Row
 from pedestal_results.intervals import row
 from pedestal_results.report import figures as fig
 from pedestal_studies.p000_ma import servo
 from pedestal_studies.result import Drawings, Result, legend
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Progress
 from pedestal_workbench.tuning import frequency_response as frequency
 from pedestal_workbench.tuning.frequency_response import Response
@@ -34,9 +34,13 @@ from pedestal_workbench.tuning.frequency_response import Response
 Design: TypeAlias = Callable[[Complexes], Complexes]    # function of s that returns the open loop of the design
 
 
-def controller(name: str) -> Case:
-    """Return the Case of scenario leo_pass in which both axes have the position controller of this name."""
-    return frequency.case(name, 'leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
+def _moving(source: str, changes: Mapping[str, Json]) -> Variant:
+    return frequency.moving(Variant(source).with_(changes))
+
+
+def controller(name: str) -> Variant:
+    """Return the variant of scenario leo_pass in which both axes have the position controller of this name."""
+    return _moving('leo_pass', {f'acu.{axis}.controller': name for axis in AXES})
 
 
 FAST_LOOP_PARAMETERS = {'acu.azimuth.feedforward.bandwidth': 40.0}  # position loop of higher bandwidth
@@ -50,12 +54,12 @@ NOTCH_PARAMETERS = {**STRUCTURE_PARAMETERS, 'acu.azimuth.notch.frequency': 7.5, 
 LOOP_CASES = {
     'pid': (controller('pid'), AXES), 'feedforward': (controller('feedforward'), AXES),
     'adrc': (controller('adrc'), AXES),
-    'paper-r1': (frequency.case('paper-r1', 'servo_sine', servo.PAPER_R1_PARAMETERS), AXES[:1]),
-    'best': (frequency.case('best', 'servo_sine', servo.BEST_PARAMETERS), AXES[:1]),
-    'rigid': (frequency.case('rigid', 'leo_pass', FAST_LOOP_PARAMETERS), AXES[:1]),
-    'structure': (frequency.case('structure', 'leo_pass', STRUCTURE_PARAMETERS), AXES[:1]),
-    'structure-notch': (frequency.case('structure-notch', 'leo_pass', NOTCH_PARAMETERS), AXES[:1])}
-"""{name of a position loop: (its Case, the axes on which it is measured)}.
+    'paper-r1': (_moving('servo_sine', servo.PAPER_R1_PARAMETERS), AXES[:1]),
+    'best': (_moving('servo_sine', servo.BEST_PARAMETERS), AXES[:1]),
+    'rigid': (_moving('leo_pass', FAST_LOOP_PARAMETERS), AXES[:1]),
+    'structure': (_moving('leo_pass', STRUCTURE_PARAMETERS), AXES[:1]),
+    'structure-notch': (_moving('leo_pass', NOTCH_PARAMETERS), AXES[:1])}
+"""{name of a position loop: (its Variant, the axes on which it is measured)}.
 
 pid, feedforward, adrc: the controllers with their defaults. paper-r1, best: cases of the study servo. rigid,
 structure, structure-notch: a faster loop with a rigid load, a flexible load, and a flexible load with a notch.
@@ -91,13 +95,19 @@ def without_gain_margin(responses: Mapping[str, Response]) -> list[str]:
                                           if math.isnan(frequency.margins(measured)['gain_margin_db'][0])])
 
 
+def position(loop: str, sweep: frequency.Sweep = frequency.POSITION_SWEEP) -> dict[str, Response]:
+    """Return {'position/AXIS/LOOP': response} of one of LOOP_CASES."""
+    variant, axes = LOOP_CASES[loop]
+    return {f'{name}/{loop}': found for name, found in frequency.position(variant, axes, sweep).items()}
+
+
 def run(progress: Progress) -> Result:
     """Measure all loops, each with full and with half excitation to test that it is linear."""
     drive = AduParameters()
     parts = {'current loops': (functools.partial(frequency.current, drive), frequency.CURRENT_SWEEP),
              'speed loops': (functools.partial(frequency.speed, drive), frequency.SPEED_SWEEP)}
-    parts |= {f'position loop {name}': (functools.partial(frequency.position, case, axes), frequency.POSITION_SWEEP)
-              for name, (case, axes) in LOOP_CASES.items()}
+    parts |= {f'position loop {name}': (functools.partial(position, name), frequency.POSITION_SWEEP)
+              for name in LOOP_CASES}
     responses: dict[str, frequency.Response] = {}
     change: dict[str, float] = {}
     for i, (text, (measure, sweep)) in enumerate(parts.items()):

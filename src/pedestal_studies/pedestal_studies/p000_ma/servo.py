@@ -11,7 +11,7 @@ best-inertia-minus   controller of best, with 20 % less load inertia
 best-full-torque     controller that uses the full torque, with no reserve for a heavier load
 adrc                 active disturbance rejection control (ADRC)
 
-`pedestal run servo_step|servo_sine --param ...` runs every case too (Case.command).
+`pedestal run servo_step|servo_sine --param ...` runs every case too (Variant.command).
 """
 import functools
 import math
@@ -22,15 +22,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from drive_law.params import AduParameters
+from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.loop.closed_loop import Run
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Floats, Json, Radians, RadiansPerSecond, Row, Seconds
 from pedestal_results import tracking
 from pedestal_results.intervals import row
 from pedestal_results.report import figures as fig
 from pedestal_studies import metrics
 from pedestal_studies.result import Drawings, Result, draw_torques, legend
-from pedestal_workbench.trials import cases
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Progress
 
 Runs: TypeAlias = dict[tuple[str, str], Run]    # {(case, kind of run): its run}
@@ -120,22 +120,32 @@ PAPER_VALUES = {'step_overshoot_percent': 12.0, 'step_settling_2percent_s': 0.2,
 SUFFIX_UNITS = {'percent': '%', 's': 's', 'rad': 'rad', 'crossings': ''}  # {last word of a metric: unit}
 
 
-def step_case(name: str) -> Case:
-    """Return the Case of the step of figure 5 with the parameters of CASE_PARAMETERS[name]."""
-    return Case(name, 'servo_step', CASE_PARAMETERS[name])
+def step_case(name: str) -> Variant:
+    """Return the variant of the step of figure 5 with the parameters of CASE_PARAMETERS[name]."""
+    return Variant('servo_step').with_(CASE_PARAMETERS[name])
 
 
-def sine_case(name: str, reading: str) -> Case:
-    """Return the Case of SINE_PERIODS periods of the paper's sine; reading: key of SINE_READINGS."""
-    return cases.sine_case(Case(name, 'servo_sine', CASE_PARAMETERS[name]), SINE_FREQUENCIES_RAD_S[reading],
-                           SINE_PERIODS)
+def of_sine(variant: Variant, w: RadiansPerSecond, periods: float) -> Variant:
+    """Return the variant with a target that moves in a sine of w for a number of periods.
+
+    The duration is up to 12 ms longer, so that the last period is complete.
+    """
+    step = 0.002
+    duration = math.ceil((2.0 * math.pi * periods / w + 0.01) / step) * step
+    return variant.with_({'tracking_receiver.target.angle.frequency': w / (2.0 * math.pi)},
+                         duration=round(duration, 3))
 
 
-def gust_case(name: str, **more: Json) -> Case:
-    """Return the Case of an axis at rest with a step of wind torque; more: further parameters."""
-    return Case(name, 'servo_step', {**CASE_PARAMETERS[name], 'acu.azimuth.preset': 0.0, 'adu.wind.gust.kind': 'step',
-                                     'adu.wind.gust.azimuth': GUST_TORQUE_NM, 'adu.wind.gust.start': GUST_START_S,
-                                     **more})
+def sine_case(name: str, reading: str) -> Variant:
+    """Return the variant of SINE_PERIODS periods of the paper's sine; reading: key of SINE_READINGS."""
+    return of_sine(Variant('servo_sine').with_(CASE_PARAMETERS[name]), SINE_FREQUENCIES_RAD_S[reading], SINE_PERIODS)
+
+
+def gust_case(name: str, **more: Json) -> Variant:
+    """Return the variant of an axis at rest with a step of wind torque; more: further parameters."""
+    return Variant('servo_step').with_({
+        **CASE_PARAMETERS[name], 'acu.azimuth.preset': 0.0, 'adu.wind.gust.kind': 'step',
+        'adu.wind.gust.azimuth': GUST_TORQUE_NM, 'adu.wind.gust.start': GUST_START_S, **more})
 
 
 def step_metrics(record: Run) -> dict[str, float]:
@@ -189,7 +199,7 @@ def records(cases: Iterable[str], progress: Progress) -> Runs:
     for i, (name, kind) in enumerate(wanted):
         progress(i / len(wanted), f'{name}: {kind}')
         case = step_case(name) if kind == 'step' else gust_case(name) if kind == 'gust' else sine_case(name, kind)
-        done[name, kind] = case.run()
+        done[name, kind] = closed_loop.Loop(case.load()).run()
     return done
 
 
@@ -226,7 +236,7 @@ def bang_bang(step: Radians, adu: AduParameters) -> tuple[Seconds, Seconds]:
 def remarks(done: Runs) -> list[str]:
     """Return the sentences that explain the rows, with the limits of the plant."""
     slow = step_metrics(done['paper-r2', 'step'])['step_settling_2percent_s']
-    adu = step_case('best').loaded().node_parameters('adu')
+    adu = step_case('best').load().node_parameters('adu')
     whole, settled = bang_bang(STEP_SIZE_RAD, adu)
     gear, bits = adu.azimuth.gear_train, adu.azimuth.encoder.load_bits
     stiffness, damping = 2.0 * gear.stiffness, 2.0 * gear.damping
@@ -318,7 +328,7 @@ def gust_figure(done: Runs) -> Figure:
         y = record['adu/truth']['position'][:, 0]
         axes.plot(record.t, 1e6 * (y - y[record.t < GUST_START_S][-1]), color=CASE_COLOURS[name], linewidth=1.3,
                   label=name)
-    stiffness = 2.0 * step_case('best').loaded().node_parameters('adu').azimuth.gear_train.stiffness
+    stiffness = 2.0 * step_case('best').load().node_parameters('adu').azimuth.gear_train.stiffness
     axes.axhline(1e6 * GUST_TORQUE_NM / stiffness, color=fig.INK_COLOUR, linewidth=0.8, linestyle='--',
                  label='deflection of the gear by the gust torque')
     axes.set_xlim(GUST_START_S - 0.05, GUST_START_S + 0.5)

@@ -21,6 +21,8 @@ from typing import TypeAlias
 
 import numpy as np
 
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import (
     Decibels,
     Degrees,
@@ -48,7 +50,6 @@ from pedestal_studies.p002_jia.angle_loop import (
 from pedestal_studies.p002_jia.figures import Readings
 from pedestal_studies.result import Drawings, Result
 from pedestal_workbench.trials import monte_carlo
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 from receiver_law import detector
 from tracking_receiver_sim.params import ReceiverParameters
@@ -442,19 +443,18 @@ NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 110.0, 'ins.tilt_
 """Parameters of an INS without noise, and of a signal so strong that the noise of the receiver has no effect."""
 
 
-def graph_case(case: str, quiet: bool = False) -> Case:
-    """Return the case of one of GRAPH_CASES.
+def graph_case(case: str, quiet: bool = False) -> Variant:
+    """Return the variant of one of GRAPH_CASES.
 
     quiet: True for a case without noise in receiver and INS, with the gains of the noisy case.
     """
-    noisy = Case(case, 'phased_array_sway', GRAPH_CASES[case])
+    noisy = Variant('phased_array_sway').with_(GRAPH_CASES[case])
     if not quiet:
         return noisy
     # The control unit still assumes the noise of the noisy case, so that its filter has the same gains.
-    tracking = noisy.loaded().node_parameters('tracking_receiver')
+    tracking = noisy.load().node_parameters('tracking_receiver')
     sigma = detector.angle_noise(tracking.antenna, tracking.receiver, tracking.receiver.cn0_dbhz, tracking.period)
-    return dataclasses.replace(noisy, parameters={**GRAPH_CASES[case], **NOISELESS_PARAMETERS,
-                                                  'acu.tracker.receiver.sigma_floor': sigma})
+    return noisy.with_({**NOISELESS_PARAMETERS, 'acu.tracker.receiver.sigma_floor': sigma})
 
 
 ELEVATION_COLUMN = 1  # column of the elevation in an error of GRAPH_CASES; column 0 is the cross-elevation
@@ -466,7 +466,7 @@ def graph_error(case: str, quiet: bool = False, seed: int | None = None) -> Pair
 
     Arguments as of `graph_case`.
     """
-    run = graph_case(case, quiet).with_seed(seed).run()
+    run = closed_loop.Loop(graph_case(case, quiet).with_(seed=seed).load()).run()
     return run.truth['error'][run.t >= GRAPH_EVALUATION_START_S]
 
 
@@ -477,7 +477,7 @@ def graph_rows(jitters: Mapping[str, list[Degrees]]) -> list[Line]:
     """
     rows: list[Line] = []
     for case in GRAPH_CASES:
-        quiet = graph_case(case, quiet=True).run()
+        quiet = closed_loop.Loop(graph_case(case, quiet=True).load()).run()
         kept = quiet.t >= GRAPH_EVALUATION_START_S
         ends = quiet.truth['error'], interval_start_error(quiet['adu/truth']['position'], quiet.truth['error'])
         worst = max(peak(np.hypot(*error[kept].T)) for error in ends)

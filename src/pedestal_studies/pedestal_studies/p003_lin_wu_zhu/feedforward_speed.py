@@ -63,7 +63,7 @@ CASES = {f'{axis}/{speed}/{name}': (axis, source, rate) for axis in REVERSAL_S_B
 DRIVE_CASES = {f'{axis}/{DRIVE_SPEED}/drive-{name}': imm_feedforward.drive_case(
     axis, sources(axis)[name].own_filter, RATES_RAD_S[DRIVE_SPEED])
     for axis in REVERSAL_S_BY_AXIS for name in ('kalman-cv', 'imm')}
-"""{case: Case} of the whole chain."""
+"""{case: DriveCase}."""
 
 UNITS = {**METRIC_UNITS, 'rate_rms_deg_s': 'deg/s', 'acceleration_rms_deg_s2': 'deg/s2'}  # {metric of a run: unit}
 

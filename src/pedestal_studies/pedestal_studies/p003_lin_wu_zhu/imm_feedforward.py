@@ -21,7 +21,7 @@ sine.
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -29,6 +29,8 @@ from matplotlib.figure import Figure
 from acu_tracker.estimation.filters.motion_models import MODEL_NAMES
 from acu_tracker.estimation.params import FilterParameters
 from acu_tracker.modes import Mode
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.parameters import as_dict
 from pedestal_common.quantities import Bools, Degrees, Floats, Pairs, RadiansPerSecond, Row, Times, Vectors3
 from pedestal_results import tracking
@@ -52,7 +54,6 @@ from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
 )
 from pedestal_studies.result import Drawings, Result, legend
 from pedestal_workbench.trials import monte_carlo
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 Misses: TypeAlias = dict[str, MissStatistics]   # {case: its statistics}
@@ -100,7 +101,14 @@ CASES = {
 """{case: (axis, Source)}."""
 
 
-def drive_case(axis: str, tuned: FilterParameters, rate: RadiansPerSecond = profiles.S_MOTION_RATE_RAD_S) -> Case:
+class DriveCase(NamedTuple):
+    """A case of the whole chain, in which the target moves on one axis."""
+    axis: str
+    variant: Variant
+
+
+def drive_case(axis: str, tuned: FilterParameters,
+               rate: RadiansPerSecond = profiles.S_MOTION_RATE_RAD_S) -> DriveCase:
     """Return the case of the whole chain, in which the target follows a sine on an axis.
 
     tuned: filter of this axis. rate: largest rate of the target. The target's range of 510 m is the
@@ -109,35 +117,35 @@ def drive_case(axis: str, tuned: FilterParameters, rate: RadiansPerSecond = prof
     w = math.pi / REVERSAL_S_BY_AXIS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
                   rate / w if name == axis else 0.0 for name in REVERSAL_S_BY_AXIS}
-    return Case(axis, 'uav_flyby', {
+    return DriveCase(axis, Variant('uav_flyby', duration=DRIVE_DURATION_S).with_({
         'tracking_receiver.target.kind': 'sine', 'tracking_receiver.target.angle.frequency': 0.5 * w / math.pi,
         'tracking_receiver.target.angle.range': 510.0, 'tracking_receiver.target.angle.elevation': DRIVE_ELEVATION_RAD,
         **amplitudes, 'tracking_receiver.receiver.latency': feedforward_loop.MISS_DELAY_STEPS * T,
         'scenario.program.interval': T,
         'adu.initial_azimuth': 0.0, 'adu.initial_elevation': DRIVE_ELEVATION_RAD,
         **{f'acu.{axis}.filter.{name}': value for name, value in as_dict(tuned).items()
-           if value != as_dict(FilterParameters())[name]}}, DRIVE_DURATION_S)
+           if value != as_dict(FilterParameters())[name]}}))
 
 
 DRIVE_CASES = {
     f'{axis}/drive-{name}': drive_case(axis, tuned) for axis in REVERSAL_S_BY_AXIS for name, tuned in {
         'kalman-cv': cv(PAPER_CV_NOISES[axis]).own_filter, 'imm': FEEDFORWARD_SOURCES['imm'].own_filter,
         'imm-default': filter_of('imm')}.items()}
-"""{case: Case} of the whole chain."""
+"""{case: DriveCase}."""
 
 
-def drive_error(case: Case, seed: int) -> tuple[Times, Floats]:
+def drive_error(case: DriveCase, seed: int) -> tuple[Times, Floats]:
     """Return (times, true pointing error of the axis [rad]) from DRIVE_EVALUATION_START_S on.
 
     case: as `drive_case` returns. The errors are NaN if the run left autotrack.
     """
-    record = case.with_seed(seed).run()
+    record = closed_loop.Loop(case.variant.with_(seed=seed).load()).run()
     record = record.where(record.t >= DRIVE_EVALUATION_START_S)
-    error = record.truth['error'][:, list(REVERSAL_S_BY_AXIS).index(case.name)]
+    error = record.truth['error'][:, list(REVERSAL_S_BY_AXIS).index(case.axis)]
     return record.t, error if np.all(record['acu/mode'] == Mode.AUTOTRACK) else np.full_like(error, math.nan)
 
 
-def drive_misses(item: tuple[Case, int]) -> tuple[Degrees, Degrees]:
+def drive_misses(item: tuple[DriveCase, int]) -> tuple[Degrees, Degrees]:
     """Return (rms, largest) miss of an item (case as `drive_case` returns, seed)."""
     _, error = drive_error(*item)
     return math.degrees(tracking.rms(error)), math.degrees(metrics.peak(error))
@@ -239,7 +247,7 @@ def remarks(misses: Misses) -> list[str]:
         'error of the filter. imm-default is the IMM with the default parameters of the product. In azimuth the error '
         'of kalman-cv is so large in every turn that the gate refuses the measurements and restarts the filter. '
         'Without a gate (acu.tracker.gate) the miss is larger. Command for the nodes: '
-        f'{DRIVE_CASES["azimuth/drive-imm-default"].command()}',
+        f'{DRIVE_CASES["azimuth/drive-imm-default"].variant.command()}',
     ]
 
 

@@ -19,13 +19,14 @@ from scipy.stats import beta
 from acu_tracker.modes import Mode
 from acu_tracker.search.acquisition import SearchParameters
 from acu_tracker.search.pattern import PATTERN_SPIRAL, PATTERN_SQUARE, SEARCH_PATTERNS
+from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.loop.closed_loop import Run
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Floats, Pairs, Radians, Row, Seconds
 from pedestal_results.intervals import CONFIDENCE_LEVEL, row
 from pedestal_results.report.figures import FILTERED_COLOUR, new_panels
 from pedestal_studies.result import Item, Result
 from pedestal_workbench.trials import monte_carlo
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
@@ -60,19 +61,18 @@ so it is 3 dB at half a beamwidth."""
 STEPTRACK_SETTLING_TIME_S = 90.0  # time after which step track is on its target [s]
 
 
-def case_of(name: str, seed: int) -> Case:
-    """Return the case of one run; name: one of CASE_NAMES."""
+def case_of(name: str, seed: int) -> Variant:
+    """Return the variant of one run; name: one of CASE_NAMES."""
     rng = np.random.default_rng(seed)
     if name == 'late_tle':
-        return Case(name, name, {'scenario.program.time_offset': -rng.uniform(1.0, 3.0)}, seed=seed)
+        return Variant(name, seed=seed).with_({'scenario.program.time_offset': -rng.uniform(1.0, 3.0)})
     if not name.startswith('search-'):
-        return Case(name, name, seed=seed)
+        return Variant(name, seed=seed)
     pattern = name.removeprefix('search-')
     x, e = offset(SEARCH_PATTERNS.index(pattern), rng)
-    return Case(name, 'sidelobe', {**SEARCH_PARAMETERS, 'acu.search.pattern': pattern,
-                                   'scenario.program.elevation_offset': e,
-                                   'scenario.program.azimuth_offset': x / math.cos(TARGET_ELEVATION_RAD)},
-                SEARCH_DURATIONS_S[pattern], seed)
+    return Variant('sidelobe', seed=seed, duration=SEARCH_DURATIONS_S[pattern]).with_({
+        **SEARCH_PARAMETERS, 'acu.search.pattern': pattern, 'scenario.program.elevation_offset': e,
+        'scenario.program.azimuth_offset': x / math.cos(TARGET_ELEVATION_RAD)})
 
 
 def offset(pattern: int, rng: np.random.Generator, beamwidth: Radians = 0.0175) -> tuple[Radians, Radians]:
@@ -121,7 +121,7 @@ def batch(item: Item) -> Pairs:
     name, first, count = item
     values = []
     for seed in range(FIRST_SEED + first, FIRST_SEED + first + count):
-        run = case_of(name, seed).run()
+        run = closed_loop.Loop(case_of(name, seed).load()).run()
         off = off_axis(run)
         if name == 'steptrack_geo':
             settled = off[run.t > STEPTRACK_SETTLING_TIME_S]

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pedestal_bringup.loop import memory_recording
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Floats, Pairs, Row
 from pedestal_results import consistency, tracking
@@ -19,7 +20,6 @@ from pedestal_results.intervals import row
 from pedestal_results.report.figures import FILTERED_COLOUR, TRUTH_COLOUR, new_panels
 from pedestal_studies.result import Item, Result, legend
 from pedestal_workbench.trials import monte_carlo
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
@@ -31,13 +31,13 @@ WINDOW_S = 1.0  # span of a mean [s]
 SCENARIOS = ('blockage', 'fade', 'late_tle', 'leo_pass', 'leo_station_7m', 'manoeuvre_in_coast', 'phased_array_sway',
              'ship_overhead', 'ship_pass', 'ship_pass_ss6', 'ship_terminal_1m2', 'sidelobe', 'station_real',
              'uav_flyby', 'uav_tracker_3m')
-CASES = {name: Case(name, name, duration=DURATION_S) for name in SCENARIOS}  # {name: Case}
+CASES = {name: Variant(name, duration=DURATION_S) for name in SCENARIOS}
 MAX_NEES = 2.4  # largest NEES of a filter that is not too sure: 2 plus 20 %
 
 
-def nees(case: Case) -> Pairs:
-    """Return the NEES of one run of a case at TIMES_S, NaN without an estimate at that time."""
-    recorded = memory_recording.record(case.loaded())
+def nees(variant: Variant) -> Pairs:
+    """Return the NEES of one run at TIMES_S, NaN without an estimate at that time."""
+    recorded = memory_recording.record(variant.load())
     found = consistency.read(recorded, tracking.read(recorded))
     assert found is not None
     known = np.isfinite(found.nees[:, 0])
@@ -51,7 +51,7 @@ def nees(case: Case) -> Pairs:
 def batch(item: Item) -> Floats:
     """Return the NEES (count, len(TIMES_S), 2) of an item (case, first run, number of runs)."""
     name, first, count = item
-    return np.array([nees(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)])
+    return np.array([nees(CASES[name].with_(seed=FIRST_SEED + first + i)) for i in range(count)])
 
 
 def rows(values: Mapping[str, Floats]) -> list[Row]:

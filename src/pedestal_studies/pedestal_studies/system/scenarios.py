@@ -11,8 +11,10 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.loop.memory_recording import MemoryRecording
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Floats, Row
 from pedestal_results import results, tracking
 from pedestal_results.intervals import row
@@ -20,7 +22,6 @@ from pedestal_results.recorded_run import RecordedRun
 from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
 from pedestal_studies.result import Item, Result, legend
 from pedestal_workbench.trials import monte_carlo
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case; seed of the first run
@@ -37,14 +38,13 @@ NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 120.0, 'acu.track
 less assumed noise, the filter would take even the smallest deviation of the target from the motion model for motion,
 not for noise."""
 
-CASES = {case.name: case for case in (
-    Case('leo_pass', 'leo_pass'), Case('ship_pass', 'ship_pass'),
-    Case('ship_pass-late', 'ship_pass', {'ins.latency': 0.02}),
-    Case('ship_pass-quiet', 'ship_pass', NOISELESS_PARAMETERS),
-    Case('ship_pass_ss6', 'ship_pass_ss6'), Case('ship_overhead', 'ship_overhead'),
-    Case('ship_align_and_track', 'ship_align_and_track'), Case('uav_flyby', 'uav_flyby'),
-    Case('uav_flyby-60m', 'uav_flyby', NEAR_FLYBY_PARAMETERS))}
-"""{name: Case}."""
+CASES = {
+    'leo_pass': Variant('leo_pass'), 'ship_pass': Variant('ship_pass'),
+    'ship_pass-late': Variant('ship_pass').with_({'ins.latency': 0.02}),
+    'ship_pass-quiet': Variant('ship_pass').with_(NOISELESS_PARAMETERS),
+    'ship_pass_ss6': Variant('ship_pass_ss6'), 'ship_overhead': Variant('ship_overhead'),
+    'ship_align_and_track': Variant('ship_align_and_track'), 'uav_flyby': Variant('uav_flyby'),
+    'uav_flyby-60m': Variant('uav_flyby').with_(NEAR_FLYBY_PARAMETERS)}
 
 TRACKING_METRICS = ('pointing_rms_deg', 'pointing_max_deg', 'single_sample_noise_deg', 'pointing_to_noise', 'loss_s')
 """Results of the pointing error."""
@@ -107,9 +107,10 @@ def extra_results(values: Mapping[str, float], run: Run) -> dict[str, float]:
     return more
 
 
-def measured(case: Case) -> dict[str, float]:
-    """Return {name: value} of one run of a case."""
-    scenario, run = case.loaded(), case.run()
+def measured(variant: Variant) -> dict[str, float]:
+    """Return {name: value} of one run of a variant."""
+    scenario = variant.load()
+    run = closed_loop.Loop(scenario).run()
     found = results.measured(RecordedRun(MemoryRecording(scenario, run)).parts)
     values = {name: value for name, (value, _) in found.items()}
     return {**values, **extra_results(values, run)}
@@ -118,7 +119,7 @@ def measured(case: Case) -> dict[str, float]:
 def batch(item: Item) -> Floats:
     """Return the values (count, len(CASE_METRICS[case])) of an item (case, first run, number of runs)."""
     name, first, count = item
-    runs = [measured(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)]
+    runs = [measured(CASES[name].with_(seed=FIRST_SEED + first + i)) for i in range(count)]
     return np.array([[values[metric] for metric in CASE_METRICS[name]] for values in runs])
 
 
@@ -148,8 +149,7 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) 
 def flyby_figure() -> Figure:
     """Draw paper 000's figures 7 to 11 for uav_flyby: error and angle before and after the filter, and the azimuth."""
     figure, axes = new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
-    case = CASES['uav_flyby'].with_seed(FIRST_SEED)
-    flown = tracking.read(MemoryRecording(case.loaded(), case.run()))
+    flown = tracking.read(memory_recording.record(CASES['uav_flyby'].with_(seed=FIRST_SEED).load()))
     middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5
     cross_elevations, elevation_errors = zip(*(errors.T for errors in (flown.measured, flown.filtered, flown.error)))
     # The measured elevation of the target is its true elevation plus the measured error minus the true error. The

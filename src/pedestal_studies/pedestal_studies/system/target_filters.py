@@ -10,7 +10,6 @@ current-statistical   filter of paper 000 with its default a_max, the largest ac
 A ratio divides the pointing error of a case by that of `tuned` under the same seed. A target whose name ends in -ship
 is seen from the deck of the scenario ship_pass. The targets that manoeuvre hard are those of HARD_TARGETS.
 """
-import dataclasses
 import functools
 import math
 import pathlib
@@ -22,6 +21,7 @@ from matplotlib.figure import Figure
 
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario.scenario import Scenario
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Degrees, Floats, Json, Meters, MetersPerSecond, Radians, Row, Seconds, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import row
@@ -30,7 +30,6 @@ from pedestal_studies import profiles
 from pedestal_studies.result import Item, Result
 from pedestal_studies.system.filters import MANOEUVRE_PARAMETERS
 from pedestal_workbench.trials import monte_carlo
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 # Targets that manoeuvre hard. Positions are in metres east, north and up of the antenna. Each function takes times at
@@ -178,10 +177,9 @@ def filters(target: str) -> dict[str, dict[str, Json]]:
             'current-statistical': _both(kind='current_statistical')}
 
 
-CASES = {f'{target}/{name}': Case(f'{target}/{name}', at, {
+CASES = {f'{target}/{name}': Variant(at).with_({
     **parameters, **{f'acu.{key}': value for key, value in changes.items()}})
     for target, (at, parameters) in TARGET_SCENARIOS.items() for name, changes in filters(target).items()}
-"""{name: Case}."""
 
 MAX_POINTING_RATIO = 1.15
 """Largest permitted ratio of the pointing with the default filter to the pointing with the tuned filter."""
@@ -193,21 +191,21 @@ def _folder() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix='pedestal-targets-')
 
 
-def loaded(case: Case) -> Scenario:
+def loaded(case: str, seed: int | None = None) -> Scenario:
     """Return the scenario of one of CASES; for a target of HARD_TARGETS its table is written first."""
-    name = _ashore(case.name.partition('/')[0]).replace('-', '_')
+    name, variant = _ashore(case.partition('/')[0]).replace('-', '_'), CASES[case].with_(seed=seed)
     if name not in HARD_TARGETS:
-        return case.loaded()
+        return variant.load()
     path = pathlib.Path(_folder().name) / f'{name}.csv'
     if not path.exists():
         write(path, name, HARD_TARGET_DURATION_S)
-    return dataclasses.replace(case, duration=HARD_TARGET_DURATION_S, parameters={
-        **case.parameters, 'tracking_receiver.target.track_file.path': path}).loaded()
+    return variant.with_({'tracking_receiver.target.track_file.path': str(path)},
+                         duration=HARD_TARGET_DURATION_S).load()
 
 
-def pointing(case: Case) -> Degrees:
+def pointing(case: str, seed: int) -> Degrees:
     """Return the rms of the true pointing error of one run of a case, both axes; NaN if it left autotrack."""
-    tracked = tracking.read(memory_recording.record(loaded(case)))
+    tracked = tracking.read(memory_recording.record(loaded(case, seed)))
     begun = np.flatnonzero(tracked.mode == 'autotrack')
     if not begun.size or np.any(tracked.mode[begun[0]:] != 'autotrack'):
         return math.nan
@@ -217,7 +215,7 @@ def pointing(case: Case) -> Degrees:
 def batch(item: Item) -> Floats:
     """Return the pointing (count,) [deg] of an item (case, first run, number of runs)."""
     name, first, count = item
-    return np.array([pointing(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)])
+    return np.array([pointing(name, FIRST_SEED + first + i) for i in range(count)])
 
 
 def rows(values: Mapping[str, Floats]) -> list[Row]:

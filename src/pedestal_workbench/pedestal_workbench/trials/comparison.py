@@ -1,15 +1,11 @@
-"""Comparison of two sides A and B trial by trial: two scenarios, or one scenario with two settings of parameters.
-
-A pair is trial i of A and trial i of B, with equal seed and equal draws of the varied parameters. For each result with
-the values a of A and b of B, `pedestal trials` states:
+"""Comparison of two sides A and B trial by trial: two scenarios, or one scenario with two settings of parameters. A
+pair is trial i of A and trial i of B, with equal seed and equal draws. For each result, with the values a of A and b
+of B:
 
 difference  mean of a - b, with a 95 % interval by Student's t
-gain        improvement of the mean of a over the mean of b [%], with a 95 % interval by the jackknife (Efron and
-            Stein, Annals of Statistics 9 (1981) 586):
-
-                100 (1 - mean a / mean b)     if smaller values are better
-                100 (mean a / mean b - 1)     if larger values are better
-
+gain        improvement of the mean of a over the mean of b [%], 100 (1 - mean a / mean b), or, if larger values are
+            better, 100 (mean a / mean b - 1), with a 95 % interval by the jackknife (Efron and Stein, Annals of
+            Statistics 9 (1981) 586)
 wins        share of the pairs in which A is better [%], with a 95 % interval by Clopper and Pearson. Equal values are
             no win.
 """
@@ -54,11 +50,8 @@ class Sides(NamedTuple):
 
 
 def names(*plans: Plan) -> tuple[str, ...]:
-    """Return a name for each of several plans.
-
-    The name states the scenario, if the plans have different scenarios, and the parameters of --param that differ
-    between the plans. Plans that do not differ have the name of their scenario.
-    """
+    """Return a name for each of several plans: its scenario, if the scenarios differ, and the parameters of --param
+    that differ between the plans; without a difference the scenario."""
     first_scenarios = [plan.scenario(0) for plan in plans]
     keys = dict.fromkeys(change.partition('=')[0] for plan in plans for change in plan.overrides
                          if change.partition('=')[0] not in plan.varied)
@@ -91,10 +84,8 @@ def _value(chosen: Scenario, key: str) -> str:
 
 
 def ranked(tables: Sequence[Table], by: str) -> list[int]:
-    """Return the indices of tables from the best to the worst, by the mean of the result `by`.
-
-    Only trials count in which all tables have the result. Without such a trial the order stays.
-    """
+    """Return the indices of tables from the best to the worst, by the mean of the result `by`. Only trials count in
+    which all tables have the result. Without such a trial the order stays."""
     columns = np.array([table.column(by) for table in tables])
     common = np.isfinite(columns).all(axis=0)
     if not common.any():
@@ -104,10 +95,8 @@ def ranked(tables: Sequence[Table], by: str) -> list[int]:
 
 
 def gain(a: Floats, b: Floats, larger: bool) -> Estimate:
-    """Return the gain [%] of a (n,) over b (n,), as the module states, with its 95 % interval.
-
-    a and b must not contain a value below 0. larger: True if larger values are better.
-    """
+    """Return the gain [%] of a (n,) over b (n,), which contain no value below 0. larger: True if larger values are
+    better."""
     def gain_of_sums(sum_a: _Sum, sum_b: _Sum) -> _Sum:
         return 100.0 * (sum_a / sum_b - 1.0 if larger else 1.0 - sum_a / sum_b)
 
@@ -124,11 +113,8 @@ def wins(a: Floats, b: Floats, larger: bool) -> Estimate:
 
 
 def has_gain(result: str, a: Floats, b: Floats) -> bool:
-    """Return True if a gain in percent of b has a meaning for a result.
-
-    A gain needs at least two pairs, and at least two values of b above 0. There is no gain for dB or negative values,
-    because a ratio has no meaning on these scales.
-    """
+    """Return True if a gain in percent of b has a meaning for a result: there are at least two pairs, and two values
+    of b above 0. It has none for dB or negative values, because a ratio has no meaning on these scales."""
     return bool(len(a) > 1 and statistics.unit(result) != 'dB' and min(a.min(), b.min()) >= 0.0
                 and np.sum(b > 0.0) > 1)
 

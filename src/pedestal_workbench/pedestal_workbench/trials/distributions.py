@@ -1,9 +1,6 @@
-"""Distributions by which trials vary a parameter: `pedestal trials --vary NODE.KEY=KIND(numbers)`.
-
-NODE.KEY=KIND(numbers) draws the value of the parameter. With an x at the end, NODE.KEY=KIND(numbers)x, it draws a
-factor of the value in the scenario. Each draw is the quantile of a number u between 0 and 1. The number u is random,
-or a coordinate of a point of a Sobol sequence; the functions of this module serve both.
-"""
+"""Distributions by which trials vary a parameter: `pedestal trials --vary NODE.KEY=KIND(numbers)`. With an x at the
+end, NODE.KEY=KIND(numbers)x, a distribution draws a factor of the value in the scenario. Each draw is the quantile of
+a number u between 0 and 1, which is random or a coordinate of a point of a Sobol sequence."""
 import re
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
@@ -21,14 +18,11 @@ Values: TypeAlias = NDArray[Any]  # numbers, or the values of a `choice`, which 
 
 
 class Kind(NamedTuple):
-    """A kind of distribution: a row of DISTRIBUTION_KINDS.
-
-    extremes(arguments) returns values that must all be in the range of the parameter: low and high, or all options of
-    a `choice`. It returns None for a distribution without bounds.
-    """
+    """A kind of distribution: a row of DISTRIBUTION_KINDS."""
     usage: str                  # text of its syntax
     arguments: int | None       # their number, None for one or more
     quantile: Callable[[Floats, tuple[Json, ...]], Values]  # quantile(u (n,), arguments) returns values (n,)
+    # low and high, or all options of a `choice`, which must be in the range of the parameter; None without bounds
     extremes: Callable[[tuple[Json, ...]], tuple[Json, ...] | None]
 
 
@@ -40,14 +34,8 @@ DISTRIBUTION_KINDS: dict[str, Kind] = {
                    lambda u, options: np.array(options, object)[(u * len(options)).astype(int)],
                    lambda options: options),
 }
-"""{name of a distribution: its kind}."""
 
-_TEXT_PATTERN = re.compile(r'(\w+)\((.*)\)(x?)')
-"""Pattern of the text of a distribution: name, arguments, x for a factor."""
-
-
-class VaryError(ValueError):
-    """Error of an invalid --vary. Its text is one line that names the --vary."""
+_TEXT_PATTERN = re.compile(r'(\w+)\((.*)\)(x?)')  # name, arguments, x for a factor
 
 
 class Distribution(NamedTuple):
@@ -58,10 +46,8 @@ class Distribution(NamedTuple):
     factor: bool    # True if a draw is a factor of the value in the scenario
 
     def draw(self, u: Floats, whole: bool = False) -> Values:
-        """Return values (n,) at the numbers u (n,) between 0 and 1.
-
-        whole: True for an integer parameter. A uniform distribution then includes low and high.
-        """
+        """Return values (n,) at the numbers u (n,) between 0 and 1. whole: True for an integer parameter, for which a
+        uniform distribution includes low and high."""
         if whole and self.kind == 'uniform':
             low, high = self.arguments
             return np.floor(low + u * (high - low + 1.0))
@@ -74,37 +60,36 @@ class Distribution(NamedTuple):
 
 
 def parse(text: str) -> Distribution:
-    """Return the distribution of a text such as 'normal(1, 0.1)x'. Raises VaryError."""
+    """Return the distribution of a text such as 'normal(1, 0.1)x'. Raises ValueError."""
     match = _TEXT_PATTERN.fullmatch(text.strip())
     usage = ', '.join(kind.usage for kind in DISTRIBUTION_KINDS.values())
     if not match:
-        raise VaryError(f'{text!r}: must be one of {usage}; a factor has an x at the end')
+        raise ValueError(f'{text!r}: must be one of {usage}; a factor has an x at the end')
     name, inside, factor = match[1], match[2], bool(match[3])
     if name not in DISTRIBUTION_KINDS:
-        raise VaryError(f'{text!r}:{did_you_mean(name, DISTRIBUTION_KINDS)} must be one of {usage}')
+        raise ValueError(f'{text!r}:{did_you_mean(name, DISTRIBUTION_KINDS)} must be one of {usage}')
     try:
         arguments = tuple(plain_yaml.parse(part) for part in inside.split(','))
     except yaml.YAMLError as error:
-        raise VaryError(f'{text!r}: {plain_yaml.problem(error)}') from None
+        raise ValueError(f'{text!r}: {plain_yaml.problem(error)}') from None
     expected = DISTRIBUTION_KINDS[name].arguments
     if None in arguments or expected not in (None, len(arguments)):
-        raise VaryError(f'{text!r}: must be {DISTRIBUTION_KINDS[name].usage}')
+        raise ValueError(f'{text!r}: must be {DISTRIBUTION_KINDS[name].usage}')
     if name != 'choice' or factor:
         arguments = tuple(_number(text, value) for value in arguments)
     if name == 'uniform' and not arguments[0] < arguments[1]:
-        raise VaryError(f'{text!r}: low must be below high')
+        raise ValueError(f'{text!r}: low must be below high')
     if name == 'normal' and not arguments[1] > 0.0:
-        raise VaryError(f'{text!r}: sigma must be above 0')
+        raise ValueError(f'{text!r}: sigma must be above 0')
     return Distribution(text.strip(), name, arguments, factor)
 
 
 def _number(text: str, value: Json) -> float:
-    """Return a value as a float. Raises VaryError if it is not a finite number. text: of the distribution, for the
-    error."""
+    """Return a value as a finite float. text: of the distribution, for the ValueError."""
     try:
         number = float('nan' if isinstance(value, bool) else value)
     except (TypeError, ValueError):
         number = float('nan')
     if not np.isfinite(number):
-        raise VaryError(f'{text!r}: {value!r} must be a number')
+        raise ValueError(f'{text!r}: {value!r} must be a number')
     return number

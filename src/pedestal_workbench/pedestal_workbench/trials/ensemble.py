@@ -1,14 +1,13 @@
 """Execution of trials: run each trial of a plan, and write its row of results to a table.
 
-The numbers do not depend on the number of workers, nor on an interruption. The row of a trial contains the results of
-`pedestal run` for each beam. The trial runs in the closed loop without ROS, which has the same data as the lockstep
-recording of the trial's command. Trials ashore run side by side (pedestal_bringup.loop.side_by_side). Trials on a ship
-or with an array run one after the other.
+The numbers do not depend on the number of workers, nor on an interruption. A trial runs in the closed loop without
+ROS, which has the same data as the lockstep recording of the trial's command. Trials ashore run side by side
+(pedestal_bringup.loop.side_by_side), trials on a ship or with an array one after the other.
 """
 import contextlib
 import functools
 import pathlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -23,67 +22,46 @@ from pedestal_workbench.trials.statistics import WHY
 from pedestal_workbench.trials.table import Table
 
 MIN_BATCH_TRIALS = 4
-"""Smallest number of trials in a batch, the work of one worker at a time.
-
-Where trials cannot run side by side, a batch has this number of trials. A killed worker then loses no more trials.
-"""
+"""Smallest number of trials in a batch, the work of one worker at a time. Where trials cannot run side by side, a
+batch has this number, so that a killed worker loses no more trials."""
 
 TRIAL_RESULTS = tuple(result.name for result in results.RESULTS if result.part not in ('run', 'supervised'))
 """Names of the results of a trial: all results of `pedestal run`, except those on its processes."""
 
 MEASURED_TOPICS = ('joint_states', 'adu/truth', 'tracking_receiver/angle_error', 'target/truth', 'acu/rate_command',
                    'acu/estimate', 'acu/reference', 'acu/filter', 'acu/mode', 'acu/pointing', 'adu/state')
-"""Topics that the results and verdicts of trials ashore need.
-
-No result reads the numbers of acu/rate_command. Because a change of acu/mode has the stamp of the acu/rate_command of
-its step (pedestal_common.node.unit.announced), this topic is in the list too.
-"""
-
-
-class TrialError(ValueError):
-    """Error of a trial that cannot be run. Its text is one line that names the trial."""
+"""Topics that the results and verdicts of trials ashore need. No result reads the numbers of acu/rate_command, but a
+change of acu/mode has the stamp of the acu/rate_command of its step (pedestal_common.node.unit.announced)."""
 
 
 def open_table(plan: Plan, folder: str | pathlib.Path, name: str = 'trials') -> Table:
-    """Return the table of the trials of a plan in a folder; `with` opens its files.
-
-    name: name of the files without extension.
-    """
+    """Return the table of the trials of a plan in a folder; `with` opens its files. name: of the files, without
+    extension."""
     prefixes = plan.scenario(0).prefixes
     heads = [f'{prefix}{result}' for prefix in prefixes for result in TRIAL_RESULTS]
     return Table(folder, name, {**plan.identity, 'sources': monte_carlo.sources()}, plan.varied, heads,
                  [f'{prefix}{WHY}' for prefix in prefixes],
-                 [[plan.seed + i, *own] for i, own in enumerate(_drawn(plan))])
-
-
-def _drawn(plan: Plan) -> Iterable[Sequence[Json]]:
-    """Return the values of the varied parameters of each trial of a plan."""
-    return zip(*plan.varied.values()) if plan.varied else [()] * plan.runs
+                 [[plan.seed + i, *(values[i] for values in plan.varied.values())] for i in range(plan.runs)])
 
 
 @contextlib.contextmanager
 def _trial(plan: Plan, i: int) -> Iterator[None]:
-    """Convert a ValueError to a TrialError that names trial i."""
     try:
         yield
     except ValueError as error:
-        raise TrialError(f'{plan.command(i)}: {error}') from None
+        raise ValueError(f'{plan.command(i)}: {error}') from None
 
 
 @functools.lru_cache(maxsize=1)
 def _memory(trials: int, steps: int) -> Records:
-    """Return the memory (trials, steps) of the records of trials that run side by side; all batches use it again.
-
-    Because new memory costs up to a tenth of the time of the trials, one memory serves all batches.
-    """
+    """Return the memory (trials, steps) of the records of trials that run side by side. Because new memory costs up to
+    a tenth of the time of the trials, all batches use it again."""
     return np.empty((trials, steps), records.of(*MEASURED_TOPICS))
 
 
 def _batch(plan: Plan) -> list[list[Json]]:
-    """Return the values of each trial of a plan, which is the part of a plan that one worker receives.
-
-    The values are the TRIAL_RESULTS of each beam, None for a missing result, then the text of WHY of each beam.
-    """
+    """Return the TRIAL_RESULTS of each beam, None for a missing result, then the text of WHY of each beam, for each
+    trial. The plan is the part of a plan that one worker receives."""
     scenarios = []
     found: list[list[Json]] = [[] for _ in range(plan.runs)]
     whys: list[list[str]] = [[] for _ in range(plan.runs)]
@@ -108,18 +86,14 @@ def _batch(plan: Plan) -> list[list[Json]]:
     return [values + why for values, why in zip(found, whys)]
 
 
-def _batch_size(plan: Plan) -> int:
-    return max(MIN_BATCH_TRIALS, side_by_side.max_parallel_trials(plan.scenario(0), MEASURED_TOPICS))
-
-
 def run_missing_trials(plans: Sequence[Plan], tables: Sequence[Table], pool: monte_carlo.Pool,
                        progress: Callable[[int, int], object] = lambda done, total: None) -> None:
-    """Run the trials of plans that are missing in their tables, and append their rows to the tables.
-
-    The batches of several plans alternate, so all plans advance together. progress(number of trials done, number of
-    all trials) is called after each batch. Raises TrialError.
-    """
-    pieces, size = [], min(map(_batch_size, plans))
+    """Run the trials of plans that are missing in their tables, and append their rows to the tables. The batches of
+    several plans alternate, so all plans advance together. progress(trials done, all trials) is called after each
+    batch. Raises ValueError that names a trial."""
+    pieces = []
+    size = max(MIN_BATCH_TRIALS, min(side_by_side.max_parallel_trials(plan.scenario(0), MEASURED_TOPICS)
+                                     for plan in plans))
     for first in range(0, max(plan.runs for plan in plans), size):
         for plan, table in zip(plans, tables):
             numbers = range(max(first, len(table.rows)), min(first + size, plan.runs))

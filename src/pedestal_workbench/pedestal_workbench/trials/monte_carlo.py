@@ -1,9 +1,6 @@
-"""Pool of workers that run studies and trials in parallel, on the cores of this machine or on a Dask cluster.
-
-A study splits its runs into batches, and takes the results of the batches in order. Because size and seeds of the
-batches do not depend on the workers, the numbers are equal to the last bit on any pool. To save memory, a batch
-returns sums and a few numbers of each run instead of records.
-"""
+"""Pool of workers that run studies and trials in parallel, on the cores of this machine or on a Dask cluster. Because
+size and seeds of the batches of runs do not depend on the workers, the numbers are equal to the last bit on any pool.
+To save memory, a batch returns sums and a few numbers of each run instead of records."""
 import contextlib
 import functools
 import hashlib
@@ -51,13 +48,10 @@ Progress: TypeAlias = Callable[[float, str], object]    # progress(share of the 
 
 
 class Pool:
-    """Workers for `map`: local processes, or the workers of a Dask cluster.
-
-    workers: number of local processes, None for one per core; scheduler: address of a Dask scheduler, such as
-    'tcp://host:port', None for local processes.
-    Use as a context; a single local worker is this process and needs no context. Raises ValueError for less than one
-    worker, RuntimeError if Dask is missing or no scheduler answers.
-    """
+    """Workers for `map`: local processes, one per core without a number, or the workers of a Dask cluster, with the
+    address of its scheduler such as 'tcp://host:port'. Use as a context; a single local worker is this process and
+    needs no context. Raises ValueError for less than one worker, RuntimeError if Dask is missing or no scheduler
+    answers."""
 
     def __init__(self, workers: int | None = None, scheduler: str | None = None) -> None:
         if workers is not None and workers < 1:
@@ -86,11 +80,8 @@ class Pool:
 
     def map(self, function: Callable[[_Item], _Result], items: Iterable[_Item],
             progress: Progress = lambda share, text: None) -> Iterator[_Result]:
-        """Yield function(item) of each item, in their order.
-
-        function: a function of a module, because others cannot be sent to workers. `progress` is called after each
-        item.
-        """
+        """Yield function(item) of each item, in their order. function: of a module, because others cannot be sent to
+        workers."""
         items = list(items)
         jobs = -1 if self.scheduler else min(self.workers, len(items) or 1)
         options = {} if self.scheduler else {'backend': 'loky'}
@@ -153,10 +144,8 @@ def _end_local() -> None:
 
 
 def _client(address: str) -> 'distributed.Client':
-    """Return the client of the Dask scheduler at an address. Raises RuntimeError.
-
-    Its workers must have equal versions of the pedestal packages and of numba, because the numbers depend on them.
-    """
+    """Return the client of a Dask scheduler, whose workers must have equal versions of the pedestal packages and of
+    numba, because the numbers depend on them. Raises RuntimeError."""
     try:
         import distributed
     except ImportError:

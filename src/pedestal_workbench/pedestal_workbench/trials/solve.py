@@ -1,11 +1,10 @@
-"""Search for the value of a parameter at which the mean of a result over trials reaches a limit.
+"""Search for the value of a parameter at which the mean of a result over trials reaches a limit: `pedestal trials
+--solve PARAMETER --until 'RESULT = LIMIT'`.
 
-This is `pedestal trials --solve PARAMETER --until 'RESULT = LIMIT'`. First the trials run at GRID_COUNT values that
-fill the range of the parameter. If the limit lies between the means at exactly one pair of neighbouring values, the
-search bisects this pair.
-
-Because a drive that trips has no result, it may hide the limit. A search without such a pair therefore bisects between
-the values with a result and their neighbours without a result.
+First the trials run at GRID_COUNT values that fill the range of the parameter. If the limit lies between the means at
+exactly one pair of neighbouring values, the search bisects this pair. Because a drive that trips has no result, it may
+hide the limit. A search without such a pair therefore bisects between the values with a result and their neighbours
+without a result.
 
 The trials at all values have equal seeds and draws. Therefore the mean is a smooth function of the value, except where
 the control law itself has a jump.
@@ -27,7 +26,6 @@ from pedestal_common.quantities import Row
 from pedestal_results import intervals
 from pedestal_workbench.trials import ensemble, statistics
 from pedestal_workbench.trials import plan as plans
-from pedestal_workbench.trials.distributions import VaryError
 from pedestal_workbench.trials.monte_carlo import Pool
 from pedestal_workbench.trials.plan import Plan
 from pedestal_workbench.trials.table import Table
@@ -37,10 +35,8 @@ GRID_COUNT, MAX_BISECTIONS = 9, 12  # number of values that fill the range; larg
 BRACKET_TOLERANCE = 0.01
 """Distance of two neighbouring values, divided by the larger absolute value, below which the search ends [-]."""
 MAX_LINEAR_RATIO = 20.0
-"""Largest ratio of the ends of a positive range whose values have equal differences [-].
-
-The values of a wider range have equal ratios.
-"""
+"""Largest ratio of the ends of a positive range whose values have equal differences; a wider range has equal ratios
+[-]."""
 TRACKED_RESULT, MIN_TRACKED_PERCENT = 'tracked_percent', 99.0
 """Result that states the share of a run in autotrack; share below which the found value gets a warning [%]."""
 MIN_MEASURED_SHARE = 0.5
@@ -63,11 +59,8 @@ class Range(NamedTuple):
 
 
 class Tried(NamedTuple):
-    """Trials at one value of the parameter.
-
-    The row is that of the mean (intervals.estimated), with the field `tracked_percent`: mean share of the run in
-    autotrack [%], None where it is not measured.
-    """
+    """Trials at one value of the parameter. The row is that of the mean (intervals.estimated), with the field
+    `tracked_percent`: mean share of the run in autotrack [%], None where it is not measured."""
     value: float
     row: Row | None     # None if the scenario refused the value
     why: str            # text of the refusal, or ''
@@ -98,19 +91,17 @@ def goal(text: str, known: Iterable[str]) -> Goal:
 
 
 def search_range(text: str, chosen: Scenario) -> Range:
-    """Return the range of a text NODE.KEY=LOW:HIGH. Raises VaryError.
-
-    The range of a text NODE.KEY is the range of the parameter.
+    """Return the range of a text NODE.KEY=LOW:HIGH, or that of the parameter for a text NODE.KEY. Raises ValueError.
     """
     key, equals, ends = text.partition('=')
     field = plans.field(chosen, key, '--solve')
     if field.type not in (int, float):
-        raise VaryError(f'--solve {key}: must be a parameter with a number')
+        raise ValueError(f'--solve {key}: must be a parameter with a number')
     low, high = (statistics.number(end) for end in ends.split(':', 1)) if ends.count(':') == 1 else (math.nan,) * 2
     if not equals:
         low, high = field.metadata.get('low', -math.inf), field.metadata.get('high', math.inf)
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise VaryError(f'--solve {text}: must be NODE.KEY=LOW:HIGH, LOW below HIGH')
+        raise ValueError(f'--solve {text}: must be NODE.KEY=LOW:HIGH, LOW below HIGH')
     return Range(key, float(low), float(high), field.type is int, field.metadata.get('unit', ''))
 
 
@@ -119,13 +110,7 @@ def table_prefix(key: str) -> str:
     return f'solve_{key.replace("/", "_")}_'
 
 
-def _between(low: float, high: float, ratio: bool) -> float:
-    """Return the middle of two values: the geometric mean if `ratio` is True, else the arithmetic mean."""
-    return math.sqrt(low * high) if ratio else 0.5 * (low + high)
-
-
 def _in_ratios(wanted: Range) -> bool:
-    """Return True if the values in a range have equal ratios, see MAX_LINEAR_RATIO."""
     return wanted.low > 0.0 and wanted.high / wanted.low > MAX_LINEAR_RATIO
 
 
@@ -138,12 +123,8 @@ def _grid(wanted: Range) -> list[float]:
 
 
 class Search:
-    """Search over a range for a goal.
-
-    make_plan   make_plan(overrides) returns the plan of the trials with these changed parameters
-    folder      folder of the tables of trials, one table for each value
-    progress    function, see ensemble.run_missing_trials
-    """
+    """Search over a range for a goal. make_plan(overrides) returns the plan of the trials with these changed
+    parameters. The folder gets one table for each value. progress: see ensemble.run_missing_trials."""
 
     def __init__(self, make_plan: Callable[[list[str]], Plan], wanted: Range, aim: Goal, folder: str | pathlib.Path,
                  pool: Pool, progress: Callable[[int, int], object] = lambda done, total: None) -> None:
@@ -152,7 +133,6 @@ class Search:
         self.tried: list[Tried] = []
 
     def _try(self, values: Iterable[float]) -> list[Tried]:
-        """Run the trials at several values at once."""
         made, refused = {}, {}
         for value in values:
             try:
@@ -161,16 +141,13 @@ class Search:
                 refused[value] = str(error)
         found = [Tried(value, None, text, False) for value, text in refused.items()]
         with contextlib.ExitStack() as stack:
-            tables = [stack.enter_context(ensemble.open_table(plan, self._folder, self._name(value)))
-                      for value, plan in made.items()]
+            tables = [stack.enter_context(ensemble.open_table(
+                plan, self._folder, f'{table_prefix(self._wanted.key)}{value!r}')) for value, plan in made.items()]
             if tables:
                 ensemble.run_missing_trials(list(made.values()), tables, self._pool, self._progress)
         found += [self._tried(value, table) for value, table in zip(made, tables)]
         self.tried = sorted((*self.tried, *found), key=lambda one: one.value)
         return sorted(found, key=lambda one: one.value)
-
-    def _name(self, value: float) -> str:
-        return f'{table_prefix(self._wanted.key)}{value!r}'
 
     def _tried(self, value: float, table: Table) -> Tried:
         name = next(name for name in table.results if self._aim.result in (name, nodes.plain(name)))
@@ -205,18 +182,14 @@ class Search:
                         f'{reason(low)} trials{_losses(low, high)}{self._gaps()}')
 
     def _crossings(self, tried: Sequence[Tried]) -> list[tuple[Tried, Tried]]:
-        """Return the pairs of neighbours whose means lie on different sides of the limit.
-
-        A mean equal to the limit counts as above the limit.
-        """
+        """Return the pairs of neighbours whose means lie on different sides of the limit; a mean at the limit counts
+        as above."""
         return [(a, b) for a, b in zip(tried, tried[1:]) if a.measured and b.measured
                 and (a.mean < self._aim.limit) != (b.mean < self._aim.limit)]
 
     def _at_edges(self) -> list[tuple[Tried, Tried]]:
-        """Bisect between each value with the result and a neighbouring value without the result.
-
-        Return the first pairs of `_crossings` that appear, [] if none appears.
-        """
+        """Bisect between each value with the result and a neighbouring value without the result. Return the first
+        pairs of `_crossings` that appear."""
         for a, b in [(a, b) for a, b in zip(self.tried, self.tried[1:]) if a.measured != b.measured]:
             while (middle := self._middle(a, b)) is not None:
                 one, = self._try([middle])
@@ -227,16 +200,15 @@ class Search:
 
     def _middle(self, low: Tried, high: Tried) -> float | None:
         """Return the middle of two values, None if their distance is within BRACKET_TOLERANCE."""
-        middle = _between(low.value, high.value, _in_ratios(self._wanted))
+        ratios = _in_ratios(self._wanted)
+        middle = math.sqrt(low.value * high.value) if ratios else 0.5 * (low.value + high.value)
         middle = round(middle) if self._wanted.whole else float(f'{middle:.6g}')
         near = high.value - low.value <= BRACKET_TOLERANCE * max(abs(low.value), abs(high.value))
         return None if near or not low.value < middle < high.value else middle
 
     def _bisected(self, low: Tried, high: Tried) -> tuple[Tried, Tried] | None:
-        """Return the narrowest pair around the limit, inside a pair of neighbours.
-
-        Return None if most trials at a value between them have no result.
-        """
+        """Return the narrowest pair around the limit, inside a pair of neighbours; None if most trials at a value
+        between them have no result."""
         for _ in range(MAX_BISECTIONS):
             middle = self._middle(low, high)
             if middle is None:
@@ -251,7 +223,6 @@ class Search:
         return low, high
 
     def _never(self, what: str) -> Solution:
-        """Return the outcome for a result that does not reach its limit."""
         wanted, known = self._wanted, [one for one in self.tried if one.measured]
         text = f'{what} is not reached for {wanted.key} from {wanted.low:g} to {wanted.high:g} {wanted.unit}'.rstrip()
         if known:
@@ -261,13 +232,11 @@ class Search:
 
     def _unsteady(self, what: str, crossings: Iterable[tuple[Tried, Tried]]) -> Solution:
         """Return the outcome for a result that reaches its limit at several values, or next to values without a
-        result.
-        """
+        result."""
         places = ', '.join(f'between {a.value:.4g} and {b.value:.4g}' for a, b in crossings)
         return Solution(math.nan, self.tried, f'{what} is not reached steadily: {places}{self._gaps()}')
 
     def _gaps(self) -> str:
-        """Return the text about the values at which most trials have no result, '' if there are none."""
         parts = []
         for measured, group in itertools.groupby(self.tried, key=lambda one: one.measured):
             values = [f'{one.value:.4g}' for one in group]
@@ -285,8 +254,8 @@ def _losses(low: Tried, high: Tried) -> str:
 
 
 def _tracked(table: Table, name: str) -> float | None:
-    """Return the mean of tracked_percent [%] over the trials of a table, for the beam of the result `name`; None if
-    the trials do not measure it."""
+    """Return the mean of tracked_percent [%] for the beam of the result `name`; None if the trials do not measure it.
+    """
     column = f'{nodes.beam_of(name)}/{TRACKED_RESULT}'.lstrip('/')
     values = table.column(column) if column in table.results else np.full(1, math.nan)
     return float(np.nanmean(values)) if np.isfinite(values).any() else None

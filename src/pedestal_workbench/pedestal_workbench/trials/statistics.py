@@ -1,29 +1,21 @@
 """Statistics over trials: percentiles, rates and sensitivities of the results, each with its 95 % interval.
 
-percentile   Percentile of a result. The interval comes from order statistics (scipy.stats.quantile_test), and holds
-             for any distribution of the result.
-rate         Share of the trials for which a statement is true. The interval is that of Clopper and Pearson (Biometrika
-             26 (1934) 404).
+percentile   The interval comes from order statistics (scipy.stats.quantile_test), and holds for any distribution.
+rate         Share of the trials for which a statement is true, with the interval of Clopper and Pearson (Biometrika 26
+             (1934) 404).
 sensitivity  Dependence of a result on a varied parameter. For a parameter with numbers it is Spearman's rank
-             correlation r, from -1 to 1. Its interval is that of Bonett and Wright (Psychometrika 65 (2000) 23), for n
-             trials:
-
-                 tanh(artanh r -+ 1.96 sqrt((1 + r^2 / 2) / (n - 3)))
-
+             correlation r, from -1 to 1, with the interval of Bonett and Wright (Psychometrika 65 (2000) 23) for n
+             trials, tanh(artanh r -+ 1.96 sqrt((1 + r^2 / 2) / (n - 3))).
              A parameter whose values are texts has no order. Its sensitivity is eta squared, from 0 to 1: the share of
              the variance of the result's ranks that the texts explain (Tomczak, Tomczak, Trends in Sport Sciences 1
-             (2014) 19):
-
-                 (H - k + 1) / (n - k)
-
-             H is the statistic of Kruskal and Wallis, k the number of different texts, n the number of trials. The
-             interval is that of an analysis of variance of the ranks, by its noncentral F distribution (Steiger,
-             Psychological Methods 9 (2004) 164).
+             (2014) 19), (H - k + 1) / (n - k). H is the statistic of Kruskal and Wallis, k the number of different
+             texts. The interval is that of an analysis of variance of the ranks, by its noncentral F distribution
+             (Steiger, Psychological Methods 9 (2004) 164).
 """
 import collections
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +25,7 @@ from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
 from pedestal_common.quantities import Bools, Coverage, Estimate, Floats, Ints, Row
 from pedestal_results import intervals, results, verdict
+from pedestal_results.intervals import Target
 from pedestal_workbench.trials.table import Table
 
 PERCENTILES = (1, 5, 25, 50, 75, 95, 99)  # reported percentiles [%]
@@ -45,59 +38,46 @@ WHY = 'why'
 
 
 class Question(NamedTuple):
-    """A statement that is true or false for each trial.
+    """A statement on a result that is true or false for each trial; a trial without the result does not meet it."""
+    name: str
+    result: str
+    target: Target | None = None    # None: the trial has the result
 
-    A trial without the result has the value NaN, for which `holds` is False.
-    """
-    name: str           # of the statement
-    result: str         # name of the result that decides
-    holds: Callable[[Floats], Bools]    # holds(values of the result (n,)) is True where the statement is true
-    sentence: str       # the statement
+    @property
+    def text(self) -> str:
+        """The statement, such as 'loss_s < 1'."""
+        return f'{self.result} {self.target.text}' if self.target else self.result
 
-
-def _meeting(target: str) -> Callable[[Floats], Bools]:
-    return lambda values: np.array([intervals.meets(value, target) for value in values])
+    def holds(self, values: Floats) -> Bools:
+        """Return True where the statement is true for the values (n,) of the result."""
+        met = [self.target is None or self.target.meets(value) for value in values.tolist()]
+        return np.isfinite(values) & np.array(met, bool)
 
 
 TRIAL_QUESTIONS = (
-    Question('locked', 'lock_time_s', np.isfinite, 'The receiver locked.'),
-    Question('tracked', 'evaluated_time_s', lambda time: time > 0.0, 'The run reached settled autotrack.'),
-    Question('never_lost', 'loss_s', lambda loss: loss == 0.0,
-             'After the first evaluated step the target was never further than half a beamwidth off.'),
-    Question('aligned', 'aligned_s', np.isfinite, 'The INS reported `aligned`.'),
-    *(Question(f'{result.name}_met', result.name,
-               _meeting(result.target),
-               f'{result.name} is {result.target}.')
+    Question('locked', 'lock_time_s'),
+    Question('tracked', 'evaluated_time_s', Target.parse('> 0')),   # the run reached settled autotrack
+    Question('never_lost', 'loss_s', Target.parse('<= 0')),     # never further off than half a beamwidth
+    Question('aligned', 'aligned_s'),
+    *(Question(f'{result.name}_met', result.name, Target.parse(result.target))
       for result in results.RESULTS if result.target and result.part not in ('run', 'supervised')),
 )
 
 
-class Requirement(NamedTuple):
-    """Criterion of the user for a result (--require)."""
-    text: str       # the criterion
-    result: str     # name of the result
-    target: str     # for intervals.meets
-
-
-_REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')
-"""Pattern of the text of a Requirement: name of the result, sign, limit."""
+_REQUIRED = re.compile(r'\s*(\S+)\s*(<=|>=|<|>)\s*(\S+)\s*')  # name of the result, sign, limit
 
 
 def check_result(option: str, name: str, known: Iterable[str]) -> None:
     """Raise ValueError unless a name is in `known`, the names of the results, with or without the name of a beam.
-
-    option: option with its value, for the text of the error.
-    """
+    option: with its value, for the text of the error."""
     if name not in known and name not in map(nodes.plain, known):
         raise ValueError(f'{option}: no trial has a result {name!r};{did_you_mean(name, known)} '
                          '`pedestal run --all --explain` explains the results')
 
 
-def requirement(text: str, known: Iterable[str]) -> Requirement:
-    """Return the criterion of a text such as 'pointing_max_deg < 0.1'. Raises ValueError.
-
-    known: names of the results.
-    """
+def requirement(text: str, known: Iterable[str]) -> Question:
+    """Return the criterion of the user (--require) of a text such as 'pointing_max_deg < 0.1'. Raises ValueError for a
+    result that is not `known`."""
     match = _REQUIRED.fullmatch(text)
     usage = f"--require {text!r}: must be RESULT < LIMIT, with <, <=, > or >=, such as 'pointing_max_deg < 0.1'"
     if not match:
@@ -106,7 +86,7 @@ def requirement(text: str, known: Iterable[str]) -> Requirement:
     check_result(f'--require {text!r}', name, known)
     if math.isnan(number(limit)):
         raise ValueError(usage)
-    return Requirement(f'{name} {sign} {limit}', name, f'{sign} {limit}')
+    return Question(f'require({name} {sign} {limit})', name, Target.parse(f'{sign} {limit}'))
 
 
 def number(text: str) -> float:
@@ -117,28 +97,27 @@ def number(text: str) -> float:
         return math.nan
 
 
-def of_requirements(case: str, table: Table, requirements: Iterable[Requirement]) -> list[Row]:
-    """Return the rows of --json: the rate at which trials meet each of some criteria.
+def of_all(case: str, table: Table, requirements: Iterable[Question] = ()) -> list[Row]:
+    """Return the rows of --json of a table of trials."""
+    return [*of_results(case, table), *of_requirements(case, table, requirements), *of_questions(case, table),
+            *of_sensitivity(case, table)]
 
-    A trial without the result does not meet its criterion. Each row also has the fields of coverage_fields.
-    """
-    found: list[Row] = []
-    for required in requirements:
-        for name in table.results:
-            own, metric = case_of(case, name)
-            if required.result in (name, metric):
-                values = table.column(name)
-                met = [bool(math.isfinite(value) and intervals.meets(value, required.target)) for value in values]
-                found.append({**intervals.estimated(own, f'require({required.text})/rate', rate(sum(met), len(met)),
-                                                    '%', len(met)),
-                              **coverage_fields(table, name, np.isfinite(values))})
-    return found
+
+def _share(question: Question, case: str, table: Table, name: str) -> Row:
+    holds = question.holds(table.column(name))
+    return intervals.estimated(case_of(case, name)[0], f'{question.name}/rate',
+                               rate(int(np.sum(holds)), len(holds)), '%', len(holds))
+
+
+def of_requirements(case: str, table: Table, requirements: Iterable[Question]) -> list[Row]:
+    """Return the rows of the rate at which trials meet each criterion, with the fields of coverage_fields."""
+    return [{**_share(required, case, table, name),
+             **coverage_fields(table, name, np.isfinite(table.column(name)))}
+            for required in requirements for name in table.results if required.result in (name, nodes.plain(name))]
 
 
 def percentile(values: Floats, share: float) -> Estimate:
-    """Return a percentile `share` [%] of values (n,), with its 95 % interval.
-
-    An end is NaN if n is too small for it.
+    """Return a percentile `share` [%] of values (n,), with its 95 % interval. An end is NaN if n is too small for it.
     """
     interval = stats.quantile_test(values, p=share / 100.0).confidence_interval(intervals.CONFIDENCE_LEVEL)
     return np.percentile(values, share), interval.low, interval.high
@@ -151,10 +130,8 @@ def rate(count: int, n: int) -> Estimate:
 
 
 def rank_correlation(x: Floats, y: Floats) -> Estimate:
-    """Return Spearman's rank correlation r of x and y (n,), with its 95 % interval.
-
-    All are NaN if x or y does not vary; the interval is NaN for n below four.
-    """
+    """Return Spearman's rank correlation r of x and y (n,), with its 95 % interval. All are NaN if x or y does not
+    vary; the interval is NaN for n below four."""
     n = len(x)
     if n < 2 or not (np.ptp(x) > 0.0 and np.ptp(y) > 0.0):
         return math.nan, math.nan, math.nan
@@ -166,11 +143,9 @@ def rank_correlation(x: Floats, y: Floats) -> Estimate:
 
 
 def eta_squared(x: Floats, y: Floats) -> Estimate:
-    """Return eta squared of the ranks of y (n,) over the categories x (n,), with its 95 % interval.
-
-    All are NaN if x or y does not vary, or if each trial has a category of its own; the interval is NaN if the
-    categories explain everything.
-    """
+    """Return eta squared of the ranks of y (n,) over the categories x (n,), with its 95 % interval. All are NaN if x
+    or y does not vary, or if each trial has a category of its own; the interval is NaN if the categories explain
+    everything."""
     n, kinds = len(x), np.unique(x)
     k = len(kinds)
     if not 1 < k < n or not np.ptp(y) > 0.0:
@@ -209,11 +184,8 @@ def case_of(case: str, name: str) -> tuple[str, str]:
 
 
 def coverage_fields(table: Table, name: str, known: Bools) -> Coverage:
-    """Return the fields `of` and `left_out` of a row of --json, which state how many trials have a result.
-
-    name: column of the result; known: mask (n,) of the trials with the result. `of` is the number of all trials.
-    `left_out` is {first word of the column `why`: number of trials}, for the trials without the result.
-    """
+    """Return the fields of a row of --json that state how many trials have a result. `of`: number of all trials;
+    `left_out`: {first word of the column `why`: number of trials}. known: mask (n,) of the trials with the result."""
     words = collections.Counter(why.partition(':')[0] or 'not measured'
                                 for why, is_known in zip(table.text(why_column(name)), known) if not is_known)
     return {'of': known.size, 'left_out': dict(words.most_common())}
@@ -241,10 +213,7 @@ def failures(table: Table) -> str:
 
 
 def of_results(case: str, table: Table) -> list[Row]:
-    """Return the rows of mean, smallest value, percentiles and largest value of each result.
-
-    Each row also has the fields of coverage_fields.
-    """
+    """Return the rows of mean, smallest value, percentiles and largest value of each result, with coverage_fields."""
     found: list[Row] = []
     for name in table.measured_results:
         values = table.column(name)
@@ -263,27 +232,14 @@ def of_results(case: str, table: Table) -> list[Row]:
 
 
 def of_questions(case: str, table: Table) -> list[Row]:
-    """Return the rows of the rates of the statements TRIAL_QUESTIONS over all trials.
-
-    A statement is false for a trial without its result.
-    """
-    found = []
-    for name in table.measured_results:
-        own, metric = case_of(case, name)
-        for question in TRIAL_QUESTIONS:
-            if question.result == metric:
-                yes = question.holds(table.column(name))
-                found.append(intervals.estimated(own, f'{question.name}/rate', rate(int(np.sum(yes)), len(yes)), '%',
-                                                 len(yes)))
-    return found
+    """Return the rows of the rates of TRIAL_QUESTIONS over all trials."""
+    return [_share(question, case, table, name) for name in table.measured_results
+            for question in TRIAL_QUESTIONS if question.result == nodes.plain(name)]
 
 
 def of_sensitivity(case: str, table: Table) -> list[Row]:
-    """Return the rows of the sensitivity of each result to each varied parameter.
-
-    The sensitivity is eta_squared for a parameter of texts, else rank_correlation. A result that does not vary has no
-    row.
-    """
+    """Return the rows of the sensitivity of each result to each varied parameter: eta_squared for a parameter of
+    texts, else rank_correlation. A result that does not vary has no row."""
     found = []
     varied = {name: (eta_squared if table.categories(name) else rank_correlation, table.column(name))
               for name in table.varied}
@@ -311,11 +267,9 @@ def ranking(name: str, values: Floats) -> Ints:
 
 
 def ranked_by(table: Table, result: str | None = None) -> str:
-    """Return the column of the result that ranks the trials.
-
-    It is the column of `result`, even if all its values are NaN. With None it is the rms pointing error, or, if no
-    trial has measured that, the rms following error in azimuth. Raises ValueError if no trial has the result.
-    """
+    """Return the column of the result that ranks the trials: that of `result`, even if all its values are NaN. With
+    None it is the rms pointing error, or, if no trial has measured that, the rms following error in azimuth. Raises
+    ValueError if no trial has the result."""
     for name in (result,) if result else ('pointing_rms_deg', 'azimuth_following_rms_deg'):
         for column in table.measured_results:
             if name in (column, nodes.plain(column)) and (result or np.isfinite(table.column(column)).any()):

@@ -1,9 +1,6 @@
-"""Table of trials: a CSV file with one row for each trial, and a JSON file that describes the trials.
-
-The rows of a batch of trials are written when the batch ends. A killed process loses the rows of unfinished batches,
-and leaves at most one incomplete line. When the same trials are started again, they continue after the last complete
-row.
-"""
+"""Table of trials: a CSV file with one row for each trial, and a JSON file that describes the trials. Rows are written
+when their batch ends. A killed process loses the rows of unfinished batches, and leaves at most one incomplete line.
+The same trials, started again, continue after the last complete row."""
 import csv
 import fcntl
 import io
@@ -20,23 +17,15 @@ from pedestal_common.quantities import Floats, Json
 LEADING_COLUMNS = ('trial', 'seed')  # columns before the varied parameters and the results
 
 
-class TableError(ValueError):
-    """Error of a table whose file is damaged, belongs to other trials, or is being written by another process. Its
-    text is one line.
-    """
-
-
 class Table:
     """Rows of the trials of a plan in the file FOLDER/NAME.csv; FOLDER/NAME.json describes the trials.
 
     identity   {key: text} that distinguishes these trials from others
-    varied     heads of the columns of varied parameters
-    results    heads of the columns of results, which are numbers
-    texts      heads of the columns of sentences
+    varied, results, texts      heads of the columns of varied parameters, of results (numbers), of sentences
     planned    rows of seed and varied parameters, which the trials must have; may be shorter than the file
 
-    Use as a context: `with` opens the file, reads its complete rows into `rows`, and locks it against other processes.
-    Raises TableError if the file exists and is damaged or belongs to other trials.
+    `with` opens the file, reads its complete rows into `rows`, and locks it against other processes. Raises ValueError
+    if the file is damaged or belongs to other trials.
     """
 
     _stream: io.BufferedRandom  # of the file, open inside the context
@@ -64,7 +53,7 @@ class Table:
         except BaseException as error:
             self._stream.close()
             if isinstance(error, BlockingIOError):
-                raise TableError(f'{self.file}: another process writes the file') from None
+                raise ValueError(f'{self.file}: another process writes the file') from None
             raise
         return self
 
@@ -72,7 +61,6 @@ class Table:
         self._stream.close()
 
     def _begin(self) -> None:
-        """Read the complete rows of the file, or begin a new file."""
         self._stream.seek(0)
         content = self._stream.read()
         whole = content[:content.rfind(b'\n') + 1]     # without an incomplete last line of a killed process
@@ -88,7 +76,6 @@ class Table:
         self._write([self.head])
 
     def _compare(self) -> None:
-        """Raise TableError if the file belongs to other trials."""
         try:
             found = json.loads(self._description_file.read_text())
         except (OSError, ValueError):
@@ -99,11 +86,10 @@ class Table:
                 names = {'columns': 'other columns', 'content': 'another scenario file of that name',
                          'sources': 'another version of the pedestal packages'}
                 difference = names.get(key, f'{key} {found.get(key)}, not {value}')
-                raise TableError(f'{self.file} contains other trials ({difference}): use another --output, or delete '
+                raise ValueError(f'{self.file} contains other trials ({difference}): use another --output, or delete '
                                  'the file')
 
     def _checked(self, content: bytes) -> list[list[str]]:
-        """Return the rows of trials in the bytes of the file. Raises TableError for a damaged row."""
         try:
             text = content.decode('utf-8-sig')
         except UnicodeDecodeError as error:
@@ -121,7 +107,7 @@ class Table:
         return rows
 
     def _check(self, row: Sequence[str], i: int, line: int) -> None:
-        """Raise TableError unless the cells of a row are those of trial i. line: number of the line in the file."""
+        """Raise ValueError unless the cells of a row are those of trial i. line: number of the line in the file."""
         if len(row) != len(self.head):
             raise self._damage(line, f'{len(row)} cells: must be {len(self.head)} as in line 1')
         planned = [i, *(self._planned[i] if i < len(self._planned) else ())]
@@ -134,8 +120,8 @@ class Table:
             elif first <= k < first + len(self.results) and cell and _number(cell) is None:
                 raise self._damage(line, f'{name} = {cell!r:.60}: must be a number, or empty for no result')
 
-    def _damage(self, line: int, text: str) -> TableError:
-        return TableError(f'{self.file}: line {line}: {text}; mend the line, or delete the file to run its trials '
+    def _damage(self, line: int, text: str) -> ValueError:
+        return ValueError(f'{self.file}: line {line}: {text}; mend the line, or delete the file to run its trials '
                           'again')
 
     def append(self, rows: Iterable[Iterable[Json]]) -> None:
@@ -156,10 +142,8 @@ class Table:
         self._stream.flush()
 
     def column(self, name: str) -> Floats:
-        """Return the numbers (n,) of a column, NaN for a result that was not measured.
-
-        For a column of texts, return the index of each text in the order of first appearance.
-        """
+        """Return the numbers (n,) of a column, NaN for a result that was not measured. Of a column of texts, return
+        the index of each text in the order of first appearance."""
         i = self.head.index(name)
         cells = [row[i] for row in self.rows]
         try:
@@ -191,7 +175,6 @@ class Table:
 
 
 def _number(cell: str) -> float | None:
-    """Return the number in a cell, None if the cell holds no number."""
     try:
         return None if '_' in cell else float(cell)
     except ValueError:

@@ -11,7 +11,7 @@ motors of paper 000 and a load of 210 kg m2. The scaling keeps the resonance fre
     receiver    C/N0 of the scenario for the area of the mirror. The power of the satellite and the noise of the
                 receiver stay the same.
     wind        the diameter of the mirror
-    structure   the lowest frequency of the data sheet, or the average of antennas of this diameter (data_sheet_format)
+    structure   the lowest frequency of the data sheet, or the average of antennas of this diameter (data_sheet)
     loops       the design of tuning/loops.py. `pedestal tune --loops` then measures the loops.
 
 If an axis cannot reach the rate of the data sheet, the scenario has RATE_SHARE of the rate that the axis reaches.
@@ -30,22 +30,21 @@ from pedestal_bringup.scenario import files, scenario
 from pedestal_bringup.scenario.header import PROGRAM_ERRORS
 from pedestal_bringup.scenario.program import Plan
 from pedestal_bringup.scenario.sections import parameters_of
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import ParameterError, as_dict, build, flatten
 from pedestal_common.quantities import DecibelHertz, Json, Radians
 from pedestal_common.text_files import parameter_file
-from pedestal_workbench.tuning import data_sheet_limits
-from pedestal_workbench.tuning.data_sheet_format import DataSheet
+from pedestal_workbench.tuning import data_sheet
+from pedestal_workbench.tuning.data_sheet import DataSheet
 from tracking_receiver_sim.params import TrackingReceiverParameters
 
 if typing.TYPE_CHECKING:
     from pedestal_workbench.tuning.loops import Plant
 
 BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033, 0.24
-"""Shares of the phase voltage of a motor [-].
-
-They are the back-EMF at rated speed, and the voltages over resistance and inductance at rated torque.
-"""
+"""Shares of the phase voltage of a motor [-]: back-EMF at rated speed, voltages over resistance and inductance at
+rated torque."""
 
 KNOWN_MIRROR_M = 2.4  # diameter of the mirror for which the C/N0 of the scenarios holds [m] (AntennaParameters)
 RATE_SHARE = 0.9  # share of the rate that an axis reaches, which replaces an unreachable rate of the data sheet [-]
@@ -90,9 +89,7 @@ def axis(sheet: DataSheet, name: str) -> dict[str, float]:
 
 def _softer(name: str, values: Mapping[str, float]) -> dict[str, float]:
     """Return {key: value} of stiffness and damping of the gear meshes, limited for the step of the simulated plant.
-
-    Because the stiffness is scaled with the load, it is too large for small motors under a heavy load.
-    """
+    Because the stiffness is scaled with the load, it is too large for small motors under a heavy load."""
     known, h = getattr(AduParameters(), name), PLANT_PERIOD_S
     J, N = values['load.inertia'], values['gear_train.reducer_ratio'] * known.gear_train.pinion_ratio
     M = mesh_inertia(values['motor_1.inertia'], N, (1.0 - values.get('structure.inertia_share', 0.0)) * J)
@@ -101,10 +98,6 @@ def _softer(name: str, values: Mapping[str, float]) -> dict[str, float]:
 
 
 def _plant(sheet: DataSheet, name: str, values: Mapping[str, float]) -> 'Plant':
-    """Return the plant of the axis `name` with parameters `values` {key: value}.
-
-    Raises ParameterError, LoopError.
-    """
     from pedestal_workbench.tuning import loops
     known = getattr(AduParameters(), name)
     try:
@@ -115,11 +108,8 @@ def _plant(sheet: DataSheet, name: str, values: Mapping[str, float]) -> 'Plant':
 
 
 def attainable(sheet: DataSheet) -> tuple[DataSheet, list[str]]:
-    """Return (data sheet with rates that its axes reach, line about each changed rate).
-
-    Two limits apply to the rate of an axis. The motors must reach it with their voltage, and they must be able to stop
-    the axis from it within half of its travel. Raises ScenarioError, ParameterError, LoopError.
-    """
+    """Return (data sheet with rates that its axes reach, line about each changed rate). Two limits apply: the motors
+    must reach the rate with their voltage, and stop the axis from it within half of its travel. Raises ValueError."""
     from pedestal_workbench.tuning import loops
     acu, remarks = scenario.load(sheet.like).node_parameters('acu'), []
     for name in AXES:
@@ -143,7 +133,6 @@ def attainable(sheet: DataSheet) -> tuple[DataSheet, list[str]]:
 
 
 def _motors(name: str, values: Mapping[str, float]) -> Iterator[MotorParameters]:
-    """Yield both motors of an axis by its name and its parameters {key: value}. Raises ParameterError."""
     known = getattr(AduParameters(), name)
     for number in (1, 2):
         own = {key.partition('.')[2]: value for key, value in values.items() if key.startswith(f'motor_{number}.')}
@@ -162,12 +151,10 @@ def cn0(sheet: DataSheet) -> DecibelHertz:
 
 @functools.cache
 def _receiver(name: str) -> TrackingReceiverParameters:
-    """Return the parameters of the receiver in the scenario of this name."""
     return scenario.load(name).node_parameters('tracking_receiver')
 
 
 def _assumed(sheet: DataSheet) -> list[str]:
-    """Return a line for each assumed value."""
     lines = []
     if not sheet.cn0:
         receiver = _receiver(sheet.like).receiver
@@ -181,10 +168,7 @@ def _assumed(sheet: DataSheet) -> list[str]:
 
 
 def sections(sheet: DataSheet, title: str) -> dict[str, dict[str, Json]]:
-    """Return {node: {key: value}} of the scenario; title: of the scenario.
-
-    Raises ScenarioError, ParameterError, LoopError.
-    """
+    """Return {node: {key: value}} of the scenario. Raises ValueError."""
     from pedestal_workbench.tuning import loops
     _, content = files.text(sheet.like)
     found = files.by_node(parameter_file.parse(content))
@@ -210,11 +194,8 @@ def sections(sheet: DataSheet, title: str) -> dict[str, dict[str, Json]]:
 
 
 def _at_the_target(sheet: DataSheet, found: Mapping[str, Mapping[str, Json]]) -> dict[str, Radians]:
-    """Return {key of adu: initial angle}, three beamwidths from the predicted target.
-
-    A slow antenna then reaches the target soon. The angles of a wide beam end at the travel of the axis.
-    found: {node: {key: value}} of the scenario.
-    """
+    """Return {key of adu: initial angle}, three beamwidths from the predicted target, so that a slow antenna reaches
+    it soon. The angles of a wide beam end at the travel of the axis. found: {node: {key: value}} of the scenario."""
     chosen = scenario.parse(sheet.like, parameter_file.text(found))
     _, angles = Plan(chosen).tables['']
     travels = [getattr(chosen.node_parameters('adu'), name).limits for name in AXES]
@@ -223,10 +204,8 @@ def _at_the_target(sheet: DataSheet, found: Mapping[str, Mapping[str, Json]]) ->
 
 
 def text(found: Mapping[str, Mapping[str, Json]], head: Iterable[str]) -> str:
-    """Return the text of a scenario file from {node: {key: value}}; head: lines of comment at its beginning.
-
-    Each value has its unit and meaning in a comment.
-    """
+    """Return the text of a scenario file from {node: {key: value}}, with unit and meaning of each value in a comment.
+    head: lines of comment at its beginning."""
     lines = []
     for node, values in found.items():
         fields = dict(flatten(parameters_of(node)))
@@ -240,26 +219,22 @@ def text(found: Mapping[str, Mapping[str, Json]], head: Iterable[str]) -> str:
 
 
 def new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
-    """Return (text of the scenario file, line about each changed or assumed value).
-
-    name: name of the scenario; command: the command line, for the head of the file. Raises SheetError for values
-    that contradict each other, which names the options of `pedestal new` to change.
-    """
+    """Return (text of the scenario file, line about each changed or assumed value). command: the command line, for the
+    head of the file. Raises ValueError for values that contradict each other, which names the options of `pedestal
+    new` to change."""
     try:
         return _new(sheet, name, command)
     except ValueError as error:
-        raise data_sheet_limits.refusal(sheet, error, lambda other: _new(other, name, command)) from None
+        raise data_sheet.refusal(sheet, error, lambda other: _new(other, name, command)) from None
 
 
 def _new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
-    """Return the values of `new`. Raises ScenarioError, ParameterError, LoopError for values that contradict each
-    other."""
     sheet, remarks = attainable(sheet)
     remarks += _assumed(sheet)
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
     found = sections(sheet, title)
     tune = shlex.join(('pedestal', 'tune', f'{name}.yaml', '--loops'))
-    run = shlex.join(('pedestal', 'run', f'{name}.yaml', '--params-file', f'{name}-loops.yaml'))
+    run = Variant(f'{name}.yaml', files=(f'{name}-loops.yaml',)).command()
     content = text(found, [*parameter_file.origin(command), 'Values that are not in the data sheet are scaled from '
                            'the antenna of the product: replace them by known values.',
                            f'Next: {tune}, then {run}', *remarks])

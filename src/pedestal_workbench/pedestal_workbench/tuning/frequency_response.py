@@ -1,27 +1,24 @@
-"""Frequency responses of the current, speed and position loops, measured on the simulated plant.
+"""Frequency responses of the current, speed and position loops, measured on the simulated plant, for `pedestal tune
+--loops` and the study of the loops.
 
-`pedestal tune --loops` and the study of the loops use this module. A multisine (a sum of sines) is added inside a loop
-while the axis moves at a constant rate. At that rate the friction is constant, and the bias torque keeps the teeth in
-contact. E is the signal after the point of the addition, and -Y is the signal that returns to this point through the
-loop. At the frequencies of the sines the open loop is L = Y / E, and the closed loop is T = L / (1 + L). The method
-needs no model of a controller.
+A multisine (a sum of sines) is added inside a loop while the axis moves at a constant rate. At that rate the friction
+is constant, and the bias torque keeps the teeth in contact. E is the signal after the point of the addition, and -Y is
+the signal that returns to this point through the loop. At the frequencies of the sines the open loop is L = Y / E, and
+the closed loop is T = L / (1 + L). The method needs no model of a controller.
 
     loop        added to                   period          E                        Y
     current     current reference i_ref    100 us          i_ref - i_q              i_q
     speed       rate command               0.5 ms          rate - mean speed / N    mean speed / N
     position    command of ACU to drive    of the drive    rate to the drive        -(rate commanded by the ACU)
 
-    i_q          motor current that makes the torque [A]
-    rate         rate command after the addition [rad/s]
-    mean speed   mean speed of both motors from their encoders [rad/s]; N: gear ratio
-
-In a run, a period of the current loop has two steps of the simulated plant. With two steps, the swing of the motors in
-their meshes is damped too well. The margins of the speed loop are then up to 0.9 dB and 3 deg too good. Because of
-this error, the current and the speed loop are measured with SUB_STEP_COUNT steps.
+Here i_q is the motor current that makes the torque, mean speed that of both motors from their encoders, N the gear
+ratio. In a run, a period of the current loop has two steps of the simulated plant. With two steps, the swing of the
+motors in their meshes is damped too well. The margins of the speed loop are then up to 0.9 dB and 3 deg too good.
+Because of this error, the current and the speed loop are measured with SUB_STEP_COUNT steps.
 """
 import dataclasses
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -30,6 +27,7 @@ from adu_drive import axis, drive_unit
 from drive_law.axis_params import SPEED_LOOP_PERIOD_S, AxisParameters
 from drive_law.params import AduParameters
 from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import (
@@ -38,28 +36,21 @@ from pedestal_common.quantities import (
     Floats,
     Hertz,
     Ints,
-    Json,
     Pairs,
     RadiansPerSecond,
     Seconds,
 )
-from pedestal_workbench.trials.cases import Case
 
 MOTOR_FIELDS = ('motor_1', 'motor_2')  # names of both motors in the state of an axis
 SWEEP_START_ANGLES_RAD = (-2.0, 0.15)  # angles of azimuth and elevation at the beginning of a measurement [rad]
 
 SWEEP_RATES_RAD_S = (0.1, 0.03)
-"""Constant rates of azimuth and elevation during a measurement [rad/s].
-
-They are far above the multisine and the Stribeck rate of the friction, and a whole measurement stays inside the
-travel. A slow axis moves at RATE_SHARE of its largest rate. The multisine is at most PEAK_SHARE of the rate.
-"""
+"""Constant rates of azimuth and elevation during a measurement [rad/s], far above the multisine and the Stribeck rate
+of the friction. A whole measurement stays inside the travel. A slow axis moves at RATE_SHARE of its largest rate."""
 
 RATE_SHARE, PEAK_SHARE = 1.0 / 3.0, 0.5
-"""RATE_SHARE: largest ratio of the rate of a measurement to the largest rate of the axis [-].
-
-PEAK_SHARE: largest ratio of the peak of the multisine to the rate of the measurement [-].
-"""
+"""Largest ratio of the rate of a measurement to the largest rate of the axis, of the peak of the multisine to the rate
+of the measurement [-]."""
 
 SUB_STEP_COUNT = 10  # number of plant steps in a current period while the current and the speed loop are measured
 
@@ -87,11 +78,8 @@ class Sweep:
         return self.bins() / self.period
 
     def signal(self, step: Seconds) -> Floats:
-        """Return the whole record (n,) with one value per step.
-
-        All sines have equal amplitudes. The phases of Schroeder (IEEE Trans. Information Theory 16 (1970) 85) keep the
-        peak of the sum low.
-        """
+        """Return the whole record (n,) with one value per step. All sines have equal amplitudes. The phases of
+        Schroeder (IEEE Trans. Information Theory 16 (1970) 85) keep the peak of the sum low."""
         n = round(self.period / step)
         k = np.arange(len(self.bins()))
         spectrum = np.zeros(n // 2 + 1, complex)
@@ -100,8 +88,7 @@ class Sweep:
         return np.tile(self.peak / np.abs(one).max() * one, self.dropped + self.kept)
 
 
-CURRENT_SWEEP = Sweep(period=0.1, lowest=10.0, highest=4000.0, points=60, dropped=5, kept=5, peak=1.5)
-"""Sweep of the current loop; peak in A."""
+CURRENT_SWEEP = Sweep(period=0.1, lowest=10.0, highest=4000.0, points=60, dropped=5, kept=5, peak=1.5)  # peak in A
 
 SPEED_SWEEP = Sweep(period=1.0, lowest=1.0, highest=900.0, points=120, dropped=2, kept=4, peak=0.015)
 """Sweep of the speed loop; peak in rad/s at the load. It needs 6 Nm of a motor, less than the bias torque."""
@@ -110,19 +97,15 @@ FLEXIBLE_SPEED_SWEEP = dataclasses.replace(SPEED_SWEEP, period=8.0, lowest=0.25,
 """Sweep of the speed loop of an axis with a declared structure, whose resonance is narrow and decays slowly."""
 
 POSITION_SWEEP = Sweep(period=8.0, lowest=0.25, highest=95.0, points=300, dropped=2, kept=3, peak=0.012)
-"""Sweep of the position loop, up to nearly half of its sampling rate 1 / 5 ms; peak in rad/s.
-
-The peak is half of the value at which the teeth lose contact with the bias torque of the paper, 5 Nm.
-"""
+"""Sweep of the position loop, up to nearly half of its sampling rate 1 / 5 ms; peak in rad/s. The peak is half of the
+value at which the teeth lose contact with the bias torque of the paper, 5 Nm."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """Measured frequency response of a loop.
-
-    In a speed loop the lowest frequency of a crossover is that of the structure on a free axis. At the frequency of
-    the structure on locked motors the dish holds the axis. There |L| falls below 1 long before the crossover.
-    """
+    """Measured frequency response of a loop. At the frequency of the structure on locked motors the dish holds the
+    axis, and |L| falls below 1 long before the crossover. In a speed loop the lowest frequency of a crossover is
+    therefore that of the structure on a free axis."""
     frequency: Floats       # (n,) [Hz]
     open_loop: Complexes    # (n,) open loop L [-]
     deviation: Floats       # (n,) standard deviation of L over the measured periods, divided by |L| [-]
@@ -148,10 +131,8 @@ def _inner_loops(state: AnyRecord, constants: AnyRecord, substeps: int, rate: Fl
                  wanted: Pairs, made: Pairs) -> None:
     """Run one axis from rest, and fill the records of its signals.
 
-    substeps        number of plant steps in a period of the current loop
     rate (n,)       rate command in each period of the speed loop [rad/s]
-    current (5 n,)  current that is added to the references i_ref of both motors, in each period of the current loop
-                    [A]
+    current (5 n,)  added to the references i_ref of both motors, in each period of the current loop [A]
     speed (n,)      filled: mean speed of the motors, at the load [rad/s]
     wanted, made    filled: i_ref and i_q of both motors (5 n, 2) [A]
     """
@@ -172,15 +153,11 @@ def _inner_loops(state: AnyRecord, constants: AnyRecord, substeps: int, rate: Fl
 
 
 def _rate(index: int, *largest: RadiansPerSecond) -> RadiansPerSecond:
-    """Return the rate at which the axis `index` of AXES is measured; largest: its rate limits."""
     return min(SWEEP_RATES_RAD_S[index], RATE_SHARE * min(largest))
 
 
 def _run_inner(drive: AduParameters, index: int, rate: Floats, current: Floats) -> tuple[Floats, Pairs, Pairs]:
-    """Return (speed (n,) [rad/s], i_ref, i_q (5 n, 2) [A]) of the axis `index` of AXES, see _inner_loops.
-
-    rate (n,): rate commands [rad/s]; current (5 n,): added to the current references [A].
-    """
+    """Return (speed (n,) [rad/s], i_ref, i_q (5 n, 2) [A]) of the axis `index` of AXES, see _inner_loops."""
     drive = dataclasses.replace(drive, initial_azimuth=SWEEP_START_ANGLES_RAD[0],
                                 initial_elevation=SWEEP_START_ANGLES_RAD[1])
     speed, wanted, made = np.zeros(len(rate)), np.zeros((len(current), 2)), np.zeros((len(current), 2))
@@ -217,11 +194,10 @@ def free_frequency(axis_parameters: AxisParameters) -> Hertz:
 
 
 def _at_most(sweep: Sweep, *rates: RadiansPerSecond) -> Sweep:
-    """Return a sweep whose peak is limited for axes that move at `rates`."""
     return dataclasses.replace(sweep, peak=min(sweep.peak, PEAK_SHARE * min(rates)))
 
 
-MOVING_CASE_PARAMETERS = {
+MOVING_PARAMETERS = {
     'acu.tracker.handover': False, 'scenario.program.time_offset': 0.0, 'scenario.program.interval': 1.0,
     'adu.initial_azimuth': SWEEP_START_ANGLES_RAD[0], 'adu.initial_elevation': SWEEP_START_ANGLES_RAD[1],
     'tracking_receiver.target.kind': 'ramp',
@@ -230,38 +206,36 @@ MOVING_CASE_PARAMETERS = {
 """Changed parameters of a scenario for a program track of constant rates on both axes; `position` sets the rates."""
 
 
-def case(name: str, scenario: str, parameters: Mapping[str, Json]) -> Case:
-    """Return the case for the measurement of position loops: a scenario with changed parameters, at constant rates."""
-    return Case(name, scenario, {**MOVING_CASE_PARAMETERS, **parameters})
+def moving(variant: Variant) -> Variant:
+    """Return a variant for the measurement of position loops, which moves at constant rates unless its own changes
+    state otherwise."""
+    return dataclasses.replace(variant, changes=()).with_(MOVING_PARAMETERS).with_(variant.changes)
 
 
-def _moving(case: Case) -> tuple[Case, list[RadiansPerSecond]]:
-    """Return (case whose target moves at the rates of the measurement, these rates of both axes)."""
-    loaded = case.loaded()
+def _at_rates(variant: Variant) -> tuple[Variant, list[RadiansPerSecond]]:
+    """Return (variant whose target moves at the rates of the measurement, these rates of both axes)."""
+    loaded = variant.load()
     drive, acu = (loaded.node_parameters(node) for node in ('adu', 'acu'))
     rates = [_rate(i, getattr(drive, name).limits.rate, getattr(acu, name).limits.rate,
                    getattr(acu, name).shaper.rate) for i, name in enumerate(AXES)]
     moved = {f'tracking_receiver.target.angle.{name}_rate': rate for name, rate in zip(AXES, rates)}
-    return dataclasses.replace(case, parameters={**case.parameters, **moved}), rates
+    return variant.with_(moved), rates
 
 
-def position(case: Case, axes: Collection[str] = AXES, sweep: Sweep = POSITION_SWEEP) -> dict[str, Response]:
-    """Return {'position/AXIS/CASE': response} of the position loops of a case of the function `case`."""
-    case, rates = _moving(case)
-    loaded = dataclasses.replace(case, duration=(sweep.dropped + sweep.kept) * sweep.period).loaded()
-    loop = closed_loop.Loop(loaded)
+def position(variant: Variant, axes: Collection[str] = AXES, sweep: Sweep = POSITION_SWEEP) -> dict[str, Response]:
+    """Return {'position/AXIS': response} of the position loops of a variant that `moving` returns."""
+    variant, rates = _at_rates(variant)
+    loop = closed_loop.Loop(variant.with_(duration=(sweep.dropped + sweep.kept) * sweep.period).load())
     added = np.zeros((loop.steps, 2))
     added[:-1] = _at_most(sweep, *rates).signal(loop.period_ns * 1e-9)[:, np.newaxis]
     commanded = loop.run(added)['acu/rate_command']['velocity']
-    return {f'position/{name}/{case.name}': response(sweep, (commanded + added)[:-1, i], -commanded[:-1, i])
+    return {f'position/{name}': response(sweep, (commanded + added)[:-1, i], -commanded[:-1, i])
             for i, name in enumerate(AXES) if name in axes}
 
 
 def _crossings(f: Floats, y: Floats, angle: Floats) -> tuple[Floats, Floats]:
-    """Return (frequencies [Hz], angles [rad]) at the zeros of y (n,), both interpolated linearly in log f.
-
-    The angle between two frequencies changes by less than half a turn.
-    """
+    """Return (frequencies [Hz], angles [rad]) at the zeros of y (n,), both interpolated linearly in log f. The angle
+    between two frequencies changes by less than half a turn."""
     i = np.flatnonzero(y[:-1] * y[1:] <= 0.0)
     share = y[i] / (y[i] - y[i + 1])
     change = np.angle(np.exp(1j * (angle[i + 1] - angle[i])))

@@ -1,11 +1,10 @@
 """Identification of the rate loop of each axis by a simulated test of the drive, for `pedestal tune --feedforward`.
+The test adds small sines of a few low frequencies to a constant rate. At this rate the friction is constant, and the
+bias torque keeps the teeth in contact.
 
-The rate loop is the drive from the rate command to the rate of the axis. The test adds small sines of a few low
-frequencies to a constant rate. At this rate the friction is constant, and the bias torque keeps the teeth in contact.
-
-W(jw) is the frequency response of the rate loop at the angular frequency w [rad/s], without its known delay. This
-delay is the transport delay plus half a period, because the drive holds each command for one period. The prediction of
-the ACU covers it. Least squares fit the terms f_1 to f_4 of the series
+W(jw) is the frequency response of the rate loop, from the rate command to the rate of the axis, at the angular
+frequency w [rad/s], without its known delay. This delay is the transport delay plus half a period, because the drive
+holds each command for one period. The prediction of the ACU covers it. Least squares fit the terms f_1 to f_4 of
 
     1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + f_4 (jw)^3.
 
@@ -31,14 +30,11 @@ from pedestal_common.quantities import Complexes, Floats, Pairs, Records, Second
 SINE_FREQUENCIES_HZ = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 2.5])
 """Frequencies of the sines [Hz]. Each has a whole number of periods in COMMON_PERIOD_S."""
 COMMON_PERIOD_S = 4.0  # period of the sum of all sines [s]
-SETTLING_PERIODS, MEASURED_PERIODS = 1, 2
-"""Number of common periods before the measurement, and number of measured common periods."""
+SETTLING_PERIODS, MEASURED_PERIODS = 1, 2  # numbers of common periods
 SERIES_TERMS = 4  # number of terms of the series of 1 / W
 IDENTIFICATION_RATES_RAD_S = (0.1, 0.06)
-"""Constant rates of azimuth and elevation [rad/s].
-
-They are larger than the sum of the sines, so the axis never turns back. A whole test stays inside the travel.
-"""
+"""Constant rates of azimuth and elevation [rad/s], larger than the sum of the sines, so the axis never turns back. A
+whole test stays inside the travel."""
 SINE_PEAK_RAD_S = 0.004  # amplitude of each sine [rad/s]
 
 
@@ -73,12 +69,9 @@ def series(w: Floats, W: Complexes, terms: int = SERIES_TERMS) -> Floats:
 
 
 def response(commanded: Floats, position: Floats, T: Seconds, delay: Seconds, w: Floats) -> Complexes:
-    """Return the response W of a rate loop at w [rad/s], without the delay and the hold of the commands.
-
-    commanded (m,): rate commands [rad/s]; command k acts from t_k + delay on, for the period T.
-    position (m,): angle of the axis [rad] at t_k.
-    The m samples contain a whole number of periods of each w. A linear trend is removed.
-    """
+    """Return the response W of a rate loop at w [rad/s], without the delay and the hold of the commands. Command k
+    acts from t_k + delay on, for the period T; the position is that at t_k. The m samples contain a whole number of
+    periods of each w. A linear trend is removed."""
     t = T * (np.arange(len(commanded)) - 0.5 * (len(commanded) - 1))
     waves = np.cos(w * t[:, np.newaxis]), np.sin(w * t[:, np.newaxis])
     basis = np.column_stack((np.ones_like(t), t, *waves))
@@ -90,12 +83,10 @@ def response(commanded: Floats, position: Floats, T: Seconds, delay: Seconds, w:
 @compiled
 def _drive(state: Records, constants: Records, inputs: Records, outputs: Records, rate: Pairs, torque: Pairs,
            position: Pairs, motors: Floats) -> None:
-    """Run the drive with n commands. Fill position with the encoder angles [rad] before each command.
-
-    rate: rate commands [rad/s]; torque: torque feed-forward [Nm]. Pairs are azimuth and elevation.
-    motors (n, 2, 4): filled for both axes with angles [rad] and torques [Nm] of motors 1 and 2 on the motor shaft.
-    The other arguments are the records of the unit of the drive, each in an array of one.
-    """
+    """Run the drive with n commands: rate commands [rad/s] and torque feed-forward [Nm]. Fill position with the
+    encoder angles [rad] before each command, motors (n, 2, 4) with angles [rad] and torques [Nm] of both motors of
+    both axes, on the motor shaft. The other arguments are the records of the unit of the drive, each in an array of
+    one."""
     u, y = inputs[0], outputs[0]
     for k in range(len(rate)):
         position[k, 0], position[k, 1] = y.azimuth.position, y.elevation.position
@@ -108,11 +99,8 @@ def _drive(state: Records, constants: Records, inputs: Records, outputs: Records
 
 
 def respond(drive: AduParameters, rate: Pairs, torque: Pairs) -> tuple[Pairs, Floats]:
-    """Return (encoder angles [rad], motors (n, 2, 4)) of a drive that receives n commands in still air.
-
-    drive: with the angles at the start; rate: rate commands [rad/s]; torque: torque feed-forward [Nm]; motors: angles
-    [rad] and torques [Nm] of motors 1 and 2 of both axes. Row k is the time of command k.
-    """
+    """Return (encoder angles [rad], motors (n, 2, 4)) of a drive that receives n commands in still air, as `_drive`
+    fills them. drive: with the angles at the start. Row k is the time of command k."""
     drive = dataclasses.replace(drive, wind=WindParameters(), initially_enabled=True)
     state, constants = drive_unit.initial_state(drive), drive_unit.constants(drive)
     inputs, outputs = drive_unit.Inputs.zeros(), drive_unit.Outputs.zeros()
@@ -124,11 +112,9 @@ def respond(drive: AduParameters, rate: Pairs, torque: Pairs) -> tuple[Pairs, Fl
 
 
 def identify(scenario: Scenario, torque: bool = True) -> dict[str, RateLoop]:
-    """Return the RateLoop of each axis of the drive in a scenario, in still air.
-
-    torque: True if the commands include the torque feed-forward of the ACU. Raises ValueError if the period of the
-    drive does not divide COMMON_PERIOD_S or if the travel is too short.
-    """
+    """Return the RateLoop of each axis of the drive in a scenario, in still air. torque: True if the commands include
+    the torque feed-forward of the ACU. Raises ValueError if the period of the drive does not divide COMMON_PERIOD_S or
+    if the travel is too short."""
     acu, drive = scenario.node_parameters('acu'), scenario.node_parameters('adu')
     axes = [getattr(drive, name) for name in topics.AXES]
     duration = (SETTLING_PERIODS + MEASURED_PERIODS) * COMMON_PERIOD_S

@@ -14,37 +14,22 @@ loops are then measured on the simulated plant, with its gears, lash, friction, 
     T_b = 0.4 T_r                               bias torque of a motor [Nm]. It is full up to a motor torque of
                                                 0.47 T_r, and zero from 1.5 T_r on.
 
-    J_m, J_L   inertia of one motor, of the load [kg m2]
-    N          gear ratio from motor to load
-    w_s        crossover of the speed loop [rad/s]
-    T_max      torque limit of a motor [Nm]
-    T_r        rated torque of a motor [Nm]
-    T_load     sum of friction, unbalance and mean wind, at the load [Nm]
+    J_m, J_L    inertia of one motor, of the load; N: gear ratio from motor to load
+    w_s         crossover of the speed loop [rad/s]
+    T_max, T_r  torque limit and rated torque of a motor; a quarter of the torque is a reserve for a heavier load
+    T_load      sum of friction, unbalance and mean wind, at the load
 
 The feed-forward takes J_A and the friction of the load. A required crossover of the position loop takes the place of
-w_s / 8. A quarter of the torque is a reserve for a heavier load.
+w_s / 8.
 
-A declared structure (`adu.AXIS.structure`, inertia_share above 0) swings with the frequency f [Hz] on locked motors.
-The receiver sees this swing as a motion of the target, and the shaper must not excite it:
-
-    speed loop      J without the share of the dish, because the dish does not follow above f
-    position loop   w_p at most 2 pi f / 3
-    shaper          a bends the structure by a / (2 pi f)^2 [rad]. The bend is at most 0.8 mrad, and at most a tenth of
-                    the beamwidth. a needs at most half of the torque limit, up to which the bias torque keeps the
-                    teeth in contact. j = a f, so that the acceleration rises within one period of the swing and leaves
-                    no swing behind. h0 = 0.8 / f.
-    filter          of the default bank only the models ca whose bandwidth (q / r)^(1/3) is at most 2 pi f / 7, because
-                    a faster model would follow the swing. q: white jerk of the model [rad/s3/sqrt(Hz)], r: root
-                    density of the noise of the receiver [rad/sqrt(Hz)].
-
-Of the two designs the smaller value counts, of h0 the larger. The margins are then measured with the structure in the
-plant. They are measured again with the load inertia changed by 30 % and f by 20 %, within the ranges of these
-parameters. The smallest margins count.
+A declared structure swings with the frequency f on locked motors. The receiver sees this swing as a motion of the
+target, and the shaper must not excite it. docs/decisions/structure.md states the design for f and its reasons. Of both
+designs the smaller value counts, of h0 the larger. The margins are then measured with the structure in the plant, and
+again in all PLANT_CORNERS, within the ranges of these parameters. The smallest margins count.
 """
 import dataclasses
 import math
 import pathlib
-import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -52,7 +37,7 @@ import numpy as np
 
 from acu_tracker.estimation.params import FilterParameters, ImmParameters
 from drive_law.axis_params import SPEED_LOOP_PERIOD_S, AxisParameters
-from pedestal_bringup.scenario import files, scenario
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common import parameters
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import (
@@ -71,7 +56,6 @@ from pedestal_common.quantities import (
 from pedestal_common.text_files import parameter_file
 from pedestal_common.text_files.text_table import TextTable
 from pedestal_recording import configuration
-from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.tuning import frequency_response as frequency
 from pedestal_workbench.tuning.frequency_response import Margins
 
@@ -85,25 +69,18 @@ MAX_BEND_RAD, BEND_SHARE = 0.8e-3, 0.1
 """Largest bend of a structure by the acceleration of the shaper [rad]; its largest ratio to the beamwidth [-]."""
 
 CLOSED_TEETH_SHARE = 0.5
-"""Share of the torque limit that the shaper uses on a flexible structure [-].
-
-Above this torque (`bias.out`) no bias torque keeps the teeth in contact.
-"""
+"""Share of the torque limit that the shaper uses on a flexible structure [-]. Above this torque (`bias.out`) no bias
+torque keeps the teeth in contact."""
 
 MODE_H0, MODE_RATIO, FILTER_RATIO = 0.8, 3.0, 7.0
-"""MODE_H0: h0 of the shaper times the frequency of the structure [-].
-
-MODE_RATIO, FILTER_RATIO: smallest ratios of the frequency of the structure to the crossover of the position loop and
-to the bandwidth of the target filter [-].
-"""
+"""h0 of the shaper times the frequency of the structure; smallest ratios of this frequency to the crossover of the
+position loop and to the bandwidth of the target filter [-]."""
 
 PLANT_CORNERS = tuple((inertia, mode) for inertia in (0.7, 1.3) for mode in (0.8, 1.2))
 """Factors (of the load inertia, of the frequency of the structure) with which the loops must also have their margins
-[-].
-"""
+[-]."""
 
-WORST_SUFFIX = ', worst'
-"""Suffix of the name of a loop in the row of the table with its smallest margins in all PLANT_CORNERS."""
+WORST_SUFFIX = ', worst'  # of the name of a loop, in the row with its smallest margins in all PLANT_CORNERS
 
 NEAR_SHARE = 0.95  # share of a required crossover from which on a loop counts as fast enough [-]
 
@@ -114,10 +91,6 @@ STILL_AIR_PARAMETERS = {'scenario.ship': False, 'scenario.program.source': 'targ
                         'adu.initially_enabled': True, 'adu.wind.azimuth': 0.0, 'adu.wind.elevation': 0.0,
                         'adu.wind.gust.kind': 'none'}
 """Changed parameters of a scenario for the measurement of a plant: ashore, in still air, on a program track."""
-
-
-class LoopError(ValueError):
-    """Error of loops that cannot be designed, or not be closed with the required margins. Its text is one line."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,12 +106,12 @@ class LoopRequirements:
                                       ('phase_margin', 20.0, 80.0, 'deg'), ('gain_margin', 3.0, 20.0, 'dB')):
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise LoopError(f'{name} = {value:g} {unit}: must be {low:g} to {high:g}')
+                raise ValueError(f'{name} = {value:g} {unit}: must be {low:g} to {high:g}')
 
 
 @dataclasses.dataclass(frozen=True)
 class Plant:
-    """Plant of one axis for the design of its loops. Raises LoopError if the motors cannot move the axis."""
+    """Plant of one axis for the design of its loops. Raises ValueError if the motors cannot move the axis."""
     name: str       # of the axis
     axis: AxisParameters
     wind: NewtonMeters = 0.0        # mean wind torque at the load
@@ -148,8 +121,8 @@ class Plant:
 
     def __post_init__(self) -> None:
         if self.acceleration <= 0.0:
-            raise LoopError(f'adu.{self.name}: the motors cannot move the axis: friction, unbalance and wind need '
-                            'more torque than both torque limits')
+            raise ValueError(f'adu.{self.name}: the motors cannot move the axis: friction, unbalance and wind need '
+                             'more torque than both torque limits')
 
     @property
     def motor_inertia(self) -> KilogramMeters2:
@@ -174,10 +147,7 @@ class Plant:
 
     @property
     def gear_inertia(self) -> KilogramMeters2:
-        """Inertia J without the share of the dish.
-
-        One motor moves this inertia above the frequency of the structure.
-        """
+        """Inertia J without the share of the dish, which one motor moves above the frequency of the structure."""
         on_gear = (1.0 - self.axis.structure.inertia_share) * self.axis.load.inertia
         return self.motor_inertia + on_gear / (2.0 * self.ratio**2)
 
@@ -195,10 +165,8 @@ class Plant:
 
 
 def receiver_noise(beamwidth: Radians, slope: float, cn0_dbhz: DecibelHertz) -> float:
-    """Return the root density of the noise of a receiver's error on the beam axis [rad/sqrt(Hz)].
-
-    slope: monopulse slope [-].
-    """
+    """Return the root density of the noise of a receiver's error on the beam axis [rad/sqrt(Hz)]. slope: monopulse
+    slope."""
     return beamwidth / (slope * math.sqrt(2.0 * 10.0**(0.1 * cn0_dbhz)))
 
 
@@ -213,10 +181,8 @@ def filter_gains(plant: Plant) -> dict[str, int]:
 
 
 def rate_slope(plant: Plant) -> RadiansPerSecond2:
-    """Return the largest slope of the rate command (`limits.acceleration`).
-
-    It is 1.3 times the acceleration of the shaper of a rigid axis.
-    """
+    """Return the largest slope of the rate command (`limits.acceleration`): 1.3 times the acceleration of the shaper
+    of a rigid axis."""
     return 1.3 * TORQUE_SHARE * plant.acceleration
 
 
@@ -262,20 +228,14 @@ def _allowed(key: str, value: float) -> float:
     return min(max(value, allowed['low']), allowed['high'])
 
 
-def _rounded(gains: Mapping[str, Json]) -> dict[str, Json]:
-    return {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in gains.items()}
-
-
 def smallest(every: Sequence[Margins]) -> Margins:
     """Return the smallest value of each metric in several results; NaN if none has the metric."""
     return {key: (np.fmin.reduce([margins[key][0] for margins in every]), unit) for key, (_, unit) in every[0].items()}
 
 
 def meets_margins(margins: Margins, required: LoopRequirements) -> bool:
-    """Return True if the margins of a loop meet the requirements.
-
-    A gain margin outside the measured band (NaN) meets its requirement. A loop whose gain is never above 1 has no
-    phase margin (NaN), and does not meet its requirement.
+    """Return True if the margins of a loop meet the requirements. A gain margin outside the measured band (NaN) meets
+    its requirement. A loop whose gain is never above 1 has no phase margin (NaN), and does not meet its requirement.
     """
     phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
     return phase >= required.phase_margin and not gain < required.gain_margin
@@ -290,21 +250,14 @@ class LoopRow(NamedTuple):
 
 
 class Loops:
-    """The loops of a scenario during their design.
+    """The loops of a scenario during their design: the plants {axis: Plant}, and the present gains, such as
+    {'adu.azimuth.speed_loop.proportional': value}. Raises ValueError for a drive without motors."""
 
-    source      name or path of the scenario
-    overrides   texts 'node.key=value' of changed parameters
-    plants      {axis: its plant}
-    gains       present gains, such as {'adu.azimuth.speed_loop.proportional': value}
-
-    Raises LoopError for a drive without motors.
-    """
-
-    def __init__(self, source: str, overrides: Iterable[str] = ()) -> None:
-        chosen = scenario.load(source, overrides)
+    def __init__(self, variant: Variant) -> None:
+        chosen = variant.load()
         if chosen.header.beam:
-            raise LoopError(f'scenario {chosen.name}: an electronic beam has no loops to tune')
-        self.source, self.overrides, self.name = source, tuple(overrides), chosen.name
+            raise ValueError(f'scenario {chosen.name}: an electronic beam has no loops to tune')
+        self.variant, self.name = variant, chosen.name
         drive = chosen.node_parameters('adu')
         known = chosen.node_parameters('tracking_receiver')
         noise = receiver_noise(known.antenna.beamwidth, known.antenna.slope, known.receiver.cn0_dbhz)
@@ -315,7 +268,8 @@ class Loops:
 
     def set(self, node: str, name: str, gains: Mapping[str, Json]) -> None:
         """Set gains {key: value} of a node for the axis `name`, rounded to four digits."""
-        self.gains |= {f'{node}.{name}.{key}': value for key, value in _rounded(gains).items()}
+        self.gains |= {f'{node}.{name}.{key}': float(f'{value:.4g}') if isinstance(value, float) else value
+                       for key, value in gains.items()}
 
     def designed(self, loop: str, name: str) -> RadiansPerSecond:
         """Return the crossover for which the gains of a loop, speed or position, were designed."""
@@ -323,34 +277,28 @@ class Loops:
             return self.gains[f'acu.{name}.feedforward.bandwidth']
         return self.gains[f'adu.{name}.speed_loop.proportional'] / self.plants[name].gear_inertia
 
-    def _case(self, corner: tuple[float, float] = (1.0, 1.0)) -> Case:
-        """Return the case of a measurement; corner: factors for axes with a structure, see PLANT_CORNERS."""
-        given = dict(text.split('=', 1) for text in self.overrides)
+    def _measured(self, corner: tuple[float, float] = (1.0, 1.0)) -> Variant:
         changed: dict[str, float] = {}
         for name, plant in self.plants.items():
             if plant.mode and corner != (1.0, 1.0):
                 changed |= {f'adu.{name}.load.inertia': _allowed('load.inertia', corner[0] * plant.axis.load.inertia),
                             f'adu.{name}.structure.frequency': _allowed('structure.frequency', corner[1] * plant.mode)}
-        return frequency.case(self.name, self.source, {**given, **self.gains, **changed, **STILL_AIR_PARAMETERS})
+        return frequency.moving(self.variant).with_({**self.gains, **changed, **STILL_AIR_PARAMETERS})
 
     def _sweep(self, axis: AxisParameters, sweep: frequency.Sweep, period: Seconds) -> frequency.Sweep:
-        """Return a sweep with limited peak and frequency; period: sampling period of the loop.
-
-        To keep the teeth in contact, the torque of the sweep stays below half of the bias torque. The highest
-        frequency stays below half of the sampling rate.
-        """
+        """Return a sweep with limited peak and frequency; period: sampling period of the loop. To keep the teeth in
+        contact, the torque of the sweep stays below half of the bias torque. The highest frequency stays below half of
+        the sampling rate."""
         peak = 0.5 * axis.bias.torque / max(axis.speed_loop.proportional * axis.gear_train.ratio, 1e-9)
         return dataclasses.replace(sweep, peak=min(sweep.peak, peak or sweep.peak),
                                    highest=min(sweep.highest, 0.475 / period))
 
     def response(self, loop: str, name: str, corner: tuple[float, float] = (1.0, 1.0)) -> frequency.Response | None:
-        """Return the response of a loop of the axis `name` with the present gains, None if the drive trips.
-
-        loop: 'current', 'speed' or 'position'; corner: factors of the plant, see PLANT_CORNERS. For the current loop
-        it is the response of the motor with the smaller phase margin.
-        """
-        case = self._case(corner)
-        drive = case.loaded().node_parameters('adu')
+        """Return the response of a loop (current, speed, position) of the axis `name` with the present gains, None if
+        the drive trips. corner: factors of the plant, see PLANT_CORNERS. For the current loop it is the response of
+        the motor with the smaller phase margin."""
+        variant = self._measured(corner)
+        drive = variant.load().node_parameters('adu')
         axis = getattr(drive, name)
         if loop == 'current':
             # frequency.current measures the azimuth, so this axis takes its place, with the travel of the azimuth.
@@ -362,7 +310,7 @@ class Loops:
             sweep = frequency.FLEXIBLE_SPEED_SWEEP if self.plants[name].mode else frequency.SPEED_SWEEP
             return frequency.speed(drive, self._sweep(axis, sweep, SPEED_LOOP_PERIOD_S), (name,))[f'speed/{name}']
         sweep = self._sweep(axis, frequency.POSITION_SWEEP, drive.period)
-        found = frequency.position(case, (name,), sweep)[f'position/{name}/{self.name}']
+        found = frequency.position(variant, (name,), sweep)[f'position/{name}']
         # A tripped drive returns no signal.
         return found if np.isfinite(found.open_loop).all() and found.open_loop.all() else None
 
@@ -371,40 +319,40 @@ class Loops:
         found = self.response(loop, name, corner)
         return frequency.margins(found) if found is not None else None
 
+    def _with_every_plant(self, loop: str, name: str, required: LoopRequirements) -> tuple[list[Margins], str]:
+        """Return (margins with the plant and, for a structure, with all PLANT_CORNERS; text on the first of them that
+        miss the requirements, '' for none)."""
+        every: list[Margins] = []
+        for corner in ((1.0, 1.0), *(PLANT_CORNERS if self.plants[name].mode else ())):
+            margins = self.measured(loop, name, corner)
+            if margins is None:
+                return every, 'the drive trips'
+            if not meets_margins(margins, required):
+                phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
+                return every, f'it has {phase:.3g} deg and {gain:.3g} dB'
+            every.append(margins)
+        return every, ''
+
     def close(self, loop: str, name: str, required: LoopRequirements, set_to: Callable[[RadiansPerSecond], None],
               fastest: RadiansPerSecond) -> tuple[RadiansPerSecond, list[tuple[str, Margins]]]:
-        """Return (w, rows) of the fastest loop that meets the requirements; w: its crossover.
-
-        loop: 'speed' or 'position'; name: axis; set_to: function that sets the gains for a crossover; fastest: first
-        tried crossover.
-        rows: names of the loop and their margins. If a structure is declared, a second row has the smallest margins in
-        all PLANT_CORNERS. Raises LoopError if no tried loop meets the requirements.
-        """
+        """Return (crossover, rows) of the fastest loop, speed or position, that meets the requirements. set_to sets
+        the gains for a crossover; fastest: first tried crossover. A row is the name of the loop and its margins. For a
+        structure, a second row has the smallest margins in all PLANT_CORNERS. Raises ValueError if no tried loop meets
+        the requirements."""
         for w in fastest * SLOWDOWN_FACTOR**np.arange(MAX_SLOWDOWNS):
             set_to(w)
-            every: list[Margins] = []
-            for corner in ((1.0, 1.0), *(PLANT_CORNERS if self.plants[name].mode else ())):
-                margins = self.measured(loop, name, corner)
-                if not (margins and meets_margins(margins, required)):
-                    break
-                every.append(margins)
-            else:
-                return w, [(loop, every[0]), (f'{loop}{WORST_SUFFIX}', smallest(every))][:1 + (len(every) > 1)]
-        found = 'the drive trips'
-        if margins:
-            phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
-            found = f'it has {phase:.3g} deg and {gain:.3g} dB'
-        raise LoopError(f'{self.name}, {name}: the {loop} loop cannot be closed with {required.phase_margin:g} deg '
-                        f'and {required.gain_margin:g} dB: at {w / (2.0 * math.pi):.3g} Hz {found}')
+            every, missed = self._with_every_plant(loop, name, required)
+            if not missed:
+                worst = [(f'{loop}{WORST_SUFFIX}', smallest(every))] if len(every) > 1 else []
+                return w, [(loop, every[0]), *worst]
+        raise ValueError(f'{self.name}, {name}: the {loop} loop cannot be closed with {required.phase_margin:g} deg '
+                         f'and {required.gain_margin:g} dB: at {w / (2.0 * math.pi):.3g} Hz {missed}')
 
 
 def design(loops: Loops, axes: Sequence[str], required: LoopRequirements,
            progress: Callable[[float, str], object]) -> list[LoopRow]:
-    """Design the loops of some axes for the requirements; the gains are then in the loops.
-
-    Return the rows of the table. progress(share of the work that is done, text) is called for each loop. Raises
-    LoopError.
-    """
+    """Design the loops of some axes, whose gains are then in `loops`, and return the rows of the table. Raises
+    ValueError."""
     speed_hz = required.speed or CROSSOVER_RATIO * (required.position or DEFAULT_SPEED_CROSSOVER_HZ / CROSSOVER_RATIO)
     wanted_s = 2.0 * math.pi * speed_hz
     rows, reached = [], {}
@@ -439,16 +387,8 @@ def design(loops: Loops, axes: Sequence[str], required: LoopRequirements,
     return rows
 
 
-def refuse_outside(loops: Loops) -> None:
-    """Raise ScenarioError if a gain is outside its range."""
-    scenario.load(loops.source, [*loops.overrides, *(files.override(*gain) for gain in loops.gains.items())])
-
-
 def table(rows: Iterable[LoopRow], required: LoopRequirements) -> list[str]:
-    """Return the table of the loops as lines of text, with measured and required values.
-
-    rows: as of `design`.
-    """
+    """Return the table of the loops as lines of text, with measured and required values."""
     cells = []
     for loop, name, wanted, margins in rows:
         values = {key: value for key, (value, _) in margins.items()}
@@ -497,23 +437,19 @@ class LoopOptions:
 
 
 def main(options: LoopOptions, required: LoopRequirements, progress: Callable[[float, str], object]) -> list[str]:
-    """Design the loops, write the parameter file and return the lines to print.
-
-    progress: function, see `design`. Raises LoopError.
-    """
+    """Design the loops, write the parameter file and return the lines to print. Raises ValueError."""
     axes = AXES if options.axis == 'both' else (options.axis,)
-    loops = Loops(options.source, options.param)
+    loops = Loops(Variant(options.source, tuple(options.param)))
     file = options.output or pathlib.Path(f'{loops.name}-loops.yaml')
     if file.exists() or not file.parent.is_dir():
-        raise LoopError(f'--output {file}: must be a new file in a directory that exists')
+        raise ValueError(f'--output {file}: must be a new file in a directory that exists')
     rows = design(loops, axes, required, progress)
     loops.gains = {key: value for key, value in loops.gains.items() if key.split('.')[1] in axes}
-    refuse_outside(loops)
+    loops.variant.with_(loops.gains).load()     # raises ScenarioError for a gain outside its range
     lines = [*table(rows, required), *remarks(loops, rows)]
     made = parameter_file.origin(options.command, configuration.git_revision() or 'unknown')
     sections = {node: {key.removeprefix(f'{node}.'): value for key, value in loops.gains.items()
                        if key.startswith(f'{node}.')} for node in ('adu', 'acu')}
     parameter_file.write_new(file, sections, [*made, *lines])
-    following = shlex.join(('pedestal', 'run', options.source, '--params-file', str(file)))
     return [*lines, '', *(f'{name:44} {value}' for name, value in loops.gains.items()),
-            f'written: {file}  ({following})']
+            f'written: {file}  ({Variant(options.source, files=(file,)).command()})']

@@ -1,11 +1,7 @@
-"""Search for the parameters of a filter that minimise a criterion, for `pedestal tune --filter` and the studies.
-
-The criterion is the rms angle error of a study, or the negative log-likelihood of the innovations of a recording. The
-search works on the logarithms of the parameters of the filter kind. One or two parameters are first searched on their
-grids. The simplex method of Nelder and Mead then starts from the best point of the grid. With more than two parameters
-it starts from the given parameters. The simplex ends when its parameters agree within 2 %. The result must be
-validated on other seeds, or on another part of the recording.
-"""
+"""Search for the parameters of a filter that minimise a criterion, for `pedestal tune --filter` and the studies. The
+search works on the logarithms of the parameters. One or two parameters are first searched on their grids. The simplex
+method of Nelder and Mead then starts from the best point of the grid, with more than two parameters from the given
+parameters. The result must be validated on other seeds, or on another part of the recording."""
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -33,21 +29,15 @@ def names(params: FilterParameters) -> tuple[str, ...]:
 
 
 def _of_kind(kind: str) -> tuple[str, ...]:
-    """Return the names of the parameters of a filter kind that have a grid for the search."""
     return tuple(name for name, field in parameters.flatten(FilterParameters)
                  if name.startswith(f'{kind}.') and field.metadata.get('grid'))
 
 
 def tuned(params: _Params, criterion: Callable[[_Params], float],
           searched: Iterable[str] | None = None) -> tuple[_Params, float]:
-    """Return (best parameters, their criterion) of a search.
-
-    params      FilterParameters or UkfParameters from which the search starts
-    criterion   returns the value to minimise, infinite or NaN without a value
-    searched    names of the searched parameters, None for those of `names`
-
-    Raises ValueError if no parameters give a finite criterion.
-    """
+    """Return (best parameters, their criterion) of a search from given FilterParameters or UkfParameters. The
+    criterion is infinite or NaN without a value. searched: names of the searched parameters, None for those of
+    `names`. Raises ValueError if no parameters give a finite criterion."""
     if searched is None:
         assert isinstance(params, FilterParameters)
         searched = names(params)

@@ -1,20 +1,15 @@
-"""`pedestal tune`: tune the parameters of the target filter or the gains of the feed-forward of the control unit.
-
-The source is a recording or a scenario:
+"""`pedestal tune`: tune the parameters of the target filter or the gains of the feed-forward of the control unit. The
+source is a recording or a scenario:
 
 filter, from a recording   The unit of the control unit receives the recorded inputs again, as in `pedestal recompute`,
                            with changed parameters. The search maximises the mean log-density log N(nu; 0, S) of the
                            innovations nu of the angle, whose variance by the filter is S. This criterion prefers small
                            innovations and a correct S. To limit the weight of outliers, the log-density falls linearly
-                           beyond HUBER_LIMIT_SIGMAS. Every second piece of the recording, PIECE_LENGTH_S long, is
-                           reserved to validate the result.
+                           beyond HUBER_LIMIT_SIGMAS. Every second piece of the recording is reserved for validation.
 filter, from a scenario    The closed loop runs with given seeds. The search minimises the rms of the true pointing
-                           error of the axis (cross-elevation, elevation) in settled autotrack. A run with another seed
-                           validates the result.
+                           error of the axis in settled autotrack. A run with another seed validates the result.
 feed-forward               The rate loop of the drive is identified (identification.py), which gives the gains k_v of
                            the rate and k_a of the acceleration. The closed loop validates the gains.
-
-The search is that of parameter_search.py. The result is a ROS 2 parameter file for nodes and for `pedestal run`.
 """
 import dataclasses
 import math
@@ -31,8 +26,8 @@ from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
 from acu_tracker.unit_law import RANGE_TOPIC
 from pedestal_bringup.loop import closed_loop
-from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.scenario import Scenario
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common import parameters
 from pedestal_common.graph import layouts, topics
 from pedestal_common.graph.steps import NS_PER_SECOND
@@ -53,13 +48,8 @@ CONVERGENCE_TIME_S, PIECE_LENGTH_S = 1.0, 0.5
 AXES = topics.AXES  # names of the axes
 DEFAULT_SEED_COUNT = 2  # default number of seeds with which a scenario runs for each tried set of parameters
 ESTIMATE_ERRORS = ('estimate_error_cross_elevation_rms_deg', 'estimate_error_elevation_rms_deg')
-"""Results that the table states for a recording."""
 TUNED_UKF_PARAMETERS = ('cv_noise', 'ca_noise', 'dwell')
 """Tuned parameters of tracker.ukf. The other parameters of tracker.ukf have an effect only at the start."""
-
-
-class TuneError(ValueError):
-    """Error of options or data that do not allow tuning. Its text is one line."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,10 +81,8 @@ class Score:
 
 
 def log_density(innovation: Pairs, sigma: Pairs) -> Pairs:
-    """Return the log-density log N(nu; 0, sigma^2) of innovations nu, without its constant.
-
-    sigma: standard deviations of the innovations. Beyond HUBER_LIMIT_SIGMAS the log-density is linear (Huber 1964).
-    """
+    """Return the log-density log N(nu; 0, sigma^2) of innovations nu, without its constant. Beyond HUBER_LIMIT_SIGMAS
+    it is linear (Huber 1964)."""
     z = np.abs(innovation / sigma)
     return -np.where(z <= HUBER_LIMIT_SIGMAS, 0.5 * z * z, HUBER_LIMIT_SIGMAS
                      * (z - 0.5 * HUBER_LIMIT_SIGMAS)) - np.log(sigma)
@@ -108,15 +96,12 @@ def _mean(values: Pairs) -> Pair:
 
 class RecordedSource:
     """A recording as the source of the tuning. The criterion is the negative mean log-density of the innovations.
+    Raises ValueError for too few receiver errors.
 
-    params      parameters of the recorded control unit
-    searched    mask (n,) of the steps in the pieces for the search
-    reserved    mask (n,) of the steps in the pieces for the validation
+    searched, reserved     masks (n,) of the steps in the pieces for the search, for the validation
     ranged      True if the recording has a measured range
     of_beams    True for an array with several beams. Its control units are the nodes `beam_1/acu` and so on. A
                 parameter file for `acu` then serves `pedestal run`, but not `ros2 run`.
-
-    Raises TuneError for too few receiver errors.
     """
 
     criterion_name, unit, kept = 'negative log-likelihood of an error', '', 'on the reserved pieces'
@@ -135,24 +120,20 @@ class RecordedSource:
         t = self.feed.stamps / NS_PER_SECOND
         compared = np.isfinite(self._innovations(done.steps)[0]).all(axis=1)
         if not compared.any():
-            raise TuneError(f'{path}: no receiver error to compare the filter with')
+            raise ValueError(f'{path}: no receiver error to compare the filter with')
         counted = compared & (t >= t[compared][0] + CONVERGENCE_TIME_S)
         even = np.floor(t / PIECE_LENGTH_S).astype(int) % 2 == 0
         # Every second piece is for the search, the others are reserved for the validation.
         self.searched, self.reserved = counted & even, counted & ~even
         if not (self.searched.any() and self.reserved.any()):
-            raise TuneError(f'{path}: receiver errors span {np.ptp(t[compared]):.3g} s; must be at least '
-                            f'{CONVERGENCE_TIME_S + 2.0 * PIECE_LENGTH_S:g} s')
+            raise ValueError(f'{path}: receiver errors span {np.ptp(t[compared]):.3g} s; must be at least '
+                             f'{CONVERGENCE_TIME_S + 2.0 * PIECE_LENGTH_S:g} s')
 
     def _innovations(self, steps: Records) -> Floats:
-        """Return (3, n, 2): innovation [rad], its standard deviation [rad] and NIS [-] of both axes.
-
-        steps (n,): outputs of the control unit.
-        """
+        """Return (3, n, 2): innovation [rad], its standard deviation [rad] and NIS [-] of both axes, of n outputs."""
         return np.array([layouts.of_filter(steps, name) for name in ('innovation', 'innovation_sigma', 'nis')])
 
     def _run(self, params: AcuParameters) -> tuple[Unit, Records]:
-        """Return (unit of the control unit, its outputs at each step (n,))."""
         unit = recompute.unit_of(self.recording, 'acu', params)
         return unit, recompute.compute(self.recording, unit, self.feed, requests=self.requests)[0]
 
@@ -177,39 +158,29 @@ class RecordedSource:
 
 
 class SimulatedSource:
-    """A scenario as the source of the tuning. The criterion is the rms pointing error [deg] in the closed loop.
-
-    The criterion counts the steps in settled autotrack, or with any_mode in any mode except standby. The fields
-    params, ranged and of_beams are as in RecordedSource. Raises TuneError if the run is never in such a mode.
-    """
+    """A scenario as the source of the tuning. The criterion is the rms pointing error [deg] in the closed loop, in
+    settled autotrack, or with any_mode in any mode except standby. The fields params, ranged and of_beams are as in
+    RecordedSource. Raises ValueError if the run is never in such a mode."""
 
     criterion_name, unit, kept = 'pointing error rms', 'deg', 'on the reserved seed'
 
-    def __init__(self, load: Callable[[int | None], Scenario], seed: int | None, runs: int, any_mode: bool) -> None:
-        """Load the scenarios, one for each seed.
-
-        load       function of the seed
-        seed       first seed, None for that of the scenario
-        runs       number of seeds for the search; the next seed validates
-        any_mode   True for all modes except standby
-        """
-        chosen = load(seed)
+    def __init__(self, variant: Variant, runs: int, any_mode: bool) -> None:
+        """Load the scenarios, one for each seed from that of the variant on; the seed after `runs` seeds validates."""
+        chosen = variant.load()
         self.any_mode = any_mode
         self.of_beams = chosen.prefixes != ('',)
         self.params = chosen.node_parameters('acu')
         self.ranged = chosen.node_parameters('tracking_receiver').receiver.ranging.measured
         first = chosen.header.seed
         self.seeds, self.kept_seeds = range(first, first + runs), (first + runs,)
-        self._scenarios = {seed: load(seed) for seed in (*self.seeds, *self.kept_seeds)}
+        self._scenarios = {seed: variant.with_(seed=seed).load() for seed in (*self.seeds, *self.kept_seeds)}
         if not np.isfinite(self.criterion(self.params)).all():
             mode = 'out of standby' if any_mode else 'in autotrack'
-            raise TuneError(f'scenario {chosen.name}: never {mode} for more than {HANDOVER_SETTLING_S:g} s')
+            raise ValueError(f'scenario {chosen.name}: never {mode} for more than {HANDOVER_SETTLING_S:g} s')
 
     def runs(self, params: AcuParameters, seeds: Iterable[int]) -> tuple[Records, Records]:
-        """Return (steps, truth) of the settled parts of the runs with these parameters and seeds.
-
-        They are records of closed_loop.STEP and of closed_loop.TRUTH, of all runs one after the other.
-        """
+        """Return (steps, truth) of the settled parts of the runs with these parameters and seeds, all runs one after
+        the other: records of closed_loop.STEP and closed_loop.TRUTH."""
         parts = []
         for seed in seeds:
             run = closed_loop.Loop(self._scenarios[seed], changed={'acu': params}).run()
@@ -246,11 +217,8 @@ def _with_filter(params: AcuParameters, axis: str, changed: FilterParameters) ->
 
 def filters(source: Source, kind: str, axes: Sequence[str],
             progress: Callable[[float, str], object]) -> tuple[AcuParameters, dict[str, Json]]:
-    """Return (parameters with the tuned filter, {name: value} of the tuned parameters).
-
-    kind: kind of the filter; axes: names of the tuned axes; progress: progress(share of the work that is done, text).
-    Raises TuneError.
-    """
+    """Return (parameters with the tuned filter, {name: value} of the tuned parameters). progress(share of the work
+    that is done, text). Raises ValueError."""
     count = 0
 
     def counted(criterion: float, part: int) -> float:
@@ -266,8 +234,8 @@ def filters(source: Source, kind: str, axes: Sequence[str],
     settings = {f'{axis}.filter.kind': kind for axis in axes}
     if kind == 'imm_ukf':
         if not source.ranged:
-            raise TuneError('--filter imm_ukf: needs a measured range (tracking_receiver.receiver.ranging.measured); '
-                            'without range the filter equals imm')
+            raise ValueError('--filter imm_ukf: needs a measured range (tracking_receiver.receiver.ranging.measured); '
+                             'without range the filter equals imm')
         rows = [AXES.index(axis) for axis in axes]
 
         def with_ukf(ukf: UkfParameters) -> AcuParameters:
@@ -296,17 +264,13 @@ def filters(source: Source, kind: str, axes: Sequence[str],
 
 
 def _rounded(params: _Params, names: Iterable[str]) -> _Params:
-    """Return parameters, in which those of some names are rounded to four digits."""
     values = parameters.as_dict(params)
     return parameters.build(type(params), {**values, **{name: float(f'{values[name]:.4g}') for name in names}})
 
 
 def feedforward(chosen: Scenario, source: Source, axes: Iterable[str],
                 progress: Callable[[float, str], object]) -> tuple[AcuParameters, dict[str, float]]:
-    """Return (parameters with identified feed-forward gains, {name: value} of the gains).
-
-    chosen: scenario whose drive is identified; axes: names of the tuned axes.
-    """
+    """Return (parameters with identified feed-forward gains, {name: value} of the gains)."""
     progress(0.1, 'identifying the rate loop')
     loops, params = identification.identify(chosen), source.params
     settings: dict[str, float] = {}
@@ -321,25 +285,24 @@ def feedforward(chosen: Scenario, source: Source, axes: Iterable[str],
 
 
 def main(options: TuneOptions, progress: Callable[[float, str], object]) -> list[str]:
-    """Tune, write the parameter file and return the lines to print. Raises TuneError."""
+    """Tune, write the parameter file and return the lines to print. Raises ValueError."""
     is_bag = pathlib.Path(options.source).is_dir() or options.source.endswith('.mcap')
     axes = AXES if options.axis == 'both' else (options.axis,)
     target = options.filter or 'feedforward'
     file = options.output or pathlib.Path(f'{pathlib.Path(options.source).stem}-{target}.yaml')
     _check(options, is_bag, file)
     source: Source
+    variant = Variant(options.source, tuple(options.param), seed=options.seed, duration=options.duration)
     progress(0.0, 'reading' if is_bag else 'compiling the laws (first time only)')
     if is_bag:
         source = RecordedSource(pathlib.Path(options.source))
     else:
-        def load(seed: int | None) -> Scenario:
-            return scenario.load(options.source, options.param, seed, options.duration)
-        source = SimulatedSource(load, options.seed, options.runs or DEFAULT_SEED_COUNT, options.feedforward)
+        source = SimulatedSource(variant, options.runs or DEFAULT_SEED_COUNT, options.feedforward)
     if options.filter is None:
-        params, settings = feedforward(load(options.seed), source, axes, progress)
+        params, settings = feedforward(variant.load(), source, axes, progress)
     else:
         params, settings = filters(source, options.filter, axes, progress)
-    whole = 0.0 if is_bag else scenario.load(options.source, options.param).header.duration
+    whole = 0.0 if is_bag else dataclasses.replace(variant, duration=None).load().header.duration
     progress(0.98, 'validating')
     old, new = source.score(source.params), source.score(params)
     lines = [*_table(source, old, new, axes), *_remarks(source, old, new, axes, settings)]
@@ -356,24 +319,22 @@ def main(options: TuneOptions, progress: Callable[[float, str], object]) -> list
 
 
 def _check(options: TuneOptions, is_bag: bool, file: pathlib.Path) -> None:
-    """Raise TuneError for options that do not fit together, or for an existing file."""
     if options.filter is not None and options.filter not in FILTER_KINDS:
-        raise TuneError(f'--filter {options.filter}: must be one of {", ".join(FILTER_KINDS)}')
+        raise ValueError(f'--filter {options.filter}: must be one of {", ".join(FILTER_KINDS)}')
     if is_bag and options.feedforward:
-        raise TuneError('--feedforward: identifies the drive of a scenario; use a scenario instead of a recording')
+        raise ValueError('--feedforward: identifies the drive of a scenario; use a scenario instead of a recording')
     for name in ('seed', 'runs', 'duration', 'param'):
         if is_bag and getattr(options, name) not in (None, []):
-            raise TuneError(f'--{name} {getattr(options, name)}: is for a scenario; a recording cannot be changed')
+            raise ValueError(f'--{name} {getattr(options, name)}: is for a scenario; a recording cannot be changed')
     if options.runs is not None and options.runs < 1:
-        raise TuneError(f'--runs {options.runs}: must be at least 1')
+        raise ValueError(f'--runs {options.runs}: must be at least 1')
     if file.exists():
-        raise TuneError(f'--output {file} exists already; the file is not overwritten')
+        raise ValueError(f'--output {file} exists already; the file is not overwritten')
     if not file.parent.is_dir():
-        raise TuneError(f'--output {file}: must be a file in a directory that exists')
+        raise ValueError(f'--output {file}: must be a file in a directory that exists')
 
 
 def _table(source: Source, old: Score, new: Score, axes: Collection[str]) -> list[str]:
-    """Return lines that compare the old with the new score."""
     rows = []
     for i, axis in enumerate(AXES):
         if axis in axes:
@@ -386,7 +347,6 @@ def _table(source: Source, old: Score, new: Score, axes: Collection[str]) -> lis
 
 
 def _remarks(source: Source, old: Score, new: Score, axes: Iterable[str], settings: Mapping[str, Json]) -> list[str]:
-    """Return lines with reasons to doubt the result."""
     doubts = []
     for axis in axes:
         i = AXES.index(axis)

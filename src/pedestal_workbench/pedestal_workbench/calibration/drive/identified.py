@@ -5,7 +5,6 @@ The twin with these values must reproduce the torques of the recording.
 import dataclasses
 import math
 import pathlib
-import shlex
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import ClassVar
 
@@ -17,6 +16,7 @@ from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import files
 from pedestal_bringup.scenario import scenario as scenarios
 from pedestal_bringup.scenario.scenario import Scenario
+from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import as_dict, build, defaults
 from pedestal_common.quantities import Json, Pairs, Row
@@ -258,7 +258,7 @@ def plan_parameters(chosen: Scenario) -> tuple[motions.MotionPlan, dict[str, dic
 def write_plan(chosen: Scenario, given: str, path: pathlib.Path) -> list[str]:
     """Write the motions for the antenna of a scenario to a new parameter file. Return lines for the user. given: name
     or path of the scenario, as the user gave it."""
-    run = shlex.join(('pedestal', 'run', given, '--params-file', str(path)))
+    run = Variant(given, files=(path,)).command()
     plan, sections = plan_parameters(chosen)
     stated = [f'motions of {motions.time_text(plan.duration)} for the antenna of {chosen.name}, within', *plan.limits]
     parameter_file.write_new(path, sections, stated)

@@ -1,0 +1,141 @@
+"""Data sheet of an antenna, whose fields are the options of `pedestal new`, and the refusal of a data sheet whose
+values contradict each other.
+
+The refusal names options, each with the range in which the antenna can be made. Because each range depends on the
+other values of the data sheet, each range is searched. An option takes values of equal ratios up to the ends of its
+own range. The edges between refused and accepted values are bisected.
+"""
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from pedestal_common.graph.topics import AXES
+from pedestal_common.parameters import ParameterError, Parameters, choice, flatten, option_of, parameter
+from pedestal_common.quantities import Hertz, Json, Radians
+
+LIGHT_SPEED_M_GHZ = 0.299792458  # speed of light [m GHz]
+MIN_MODE_HZ, MAX_MODE_HZ = 1.0, 200.0  # smallest and largest structural frequency that the simulated plant allows [Hz]
+
+TEMPLATE_SCENARIOS = ('leo_pass', 'geo_station', 'uav_flyby', 'ship_pass', 'ship_uav')
+
+GRID_COUNT, BISECTIONS, MAX_OPTIONS = 8, 10, 3
+"""Number of tried values on each side of the refused value; number of bisections of an edge; largest number of options
+in the refusal."""
+
+NO_CAUSE = ('encoder_bits', 'cn0', 'lash')  # fields of the data sheet that contradict no other field
+
+
+@dataclasses.dataclass(frozen=True)
+class DataSheet(Parameters):
+    """Data sheet of an antenna. Both motors of an axis have equal data."""
+    mirror: float = parameter(3.0, 0.1, 40.0, 'm', 'diameter of the mirror')
+    frequency: float = parameter(2.3, 0.1, 100.0, 'GHz', 'frequency of the received signal')
+    cn0: float = parameter(0.0, 0.0, 120.0, 'dB-Hz', 'C/N0 on the beam axis at the reference range of the scenario; '
+                           '0: computed from that of the scenario for the area of the mirror')
+    beamwidth: float = parameter(0.0, 0.0, 20.0, 'deg',
+                                 'half-power beamwidth; 0: computed as 70 deg times wavelength divided by diameter')
+    inertia_azimuth: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'inertia of the load about the azimuth axis')
+    inertia_elevation: float = parameter(150.0, 0.1, 1e7, 'kg m2', 'inertia of the load about the elevation axis')
+    ratio_azimuth: float = parameter(64.0, 8.0, 1e5, '', 'gear ratio from motor to azimuth axis')
+    ratio_elevation: float = parameter(90.0, 8.0, 1e5, '', 'gear ratio from motor to elevation axis')
+    motor_torque: float = parameter(30.0, 0.1, 1000.0, 'Nm',
+                                    'rated torque of one motor; the peak torque is set to three times this torque')
+    motor_speed: float = parameter(1500.0, 100.0, 10000.0, 'rpm', 'rated speed of a motor')
+    lash: float = parameter(1.0, 0.0, 50.0, 'mrad', 'lash of one gear mesh, referred to the load axis')
+    rate_azimuth: float = parameter(140.0, 0.6, 1000.0, 'deg/s', 'largest rate of azimuth')
+    rate_elevation: float = parameter(97.0, 0.6, 1000.0, 'deg/s', 'largest rate of elevation')
+    mode: float = parameter(0.0, 0.0, MAX_MODE_HZ, 'Hz', 'lowest structural frequency with locked motors, 1 to 200; '
+                            '0: computed as 20 Hz times the diameter in m to the power -0.7')
+    mode_share: float = parameter(0.5, 0.0, 0.9, '', 'share of the load inertia that swings with the lowest '
+                                  'structural frequency; 0: rigid structure')
+    encoder_bits: int = parameter(22, 8, 32, 'bit', 'resolution of the load encoders, per turn')
+    like: str = choice('leo_pass', TEMPLATE_SCENARIOS, 'scenario that provides target and site')
+
+    def __post_init__(self) -> None:
+        if self.mode != 0.0 and not MIN_MODE_HZ <= self.mode <= MAX_MODE_HZ:
+            raise ParameterError(f'mode = {self.mode:g} Hz: must be {MIN_MODE_HZ:g} to {MAX_MODE_HZ:g}, or 0 for the '
+                                 'average of antennas of this diameter')
+        super().__post_init__()
+
+    @property
+    def structural_frequency(self) -> Hertz:
+        """Lowest frequency of the structure with locked motors. Without `mode` it is the average of antennas of this
+        diameter d [m], 20 Hz d^-0.7. Source: W. Gawronski, Control and Pointing Challenges of Antennas and (Radio)
+        Telescopes, IPN Progress Report 42-159 (JPL, 2004), and Modeling and Control of Antennas and Telescopes
+        (Springer, 2008). Because single antennas differ from the average, a measured frequency takes precedence."""
+        return self.mode or 20.0 * self.mirror**-0.7
+
+    @property
+    def theta(self) -> Radians:
+        """Half-power beamwidth."""
+        return math.radians(self.beamwidth or 70.0 * LIGHT_SPEED_M_GHZ / self.frequency / self.mirror)
+
+
+def refusal(sheet: DataSheet, error: ValueError, make: Callable[[DataSheet], object]) -> ValueError:
+    """Return the error with options for the error of a data sheet. make(sheet) raises ValueError for a refused one."""
+    axis = _axis(error)
+
+    def is_made(name: str, value: float) -> bool:
+        """Return True if the data sheet with another value is made, or refused for another axis."""
+        try:
+            changes: dict[str, Json] = {name: value}
+            make(dataclasses.replace(sheet, **changes))
+        except ValueError as found:
+            return bool(axis and _axis(found) and _axis(found) != axis)
+        return True
+
+    fields = [(name, field) for name, field in flatten(type(sheet)) if 'low' in field.metadata
+              and name not in NO_CAUSE and getattr(sheet, name) > 0.0
+              and not (axis and name.rpartition('_')[2] in AXES and not name.endswith(axis))]
+    found: list[str] = []
+    # The options that differ from the default come first, because the user gave them.
+    for name, field in sorted(fields, key=lambda item: getattr(sheet, item[0]) == item[1].default):
+        if len(found) == MAX_OPTIONS:
+            break
+        edges = _edges(name, getattr(sheet, name), field.metadata, is_made)
+        if edges:
+            value = f'{getattr(sheet, name):g} {field.metadata["unit"]}'.rstrip()
+            found.append(f'{option_of(name)} {value}: must be {edges[0]:g} to {edges[1]:g}')
+    if not found:
+        return ValueError(f'the values of the data sheet contradict each other: {error}')
+    return ValueError(f'{", or ".join(found)}, with the other values of the data sheet ({error})')
+
+
+def _axis(error: ValueError) -> str:
+    return next((name for name in AXES if f'{name}.' in str(error) or f'adu.{name}:' in str(error)), '')
+
+
+def _edges(name: str, value: float, meta: Mapping[str, Json],
+           is_made: Callable[[str, float], bool]) -> tuple[float, float] | None:
+    """Return the lowest and highest accepted value next to a refused value of a field. meta: metadata of the field;
+    is_made(name, value) returns True for an accepted value."""
+    for end in (meta['high'], meta['low'] or 1e-4 * meta['high']):
+        refused, accepted, last = value, 0.0, 0.0   # 0: no value was accepted
+        for tried in np.geomspace(value, end, GRID_COUNT + 1)[1:].tolist() if end != value else ():
+            tried = min(max(tried, meta['low']), meta['high'])
+            if is_made(name, tried):
+                accepted, last = accepted or tried, tried
+            elif accepted:
+                last = _bisected(last, tried, lambda one: is_made(name, one))
+                break
+            else:
+                refused = tried
+        if accepted:
+            edge = _bisected(accepted, refused, lambda one: is_made(name, one))
+            low, high = sorted((edge, last))
+            return _rounded(low, math.ceil), _rounded(high, math.floor)
+    return None
+
+
+def _bisected(accepted: float, refused: float, is_made: Callable[[float], bool]) -> float:
+    for _ in range(BISECTIONS):
+        middle = math.sqrt(accepted * refused)
+        accepted, refused = (middle, refused) if is_made(middle) else (accepted, middle)
+    return accepted
+
+
+def _rounded(value: float, direction: Callable[[float], int]) -> float:
+    size = 10.0**(math.floor(math.log10(value)) - 2)
+    return float(f'{direction(value / size - 1e-9 if direction is math.ceil else value / size + 1e-9) * size:.3g}')
