@@ -1,18 +1,13 @@
 """ROS node of the antenna drive unit: owns the time, publishes the encoders, executes rate commands.
 
 The node runs the unit `adu_drive.unit.Adu`, whose law is `drive_unit.step`; change the drive there. The clock and the
-steps are in `timekeeper_node`; this file adds the state file. `entry` is imported first, so that a signal during the
-other imports ends the process without a message.
+steps are in `timekeeper_node`; this file adds the state file.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
-import sys
-
 from adu_drive import state_file
 from adu_drive.params import AduNodeParameters
 from adu_drive.timekeeper_node import Timekeeper
 from adu_drive.unit import Adu
+from pedestal_common.graph.nodes import Node
 from pedestal_common.node import shell
 from pedestal_common.node.unit import LEVEL_WARN, Diagnosis
 
@@ -23,10 +18,10 @@ class AduNode(Timekeeper):
     parameters: AduNodeParameters
     unit: Adu
 
-    def __init__(self, module: str = 'adu_drive.adu_node') -> None:
+    def __init__(self, row: Node) -> None:
         self.unsaved = ''
         self.saved: state_file.PlantState | None = None
-        super().__init__(module)
+        super().__init__(row)
 
     def prepare(self, unit: shell.Unprepared) -> None:
         """Compile the laws, then resume the plant state in the state file."""
@@ -77,12 +72,3 @@ class AduNode(Timekeeper):
         if self.unsaved and diagnosis.level < LEVEL_WARN:
             return diagnosis._replace(level=LEVEL_WARN, message=self.unsaved)
         return diagnosis
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node to its end. Return the exit code."""
-    return shell.main(AduNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

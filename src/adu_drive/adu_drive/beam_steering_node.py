@@ -2,23 +2,14 @@
 
 The node sets the time of the graph, publishes the beams that are active, and points each beam to its references. For
 each beam the node runs the unit `array.beam_unit.Beam`, whose law is `array.electronic_beam.step`; change the beam
-there. `entry` is imported first, so that a signal during the other imports ends the process without a message.
+there.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
-import sys
-
 from adu_drive.timekeeper_node import Timekeeper, unit_of
-from pedestal_common.node import shell
 from pedestal_common.node.unit import Diagnosis
 
 
 class BeamSteeringNode(Timekeeper):
     """Node with a unit for each beam and common diagnostics. A port is a unit with its topics."""
-
-    def __init__(self) -> None:
-        super().__init__('adu_drive.beam_steering_node')
 
     def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of all beams: their angles, the common state, level and message of the worst beam."""
@@ -30,12 +21,3 @@ class BeamSteeringNode(Timekeeper):
         # The message names the command topic of the worst beam.
         command = unit_of(port).COMMAND
         return Diagnosis(worst.level, worst.message.replace(command, port.named(command)), values + state)
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node to its end. Return the exit code."""
-    return shell.main(BeamSteeringNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

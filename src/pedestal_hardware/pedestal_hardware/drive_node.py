@@ -1,20 +1,15 @@
 """ROS node of an antenna with four CiA 402 servo drives: owns the time, and takes the place of `adu_node`.
 
 The node runs the unit `pedestal_hardware.unit.ServoDrives`, whose law is in `servo_drives`. A thread of the node
-commissions drives that have not been used yet or that return to the bus. `entry` is imported first, so that a signal
-during the other imports ends the process without a message.
+commissions drives that have not been used yet or that return to the bus.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
-import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from adu_drive.adu_node import AduNode
-from pedestal_common.node import shell
+from pedestal_common.graph.nodes import Node
 from pedestal_common.node.unit import Diagnosis
 from pedestal_common.quantities import Message, Nanoseconds
 from pedestal_hardware import commissioning, errors
@@ -38,7 +33,7 @@ class DriveNode(AduNode):
     parameters: ServoDriveParameters
     unit: ServoDrives
 
-    def __init__(self) -> None:
+    def __init__(self, row: Node) -> None:
         self.recommission: set[int] = set()     # drives that the thread commissions again, because of a reset
         self.changed, self.ending = threading.Event(), False
         self.bus: CanopenBus | None = None
@@ -46,7 +41,7 @@ class DriveNode(AduNode):
         self.start_time: Nanoseconds | None = None
         self.shown_errors: list[int] = []
         self.shown_problems: list[str] = []
-        super().__init__('pedestal_hardware.drive_node')
+        super().__init__(row)
 
     def begin(self) -> None:
         """Prepare the bus and the steps. The first step waits until all drives answer."""
@@ -180,12 +175,3 @@ class DriveNode(AduNode):
         if self.commissioning is not None:
             self.commissioning.join(LEAVE_TIME_S)
         super().close()
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node to its end. Return the exit code."""
-    return shell.main(DriveNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -59,8 +59,8 @@ class Child:
 
     command   interpreter, '-m', module, arguments ...
     output    file descriptor of its log
-    rehearse  function that a copy calls while it is held, to load the laws of the node. Errors of this function are
-              ignored, because the node meets the same error later and reports it.
+    rehearse  function that a copy calls while it is held, to import the node and load its laws. Errors of this
+              function are ignored, because the node meets the same error later and reports it.
     """
 
     def __init__(self, command: list[str], output: int, rehearse: Callable[[], object]) -> None:
@@ -190,10 +190,6 @@ def _as_copy(command: list[str], gate: int, rehearse: Callable[[], object]) -> i
     found = importlib.util.find_spec(module)
     assert found is not None and found.origin is not None
     sys.argv = [found.origin, *command[3:]]
-    # The module of the node first imports pedestal_common.entry, which sets the signal handlers if sys.argv[0] is a
-    # node. The parent may have imported `entry` with another sys.argv[0]. Because an import executes a module only
-    # once, `entry` is removed here, so that the next import executes it again.
-    sys.modules.pop('pedestal_common.entry', None)
     main = importlib.import_module(module).main
     with contextlib.suppress(Exception):
         rehearse()

@@ -71,7 +71,7 @@ class Operator(Shell):
         deadline = time.monotonic() + DISCOVERY_TIME_S
         while time.monotonic() < deadline:
             names = self.get_node_names()
-            if names.count(self.name) > 1 or any(node.name in names for node in nodes.NODES if node.module):
+            if names.count(self.name) > 1 or any(node.name in names for node in nodes.NODES if node.program):
                 raise domain.another_graph(self.context.get_domain_id())
             time.sleep(0.02)
 

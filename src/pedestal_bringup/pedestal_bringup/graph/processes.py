@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from pedestal_bringup.graph.child import Child
 from pedestal_common.graph import nodes
+from pedestal_common.node import run
 from pedestal_common.quantities import Json
 
 if TYPE_CHECKING:
@@ -46,16 +47,16 @@ class RunError(RuntimeError):
 
 class ServerProcess(NamedTuple):
     """Process of a server beside the nodes (operator_servers)."""
-    command: list[str]      # interpreter, '-m', module, arguments ...
+    command: list[str]      # as run.command makes it
     first_lines: int        # number of lines that the server prints for the user when it begins to serve
 
 
-def command_line(node: str, module: str, file: pathlib.Path) -> list[str]:
-    """Return the command that starts a node with a parameter file. node: its name; the node beam_2/acu starts in the
-    namespace beam_2. module: its Python module; file: path of the parameter file."""
+def command_line(node: str, executable: str, file: pathlib.Path) -> list[str]:
+    """Return the command that starts a node with a parameter file. The node beam_2/acu starts in the namespace beam_2.
+    """
     beam = nodes.beam_of(node)
-    return [sys.executable, '-m', module, '--ros-args', *(['-r', f'__ns:=/{beam}'] if beam else []),
-            '--params-file', str(file)]
+    return run.command(executable, '--ros-args', *(['-r', f'__ns:=/{beam}'] if beam else []), '--params-file',
+                       str(file))
 
 
 @contextlib.contextmanager
@@ -71,9 +72,10 @@ def uninterrupted() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _load_laws(scenario: 'Scenario', node: str) -> None:
-    """Load the laws of a node from the law cache; do nothing if the cache lacks them."""
+def _load_node(scenario: 'Scenario', node: str) -> None:
+    """Import the class of a node, and load its laws if they are in the law cache."""
     from pedestal_common.compiled import is_compiled  # imported late, because only a run needs numba
+    scenario.row(node).node_type()
     if scenario.row(node).unit:
         unit = scenario.unit(node)
         if is_compiled(unit):
@@ -189,10 +191,13 @@ class Graph:
             if node in self.servers:
                 os.fchmod(output.fileno(), SERVER_LOG_MODE)
                 self._unannounced.add(node)
-                command, rehearse = self.servers[node].command, lambda: None
+                command = self.servers[node].command
+
+                def rehearse() -> object:
+                    return nodes.EXECUTABLES[command[3]].node_type()
             else:
-                command = command_line(node, self.scenario.row(node).module, self.file)
-                rehearse = functools.partial(_load_laws, self.scenario, node)
+                command = command_line(node, self.scenario.row(node).executable, self.file)
+                rehearse = functools.partial(_load_node, self.scenario, node)
             self.processes[node] = Child(command, output.fileno(), rehearse)
         with contextlib.suppress(OSError):
             self._reaper_input.write(b'%d\n' % self.processes[node].pid)

@@ -7,7 +7,7 @@ The class UnitNode runs every unit. Subclasses add tasks that are no law: the dr
 import collections
 import dataclasses
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from rclpy.timer import Timer
@@ -130,14 +130,13 @@ class Port:
 
 
 class UnitNode(shell.Shell):
-    """Node that runs the unit of a module (nodes.Node.module)."""
+    """Node that runs the unit of its row."""
 
     PRECEDENCE = 0
     """Amount by which the scheduling priority of this node exceeds graph.priority."""
 
-    def __init__(self, module: str, serves_beams: bool = False) -> None:
-        self.row = nodes.of_executable(module)
-        unit_type = self.row.unit_type()
+    def __init__(self, row: nodes.Node, serves_beams: bool = False) -> None:
+        self.row, unit_type = row, row.unit_type()
         super().__init__(self.row.name, self.row.parameters_type(), unit_type.LIVE)
         flags = [flag for flag in topics.TOPIC_FLAGS if getattr(self.parameters, flag, False)]
         reads = nodes.reads(self.row, self.graph.members, flags)
@@ -450,8 +449,3 @@ def decoding(decoder: records.Decoder) -> Callable[[bytes], tuple[Nanoseconds, r
         message = decoded(data)
         return message[0], message
     return decode
-
-
-def main(module: str, args: Sequence[str] | None = None) -> int:
-    """Run the unit of a module and return the exit code."""
-    return shell.main(lambda: UnitNode(module), args)

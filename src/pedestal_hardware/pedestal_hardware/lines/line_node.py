@@ -15,8 +15,7 @@ class LineNode(shell.Shell):
     """Node of a device that sends lines. Its parameters have the field `silence`, the longest time between two
     published messages that is no error [s]."""
 
-    def __init__(self, module: str) -> None:
-        row = nodes.of_executable(module)
+    def __init__(self, row: nodes.Node) -> None:
         super().__init__(row.name, row.parameters_type())
         self.lock = threading.Lock()
         self.line_reader: LineReader | None = None      # None for a device that sends no lines
