@@ -155,15 +155,10 @@ class StructureParameters(Parameters):
 class FrictionParameters(Parameters):
     """LuGre friction of the load bearing."""
     coulomb: float = parameter(60.0, 0.01, 1e5, 'Nm', 'sliding friction')
-    breakaway: float = parameter(80.0, 0.01, 1e5, 'Nm', 'static friction')
+    breakaway: float = parameter(80.0, 0.01, 1e5, 'Nm', 'static friction', must_be='at least coulomb')
     stribeck_rate: float = parameter(2e-3, 1e-5, 1.0, 'rad/s', 'rate at which the static part has fallen to 1 / e')
     stiffness: float = parameter(2e5, 1.0, 1e9, 'Nm/rad', 'stiffness of the bristles')
     damping: float = parameter(400.0, 0.0, 1e6, 'Nms/rad', 'damping of the bristles')
-
-    def check(self) -> None:
-        """Raise ParameterError if static friction is below sliding friction."""
-        if self.breakaway < self.coulomb:
-            raise ParameterError(f'breakaway = {self.breakaway:g} Nm: must be at least coulomb = {self.coulomb:g}')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -172,7 +167,8 @@ class LimitParameters(Parameters):
     rate: float = parameter(2.45, 0.01, 20.0, 'rad/s', 'largest rate command')
     deceleration: float = parameter(20.0, 0.01, 500.0, 'rad/s2', 'for the controlled stop and at the end of travel')
     lower: float = parameter(math.radians(-270.0), -20.0, 20.0, 'rad', 'lower end of the commanded travel')
-    upper: float = parameter(math.radians(270.0), -20.0, 20.0, 'rad', 'upper end of the commanded travel')
+    upper: float = parameter(math.radians(270.0), -20.0, 20.0, 'rad', 'upper end of the commanded travel',
+                             must_be='above lower')
     approach: float = parameter(10.0, 0.5, 50.0, '1/s', 'ratio of rate to distance close to the end of travel')
     final: float = parameter(0.0, 0.0, 10.0, 'rad', 'distance from the end of travel to the final switch, which '
                              'removes the torque; 0: stopping distance from `rate`')
@@ -196,9 +192,7 @@ class LimitParameters(Parameters):
         return final, emergency, self.buffer or emergency + DEFAULT_BUFFER_MARGIN_RAD
 
     def check(self) -> None:
-        """Raise ParameterError for an empty travel, or a switch within the stopping distance."""
-        if self.upper <= self.lower:
-            raise ParameterError(f'upper = {self.upper:g} rad: must be above lower = {self.lower:g}')
+        """Raise ParameterError for a switch within the stopping distance."""
         final, emergency, buffer = self.switches
         if final < self.stopping_distance:
             raise ParameterError(f'final = {final:g} rad: must be at least {self.stopping_distance:.4g} rad, the '
@@ -244,13 +238,9 @@ class StowPinParameters(Parameters):
     elevation: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'elevation at which its pin meets the hole')
     window: float = parameter(1.75e-3, 1e-5, 0.1, 'rad', 'largest distance from the hole for moving a pin in')
     travel_time: float = parameter(3.0, 0.0, 600.0, 's', 'time of a pin from out to in')
-    timeout: float = parameter(10.0, 0.01, 600.0, 's', 'longest time for the motion of a pin; then the pin has failed')
+    timeout: float = parameter(10.0, 0.01, 600.0, 's', 'longest time for the motion of a pin; then the pin has failed',
+                               must_be='above travel_time')
     initially_in: bool = flag(False, 'true: both pins are in at t = 0')
-
-    def check(self) -> None:
-        """Raise ParameterError if the timeout is not above the travel time."""
-        if self.timeout <= self.travel_time:
-            raise ParameterError(f'timeout = {self.timeout:g} s: must be above travel_time = {self.travel_time:g} s')
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,19 +17,25 @@ Field: typing.TypeAlias = 'dataclasses.Field[Value]'     # one parameter of a da
 _N = typing.TypeVar('_N', bound=float)
 
 
+RELATIONS = {'below': operator.lt, 'above': operator.gt, 'at most': operator.le, 'at least': operator.ge}
+"""{words of an error: comparison of a field with another field}."""
+
+
 class ParameterError(ValueError):
     """Unknown parameter, or value outside its range; the message gives its name, its value and the allowed range."""
 
 
 def parameter(default: _N, low: float, high: float, unit: str, doc: str,
-              grid: tuple[float, float, int] | None = None) -> _N:
+              grid: tuple[float, float, int] | None = None, must_be: str = '') -> _N:
     """Declare a number (float or int, as annotated) between low and high inclusive.
+
+    must_be: relation to another field of the dataclass, such as 'below high'; one of RELATIONS and the field.
 
     grid: (lowest value, highest value, number of values) of the values at which `pedestal tune` begins its search for
     the best value. The values are spaced evenly in the logarithm. None: the parameter is not tuned.
     """
     return dataclasses.field(default=default, metadata={'low': low, 'high': high, 'unit': unit, 'doc': doc,
-                                                        'grid': grid})
+                                                        'grid': grid, 'must_be': must_be})
 
 
 def choice(default: str, options: Iterable[str], doc: str) -> str:
@@ -58,21 +64,33 @@ class Parameters:
 
     A subclass adds its checks between fields in `check`, which raises ParameterError.
     """
+    REALTIME_ONLY: typing.ClassVar[str] = ''    # reason why its node cannot run in lockstep, the end of the error
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             _check_field(field, field.name, getattr(self, field.name))
+        for field in dataclasses.fields(self):
+            if field.metadata.get('must_be'):
+                self._check_relation(field)
         self.check()
+
+    def _check_relation(self, field: Field) -> None:
+        relation, _, other = field.metadata['must_be'].rpartition(' ')
+        value, limit = getattr(self, field.name), getattr(self, other)
+        if not RELATIONS[relation](value, limit):
+            unit = f' {field.metadata["unit"]}'.rstrip()
+            raise ParameterError(f'{field.name} = {value:g}{unit}: must be {relation} {other} = {limit:g}{unit}')
 
     def check(self) -> None:
         """Check fields that limit each other; overridden where there are any."""
 
     def check_graph(self, beams: int, lockstep: bool) -> None:
-        """Raise ParameterError where parameters do not fit the graph; overridden where there are such parameters.
+        """Raise ParameterError where parameters do not fit a graph; overridden where there are such parameters.
 
-        beams: number of beams of an electronic array, 0 for a drive with motors; lockstep: True if the pacing of the
-        graph is lockstep.
+        beams: number of beams of an electronic array, 0 for a drive with motors.
         """
+        if lockstep and self.REALTIME_ONLY:
+            raise ParameterError(f'graph.pacing = lockstep: must be realtime{self.REALTIME_ONLY}')
 
 
 AnyParameters: typing.TypeAlias = typing.Any    # instance of a parameter class that the node determines
