@@ -15,7 +15,7 @@ from pedestal_common.geometry import omm, orbit
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import did_you_mean
-from pedestal_common.text_files import content, csv_table
+from pedestal_common.text_files import csv_table, files
 from pedestal_common.text_files.files import FilePath
 from tracking_receiver_sim.ephemeris import lines
 from tracking_receiver_sim.params import LeoPassParameters
@@ -68,7 +68,7 @@ def read(path: FilePath, name: str = '', when: datetime.datetime | None = None) 
     """
     try:
         with csv_table.stream(path) as stream:
-            beginning = content.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
+            beginning = files.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
         # history: sets of elements of the wanted satellite; others: number of sets of other satellites of this name.
         names, others = [], 0
         history: list[Satellite] = []
@@ -287,7 +287,7 @@ def _xml(path: FilePath) -> Iterator[Satellite]:
 
     try:
         with csv_table.stream(path) as stream:
-            parser = content.xml_parser(stream)
+            parser = files.xml_parser(stream)
             parser.buffer_text = True
             parser.StartDoctypeDeclHandler, parser.CharacterDataHandler = doctype, text
             parser.StartElementHandler, parser.EndElementHandler = start, end

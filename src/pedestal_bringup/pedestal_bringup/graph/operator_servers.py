@@ -1,8 +1,5 @@
-"""Servers that connect other programs to the antenna: rotctld, EasyComm, the operator's page, Foxglove, RViz.
-
-`pedestal run` starts the requested servers beside a realtime run. Each server is a node of its own that uses only the
-topics of the graph.
-"""
+"""Servers that connect other programs to the antenna, which `pedestal run` starts beside a realtime run. Each server
+is a node of its own that uses only the topics of the graph."""
 import contextlib
 import importlib.util
 import typing
@@ -58,8 +55,7 @@ def port(text: str) -> int:
 def check(ports: Mapping[str, int], header: ScenarioParameters, option: str = '--{} ') -> None:
     """Raise ValueError if servers are requested in lockstep, if a library is missing, or if a port is in use.
 
-    ports: {name of the server: its port, 0 without one}; option: format of an option in
-    the error, '--{} ' for the command line or '{}:=' for a launch file.
+    ports: {name: port, 0 without one}; option: format of an option in the error, such as '{}:=' for a launch file.
     """
     with contextlib.ExitStack() as probes:
         for name, number in ports.items():
@@ -77,7 +73,7 @@ def check(ports: Mapping[str, int], header: ScenarioParameters, option: str = '-
 
 
 def processes(ports: Mapping[str, int], header: ScenarioParameters) -> dict[str, ServerProcess]:
-    """Return {name: process} of servers. ports: {name: TCP port, 0 without one}. Raises ValueError, see `check`."""
+    """Return {name: process} of servers {name: TCP port, 0 without one}. Raises ValueError, see `check`."""
     check(ports, header)
     return {name: ServerProcess(
         run.command(SERVERS[name].executable, '--ros-args', '-p', f'graph.beams:={header.graph_beams}',

@@ -1,8 +1,7 @@
-"""Table of the nodes of the graph: their executables, and the topics that they read and write. The functions below the
-table return the graph that results from it.
+"""Table of the nodes of the graph: their executables, and the topics that they read and write. No ROS here.
 
 In an electronic array of several beams the nodes `of_beam` and their topics exist once per beam, with the prefix
-`beam_1/` ... `beam_N/`; all other nodes and topics are shared. No ROS here.
+`beam_1/` ... `beam_N/`; all other nodes and topics are shared.
 """
 import functools
 import importlib
@@ -229,11 +228,8 @@ beam."""
 
 
 def row(name: str, array: bool = False, servo: bool = False, iq: bool = False) -> Node:
-    """Return the Node of a name, 'beam_2/acu' as well as 'acu'.
-
-    array: True for a graph whose drive is an electronic array; servo: True for a graph with servo drives; iq: True for
-    a graph with a receiver of I/Q samples.
-    """
+    """Return the Node of a name, 'beam_2/acu' as well as 'acu', in a graph with an electronic array, with servo
+    drives, or with a receiver of I/Q samples."""
     if name in SIMULATED_PARTS:
         return SIMULATED_DRIVES if name == SIMULATED_DRIVES.name else SIMULATED_IQ
     if name == MONOPULSE_RECEIVER.name and iq:
@@ -276,11 +272,8 @@ class Link(typing.NamedTuple):
 
 @functools.cache
 def links(beams: int = 0, servo: bool = False, iq: bool = False) -> dict[str, Link]:
-    """Return {name: Link} of a graph, in the order of TOPICS.
-
-    beams: number of beams of an electronic array, 0 for a drive with motors; servo: True for a graph with simulated
-    servo drives; iq: True for a graph with simulated I/Q samples.
-    """
+    """Return {name: Link} of a graph, in the order of TOPICS. beams: of an electronic array, 0 for a drive with
+    motors; servo, iq: as in `row`, simulated."""
     rows = [row(node.name, beams > 0, servo, iq) for node in NODES] + [SIMULATED_DRIVES] * servo + [SIMULATED_IQ] * iq
     links = {}
     for topic in TOPICS:
@@ -303,8 +296,8 @@ def links_of(names: Collection[str], beams: int = 0) -> dict[str, Link]:
 
 
 def recorded(names: Collection[str], flags: Collection[str] = (), beams: int = 0) -> list[Link]:
-    """Return the Links that have a publisher in a graph of these nodes, or to which any client may publish. These are
-    recorded. flags: those of topics.TOPIC_FLAGS that are set."""
+    """Return the Links that have a publisher in a graph of these nodes, or to which any client may publish. flags:
+    those of topics.TOPIC_FLAGS that are set."""
     return [link for link in links_of(names, beams).values()
             if any(name in names for name in (link.readers if link.rate in REALTIME_RATES else link.writers))
             and (not link.flag or link.flag in flags)]
@@ -316,16 +309,13 @@ def held(names: Iterable[str]) -> frozenset[str]:
 
 
 def readers(link: Link, names: Iterable[str]) -> list[str]:
-    """Return the nodes among `names`, those of a graph, that must subscribe to a topic before the graph may start.
-
-    The recorder subscribes to every topic.
-    """
+    """Return the nodes among `names` that must subscribe to a topic before the graph may start; the recorder to every
+    topic."""
     return [name for name in names if name in link.readers or name == 'recorder']
 
 
 def reads(node: Node, names: Iterable[str], flags: Collection[str] = ()) -> tuple[str, ...]:
-    """Return the topics that a Node subscribes to in a graph of these nodes, in the order of its row, its trigger
-    first.
+    """Return the topics that a Node subscribes to in a graph of these nodes, its trigger first.
 
     A node that is not in the graph may be real equipment, so its topics are included. Excluded are the topics of an
     optional node that is not among the names, and topics whose flag is not set.
@@ -341,9 +331,6 @@ def reads(node: Node, names: Iterable[str], flags: Collection[str] = ()) -> tupl
 
 
 def noise(seed: int, node: str) -> np.random.Generator:
-    """Return the noise of a simulated node for a run's seed: a stream of its own, the same on every machine.
-
-    The stream depends on the place of the node in NODES. A node that is inserted changes the noise of all nodes
-    after it.
-    """
+    """Return the noise of a simulated node for a run's seed, the same on every machine. It depends on the place of the
+    node in NODES: a node that is inserted changes the noise of all nodes after it."""
     return np.random.default_rng((seed, NODE_NAMES.index(node)))

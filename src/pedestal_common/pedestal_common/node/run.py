@@ -1,9 +1,8 @@
-"""Process of a node. The installed executable of each node (`acu_node`) calls `main`, and so does
-`python -m pedestal_common.node.run acu_node`.
+"""Process of a node: its installed executable (`acu_node`) calls `main`, as does `python -m pedestal_common.node.run
+acu_node`.
 
-The imports of a node take half a second and more. Without the handlers of `main` a signal in that time would print a
-traceback; with them it ends the process at once, without a message. `shell.main` later sets handlers of its own.
-This module therefore imports nothing at its beginning that takes time.
+The imports of a node take half a second and more. The handlers of `main` avoid that a signal in that time prints a
+traceback. This module therefore imports nothing at its beginning that takes time.
 """
 import os
 import pathlib

@@ -4,7 +4,7 @@ import typing
 
 from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import Decibels, Nanoseconds
-from pedestal_common.stream.drops import Drops
+from pedestal_common.stream import Drops
 from pedestal_hardware.level.line_format import LineFormat
 from pedestal_hardware.level.params import LevelReceiverParameters
 

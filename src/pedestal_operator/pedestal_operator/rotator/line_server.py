@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeAlias, TypeVar
 
-from pedestal_common.stream.splitter import Overlong, Splitter
+from pedestal_common.stream import Overlong, Splitter
 from pedestal_operator import tcp_port
 
 MAX_UNREAD_BYTES = 65_536  # largest size of unread answers of a client [bytes]; further answers are dropped
