@@ -3,11 +3,9 @@ Python interpreter.
 
 A copy (os.fork without exec) already has the imports of every node: `pedestal run leo_pass --duration 1` takes 4.9 s
 with copies and 8.5 s without (medians of 7 pairs on 2 cores; 3.9 and 6.4 s of CPU). A fork copies only the thread that
-calls it, so a copy is possible only while `pedestal run` needs no other thread:
-
-- Threads of Python: threading.active_count() counts them.
-- Threads of rclpy: Its libraries start threads in C++, which a copy would lack, so no copy is made after its import.
-- Threads of OpenBLAS (numpy): OpenBLAS ends its own threads at a fork, so they need no care.
+calls it, so a copy is possible only while `pedestal run` needs no other thread. threading.active_count() counts those
+of Python. The libraries of rclpy start threads in C++, so no copy is made after the import of rclpy. OpenBLAS (numpy)
+ends its own threads at a fork.
 
 A child is held: it loads its imports and its laws, then waits for `begin`. The nodes of a run therefore load at the
 same time, and start together.
