@@ -71,8 +71,7 @@ class _Translation(JITCodeLibrary):
         return self._final_module
 
     def add_llvm_module(self, ll_module: llvmlite.binding.ModuleRef) -> None:
-        """Add an LLVM module, without numba's optimisation of each function: the whole executable is optimised later.
-        """
+        """Add an LLVM module without numba's optimisation: the whole executable is optimised later."""
         self._final_module.link_in(ll_module)
 
     def finalize(self) -> None:
@@ -263,8 +262,7 @@ class Law(CPUDispatcher):
         return law_key.digest((stands_for, law_key.of_types(args)))
 
     def is_cached(self, *values: object) -> bool:
-        """Return True if the executable for these values is in the law cache, with those of the separate laws that it
-        calls."""
+        """Return True if the executable for these values is in the law cache, with the separate laws that it calls."""
         return self._is_cached(tuple(map(self.typeof_pyval, values)))
 
     def _is_cached(self, args: Types) -> bool:
@@ -295,8 +293,7 @@ class Law(CPUDispatcher):
         return self.executable(tuple(args)).entry_point
 
     def executable(self, args: Types) -> compiler.CompileResult:
-        """Return the CompileResult of the executable. If several processes need one, one compiles it and the others
-        wait."""
+        """Return the CompileResult of the executable, which one process compiles while the others wait."""
         with global_compiler_lock:
             if args not in self.overloads:
                 path = self._file('executable', args)
@@ -398,8 +395,7 @@ class Law(CPUDispatcher):
         return compiler.CompileResult._rebuild(self.targetctx, *kept.compiled)
 
     def _link(self, args: Types) -> types.Type:
-        """Make the machine code of a separate law known to the executables that call it; return the type of its
-        result."""
+        """Make the code of a separate law known to the executables that call it; return the type of its result."""
         made = self.executable(args)
         name = made.fndesc.llvm_func_name
         llvmlite.binding.add_symbol(name, made.library.get_pointer_to_function(name))
@@ -408,8 +404,7 @@ class Law(CPUDispatcher):
 
 @contextlib.contextmanager
 def _garbage_kept() -> Iterator[None]:
-    """Switch off the garbage collector, which searches all objects of the compiler again and again, and finds little.
-    """
+    """Switch off the garbage collector, which searches all objects of the compiler and finds little."""
     enabled = gc.isenabled()
     gc.disable()
     try:

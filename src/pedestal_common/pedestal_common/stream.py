@@ -31,8 +31,7 @@ class Connection:
             self._thread.join(longest + RETRY_PERIOD_S)
 
     def serve(self) -> None:
-        """Open the device and serve it until the connection ends. Raise OSError or ValueError to have it opened again.
-        """
+        """Open the device and serve it until the end. Raise OSError or ValueError to have it opened again."""
         raise NotImplementedError
 
     def _run(self) -> None:

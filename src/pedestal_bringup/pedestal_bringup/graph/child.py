@@ -17,6 +17,7 @@ import gc
 import importlib.util
 import math
 import os
+import pathlib
 import signal
 import struct
 import subprocess
@@ -123,7 +124,7 @@ class Child:
 
 
 def _run_child(run: Callable[[], int]) -> NoReturn:
-    """End the child with the exit code of run(), 1 after an error: it must never return into the code of its parent.
+    """End the child with the exit code of run(), 1 after an error. It must never return into the code of its parent.
     """
     code: str | int = 1     # a text ends a program with exit code 1
     try:
@@ -190,24 +191,19 @@ def _as_copy(command: list[str], gate: int, rehearse: Callable[[], object]) -> i
 
 
 def _set_command_line(command: list[str]) -> bool:
-    """Give this process its own command line, as ps, pgrep and killall show it. Return True if the kernel has done so.
-    """
-    with contextlib.suppress(OSError, ValueError, struct.error):
-        return _try_to_set_command_line(command)
-    return False
-
-
-def _try_to_set_command_line(command: list[str]) -> bool:
+    """Give this process its own command line, as ps, pgrep and killall show it. Return True if the kernel did so."""
     _libc.prctl(PR_SET_NAME, os.path.basename(command[0]).encode())
     line = b''.join(os.fsencode(argument) + b'\0' for argument in command)
     begin = _libc.malloc(len(line))
     ctypes.memmove(begin, line, len(line))
-    with open('/proc/self/stat') as stream:
+    try:
         # proc(5) counts its fields from 1. The fields are counted from the last bracket on, because field 2, a name in
         # brackets, may contain any character. Three zeros stand for the fields 0, 1 and 2.
-        fields = ['0', '0', '0', *stream.read().rpartition(')')[2].split()]
-    code, stack, data_and_heap, environment = (map(int, fields[first:end]) for first, end in (
-        CODE_FIELDS, STACK_FIELDS, DATA_AND_HEAP_FIELDS, ENVIRONMENT_FIELDS))
-    memory = PRCTL_MM_MAP.pack(*code, *data_and_heap, _libc.sbrk(0), *stack, begin, begin + len(line), *environment,
-                               NO_AUXILIARY_VECTOR, NO_AUXILIARY_SIZE, NO_FILE)
+        fields = ['0', '0', '0', *pathlib.Path('/proc/self/stat').read_text().rpartition(')')[2].split()]
+        code, stack, data_and_heap, environment = (map(int, fields[first:end]) for first, end in (
+            CODE_FIELDS, STACK_FIELDS, DATA_AND_HEAP_FIELDS, ENVIRONMENT_FIELDS))
+        memory = PRCTL_MM_MAP.pack(*code, *data_and_heap, _libc.sbrk(0), *stack, begin, begin + len(line),
+                                   *environment, NO_AUXILIARY_VECTOR, NO_AUXILIARY_SIZE, NO_FILE)
+    except (OSError, ValueError, struct.error):
+        return False
     return _libc.prctl(PR_SET_MM, PR_SET_MM_MAP, memory, len(memory), 0) == 0

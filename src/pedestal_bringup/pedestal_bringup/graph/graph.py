@@ -1,4 +1,5 @@
 """Run of a scenario as a graph of nodes, from its files to its end, for `pedestal run`."""
+import itertools
 import pathlib
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
@@ -13,20 +14,13 @@ if TYPE_CHECKING:
     from pedestal_bringup.scenario.program import Plan
 
 
-def _free_bag(scenario: str) -> pathlib.Path:
-    """Return the path bags/runs/SCENARIO-N with the smallest N for which nothing exists there."""
-    number = 1
-    while True:
-        bag = pathlib.Path('bags') / 'runs' / f'{scenario}-{number}'
-        if not bag.exists():
-            return bag
-        number += 1
-
-
 def new_bag(given: str, scenario: str) -> pathlib.Path:
-    """Return the folder for the recording: `given`, or a free one in bags/runs. Raises ValueError if it exists
-    already."""
-    bag = pathlib.Path(given) if given else _free_bag(scenario)
+    """Return the folder of the recording: `given`, or the first bags/runs/SCENARIO-N that does not exist. Raises
+    ValueError if `given` exists."""
+    if not given:
+        return next(bag for number in itertools.count(1)
+                    if not (bag := pathlib.Path('bags') / 'runs' / f'{scenario}-{number}').exists())
+    bag = pathlib.Path(given)
     if bag.exists():
         raise ValueError(f'bag {bag} exists already; a recording is never overwritten')
     return bag

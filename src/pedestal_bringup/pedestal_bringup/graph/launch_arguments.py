@@ -41,16 +41,14 @@ ARGUMENTS = (
 
 
 def misspelt_arguments(names: Iterable[str]) -> list[str]:
-    """Return a line on each name that looks like a misspelt argument. Because launch accepts any name, it reports no
-    error."""
+    """Return a line on each name that looks like a misspelt argument: launch accepts any name."""
     known = [argument.name for argument in ARGUMENTS]
     return [f'no argument {name}:=;{meant}' for name in names
             if name not in known and (meant := parameters.did_you_mean(name, known))]
 
 
 def _number(given: Mapping[str, str], name: str, number_type: Callable[[str], _N], description: str) -> _N | None:
-    """Return the number of an argument; None if its text is empty. description: of an allowed value. Raises
-    ValueError."""
+    """Return the number of an argument, None for an empty text. Raises ValueError with the description of a number."""
     try:
         return number_type(given[name]) if given[name] else None
     except ValueError:

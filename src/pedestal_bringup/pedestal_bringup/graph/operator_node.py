@@ -57,8 +57,8 @@ class Operator(Shell):
                 self._publish_by_topic[name] = self.writer(name)
 
     def check_domain_free(self) -> None:
-        """Raise GraphError if nodes of another graph are on this ROS domain, which would receive the messages of this
-        graph."""
+        """Raise GraphError if nodes of another graph, which would receive the messages of this graph, are on this
+        domain."""
         deadline = time.monotonic() + DISCOVERY_TIME_S
         while time.monotonic() < deadline:
             names = self.get_node_names()

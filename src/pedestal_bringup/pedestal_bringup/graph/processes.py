@@ -208,8 +208,8 @@ class Graph:
             return not any([code for group in (first, others, ['recorder']) for code in self._stop(group)])
 
     def _stop(self, names: Iterable[str]) -> list[int]:
-        """Stop processes together, and return their exit codes. One that ignores SIGTERM is killed after
-        NODE_STOP_TIMEOUT_S."""
+        """Stop processes together, and return their exit codes; kill one that ignores SIGTERM for NODE_STOP_TIMEOUT_S.
+        """
         processes = [self.processes[node] for node in names if node in self.processes]
         for process in processes:
             if process.poll() is None:
@@ -237,8 +237,7 @@ class Graph:
         return [line for line in self._lines(node) if not line.startswith('{')][-SHOWN_LOG_LINES:]
 
     def result(self, node: str) -> dict[str, Json]:
-        """Return the last JSON object in a node's log: its result or the reason of its end, as shell.main prints it,
-        or {}."""
+        """Return the last JSON object in a node's log: its result or the reason of its end (shell.main), or {}."""
         for line in reversed(self._lines(node)):
             if line.startswith('{'):
                 with contextlib.suppress(ValueError):

@@ -17,8 +17,7 @@ GRACE_PERIOD_S = 20.0  # time from the end of `pedestal run` in which the nodes 
 
 
 def main() -> None:
-    """Read the process numbers of the nodes until the input ends, wait for the grace period, and kill the nodes that
-    remain."""
+    """Read the process numbers of the nodes, wait for the grace period, and kill the nodes that remain."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     nodes = []

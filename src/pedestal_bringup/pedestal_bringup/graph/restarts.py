@@ -22,8 +22,7 @@ class Restarts:
         self._due: dict[str, Seconds] = {}
 
     def note_death(self, node: str, now: Seconds) -> int:
-        """Note the death of a node. Return the number of its next restart in the window, 0 if the node has died too
-        often."""
+        """Note the death of a node. Return the number of its next restart in the window, 0 after too many deaths."""
         deaths = self._deaths[node]
         while deaths and deaths[0] <= now - self.within:
             deaths.popleft()

@@ -27,8 +27,7 @@ MAX_SILENCE_S = 5.0
 
 
 def prepare(scenario: Scenario) -> None:
-    """Compile the laws of the nodes of a scenario that are not in the law cache, each node in a process of its own, so
-    that the nodes start without delay. Raises RunError."""
+    """Compile the laws of the nodes that are not in the law cache, each node in its own process. Raises RunError."""
     units = {nodes.plain(node): node for node in scenario.nodes
              if scenario.row(node).unit and not is_compiled(scenario.unit(node))}
     processes = {node: subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.loop.prepare', node, scenario.name],

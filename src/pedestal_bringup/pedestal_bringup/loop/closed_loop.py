@@ -198,8 +198,7 @@ class Loop:
         self.steps = round(scenario.header.duration / period) + 1
 
     def before_step(self, first: int, forecasts: list[Forecast]) -> None:
-        """Execute the scheduled commands that are due, and keep their replies. At each whole second, add to
-        `forecasts`."""
+        """Execute the scheduled commands that are due. At each whole second, add to `forecasts`."""
         stamp = first * self.period_ns
         if stamp // NS_PER_SECOND > (stamp - self.period_ns) // NS_PER_SECOND:
             forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['guidance']['lookahead'])))

@@ -66,7 +66,7 @@ def _compile_loop(name: str, count: int) -> tuple[str, Seconds]:
 
 
 def compile_cold(units: Iterable[tuple[str, ...]], loops: Iterable[tuple[str, int]]) -> None:
-    """Compile the laws that are not cached, of rows of COMPILED_UNITS and COMPILED_LOOPS, and print a line for each.
+    """Compile the laws that are not cached, by rows of COMPILED_UNITS and COMPILED_LOOPS, and print a line for each.
     """
     if vars(numba.config)['DISABLE_JIT']:      # for a debugger: there is nothing to compile
         return

@@ -102,8 +102,7 @@ def max_parallel_trials(scenario: Scenario, names: Sequence[str]) -> int:
 
 
 def can_run_parallel(loops: Sequence[Loop]) -> bool:
-    """Return True if these loops can run side by side: drives with motors ashore, with equal period, steps and shapes.
-    """
+    """Return True if these loops can run side by side: motors, ashore, with equal period, steps and shapes."""
     return (MIN_PARALLEL_LOOPS <= len(loops) <= lanes.LANE_COUNT and all(map(_fits_lanes, loops))
             and len(set(map(_shape, loops))) == 1)
 
@@ -131,8 +130,7 @@ def _stacked(units: Sequence[Unit]) -> Records:
 
 
 def _joined_tracks(tracks: Iterable[ProgramTrack]) -> tuple[ProgramTrack, Ints]:
-    """Return (one ProgramTrack with the rows of n ProgramTracks, their ends (n + 1,), 0 first); the tracks may differ
-    in length."""
+    """Return (one ProgramTrack with the rows of n ProgramTracks, their ends (n + 1,), 0 first)."""
     return ProgramTrack(*map(np.concatenate, zip(*tracks))), np.cumsum([0, *(len(track.times) for track in tracks)])
 
 

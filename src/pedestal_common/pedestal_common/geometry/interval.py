@@ -5,8 +5,7 @@ from pedestal_common.quantities import Floats
 
 @compiled
 def interval(breaks: Floats, t: float) -> int:
-    """Return the index i with breaks[i] <= t < breaks[i + 1] in increasing breaks, 0 before the first, n - 2 after the
-    last."""
+    """Return the index i with breaks[i] <= t < breaks[i + 1], 0 before the first of n breaks, n - 2 after the last."""
     low, high = 0, len(breaks) - 1
     while high - low > 1:
         middle = (low + high) // 2

@@ -26,8 +26,7 @@ def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> X
 
 @compiled
 def direction(azimuth: Radians, elevation: Radians) -> Xyz:
-    """Return the unit vector of an azimuth (clockwise) and an elevation: FLU of deck angles, north-west-up of earth
-    angles."""
+    """Return the unit vector of an azimuth (clockwise): FLU of deck angles, north-west-up of earth angles."""
     cos_el = math.cos(elevation)
     return cos_el * math.cos(azimuth), -cos_el * math.sin(azimuth), math.sin(elevation)
 
@@ -90,8 +89,7 @@ def offsets(azimuth: Radians, elevation: Radians, x: float, y: float, z: float) 
 @compiled
 def offset_rates(beam: Direction, beam_rate: tuple[RadiansPerSecond, RadiansPerSecond], r: Xyz,
                  v: Xyz) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return the time derivative of `offsets`, (d dX/dt, d dE/dt). r, v: vector of the direction, and its derivative.
-    """
+    """Return the time derivative of `offsets`, of a direction r with its derivative v."""
     azimuth, elevation = beam
     azimuth_rate, elevation_rate = beam_rate
     x, y, z = r
@@ -172,8 +170,7 @@ def rotation(qx: float, qy: float, qz: float, qw: float, mat: Matrix3) -> None:
 
 @compiled
 def quaternion(roll: Radians, pitch: Radians, yaw: Radians) -> tuple[float, float, float, float]:
-    """Return the unit quaternion deck -> earth of roll, pitch and yaw about fixed axes (REP 103). At yaw 0 the bow
-    points east."""
+    """Return the quaternion deck -> earth of angles about fixed axes (REP 103). At yaw 0 the bow points east."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)

@@ -80,8 +80,7 @@ def checked(fields: Mapping[str, object]) -> dict[str, str]:
 
 
 def initialize(satrec: Satrec, text: str) -> str:
-    """Fill a Satrec with the elements of an OMM in JSON. Return the catalogue number, else the name of the satellite.
-    Raises ValueError."""
+    """Fill a Satrec with an OMM in JSON. Return the catalogue number, else the name. Raises ValueError."""
     try:
         fields = json.loads(text, parse_int=str, parse_float=str)
     except (json.JSONDecodeError, RecursionError) as error:

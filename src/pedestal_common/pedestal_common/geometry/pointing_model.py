@@ -149,8 +149,7 @@ def put(model: PointingModel, terms: Floats) -> None:
 
 @compiled
 def put_between(model: PointingModel, before: Floats, after: Floats, x: float) -> None:
-    """Set a model on the way from the terms `before` to `after` at the share x of the time, 0 to 1, without a rate at
-    both ends."""
+    """Set a model between the terms `before` and `after` at the share x of the time, without a rate at both ends."""
     share, terms = x * x * (3.0 - 2.0 * x), model.terms
     for i in range(len(terms)):
         terms[i] = after[i] if x == 1.0 else before[i] + share * (after[i] - before[i])

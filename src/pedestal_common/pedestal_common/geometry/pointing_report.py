@@ -81,8 +81,7 @@ def residual_rows(text: str) -> list[list[float]]:
 
 
 def residual_text(directions: Pairs, residuals: Pairs) -> str:
-    """Return the text of residual_rows for directions and residuals [deg], at most MAX_RESIDUALS at equal distances.
-    """
+    """Return the text of residual_rows for angles [deg], at most MAX_RESIDUALS rows at equal distances."""
     chosen = np.unique(np.linspace(0, len(directions) - 1, min(len(directions), MAX_RESIDUALS)).round().astype(int))
     return '; '.join(f'{az:.0f} {el:.0f} {1e3 * x:.1f} {1e3 * y:.1f}'
                      for (az, el), (x, y) in zip(directions[chosen], residuals[chosen]))
@@ -110,8 +109,7 @@ def _directions(model: PointingModel, before: Floats, after: Floats, begins: Sec
 
 
 def directions(report: Report | None, times: Times, angles: Pairs) -> Pairs:
-    """Return the directions of the beam on the sky, deck angles, of encoder angles; those of encoders without a
-    report."""
+    """Return the directions of the beam on the sky, deck angles; those of the encoders without a report."""
     if report is None or not (report.terms or report.before):
         return angles
     after, on_sky = in_radians(report.terms), np.empty((len(angles), 2))

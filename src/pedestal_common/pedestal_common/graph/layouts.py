@@ -155,8 +155,7 @@ def columns(topic: str) -> tuple[Column, ...]:
 
 
 def column(type_name: str, path: str, texts: Mapping[str, str]) -> str | None:
-    """Return the name of the column of a number at a path in a message with texts {path: text}; None for header and
-    covariances."""
+    """Return the name of the column of a number at a path in a message; None for header and covariances."""
     for field in LAYOUTS.get(type_name, ()):
         match = re.fullmatch(field.path, path)
         if match:
@@ -184,7 +183,6 @@ def unit(topic: str, type_name: str, column: str) -> str:
 
 
 def of_filter(steps: Records, name: str) -> Pairs:
-    """Return one number of the filters of both axes, a key of topics.FILTER_UNITS, from records with the topic
-    acu/filter."""
+    """Return one number (topics.FILTER_UNITS) of the filters of both axes from records with the topic acu/filter."""
     numbers = steps['acu/filter']['position'].reshape(len(steps), len(topics.AXES), len(topics.FILTER_UNITS))
     return numbers[:, :, list(topics.FILTER_UNITS).index(name)]

@@ -309,8 +309,7 @@ def held(names: Iterable[str]) -> frozenset[str]:
 
 
 def readers(link: Link, names: Iterable[str]) -> list[str]:
-    """Return the nodes among `names` that must subscribe to a topic before the graph may start; the recorder to every
-    topic."""
+    """Return the nodes among `names` that must subscribe to a topic before the graph starts, with the recorder."""
     return [name for name in names if name in link.readers or name == 'recorder']
 
 

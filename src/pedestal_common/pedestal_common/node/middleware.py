@@ -24,8 +24,7 @@ DDS_PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
 
 
 def qos(rate: str, role: str = 'lockstep') -> QoSProfile:
-    """Return the quality of service of the topics of a rate. role: `lockstep`, or a field of topics.Qos in realtime.
-    """
+    """Return the quality of service of the topics of a rate. role: `lockstep`, or a field of topics.Qos."""
     row = topics.QOS_BY_RATE[rate]
     depth, reliable = getattr(row, role), role != 'read' or row.reliable
     return QoSProfile(history=HistoryPolicy.KEEP_LAST if depth else HistoryPolicy.KEEP_ALL, depth=depth or 1,

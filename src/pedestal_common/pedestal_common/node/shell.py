@@ -93,8 +93,7 @@ def stop_on_signals() -> None:
 
 
 def readings() -> tuple[Nanoseconds, Nanoseconds]:
-    """Return a pair of readings (steady clock, system clock), taken again at most twice if they lie more than 0.1 ms
-    apart."""
+    """Return readings (steady clock, system clock), taken again at most twice if they lie 0.1 ms apart."""
     for _ in range(3):
         steady, system = time.monotonic_ns(), time.time_ns()
         if time.monotonic_ns() - steady < 100_000:
@@ -157,8 +156,7 @@ class Shell(Node):
             """Take the node from the graph; rclpy does not state the type."""
 
     def _place(self, name: str) -> tuple[str, str]:
-        """Return (namespace of the graph, prefix of this node's beam in the graph or ''), each with a '/' at its end.
-        """
+        """Return (namespace of the graph, prefix of this node's beam or ''), each with a '/' at its end."""
         namespace = self.get_namespace().rstrip('/') + '/'
         prefix = next((prefix for prefix in nodes.prefixes(self.graph.beams) if name in nodes.NODE_NAMES
                        and nodes.row(name).of_beam and namespace.endswith('/' + prefix)), '')
@@ -290,8 +288,8 @@ class Shell(Node):
         return self.create_timer(period, self._guarded(function), clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _guarded(self, function: Callable[..., object]) -> Callable[..., None]:
-        """Return a callback that calls `function` and stores an expected error for `main`, before rclpy prints a
-        traceback."""
+        """Return a callback that stores an expected error of `function` for `main`, before rclpy prints a traceback.
+        """
         def call(*args: object) -> None:
             try:
                 function(*args)
@@ -307,8 +305,7 @@ class Shell(Node):
         self.diagnostics = Diagnostics(self, diagnose)
 
     def diagnose_now(self) -> bool:
-        """Publish the diagnostics at once in realtime, unless the last are too new. Return True if they were
-        published."""
+        """Publish the diagnostics in realtime, unless the last are too new. Return True if they were published."""
         return self.diagnostics is not None and not self.graph.lockstep and self.diagnostics.publish_urgent()
 
     def begin_step(self, stamp: Nanoseconds) -> None:
@@ -376,8 +373,7 @@ class Shell(Node):
                                  f'{self.context.get_domain_id()}; set a free one')
 
     def _missing(self, publisher: Publisher, wanted: Sequence[str]) -> list[str]:
-        """Return the names of the wanted subscribers that a topic lacks. Only a replay replaces a wanted subscriber.
-        """
+        """Return the wanted subscribers that a topic lacks. Only a replay replaces a wanted subscriber."""
         if not wanted:
             return []
         subscribers = self.get_subscriptions_info_by_topic(publisher.topic_name)
@@ -396,8 +392,7 @@ class Shell(Node):
         return 'messages'
 
     def draining(self) -> bool:
-        """Return True while a node that has finished must go on receiving before `close`; overridden by the recorder.
-        """
+        """Return True while a finished node must go on receiving before `close`; overridden by the recorder."""
         return False
 
     def close(self) -> None:
@@ -409,8 +404,7 @@ class Shell(Node):
 
 
 def _write_line(stream: TextIO, line: str) -> None:
-    """Write a last line without Python's buffer. A full disk or a closed pipe must not change the reason of the end.
-    """
+    """Write a last line without a buffer. A full disk or a closed pipe must not change the reason of the end."""
     with contextlib.suppress(OSError):
         os.write(stream.fileno(), f'{line}\n'.encode())
 

@@ -137,8 +137,7 @@ class LockstepSubscriber(Generic[_M]):
 
 
 class TopicSubscriber(Generic[_M]):
-    """Subscriber to one topic in realtime, which passes the messages that its PublisherGate accepts to take(message,
-    True after a gap)."""
+    """Subscriber to one topic in realtime, which passes the messages that its PublisherGate accepts to take."""
 
     def __init__(self, node: 'Shell', link: nodes.Link, ros_name: str,
                  decode: Callable[[bytes], tuple[Nanoseconds | None, _M]], take: Callable[[_M, bool], None]) -> None:
@@ -192,8 +191,7 @@ class TopicSubscriber(Generic[_M]):
             self._node.diagnose_now()
 
     def unexpected_publishers(self) -> list[str]:
-        """Return the names of the publishers that the graph does not expect; [] in a graph without the expected nodes.
-        """
+        """Return the names of the publishers that the graph does not expect."""
         return foreign_publishers(self._node, self.link, self._ros_name) or []
 
     def _unexpected_count(self) -> int | None:
@@ -216,8 +214,7 @@ class TopicSubscriber(Generic[_M]):
         return LEVEL_ERROR, f'{self.link.name}: {count} dropped: {kind}: {who}'
 
     def values(self) -> list[tuple[str, str]]:
-        """Return [(key, text)] for the diagnostics: counts of dropped messages, smallest time from sending to
-        reception."""
+        """Return [(key, text)]: counts of dropped messages, smallest time from sending to reception."""
         gate = self.gate
         values = [(f'dropped {self.link.name}: {kind}', str(count)) for kind, count in gate.drops.counts.items()]
         if gate.offset is not None:

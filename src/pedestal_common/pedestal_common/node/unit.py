@@ -108,8 +108,7 @@ class Unit(typing.Protocol):
         return self.memory.record[0]
 
     def block(self, steps: int) -> Memory:
-        """Return the memory for this number of next steps, at most MAX_BLOCK_STEPS; overridden by a unit with noise.
-        """
+        """Return the memory for the next steps, at most MAX_BLOCK_STEPS; overridden by a unit with noise."""
         return self.memory
 
     def step(self, stamps: Stamps, inputs: Records, outputs: Records) -> None:
@@ -142,8 +141,7 @@ class Unit(typing.Protocol):
         self._last = stamp
 
     def command(self, command: commands.Command) -> Reply:
-        """Execute a Command between two steps, with effect in the next step. The Reply is also added to
-        `pending_replies`."""
+        """Execute a Command between two steps. The Reply is also added to `pending_replies`."""
         try:
             self.admit(command)
             if command.verb in self.REQUESTS:
@@ -156,8 +154,7 @@ class Unit(typing.Protocol):
         return reply
 
     def admit(self, command: commands.Command) -> None:
-        """Raise ValueError where the client of a Command may not command; overridden by a unit with a client in
-        control."""
+        """Raise ValueError where the client of a Command may not command."""
 
     def execute(self, command: commands.Command, arguments: Mapping[str, Value]) -> Reply:
         """Execute a Command of VERBS; overridden by a unit with commands. Raises ValueError for a refusal."""

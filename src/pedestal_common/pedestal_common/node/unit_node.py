@@ -292,8 +292,7 @@ class UnitNode(shell.Shell):
         self.restart()
 
     def _step_taker(self, name: str) -> Callable[[records.Decoded, bool], None]:
-        """Return take(message, after_gap) of an input. After a gap it resets the state that depends on earlier
-        messages."""
+        """Return take(message, after_gap) of an input. A gap resets the state that depends on earlier messages."""
         assert self.steps
         steps = self.steps
 
@@ -352,8 +351,7 @@ class UnitNode(shell.Shell):
             self.get_logger().warning(f'{name}: {response.message}')
 
     def _watch_trigger(self) -> None:
-        """Set `silent` of the units in realtime while the trigger is absent, except after a stall of this node and
-        before graph.start."""
+        """Set `silent` of the units while the trigger is absent, except after a stall and before graph.start."""
         assert self.steps
         now, limit = time.monotonic_ns(), self.graph.silence * NS_PER_SECOND
         if self.clock()[1] < self.graph.start:

@@ -73,8 +73,7 @@ class PublisherGate(Generic[_M]):
         self._back: Nanoseconds | None = None           # the newest of these
 
     def take(self, data: bytes, number: int, source: Nanoseconds, now: Nanoseconds, utc: Nanoseconds) -> _M | None:
-        """Return the decoded message, None for a dropped message. source: time of sending, UTC; now, utc: of
-        reception."""
+        """Return the decoded message, None for a dropped one. source: time of sending; now, utc: of reception."""
         self.after_gap = False
         if not self._paced:
             if self._unexpected():
@@ -92,7 +91,7 @@ class PublisherGate(Generic[_M]):
             return None
         if stamp is not None and not self._in_order(stamp, now, utc):
             return None
-        self._note_offset(utc - source)
+        self.offset = utc - source if self.offset is None else min(self.offset, utc - source)
         return message
 
     def _admit(self, stream: Stream | None, now: Nanoseconds) -> bool:
@@ -151,8 +150,7 @@ class PublisherGate(Generic[_M]):
                 if other is not stream and now - other.arrival < SILENCE_LIMIT_NS]
 
     def _in_order(self, stamp: Nanoseconds, now: Nanoseconds, utc: Nanoseconds) -> bool:
-        """Return True if a stamp is later than the last one and not ahead of the time, or if stamps have been back for
-        SILENCE_LIMIT_NS."""
+        """Return True if a stamp is not ahead, and later than the last one or gone back for SILENCE_LIMIT_NS."""
         if stamp > utc + self._future:
             self.drops.drop(DROP_FUTURE, f'{(stamp - utc) * 1e-9:.3f} s ahead', now)
             return False
@@ -167,6 +165,3 @@ class PublisherGate(Generic[_M]):
             return True
         self.drops.drop(DROP_STALE, f'{(self._stamp - stamp) * 1e-9:.3f} s older than the last', now)
         return False
-
-    def _note_offset(self, offset: Nanoseconds) -> None:
-        self.offset = offset if self.offset is None else min(self.offset, offset)

@@ -125,8 +125,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def _known(name: str, wanted: Quantity) -> tuple[str, str] | None:
-    """Return (name of the quantity, rest without blanks and brackets) of a column's name; None for another quantity.
-    """
+    """Return (name of the quantity, rest without blanks and brackets) of a column; None for another quantity."""
     for spaced in (name, _CAMEL_CASE_PATTERN.sub(' ', name)):
         text = ' '.join(spaced.lower().replace('_', ' ').replace('-', ' ').split())
         for known in sorted(wanted.names, key=len, reverse=True):
@@ -142,8 +141,7 @@ def _rest(name: str, wanted: Quantity) -> str:
 
 
 def unit_of(name: str, wanted: Quantity) -> str | None:
-    """Return the unit of a column; '' if the words behind the quantity are no known unit; None for another quantity.
-    """
+    """Return the unit of a column; '' for words that are no known unit, None for another quantity."""
     match = _known(name, wanted)
     if not match:
         return None

@@ -209,8 +209,7 @@ class Table:
         return f'{_columns.listed(self.fieldnames)} (separator {self.separator!r})'
 
     def number(self, column: _columns.Column, cell: str | None, low: float, high: float) -> float:
-        """Return the number in a cell (None if the row ends before it), in the unit of its quantity. Raises
-        TableError."""
+        """Return the number in a cell, None beyond the row, in the unit of its quantity. Raises TableError."""
         if cell is None:
             raise TableError(f'{self.path}: line {self.line_num}: the row ends before the column {column.name!r:.60}')
         if _columns.is_time(column.unit) and _DATE_PATTERN.match(cell):

@@ -125,8 +125,7 @@ def _check(events: Iterable[yaml.Event], aliases: bool) -> None:
 
 
 def read(path: FilePath) -> Json:
-    """Return the values of a YAML file of at most MAX_YAML_BYTES, aliases accepted. Raises OSError,
-    UnicodeDecodeError, yaml.YAMLError."""
+    """Return the values of a YAML file, aliases accepted. Raises OSError, UnicodeDecodeError, yaml.YAMLError."""
     return parse(files.read_text(path, MAX_YAML_BYTES), aliases=True)
 
 

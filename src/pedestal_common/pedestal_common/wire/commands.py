@@ -128,8 +128,7 @@ def _value(definition: Definition, argument: Argument, text: str | None) -> floa
 
 
 def _in_degrees(number: float, argument: Argument) -> str:
-    """Return a refused angle or rate and its range in degrees, as `pedestal mode rate --az 500` gives it; '' for
-    another unit or NaN."""
+    """Return a refused angle or rate and its range in degrees, as the verbs give it; '' for another unit or NaN."""
     if argument.unit not in ('rad', 'rad/s') or math.isnan(number):
         return ''
     given, low, high = (f'{math.degrees(value):.4g}' for value in (number, argument.low, argument.high))

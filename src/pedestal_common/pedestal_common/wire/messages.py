@@ -55,8 +55,7 @@ def serialize(message: Message) -> bytes:
 
 
 def deserialize(data: bytes, type_name: str) -> Message:
-    """Return the message in CDR bytes. Raises ValueError, which names the type, for other bytes and for more than
-    MAX_CDR_BYTES."""
+    """Return the message in CDR bytes, at most MAX_CDR_BYTES. Raises ValueError, which names the type."""
     if len(data) > MAX_CDR_BYTES:
         raise ValueError(f'{len(data)} bytes of a {type_name}, must be at most {MAX_CDR_BYTES}')
     try:
@@ -91,8 +90,7 @@ def put_stamp(stamp: Message, ns: Nanoseconds) -> None:
 
 
 def since(message: Message, epoch: Nanoseconds) -> Message:
-    """Change the stamp in the header of a message so that it counts from an epoch, unless it is 0; return the message.
-    """
+    """Make the stamp in the header of a message count from an epoch, unless it is 0; return the message."""
     stamp = nanoseconds(message.header.stamp)
     put_stamp(message.header.stamp, stamp - epoch if stamp else 0)
     return message
@@ -130,8 +128,7 @@ def _vector3_stamped(row: topics.Topic) -> Message:
 
 
 def _range(row: topics.Topic) -> Message:
-    """Return a Range at any distance, measured by radio: the code is 0 (ultrasound), because radio is no infrared
-    light."""
+    """Return a Range at any distance. The type has no code for radio, so the code is 0 (ultrasound)."""
     return Range(header=header(row.frame), radiation_type=0, field_of_view=0.0, min_range=0.0, max_range=float('inf'),
                  range=0.0, variance=0.0)
 
