@@ -17,7 +17,7 @@ import limited
 import not_judged
 import numpy as np
 import pytest
-from shared import PEDESTAL, begins_with, free_port
+from shared import NODE, PEDESTAL, begins_with, free_port
 
 MOST_DOMAINS = 25
 """Domains that a test session holds: several sit side by side, and others want some too."""
@@ -146,7 +146,7 @@ class Run:
         self.json = self.bag.with_name(self.bag.name + '.json')
 
     def pids(self):
-        """{module: pid} of the nodes that run."""
+        """{executable without _node: pid} of the nodes that run."""
         found = {}
         for process in pathlib.Path('/proc').glob('[0-9]*'):
             try:
@@ -154,7 +154,7 @@ class Run:
             except OSError:
                 continue
             if str(self.log / 'parameters.yaml') in arguments:
-                found[arguments[2].rpartition('.')[2].removesuffix('_node')] = int(process.name)
+                found[arguments[3].removesuffix('_node')] = int(process.name)
         return found
 
     def signal(self, node, number):
@@ -243,14 +243,8 @@ def recorded(reserve_domain, tmp_path_factory):
     return make
 
 
-MODULES = {'ship_motion': 'ship_motion_sim.ship_motion_node', 'ins': 'ship_motion_sim.ins_node',
-           'tracking_receiver': 'tracking_receiver_sim.tracking_receiver_node', 'acu': 'acu_tracker.acu_node',
-           'adu': 'adu_drive.adu_node', 'beam_steering': 'adu_drive.beam_steering_node',
-           'drive': 'pedestal_hardware.drive_node', 'drives': 'equipment_sim.drives.drives_node',
-           'monopulse': 'pedestal_hardware.monopulse.monopulse_receiver_node',
-           'iq': 'equipment_sim.iq.iq_node', 'ins_input': 'pedestal_hardware.ins.ins_input_node',
-           'level_receiver': 'pedestal_hardware.level.level_receiver_node',
-           'recorder': 'pedestal_recording.recorder_node', 'page': 'pedestal_operator.page_node'}
+EXECUTABLES = {'drives': 'simulated_drives_node', 'monopulse': 'monopulse_receiver_node', 'page': 'operator_page'}
+"""{node of the tests: its executable} of those whose executable is not NODE_node."""
 
 
 @dataclasses.dataclass
@@ -272,7 +266,7 @@ def start_node(reserve_domain, tmp_path_factory):
 
     def start(node, *arguments, domain_id=None):
         folder, domain = tmp_path_factory.mktemp(node), domain_id or reserve_domain()
-        command = [sys.executable, '-m', MODULES[node], '--ros-args', *arguments]
+        command = [*NODE, EXECUTABLES.get(node, f'{node}_node'), '--ros-args', *arguments]
         started.append(NodeProcess(_popen(command, folder, _environment(domain, folder)), domain))
         return started[-1]
 

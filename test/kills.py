@@ -105,14 +105,14 @@ class Watcher:
 
 
 def children(pid):
-    """{node: pid} of the nodes that `pedestal run` runs: direct children, named by their module."""
+    """{node: pid} of the nodes that `pedestal run` runs: direct children, named by their executable."""
     found = {}
     for process in pathlib.Path('/proc').glob('[0-9]*'):
         with contextlib.suppress(OSError, IndexError):
             state, parent = (process / 'stat').read_text().rpartition(')')[2].split()[:2]
             arguments = (process / 'cmdline').read_text().split('\0')
-            if int(parent) == pid and state != 'Z' and arguments[2].endswith('_node'):
-                found[next(node.name for node in nodes.NODES if node.module == arguments[2])] = int(process.name)
+            if int(parent) == pid and state != 'Z' and arguments[2] == 'pedestal_common.node.run':
+                found[nodes.EXECUTABLES[arguments[3]].name] = int(process.name)
     return found
 
 

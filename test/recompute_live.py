@@ -170,7 +170,7 @@ def _run(recording: FedRecording, done: recompute.Recomputed, params: parameters
     with open(log, 'wb') as output:
         feeder.check_domain_free()
         feeder.stand_in(names)
-        process = subprocess.Popen(command_line(done.node, done.unit.NODE.module, file),
+        process = subprocess.Popen(command_line(done.node, done.unit.NODE.executable, file),
                                    stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
                                    env={**os.environ, 'ROS_LOG_DIR': str(folder)})
         try:

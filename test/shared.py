@@ -11,6 +11,9 @@ PATIENCE = 120.0
 PEDESTAL = (sys.executable, '-m', 'pedestal.cli')
 """The command, as arguments of a process."""
 
+NODE = (sys.executable, '-m', 'pedestal_common.node.run')
+"""Start of a node, as arguments of a process; the executable of the node follows."""
+
 
 def free_port():
     """Return a port of this machine on which nobody listens."""

@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from shared import NODE
 
 from pedestal_common.wire import commands, messages
 
@@ -89,7 +90,7 @@ def test_a_drive_of_ones_own(file, amplifiers, delay, start_process, connect, re
         client.read(name)
     client.until(lambda: [state.data for state in client.heard['adu/state']] == ['fault: amplifiers silent'])
     motors.start()
-    start_process([sys.executable, '-m', 'acu_tracker.acu_node', '--ros-args', '--params-file',
+    start_process([*NODE, 'acu_node', '--ros-args', '--params-file',
                    FILE.with_name('drive.yaml'), '-p', f'command_delay:={delay}'], ROS_DOMAIN_ID=str(domain))
     for name in ('acu/mode', 'acu/alarms', 'acu/command_result'):
         client.read(name)

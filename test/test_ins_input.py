@@ -1,13 +1,12 @@
 """A ship scenario in realtime with ins_input_node in the place of ins_node: NMEA sentences of `pedestal simulate ins`,
 and the Imu of a driver with a wrong frame."""
 import math
-import sys
 import time
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from shared import PEDESTAL, free_port
+from shared import NODE, PEDESTAL, free_port
 
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
@@ -15,9 +14,9 @@ from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import commands, messages
 from ship_motion_sim.sea import motion
 
-NODES = {'ship_motion': 'ship_motion_sim.ship_motion_node', 'acu': 'acu_tracker.acu_node',
-         'tracking_receiver': 'tracking_receiver_sim.tracking_receiver_node', 'adu': 'adu_drive.adu_node'}
-INPUT = 'pedestal_hardware.ins.ins_input_node'
+NODES = {'ship_motion': 'ship_motion_node', 'acu': 'acu_node',
+         'tracking_receiver': 'tracking_receiver_node', 'adu': 'adu_node'}
+INPUT = 'ins_input_node'
 
 
 @pytest.mark.thorough
@@ -36,7 +35,7 @@ def test_a_ship_scenario_tracks_with_an_ins_that_sends_nmea(patient, start_proce
         **{node: {**chosen.given(node), **shared} for node in NODES},
         'ins': {**shared, 'nmea.url': f'udp://127.0.0.1:{port}', 'stamp': 'device'}}))
     for module in (*NODES.values(), INPUT):
-        start_process([sys.executable, '-m', module, '--ros-args', '--params-file', file], ROS_DOMAIN_ID=str(domain))
+        start_process([*NODE, module, '--ros-args', '--params-file', file], ROS_DOMAIN_ID=str(domain))
 
     def simulated():
         return start_process([*PEDESTAL, 'simulate', 'ins', '--scenario', 'ship_pass', '--port', port, '--start',
@@ -104,7 +103,7 @@ def deviations(samples, chosen, start):
 def test_the_wrong_frame_of_a_driver_ends_its_attitude_within_10_s(start_process, connect, reserve_domain):
     """A driver like NovAtel's, at 50 Hz, whose rates have the axes right, forward, up. The deck rolls."""
     domain = reserve_domain()
-    start_process([sys.executable, '-m', INPUT, '--ros-args', '-p', 'source:=imu', '-p', 'imu.topic:=driver/imu', '-p',
+    start_process([*NODE, INPUT, '--ros-args', '-p', 'source:=imu', '-p', 'imu.topic:=driver/imu', '-p',
                    'imu.earth:=nwu', '-r', 'driver/imu:=ship/imu/data_raw'], ROS_DOMAIN_ID=str(domain))
     client = connect(domain, 'driver')
     for name in ('ship/imu/data', 'ins/state', 'diagnostics'):

@@ -3,12 +3,12 @@ import math
 import os
 import pty
 import socket
-import sys
 import time
 import tty
 
 import numpy as np
 import pytest
+from shared import NODE
 
 from pedestal_common.wire import commands
 
@@ -16,8 +16,8 @@ pytestmark = pytest.mark.thorough
 
 TARGET, BEAMWIDTH = np.array((0.506, 0.6)), 0.0175
 GRAPH = ('graph.pacing:=realtime', 'graph.nodes:=acu,adu')
-MODULES = {'adu_drive.adu_node': (*GRAPH, 'period:=0.02', 'initial_azimuth:=0.7', 'initial_elevation:=0.6'),
-           'acu_tracker.acu_node': (*GRAPH, 'period:=0.02', 'steptrack.cycle:=2.0', 'steptrack.dwell:=0.3',
+MODULES = {'adu_node': (*GRAPH, 'period:=0.02', 'initial_azimuth:=0.7', 'initial_elevation:=0.6'),
+           'acu_node': (*GRAPH, 'period:=0.02', 'steptrack.cycle:=2.0', 'steptrack.dwell:=0.3',
                                     'azimuth.feedforward.bandwidth:=4.0', 'elevation.feedforward.bandwidth:=4.0')}
 
 
@@ -67,10 +67,10 @@ def test_step_track_by_a_level(receiver, start_process, connect, reserve_domain)
     """Step track climbs to the target by a level, 20 times a second. First the ACU learns the noise off target. A
     half line and a level out of range are named, and the node continues."""
     domain, noise, last = reserve_domain(), np.random.default_rng(1), [-math.inf]
-    node = {'pedestal_hardware.level.level_receiver_node': (
+    node = {'level_receiver_node': (
         *GRAPH, f'url:={receiver.url}', f"format:='{receiver.form}'", 'lowest:=0.0', 'highest:=90.0')}
     for module, changes in {**MODULES, **node}.items():
-        start_process([sys.executable, '-m', module, '--ros-args',
+        start_process([*NODE, module, '--ros-args',
                        *(part for change in changes for part in ('-p', change))], ROS_DOMAIN_ID=str(domain))
     client = connect(domain, 'level')
 

@@ -132,7 +132,7 @@ def cut(hosts, tmp_path_factory, reserve_domain):
     file.write_text(parameters_of_all(chosen, bag, begin))
     (folder / 'bag.log').mkdir()
     started = [hosts.start('far' if node == 'acu' else 'near',
-                           processes.command_line(node, chosen.row(node).module, file), folder / f'{node}.log',
+                           processes.command_line(node, chosen.row(node).executable, file), folder / f'{node}.log',
                            **domain)
                for node in chosen.nodes if node != 'operator']
 

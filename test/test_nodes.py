@@ -7,10 +7,10 @@ import pathlib
 import random
 import re
 import signal
-import sys
 import time
 
 import pytest
+from shared import NODE
 
 from pedestal_common.text_files import parameter_file
 
@@ -54,7 +54,7 @@ def test_a_node_ends_in_silence_when_told_to(ended, node):
 @pytest.mark.thorough
 def test_a_node_that_compiles_ends_at_once(start_process, reserve_domain, tmp_path):
     """Nothing is compiled yet: it would take the control unit half a minute to come to its end."""
-    process = start_process([sys.executable, '-m', 'acu_tracker.acu_node'], XDG_CACHE_HOME=str(tmp_path / 'cache'),
+    process = start_process([*NODE, 'acu_node'], XDG_CACHE_HOME=str(tmp_path / 'cache'),
                             NUMBA_CACHE_DIR=None, ROS_DOMAIN_ID=str(reserve_domain()))
     deadline = time.monotonic() + 60.0
     while not any((tmp_path / 'cache').rglob('acu_tracker.*')):
@@ -93,7 +93,7 @@ def test_ctrl_c_at_any_moment_ends_a_node_in_silence(start_node, node):
 def test_a_node_needs_neither_a_home_nor_a_folder_for_logs(start_process, reserve_domain, connect, complaints,
                                                           changes):
     domain_id = reserve_domain()
-    process = start_process([sys.executable, '-m', 'adu_drive.adu_node'], ROS_DOMAIN_ID=str(domain_id), **changes)
+    process = start_process([*NODE, 'adu_node'], ROS_DOMAIN_ID=str(domain_id), **changes)
     client = connect(domain_id)
     client.until(lambda: client.node.count_publishers('diagnostics'))
     process.send_signal(signal.SIGTERM)

@@ -13,13 +13,12 @@ import socket
 import ssl
 import statistics
 import subprocess
-import sys
 import time
 import urllib.parse
 
 import limited
 import pytest
-from shared import PATIENCE, PEDESTAL, begins_with, free_port
+from shared import NODE, PATIENCE, PEDESTAL, begins_with, free_port
 from tunnel import Tunnel
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect as connect_web_socket
@@ -182,7 +181,7 @@ def _resident(pid):
 @pytest.mark.thorough
 def test_a_busy_port_is_said_in_one_line(lone, run_process, one_line):
     _, site = lone
-    done = run_process([sys.executable, '-m', 'pedestal_operator.page_node', '--ros-args', '-p', f'port:={site.port}'],
+    done = run_process([*NODE, 'operator_page', '--ros-args', '-p', f'port:={site.port}'],
                        PATIENCE)
     assert done.returncode == 1 and 'in use' in one_line(done.stderr)
 

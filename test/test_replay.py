@@ -7,12 +7,11 @@ import pty
 import re
 import signal
 import subprocess
-import sys
 import termios
 import time
 
 import pytest
-from shared import PEDESTAL
+from shared import NODE, PEDESTAL
 
 from pedestal_common.graph import topics
 from pedestal_common.node import middleware
@@ -57,10 +56,10 @@ def sent(output):
 def acu_and_recorder(run, start_process, domain, tmp_path):
     """start(pacing) -> (acu, recorder of its answers) with the parameters of the run."""
     def start(pacing):
-        node = [sys.executable, '-m', 'acu_tracker.acu_node', '--ros-args', '--params-file',
+        node = [*NODE, 'acu_node', '--ros-args', '--params-file',
                 run.log / 'parameters.yaml', '-p', 'acu:graph.nodes:=acu,ins,adu,operator,recorder', '-p',
                 f'acu:graph.pacing:={pacing}']
-        recorder = [sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args', '-p',
+        recorder = [*NODE, 'recorder_node', '--ros-args', '-p',
                     f'bag:={tmp_path / "again"}', '-p', 'graph.nodes:=acu,recorder', '-p', f'graph.pacing:={pacing}']
         return [start_process(command, ROS_DOMAIN_ID=str(domain)) for command in (node, recorder)]
     return start
@@ -97,7 +96,7 @@ def test_a_live_acu_answers_as_it_did(pace, run, acu_and_recorder, run_process, 
 @pytest.mark.thorough
 def test_a_second_replay_begins_again(run, connect, start_process, run_process, domain):
     """The answers are the recorded answers each time."""
-    acu = start_process([sys.executable, '-m', 'acu_tracker.acu_node', '--ros-args', '--params-file',
+    acu = start_process([*NODE, 'acu_node', '--ros-args', '--params-file',
                          run.log / 'parameters.yaml', '-p', 'acu:graph.nodes:=acu,ins,adu,operator'],
                         ROS_DOMAIN_ID=str(domain))
     client = connect(domain)
@@ -118,7 +117,7 @@ def test_a_second_replay_begins_again(run, connect, start_process, run_process, 
 @pytest.mark.thorough
 def test_a_second_replay_into_the_drive_begins_again(run, connect, start_process, run_process, domain):
     """The drive waits longer than its deadline for the second replay."""
-    drive = start_process([sys.executable, '-m', 'adu_drive.adu_node', '--ros-args', '--params-file',
+    drive = start_process([*NODE, 'adu_node', '--ros-args', '--params-file',
                            run.log / 'parameters.yaml', '-p', 'adu:graph.deadline:=5.0'], ROS_DOMAIN_ID=str(domain))
     client = connect(domain)
     client.read('joint_states')
@@ -136,7 +135,7 @@ def test_a_second_replay_into_the_drive_begins_again(run, connect, start_process
 @pytest.mark.thorough
 def test_all_of_it_into_a_recorder_gives_the_same_file(run, start_process, run_process, domain, tmp_path,
                                                        complaints):
-    recorder = start_process([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args', '--params-file',
+    recorder = start_process([*NODE, 'recorder_node', '--ros-args', '--params-file',
                               run.log / 'parameters.yaml', '-p', f'recorder:bag:={tmp_path / "bag"}'],
                              ROS_DOMAIN_ID=str(domain))
     done = run_process([*PEDESTAL, 'replay', run.bag, '--rate', '5'], 60.0, ROS_DOMAIN_ID=str(domain))

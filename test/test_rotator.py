@@ -4,12 +4,11 @@ import pathlib
 import shutil
 import signal
 import subprocess
-import sys
 import time
 
 import numpy as np
 import pytest
-from shared import PEDESTAL, free_port
+from shared import NODE, PEDESTAL, free_port
 
 from pedestal_common.wire import commands, messages
 
@@ -50,16 +49,16 @@ def station(device, start_process, connect, reserve_domain):
     """(Client, Device, smallest step [deg]) of a graph of control unit and rotator."""
     domain, (protocol, rotator) = reserve_domain(), device
     def start(module, changes):
-        start_process([sys.executable, '-m', module, '--ros-args', '--params-file', PARAMETERS,
+        start_process([*NODE, module, '--ros-args', '--params-file', PARAMETERS,
                        *(part for change in changes for part in ('-p', change))], ROS_DOMAIN_ID=str(domain))
 
     # The control unit is there first, and reports a silent drive until the rotator is there.
-    start('acu_tracker.acu_node', STEP_TRACK)
+    start('acu_node', STEP_TRACK)
     client = connect(domain, f'client_{domain}')
     for name in ('acu/mode', 'acu/command_result', 'diagnostics'):
         client.read(name)
     client.diagnosed('no joint_states', 60.0)
-    start('pedestal_hardware.rotator_node', (f'protocol:={protocol}', f'url:={rotator.url}'))
+    start('rotator_node', (f'protocol:={protocol}', f'url:={rotator.url}'))
     for name in ('adu/state', 'joint_states'):
         client.read(name)
     client.write('acu/command', 'acu/program_track')

@@ -10,11 +10,10 @@ import shutil
 import signal
 import socket
 import subprocess
-import sys
 import time
 
 import pytest
-from shared import begins_with, free_port
+from shared import NODE, begins_with, free_port
 
 from pedestal_common.wire import commands
 
@@ -90,7 +89,7 @@ def test_a_program_without_line_ends_is_answered(antenna):
 @pytest.mark.thorough
 def test_without_an_antenna_no_answer_is_a_position(start_process, complaints):
     """One line in the log for each kind of refusal, however often it happens."""
-    nodes = {name: start_process([sys.executable, '-m', f'pedestal_operator.{name}_node', '--ros-args', '-p',
+    nodes = {name: start_process([*NODE, f'{name}_node', '--ros-args', '-p',
                                   'port:=0']) for name in ('rotctld', 'easycomm')}
     ports = {name: int(begins_with(node, 1).removeprefix(f'{name}: 127.0.0.1:')) for name, node in nodes.items()}
     with connected(ports['rotctld']) as probe:
@@ -184,7 +183,7 @@ def server(request, antenna, start_process):
         yield request.param, port, '2'
         return
     port = free_port()
-    command = [sys.executable, '-m', 'pedestal_operator.easycomm_node', '--ros-args', '-p', f'port:={port}']
+    command = [*NODE, 'easycomm_node', '--ros-args', '-p', f'port:={port}']
     node = start_process(command, ROS_DOMAIN_ID=str(run.domain_id))
     with connected(port) as probe:
         client.until(lambda: ask(probe, 'AZ GS').startswith(b'AZ'), 60.0)
@@ -271,7 +270,7 @@ def test_easycomm_over_tcp_and_a_serial_device(antenna, start_process):
     """Hamlib's models 201, 202 and 204, and a pair of pseudo terminals in the place of a serial line."""
     run, client, _ = antenna
     port, (end, device) = free_port(), pty.openpty()
-    node = start_process([sys.executable, '-m', 'pedestal_operator.easycomm_node', '--ros-args', '-p', f'port:={port}',
+    node = start_process([*NODE, 'easycomm_node', '--ros-args', '-p', f'port:={port}',
                           '-p', f'device:={os.ttyname(device)}'], ROS_DOMAIN_ID=str(run.domain_id))
     connected(port).close()
     os.set_blocking(end, False)
@@ -318,7 +317,7 @@ def test_a_server_that_is_killed_serves_again_and_releases_the_control_of_its_cl
     with connected(port) as first:
         assert granted(first, 'P 20 40')
         [pid] = [int(process.name) for process in pathlib.Path('/proc').glob('[0-9]*')
-                 if {f'port:={port}', 'pedestal_operator.rotctld_node'} <= set(_arguments(process))]
+                 if {f'port:={port}', 'rotctld_node'} <= set(_arguments(process))]
         os.kill(pid, signal.SIGKILL)
         assert first.recv(10) == b''
     def accepts(line):

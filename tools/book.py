@@ -31,7 +31,7 @@ def parameter_page():
              'prints the same. The units are SI units and radians. A name that ends in `_deg` or `_dbhz` has this '
              'unit instead.']
     kinds = {node: parameters_of(node) for node in
-             ('scenario', *(node.name for node in nodes.NODES if node.module), 'beam_steering')}
+             ('scenario', *(node.name for node in nodes.NODES if node.program), 'beam_steering')}
     for node, kind in {**kinds, 'graph, of every node': GraphParameters}.items():
         values = parameters.defaults(kind)
         lines += ['', f'## {node}', '', '| parameter | default | range | unit | meaning |', '|---|---|---|---|---|']

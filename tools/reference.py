@@ -54,7 +54,7 @@ RATE_TEXTS = {'step': 'every step', 'once': 'once, latched or not', 'second': '1
 def node_table():
     """Return the table of the nodes: executable, function, and the equipment of a real antenna that the node stands
     for."""
-    rows = [(f'`{node.name}`', f'`{node.executable}` ({node.package})' if node.module else '', node.doc,
+    rows = [(f'`{node.name}`', f'`{node.executable}` ({node.package})' if node.program else '', node.doc,
              node.stands_for) for node in (*nodes.NODES, *nodes.HARDWARE_ROWS)]
     return TextTable(('node', 'executable (package)', 'function', 'stands for'), rows)
 

@@ -52,7 +52,7 @@ class Station:
         for node in names:
             with open(self._log_of(node), 'ab') as log:
                 self.processes[node] = subprocess.Popen(
-                    processes.command_line(node, self.scenario.row(node).module, self.file),
+                    processes.command_line(node, self.scenario.row(node).executable, self.file),
                     stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=self.environment, cwd=self.folder,
                     start_new_session=True)
 

@@ -20,6 +20,6 @@ setup(
     description='Antenna control unit: target estimators, modes, position loop and program track.',
     license='Apache-2.0',
     entry_points={'console_scripts': [
-        'acu_node = acu_tracker.acu_node:main',
+        'acu_node = pedestal_common.node.run:main',
     ]},
 )

@@ -20,7 +20,7 @@ setup(
                 'the laws of drive_law.',
     license='Apache-2.0',
     entry_points={'console_scripts': [
-        'adu_node = adu_drive.adu_node:main',
-        'beam_steering_node = adu_drive.beam_steering_node:main',
+        'adu_node = pedestal_common.node.run:main',
+        'beam_steering_node = pedestal_common.node.run:main',
     ]},
 )

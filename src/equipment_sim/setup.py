@@ -19,7 +19,7 @@ setup(
     description='Simulated equipment for pedestal_hardware: servo drives, samples of a front end, a rotator, an INS.',
     license='Apache-2.0',
     entry_points={'console_scripts': [
-        'iq_node = equipment_sim.iq.iq_node:main',
-        'simulated_drives_node = equipment_sim.drives.drives_node:main',
+        'iq_node = pedestal_common.node.run:main',
+        'simulated_drives_node = pedestal_common.node.run:main',
     ]},
 )

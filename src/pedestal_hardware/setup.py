@@ -20,10 +20,10 @@ setup(
     description='Servo drives, rotators, receivers and INS in place of simulated nodes.',
     license='Apache-2.0',
     entry_points={'console_scripts': [
-        'drive_node = pedestal_hardware.drive_node:main',
-        'ins_input_node = pedestal_hardware.ins.ins_input_node:main',
-        'level_receiver_node = pedestal_hardware.level.level_receiver_node:main',
-        'rotator_node = pedestal_hardware.rotator_node:main',
-        'monopulse_receiver_node = pedestal_hardware.monopulse.monopulse_receiver_node:main',
+        'drive_node = pedestal_common.node.run:main',
+        'ins_input_node = pedestal_common.node.run:main',
+        'level_receiver_node = pedestal_common.node.run:main',
+        'rotator_node = pedestal_common.node.run:main',
+        'monopulse_receiver_node = pedestal_common.node.run:main',
     ]},
 )

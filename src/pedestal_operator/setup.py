@@ -22,10 +22,10 @@ setup(
     description='Operation of the antenna by persons and other programs: console, page, rotator protocols.',
     license='Apache-2.0',
     entry_points={'console_scripts': [
-        'easycomm_node = pedestal_operator.easycomm_node:main',
-        'frames_node = pedestal_operator.frames_node:main',
-        'live_node = pedestal_operator.live_node:main',
-        'operator_page = pedestal_operator.page_node:main',
-        'rotctld_node = pedestal_operator.rotctld_node:main',
+        'easycomm_node = pedestal_common.node.run:main',
+        'frames_node = pedestal_common.node.run:main',
+        'live_node = pedestal_common.node.run:main',
+        'operator_page = pedestal_common.node.run:main',
+        'rotctld_node = pedestal_common.node.run:main',
     ]},
 )

@@ -19,6 +19,6 @@ setup(
     description='Records a graph as rosbag2 with MCAP; reads, verifies, recovers and exports recordings.',
     license='Apache-2.0',
     entry_points={'console_scripts': [
-        'recorder_node = pedestal_recording.recorder_node:main',
+        'recorder_node = pedestal_common.node.run:main',
     ]},
 )

@@ -19,7 +19,7 @@ setup(
     description='Wave-driven ship motion with its IMU, and the inertial navigation system that measures it.',
     license='Apache-2.0',
     entry_points={'console_scripts': [
-        'ship_motion_node = ship_motion_sim.ship_motion_node:main',
-        'ins_node = ship_motion_sim.ins_node:main',
+        'ship_motion_node = pedestal_common.node.run:main',
+        'ins_node = pedestal_common.node.run:main',
     ]},
 )

@@ -20,6 +20,6 @@ setup(
                 'sees them.',
     license='Apache-2.0',
     entry_points={'console_scripts': [
-        'tracking_receiver_node = tracking_receiver_sim.tracking_receiver_node:main',
+        'tracking_receiver_node = pedestal_common.node.run:main',
     ]},
 )

@@ -1,20 +1,11 @@
 """ROS node of an electronically steered array: it runs a unit for each beam, whose law is
 `array.electronic_beam.step`."""
-import pedestal_common.entry  # noqa: F401  # first, for signals during the other imports
-
-# isort: split
-import sys
-
 from drive_law.timekeeper_node import Timekeeper, unit_of
-from pedestal_common.node import shell
 from pedestal_common.node.unit import Diagnosis
 
 
 class BeamSteeringNode(Timekeeper):
     """Node with a unit for each beam and common diagnostics. A port is a unit with its topics."""
-
-    def __init__(self) -> None:
-        super().__init__('adu_drive.beam_steering_node')
 
     def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of all beams: their angles, the common state, level and message of the worst beam."""
@@ -26,12 +17,3 @@ class BeamSteeringNode(Timekeeper):
         # The message names the command topic of the worst beam.
         command = unit_of(port).COMMAND
         return Diagnosis(worst.level, worst.message.replace(command, port.named(command)), values + state)
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node to its end. Return the exit code."""
-    return shell.main(BeamSteeringNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

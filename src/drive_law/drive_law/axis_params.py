@@ -131,15 +131,10 @@ class StructureParameters(Parameters):
 class FrictionParameters(Parameters):
     """LuGre friction of the load bearing."""
     coulomb: float = parameter(60.0, 0.01, 1e5, 'Nm', 'sliding friction')
-    breakaway: float = parameter(80.0, 0.01, 1e5, 'Nm', 'static friction')
+    breakaway: float = parameter(80.0, 0.01, 1e5, 'Nm', 'static friction', must_be='at least coulomb')
     stribeck_rate: float = parameter(2e-3, 1e-5, 1.0, 'rad/s', 'rate at which the static part has fallen to 1 / e')
     stiffness: float = parameter(2e5, 1.0, 1e9, 'Nm/rad', 'stiffness of the bristles')
     damping: float = parameter(400.0, 0.0, 1e6, 'Nms/rad', 'damping of the bristles')
-
-    def check(self) -> None:
-        """Raise ParameterError if static friction is below sliding friction."""
-        if self.breakaway < self.coulomb:
-            raise ParameterError(f'breakaway = {self.breakaway:g} Nm: must be at least coulomb = {self.coulomb:g}')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -148,7 +143,8 @@ class LimitParameters(Parameters):
     rate: float = parameter(2.45, 0.01, 20.0, 'rad/s', 'largest rate command')
     deceleration: float = parameter(20.0, 0.01, 500.0, 'rad/s2', 'for the controlled stop and at the end of travel')
     lower: float = parameter(math.radians(-270.0), -20.0, 20.0, 'rad', 'lower end of the commanded travel')
-    upper: float = parameter(math.radians(270.0), -20.0, 20.0, 'rad', 'upper end of the commanded travel')
+    upper: float = parameter(math.radians(270.0), -20.0, 20.0, 'rad', 'upper end of the commanded travel',
+                             must_be='above lower')
     approach: float = parameter(10.0, 0.5, 50.0, '1/s', 'ratio of rate to distance close to the end of travel')
     final: float = parameter(0.0, 0.0, 10.0, 'rad', 'distance from the end of travel to the final switch, which '
                              'removes the torque; 0: stopping distance from `rate`')
@@ -172,9 +168,7 @@ class LimitParameters(Parameters):
         return final, emergency, self.buffer or emergency + DEFAULT_BUFFER_MARGIN_RAD
 
     def check(self) -> None:
-        """Raise ParameterError for an empty travel, or a switch within the stopping distance."""
-        if self.upper <= self.lower:
-            raise ParameterError(f'upper = {self.upper:g} rad: must be above lower = {self.lower:g}')
+        """Raise ParameterError for a switch within the stopping distance."""
         final, emergency, buffer = self.switches
         if final < self.stopping_distance:
             raise ParameterError(f'final = {final:g} rad: must be at least {self.stopping_distance:.4g} rad, the '

@@ -3,6 +3,7 @@ restart."""
 from drive_law.params import AduNodeParameters
 from drive_law.rate_drive import PlantState, RateDrive, read_plant_state, write_plant_state
 from drive_law.timekeeper_node import Timekeeper
+from pedestal_common.graph.nodes import Node
 from pedestal_common.node import shell
 from pedestal_common.node.unit import LEVEL_WARN, Diagnosis
 
@@ -13,10 +14,10 @@ class RateDriveNode(Timekeeper):
     parameters: AduNodeParameters
     unit: RateDrive
 
-    def __init__(self, module: str) -> None:
+    def __init__(self, row: Node) -> None:
         self.unsaved = ''
         self.saved: PlantState | None = None
-        super().__init__(module)
+        super().__init__(row)
 
     def prepare(self, unit: shell.Unprepared) -> None:
         """Compile the laws, then resume the plant state in the state file."""

@@ -9,6 +9,7 @@ from typing import Protocol, cast
 from rclpy.executors import Executor
 
 from drive_law.params import RunParameters
+from pedestal_common.graph.nodes import Node
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.node import unit_node
 from pedestal_common.node.unit import Diagnosis, Unit
@@ -59,8 +60,8 @@ class Timekeeper(unit_node.UnitNode):
     PRECEDENCE = 1
     """Priority above that of the other nodes, whose searches and predictions may take longer than a step."""
 
-    def __init__(self, module: str) -> None:
-        super().__init__(module, serves_beams=True)
+    def __init__(self, row: Node) -> None:
+        super().__init__(row, serves_beams=True)
 
     def begin(self) -> None:
         """Begin the steps, which define the time of the graph."""

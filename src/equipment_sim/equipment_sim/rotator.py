@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from pedestal_common.quantities import Seconds
-from pedestal_common.stream.splitter import Splitter
+from pedestal_common.stream import Splitter
 from pedestal_hardware.rotator.protocols import Rot2prog
 
 PULSES_PER_DEG = Rot2prog.PULSES_PER_DEG

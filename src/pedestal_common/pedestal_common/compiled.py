@@ -1,8 +1,5 @@
-"""Decorators that compile every law.
-
-The arithmetic is strict IEEE 754 (no fastmath): a law gives the same bits wherever it is inlined. A study, a node and
-a recomputed bag therefore agree exactly, and NaN keeps its meaning on the topics.
-"""
+"""Decorators that compile every law. The arithmetic is strict IEEE 754 (no fastmath): a law gives the same bits
+wherever it is inlined, so study, node and recomputed bag agree exactly, and NaN keeps its meaning on the topics."""
 from collections.abc import Callable
 from typing import Protocol, TypeVar, cast
 
@@ -41,26 +38,21 @@ def compiled(law: _F) -> _F:
 
 
 def separate(law: _F) -> _F:
-    """Compile a large law into machine code of its own, as decorator. The laws that call it do not contain it.
-
-    After an edit of the law its callers are not compiled again, and laws that share it contain it once.
-    """
+    """Compile a large law into machine code of its own, as decorator. After an edit of the law its callers are not
+    compiled again, and laws that share it contain it once."""
     return _law(law, separate=True)
 
 
 def inlined(law: _F) -> _F:
-    """Compile a small law as `compiled` does, and inline it into its callers, as decorator.
-
-    A loop over the lanes of the drive (trials that are computed together) becomes vector instructions only if its laws
-    are inlined. A bank of filters is also faster.
-    """
+    """Compile a small law as `compiled` does, and inline it into its callers, as decorator. Loops over the lanes of
+    the drive become vector instructions only if their laws are inlined; a bank of filters is faster too."""
     return _law(law, forceinline=True)
 
 
 @compiled
 def assign(target: Pairs, source: Pairs) -> None:
-    """Copy the array source into target, both (n, m). This replaces `target[:] = source`, because numba takes three
-    seconds to compile numpy's check of the shapes."""
+    """Copy the array source into target. This replaces `target[:] = source`, because numba takes three seconds to
+    compile numpy's check of the shapes."""
     for i in range(target.shape[0]):
         for j in range(target.shape[1]):
             target[i, j] = source[i, j]

@@ -9,9 +9,9 @@ from pedestal_common.quantities import Seconds
 def fhan(x1: float, x2: float, r: float, h0: Seconds) -> float:
     """Return the acceleration u, between -r and r, that brings x1'' = u to rest at x1 = 0 in the shortest time.
 
-    x1: error, in any unit; x2: its rate [unit/s]; r: largest acceleration [unit/s2]; h0: time that sets the size
-    of a linear zone. In this zone, which u = r crosses within h0, u is a linear function of x1 and x2. This avoids
-    chattering. The formula, with the names d, a0, y and a, is that of Han (2009).
+    x1: error, in any unit; x2: its rate; h0: time that sets the size of a zone in which u is linear in x1 and x2, and
+    which u = r crosses within h0. This avoids chattering. The formula, with the names d, a0, y and a, is that of Han
+    (2009).
     """
     d = r * h0 * h0
     a0 = h0 * x2

@@ -1,8 +1,7 @@
 """Stop of a process by an exception in the handler of a signal, also where Python would ignore the exception.
 
-Python ignores every exception in a destructor, and in a callback of a weak reference or of a C library. The work would
-go on, with a traceback on stderr. Numba runs many such destructors and callbacks while it compiles. Therefore a timer
-sends SIGALRM a little later, and the handler of SIGALRM raises the exception again.
+Python ignores every exception in a destructor, and in a callback of a weak reference or of a C library. Numba runs
+many of these while it compiles. Therefore a timer sends SIGALRM a little later, whose handler raises it again.
 """
 import signal
 import sys
@@ -16,10 +15,7 @@ be ignored and would lose the code, so that the law could not be loaded."""
 
 
 def raise_stop(stop: type[BaseException], frame: types.FrameType | None) -> None:
-    """Raise the exception `stop`, or raise it a little later if LLVM makes machine code now.
-
-    frame: second argument of the handler of a signal.
-    """
+    """Raise the exception `stop`, or raise it a little later if LLVM makes machine code now."""
     while frame is not None:
         if frame.f_code.co_name in _HOOKS:
             _stop_later()
@@ -29,10 +25,7 @@ def raise_stop(stop: type[BaseException], frame: types.FrameType | None) -> None
 
 
 def retry(stop: type[BaseException]) -> None:
-    """Let SIGALRM follow whenever Python ignores the exception `stop`. The handler of SIGALRM must raise it again.
-
-    Any other ignored exception is reported as Python does.
-    """
+    """Let SIGALRM, whose handler must raise it again, follow whenever Python ignores the exception `stop`."""
     def on_unraisable(unraisable: 'sys.UnraisableHookArgs') -> None:
         if issubclass(unraisable.exc_type, stop):
             _stop_later()
@@ -42,5 +35,4 @@ def retry(stop: type[BaseException]) -> None:
 
 
 def _stop_later() -> None:
-    """Start a timer that sends SIGALRM to this process."""
     signal.setitimer(signal.ITIMER_REAL, STOP_RETRY_S)

@@ -1,10 +1,10 @@
 """Compiler of the laws, which the decorator `compiled` uses in place of numba's own dispatcher.
 
-A law that only other laws call is translated to LLVM's intermediate code, and no more. A law that Python calls
-becomes an executable: machine code of this law with all the laws that it calls. A separate law is an executable of its
-own. Its callers contain a call of its machine code, so that an edit of it does not compile its callers again. Numba
-itself makes machine code and a wrapper for Python of each function, and optimises the function again in each of its
-callers. Because Python calls only ten of 500 laws, this would double the time of compilation.
+A law that only other laws call is translated to LLVM's intermediate code, and no more. A law that Python calls becomes
+an executable: machine code of this law with all the laws that it calls. A separate law is an executable of its own,
+which its callers call, so that an edit of it does not compile them again. Numba itself makes machine code and a
+wrapper for Python of each function, and optimises it again in each of its callers. Because Python calls only ten of
+500 laws, this would double the time of compilation.
 
 Each symbol in the machine code contains the key of its law (law_key), or the name of a separate law. Nothing that is
 loaded can therefore be taken for something else, whatever was loaded before.
@@ -42,8 +42,7 @@ Types: TypeAlias = tuple[types.Type, ...]       # of the arguments of a law
 
 
 class _Translation(JITCodeLibrary):
-    """Translation: LLVM code of one Law for arguments of the types `args`, not yet linked with the laws that it calls.
-    """
+    """LLVM code of one Law for arguments of the types `args`, not yet linked with the laws that it calls."""
     _shared_module: llvmlite.binding.ModuleRef | None       # with the laws that it calls
 
     def __init__(self, codegen: JITCPUCodegen, law: 'Law', args: Types) -> None:
@@ -52,7 +51,6 @@ class _Translation(JITCodeLibrary):
 
     @property
     def calls(self) -> list['_Translation']:
-        """Translations of the laws that this law calls."""
         return [library for library in self._linking_libraries if isinstance(library, _Translation)]
 
     @property
@@ -73,16 +71,15 @@ class _Translation(JITCodeLibrary):
         return self._final_module
 
     def add_llvm_module(self, ll_module: llvmlite.binding.ModuleRef) -> None:
-        """Add an LLVM module. Numba would also optimise each function here. This is left out, because the whole
-        executable is optimised later."""
+        """Add an LLVM module without numba's optimisation: the whole executable is optimised later."""
         self._final_module.link_in(ll_module)
 
     def finalize(self) -> None:
         """Complete the code of this law with the functions of numba's libraries that it calls.
 
         Numba numbers its own functions in the order of their use, so two processes give different functions the same
-        symbol. The functions of numba are therefore internal to this module. Otherwise the linker would take the
-        function of another translation for them.
+        symbol. They are therefore internal to this module: the linker would else take that of another translation for
+        them.
         """
         own = {function.name for function in self._final_module.functions if not function.is_declaration}
         for library in self._linking_libraries:
@@ -113,11 +110,8 @@ class _Translation(JITCodeLibrary):
 
 
 def _relink(module: llvmlite.binding.ModuleRef, before: llvmlite.binding.Linkage, after: str) -> None:
-    """Give the linkage `after` to the functions of an LLVM module that have the linkage `before`.
-
-    With weak_odr the linker keeps one of several equal functions. With linkonce_odr it also drops a function that has
-    been inlined everywhere.
-    """
+    """Give another linkage to functions. With weak_odr the linker keeps one of several equal functions; with
+    linkonce_odr it also drops a function that has been inlined everywhere."""
     for function in module.functions:
         if not function.is_declaration and function.linkage == before:
             function.linkage = after
@@ -132,11 +126,8 @@ class _Arguments(tuple[types.Type, ...]):
 
 
 class _Compiler(compiler.Compiler):
-    """Numba's compiler, which gives a law the same symbol (name in the machine code) in every process.
-
-    A process can therefore use the translation that another process has cached. Numba's own symbols number the laws
-    and the types of records in the order of their use, which differs from process to process.
-    """
+    """Numba's compiler, which gives a law the same symbol in every process, so that a process can use the translation
+    that another has cached. Numba's own symbols number laws and types of records in the order of their use."""
 
     def __init__(self, *arguments: object) -> None:
         super().__init__(*arguments)
@@ -156,7 +147,6 @@ def _symbol(name: str, types: Types, *, abi_tags: tuple[str, ...] = (), uid: int
 
 
 def _named(module: str, name: str) -> object:
-    """Return what has a qualified name in a module; None if there is none."""
     try:
         return functools.reduce(getattr, name.split('.'), importlib.import_module(module))
     except (ImportError, AttributeError):
@@ -164,10 +154,8 @@ def _named(module: str, name: str) -> object:
 
 
 def _has_names(kind: types.Type) -> bool:
-    """Return True if another process finds the classes of a numba type by their names.
-
-    The class of a named tuple that has no name in its module would be another one after it is loaded.
-    """
+    """Return True if another process finds the classes of a numba type by their names. The class of a named tuple that
+    has no name in its module would be another one after it is loaded."""
     of = getattr(kind, 'instance_class', None)
     members: Iterable[types.Type] = kind if isinstance(kind, types.BaseTuple) else ()
     return (of is None or _named(of.__module__, of.__qualname__) is of) and all(map(_has_names, members))
@@ -189,8 +177,8 @@ class _Call(NamedTuple):
 
 
 def _calls(translations: list[_Translation]) -> list[_Call] | None:
-    """Return the calls of the laws with these translations; None if another process cannot find one of these laws, or
-    of its types, by its name. A law that is made inside a function has none."""
+    """Return the calls of the laws with these translations; None if another process cannot find a law or a type by its
+    name. A law that is made inside a function has none."""
     calls = [_Call(part.law.py_func.__module__, part.law.py_func.__qualname__,
                    '' if part.law.separate else part.law.key, part.args,
                    part.law.translation(part.args).signature.return_type) for part in translations]
@@ -216,14 +204,12 @@ class _KeptTranslation(NamedTuple):
 
 
 class _KeptExecutable(NamedTuple):
-    """Cached form of an executable."""
     separate: list[_Call]       # separate laws whose machine code it calls
     compiled: tuple[object, ...]    # numba's own form of a CompileResult
 
 
 class _LawType(types.Dispatcher):
-    """Numba's type of a Law in compiled code. There a Law is a constant without a value, because code with the value
-    could not be cached."""
+    """Numba's type of a Law in compiled code, a constant without a value: code with the value could not be cached."""
 
 
 register_model(_LawType)(OpaqueModel)
@@ -242,8 +228,8 @@ _SEPARATE: dict[str, 'Law'] = {}
 class Law(CPUDispatcher):
     """Compiled law: a numba dispatcher, which translates the law once for each set of argument types (overload).
 
-    An overload becomes an executable only when Python calls it, or when the law is separate. Translations and
-    executables are cached. separate: True if the law is not contained in the machine code of its callers.
+    An overload becomes an executable only when Python calls it, or when the law is separate: not contained in the
+    machine code of its callers.
     """
 
     def __init__(self, *arguments: object, separate: bool = False, **keywords: object) -> None:
@@ -270,16 +256,13 @@ class Law(CPUDispatcher):
         return law_key.of_law(self)
 
     def symbol(self, args: Types) -> str:
-        """Return a digest that becomes part of the symbol of this law for arguments of these types.
-
-        The symbol of a separate law outlives a change of the law, because the machine code of its callers contains it.
-        """
+        """Return a digest that becomes part of the symbol of this law. That of a separate law outlives a change of the
+        law, because the machine code of its callers contains it."""
         stands_for = self._name if self.goes_by_name else self.key
         return law_key.digest((stands_for, law_key.of_types(args)))
 
     def is_cached(self, *values: object) -> bool:
-        """Return True if the executable for arguments of the types of these values is in the law cache, with those of
-        the separate laws that it calls."""
+        """Return True if the executable for these values is in the law cache, with the separate laws that it calls."""
         return self._is_cached(tuple(map(self.typeof_pyval, values)))
 
     def _is_cached(self, args: Types) -> bool:
@@ -288,7 +271,6 @@ class Law(CPUDispatcher):
             (law := call.law) is not None and law._is_cached(call.args) for call in kept.separate)
 
     def _file(self, form: str, args: Types) -> pathlib.Path:
-        """Return the path of the file of a translation or an executable in the law cache."""
         return law_cache.file(self._name, _COMPILER, form, self.key, law_key.of_types(args))
 
     def get_call_template(self, args: Types,
@@ -311,10 +293,7 @@ class Law(CPUDispatcher):
         return self.executable(tuple(args)).entry_point
 
     def executable(self, args: Types) -> compiler.CompileResult:
-        """Return the CompileResult of the executable for arguments of these types.
-
-        If several processes need an executable that is not cached, one compiles it and the others wait.
-        """
+        """Return the CompileResult of the executable, which one process compiles while the others wait."""
         with global_compiler_lock:
             if args not in self.overloads:
                 path = self._file('executable', args)
@@ -331,7 +310,7 @@ class Law(CPUDispatcher):
             return self.overloads[args]
 
     def translation(self, args: Types) -> compiler.CompileResult:
-        """Return the CompileResult of the translation for arguments of these types, for calls from other laws."""
+        """Return the CompileResult of the translation, for calls from other laws."""
         if args not in self._translated:
             path = self._file('translation', args)
             made = self._load_translation(path, args)
@@ -347,7 +326,6 @@ class Law(CPUDispatcher):
         return self._translated[args]
 
     def _translate(self, args: Types) -> compiler.CompileResult:
-        """Return the CompileResult of a new translation for arguments of these types."""
         flags = compiler.Flags()
         self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
         flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
@@ -358,7 +336,6 @@ class Law(CPUDispatcher):
         return made
 
     def _load_translation(self, path: pathlib.Path, args: Types) -> compiler.CompileResult | None:
-        """Return the CompileResult of a cached translation; None where there is none that fits."""
         kept = law_cache.load(path)
         if not isinstance(kept, _KeptTranslation):
             return None
@@ -378,7 +355,6 @@ class Law(CPUDispatcher):
             lifted=(), fndesc=kept.fndesc, environment=kept.environment, metadata=None, reload_init=())
 
     def _make_executable(self, args: Types, path: pathlib.Path) -> compiler.CompileResult:
-        """Return the CompileResult of a new executable, and save it in the file of the law cache."""
         law = self.translation(args)
         separate = law.library.parts[1]
         for part in separate:
@@ -406,7 +382,6 @@ class Law(CPUDispatcher):
         return made
 
     def _load_executable(self, path: pathlib.Path) -> compiler.CompileResult | None:
-        """Return the CompileResult of a cached executable; None where there is none that fits."""
         kept = law_cache.load(path)
         if not isinstance(kept, _KeptExecutable):
             return None
@@ -420,8 +395,7 @@ class Law(CPUDispatcher):
         return compiler.CompileResult._rebuild(self.targetctx, *kept.compiled)
 
     def _link(self, args: Types) -> types.Type:
-        """Make the machine code of a separate law known to the executables that call it; return the type of its
-        result."""
+        """Make the code of a separate law known to the executables that call it; return the type of its result."""
         made = self.executable(args)
         name = made.fndesc.llvm_func_name
         llvmlite.binding.add_symbol(name, made.library.get_pointer_to_function(name))
@@ -430,8 +404,7 @@ class Law(CPUDispatcher):
 
 @contextlib.contextmanager
 def _garbage_kept() -> Iterator[None]:
-    """Switch Python's garbage collector off, as a context: it searches all objects of the compiler again and again,
-    and finds little."""
+    """Switch off the garbage collector, which searches all objects of the compiler and finds little."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -442,11 +415,8 @@ def _garbage_kept() -> Iterator[None]:
 
 
 def by_type(function: Callable[..., object], law_of: Callable[[types.Type], Law | None]) -> None:
-    """Let compiled code call `function`, which stands for a Law that depends on the type of its first argument.
-
-    law_of(type of the first argument) returns the Law, or None if the call does nothing. Numba's own function
-    `overload` is not used, because it would make an executable of each of these laws.
-    """
+    """Let compiled code call `function`, which stands for the Law that law_of(type of the first argument) returns, or
+    None for a call that does nothing. Numba's `overload` would make an executable of each of these laws."""
     law_key.template(function, law_of)
 
     @type_callable(function)

@@ -93,7 +93,6 @@ def save(path: pathlib.Path, content: object) -> None:
 
 @functools.cache
 def _report(reason: str) -> None:
-    """Write a line to stderr, once in a process for each reason."""
     print(f'the law cache {_ROOT} cannot be written ({reason}): each process compiles its laws', file=sys.stderr)
 
 

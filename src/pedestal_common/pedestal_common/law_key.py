@@ -4,9 +4,8 @@ The key is made of the functions and values in memory, which are those that the 
 edited while a process runs therefore cannot give new code the key of old code. Comments, docstrings, line numbers and
 the place of a file are not part of a key.
 
-The values of a law are found by names: every global name and every attribute name of its code, also those of other
-functions of the same name. A key thus depends on a little more than the law, which costs a needless compilation at
-most.
+The values of a law are found by the global and attribute names of its code, also those of other functions of the same
+name. A key thus depends on a little more than the law, which costs a needless compilation at most.
 """
 import enum
 import hashlib
@@ -36,11 +35,8 @@ def digest(parts: Iterable[str]) -> str:
 
 
 def of_law(law: CPUDispatcher, whole: bool = False) -> str:
-    """Return the key of a law (law.Law), which includes the laws that it calls and their values.
-
-    Of a separate law that it calls, only the name is part of the key: the law cache checks the type of its result.
-    whole: include the separate laws too.
-    """
+    """Return the key of a law (law.Law), with the laws that it calls and their values. Of a separate law only the name
+    is part of the key, unless `whole`: the law cache checks the type of its result."""
     found, todo = {}, [law]
     while todo:
         part = todo.pop()
@@ -57,10 +53,8 @@ def of_types(args: tuple[numba_types.Type, ...]) -> str:
 
 
 def template(function: Callable[..., object], *values: object) -> None:
-    """Mark a function that numba's `overload` or `type_callable` in its module lets laws call.
-
-    values: what chooses or makes the compiled code, in addition to the module of the function.
-    """
+    """Mark a function that numba's `overload` or `type_callable` lets laws call. values: what chooses or makes the
+    compiled code, in addition to the module of the function."""
     vars(function)['template_values'] = values
 
 
@@ -89,13 +83,11 @@ def _name(thing: Callable[..., object]) -> str:
 
 
 def _names(code: types.CodeType) -> set[str]:
-    """Return the names of globals and attributes in a code and in the functions within it."""
     return {*code.co_names, *(name for part in code.co_consts if isinstance(part, types.CodeType)
                               for name in _names(part))}
 
 
 def _of_code(code: types.CodeType, docstring: str | None = None) -> str:
-    """Return the text of a code without its docstring."""
     constants = [_of_code(part) if isinstance(part, types.CodeType) else
                  f'{type(part).__name__} {sorted(map(repr, part)) if isinstance(part, frozenset) else repr(part)}'
                  for part in code.co_consts]
@@ -145,7 +137,6 @@ class _Values:
         self._open: set[int] = set()      # ids of what is being described: a module may name itself
 
     def text(self, value: object) -> str:
-        """Return the text of a value."""
         if id(value) in self._open:
             return 'itself'
         self._open.add(id(value))

@@ -1,7 +1,5 @@
-"""Parameters of the nodes as frozen dataclasses: one declaration gives default, unit, range and description.
-
-node/shell.py declares these parameters in ROS and refuses wrong values. No ROS here.
-"""
+"""Parameters of the nodes as frozen dataclasses: one declaration gives default, unit, range and description. No ROS
+here."""
 import dataclasses
 import difflib
 import functools
@@ -17,19 +15,23 @@ Field: typing.TypeAlias = 'dataclasses.Field[Value]'     # one parameter of a da
 _N = typing.TypeVar('_N', bound=float)
 
 
+RELATIONS = {'below': operator.lt, 'above': operator.gt, 'at most': operator.le, 'at least': operator.ge}
+"""{words of an error: comparison of a field with another field}."""
+
+
 class ParameterError(ValueError):
     """Unknown parameter, or value outside its range; the message gives its name, its value and the allowed range."""
 
 
 def parameter(default: _N, low: float, high: float, unit: str, doc: str,
-              grid: tuple[float, float, int] | None = None) -> _N:
+              grid: tuple[float, float, int] | None = None, must_be: str = '') -> _N:
     """Declare a number (float or int, as annotated) between low and high inclusive.
 
-    grid: (lowest value, highest value, number of values) of the values at which `pedestal tune` begins its search for
-    the best value. The values are spaced evenly in the logarithm. None: the parameter is not tuned.
+    grid: (lowest, highest, number) of the values, evenly spaced in the logarithm, at which `pedestal tune` begins its
+    search; None: not tuned. must_be: relation to another field, one of RELATIONS and the field, as in 'below high'.
     """
     return dataclasses.field(default=default, metadata={'low': low, 'high': high, 'unit': unit, 'doc': doc,
-                                                        'grid': grid})
+                                                        'grid': grid, 'must_be': must_be})
 
 
 def choice(default: str, options: Iterable[str], doc: str) -> str:
@@ -54,25 +56,34 @@ def group(cls: 'type[_P]', **changes: 'Value') -> '_P':
 
 @dataclasses.dataclass(frozen=True)
 class Parameters:
-    """Base of every parameter dataclass; checks each field's range when it is made.
-
-    A subclass adds its checks between fields in `check`, which raises ParameterError.
-    """
+    """Base of every parameter dataclass; checks its fields when it is made, raising ParameterError."""
+    REALTIME_ONLY: typing.ClassVar[str] = ''    # reason why its node cannot run in lockstep, the end of the error
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             _check_field(field, field.name, getattr(self, field.name))
+        for field in dataclasses.fields(self):
+            if field.metadata.get('must_be'):
+                self._check_relation(field)
         self.check()
 
+    def _check_relation(self, field: Field) -> None:
+        relation, _, other = field.metadata['must_be'].rpartition(' ')
+        value, limit = getattr(self, field.name), getattr(self, other)
+        if not RELATIONS[relation](value, limit):
+            unit = f' {field.metadata["unit"]}'.rstrip()
+            raise ParameterError(f'{field.name} = {value:g}{unit}: must be {relation} {other} = {limit:g}{unit}')
+
     def check(self) -> None:
-        """Check fields that limit each other; overridden where there are any."""
+        """Check fields that limit each other; overridden where a `must_be` cannot state the relation."""
 
     def check_graph(self, beams: int, lockstep: bool) -> None:
-        """Raise ParameterError where parameters do not fit the graph; overridden where there are such parameters.
+        """Raise ParameterError where parameters do not fit a graph; overridden where there are such parameters.
 
-        beams: number of beams of an electronic array, 0 for a drive with motors; lockstep: True if the pacing of the
-        graph is lockstep.
+        beams: number of beams of an electronic array, 0 for a drive with motors.
         """
+        if lockstep and self.REALTIME_ONLY:
+            raise ParameterError(f'graph.pacing = lockstep: must be realtime{self.REALTIME_ONLY}')
 
 
 AnyParameters: typing.TypeAlias = typing.Any    # instance of a parameter class that the node determines
@@ -81,8 +92,7 @@ _F = typing.TypeVar('_F', bound=Callable[..., object])
 
 
 def _cached(function: _F) -> _F:
-    """Return functools.cache of a function, with the type of that function for mypy. The type of functools.cache would
-    refuse the class of a dataclass as an argument, which mypy takes for unhashable."""
+    """Return functools.cache of a function with its type: mypy takes the class of a dataclass for unhashable."""
     return typing.cast(_F, functools.cache(function))
 
 
@@ -97,8 +107,7 @@ _ROS_PREFIX = 'qos_overrides.'  # beginning of the names of further parameters t
 
 
 def without_ros(values: 'Mapping[str, Value]') -> 'dict[str, Value]':
-    """Return {dotted name: value} without the parameters of every ROS 2 node. Raises ParameterError for a value that
-    rclpy would refuse."""
+    """Return {dotted name: value} without the parameters of every ROS 2 node. Raises ParameterError as rclpy would."""
     own = {name: value for name, value in values.items() if name in RosParameters.__dataclass_fields__}
     if own:
         RosParameters(**own)
@@ -131,7 +140,6 @@ def _check_field(field: Field, name: str, value: object) -> None:
 
 @_cached
 def _group_type(field: Field) -> type[Parameters]:
-    """Return the dataclass of a group."""
     assert field.default_factory is not dataclasses.MISSING
     return type(field.default_factory())
 
@@ -148,7 +156,6 @@ def flatten(cls: type[Parameters], prefix: str = '') -> Iterator[tuple[str, Fiel
 
 @_cached
 def _default(cls: type[_P]) -> _P:
-    """Return an instance of a parameter dataclass with every default."""
     return cls()
 
 
@@ -180,20 +187,15 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def build(cls: type[_P], values: 'Mapping[str, Value]', prefix: str = '') -> _P:
-    """Return an instance with values {dotted name: value}. Every name begins with `prefix`. Other fields keep their
-    default.
-
-    Raises ParameterError for an unknown name (with the nearest known name) or a refused value.
-    """
+    """Return an instance with values {dotted name: value}, in which every name begins with `prefix`, and defaults.
+    Raises ParameterError for an unknown name (with the nearest known name) or a refused value."""
     _check_names(dict(flatten(cls, prefix)), values)
     return _replace(_default(cls), values, prefix)
 
 
 def check_each(cls: type[Parameters], values: 'Mapping[str, Value]') -> None:
     """Raise ParameterError for the first of {dotted name: value} that `build` would refuse whatever the others are.
-
-    Each value is checked alone. `Parameters.check`, which compares fields with each other, is not called.
-    """
+    Relations between fields are not checked."""
     known = dict(flatten(cls))
     _check_names(known, values)
     for name, value in values.items():
@@ -228,11 +230,8 @@ def _replace(instance: _P, values: 'Mapping[str, Value]', prefix: str) -> _P:
 
 @_cached
 def record_type(cls: type[Parameters]) -> 'DType':
-    """Return the type of the numpy record of a parameter dataclass.
-
-    A float becomes f8, an int or a bool i8, a choice i8 (its index among the options), and a group a nested record.
-    Other texts are left out.
-    """
+    """Return the type of the numpy record of a parameter dataclass. A float becomes f8; an int, a bool, or the index
+    of a choice i8; a group a nested record. Other texts are left out."""
     fields: list[tuple[str, str | DType]] = []
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
@@ -260,10 +259,8 @@ def _record_values(instance: Parameters, cls: type[Parameters]) -> tuple[object,
 
 
 def record(instance: Parameters, cls: type[Parameters] | None = None) -> 'Records':
-    """Return an instance as a record array of shape (1,), the form in which compiled laws read parameters.
-
-    cls: base class of the instance, whose fields alone are in the record; None: all fields of the instance.
-    """
+    """Return an instance as a record array of shape (1,), the form in which compiled laws read parameters. cls: base
+    class of the instance, whose fields alone are in the record."""
     cls = cls or type(instance)
     import numpy as np
     return np.array([_record_values(instance, cls)], record_type(cls))

@@ -1,9 +1,5 @@
 """Types of numbers and arrays: what a number means, its unit or its shape. numba and Python ignore both; a reader and
-mypy do not. The types at the end stand for data without a declared type.
-
-`Radians` is a float, `Pairs` is an array of floats of shape (n, 2). A shape such as `Vector3` also gives the size of
-an array in a record (record.Record).
-"""
+mypy do not. A shape such as `Vector3` also gives the size of an array in a record (record.Record)."""
 from collections.abc import Sequence
 from typing import Annotated, Any, TypeAlias, TypedDict, TypeVar
 

@@ -27,11 +27,8 @@ _SCALARS = {float: 'f8', int: 'i8', complex: 'c16'}
 
 
 class Record:
-    """Base of declared records. Each has the fields of its base class, then its own, in their order.
-
-    A subclass with the argument align=False has no bytes between its fields. One with open=True has no type of its
-    own: its subclasses declare the shape of a field.
-    """
+    """Base of declared records, with the fields of its base class first. align=False: no bytes between the fields;
+    open=True: no type of its own, because its subclasses declare the shape of a field."""
     dtype: ClassVar[DType]
 
     def __init_subclass__(cls, align: bool = True, open: bool = False) -> None:

@@ -1,11 +1,7 @@
-"""Array arithmetic with the same bits on every processor.
-
-The elementary functions are those of the C library. Matrix products and solutions have their operations in a fixed
-order.
+"""Array arithmetic with the same bits on every processor, by the C library and a fixed order of operations.
 
 The last digits of numpy's own sin and ** depend on the processor (AVX-512), and those of its matrix products on the
-BLAS library. A run would then not give the same bytes on another machine. The functions of this module are slow, and
-are therefore called only once, before the first step.
+BLAS library. These functions are slow, and are therefore called only once, before the first step.
 """
 import math
 
@@ -28,10 +24,7 @@ def geomspace(first: float, last: float, n: int) -> Floats:
 
 
 def solution(A: Floats | Complexes, b: Floats | Complexes) -> list[complex]:
-    """Return the solution x of A x = b, by Gauss's elimination with the largest pivot of each column.
-
-    A: (n, n), real or complex; b: (n,).
-    """
+    """Return the solution x of A x = b, A (n, n), by Gauss's elimination with the largest pivot of each column."""
     rows = [[*row, right] for row, right in zip(np.asarray(A).tolist(), np.asarray(b).tolist())]
     for i in range(len(rows)):
         pivot = max(range(i, len(rows)), key=lambda k: abs(rows[k][i]))

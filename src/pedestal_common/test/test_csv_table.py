@@ -7,7 +7,7 @@ import zipfile
 
 import pytest
 
-from pedestal_common.text_files import columns, content, csv_table
+from pedestal_common.text_files import columns, csv_table, files
 
 PLAIN = 'time_s,roll_deg,note\n0,1.25,a\n1,-2.5,b\n2,3.75,c\n'
 ROWS = [[0.0, 1.25], [1.0, -2.5], [2.0, 3.75]]
@@ -132,5 +132,5 @@ def test_names_above_the_rows_count(comment, names):
 
 
 def test_the_beginning_of_a_text():
-    assert content.beginning('ü<gpx'.encode('utf-16')) == 'ü<gpx'
-    assert content.beginning(b'\xef\xbb\xbfa\xfc') == 'a\ufffd'
+    assert files.beginning('ü<gpx'.encode('utf-16')) == 'ü<gpx'
+    assert files.beginning(b'\xef\xbb\xbfa\xfc') == 'a\ufffd'

@@ -1,5 +1,4 @@
 """The table of nodes: the graph of a drive, of one electronic beam, of several; what each row names exists."""
-import importlib
 
 import pytest
 
@@ -20,12 +19,12 @@ def test_every_topic_is_written_by_one_node_and_every_name_is_in_the_table_of_to
         assert node.answer in ('', *node.writes)
 
 
-@pytest.mark.parametrize('node', [node for node in (*nodes.NODES, nodes.ARRAY_DRIVE) if node.module],
-                         ids=lambda n: n.module)
+@pytest.mark.parametrize('node', [node for node in (*nodes.NODES, nodes.ARRAY_DRIVE) if node.program],
+                         ids=lambda n: n.program)
 def test_what_a_row_names_exists(node):
     pytest.importorskip('rclpy')
     pytest.importorskip(node.package)
-    assert callable(importlib.import_module(node.module).main)
+    assert callable(node.node_type())
     assert hasattr(node.parameters_type(), 'check')
     if node.unit:
         assert unit.Unit in node.unit_type().__mro__ and node.unit_type().NODE == node

@@ -4,11 +4,10 @@ from typing import Annotated
 
 import pytest
 
+from pedestal_common import ring, stream
 from pedestal_common.quantities import Ints
 from pedestal_common.record import Record
-from pedestal_common.stream import connection, ring
-from pedestal_common.stream.drops import REPORT_NS, Drops
-from pedestal_common.stream.splitter import Overlong, Splitter
+from pedestal_common.stream import REPORT_NS, Drops, Overlong, Splitter
 
 
 def test_frames_end_with_any_end_and_may_arrive_in_pieces():
@@ -29,7 +28,7 @@ def test_an_overlong_frame_is_told_once_and_kept_out_of_memory(pieces):
     assert [isinstance(frame, Overlong) for frame in found] == [True, False] and found[1] == b'1'
 
 
-class Failing(connection.Connection):
+class Failing(stream.Connection):
     """A device that vanishes each time."""
 
     def __init__(self):
@@ -42,7 +41,7 @@ class Failing(connection.Connection):
 
 
 def test_a_connection_is_opened_again_until_its_end(monkeypatch):
-    monkeypatch.setattr(connection, 'RETRY_PERIOD_S', 0.01)
+    monkeypatch.setattr(stream, 'RETRY_PERIOD_S', 0.01)
     device = Failing()
     assert device.silence == 'device: not connected so far'
     device.end(1.0)             # before its start

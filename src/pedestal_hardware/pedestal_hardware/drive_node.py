@@ -1,16 +1,12 @@
 """ROS node of an antenna with four CiA 402 servo drives, in place of `adu_node`. A thread of the node commissions
 drives that have not been used yet or that return to the bus."""
-import pedestal_common.entry  # noqa: F401  # first, for signals during the other imports
-
-# isort: split
-import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from drive_law.rate_drive_node import RateDriveNode
-from pedestal_common.node import shell
+from pedestal_common.graph.nodes import Node
 from pedestal_common.node.unit import Diagnosis
 from pedestal_common.quantities import Message
 from pedestal_hardware import commissioning, errors
@@ -35,14 +31,14 @@ class DriveNode(StartsWithEquipment, RateDriveNode):
     parameters: ServoDriveParameters
     unit: ServoDrives
 
-    def __init__(self) -> None:
+    def __init__(self, row: Node) -> None:
         self.recommission: set[int] = set()     # drives that the thread commissions again, because of a reset
         self.changed, self.ending = threading.Event(), False
         self.bus: CanopenBus | None = None
         self.commissioning: threading.Thread | None = None
         self.shown_errors: list[int] = []
         self.shown_problems: list[str] = []
-        super().__init__('pedestal_hardware.drive_node')
+        super().__init__(row)
 
     def begin(self) -> None:
         """Prepare the bus and the steps. The first step waits until all drives answer."""
@@ -163,12 +159,3 @@ class DriveNode(StartsWithEquipment, RateDriveNode):
         if self.commissioning is not None:
             self.commissioning.join(LEAVE_TIME_S)
         super().close()
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node to its end. Return the exit code."""
-    return shell.main(DriveNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

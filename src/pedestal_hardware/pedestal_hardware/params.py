@@ -95,6 +95,8 @@ class DrivesParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class ServoDriveParameters(AduNodeParameters):
     """Parameters of drive_node, and of the simulated drives. The simulated drives use those of the plant."""
+    REALTIME_ONLY = ' for servo drives'
+
     control: str = choice('velocity', CONTROLS, 'division of the control. velocity: the drives '
                           'contain the proportional part of the speed loops, this node the other parts; drive: the '
                           'drive of motor 1 contains the speed loop, and motor 2 follows its torque; torque: this '
@@ -136,9 +138,3 @@ class ServoDriveParameters(AduNodeParameters):
     def torque_mode(self, drive: int) -> bool:
         """Return True if a drive is in the mode of torque."""
         return self.control == 'torque' or self.control == 'drive' and drive % 2 == 1
-
-    def check_graph(self, beams: int, lockstep: bool) -> None:
-        """Raise ParameterError for lockstep, which real drives cannot follow."""
-        super().check_graph(beams, lockstep)
-        if lockstep:
-            raise ParameterError('graph.pacing = lockstep: must be realtime for servo drives')

@@ -1,18 +1,13 @@
 """ROS node of a rotator: a drive that takes set-points, by rotctld, GS-232, EasyComm or Rot2Prog.
 
 The node owns the time of its graph, which is a graph in realtime with the angles of an array (`graph.beams` 1). It
-runs the unit `rotator.unit.Rotator`; change the law in `rotator.set_point`. `entry` is imported first, so that a
-signal during the other imports ends the process without a message.
+runs the unit `rotator.unit.Rotator`; change the law in `rotator.set_point`.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
-import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from drive_law.timekeeper_node import Timekeeper
-from pedestal_common.node import shell
+from pedestal_common.graph.nodes import Node
 from pedestal_common.quantities import Nanoseconds
 from pedestal_common.wire.records import Decoded
 from pedestal_hardware.rotator.line import Line
@@ -27,9 +22,9 @@ class RotatorNode(Timekeeper):
     parameters: RotatorParameters
     unit: Rotator
 
-    def __init__(self) -> None:
+    def __init__(self, row: Node) -> None:
         self.line: Line | None = None
-        super().__init__('pedestal_hardware.rotator_node')
+        super().__init__(row)
 
     def begin(self) -> None:
         """Connect to the device and begin the steps."""
@@ -55,12 +50,3 @@ class RotatorNode(Timekeeper):
         if self.line is not None:
             self.line.close()
         super().close()
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node to its end. Return the exit code."""
-    return shell.main(RotatorNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -12,23 +12,22 @@ from pedestal_hardware.rotator.protocols import PROTOCOLS
 class TravelParameters(Parameters):
     """Range of one axis."""
     low: float = parameter(0.0, -720.0, 720.0, 'deg', 'lowest set-point that the device takes')
-    high: float = parameter(360.0, -720.0, 720.0, 'deg', 'highest set-point that the device takes')
-
-    def check(self) -> None:
-        """Raise ParameterError for an empty range."""
-        if not self.low < self.high:
-            raise ParameterError(f'high = {self.high:g} deg: must be above low = {self.low:g} deg')
+    high: float = parameter(360.0, -720.0, 720.0, 'deg', 'highest set-point that the device takes',
+                            must_be='above low')
 
 
 @dataclasses.dataclass(frozen=True)
 class RotatorParameters(RunParameters):
     """Parameters of rotator_node."""
+    REALTIME_ONLY = ', because the rotator has its own time'
+
     period: float = parameter(0.2, 0.05, 1.0, 's', 'step T: time between two measurements and two set-points')
     protocol: str = choice('rotctld', tuple(PROTOCOLS), 'protocol of the rotator')
     url: str = text('socket://127.0.0.1:4533', 'connection: socket://HOST:PORT, or the path of a serial device')
     baud_rate: int = parameter(0, 0, 1_000_000, 'Bd', 'speed of a serial device; 0: the usual speed of the protocol')
     answer_timeout: float = parameter(1.0, 0.05, 10.0, 's', 'longest wait for an answer of the device')
-    silence: float = parameter(3.0, 0.1, 60.0, 's', 'age of the last measurement from which the device is in fault')
+    silence: float = parameter(3.0, 0.1, 60.0, 's', 'age of the last measurement from which the device is in fault',
+                               must_be='above answer_timeout')
     resolution: float = parameter(0.0, 0.0, 5.0, 'deg', 'smallest step of a set-point; 0: that of the protocol')
     dead_band: float = parameter(0.1, 0.0, 20.0, 'deg', 'distance of the target from the last set-point from which a '
                                  'new one is sent')
@@ -56,9 +55,6 @@ class RotatorParameters(RunParameters):
         if self.resolution and self.resolution < finest:
             raise ParameterError(f'resolution = {self.resolution:g} deg: must be 0, or at least {finest:g} deg, the '
                                  f'resolution of {self.protocol}')
-        if self.silence <= self.answer_timeout:
-            raise ParameterError(f'silence = {self.silence:g} s: must be above answer_timeout = '
-                                 f'{self.answer_timeout:g} s')
         if self.protocol == 'rot2prog' and min(self.azimuth.low, self.elevation.low) < -360.0:
             raise ParameterError('azimuth.low, elevation.low: must be at least -360 deg, the range of rot2prog')
         if self.protocol == 'gs232' and min(self.azimuth.low, self.elevation.low) < 0.0:
@@ -66,8 +62,7 @@ class RotatorParameters(RunParameters):
 
     def check_graph(self, beams: int, lockstep: bool) -> None:
         """Raise ParameterError for a graph in lockstep, or for a graph of a drive with motors."""
-        if lockstep:
-            raise ParameterError('graph.pacing = lockstep: must be realtime, because the rotator has its own time')
+        super().check_graph(beams, lockstep)
         if beams != 1:
             raise ParameterError(f'graph.beams = {beams}: must be 1, because a rotator follows angles, as an array '
                                  'does')

@@ -9,8 +9,8 @@ import tty
 
 import pytest
 
+from pedestal_common import stream
 from pedestal_common.parameters import ParameterError, build
-from pedestal_common.stream import connection
 from pedestal_hardware.level.line_format import LineFormat
 from pedestal_hardware.level.unit import LevelReceiverParameters, LevelUnit
 from pedestal_hardware.lines import reader
@@ -199,7 +199,7 @@ def test_a_serial_device_that_vanishes_and_returns(tmp_path):
 
 def test_a_tcp_device_that_falls_silent_is_opened_again(monkeypatch):
     monkeypatch.setattr(reader, 'TCP_SILENCE_S', 0.3)
-    monkeypatch.setattr(connection, 'RETRY_PERIOD_S', 0.05)
+    monkeypatch.setattr(stream, 'RETRY_PERIOD_S', 0.05)
     with socket.create_server(('127.0.0.1', 0)) as server:
         kept = []
         threading.Thread(target=lambda: [kept.append(server.accept()) for _ in range(2)], daemon=True).start()

@@ -1,17 +1,11 @@
 """ROS node that serves the rotator protocol EasyComm over TCP and a serial device, for programs that track satellites.
 
 In the folder rotator, easycomm.py reads the lines and controller.py turns them into commands.
-
-The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
 import dataclasses
-import sys
 
 from pedestal_common import parameters
-from pedestal_common.node import shell
+from pedestal_common.graph.nodes import Node
 from pedestal_common.quantities import Degrees, Seconds
 from pedestal_operator.rotator import easycomm
 from pedestal_operator.rotator.controller import PendingRequest
@@ -45,8 +39,8 @@ class EasycommNode(ServerNode[EasycommClient]):
     """Server of EasyComm. A setting has no answer in this protocol, so the log and the status GS report a refusal."""
     parameters: EasycommParameters
 
-    def __init__(self) -> None:
-        super().__init__('easycomm', EasycommParameters, easycomm.MAX_LINE_BYTES, EasycommClient)
+    def __init__(self, row: Node) -> None:
+        super().__init__(row.name, EasycommParameters, easycomm.MAX_LINE_BYTES, EasycommClient)
 
     @property
     def device(self) -> str:
@@ -122,12 +116,3 @@ class EasycommNode(ServerNode[EasycommClient]):
             return easycomm.STATUS_ERROR
         moving = any(abs(rate) > 0.01 for rate in self.rates())
         return easycomm.STATUS_MOVING if moving else easycomm.STATUS_IDLE
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the server until it is stopped. args: of the command line, None for sys.argv."""
-    return shell.main(EasycommNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -1,17 +1,11 @@
 """ROS node for the viewer RViz: it publishes the model of the pedestal on `robot_description`, and its frames on `tf`.
 
 In the folder `viewers`, frames.py computes the frames, and the subfolder `files` contains the model.
-
-The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
-import sys
-
 from rclpy.qos import QoSProfile
 
 from pedestal_common import parameters
+from pedestal_common.graph.nodes import Node
 from pedestal_common.node import middleware, shell
 from pedestal_common.wire import messages
 from pedestal_operator.viewers import frames
@@ -25,8 +19,8 @@ class FramesNode(shell.Shell):
     """Publisher of the model at the start, and of the frames while tf has a subscriber, if tf2_msgs is installed."""
     awaits = 'its end'
 
-    def __init__(self) -> None:
-        super().__init__('frames', parameters.Parameters)
+    def __init__(self, row: Node) -> None:
+        super().__init__(row.name, parameters.Parameters)
         text = messages.String(data=frames.PEDESTAL_URDF)
         description = self.create_publisher(middleware.message_class(text.__msgtype__), 'robot_description',
                                             middleware.qos('change', 'written'))
@@ -48,12 +42,3 @@ class FramesNode(shell.Shell):
         if stamp != self._published_stamp:
             self._published_stamp = stamp
             self._tf.publish(messages.serialize(frames.tf_message(stamp, transforms)))
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node until it is stopped. args: of the command line, None for sys.argv."""
-    return shell.main(FramesNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -1,21 +1,15 @@
 """ROS node that serves the messages of the graph, byte by byte, to the viewers Foxglove and Lichtblick by WebSocket.
 
 In the folder viewers, on_demand.py subscribes to the topics that a viewer shows.
-
-The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
 import dataclasses
 import queue
-import sys
 from collections.abc import Mapping
 from types import ModuleType
 
 from pedestal_common import parameters
 from pedestal_common.graph import topics
-from pedestal_common.graph.nodes import Link
+from pedestal_common.graph.nodes import Link, Node
 from pedestal_common.node import shell
 from pedestal_common.quantities import Message, Nanoseconds
 from pedestal_common.wire import messages
@@ -111,8 +105,8 @@ class LiveNode(shell.Shell):
     parameters: LiveParameters
     _latched: dict[str, Outlet]     # {name of a channel whose last message every new viewer receives}
 
-    def __init__(self) -> None:
-        super().__init__('live', LiveParameters)
+    def __init__(self, row: Node) -> None:
+        super().__init__(row.name, LiveParameters)
         self._foxglove, p = sdk(), self.parameters
         self._topics = [TopicOutlet(self, link) for link in self.links.values()]
         self._latched = {outlet.channel.topic(): outlet for outlet in self._topics if outlet.latched}
@@ -153,12 +147,3 @@ class LiveNode(shell.Shell):
         """Close the server, then the node."""
         self._server.stop()
         super().close()
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the server until it is stopped. args: of the command line, None for sys.argv."""
-    return shell.main(LiveNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -2,17 +2,11 @@
 
 In the folder page, page_server.py serves the browsers, page_state.py makes the content, page_requests.py executes the
 commands.
-
-The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
 import collections
 import contextlib
 import dataclasses
 import socket
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 
@@ -22,7 +16,7 @@ from rclpy.client import Client
 from rclpy.task import Future
 
 from pedestal_common import parameters
-from pedestal_common.node import shell
+from pedestal_common.graph.nodes import Node
 from pedestal_common.quantities import Message, Seconds
 from pedestal_common.wire import commands
 from pedestal_operator.page import page_security, page_sky, page_state
@@ -55,8 +49,8 @@ class PageNode(Remote, page_state.PageAntenna):
     _parameter_requests: dict[str, tuple[Client | None, Future | None]]     # {node: client, pending request}
     _sent_log_revision: int | None
 
-    def __init__(self) -> None:
-        super().__init__('operator_page', 'page', parameters_type=PageParameters)
+    def __init__(self, row: Node) -> None:
+        super().__init__(row.name, 'page', parameters_type=PageParameters)
         self.path, self.configuration, self.log = None, {}, Log()
         self._history = collections.deque(maxlen=round(page_state.CHART_SPAN_S / page_state.CHART_PERIOD_S))
         self._beam_history, self._upcoming_passes = page_sky.BeamHistory(page_state.CHART_SPAN_S), UpcomingPasses()
@@ -165,12 +159,3 @@ class PageNode(Remote, page_state.PageAntenna):
         self._server.close()
         self._upcoming_passes.close()
         super().close()
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the server until it is stopped. args: of the command line, None for sys.argv."""
-    return shell.main(PageNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -1,18 +1,12 @@
 """ROS node that serves the rotator protocol of rotctld over TCP to gpredict and to other clients of Hamlib.
 
 In the folder rotator, rotctld.py reads the lines and controller.py turns them into commands.
-
-The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
 import dataclasses
-import sys
 from collections.abc import Sequence
 
 from pedestal_common import parameters
-from pedestal_common.node import shell
+from pedestal_common.graph.nodes import Node
 from pedestal_common.quantities import Seconds
 from pedestal_operator.rotator import pointing, rotctld
 from pedestal_operator.rotator.controller import PendingRequest
@@ -49,8 +43,8 @@ class RotctldNode(ServerNode[RotctldClient]):
     """Server of the rotctld protocol; it answers the lines of a client in order."""
     parameters: RotctldParameters
 
-    def __init__(self) -> None:
-        super().__init__('rotctld', RotctldParameters, rotctld.MAX_LINE_BYTES, RotctldClient)
+    def __init__(self, row: Node) -> None:
+        super().__init__(row.name, RotctldParameters, rotctld.MAX_LINE_BYTES, RotctldClient)
 
     def serve(self, client: RotctldClient, now: Seconds) -> None:
         """Answer the lines in order; one that commands the antenna, after the reply of the control unit."""
@@ -129,12 +123,3 @@ class RotctldNode(ServerNode[RotctldClient]):
         if request.name == 'dump_caps':
             return [('', f'Caps of the pedestal: azimuth {limits.azimuth}, elevation {limits.elevation} deg')]
         return rotctld.state(limits, bool(request.separator))
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the server until it is stopped. args: of the command line, None for sys.argv."""
-    return shell.main(RotctldNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -1,16 +1,10 @@
 """Recorder: the ROS node that records every topic of the graph in a bag, byte by byte, and reports each lost message.
 
 This module receives the messages, step_order.py puts them in order, and writer.py writes them.
-
-The module imports `entry` before anything else, so that a signal during the other imports ends the process cleanly.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
 import collections
-import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TypeAlias
 
 from rclpy.qos import HistoryPolicy
@@ -113,8 +107,8 @@ class RecorderNode(shell.Shell):
     In realtime the publish time of a message is the wall time of the publisher, and the log time is its stamp.
     """
 
-    def __init__(self) -> None:
-        super().__init__('recorder', RecorderParameters)
+    def __init__(self, row: nodes.Node) -> None:
+        super().__init__(row.name, RecorderParameters)
         names = self.graph.members
         if self.graph.lockstep and not names:
             raise parameters.ParameterError("graph.nodes = '': must name the nodes of the graph in lockstep")
@@ -385,12 +379,3 @@ class RecorderNode(shell.Shell):
             self._error = self._losses()
         if self._error is not None:
             raise GraphError(self._error)
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node to its end, and return the exit code."""
-    return shell.main(RecorderNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -7,7 +7,6 @@ import random
 import resource
 import signal
 import subprocess
-import sys
 import time
 
 import domains
@@ -19,6 +18,7 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 
 from pedestal_common.graph import nodes, topics  # noqa: E402
+from pedestal_common.node import run  # noqa: E402
 from pedestal_common.node.middleware import message_class  # noqa: E402
 from pedestal_common.wire import messages  # noqa: E402
 from pedestal_recording import bag  # noqa: E402
@@ -65,8 +65,8 @@ class Recorder:
     def __init__(self, directory, pacing, *arguments, nodes=NODES, **options):
         known = ('-p', f'graph.nodes:={",".join(nodes)}') if nodes else ()
         self.process = subprocess.Popen(
-            [sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args', '-p', f'bag:={directory}',
-             '-p', f'graph.pacing:={pacing}', *known, *arguments],
+            [*run.command('recorder_node'), '--ros-args', '-p', f'bag:={directory}', '-p', f'graph.pacing:={pacing}',
+             *known, *arguments],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
         self.started.append(self.process)
 

@@ -2,20 +2,15 @@
 
 The unit ship_unit.ShipMotion holds the law. To change the model of the ship or of its IMU, edit
 ship_motion_sim/ship_unit.py. This module adds the NMEA datagrams. They contain the true attitude, because they stand
-for an instrument of the ship whose errors are not modelled. `entry` is imported first because a signal during the
-other imports would end the process with a traceback.
+for an instrument of the ship whose errors are not modelled.
 """
-import pedestal_common.entry  # noqa: F401
-from pedestal_common.quantities import Nanoseconds
-
-# isort: split
 import socket
-import sys
 from collections.abc import Mapping
 
-from pedestal_common.node import shell, unit_node
+from pedestal_common.node import unit_node
 from pedestal_common.node.unit import LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.parameters import ParameterError
+from pedestal_common.quantities import Nanoseconds
 from pedestal_common.wire.records import Decoded
 from ship_motion_sim import nmea
 from ship_motion_sim.params import NmeaParameters, ShipMotionParameters
@@ -74,12 +69,3 @@ class ShipMotionNode(unit_node.UnitNode):
         if failure and diagnosis.level == LEVEL_OK:
             return diagnosis._replace(level=LEVEL_WARN, message=failure)
         return diagnosis
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node to its end; args: command line, None for sys.argv."""
-    return shell.main(lambda: ShipMotionNode('ship_motion_sim.ship_motion_node'), args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

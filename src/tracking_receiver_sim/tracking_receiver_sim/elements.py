@@ -14,7 +14,7 @@ from pedestal_common.geometry import omm, orbit
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import did_you_mean
-from pedestal_common.text_files import content, csv_table
+from pedestal_common.text_files import csv_table, files
 from pedestal_common.text_files.files import FilePath
 from tracking_receiver_sim.params import LeoPassParameters
 from tracking_receiver_sim.tracks import lines
@@ -61,7 +61,7 @@ def read(path: FilePath, name: str = '', when: datetime.datetime | None = None) 
     nearest to `when` (UTC), or the latest one."""
     try:
         with csv_table.stream(path) as stream:
-            beginning = content.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
+            beginning = files.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
         # history: sets of elements of the wanted satellite; others: number of sets of other satellites of this name.
         names, others = [], 0
         history: list[Satellite] = []
@@ -274,7 +274,7 @@ def _xml(path: FilePath) -> Iterator[Satellite]:
     """Yield the satellites of the segments of an OMM or NDM as XML; expat keeps no parsed data in memory."""
     try:
         with csv_table.stream(path) as stream:
-            parser = content.xml_parser(stream)
+            parser = files.xml_parser(stream)
             segments = _Segments(path, parser)
             while piece := stream.read(PARSE_CHUNK_BYTES):
                 parser.Parse(piece)

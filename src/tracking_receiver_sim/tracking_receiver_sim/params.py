@@ -75,17 +75,12 @@ class LeoPassParameters(Parameters):
     omm: str = text('', 'elements as a CCSDS OMM in JSON, instead of the TLE')
     start_time: str = text('', 'UTC of the start, ISO 8601; empty: the run is centred on a culmination; the kinds sun '
                            'and moon need it')
-    culmination_low_deg: float = parameter(30.0, 0.0, 90.0, 'deg', 'lowest culmination that the pass finder accepts')
+    culmination_low_deg: float = parameter(30.0, 0.0, 90.0, 'deg', 'lowest culmination that the pass finder accepts',
+                                           must_be='below culmination_high_deg')
     culmination_high_deg: float = parameter(70.0, 0.0, 90.0, 'deg', 'highest culmination that the pass finder accepts')
     search_days: float = parameter(3.0, 0.1, 30.0, 'd', 'length of the search for a pass, from the TLE epoch on')
     ut1_offset: float = parameter(0.0, -0.9, 0.9, 's', 'UT1 - UTC (IERS Bulletin A), which turns the earth further, '
                                   'also below sun and moon; a program track assumes 0')
-
-    def check(self) -> None:
-        """Raise ParameterError if the lower limit of the culmination is not below the upper limit."""
-        if self.culmination_low_deg >= self.culmination_high_deg:
-            raise ParameterError(f'culmination_low_deg = {self.culmination_low_deg:g} deg: must be below '
-                                 f'culmination_high_deg = {self.culmination_high_deg:g} deg')
 
 
 @dataclasses.dataclass(frozen=True)

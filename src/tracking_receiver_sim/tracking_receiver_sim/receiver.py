@@ -13,6 +13,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from pedestal_common import ring
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry import blockage
@@ -35,7 +36,6 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
-from pedestal_common.stream import ring
 from receiver_law import detector, smoothing
 from receiver_law.detector import Voltages, hertz
 from receiver_law.monopulse import channels, disk_channels

@@ -171,15 +171,10 @@ class TrackerParameters(Parameters):
     lock_count: int = parameter(100, 1, 100000, '', 'number of consecutive accepted errors before program hands over, '
                                 'and of consecutive plausible rates before rates are used')
     coast_after: float = parameter(0.1, 1e-3, 100.0, 's', 'time without an error after which autotrack coasts')
-    coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack ends')
+    coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack ends',
+                                  must_be='at least coast_after')
     handover: bool = flag(True, 'automatic hand-over from program to autotrack after lock')
     receiver: ReceiverModelParameters = group(ReceiverModelParameters)
     matrix: ErrorMatrixParameters = group(ErrorMatrixParameters)
     attitude: AttitudeModelParameters = group(AttitudeModelParameters)
     ukf: UkfParameters = group(UkfParameters)
-
-    def check(self) -> None:
-        """Raise ParameterError if autotrack would end before it coasts."""
-        if self.coast_time < self.coast_after:
-            raise ParameterError(f'coast_time = {self.coast_time:g} s: must be at least coast_after = '
-                                 f'{self.coast_after:g} s')

@@ -29,7 +29,7 @@ from acu_tracker.search.pattern import SEARCH_PATTERNS, Area, Point
 from acu_tracker.signals import Inputs
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
-from pedestal_common.parameters import ParameterError, Parameters, choice, parameter
+from pedestal_common.parameters import Parameters, choice, parameter
 from pedestal_common.quantities import DecibelHertz, Floats, Meters, Pair, Radians, Records, Seconds
 from pedestal_common.record import Record
 
@@ -43,17 +43,13 @@ class SearchParameters(Parameters):
 
     pattern: str = choice('spiral', SEARCH_PATTERNS, 'search path; square and raster lie along the track')
     wait: float = parameter(2.5, 0.0, 600.0, 's', 'time at the last place, in which the noise is learnt')
-    small: float = parameter(1.5, 0.1, 50.0, 'beamwidths', 'radius of the small area')
+    small: float = parameter(1.5, 0.1, 50.0, 'beamwidths', 'radius of the small area', must_be='at most full')
     full: float = parameter(5.0, 0.1, 200.0, 'beamwidths', 'radius of the full area')
     across: float = parameter(0.3, 0.0, 1.0, '', 'raster and sector: half width of the area over half its length')
     pitch: float = parameter(0.7, 0.1, 1.0, 'beamwidths', 'distance between neighbouring lines')
     speed: float = parameter(1.0, 0.01, 1.0, '', 'speed of the beam, in beamwidths per 4 time constants of the level')
     rounds: int = parameter(3, 1, 1000, '', 'number of rounds of both areas before the fallback mode')
 
-    def check(self) -> None:
-        """Raise ParameterError if the small area is larger than the full one."""
-        if self.small > self.full:
-            raise ParameterError(f'small = {self.small:g} beamwidths: must be at most full = {self.full:g}')
 
 
 ACQUISITION_PHASES = ('settle', 'look around', 'peak', 'check', 'checked', 'wrong slope')

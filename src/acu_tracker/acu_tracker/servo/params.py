@@ -82,7 +82,7 @@ class ShaperParameters(Parameters):
 class LimitsParameters(Parameters):
     """Limits of the axis. The rate command never exceeds them, and stops the axis before low and high."""
 
-    low: float = parameter(-1.5 * math.pi, -20.0, 20.0, 'rad', 'lowest encoder angle')
+    low: float = parameter(-1.5 * math.pi, -20.0, 20.0, 'rad', 'lowest encoder angle', must_be='below high')
     high: float = parameter(1.5 * math.pi, -20.0, 20.0, 'rad', 'highest encoder angle')
     rate: float = parameter(2.45, 1e-4, 100.0, 'rad/s', 'largest rate command')
     acceleration: float = parameter(40.0, 1e-4, 1e5, 'rad/s2', 'largest change of the rate command over time')
@@ -93,8 +93,3 @@ class LimitsParameters(Parameters):
     def deceleration(self) -> RadiansPerSecond2:
         """Deceleration with which the axis stops before low and high."""
         return self.braking or 0.5 * self.acceleration
-
-    def check(self) -> None:
-        """Raise ParameterError if low is not below high."""
-        if self.low >= self.high:
-            raise ParameterError(f'low = {self.low:g} rad: must be below high = {self.high:g} rad')

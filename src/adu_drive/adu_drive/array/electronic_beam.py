@@ -7,10 +7,10 @@ models the closed-loop period of that paper.
 from typing import Annotated
 
 from adu_drive.array.params import BEAM_RING_SIZE, check_delay
+from pedestal_common import ring
 from pedestal_common.compiled import compiled
 from pedestal_common.quantities import Bit, Floats, Ints, Nanoseconds, Pair, Radians, Records, Seconds
 from pedestal_common.record import Record
-from pedestal_common.stream import ring
 from pedestal_common.wire.records import NO_STAMP
 
 MAX_COMMAND_ANGLE_RAD = 1e3  # largest valid angle of a command [rad]; a command beyond it, infinite or NaN is ignored

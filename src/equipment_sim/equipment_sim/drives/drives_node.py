@@ -2,17 +2,13 @@
 
 A thread serves the bus. It advances drives and plant with the time, and publishes adu/truth at each SYNC.
 """
-import pedestal_common.entry  # noqa: F401  # first, for signals during the other imports
-
-# isort: split
-import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from equipment_sim.drives import law
 from equipment_sim.drives.unit import SimulatedDrives
-from pedestal_common.graph.nodes import DRIVE_NODE
-from pedestal_common.node import shell, unit_node
+from pedestal_common.graph.nodes import DRIVE_NODE, Node
+from pedestal_common.node import unit_node
 from pedestal_common.node.unit_node import Port
 from pedestal_common.quantities import Message
 from pedestal_common.wire import records
@@ -33,12 +29,12 @@ class DrivesNode(unit_node.UnitNode):
     PRECEDENCE = 2
     """Priority above that of the drive node, which waits for the reports of the drives in each step."""
 
-    def __init__(self) -> None:
+    def __init__(self, row: Node) -> None:
         self.lock = threading.Lock()        # held while the unit steps or takes a command
         self.ending = False
         self.newest: dict[str, records.Decoded] = {}
         self.served: threading.Thread | None = None
-        super().__init__('equipment_sim.drives.drives_node')
+        super().__init__(row)
 
     def begin(self) -> None:
         """Serve the bus."""
@@ -122,12 +118,3 @@ class DrivesNode(unit_node.UnitNode):
         if self.served is not None:
             self.served.join(1.0)
         super().close()
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node to its end. Return the exit code."""
-    return shell.main(DrivesNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

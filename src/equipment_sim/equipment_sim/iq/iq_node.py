@@ -1,19 +1,14 @@
 """ROS node of the simulated I/Q: sends the samples of all channels for each direction of the beam.
 
 The unit is unit.SimulatedIq. Before the first step the node sends noise, as a front end without a signal does.
-`entry` is imported first, so that a signal during the other imports ends the process without a message.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from equipment_sim.iq import sinks
 from equipment_sim.iq.unit import SimulatedIq
-from pedestal_common.graph.nodes import MONOPULSE_RECEIVER
+from pedestal_common.graph.nodes import MONOPULSE_RECEIVER, Node
 from pedestal_common.graph.steps import NS_PER_SECOND
-from pedestal_common.node import shell, unit_node
+from pedestal_common.node import unit_node
 from pedestal_common.quantities import Message, Nanoseconds
 from pedestal_common.wire import records
 from pedestal_hardware.monopulse.params import MonopulseParameters
@@ -28,11 +23,11 @@ class IqNode(unit_node.UnitNode):
     parameters: MonopulseParameters
     unit: SimulatedIq
 
-    def __init__(self) -> None:
+    def __init__(self, row: Node) -> None:
         self.sink: sinks.Sink | None = None
         self.sent: Nanoseconds | None = None    # UTC of the end of the samples that were sent
         self.number = 0                         # of the next sample
-        super().__init__('equipment_sim.iq.iq_node')
+        super().__init__(row)
 
     def begin(self) -> None:
         """Open the sink, and begin to follow the trigger."""
@@ -73,12 +68,3 @@ class IqNode(unit_node.UnitNode):
         if self.sink is not None:
             self.sink.close()
         super().close()
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node to its end. Return the exit code."""
-    return shell.main(IqNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -223,11 +223,11 @@ def _live(options: argparse.Namespace) -> int:
         for file in sorted(options.layouts.iterdir()):
             print(file)
         return 0
-    from pedestal_operator import live_node
+    from pedestal_common.node import run
     port = DEFAULT_LIVE_PORT if options.port is None else options.port
     print('layouts: pedestal live --layouts DIR; Ctrl-C ends the server', flush=True)
-    return live_node.main(['--ros-args', '--log-level', 'warn', '-p', f'port:={port}',
-                           '-p', f'graph.beams:={options.beams or 0}'])
+    return run.run('live_node', ['--ros-args', '--log-level', 'warn', '-p', f'port:={port}',
+                                 '-p', f'graph.beams:={options.beams or 0}'])
 
 
 def _add_program(parser: argparse.ArgumentParser) -> None:

@@ -31,16 +31,16 @@ def _drives(options: argparse.Namespace) -> int:
 
     from pedestal_bringup.scenario import scenario
     from pedestal_common.graph import nodes
+    from pedestal_common.node import run
     from pedestal_common.text_files import parameter_file
     changes = ['scenario.drives=simulated', *arguments.variant(options).overrides()]
     changes += [] if options.port is None else [f'adu.bus.port={options.port}']
     chosen = scenario.load(options.scenario or 'leo_pass', changes, pacing='realtime')
-    name = nodes.SIMULATED_DRIVES.name
-    from equipment_sim.drives import drives_node
+    row = nodes.SIMULATED_DRIVES
     with tempfile.NamedTemporaryFile('w', suffix='.yaml') as file:
-        file.write(parameter_file.text({name: {**chosen.given(name), 'graph.nodes': name}}))
+        file.write(parameter_file.text({row.name: {**chosen.given(row.name), 'graph.nodes': row.name}}))
         file.flush()
-        return drives_node.main(['--ros-args', '--params-file', file.name])
+        return run.run(row.executable, ['--ros-args', '--params-file', file.name])
 
 
 def _add_receiver(parser: argparse.ArgumentParser) -> None:

@@ -1,8 +1,5 @@
-"""Run of a scenario as a graph of nodes, from its files to its end, for `pedestal run`.
-
-The class processes.Graph makes a process for each node and holds it. The module `watch` then lets the held nodes
-begin, and watches them.
-"""
+"""Run of a scenario as a graph of nodes, from its files to its end, for `pedestal run`."""
+import itertools
 import pathlib
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
@@ -17,34 +14,21 @@ if TYPE_CHECKING:
     from pedestal_bringup.scenario.program import Plan
 
 
-def _free_bag(scenario: str) -> pathlib.Path:
-    """Return the path bags/runs/SCENARIO-N with the smallest N for which nothing exists there.
-
-    scenario: name of the scenario.
-    """
-    number = 1
-    while True:
-        bag = pathlib.Path('bags') / 'runs' / f'{scenario}-{number}'
-        if not bag.exists():
-            return bag
-        number += 1
-
-
 def new_bag(given: str, scenario: str) -> pathlib.Path:
-    """Return the folder for the recording: `given`, or bags/runs/SCENARIO-N if `given` is empty. scenario: name of the
-    scenario. Raises ValueError if the folder exists already."""
-    bag = pathlib.Path(given) if given else _free_bag(scenario)
+    """Return the folder of the recording: `given`, or the first bags/runs/SCENARIO-N that does not exist. Raises
+    ValueError if `given` exists."""
+    if not given:
+        return next(bag for number in itertools.count(1)
+                    if not (bag := pathlib.Path('bags') / 'runs' / f'{scenario}-{number}').exists())
+    bag = pathlib.Path(given)
     if bag.exists():
         raise ValueError(f'bag {bag} exists already; a recording is never overwritten')
     return bag
 
 
 def read_files(plan: 'Plan') -> tuple[list[str], dict[str, Message]]:
-    """Read the files of ship and target of a plan before any node is started.
-
-    Return (lines of text that announce the run to the user, {topic: program track}). Raises ValueError, OSError for an
-    invalid file.
-    """
+    """Read the files of ship and target of a plan. Return (lines that announce the run, {topic: program track}).
+    Raises ValueError, OSError for an invalid file."""
     return plan.announced(), plan.tracks
 
 
@@ -52,9 +36,9 @@ def run(plan: 'Plan', bag: pathlib.Path, progress: AbstractContextManager[Callab
         servers: Mapping[str, ServerProcess] | None = None) -> Outcome:
     """Run the scenario of a plan to its end, or until Ctrl-C, and return its Outcome.
 
-    bag: folder for the recording. progress: its function is called during the run with the time of the run. servers:
-    {name: process} beside the nodes. Raises RuntimeError if the run cannot continue. The recording up to that moment
-    stays readable. Raises GraphError if the domain of the user has another graph, see domain.of_run.
+    progress: its function is called with the time of the run. servers: {name: process} beside the nodes. Raises
+    RuntimeError if the run cannot continue; the recording up to that moment stays readable. Raises GraphError, see
+    domain.of_run.
     """
     _, tracks = read_files(plan)
     with domain.of_run(), Graph(plan.scenario, bag, servers) as graph:

@@ -1,5 +1,5 @@
-"""Arguments of the launch file pedestal.launch.py, and the functions that turn them into a scenario. This module does
-not import the ROS 2 package `launch`, because only a machine with ROS 2 has it."""
+"""Arguments of the launch file pedestal.launch.py, and the functions that turn them into a scenario. The ROS 2 package
+`launch` is not imported, because only a machine with ROS 2 has it."""
 import pathlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple, TypeVar
@@ -41,19 +41,14 @@ ARGUMENTS = (
 
 
 def misspelt_arguments(names: Iterable[str]) -> list[str]:
-    """Return a line on each of the given names that looks like a misspelt argument. Because launch accepts any name,
-    it reports no error itself."""
+    """Return a line on each name that looks like a misspelt argument: launch accepts any name."""
     known = [argument.name for argument in ARGUMENTS]
     return [f'no argument {name}:=;{meant}' for name in names
             if name not in known and (meant := parameters.did_you_mean(name, known))]
 
 
 def _number(given: Mapping[str, str], name: str, number_type: Callable[[str], _N], description: str) -> _N | None:
-    """Return the number of the argument `name`; None if its text is empty.
-
-    given: {argument: text}; description: of an allowed value, for the error. Raises
-    ValueError.
-    """
+    """Return the number of an argument, None for an empty text. Raises ValueError with the description of a number."""
     try:
         return number_type(given[name]) if given[name] else None
     except ValueError:
@@ -72,8 +67,7 @@ def load_scenario(given: Mapping[str, str]) -> scenario.Scenario:
 
 def servers(given: Mapping[str, str],
             chosen: scenario.Scenario) -> list[tuple[operator_servers.Server, dict[str, int]]]:
-    """Return [(server, its parameters)] of the requested servers. given: {argument: text}. Raises
-    ValueError, see operator_servers.check."""
+    """Return [(server, its parameters)] of the requested servers. Raises ValueError, see operator_servers.check."""
     ports = {name: _port(name, given[name]) for name in operator_servers.SERVERS if given[name].lower() != SERVER_OFF}
     operator_servers.check(ports, chosen.header, '{}:=')
     return [(operator_servers.SERVERS[name], {'graph.beams': chosen.header.graph_beams,
@@ -81,7 +75,6 @@ def servers(given: Mapping[str, str],
 
 
 def _port(name: str, text: str) -> int:
-    """Return the port of a server, 0 for a server without one. Raises ValueError."""
     default = operator_servers.SERVERS[name].port
     try:
         return default if text.lower() == SERVER_ON or not default else operator_servers.port(text)
@@ -90,8 +83,7 @@ def _port(name: str, text: str) -> int:
 
 
 def prepare(given: Mapping[str, str], chosen: scenario.Scenario) -> tuple[list[str], pathlib.Path, pathlib.Path]:
-    """Prepare the run of a scenario: in realtime compile its laws, then write its files to the folder of the
-    logs. given: {argument: text}.
+    """Prepare the run of a scenario: in realtime compile its laws, then write its files to the folder of the logs.
 
     Return (lines on the run, path of the ROS 2 parameter file of all nodes, path of the scenario file). Raises
     ValueError, RuntimeError.

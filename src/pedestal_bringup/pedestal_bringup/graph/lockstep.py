@@ -1,5 +1,5 @@
-"""Watch of a lockstep run by `pedestal run`. In lockstep every node is needed for the next step, so a node that dies
-or is silent ends the run. The error names this node."""
+"""Watch of a lockstep run by `pedestal run`. Every node is needed for the next step, so a node that dies or is silent
+ends the run. The error names this node."""
 import time
 from collections.abc import Callable, Mapping, Sequence
 
@@ -19,11 +19,8 @@ SELF_ENDING_NODES = (nodes.DRIVE_NODE, 'recorder')  # nodes that end by themselv
 
 def watch(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
           progress: Callable[[Seconds], object]) -> None:
-    """Watch the nodes from their start to their end.
-
-    tracks: {topic: program track}, sent once all nodes that read them are present; progress: function of the drive's
-    time. Raises RuntimeError.
-    """
+    """Watch the nodes from their start to their end. The program tracks {topic: message} are sent once all nodes that
+    read them are present. Raises RuntimeError."""
     header = graph.scenario.header
     sent = False
     executor = SingleThreadedExecutor()
@@ -52,13 +49,9 @@ def failure(graph: Graph, stuck_nodes: Callable[[list[str]], list[str]],
             without_diagnostics: str | None = None) -> RuntimeError:
     """Return the RuntimeError of a run in which a node has ended too early, or is without diagnostics for too long.
 
-    stuck_nodes: function that returns which of the named nodes do not answer a request. without_diagnostics: node
-    whose diagnostics are too old, or None.
-
     The error names the first node found in this order: a node killed by a signal, a stuck or accused node, a node that
-    ended. A node that ends because it waited in vain accuses the node that it waited for. The accused node may itself
-    wait for the stuck node. Once the drive has ended without error, all other nodes get a signal to end, so an end
-    with exit code 0 is then not too early.
+    ended. A node that ends because it waited in vain accuses the node that it waited for, which may itself wait for
+    the stuck node. Once the drive has ended without error, an end with exit code 0 is not too early.
     """
     time.sleep(ACCUSATION_TIME_S)
     ended = graph.ended()

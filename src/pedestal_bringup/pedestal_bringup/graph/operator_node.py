@@ -1,5 +1,5 @@
-"""Node `operator` inside the processes `pedestal run` and `pedestal program`: it sends the program tracks to the
-control units, and receives the diagnostics of the other nodes."""
+"""Node `operator` inside `pedestal run` and `pedestal program`: it sends the program tracks to the control units, and
+receives the diagnostics of the other nodes."""
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -18,11 +18,7 @@ SERVICE_TIMEOUT_S = 2.0  # time in which a node must answer a parameter service,
 
 
 class Operator(Shell):
-    """Node that sends the program tracks to a graph and receives the diagnostics of the graph.
-
-    beams   number of beams of an array, 0 for a drive with motors (as of nodes.links)
-    names   nodes whose diagnostics are used; others are ignored
-    """
+    """Node that sends the program tracks to a graph and receives the diagnostics of the nodes `names`."""
     on_diagnostics: Callable[[Message, Seconds], None]  # called with each DiagnosticStatus of these nodes and the
                                                         # monotonic time at which it arrived
     time: Seconds               # of the graph, by the newest diagnostics
@@ -45,12 +41,8 @@ class Operator(Shell):
             self._publish_by_topic[topic](messages.serialize(message))
 
     def send_to(self, names: Sequence[str], tracks: Mapping[str, Message]) -> bool:
-        """Publish the program tracks {topic: message} if all their subscribers are present. Return True if the tracks
-        are published.
-
-        names: nodes of the graph. Because a short run may end before a late recorder receives a track, this method
-        publishes nothing while a subscriber is missing.
-        """
+        """Publish the program tracks if all their subscribers are present, and return True then. Because a short run
+        may end before a late recorder receives a track, nothing is published while a subscriber is missing."""
         self._open_publishers(tracks)
         if any(self._missing(publisher, nodes.readers(link, names))
                for link, publisher in self.publishers_by_link.items()):
@@ -59,23 +51,21 @@ class Operator(Shell):
         return True
 
     def _open_publishers(self, names: Iterable[str]) -> None:
-        """Open a publisher for each of these topics, unless it is open."""
         for name in names:
             if name not in self._publish_by_topic:
                 self._publish_by_topic[name] = self.writer(name)
 
     def check_domain_free(self) -> None:
-        """Raise GraphError if nodes of another graph are on this ROS domain, because those nodes would receive the
-        messages of this graph."""
+        """Raise GraphError if nodes of another graph, which would receive the messages of this graph, are on this
+        domain."""
         deadline = time.monotonic() + DISCOVERY_TIME_S
         while time.monotonic() < deadline:
             names = self.get_node_names()
-            if names.count(self.name) > 1 or any(node.name in names for node in nodes.NODES if node.module):
+            if names.count(self.name) > 1 or any(node.name in names for node in nodes.NODES if node.program):
                 raise domain.another_graph(self.context.get_domain_id())
             time.sleep(0.02)
 
     def _note_diagnostics(self, array: Message) -> None:
-        """Take a DiagnosticArray: keep its time, and call on_diagnostics for each status of the watched nodes."""
         for status in array.status:
             if status.name in self._names:
                 self.time = max(self.time, messages.nanoseconds(array.header.stamp) * 1e-9)
@@ -88,17 +78,14 @@ class Operator(Shell):
         return last if last is not None and time.monotonic() - self.latest[last] > limit else None
 
     def stuck(self, names: Sequence[str], executor: Executor) -> list[str]:
-        """Return those of the named nodes that do not answer a request for parameters.
-
-        rclpy answers this request in the thread that also runs the steps of the node. A node without an answer is
-        therefore stuck in its code. executor: of this node.
-        """
+        """Return those of the named nodes that do not answer a request for parameters. A node answers it in the thread
+        that also runs the steps, so a node without an answer is stuck in its code."""
         answers = self._get_parameters(names, GetParameters.Request(), executor)
         return [node for node in names if node not in answers]
 
     def graph_start(self, node: str, executor: Executor) -> Nanoseconds:
-        """Return graph.start of a running node: the UTC at which its time is 0. executor: of this node. Raises
-        RuntimeError if the node does not answer."""
+        """Return graph.start of a running node, the UTC at which its time is 0. Raises RuntimeError without an answer.
+        """
         answers = self._get_parameters([node], GetParameters.Request(names=['graph.start']), executor)
         if node not in answers or not answers[node].values:
             domain_id = self.context.get_domain_id()
@@ -107,7 +94,6 @@ class Operator(Shell):
         return answers[node].values[0].integer_value
 
     def _get_parameters(self, names: Sequence[str], request: Message, executor: Executor) -> dict[str, Message]:
-        """Return {node: its answer to a GetParameters request} of the named nodes that answer in time."""
         clients = {node: self.create_client(GetParameters, f'{node}/get_parameters') for node in names}
         calls: dict[str, Future] = {}
         deadline = time.monotonic() + SERVICE_TIMEOUT_S

@@ -1,17 +1,15 @@
-"""Servers that connect other programs to the antenna: rotctld, EasyComm, the operator's page, Foxglove, RViz.
-
-`pedestal run` starts the requested servers beside a realtime run. Each server is a node of its own that uses only the
-topics of the graph.
-"""
+"""Servers that connect other programs to the antenna, which `pedestal run` starts beside a realtime run. Each server
+is a node of its own that uses only the topics of the graph."""
 import contextlib
 import importlib.util
-import sys
 import typing
 from collections.abc import Mapping
 
 from pedestal_bringup.graph.processes import ServerProcess
 from pedestal_bringup.scenario.header import ScenarioParameters
-from pedestal_common.stream.connection import listen
+from pedestal_common.graph import nodes
+from pedestal_common.node import run
+from pedestal_common.stream import listen
 from pedestal_operator.page.page_security import PAGE_ROLES
 
 SERVER_ADDRESS = '127.0.0.1'
@@ -20,8 +18,7 @@ SERVER_ADDRESS = '127.0.0.1'
 
 class Server(typing.NamedTuple):
     """Server, a row of SERVERS."""
-    module: str             # Python module of the node
-    executable: str         # name of the node's executable in ROS 2
+    executable: str         # of its node
     port: int               # default TCP port; 0: the server has none
     does: str               # task of the server, for the help texts
     first_lines: int = 1    # number of lines that it prints for the user when it begins to serve; each begins with
@@ -32,18 +29,18 @@ class Server(typing.NamedTuple):
     @property
     def package(self) -> str:
         """Name of the ROS package that contains the node."""
-        return self.module.partition('.')[0]
+        return nodes.EXECUTABLES[self.executable].package
 
 
-SERVERS = {'rotctld': Server('pedestal_operator.rotctld_node', 'rotctld_node', 4533,
+SERVERS = {'rotctld': Server('rotctld_node', 4533,
                              "serve the protocol of Hamlib's rotctld"),
-           'easycomm': Server('pedestal_operator.easycomm_node', 'easycomm_node', 4535,
+           'easycomm': Server('easycomm_node', 4535,
                               'serve EasyComm I, II and III'),
-           'page': Server('pedestal_operator.page_node', 'operator_page', 8080,
+           'page': Server('operator_page', 8080,
                           "serve the operator's page for a browser", first_lines=len(PAGE_ROLES)),
-           'foxglove': Server('pedestal_operator.live_node', 'live_node', 8765, 'serve every topic to Foxglove',
+           'foxglove': Server('live_node', 8765, 'serve every topic to Foxglove',
                               library='foxglove', extra='pedestal_operator[live]'),
-           'frames': Server('pedestal_operator.frames_node', 'frames_node', 0,
+           'frames': Server('frames_node', 0,
                             'publish robot_description and tf, for RViz')}
 
 
@@ -58,8 +55,7 @@ def port(text: str) -> int:
 def check(ports: Mapping[str, int], header: ScenarioParameters, option: str = '--{} ') -> None:
     """Raise ValueError if servers are requested in lockstep, if a library is missing, or if a port is in use.
 
-    ports: {name of the server: its port, 0 without one}; option: format of an option in
-    the error, '--{} ' for the command line or '{}:=' for a launch file.
+    ports: {name: port, 0 without one}; option: format of an option in the error, such as '{}:=' for a launch file.
     """
     with contextlib.ExitStack() as probes:
         for name, number in ports.items():
@@ -77,9 +73,9 @@ def check(ports: Mapping[str, int], header: ScenarioParameters, option: str = '-
 
 
 def processes(ports: Mapping[str, int], header: ScenarioParameters) -> dict[str, ServerProcess]:
-    """Return {name: process} of servers. ports: {name: TCP port, 0 without one}. Raises ValueError, see `check`."""
+    """Return {name: process} of servers {name: TCP port, 0 without one}. Raises ValueError, see `check`."""
     check(ports, header)
     return {name: ServerProcess(
-        [sys.executable, '-m', SERVERS[name].module, '--ros-args', '-p', f'graph.beams:={header.graph_beams}',
-         *(['-p', f'port:={number}'] if number else [])], SERVERS[name].first_lines)
+        run.command(SERVERS[name].executable, '--ros-args', '-p', f'graph.beams:={header.graph_beams}',
+                    *(['-p', f'port:={number}'] if number else [])), SERVERS[name].first_lines)
         for name, number in ports.items()}

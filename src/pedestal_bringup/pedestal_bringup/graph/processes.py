@@ -1,5 +1,5 @@
-"""Processes of the nodes of a run: `pedestal run` starts each node as its direct child with a log of its own, ends the
-nodes in order, and leaves none behind."""
+"""Processes of a run: `pedestal run` starts each node as its direct child with a log of its own, ends the nodes in
+order, and leaves none behind."""
 import contextlib
 import ctypes
 import functools
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from pedestal_bringup.graph.child import Child
 from pedestal_common.graph import nodes
+from pedestal_common.node import run
 from pedestal_common.quantities import Json
 
 if TYPE_CHECKING:
@@ -42,22 +43,20 @@ _libc = ctypes.CDLL(None)
 
 class ServerProcess(NamedTuple):
     """Process of a server beside the nodes (operator_servers)."""
-    command: list[str]      # interpreter, '-m', module, arguments ...
+    command: list[str]      # as run.command makes it
     first_lines: int        # number of lines that the server prints for the user when it begins to serve
 
 
-def command_line(node: str, module: str, file: pathlib.Path) -> list[str]:
-    """Return the command that starts a node with a parameter file. node: its name; the node beam_2/acu starts in the
-    namespace beam_2. module: its Python module; file: path of the parameter file."""
+def command_line(node: str, executable: str, file: pathlib.Path) -> list[str]:
+    """Return the command that starts a node with a parameter file, beam_2/acu in the namespace beam_2."""
     beam = nodes.beam_of(node)
-    return [sys.executable, '-m', module, '--ros-args', *(['-r', f'__ns:=/{beam}'] if beam else []),
-            '--params-file', str(file)]
+    return run.command(executable, '--ros-args', *(['-r', f'__ns:=/{beam}'] if beam else []), '--params-file',
+                       str(file))
 
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Ignore the signals that end `pedestal` in this context, which is the clean stop of the nodes. A second Ctrl-C
-    thus does not interrupt the stop."""
+    """Ignore the signals that end `pedestal` in this context, so that a second Ctrl-C does not interrupt the stop."""
     before = {number: signal.signal(number, signal.SIG_IGN)
               for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
@@ -67,9 +66,10 @@ def uninterrupted() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _load_laws(scenario: 'Scenario', node: str) -> None:
-    """Load the laws of a node from the law cache; do nothing if the cache lacks them."""
+def _load_node(scenario: 'Scenario', node: str) -> None:
+    """Import the class of a node, and load its laws if they are in the law cache."""
     from pedestal_common.compiled import is_compiled  # imported late, because only a run needs numba
+    scenario.row(node).node_type()
     if scenario.row(node).unit:
         unit = scenario.unit(node)
         if is_compiled(unit):
@@ -77,17 +77,15 @@ def _load_laws(scenario: 'Scenario', node: str) -> None:
 
 
 class Graph:
-    """Processes of the nodes and servers of one run, with their logs.
+    """Processes of the nodes and servers of one run, with their logs, as a context.
 
-    Use a Graph as a context. The nodes are held (child.Child) from the beginning of the context until `begin`. The end
-    of the context stops all processes that still run. No process outlives `pedestal run`, however `pedestal run` ends:
-    the kernel sends the processes SIGTERM, and the reaper, a process of its own, kills any node that ignores SIGTERM.
+    The nodes are held (child.Child) from its beginning until `begin`. Its end stops all processes that still run. No
+    process outlives `pedestal run`, however it ends: the kernel sends the processes SIGTERM, and the reaper, a process
+    of its own, kills any node that ignores SIGTERM.
 
-    The folder BAG.log beside the bag (attribute `log`) holds NODE.log for each process, parameters.yaml, and
-    NODE.state with the last angles of a drive. The logs and states of an earlier run of the same name are deleted.
-    Raises RuntimeError if the folder cannot be written.
-
-    bag: folder of the recording; servers: by name.
+    The folder BAG.log beside the bag holds NODE.log for each process, parameters.yaml, and NODE.state with the last
+    angles of a drive. Those of an earlier run of the same name are deleted. Raises RuntimeError if the folder cannot
+    be written.
     """
     log: pathlib.Path
 
@@ -131,10 +129,8 @@ class Graph:
         self._reaper.wait()
 
     def start_servers(self) -> None:
-        """Start the servers, and wait until each has announced itself. Raises RuntimeError for one that ends instead.
-
-        The announcement of a server are the lines `NAME: address` or `NAME, ...` in its log.
-        """
+        """Start the servers, and wait until each has announced itself by lines `NAME: address` or `NAME, ...` in its
+        log. Raises RuntimeError for a server that ends instead."""
         for name in self.servers:
             self.start(name)
         deadline = time.monotonic() + SERVER_START_TIMEOUT_S
@@ -157,13 +153,12 @@ class Graph:
                 print(*lines, sep='\n', flush=True)
 
     def write(self, parameters: str) -> None:
-        """Write the parameter file with which every node starts. parameters: text of a ROS 2 parameter file."""
+        """Write the ROS 2 parameter file with which every node starts."""
         with self._disk_errors_named():
             self.file.write_text(parameters)
 
     def begin(self, parameters: str, names: Collection[str] | None = None) -> None:
-        """Start the held nodes. parameters: text of the ROS 2 parameter file with which they start; names: nodes to
-        start, None for all that do not run yet."""
+        """Start the held nodes `names`, or all that do not run yet, with the text of a parameter file."""
         self.write(parameters)
         for node, process in self.processes.items():
             if node not in self.servers and node not in self._begun and (names is None or node in names):
@@ -176,8 +171,6 @@ class Graph:
         self.processes[node].begin()
 
     def _hold(self, node: str) -> None:
-        """Make the process of a node or server, which is held until its `begin`, and report its number to the
-        reaper."""
         with open(self._log_of(node), 'ab') as output:
             self._log_starts[node] = size = output.seek(0, os.SEEK_END)
             _libc.fallocate(output.fileno(), FALLOC_FL_KEEP_SIZE, ctypes.c_long(size),
@@ -185,10 +178,13 @@ class Graph:
             if node in self.servers:
                 os.fchmod(output.fileno(), SERVER_LOG_MODE)
                 self._unannounced.add(node)
-                command, rehearse = self.servers[node].command, lambda: None
+                command = self.servers[node].command
+
+                def rehearse() -> object:
+                    return nodes.EXECUTABLES[command[3]].node_type()
             else:
-                command = command_line(node, self.scenario.row(node).module, self.file)
-                rehearse = functools.partial(_load_laws, self.scenario, node)
+                command = command_line(node, self.scenario.row(node).executable, self.file)
+                rehearse = functools.partial(_load_node, self.scenario, node)
             self.processes[node] = Child(command, output.fileno(), rehearse)
         with contextlib.suppress(OSError):
             self._reaper_input.write(b'%d\n' % self.processes[node].pid)
@@ -200,10 +196,8 @@ class Graph:
         self.processes[node].wait()
 
     def stop(self) -> bool:
-        """Stop the processes that still run, and return True if every process has ended with exit code 0.
-
-        The recorder ends last. In realtime the drive ends first, so that it stops its axes while the other nodes are
-        still present.
+        """Stop the processes that still run, and return True if every process has ended with exit code 0. The recorder
+        ends last. In realtime the drive ends first, so that it stops its axes while the other nodes are still present.
         """
         first = [nodes.DRIVE_NODE] if self.scenario.header.pacing == 'realtime' else []
         others = [node for node in self.processes if node not in (*first, 'recorder')]
@@ -211,8 +205,8 @@ class Graph:
             return not any([code for group in (first, others, ['recorder']) for code in self._stop(group)])
 
     def _stop(self, names: Iterable[str]) -> list[int]:
-        """Stop the processes of these names together, and return their exit codes. A process that ignores SIGTERM is
-        killed after NODE_STOP_TIMEOUT_S."""
+        """Stop processes together, and return their exit codes; kill one that ignores SIGTERM for NODE_STOP_TIMEOUT_S.
+        """
         processes = [self.processes[node] for node in names if node in self.processes]
         for process in processes:
             if process.poll() is None:
@@ -228,11 +222,9 @@ class Graph:
         return [process.wait() for process in processes]
 
     def _log_of(self, node: str) -> pathlib.Path:
-        """Return the path of the log of a node or server."""
         return self.log / f'{node.replace("/", ".")}.log'
 
     def _lines(self, node: str) -> list[str]:
-        """Return the lines of the log of a node or server since its last start."""
         with open(self._log_of(node), 'rb') as log:
             log.seek(self._log_starts[node])
             return log.read().decode(errors='replace').strip().splitlines()
@@ -242,8 +234,7 @@ class Graph:
         return [line for line in self._lines(node) if not line.startswith('{')][-SHOWN_LOG_LINES:]
 
     def result(self, node: str) -> dict[str, Json]:
-        """Return the last JSON object in a node's log: the result of the node or the reason of its end, as shell.main
-        prints it; {} if the log has none."""
+        """Return the last JSON object in a node's log: its result or the reason of its end (shell.main), or {}."""
         for line in reversed(self._lines(node)):
             if line.startswith('{'):
                 with contextlib.suppress(ValueError):
@@ -267,8 +258,7 @@ class Graph:
         return f'{node} {reason}; its last log lines ({self._log_of(node)}):\n{log}'
 
     def cause(self, node: str, code: int) -> str:
-        """Return the last log line of a node, in brackets, if the node ended by itself with an error. code: its exit
-        code. Return '' for a node that a signal has ended."""
+        """Return the last log line of a node in brackets, if the node ended by itself with an error; else ''."""
         lines = self.last_lines(node)
         return f' ({lines[-1]})' if lines and code > 0 else ''
 
@@ -279,10 +269,8 @@ def exit_description(code: int) -> str:
 
 
 def log_folder(bag: str | pathlib.Path) -> pathlib.Path:
-    """Return the folder of the logs of a run beside its bag: BAG.log, or BAG.logs where BAG.log is a file.
-
-    `pedestal run --bag dish > dish.log` makes such a file.
-    """
+    """Return the folder of the logs of a run: BAG.log, or BAG.logs where BAG.log is a file, as `pedestal run --bag
+    dish > dish.log` makes it."""
     bag = pathlib.Path(bag)
     folder = bag.with_name(bag.name + '.log')
     return bag.with_name(bag.name + '.logs') if folder.is_file() else folder

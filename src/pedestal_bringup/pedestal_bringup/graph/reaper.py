@@ -1,12 +1,9 @@
 """Reaper: a process beside `pedestal run` that kills nodes which a dead `pedestal run` has left behind.
 
-When `pedestal run` dies, the kernel sends each node SIGTERM (child.Child). The node then ends in order; the drive
-first stops its axes by a ramp. A node that hangs or is suspended (SIGSTOP) ignores SIGTERM, so the reaper kills it.
-
-The reaper reads the process numbers of the nodes from its standard input, one per line, and holds a pidfd (process
-file descriptor) of each. A pidfd avoids that a signal reaches a later process with the same number. When
-`pedestal run` ends, the input ends, and the grace period begins. Without pidfds (Linux before 5.3) the reaper does
-nothing.
+When `pedestal run` dies, the kernel sends each node SIGTERM, and the drive stops its axes by a ramp. A node that hangs
+or is suspended (SIGSTOP) ignores SIGTERM, so the reaper kills it after a grace period. The reaper reads the process
+numbers of the nodes from its standard input, which ends with `pedestal run`. A pidfd of each avoids that a signal
+reaches a later process with the same number; without pidfds (Linux before 5.3) the reaper does nothing.
 """
 import contextlib
 import os
@@ -20,8 +17,7 @@ GRACE_PERIOD_S = 20.0  # time from the end of `pedestal run` in which the nodes 
 
 
 def main() -> None:
-    """Read the process numbers of the nodes until the input ends, wait for the grace period, and kill the nodes that
-    remain."""
+    """Read the process numbers of the nodes, wait for the grace period, and kill the nodes that remain."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     nodes = []
@@ -38,7 +34,6 @@ def main() -> None:
 
 
 def _signal(nodes: Iterable[int], number: int) -> None:
-    """Send a signal to the nodes, a list of pidfds."""
     for node in nodes:
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(node, number)

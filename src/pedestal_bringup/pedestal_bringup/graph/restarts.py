@@ -1,8 +1,5 @@
-"""Rules for the restart of dead nodes in a realtime run: when a node is started again, and how often it may die. The
-supervisor uses these rules. This module starts no process and reads no clock.
-
-The death of a node is the end of its process before the end of the run, for any cause.
-"""
+"""Rules for the restart of dead nodes in a realtime run. No process is started and no clock is read here: all times
+are those of one monotonic clock. The death of a node is the end of its process before the end of the run."""
 import collections
 import math
 
@@ -10,7 +7,7 @@ from pedestal_common.quantities import Seconds
 
 
 class Restarts:
-    """Schedule of the restarts of nodes that died. All times are those of one monotonic clock.
+    """Schedule of the restarts of nodes that died.
 
     attempts  largest number of restarts of a node in the time `within`; 0: no restart
     within    length of the window in which the deaths of a node are counted
@@ -25,8 +22,7 @@ class Restarts:
         self._due: dict[str, Seconds] = {}
 
     def note_death(self, node: str, now: Seconds) -> int:
-        """Note the death of a node at the time now. Return the number of its next restart in the window, from 1
-        on; 0 if the node has died too often."""
+        """Note the death of a node. Return the number of its next restart in the window, 0 after too many deaths."""
         deaths = self._deaths[node]
         while deaths and deaths[0] <= now - self.within:
             deaths.popleft()
@@ -46,9 +42,7 @@ class Restarts:
 
 
 class Losses:
-    """Count of the steps that the drive lost outside the recovery time after a death. All times are those of one
-    monotonic clock. The drive itself publishes the number of steps that it has lost since its start.
-    """
+    """Count of the steps that the drive lost outside the recovery time after a death."""
     RECOVERY_TIME_S = 5.0
     """Time after a death in which lost steps count as an effect of the death [s]. A graph recovers within 2.3 s
     (docs/reliability.md)."""
@@ -62,8 +56,7 @@ class Losses:
         self._recovered_at = now + self.RECOVERY_TIME_S
 
     def note(self, number: int, now: Seconds) -> None:
-        """Note the number of steps that the drive has published as lost, at the time now. A restarted drive begins
-        at 0."""
+        """Note the number of lost steps that the drive has published. A restarted drive begins at 0."""
         if now > self._recovered_at:
             restarted = number < self._last_number
             self.count += number - (0 if restarted else self._last_number)
@@ -71,11 +64,10 @@ class Losses:
 
 
 class Silence:
-    """Times at which the last diagnostics of each node arrived, to find silent nodes. All times are those of one
-    monotonic clock.
+    """Times at which the last diagnostics of each node arrived, to find silent nodes.
 
-    A pause longer than `gap` between two calls of `note_check` is a stall of `pedestal run` itself. Because
-    `pedestal run` could not receive diagnostics in that time, the pause does not count as silence.
+    A pause longer than `gap` between two calls of `note_check` is a stall of `pedestal run` itself, which could not
+    receive diagnostics. The pause therefore does not count as silence.
     """
 
     def __init__(self, gap: Seconds = 1.0) -> None:

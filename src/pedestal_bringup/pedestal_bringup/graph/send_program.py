@@ -1,8 +1,5 @@
-"""Program that sends the program track of a scenario to its running nodes.
-
-The launch file pedestal.launch.py starts it as `python -m pedestal_bringup.graph.send_program SCENARIO`. Users call
-`pedestal program` instead. The function watch.send_program does the work.
-"""
+"""Program of the launch file pedestal.launch.py: sends the program track of a scenario to its running nodes. Users
+call `pedestal program` instead."""
 import sys
 
 from pedestal_bringup.graph import watch

@@ -1,5 +1,4 @@
-"""Start and outcome of a run of the graph: the time at which the run begins, the parameters of its nodes, and the data
-that the run leaves."""
+"""Start and outcome of a run of the graph: its time 0, the parameters of its nodes, and the data that it leaves."""
 import dataclasses
 import pathlib
 import time
@@ -35,8 +34,7 @@ class Outcome:
 
 
 def begins(scenario: Scenario) -> Nanoseconds:
-    """Return graph.start of a run whose nodes start now: the UTC at which its time is 0. In lockstep, where the
-    steps alone determine the time, return 0."""
+    """Return graph.start of a run whose nodes start now: the UTC at which its time is 0. In lockstep return 0."""
     if scenario.header.pacing != 'realtime':
         return 0
     lead = START_LEAD_TIME_S + (DRIVES_LEAD_TIME_S if scenario.header.servo else 0.0)
@@ -46,10 +44,9 @@ def begins(scenario: Scenario) -> Nanoseconds:
 def parameters_of_all(scenario: Scenario, bag: pathlib.Path, start: Nanoseconds,
                       changes: Mapping[str, Mapping[str, object]] | None = None) -> str:
     """Return the text of the ROS 2 parameter file of a run: the values of a scenario for each node, and the parameters
-    `graph.` that all its nodes share.
+    `graph.` that all share.
 
-    bag: folder of the recording; start: graph.start, see `begins`; changes: {node: {name: value}} that the scenario
-    does not contain.
+    changes: {node: {name: value}} that the scenario does not contain.
     """
     names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
     shared = {'graph.pacing': scenario.header.pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,

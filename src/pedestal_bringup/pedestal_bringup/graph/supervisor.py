@@ -1,5 +1,5 @@
-"""Supervisor of the nodes of a realtime run, inside `pedestal run`. Because the antenna must continue, the supervisor
-starts a dead node again. It kills a node that was silent for too long, and then starts this node again."""
+"""Supervisor of the nodes of a realtime run. Because the antenna must continue, the supervisor starts a dead node
+again. It kills a node that was silent for too long, and then starts this node again."""
 import contextlib
 import signal
 import subprocess
@@ -27,8 +27,10 @@ MAX_SILENCE_S = 5.0
 
 
 def prepare(scenario: Scenario) -> None:
-    """Compile the laws of the nodes of a scenario that are not in the law cache, so that the nodes start without
-    delay. The laws of each node are compiled in a process of their own. Raises RuntimeError."""
+    """Compile the laws of the nodes that are not in the law cache, each node in its own process.
+
+    Raises RuntimeError.
+    """
     units = {nodes.plain(node): node for node in scenario.nodes
              if scenario.row(node).unit and not is_compiled(scenario.unit(node))}
     processes = {node: subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.loop.prepare', node, scenario.name],
@@ -56,11 +58,7 @@ def prepare(scenario: Scenario) -> None:
 
 
 class Supervisor:
-    """Supervisor of the processes of a running graph.
-
-    operator: receives the diagnostics; start: UTC at which the time of the graph is 0. restarts, losses: see the
-    module restarts.
-    """
+    """Supervisor of the processes of a running graph. operator: receives the diagnostics; start: time 0, UTC."""
 
     def __init__(self, graph: Graph, operator: Operator, start: Nanoseconds) -> None:
         header = graph.scenario.header
@@ -75,11 +73,8 @@ class Supervisor:
         operator.on_diagnostics = self._note
 
     def watch(self, tracks: Mapping[str, Message], progress: Callable[[Seconds], object]) -> None:
-        """Watch the nodes until the end of the run. The end is a UTC, and a restart does not move it.
-
-        tracks: {topic: program track}; progress: function of the time of the run. Raises RuntimeError if a node has
-        died too often.
-        """
+        """Watch the nodes until the end of the run, a UTC that a restart does not move. The program tracks are sent
+        first. Raises RuntimeError if a node has died too often."""
         executor = SingleThreadedExecutor()
         executor.add_node(self._operator)
         self._operator.send(tracks)
@@ -89,21 +84,18 @@ class Supervisor:
             self.check_processes(time.monotonic())
 
     def _is_running(self) -> bool:
-        """Return True while the run continues. The run is over when the drive has ended at the end of the run, at the
-        latest SHUTDOWN_GRACE_S after it. A drive that is dead shortly before the end, and that is therefore not
-        started again, also ends the run."""
+        """Return True until the drive has ended at the end of the run, at the latest SHUTDOWN_GRACE_S after it. A
+        drive that is dead shortly before the end is not started again, and also ends the run."""
         now, drive_runs = time.time_ns(), self._graph.processes[nodes.DRIVE_NODE].poll() is None
         if now < self._end:
             return drive_runs or not self._is_nearly_over()
         return drive_runs and now < self._end + SHUTDOWN_GRACE_S * NS_PER_SECOND
 
     def _is_nearly_over(self) -> bool:
-        """Return True if a dead node is no longer started again, because the end of the run is near."""
         return time.time_ns() > self._end - RESTART_CUTOFF_S * NS_PER_SECOND
 
     def check_processes(self, now: Seconds) -> None:
-        """Start dead nodes again when their restart is due, and kill nodes that were silent for too long. now:
-        monotonic time."""
+        """Start dead nodes again when their restart is due, and kill nodes that were silent for too long."""
         self._silence.note_check(now)
         for node in self._silence.longer_than(min(MAX_SILENCE_S, self._limits.silence or MAX_SILENCE_S), now):
             if node not in self._reported_silent:
@@ -122,9 +114,8 @@ class Supervisor:
             self._graph.start(node)
 
     def _handle_exit(self, node: str, code: int, now: Seconds) -> None:
-        """Schedule the restart of a node or server that has died. Raises RuntimeError, which ends the run, if a
-        node has died too often. A server that has died too often stays off. code: exit code; now: monotonic time.
-        """
+        """Schedule the restart of a node or server that has died. Raises RuntimeError, which ends the run, if a node
+        has died too often. A server that has died too often stays off."""
         limits = self._limits
         reason = ('was silent and was killed' if node in self._reported_silent and code == -signal.SIGKILL
                   else exit_description(code))
@@ -146,7 +137,6 @@ class Supervisor:
                f'within {limits.within:g} s')
 
     def _note(self, status: Message, now: Seconds) -> None:
-        """Note a DiagnosticStatus of a node that arrived at the monotonic time now."""
         node = status.name
         self._silence.note(node, now)
         if node == nodes.DRIVE_NODE:

@@ -1,9 +1,8 @@
-"""Watch of a run by the process `pedestal run`, which takes part in the graph as the node `operator`: it sends the
-program track and watches the other nodes.
+"""Watch of a run by the process `pedestal run`, which takes part in the graph as the node `operator`.
 
-In lockstep a node that dies or is silent ends the run with an error that names the node (module lockstep). In realtime
-such a node is started again (module supervisor). Simulated equipment and its node start before the other nodes,
-because time 0, a parameter of every node, follows the answer of the equipment.
+In lockstep a node that dies or is silent ends the run (module lockstep). In realtime such a node is started again
+(module supervisor). Simulated equipment and its node start before the other nodes, because time 0, a parameter of
+every node, follows the answer of the equipment.
 """
 import socket
 import time
@@ -30,8 +29,7 @@ Changes: TypeAlias = Mapping[str, Mapping[str, object]]     # {node: {parameter:
 
 
 def run(graph: Graph, tracks: Mapping[str, Message], progress: Callable[[Seconds], object]) -> Outcome:
-    """Let the held nodes (child.Child) of a graph begin, watch the nodes to their end or until Ctrl-C, and return the
-    Outcome.
+    """Let the held nodes of a graph begin, watch them to their end or until Ctrl-C, and return the Outcome.
 
     tracks: {topic: program track}; progress: function of the time of the run. Raises RuntimeError, and GraphError if
     another graph runs on the domain.
@@ -51,7 +49,6 @@ def run(graph: Graph, tracks: Mapping[str, Message], progress: Callable[[Seconds
 
 def _in_lockstep(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
                  progress: Callable[[Seconds], object]) -> Outcome:
-    """Run a graph in lockstep and return its Outcome; arguments as of `run`."""
     graph.begin(parameters_of_all(graph.scenario, graph.bag, 0))
     try:
         lockstep.watch(graph, operator, tracks, progress)
@@ -63,7 +60,6 @@ def _in_lockstep(graph: Graph, operator: Operator, tracks: Mapping[str, Message]
 
 def _in_realtime(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
                  progress: Callable[[Seconds], object]) -> Outcome:
-    """Run a graph in realtime and return its Outcome; arguments as of `run`."""
     supervisor.prepare(graph.scenario)
     start, changes = begins(graph.scenario), _addresses(graph.scenario)
     if graph.scenario.header.simulated_parts:
@@ -87,7 +83,6 @@ def _in_realtime(graph: Graph, operator: Operator, tracks: Mapping[str, Message]
 
 
 def _free_port(kind: int) -> int:
-    """Return a port of this machine that no program uses. kind: socket.SOCK_STREAM for TCP, SOCK_DGRAM for UDP."""
     with socket.socket(socket.AF_INET, kind) as free:
         free.bind(('127.0.0.1', 0))
         return free.getsockname()[1]
@@ -116,11 +111,8 @@ ANSWER_PARAMETERS = {
 
 
 def _equipment_begun(graph: Graph, operator: Operator, changes: Changes) -> Nanoseconds:
-    """Let simulated equipment and its node begin, wait for the answer of the equipment, and return graph.start,
-    which its node chooses then. If several are simulated, time 0 follows the answer of the drives.
-
-    changes: see parameters_of_all. Raises RuntimeError.
-    """
+    """Let simulated equipment and its node begin, and return graph.start, which its node chooses at the answer of the
+    equipment. If several are simulated, time 0 follows the answer of the drives. Raises RuntimeError."""
     part = graph.scenario.header.simulated_parts[0]
     chooser = nodes.SIMULATED_PARTS[part]
     provisional = time.time_ns() + round((LATEST_START_S + START_LEAD_TIME_S) * NS_PER_SECOND)
@@ -137,11 +129,8 @@ def _equipment_begun(graph: Graph, operator: Operator, changes: Changes) -> Nano
 
 def chosen_start(graph: Graph, operator: Operator, spin: Callable[..., object], part: str,
                  limit: Seconds) -> Nanoseconds:
-    """Wait until the node of simulated equipment chooses time 0, and return it.
-
-    spin: function spin(timeout_sec) that lets the operator take diagnostics; part: name
-    of the equipment; limit: longest wait. Raises RuntimeError that names the node and what it awaits.
-    """
+    """Wait until the node of simulated equipment chooses time 0, and return it. spin(timeout_sec) lets the operator
+    take diagnostics. Raises RuntimeError that names the node and what it awaits."""
     chooser, heard = nodes.SIMULATED_PARTS[part], ['no diagnostics']
     chosen: list[Nanoseconds] = []
 
@@ -162,11 +151,8 @@ def chosen_start(graph: Graph, operator: Operator, spin: Callable[..., object], 
 
 
 def send_program(plan: Plan, start: Nanoseconds | None = None, ros_arguments: Sequence[str] = ()) -> int:
-    """Send the program track of a plan to a running ACU and keep it latched until Ctrl-C.
-
-    start: UTC at which the time of the track is 0; None: the graph.start of the ACU, which is requested from it.
-    ros_arguments: arguments of ROS for the sending node, such as the namespace of the graph.
-    """
+    """Send the program track of a plan to a running ACU and keep it latched until Ctrl-C. start: time 0 of the track,
+    UTC; None: the graph.start of the ACU."""
     beams = plan.scenario.header.graph_beams
     middleware.initialise(ros_arguments)
     try:

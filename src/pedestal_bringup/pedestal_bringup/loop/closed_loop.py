@@ -1,10 +1,8 @@
-"""Closed loop of a scenario without ROS: the units of all nodes run in one process, in compiled calls. Studies and
-trials use it instead of the graph of nodes.
+"""Closed loop of a scenario without ROS: the units of all nodes run in one process, in compiled calls.
 
 In step k the drive moves to its time t_k by the commands of step k - 1 and publishes its position. Then ship, INS,
-receiver and control unit answer in this order. All units read and write one record that holds every topic. A run
-equals a lockstep recording of the scenario to the last bit. If an array has several beams, each beam is a loop of its
-own. These loops have equal ship, INS and time, and do not act on each other.
+receiver and control unit answer in this order. A run equals a lockstep recording of the scenario to the last bit. Each
+beam of an array is a loop of its own. These loops have equal ship, INS and time, and do not act on each other.
 """
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -65,11 +63,8 @@ _LAWS = {memory: law for node in nodes.UNIT_NODES for memory, (law, _) in node.u
 
 
 def step(memory: AnyMemory, stamp: Nanoseconds, inputs: AnyRecord, outputs: AnyRecord) -> None:
-    """Make the step of any unit, selected by the type of its memory. memory None: no unit, so do nothing.
-
-    Only compiled code calls this function. `by_type` below gives compiled code the law of each type of memory. inputs,
-    outputs: records of STEP_DTYPE.
-    """
+    """Make the step of any unit, selected by the type of its memory; None: no unit. Only compiled code calls this
+    function, by `by_type` below. inputs, outputs: records of STEP_DTYPE."""
     raise NotImplementedError
 
 
@@ -77,10 +72,7 @@ by_type(step, lambda memory: None if isinstance(memory, types.NoneType) else _LA
 
 
 def true_bias(drive: AnyMemory, truth: Truth) -> None:
-    """Write the bias torques of the drive into `truth`; an array has none. drive: memory of its unit.
-
-    Only compiled code calls this function.
-    """
+    """Write the bias torques of the drive into `truth`; an array has none. Only compiled code calls this function."""
     raise NotImplementedError
 
 
@@ -106,10 +98,8 @@ def loop(units: tuple[AnyMemory, ...], first: int, period_ns: Nanoseconds, befor
     """Make n steps, from the step number `first` on.
 
     units      memories of drive, ship, INS, receiver and control unit; ship and INS are None ashore
-    period_ns  time of one step
     before     (1,) of STEP_DTYPE: the previous step, from which the drive takes its commands; changed to the last step
-    injected   for azimuth and elevation: added to the commands on their way to the drive. A drive follows the
-               rates [rad/s], the beam of an array follows the angles [rad]; the number is added to both.
+    injected   added to the commands on their way to the drive: rates [rad/s], or angles [rad] of the beam of an array
     steps      (n,) of STEP_DTYPE, filled
     truth      Truths (n,), filled
     """
@@ -136,7 +126,7 @@ UNIT_ORDER = ('adu', 'ship_motion', 'ins', 'tracking_receiver', 'acu')
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """Result of a run of the closed loop, kept in memory; memory_recording gives it the interface of a recording."""
+    """Result of a run of the closed loop; memory_recording gives it the interface of a recording."""
     steps: Records              # (n,) of STEP_DTYPE, or of some of its topics
     truth: Records              # Truths (n,); none for one of several runs that side_by_side computes together
     stamps: Stamps
@@ -186,11 +176,8 @@ class Run:
 
 
 class Loop:
-    """Closed loop of a scenario: the units of its nodes, ready for one run.
-
-    beam: name of one beam of several, such as beam_2; '': the first beam. changed: {node: parameters} that replace
-    those of the scenario.
-    """
+    """Closed loop of a scenario, ready for one run. beam: one of several, such as beam_2; '': the first. changed:
+    {node: parameters} that replace those of the scenario."""
     units: dict[str, Unit]
     steps: int                  # number of steps of the run
 
@@ -211,8 +198,7 @@ class Loop:
         self.steps = round(scenario.header.duration / period) + 1
 
     def before_step(self, first: int, forecasts: list[Forecast]) -> None:
-        """Prepare the step number `first`: execute the scheduled commands that are due, and keep their replies. If a
-        second of the run begins, append the forecast to `forecasts`."""
+        """Execute the scheduled commands that are due. At each whole second, add to `forecasts`."""
         stamp = first * self.period_ns
         if stamp // NS_PER_SECOND > (stamp - self.period_ns) // NS_PER_SECOND:
             forecasts.append((stamp, announcement.numbers(self.units['acu'].parts['state']['guidance']['lookahead'])))
@@ -231,8 +217,8 @@ class Loop:
     def run(self, injected: Pairs | None = None, watch: Callable[[int], int] | None = None) -> Run:
         """Make every step of the scenario and return the Run. Call this method only once.
 
-        injected: see `loop`; None: zeros. watch(number of steps made): a function that is called between
-        blocks of steps and may read or command the units. It returns the largest number of steps until its next call.
+        watch(number of steps made) is called between blocks of steps and may read or command the units. It returns the
+        largest number of steps until its next call.
         """
         if injected is None:
             injected = np.zeros((self.steps, 2))

@@ -1,5 +1,4 @@
-"""Simulated I/Q samples of a scenario: the beam moves as in a run of the scenario in memory (closed_loop). The unit of
-the simulated I/Q makes the samples of all channels along this run."""
+"""Simulated I/Q samples of a scenario: the samples of all channels while the beam moves as in the closed loop."""
 import time
 from collections.abc import Callable, Iterable
 
@@ -23,11 +22,8 @@ IQ_SECTIONS = tuple(f'{node}.{group}.' for node in ('tracking_receiver', 'iq')
 
 def scenarios(name: str, changes: Iterable[str], own: Iterable[str] = (),
               duration: Seconds | None = None) -> tuple[Scenario, Scenario]:
-    """Return (scenario of the loop, scenario of the I/Q) for `run`, of the name or path of a scenario.
-
-    changes: texts 'node.key=value'; own: further texts for the I/Q scenario; duration: None for that of the
-    scenario. Raises ScenarioError.
-    """
+    """Return (scenario of the loop, scenario of the I/Q) for `run`. changes: texts 'node.key=value'; own: further ones
+    for the I/Q scenario. Raises ScenarioError."""
     of_loop = [change for change in changes if not change.startswith(IQ_SECTIONS)]
     return (scenario.load(name, of_loop, duration=duration, pacing='lockstep'),
             scenario.load(name, ['scenario.receiver=simulated-iq', *changes, *own], duration=duration,
@@ -43,15 +39,8 @@ def start_utc(unit: SimulatedIq) -> Nanoseconds:
 
 
 def run(loop_scenario: Scenario, iq_scenario: Scenario, live: bool, progress: Callable[[Seconds], object]) -> int:
-    """Send the samples of a scenario to the source address of its receiver, and return their number.
-
-    loop_scenario   with the simulated receiver, whose beam is taken
-    iq_scenario     the same with I/Q samples
-    live            True to send each step at its time, False for a file
-    progress        function of the time of the run
-
-    Raises StreamError.
-    """
+    """Send the samples of a scenario to the source address of its receiver, and return their number. Raises
+    StreamError. live: send each step at its time, for a stream."""
     unit = iq_scenario.unit(nodes.SIMULATED_IQ.name)
     assert isinstance(unit, SimulatedIq)
     sink = sinks.opened(unit.parameters)

@@ -1,5 +1,4 @@
-"""Recording without a file: a run of the closed loop, kept in memory, with the methods of bag.Bag that
-pedestal_results uses. Trials and studies compute their results from it."""
+"""Recording without a file: a run of the closed loop, with the methods of bag.Bag that pedestal_results uses."""
 import functools
 from collections.abc import Iterator
 
@@ -20,17 +19,13 @@ KEYHOLE_ENTRY = 'keyhole', 'keyhole'
 
 
 def record(scenario: Scenario, beam: str = '') -> 'MemoryRecording':
-    """Run a scenario in memory and return its recording. beam: name of one beam of several, such as
-    beam_2; '': the first beam."""
+    """Run a scenario in memory and return the recording of a beam, such as beam_2; '': the first."""
     return MemoryRecording(scenario, closed_loop.Loop(scenario, beam).run())
 
 
 class MemoryRecording:
-    """Recording of one beam of a scenario, made from its run.
-
-    From the diagnostics it holds only the keyhole forecasts of the control unit and the last values of each node,
-    because no result uses anything else.
-    """
+    """Recording of one beam of a scenario, made from its run. From the diagnostics it holds only the keyhole forecasts
+    of the control unit and the last values of each node, because no result uses anything else."""
 
     def __init__(self, scenario: Scenario, run: closed_loop.Run) -> None:
         receiver = run.units['tracking_receiver'].parameters
@@ -71,8 +66,7 @@ class MemoryRecording:
         return dict(self._run.units[node].diagnose().values)
 
     def messages(self, topic: str) -> Iterator[tuple[str, Nanoseconds, Nanoseconds, Message]]:
-        """Yield (topic, log time, publish time, message) of `diagnostics`, of a topic of replies or of the
-        program track."""
+        """Yield (topic, log time, publish time, message) of `diagnostics`, replies or the program track."""
         if topic in self._run.tracks:
             yield topic, 0, 0, self._run.tracks[topic]
         for stamp, command, reply in self._run.replies.get(topic, ()):

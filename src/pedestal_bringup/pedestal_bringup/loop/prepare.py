@@ -1,7 +1,5 @@
-"""Compile laws that are not yet in the law cache, so that the processes that use these laws start at once. `make` and
-the supervisor of a realtime run start this module as a program.
-
-`python -m pedestal_bringup.loop.prepare ...` compiles, by its arguments:
+"""Program that compiles laws that are not yet in the law cache, so that processes start at once, for `make` and the
+supervisor of a realtime run. Its arguments:
 
     (none)       the laws of every node on all cores, then those of the closed loop
     NAME         the laws of the nodes that COMPILED_UNITS lists for the scenario NAME
@@ -40,26 +38,23 @@ COMPILE_RUN_S = 0.1  # duration of the scenario that is run to compile a closed 
 
 
 def _unit_of_scenario(name: str, node: str, *changes: str) -> Unit:
-    """Return the unit of a node of the scenario `name` with changes."""
     return scenario.load(name, changes).unit(node)
 
 
 def _compile_unit(name: str, node: str, *changes: str) -> tuple[str, Seconds]:
-    """Compile the laws of a node of the scenario `name` with changes. Return (text that names them, time that this
-    took)."""
+    """Compile the laws of a node of a scenario with changes. Return (text that names them, time taken)."""
     begun = time.perf_counter()
     _unit_of_scenario(name, node, *changes).prepare()
     return f'{node} of {name}{" with servo drives" * bool(changes)}', time.perf_counter() - begun
 
 
 def _loop_done(name: str, count: int) -> pathlib.Path:
-    """Return the path of the file that marks `count` closed loops of a scenario as compiled."""
     law = closed_loop.loop if count == 1 else side_by_side.loops_in_lanes
     return law_cache.file(f'compiled-{name}-{count}', law_key.of_law(law, whole=True))
 
 
 def _compile_loop(name: str, count: int) -> tuple[str, Seconds]:
-    """Compile `count` parallel closed loops of the scenario `name`. Return (text that names them, time taken)."""
+    """Compile parallel closed loops of a scenario. Return (text that names them, time taken)."""
     begun = time.perf_counter()
     loops = [closed_loop.Loop(scenario.load(name, duration=COMPILE_RUN_S)) for _ in range(count)]
     if count > 1:
@@ -71,8 +66,8 @@ def _compile_loop(name: str, count: int) -> tuple[str, Seconds]:
 
 
 def compile_cold(units: Iterable[tuple[str, ...]], loops: Iterable[tuple[str, int]]) -> None:
-    """Compile the laws that are not cached, and print a line for each unit and closed loop. units: rows of
-    COMPILED_UNITS; loops: rows of COMPILED_LOOPS."""
+    """Compile the laws that are not cached, by rows of COMPILED_UNITS and COMPILED_LOOPS, and print a line for each.
+    """
     if vars(numba.config)['DISABLE_JIT']:      # for a debugger: there is nothing to compile
         return
     units = [part for part in units if not is_compiled(_unit_of_scenario(*part))]

@@ -1,9 +1,8 @@
-"""Closed loops of several trials, run side by side in one compiled call, so that trials take less time. The processor
-computes the drives of all trials together, each drive in one lane (adu_drive.lanes).
+"""Closed loops of several trials, run side by side in one compiled call, each drive in one lane (adu_drive.lanes).
 
-In a single closed loop the drive takes two thirds of the computing time. On lanes it takes a quarter of that.
-Receivers and control units run one after the other, with the records and laws of a single loop. Every number equals
-that of closed_loop.Loop to the last bit.
+In a single closed loop the drive takes two thirds of the computing time, on lanes a quarter of that. Receivers and
+control units run one after the other, with the records and laws of a single loop. Every number equals that of
+closed_loop.Loop to the last bit.
 """
 import typing
 from collections.abc import Iterable, Sequence
@@ -36,7 +35,6 @@ MAX_MEMORY_BYTES = 2**30  # largest memory for the records of parallel trials [b
 
 @compiled
 def _receiver_law(receivers: receiver_unit.Memory, i: int, stamp: Nanoseconds, step: AnyRecord) -> None:
-    """Make the step of receiver i. receivers: as of `loops_in_lanes`; step: record of STEP_DTYPE."""
     own = receiver_unit.Memory(receivers.record[i:i + 1], receivers.breaks[i], receivers.coefficients[i],
                                receivers.normals[i])
     receiver_unit.law(own, stamp, step, step)
@@ -44,7 +42,6 @@ def _receiver_law(receivers: receiver_unit.Memory, i: int, stamp: Nanoseconds, s
 
 @compiled
 def _track(rows: ProgramTrack, ends: Ints, i: int) -> ProgramTrack:
-    """Return ProgramTrack i of those that `_joined_tracks` has joined into rows, with their ends."""
     return ProgramTrack(rows.times[ends[i]:ends[i + 1]], rows.angles[ends[i]:ends[i + 1]])
 
 
@@ -57,7 +54,6 @@ class ControlUnits(typing.NamedTuple):
 
 @compiled
 def _acu_law(acus: ControlUnits, i: int, stamp: Nanoseconds, step: AnyRecord) -> None:
-    """Make the step of control unit i. step: record of STEP_DTYPE."""
     of_all, ends = acus.tables, acus.ends
     tables = Tables(_track(of_all.program, ends[0], i), _track(of_all.tle, ends[1], i), _track(of_all.sun, ends[2], i))
     unit_law.law(unit_law.Memory(acus.record[i:i + 1], tables), stamp, step, step)
@@ -78,10 +74,7 @@ def loops_in_lanes(drives: Floats, receivers: receiver_unit.Memory, acus: Contro
 
     drives     flat array of the drives on lanes, as lanes.to_lanes gives it
     receivers  their arrays have the trials as their first dimension
-    period_ns  time of one step
-    steps      (2, trials) of STEP_DTYPE: the last even step and the last odd step, in turn the present and the
-               previous step
-    kept       keeps a part of each step
+    steps      (2, trials) of STEP_DTYPE: the last even and the last odd step, in turn the present and the previous
     """
     moving = drive_unit.DRIVE_LANES(drives)
     for k in range(first, last):
@@ -95,13 +88,12 @@ def loops_in_lanes(drives: Floats, receivers: receiver_unit.Memory, acus: Contro
 
 
 def _words(records: Records) -> Ints:
-    """Return a view of records (n, m) as their 8-byte words (n, m, words)."""
     return records.view(np.int64).reshape(*records.shape, -1)
 
 
 def max_parallel_trials(scenario: Scenario, names: Sequence[str]) -> int:
-    """Return the largest number of trials of a scenario that can run side by side; 0 for a scenario with a
-    ship or an array. names: topics that are kept, whose records determine the memory needed."""
+    """Return the largest number of trials of a scenario that can run side by side and keep these topics in memory; 0
+    for a scenario with a ship or an array."""
     if scenario.header.ship or scenario.header.beam:
         return 0
     steps = scenario.header.duration / scenario.node_parameters('adu').period
@@ -109,8 +101,7 @@ def max_parallel_trials(scenario: Scenario, names: Sequence[str]) -> int:
 
 
 def can_run_parallel(loops: Sequence[Loop]) -> bool:
-    """Return True if these loops can run side by side: drives with motors ashore, with equal period and
-    number of steps, and memories of equal shapes."""
+    """Return True if these loops can run side by side: motors, ashore, with equal period, steps and shapes."""
     return (MIN_PARALLEL_LOOPS <= len(loops) <= lanes.LANE_COUNT and all(map(_fits_lanes, loops))
             and len(set(map(_shape, loops))) == 1)
 
@@ -122,7 +113,6 @@ def _fits_lanes(loop: Loop) -> bool:
 
 
 def _shape(loop: Loop) -> tuple[object, ...]:
-    """Return the numbers that must be equal for loops that run side by side: times, counts and array shapes."""
     receiver = loop.units['tracking_receiver'].memory
     constants = loop.units['adu'].parts['constants']
     return (loop.period_ns, loop.steps, int(constants['speed_ticks']), int(constants['substeps']),
@@ -130,8 +120,7 @@ def _shape(loop: Loop) -> tuple[object, ...]:
 
 
 def _stacked(units: Sequence[Unit]) -> Records:
-    """Join the records of units into one array (units,) and return it; each unit continues with its part of the
-    array."""
+    """Join the records of units into one array (units,), of which each unit continues with its part."""
     record = np.empty(len(units), units[0].memory.record.dtype)
     for i, unit in enumerate(units):
         record[i:i + 1] = unit.memory.record
@@ -140,19 +129,13 @@ def _stacked(units: Sequence[Unit]) -> Records:
 
 
 def _joined_tracks(tracks: Iterable[ProgramTrack]) -> tuple[ProgramTrack, Ints]:
-    """Return (one ProgramTrack with the rows of n ProgramTracks, their ends); the tracks may differ in length.
-
-    ends: (n + 1,), 0 first: track i has the rows ends[i] ... ends[i + 1] - 1.
-    """
+    """Return (one ProgramTrack with the rows of n ProgramTracks, their ends (n + 1,), 0 first)."""
     return ProgramTrack(*map(np.concatenate, zip(*tracks))), np.cumsum([0, *(len(track.times) for track in tracks)])
 
 
 def runs(loops: Sequence[Loop], names: Sequence[str], kept: Records | None = None) -> list[Run]:
-    """Run loops side by side (see can_run_parallel), and return the Run of each, without truth.
-
-    names: topics that the Runs keep. kept: memory (trials, steps) of records.of(*names) for the Runs, which the next
-    call overwrites; None: new memory.
-    """
+    """Run loops side by side (see can_run_parallel), and return the Run of each, without truth. kept: memory (trials,
+    steps) of records.of(*names) for the Runs, which the next call overwrites."""
     drives, receivers, acus = ([loop.units[name] for loop in loops] for name in LANE_UNIT_TYPES)
     drive_record, receiver_record, acu_record = _stacked(drives), _stacked(receivers), _stacked(acus)
     moving = lanes.to_lanes(drive_record)

@@ -17,7 +17,7 @@ Sections: typing.TypeAlias = dict[str, dict[str, Value]]    # {node or `scenario
 
 _P = typing.TypeVar('_P', bound=parameters.Parameters)
 
-SECTION_NODES = tuple(node.name for node in nodes.NODES if node.module)  # nodes that can have a section in a scenario
+SECTION_NODES = tuple(node.name for node in nodes.NODES if node.program)  # nodes that can have a section in a scenario
 
 OPTIONAL_NODES = tuple(node.name for node in nodes.NODES if node.optional)  # nodes that take part only on a ship
 

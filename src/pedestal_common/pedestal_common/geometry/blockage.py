@@ -1,5 +1,4 @@
-"""Hidden sectors: ranges of deck azimuth (clockwise from the bow) and elevation in which the superstructure of the
-ship hides the target."""
+"""Hidden sectors: ranges of deck azimuth and elevation in which the superstructure of the ship hides the target."""
 import math
 
 import numpy as np
@@ -16,11 +15,8 @@ BLOCKAGE_DOC = ("sectors hidden by the superstructure, at most 8: 'azimuth_low a
 
 
 def sectors(text: str) -> Floats:
-    """Return the table (MAX_SECTORS, 3) [rad] that `blocked` reads, from a text as in BLOCKAGE_DOC.
-
-    A row has the lowest and the highest azimuth and the highest elevation of a sector. Raises ParameterError, which
-    names the sector and the allowed range.
-    """
+    """Return the table (MAX_SECTORS, 3) [rad] that `blocked` reads, from a text as in BLOCKAGE_DOC: azimuth low and
+    high, elevation high. Raises ParameterError, which names the sector and the allowed range."""
     table = np.full((MAX_SECTORS, 3), -math.inf)
     parts = [part.split() for part in text.split(';') if part.strip()]
     if len(parts) > MAX_SECTORS:
@@ -41,8 +37,7 @@ def sectors(text: str) -> Floats:
 
 @compiled
 def blocked(table: Floats, azimuth: Radians, elevation: Radians) -> bool:
-    """Return True if a direction, in deck angles, is in a hidden sector; False if an angle is NaN. table: from
-    `sectors`."""
+    """Return True if a direction, in deck angles, is in a hidden sector of `sectors`; False if an angle is NaN."""
     for i in range(MAX_SECTORS):
         low, high, top = table[i, 0], table[i, 1], table[i, 2]
         if elevation <= top:

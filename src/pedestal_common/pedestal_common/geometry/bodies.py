@@ -24,7 +24,6 @@ MOON_LIGHT_TIME_S = 385_000_560.0 / SPEED_OF_LIGHT_M_S  # from the mean distance
 
 
 def _sun(tt: Floats) -> Vectors3:
-    """Return the apparent positions (m, 3) of the sun [AU] at days tt (m,) of TT since J2000."""
     heliocentric, barycentric = erfa.epv00(erfa.DJ00, tt)
     velocity = barycentric['v'] * erfa.AULT / SECONDS_PER_DAY
     distance, direction = erfa.pn(-heliocentric['p'])
@@ -33,7 +32,6 @@ def _sun(tt: Floats) -> Vectors3:
 
 
 def _moon(tt: Floats) -> Vectors3:
-    """Return the apparent positions (m, 3) of the moon [AU] at days tt (m,) of TT since J2000."""
     return erfa.moon98(erfa.DJ00, tt - MOON_LIGHT_TIME_S / SECONDS_PER_DAY)['p']
 
 
@@ -42,10 +40,8 @@ POSITIONS = {'sun': _sun, 'moon': _moon}
 
 
 def position(body: str, n: Floats) -> Vectors3:
-    """Return the apparent geocentric positions (m, 3) of a body [m] at days n (m,) of UTC since J2000.
-
-    The frame is TEME, that of orbit.earth_fixed: the true equator and the mean equinox of date.
-    """
+    """Return the apparent geocentric positions (m, 3) of a body [m] at days n (m,) of UTC since J2000, in TEME: the
+    true equator and the mean equinox of date."""
     tt = n + TT_MINUS_UTC_S / SECONDS_PER_DAY
     equinox = erfa.gst06a(erfa.DJ00, n, erfa.DJ00, tt) - erfa.gmst82(erfa.DJ00, n)
     to_teme = erfa.rz(equinox, erfa.pnm06a(erfa.DJ00, tt))
@@ -53,10 +49,8 @@ def position(body: str, n: Floats) -> Vectors3:
 
 
 def seen(body: str, station: StationParameters, julian: Days, fractions: Floats, to_fixed: Rotations) -> Vectors3:
-    """Return the vectors [m], ENU of a station, in which a body of POSITIONS is seen without refraction.
-
-    julian, fractions, to_fixed: the Julian dates julian + fractions (n,) in UTC, and orbit.earth_fixed at these times.
-    """
+    """Return the vectors [m], ENU of a station, in which a body is seen without refraction at julian + fractions (n,),
+    UTC. to_fixed: orbit.earth_fixed at these times."""
     step = NODE_INTERVAL_S / SECONDS_PER_DAY
     nodes = np.arange(np.min(fractions), np.max(fractions) + step, step)
     positions = position(body, julian - erfa.DJ00 + nodes)

@@ -1,9 +1,8 @@
-"""Orientation of the earth from a file finals2000A of the IERS: UT1 - UTC and the polar motion, day by day.
+"""Orientation of the earth from a file finals2000A of the IERS (International Earth Rotation and Reference Systems
+Service): UT1 - UTC and the polar motion, day by day.
 
-The file has one row for each day at 0 h UTC, measured (I) or predicted (P). Its columns of Bulletin A are used; the
-IERS (International Earth Rotation and Reference Systems Service) describes them in readme.finals2000A. Between two
-rows the values are interpolated linearly. A leap second between two rows is kept out of the interpolation. Before the
-first row and after the last row, the nearest row holds, so the values have no jump there.
+Each day has a row at 0 h UTC, whose columns of Bulletin A are described in readme.finals2000A. Between two rows the
+values are interpolated linearly, without a leap second. Outside, the nearest row holds, so the values have no jump.
 """
 import dataclasses
 import datetime
@@ -72,9 +71,7 @@ class EarthOrientation:
 
     def problem(self, mjd: Days, oldest: Days) -> str:
         """Return the reason why the values at an MJD are inaccurate, with the values used instead; '' for good values.
-
-        oldest: largest age of the last measured row without a problem.
-        """
+        oldest: largest age of the last measured row without a problem."""
         first, last = self.mjd[0], self.mjd[-1]
         if mjd < first:
             return f'{self.name} begins on {_date(first)}, in the future; its first row holds'
@@ -111,10 +108,8 @@ def load(parameters: EarthOrientationParameters) -> EarthOrientation | None:
 
 @functools.lru_cache(4)
 def _read(path: str, _modified: int, _size: int) -> EarthOrientation:
-    """Return the EarthOrientation of a file. Raises ValueError with the line, OSError, UnicodeDecodeError.
-
-    The file is read again once its time of modification or its size differs.
-    """
+    """Return the EarthOrientation of a file, read again once its time or size differs. Raises ValueError with the
+    line, OSError, UnicodeDecodeError."""
     mjds: list[Days] = []
     rows: list[list[float]] = []
     measured = -math.inf
@@ -140,7 +135,6 @@ def _read(path: str, _modified: int, _size: int) -> EarthOrientation:
 
 
 def _number(line: int, name: str, cell: str, low: float, high: float, unit: str) -> float:
-    """Return the number in a cell of a line. Raises ValueError for any other text and outside low to high."""
     try:
         value = float(cell)
     except ValueError:

@@ -1,5 +1,4 @@
-"""Geodesy on the WGS84 ellipsoid: the place of the pedestal, earth-fixed positions, the east-north-up frame; also the
-constants of the turning earth and of the light."""
+"""Geodesy on the WGS84 ellipsoid: the place of the pedestal, earth-fixed positions, the east-north-up frame."""
 import dataclasses
 import math
 
@@ -52,11 +51,8 @@ def station_frame(station: StationParameters) -> tuple[Vector3, Matrix3]:
 
 def destination(latitude_deg: Degrees, longitude_deg: Degrees, bearing: Radians,
                 distance: Meters) -> tuple[Degrees, Degrees]:
-    """Return (latitude, longitude) of the place at a distance and a bearing, which is clockwise from north.
-
-    The place is on the great circle that leaves the first place with this bearing. Because the earth is taken as a
-    sphere, the distance is right to 0.6 %.
-    """
+    """Return (latitude, longitude) at a distance and a bearing, clockwise from north, on a great circle. Because the
+    earth is taken as a sphere, the distance is right to 0.6 %."""
     phi, delta = math.radians(latitude_deg), distance / EARTH_RADIUS_M
     sin_there = math.sin(phi) * math.cos(delta) + math.cos(phi) * math.sin(delta) * math.cos(bearing)
     east = math.atan2(math.sin(bearing) * math.sin(delta) * math.cos(phi),

@@ -1,6 +1,4 @@
-"""Line-of-sight geometry: directions in the frames of beam, deck and earth.
-
-The docstring of the package pedestal_common defines the frames. Symbols:
+"""Line-of-sight geometry: directions in the frames of beam, deck and earth, which pedestal_common defines.
 
     b, c, e         components of a vector along the beam, in cross-elevation and in elevation
     db, dc, de      time derivatives of b, c, e
@@ -28,16 +26,14 @@ def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> X
 
 @compiled
 def direction(azimuth: Radians, elevation: Radians) -> Xyz:
-    """Return the unit vector of an azimuth (clockwise) and an elevation: FLU for deck angles, north-west-up for earth
-    angles."""
+    """Return the unit vector of an azimuth (clockwise): FLU of deck angles, north-west-up of earth angles."""
     cos_el = math.cos(elevation)
     return cos_el * math.cos(azimuth), -cos_el * math.sin(azimuth), math.sin(elevation)
 
 
 @compiled
 def angles(x: float, y: float, z: float) -> Direction:
-    """Return azimuth (clockwise) and elevation of a vector of any length: deck angles if the vector is FLU, earth
-    angles if it is north-west-up."""
+    """Return azimuth (clockwise) and elevation of a vector of any length, FLU or north-west-up as in `direction`."""
     return math.atan2(-y, x), math.atan2(z, math.hypot(x, y))
 
 
@@ -72,14 +68,11 @@ def to_deck(mat_ed: Matrix3, east: float, north: float, up: float) -> Xyz:
 
 @compiled
 def offsets(azimuth: Radians, elevation: Radians, x: float, y: float, z: float) -> tuple[Radians, Radians]:
-    """Return the offset (dX, dE) of a direction from the beam.
-
-    azimuth, elevation: of the beam
-    x, y, z: vector of the direction, of any length, in the frame of these angles
+    """Return the offset (dX, dE) of a direction, a vector of any length in the frame of the angles of the beam.
 
     The cross-elevation dX is positive in the direction of growing azimuth, the elevation dE is positive upwards. The
-    offset is azimuthal equidistant: its length hypot(dX, dE) is the angle between beam and direction, exact up to
-    180 deg.
+    offset is azimuthal equidistant: its length hypot(dX, dE) is the angle between beam and direction, exact up to 180
+    deg.
     """
     sa, ca, se, ce = math.sin(azimuth), math.cos(azimuth), math.sin(elevation), math.cos(elevation)
     b = ce * ca * x - ce * sa * y + se * z
@@ -96,11 +89,7 @@ def offsets(azimuth: Radians, elevation: Radians, x: float, y: float, z: float) 
 @compiled
 def offset_rates(beam: Direction, beam_rate: tuple[RadiansPerSecond, RadiansPerSecond], r: Xyz,
                  v: Xyz) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return the time derivative of `offsets`, (d dX/dt, d dE/dt).
-
-    beam, beam_rate: angles of the beam and their rates
-    r: vector of the direction, of any length, in the frame of these angles; v: time derivative of r
-    """
+    """Return the time derivative of `offsets`, of a direction r with its derivative v."""
     azimuth, elevation = beam
     azimuth_rate, elevation_rate = beam_rate
     x, y, z = r
@@ -125,11 +114,8 @@ def offset_rates(beam: Direction, beam_rate: tuple[RadiansPerSecond, RadiansPerS
 
 @compiled
 def displaced(azimuth: Radians, elevation: Radians, cross_elevation: Radians, elevation_error: Radians) -> Direction:
-    """Return azimuth and elevation of the direction at an offset from the beam: the inverse of `offsets`.
-
-    azimuth, elevation: of the beam; cross_elevation, elevation_error: the offset (dX, dE). The returned azimuth is
-    within pi of the azimuth of the beam.
-    """
+    """Return azimuth and elevation of the direction at an offset (dX, dE) from the beam: the inverse of `offsets`. The
+    azimuth is within pi of the azimuth of the beam."""
     theta = math.hypot(cross_elevation, elevation_error)
     sinc = math.sin(theta) / theta if theta > 0.0 else 1.0
     b, c, e = math.cos(theta), sinc * cross_elevation, sinc * elevation_error
@@ -143,11 +129,8 @@ def displaced_motion(azimuth: Radians, elevation: Radians, azimuth_rate: Radians
                      elevation_rate: RadiansPerSecond, cross_elevation: Radians, elevation_error: Radians,
                      cross_elevation_rate: RadiansPerSecond,
                      elevation_error_rate: RadiansPerSecond) -> tuple[float, float, float, float, float, float]:
-    """Return the unit vector of the direction at an offset from the beam, and its time derivative [1/s].
-
-    The first four arguments are the angles of the beam and their rates, the others the offset (dX, dE) and its rates.
-    The vectors are FLU for deck angles, north-west-up for earth angles. See `offsets`, `offset_rates`.
-    """
+    """Return the unit vector of the direction at an offset from the beam, and its time derivative [1/s], FLU for deck
+    angles, north-west-up for earth angles. See `offsets`, `offset_rates`."""
     theta2 = cross_elevation * cross_elevation + elevation_error * elevation_error
     theta = math.sqrt(theta2)
     cos_theta = math.cos(theta)
@@ -187,8 +170,7 @@ def rotation(qx: float, qy: float, qz: float, qw: float, mat: Matrix3) -> None:
 
 @compiled
 def quaternion(roll: Radians, pitch: Radians, yaw: Radians) -> tuple[float, float, float, float]:
-    """Return the unit quaternion (x, y, z, w) deck -> earth of roll, pitch and yaw about fixed axes (REP 103). At yaw
-    0 the bow points east."""
+    """Return the quaternion deck -> earth of angles about fixed axes (REP 103). At yaw 0 the bow points east."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)

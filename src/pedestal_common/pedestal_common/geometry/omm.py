@@ -1,8 +1,5 @@
 """Reader of an Orbit Mean-Elements Message (OMM, CCSDS 502.0-B): it checks the elements of a satellite for SGP4.
-
-Unlike a TLE, an OMM does not limit the number of digits of its elements and of the catalogue number. SGP4 uses
-neither the number of the element set nor the number of the revolution.
-"""
+Unlike a TLE, an OMM does not limit the number of digits."""
 import datetime
 import json
 import math
@@ -44,10 +41,8 @@ def require_sgp4(ephemeris_type: object) -> None:
 
 
 def catalogue_number(text: str) -> str:
-    """Return a catalogue number as digits, '' for an empty text. Raises ValueError.
-
-    The first of five characters may be a letter (Alpha-5).
-    """
+    """Return a catalogue number as digits, '' for an empty text. The first of five characters may be a letter
+    (Alpha-5). Raises ValueError."""
     text = text.strip()
     try:
         number = from_alpha5(text) if len(text) == 5 else int(text or 0)
@@ -59,10 +54,8 @@ def catalogue_number(text: str) -> str:
 
 
 def checked(fields: Mapping[str, object]) -> dict[str, str]:
-    """Return {keyword: text} of valid elements, with every number that SGP4 needs, from the fields of an OMM.
-
-    Raises ValueError, which names keyword, value and range.
-    """
+    """Return {keyword: text} of valid elements, with every number that SGP4 needs, from the fields of an OMM. Raises
+    ValueError, which names keyword, value and range."""
     given = {**DEFAULT_FIELDS, **{key: str(value).strip() for key, value in fields.items() if key in KEYWORDS}}
     for keyword, allowed in ALLOWED_VALUES.items():
         if given.get(keyword, allowed[0]).upper() not in allowed:
@@ -87,8 +80,7 @@ def checked(fields: Mapping[str, object]) -> dict[str, str]:
 
 
 def initialize(satrec: Satrec, text: str) -> str:
-    """Fill a Satrec with the elements of an OMM in JSON. Return the catalogue number, or the name of the satellite if
-    there is no number. Raises ValueError."""
+    """Fill a Satrec with an OMM in JSON. Return the catalogue number, else the name. Raises ValueError."""
     try:
         fields = json.loads(text, parse_int=str, parse_float=str)
     except (json.JSONDecodeError, RecursionError) as error:

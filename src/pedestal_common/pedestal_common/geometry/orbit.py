@@ -1,8 +1,6 @@
-"""Orbit of a satellite: its elements from a TLE or an OMM, its position over a station by SGP4, and Julian dates.
-
-The earth turns with UT1. Without a ut1_offset, UT1 is taken as equal to UTC; tracking_receiver_sim.target states the
-resulting error. earth_orientation reads UT1 and the polar motion from a file.
-"""
+"""Orbit of a satellite: its elements from a TLE or an OMM, its position over a station by SGP4, and Julian dates. The
+earth turns with UT1, which is taken as equal to UTC without a ut1_offset (tracking_receiver_sim.target states the
+error)."""
 import datetime
 import re
 from typing import Protocol
@@ -41,8 +39,7 @@ MAX_TLE_AGE_DAYS = 30.0  # largest time from the TLE epoch at which SGP4 is used
 
 
 class TargetError(ValueError):
-    """Error of a target that cannot be built. Its text is one line that names the file or TLE line, row, field, value.
-    """
+    """Error of a target that cannot be built: one line that names the file or TLE line, row, field, value."""
 
 
 class Elements(Protocol):
@@ -107,11 +104,9 @@ def satellite(leo_pass: Elements) -> Satellite:
 
 def earth_fixed(julian: float, fractions: Floats, ut1_offset: Seconds | Times = 0.0,
                 pole: Pairs | None = None) -> Rotations:
-    """Return rotations from TEME, the frame of SGP4 (true equator and mean equinox of date), to the
-    earth-fixed frame.
+    """Return rotations from TEME, the frame of SGP4 (true equator and mean equinox of date), to the earth-fixed frame.
 
-    The times are the Julian dates julian + fractions (n,), in UTC. ut1_offset: UT1 - UTC; pole: polar motion x, y
-    [rad], None for the pole of TEME.
+    The times are julian + fractions (n,), UTC. pole: polar motion x, y [rad], None for the pole of TEME.
     """
     theta = gstime(julian) + SIDEREAL_RATE * (SECONDS_PER_DAY * fractions + ut1_offset)
     c, s = cos(theta), sin(theta)
@@ -128,8 +123,8 @@ def earth_fixed(julian: float, fractions: Floats, ut1_offset: Seconds | Times = 
 def apparent(fixed: Vectors3, origin: Vector3) -> Vectors3:
     """Return the vectors [m] to the places at which an observer sees targets, earth-fixed.
 
-    fixed: positions [m] of the targets when the light left them, turned with the earth to its arrival; origin:
-    position [m] of the observer. The observer moves with the earth, which adds the diurnal aberration.
+    fixed: positions [m] when the light left, turned with the earth to its arrival; origin: position [m] of the
+    observer, who moves with the earth, which adds the diurnal aberration.
     """
     relative = fixed - origin
     travel = np.sqrt(np.einsum('ni,ni->n', relative, relative)) / SPEED_OF_LIGHT_M_S
@@ -137,8 +132,7 @@ def apparent(fixed: Vectors3, origin: Vector3) -> Vectors3:
 
 
 def _teme(satrec: Satellite, julian: float, fractions: Floats) -> tuple[Vectors3, Vectors3]:
-    """Return position and velocity [km, km/s] of a satellite in TEME; arguments as in `enu`. Raises
-    TargetError."""
+    """Return position and velocity [km, km/s] of a satellite in TEME. Raises TargetError."""
     error, position, velocity = satrec.sgp4_array(np.full(len(fractions), julian), fractions)
     if error.any():
         i = int(np.argmax(error != 0))
@@ -149,10 +143,8 @@ def _teme(satrec: Satellite, julian: float, fractions: Floats) -> tuple[Vectors3
 
 def enu(satrec: Satellite, station: StationParameters, julian: float, fraction: float, times: Times,
         ut1_offset: Seconds | Times = 0.0) -> tuple[Vectors3, Vectors3]:
-    """Return position [m] and velocity against the earth [m/s] of a satellite, ENU of a station.
-
-    times: after the Julian date julian + fraction, UTC; ut1_offset: UT1 - UTC. Raises TargetError where SGP4 fails.
-    """
+    """Return position [m] and velocity against the earth [m/s] of a satellite, ENU of a station. times: after the
+    Julian date julian + fraction, UTC. Raises TargetError where SGP4 fails."""
     fractions = fraction + times / SECONDS_PER_DAY
     position, velocity = _teme(satrec, julian, fractions)
     to_fixed = earth_fixed(julian, fractions, ut1_offset)
@@ -164,13 +156,8 @@ def enu(satrec: Satellite, station: StationParameters, julian: float, fraction: 
 
 def seen(satrec: Satellite, station: StationParameters, julian: float, fractions: Floats, to_fixed: Rotations,
          light_time: bool) -> Vectors3:
-    """Return the vectors [m], ENU of a station, in which a satellite is seen without refraction.
-
-    julian, fractions, to_fixed  the Julian dates julian + fractions (n,) in UTC, and `earth_fixed` at these times
-    light_time       True to include the travel time of the wave
-
-    Raises TargetError where SGP4 fails.
-    """
+    """Return the vectors [m], ENU of a station, in which a satellite is seen without refraction at julian + fractions
+    (n,), UTC. to_fixed: `earth_fixed` at these times. Raises TargetError where SGP4 fails."""
     origin, to_enu = station_frame(station)
     fixed = np.einsum('nij,nj->ni', to_fixed, 1e3 * _teme(satrec, julian, fractions)[0])
     if not light_time:
@@ -201,11 +188,8 @@ def julian_date(when: datetime.datetime) -> tuple[float, float]:
 
 
 def instant(name: str, text: str) -> datetime.datetime:
-    """Return the time in an ISO 8601 text as a datetime in UTC without a zone.
-
-    name: name of the text in the TargetError that a wrong text raises. The leap second 23:59:60 counts as the first
-    second of the next day.
-    """
+    """Return the time in an ISO 8601 text as a datetime in UTC without a zone. The leap second 23:59:60 counts as the
+    first second of the next day. Raises TargetError with the name of the text."""
     leap = LEAP_SECOND_PATTERN.sub(r'\g<1>59', text)
     try:
         when = datetime.datetime.fromisoformat(leap.replace('Z', '+00:00')) + datetime.timedelta(seconds=leap != text)

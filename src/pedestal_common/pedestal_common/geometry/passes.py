@@ -1,10 +1,6 @@
-"""Passes of a satellite over a station: from its rise above the horizon to its set.
-
-The search computes the elevation by SGP4 every SEARCH_STEP_S seconds. Rise and set are exact to a millisecond, and the
-culmination is the highest instant between them. A pass shorter than SEARCH_STEP_S may be missed, which is
-harmless: it stays below 1 deg. A pass under way at the beginning or at the end of the search is followed to its rise
-and to its set.
-"""
+"""Passes of a satellite over a station, by SGP4 every SEARCH_STEP_S seconds. Rise and set are exact to a millisecond,
+and the culmination is the highest instant between them. A shorter pass may be missed, which stays below 1 deg. A pass
+under way at the beginning or at the end of the search is followed to its rise and to its set."""
 import datetime
 import math
 import typing
@@ -108,11 +104,8 @@ def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.
 
 
 def _until_below(elevation: Callable[[Times], Floats], start: Seconds, step: Seconds) -> tuple[Times, Floats]:
-    """Return (times, elevations [deg]) after `start`, in steps, up to the first below the horizon.
-
-    A negative step goes back in time. The series ends at most MAX_PASS_DAYS away, or where SGP4 fails. elevation:
-    function of times, which returns elevations.
-    """
+    """Return (times, elevations [deg]) from `start` up to the first below the horizon, at most MAX_PASS_DAYS away, or
+    where SGP4 fails. A negative step goes back in time."""
     times, heights = np.zeros(0), np.zeros(0)
     while len(times) * abs(step) < MAX_PASS_DAYS * SECONDS_PER_DAY:
         chunk = start + step * np.arange(len(times) + 1, len(times) + 1 + PASS_CHUNK_STEPS, dtype=np.float64)
@@ -129,8 +122,7 @@ def _until_below(elevation: Callable[[Times], Floats], start: Seconds, step: Sec
 
 
 def search_start(satrec: Satellite, now: datetime.datetime) -> tuple[datetime.datetime, str]:
-    """Return (beginning of the search, reason). These are `now` and '', or the epoch of the elements and the reason,
-    if the elements are too far from `now`."""
+    """Return (`now`, ''), or the epoch of the elements and the reason if these are too far from `now`."""
     epoch = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF)
     age = (now - epoch).total_seconds() / SECONDS_PER_DAY
     if abs(age) <= orbit.MAX_TLE_AGE_DAYS:
@@ -140,9 +132,7 @@ def search_start(satrec: Satellite, now: datetime.datetime) -> tuple[datetime.da
 
 
 def chosen_pass(satrec: Satellite, station: StationParameters, which: str, now: datetime.datetime) -> Pass:
-    """Return the pass that `which` names. now: UTC. Raises TargetError.
-
-    The values of `which` are:
+    """Return the pass that `which` names. Raises TargetError.
 
     next    the pass under way, or the next pass
     N       a number: the Nth pass after `search_start`

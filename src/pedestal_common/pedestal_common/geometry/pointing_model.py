@@ -149,10 +149,7 @@ def put(model: PointingModel, terms: Floats) -> None:
 
 @compiled
 def put_between(model: PointingModel, before: Floats, after: Floats, x: float) -> None:
-    """Set a model on the way from the terms `before` to the terms `after` (20,).
-
-    x: share of the time, 0 to 1. The terms begin and end without a rate.
-    """
+    """Set a model between the terms `before` and `after` at the share x of the time, without a rate at both ends."""
     share, terms = x * x * (3.0 - 2.0 * x), model.terms
     for i in range(len(terms)):
         terms[i] = after[i] if x == 1.0 else before[i] + share * (after[i] - before[i])
@@ -200,7 +197,6 @@ def _to_deck(T: Matrix3, x: float, y: float, z: float) -> Xyz:
 
 @compiled
 def _from_deck(T: Matrix3, v: Xyz) -> Xyz:
-    """Return a vector v after the inverse of the rotation T."""
     x, y, z = v
     return (T[0, 0] * x + T[1, 0] * y + T[2, 0] * z, T[0, 1] * x + T[1, 1] * y + T[2, 1] * z,
             T[0, 2] * x + T[1, 2] * y + T[2, 2] * z)
@@ -209,11 +205,8 @@ def _from_deck(T: Matrix3, v: Xyz) -> Xyz:
 @compiled
 def direction_motion(model: PointingModel, A: Radians, E: Radians, A_dot: RadiansPerSecond,
                      E_dot: RadiansPerSecond) -> tuple[Direction, tuple[RadiansPerSecond, RadiansPerSecond]]:
-    """Return ((azimuth, elevation), their rates) of the beam on the sky.
-
-    A, E, A_dot, E_dot: angles and rates of the encoders. Among azimuths whole turns apart, the result is
-    nearest to the azimuth of the axis. If the beam is past the zenith, the elevation is above 90 deg.
-    """
+    """Return ((azimuth, elevation), their rates) of the beam on the sky, of angles and rates of the encoders. The
+    azimuth is in the turn of the axis. If the beam is past the zenith, the elevation is above 90 deg."""
     a, e = A - model.p.p1, E - model.p.p7
     azimuth, elevation, azimuth_dot, elevation_dot = a, e, A_dot, E_dot
     if model.periodic:
@@ -249,11 +242,8 @@ def direction_of(model: PointingModel, A: Radians, E: Radians) -> Direction:
 
 @compiled
 def _angle_rates(x: float, y: float, v: Xyz, w: Xyz, level: float) -> tuple[float, float]:
-    """Return the first and second time derivative of the azimuth of a vector.
-
-    x, y   components of the vector; level: x^2 + y^2, limited from below
-    v, w   first and second derivative of the vector
-    """
+    """Return the first and second time derivative of the azimuth of a vector, whose derivatives are v and w. level:
+    x^2 + y^2, limited from below."""
     rate = (y * v[0] - x * v[1]) / level
     return rate, (y * w[0] - x * w[1] - 2.0 * rate * (x * v[0] + y * v[1])) / level
 
@@ -261,10 +251,8 @@ def _angle_rates(x: float, y: float, v: Xyz, w: Xyz, level: float) -> tuple[floa
 @compiled
 def _axis_motion(model: PointingModel, u: Xyz, v: Xyz, w: Xyz,
                  plunged: bool) -> tuple[AxisMotion, AxisMotion, bool]:
-    """Return (motion of the azimuth, that of the elevation, reachable) after steps 3 to 7 are undone.
-
-    The arguments are those of encoder_motion. The azimuth is in no particular turn.
-    """
+    """Return (motion of the azimuth, that of the elevation, reachable) after steps 3 to 7 are undone, as in
+    encoder_motion. The azimuth is in no particular turn."""
     x, y, z = _from_deck(model.tilt, u)
     v, w = _from_deck(model.tilt, v), _from_deck(model.tilt, w)
     # q: sine of the elevation; (x_m, y_m): horizontal part of the beam at azimuth 0; level: its squared length.
@@ -302,9 +290,8 @@ def encoder_motion(model: PointingModel, u: Xyz, v: Xyz, w: Xyz, plunged: bool,
                    near: Radians) -> tuple[AxisMotion, AxisMotion, bool]:
     """Return the motion of the encoders that keeps the beam on a moving direction, and whether the beam reaches it.
 
-    u, v, w   unit vector of the direction on the sky, FLU, and its first and second time derivative
-    plunged   True if the axes point to the direction over the zenith
-    near      azimuth near which the azimuth of the axis is chosen
+    u, v, w: unit vector of the direction on the sky, FLU, and its derivatives; plunged: the axes point to it over the
+    zenith; near: azimuth near which that of the axis is chosen.
     """
     (azimuth, a_dot, a_ddot), (elevation, e_dot, e_ddot), reachable = _axis_motion(model, u, v, w, plunged)
     azimuth = near + wrap(azimuth - near)
@@ -328,13 +315,9 @@ def encoder_motion(model: PointingModel, u: Xyz, v: Xyz, w: Xyz, plunged: bool,
 
 @compiled
 def encoder_of(model: PointingModel, azimuth: Radians, elevation: Radians) -> tuple[Radians, Radians, bool]:
-    """Return (A, E, reachable): the angles of the encoders at which the beam points to a direction on the sky.
-
-    azimuth, elevation   of the direction; above 90 deg the axes point over the zenith
-    reachable            False if the beam cannot point to the direction; A, E then belong to the nearest one
-
-    The azimuth of the axis is the one nearest to `azimuth`, which counts revolutions.
-    """
+    """Return (A, E, reachable): the angles of the encoders at which the beam points to a direction on the sky, or to
+    the nearest reachable one. An elevation above 90 deg points over the zenith. The azimuth of the axis is the one
+    nearest to `azimuth`, which counts revolutions."""
     if model.exact:
         return azimuth, elevation, True
     zero = (0.0, 0.0, 0.0)

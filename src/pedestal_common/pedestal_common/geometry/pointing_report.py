@@ -1,9 +1,6 @@
-"""Report of the pointing model in force, the text of acu/pointing, and the directions that a reader derives from it.
-
-The control unit publishes a report at its start and at both ends of a change of its model. The text is JSON. A reader
-of the encoder angles computes the direction of the beam on the sky from the last report. Terms have the units of the
-parameters: degrees, or none for the factors.
-"""
+"""Report of the pointing model in force, the JSON text of acu/pointing, and the directions that a reader derives from
+it. The control unit publishes it at its start and at both ends of a change of its model. Terms have the units of the
+parameters: degrees, or none for the factors."""
 import json
 import math
 import typing
@@ -64,11 +61,8 @@ def read(text: str) -> Report:
 
 
 def residual_rows(text: str) -> list[list[float]]:
-    """Return the residuals of a fit [[azimuth, elevation, cross-elevation, elevation], ...] [deg] of a text.
-
-    The text is 'azimuth elevation cross-elevation elevation; ...' with the direction in degrees and the residual in
-    thousandths of a degree; '': no residuals. Raises ValueError.
-    """
+    """Return the residuals of a fit [[azimuth, elevation, cross-elevation, elevation], ...] [deg] of a text 'azimuth
+    elevation cross-elevation elevation; ...' with direction in degrees, residual in thousandths. Raises ValueError."""
     rows = [part.split() for part in text.split(';') if part.strip()]
     if len(rows) > MAX_RESIDUALS:
         raise ValueError(f'{len(rows)} residuals: must be at most {MAX_RESIDUALS}')
@@ -87,10 +81,7 @@ def residual_rows(text: str) -> list[list[float]]:
 
 
 def residual_text(directions: Pairs, residuals: Pairs) -> str:
-    """Return the text of residual_rows for directions and residuals [deg].
-
-    Of more than MAX_RESIDUALS rows, rows at equal distances are taken.
-    """
+    """Return the text of residual_rows for angles [deg], at most MAX_RESIDUALS rows at equal distances."""
     chosen = np.unique(np.linspace(0, len(directions) - 1, min(len(directions), MAX_RESIDUALS)).round().astype(int))
     return '; '.join(f'{az:.0f} {el:.0f} {1e3 * x:.1f} {1e3 * y:.1f}'
                      for (az, el), (x, y) in zip(directions[chosen], residuals[chosen]))
@@ -111,7 +102,6 @@ def in_radians(terms: typing.Mapping[str, float]) -> Floats:
 @compiled
 def _directions(model: PointingModel, before: Floats, after: Floats, begins: Seconds, ends: Seconds, times: Times,
                 angles: Pairs, on_sky: Pairs) -> None:
-    """Fill on_sky with the directions of the encoder angles at these times."""
     for k in range(len(times)):
         if ends > begins:
             pointing_model.put_between(model, before, after, min(max((times[k] - begins) / (ends - begins), 0.0), 1.0))
@@ -119,10 +109,7 @@ def _directions(model: PointingModel, before: Floats, after: Floats, begins: Sec
 
 
 def directions(report: Report | None, times: Times, angles: Pairs) -> Pairs:
-    """Return the directions of the beam on the sky, deck angles, of encoder angles at times of the graph.
-
-    report: the one in force; None: encoders and sky have the same angles.
-    """
+    """Return the directions of the beam on the sky, deck angles; those of the encoders without a report."""
     if report is None or not (report.terms or report.before):
         return angles
     after, on_sky = in_radians(report.terms), np.empty((len(angles), 2))

@@ -62,7 +62,6 @@ def of_weather(pressure: float, temperature: float, humidity: float) -> Air:
 
 @compiled
 def _of_erfa(air: Air, elevation: Radians) -> Radians:
-    """Return the refraction at a true elevation, by the function atioq of ERFA."""
     z, r = math.sin(elevation), math.cos(elevation)
     tan_z = r / z
     w = air.B * tan_z * tan_z
@@ -71,7 +70,6 @@ def _of_erfa(air: Air, elevation: Radians) -> Radians:
 
 @compiled
 def _of_itu(air: Air, elevation: Radians) -> Radians:
-    """Return the refraction at a true elevation, by ITU-R P.834."""
     E = math.degrees(max(elevation, MIN_ELEVATION_RAD))
     return math.radians(air.N / ITU_REFRACTIVITY / (1.728 + 0.5411 * E + 0.03723 * E * E))
 
@@ -90,10 +88,7 @@ def refraction(air: Air, elevation: Radians) -> Radians:
 
 @compiled
 def raise_all(weather: Vectors3, elevations: Floats) -> None:
-    """Add the refraction to true elevations [rad], in place.
-
-    weather: the numbers of a Weather for each elevation.
-    """
+    """Add the refraction to true elevations [rad], in place. weather: the numbers of a Weather for each elevation."""
     for k in range(len(elevations)):
         air = of_weather(weather[k, 0], weather[k, 1], weather[k, 2])
         elevations[k] += refraction(air, elevations[k])

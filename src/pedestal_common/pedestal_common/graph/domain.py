@@ -1,8 +1,5 @@
-"""ROS domain of a run. A domain of a machine has one run at a time.
-
-A run reserves its domain by an abstract Unix socket, which the kernel closes however the run ends. Discovery alone is
-too slow for this check on a busy machine.
-"""
+"""ROS domain of a run: a domain of a machine has one run at a time. A run reserves its domain by an abstract Unix
+socket, which the kernel closes however the run ends. Discovery alone is too slow for this check on a busy machine."""
 import contextlib
 import os
 import pathlib
@@ -28,10 +25,10 @@ def another_graph(domain_id: int) -> GraphError:
 
 @contextlib.contextmanager
 def of_run() -> Iterator[int]:
-    """Reserve the ROS domain of a run as a context, and give its number to this process and its children.
+    """Reserve the ROS domain of a run as a context, before rclpy is initialised, and give it to this process and its
+    children.
 
-    This is the domain that the user has set. If the user has set none, it is the first free domain; a line on stdout
-    names a domain other than the default. The context begins before rclpy is initialised, which reads the domain.
+    This is the domain of the user, else the first free one; a line on stdout names a domain other than the default.
     Raises GraphError if another run holds the domain, ValueError for a domain that is no number of DDS.
     """
     before = os.environ.get(VARIABLE)
@@ -51,7 +48,6 @@ def of_run() -> Iterator[int]:
 
 @contextlib.contextmanager
 def _reserved(given: str | None) -> Iterator[int]:
-    """Reserve a given domain, or the first free one, as a context."""
     candidates = [_number(given)] if given else range(DEFAULT_DOMAIN, MAX_CHOSEN_DOMAIN + 1)
     for domain_id in candidates:
         with socket.socket(socket.AF_UNIX) as holder:
@@ -65,7 +61,6 @@ def _reserved(given: str | None) -> Iterator[int]:
 
 
 def _number(text: str) -> int:
-    """Return a domain of the user as a number. Raises ValueError."""
     if not text.isdecimal() or int(text) > MAX_DOMAIN:
         raise ValueError(f'{VARIABLE} {text}: must be a whole number from 0 to {MAX_DOMAIN}')
     return int(text)
@@ -79,7 +74,6 @@ def hint(domain_id: int) -> str:
 
 
 def _of_other_runs(domain_id: int) -> list[int]:
-    """Return the domains of the runs of this machine except domain_id."""
     try:
         names = pathlib.Path('/proc/net/unix').read_text().split()
     except OSError:     # a system without this file

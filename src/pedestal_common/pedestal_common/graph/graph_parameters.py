@@ -9,8 +9,7 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 
 
 def topic_flags(names: Iterable[str]) -> type[parameters.Parameters]:
-    """Return a base class for a parameter dataclass. It has a field for the flag (Topic.flag) of each of these topics.
-    """
+    """Return a base class for a parameter dataclass, with a field for the flag (Topic.flag) of each topic."""
     flagged: dict[str, list[str]] = {}
     for topic in map(topics.TOPIC_BY_NAME.__getitem__, names):
         if topic.flag:

@@ -1,8 +1,5 @@
-"""Layouts of the messages: names, units and tolerances of the numbers in a message of each type.
-
-A column is one number in the messages of a topic, for example 'azimuth.velocity' of joint_states. The records of the
-nodes, the tables of a bag, the comparison of recordings and the export all take their columns from here.
-"""
+"""Layouts of the messages: names, units and tolerances of the numbers in a message of each type. A column is one
+number in the messages of a topic, for example 'azimuth.velocity' of joint_states."""
 import math
 import re
 import typing
@@ -80,7 +77,6 @@ class NoDataMark(typing.NamedTuple):
 
 
 def _negative(variance: float | Floats) -> bool | Bools:
-    """Return True where a variance is negative."""
     return variance < 0.0
 
 
@@ -102,10 +98,8 @@ min_range to max_range must be discarded."""
 
 def no_data(type_name: str, numbers: Iterable[tuple[str, int, str]],
             texts: Mapping[str, str]) -> list[tuple[list[str], list[tuple[int, str]], Absent]]:
-    """Return [(names of the columns of a field, [(first byte, dtype)] of the numbers of its mark, function absent)].
-
-    numbers, texts: places in a message of the type, as in cdr.Places; absent: as in NoDataMark.
-    """
+    """Return [(names of the columns of a field, [(first byte, dtype)] of the numbers of its mark, NoDataMark.absent)].
+    numbers, texts: places in a message of the type, as in cdr.Places."""
     places = {path: (start, dtype) for path, start, dtype in numbers}
     marks = NO_DATA_MARKS.get(type_name, ())
     patterns = {field.name: field.path for field in LAYOUTS.get(type_name, ())}
@@ -115,10 +109,8 @@ def no_data(type_name: str, numbers: Iterable[tuple[str, int, str]],
 
 
 def blank_no_data(type_name: str, table: dict[str, Floats]) -> dict[str, Floats]:
-    """Return a table {column: array (n,)} with NaN where its messages mark the numbers of a field as no data.
-
-    A mark is applied only if all its numbers are columns of the table.
-    """
+    """Return a table {column: array (n,)} with NaN where its messages mark a field as no data. A mark is applied only
+    if all its numbers are columns of the table."""
     for mark in NO_DATA_MARKS.get(type_name, ()):
         numbers = [table.get(column(type_name, path, {}) or '') for path in mark.paths]
         if all(number is not None for number in numbers):
@@ -148,7 +140,6 @@ def fields(topic: str) -> tuple[Field, ...]:
 
 
 def _names(field: Field, row: topics.Topic) -> tuple[str, ...]:
-    """Return the text for {} of each column of a field."""
     if field.components is None:
         return row.names
     # A digit is the index of a diagonal element of a covariance (3, 3), stored by rows: 0, 4 and 8 belong to x, y, z.
@@ -164,8 +155,7 @@ def columns(topic: str) -> tuple[Column, ...]:
 
 
 def column(type_name: str, path: str, texts: Mapping[str, str]) -> str | None:
-    """Return the name of the column of a number at a path in a message of any type; None for header and covariances,
-    which have no column. texts: {path: text} of the message."""
+    """Return the name of the column of a number at a path in a message; None for header and covariances."""
     for field in LAYOUTS.get(type_name, ()):
         match = re.fullmatch(field.path, path)
         if match:
@@ -193,9 +183,6 @@ def unit(topic: str, type_name: str, column: str) -> str:
 
 
 def of_filter(steps: Records, name: str) -> Pairs:
-    """Return one number of the filters of both axes from records (n,) with the topic acu/filter.
-
-    name: key of topics.FILTER_UNITS.
-    """
+    """Return one number (topics.FILTER_UNITS) of the filters of both axes from records with the topic acu/filter."""
     numbers = steps['acu/filter']['position'].reshape(len(steps), len(topics.AXES), len(topics.FILTER_UNITS))
     return numbers[:, :, list(topics.FILTER_UNITS).index(name)]

@@ -1,7 +1,5 @@
-"""Table of the modes of the control unit, with one row for each mode.
-
-The commands, the services, the buttons of the page, the faults study and the documentation are made from these rows.
-"""
+"""Table of the modes of the control unit, from which commands, services, the buttons of the page, the faults study and
+the documentation are made."""
 import typing
 
 

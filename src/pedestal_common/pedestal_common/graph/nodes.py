@@ -1,14 +1,13 @@
-"""Table of the nodes of the graph: their executables, and the topics that they read and write. The functions below the
-table return the graph that results from it.
+"""Table of the nodes of the graph: their executables, and the topics that they read and write. No ROS here.
 
 In an electronic array of several beams the nodes `of_beam` and their topics exist once per beam, with the prefix
-`beam_1/` ... `beam_N/`; all other nodes and topics are shared. No ROS here.
+`beam_1/` ... `beam_N/`; all other nodes and topics are shared.
 """
 import functools
 import importlib
 import re
 import typing
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 
 import numpy as np
 
@@ -23,7 +22,7 @@ DRIVE_NODE = 'adu'  # name of the node that owns the time
 class Node(typing.NamedTuple):
     """Row of the table: one node."""
     name: str                       # in the graph
-    module: str = ''                # executable, PACKAGE.EXECUTABLE; '' for a node without a process of its own
+    program: str = ''               # PACKAGE.EXECUTABLE; '' for a node without a process of its own
     parameters: str = ''            # module and name of its parameter class
     unit: str = ''                  # module and name of its unit (unit.Unit); '' for a node without a law
     reads: tuple[str, ...] = ()     # topics that it subscribes to; the first is the trigger, which begins its steps
@@ -35,16 +34,21 @@ class Node(typing.NamedTuple):
     stands_for: str = ''            # the equipment that replaces it on a real antenna
     of_beam: bool = False           # each beam of an array has a node of its own
     optional: bool = False          # the other nodes run without it in a graph that does not name it
+    runs: str = 'pedestal_common.node.unit_node:UnitNode'   # module and name of the class of its process
 
     @property
     def package(self) -> str:
         """ROS package of the node."""
-        return self.module.partition('.')[0]
+        return self.program.partition('.')[0]
 
     @property
     def executable(self) -> str:
         """Name of its executable in that package."""
-        return self.module.rpartition('.')[2]
+        return self.program.rpartition('.')[2]
+
+    def node_type(self) -> Callable[['Node'], typing.Any]:      # a Shell, which this module must not import
+        """Return the class of its process; node.run makes the node from its row."""
+        return _named(self.runs)
 
     def parameters_type(self) -> type[AnyParameters]:
         """Return its parameter dataclass."""
@@ -66,7 +70,8 @@ NODES = (
          reads=('clock',),
          writes=('ship/truth', 'ship/imu/data_raw'),
          answer='ship/truth', obeys='ship_motion/inject', replies='ship_motion/injected',
-         doc='ship on a seaway, its IMU', stands_for='ship and IMU', optional=True),
+         doc='ship on a seaway, its IMU', stands_for='ship and IMU', optional=True,
+         runs='ship_motion_sim.ship_motion_node:ShipMotionNode'),
     Node('ins', 'ship_motion_sim.ins_node', 'ship_motion_sim.params:InsParameters', 'ship_motion_sim.ins_unit:Ins',
          reads=('ship/imu/data_raw',),
          writes=('ship/imu/data', 'ins/state', 'ins/error'),
@@ -97,9 +102,10 @@ NODES = (
          answer='joint_states', obeys='adu/inject', replies='adu/injected',
          doc='antenna drive unit: two axes, two motors each, with the simulated mechanics; its clock sets the steps '
          'of all nodes',
-         stands_for='servo drive and pedestal'),
+         stands_for='servo drive and pedestal', runs='adu_drive.adu_node:AduNode'),
     Node('recorder', 'pedestal_recording.recorder_node', 'pedestal_recording.recorder_params:RecorderParameters',
-         doc='writes the messages of every topic, as received, into a rosbag2 directory'),
+         doc='writes the messages of every topic, as received, into a rosbag2 directory',
+         runs='pedestal_recording.recorder_node:RecorderNode'),
     Node('operator', reads=('diagnostics',), writes=('acu/program_track',),
          doc='sends the program track, receives diagnostics; runs inside `pedestal run`, or as `pedestal program`',
          stands_for='the operator'),
@@ -115,7 +121,7 @@ ARRAY_DRIVE = Node(DRIVE_NODE, 'adu_drive.beam_steering_node', 'adu_drive.array.
                    writes=('joint_states', 'adu/truth', 'clock', 'adu/state'),
                    answer='joint_states',
                    doc='electronically steered array in place of the drive (`beam: true`), without motors',
-                   stands_for='beam steering computer and array')
+                   stands_for='beam steering computer and array', runs='adu_drive.beam_steering_node:BeamSteeringNode')
 """Drive of an array: it follows angles instead of rates, and the motion of the ship exerts no torque on it."""
 
 SERVO_DRIVE = Node(DRIVE_NODE, 'pedestal_hardware.drive_node', 'pedestal_hardware.params:ServoDriveParameters',
@@ -124,16 +130,17 @@ SERVO_DRIVE = Node(DRIVE_NODE, 'pedestal_hardware.drive_node', 'pedestal_hardwar
                    writes=('joint_states', 'clock', 'adu/motor_states', 'adu/state'),
                    answer='joint_states', replies='adu/injected',
                    doc='four CiA 402 servo drives on a CAN bus in place of the drive; two drives for each axis',
-                   stands_for='nothing: this node commands the real drives')
+                   stands_for='nothing: this node commands the real drives',
+                   runs='pedestal_hardware.drive_node:DriveNode')
 """Drive of an antenna with servo drives on a bus. Real drives publish no true direction of the dish."""
 
-SIMULATED_DRIVES = Node('drives', 'equipment_sim.drives.drives_node',
+SIMULATED_DRIVES = Node('drives', 'equipment_sim.simulated_drives_node',
                         'pedestal_hardware.params:ServoDriveParameters',
                         'equipment_sim.drives.unit:SimulatedDrives',
                         reads=('clock', 'ship/truth'), writes=('adu/truth',),
                         obeys='adu/inject', replies='adu/injected',
                         doc='four simulated CiA 402 drives with the simulated mechanics, on a socketcand server',
-                        stands_for='servo drives and pedestal')
+                        stands_for='servo drives and pedestal', runs='equipment_sim.drives.drives_node:DrivesNode')
 """Simulated drives of SERVO_DRIVE. A graph that names them has servo drives."""
 
 ROTATOR_DRIVE = Node(DRIVE_NODE, 'pedestal_hardware.rotator_node',
@@ -143,41 +150,45 @@ ROTATOR_DRIVE = Node(DRIVE_NODE, 'pedestal_hardware.rotator_node',
                      answer='joint_states',
                      doc='rotator with its own position loop in place of the drive, by rotctld, GS-232, EasyComm or '
                      'Rot2Prog',
-                     stands_for='nothing: this node drives a real rotator')
+                     stands_for='nothing: this node drives a real rotator',
+                     runs='pedestal_hardware.rotator_node:RotatorNode')
 """Drive of a rotator: it follows angles, as an array does."""
 
-MONOPULSE_RECEIVER = Node('tracking_receiver', 'pedestal_hardware.monopulse.monopulse_receiver_node',
+MONOPULSE_RECEIVER = Node('tracking_receiver', 'pedestal_hardware.monopulse_receiver_node',
                           'pedestal_hardware.monopulse.params:MonopulseParameters',
                           'pedestal_hardware.monopulse.unit:MonopulseReceiver',
                           reads=('clock',), writes=('tracking_receiver/angle_error',),
                           doc='monopulse receiver of I/Q samples (VITA 49, GNU Radio by ZMQ, SigMF) in place of the '
                           'simulated receiver',
-                          stands_for='nothing: this node receives the samples of a real front end')
+                          stands_for='nothing: this node receives the samples of a real front end',
+                          runs='pedestal_hardware.monopulse.monopulse_receiver_node:MonopulseReceiverNode')
 """Receiver of the I/Q samples of an antenna."""
 
-SIMULATED_IQ = Node('iq', 'equipment_sim.iq.iq_node',
+SIMULATED_IQ = Node('iq', 'equipment_sim.iq_node',
                     'pedestal_hardware.monopulse.params:MonopulseParameters',
                     'equipment_sim.iq.unit:SimulatedIq',
                     reads=('adu/truth', 'ship/truth'), writes=('target/truth',),
                     obeys='tracking_receiver/inject', replies='tracking_receiver/injected',
                     doc='simulated I/Q samples of target, antenna and front end, sent to the monopulse receiver',
-                    stands_for='feed, front end and RF')
+                    stands_for='feed, front end and RF', runs='equipment_sim.iq.iq_node:IqNode')
 """Simulated samples for MONOPULSE_RECEIVER. A graph that names them has such a receiver."""
 
 DRIVE_ROWS = (ARRAY_DRIVE, SERVO_DRIVE, SIMULATED_DRIVES, ROTATOR_DRIVE)
 """Rows of the nodes that take the place of the drive in NODES, or simulate a part of it."""
 
-LEVEL_RECEIVER = Node('tracking_receiver', 'pedestal_hardware.level.level_receiver_node',
+LEVEL_RECEIVER = Node('tracking_receiver', 'pedestal_hardware.level_receiver_node',
                       'pedestal_hardware.level.unit:LevelReceiverParameters',
                       writes=('tracking_receiver/angle_error',),
                       doc='receiver with a level only, for step track: lines by UDP, TCP or a serial line',
-                      stands_for='nothing: this node reads a real receiver', of_beam=True)
+                      stands_for='nothing: this node reads a real receiver', of_beam=True,
+                      runs='pedestal_hardware.level.level_receiver_node:LevelReceiverNode')
 """Receiver without error channels."""
 
-INS_INPUT = Node('ins', 'pedestal_hardware.ins.ins_input_node', 'pedestal_hardware.ins.params:InsInputParameters',
+INS_INPUT = Node('ins', 'pedestal_hardware.ins_input_node', 'pedestal_hardware.ins.params:InsInputParameters',
                  writes=('ship/imu/data', 'ins/state'),
                  doc='attitude and deck rate of a real INS: NMEA sentences, or the `sensor_msgs/Imu` of its driver',
-                 stands_for='nothing: this node reads a real INS', optional=True)
+                 stands_for='nothing: this node reads a real INS', optional=True,
+                 runs='pedestal_hardware.ins.ins_input_node:InsInputNode')
 """Input of a real INS. The INS publishes no statistics of its error."""
 
 EQUIPMENT_ROWS = (LEVEL_RECEIVER, INS_INPUT)
@@ -190,6 +201,22 @@ HARDWARE_ROWS = (*DRIVE_ROWS, MONOPULSE_RECEIVER, SIMULATED_IQ, *EQUIPMENT_ROWS)
 SIMULATED_PARTS = {SIMULATED_DRIVES.name: DRIVE_NODE, SIMULATED_IQ.name: MONOPULSE_RECEIVER.name}
 """{name of a node that simulates a part of the equipment: node that commands or receives this part}."""
 
+SERVER_ROWS = (
+    Node('rotctld', 'pedestal_operator.rotctld_node', doc="serves the protocol of Hamlib's rotctld",
+         runs='pedestal_operator.rotctld_node:RotctldNode'),
+    Node('easycomm', 'pedestal_operator.easycomm_node', doc='serves EasyComm I, II and III',
+         runs='pedestal_operator.easycomm_node:EasycommNode'),
+    Node('operator_page', 'pedestal_operator.operator_page', doc="serves the operator's page for a browser",
+         runs='pedestal_operator.page_node:PageNode'),
+    Node('live', 'pedestal_operator.live_node', doc='serves every topic to Foxglove',
+         runs='pedestal_operator.live_node:LiveNode'),
+    Node('frames', 'pedestal_operator.frames_node', doc='publishes robot_description and tf, for RViz',
+         runs='pedestal_operator.frames_node:FramesNode'))
+"""Rows of the servers, which connect other programs to a graph and belong to none. Each reads the topics it needs."""
+
+EXECUTABLES = {node.executable: node for node in (*NODES, *HARDWARE_ROWS, *SERVER_ROWS) if node.program}
+"""{name of an executable: its Node}."""
+
 NODE_NAMES = tuple(node.name for node in NODES)
 UNIT_NODES = (*(node for node in NODES if node.unit), ARRAY_DRIVE)  # nodes that run a unit
 
@@ -201,11 +228,8 @@ beam."""
 
 
 def row(name: str, array: bool = False, servo: bool = False, iq: bool = False) -> Node:
-    """Return the Node of a name, 'beam_2/acu' as well as 'acu'.
-
-    array: True for a graph whose drive is an electronic array; servo: True for a graph with servo drives; iq: True for
-    a graph with a receiver of I/Q samples.
-    """
+    """Return the Node of a name, 'beam_2/acu' as well as 'acu', in a graph with an electronic array, with servo
+    drives, or with a receiver of I/Q samples."""
     if name in SIMULATED_PARTS:
         return SIMULATED_DRIVES if name == SIMULATED_DRIVES.name else SIMULATED_IQ
     if name == MONOPULSE_RECEIVER.name and iq:
@@ -213,11 +237,6 @@ def row(name: str, array: bool = False, servo: bool = False, iq: bool = False) -
     if name == DRIVE_NODE and (array or servo):
         return ARRAY_DRIVE if array else SERVO_DRIVE
     return NODES[NODE_NAMES.index(plain(name))]
-
-
-def of_executable(module: str) -> Node:
-    """Return the Node of an executable."""
-    return next(node for node in (*NODES, *HARDWARE_ROWS) if node.module == module)
 
 
 def beam_of(name: str) -> str:
@@ -253,11 +272,8 @@ class Link(typing.NamedTuple):
 
 @functools.cache
 def links(beams: int = 0, servo: bool = False, iq: bool = False) -> dict[str, Link]:
-    """Return {name: Link} of a graph, in the order of TOPICS.
-
-    beams: number of beams of an electronic array, 0 for a drive with motors; servo: True for a graph with simulated
-    servo drives; iq: True for a graph with simulated I/Q samples.
-    """
+    """Return {name: Link} of a graph, in the order of TOPICS. beams: of an electronic array, 0 for a drive with
+    motors; servo, iq: as in `row`, simulated."""
     rows = [row(node.name, beams > 0, servo, iq) for node in NODES] + [SIMULATED_DRIVES] * servo + [SIMULATED_IQ] * iq
     links = {}
     for topic in TOPICS:
@@ -280,8 +296,8 @@ def links_of(names: Collection[str], beams: int = 0) -> dict[str, Link]:
 
 
 def recorded(names: Collection[str], flags: Collection[str] = (), beams: int = 0) -> list[Link]:
-    """Return the Links that have a publisher in a graph of these nodes, or to which any client may publish. These are
-    recorded. flags: those of topics.TOPIC_FLAGS that are set."""
+    """Return the Links that have a publisher in a graph of these nodes, or to which any client may publish. flags:
+    those of topics.TOPIC_FLAGS that are set."""
     return [link for link in links_of(names, beams).values()
             if any(name in names for name in (link.readers if link.rate in REALTIME_RATES else link.writers))
             and (not link.flag or link.flag in flags)]
@@ -293,16 +309,12 @@ def held(names: Iterable[str]) -> frozenset[str]:
 
 
 def readers(link: Link, names: Iterable[str]) -> list[str]:
-    """Return the nodes among `names`, those of a graph, that must subscribe to a topic before the graph may start.
-
-    The recorder subscribes to every topic.
-    """
+    """Return the nodes among `names` that must subscribe to a topic before the graph starts, with the recorder."""
     return [name for name in names if name in link.readers or name == 'recorder']
 
 
 def reads(node: Node, names: Iterable[str], flags: Collection[str] = ()) -> tuple[str, ...]:
-    """Return the topics that a Node subscribes to in a graph of these nodes, in the order of its row, its trigger
-    first.
+    """Return the topics that a Node subscribes to in a graph of these nodes, its trigger first.
 
     A node that is not in the graph may be real equipment, so its topics are included. Excluded are the topics of an
     optional node that is not among the names, and topics whose flag is not set.
@@ -318,9 +330,6 @@ def reads(node: Node, names: Iterable[str], flags: Collection[str] = ()) -> tupl
 
 
 def noise(seed: int, node: str) -> np.random.Generator:
-    """Return the noise of a simulated node for a run's seed: a stream of its own, the same on every machine.
-
-    The stream depends on the place of the node in NODES. A node that is inserted changes the noise of all nodes
-    after it.
-    """
+    """Return the noise of a simulated node for a run's seed, the same on every machine. It depends on the place of the
+    node in NODES: a node that is inserted changes the noise of all nodes after it."""
     return np.random.default_rng((seed, NODE_NAMES.index(node)))

@@ -1,5 +1,5 @@
-"""Step matching: selection of the messages that belong to the step t_k of a node. No ROS here: the messages of a
-recording are matched in the same way.
+"""Step matching: selection of the messages that belong to the step t_k of a node, live or from a recording. No ROS
+here.
 
 One input of a node is the trigger: each of its messages begins a step. The other inputs are followers. A follower with
 a latency L contributes its message of the newest trigger stamp <= t_k - L. Example with the period T and L = 2 T:
@@ -20,8 +20,8 @@ RECENT_INTERVALS = 8  # number of intervals between the messages of a follower o
 
 
 class GraphError(RuntimeError):
-    """Error in the graph around a node. Its text is one line that names topic, stamp or node. silent: names of the
-    silent nodes."""
+    """Error in the graph around a node, one line that names topic, stamp or node. silent: names of the silent nodes.
+    """
 
     def __init__(self, message: str, silent: Iterable[str] = ()) -> None:
         super().__init__(message)
@@ -32,18 +32,16 @@ class GraphError(RuntimeError):
 
 
 class Steps:
-    """Matcher of a node's inputs: the trigger stamped t_k and, of each follower, the message due at t_k.
+    """Matcher of a node's inputs. answer(stamp, trigger message, {follower: message or None}) is called once per step,
+    in order.
 
-    followers  {topic: latency}; the message due has the newest trigger stamp <= t_k - latency. At the start no
-               message is due
-    answer     answer(stamp, trigger_message, {topic: message or None}), called once per step, in order
     prompt     True if a realtime step is answered at once, without waiting for followers
     held       followers for which a realtime step does not wait, because their last message stays valid
 
     In lockstep a step waits for exactly the messages due. Triggers that arrive before the answer are queued. In
-    realtime the step t_k is answered at the latest when the trigger of the next step arrives. Its answer receives the
-    newest messages, and None for a follower without a new message. Real equipment may have fewer messages than steps.
-    Therefore a realtime step waits only if the next message, by the shortest of the last intervals, is due.
+    realtime the step t_k is answered at the latest when the trigger of the next step arrives, with the newest
+    messages, and None for a follower without a new one. Because real equipment may have fewer messages than steps, a
+    realtime step waits only if the next message, by the shortest of the last intervals, is due.
     """
 
     def __init__(self, trigger: str, followers: Mapping[str, Nanoseconds], lockstep: bool,
@@ -102,7 +100,6 @@ class Steps:
             self._close()
 
     def _begin(self, stamp: Nanoseconds, message: Message) -> None:
-        """Make the step of a trigger the pending step, and determine the message due of each follower."""
         self._pending = (stamp, message)
         for name, awaited in self._awaited.items():
             awaited.append(stamp)
@@ -111,8 +108,8 @@ class Steps:
                 self._due[name] = awaited.popleft()
 
     def reset_after_gap(self, topic: str) -> None:
-        """Reset the state of a topic whose next message does not continue the earlier ones. If the topic is the
-        trigger, reset the state of all topics."""
+        """Reset the state of a topic whose next message does not continue the earlier ones; that of all for the
+        trigger."""
         for name in (topic,) if topic != self.trigger else self._last:
             self._last[name] = None
             if name in self._due:
@@ -125,18 +122,14 @@ class Steps:
             self._ahead.clear()
 
     def _refuse(self, reason: str) -> None:
-        """Raise GraphError in lockstep; count the refused message in realtime."""
         if self._lockstep:
             raise GraphError(reason)
         self.refused += 1
         self.refusal = reason
 
     def _ready(self, topic: str) -> bool:
-        """Return True if the pending step does not wait for a follower. Drop messages of the follower that are older
-        than the message due, except the last one.
-
-        Raises GraphError in lockstep if the next message is not the message due.
-        """
+        """Return True if the pending step does not wait for a follower, whose outdated messages are dropped. Raises
+        GraphError in lockstep if the next message is not the message due."""
         due, arrived = self._due[topic], self._arrived[topic]
         if due is None or topic in self._held:
             return True
@@ -161,8 +154,8 @@ class Steps:
             self._close()
 
     def _close(self) -> None:
-        """Answer the pending step. In lockstep the answer receives the messages due, in realtime the newest messages
-        whose stamp is not later than that of the step."""
+        """Answer the pending step: in lockstep with the messages due, in realtime with the newest messages up to its
+        stamp."""
         assert self._pending is not None
         stamp, message = self._pending
         self._pending = None

@@ -1,7 +1,6 @@
-"""Table of the topics of the graph: type, rate, and meaning of every number. The module `nodes` has their publishers
-and subscribers.
+"""Table of the topics of the graph: type, rate, and meaning of every number. `nodes` has their publishers and
+subscribers.
 
-Rate
     step    one message per drive step, stamped with the step (or with the measured step, where latency is modelled)
     once    one message before the first step
     second  one message of each publisher at every whole second of the drive's time
@@ -9,7 +8,6 @@ Rate
     sample  a message whenever its publisher has measured, in realtime only; a lockstep run takes none
     command a message for each command; the reply states the result, and the step before which the command took effect
     reply   a message for each command that the node accepted or refused
-The rate determines the quality of service: see QOS_BY_RATE.
 """
 import typing
 from collections.abc import Mapping
@@ -36,7 +34,7 @@ NO_TEXT_CODE = -1  # code, in records, of a text or a list that was never publis
 
 
 class Qos(typing.NamedTuple):
-    """Quality of service of a rate: a row of QOS_BY_RATE. Publishers are reliable, and subscribers in lockstep too."""
+    """Quality of service of a rate. Publishers are reliable, and subscribers in lockstep too."""
     latched: bool       # a late joiner receives the last message
     lockstep: int       # queue depth of publishers and subscribers in lockstep; 0: all messages
     written: int        # queue depth of a publisher in realtime, which never waits for a subscriber

@@ -30,10 +30,8 @@ class MessageFault(Record):
 
 @compiled
 def clear(faults: MessageFault) -> None:
-    """End every fault of the message. Afterwards `apply` sets the faults that are still in force.
-
-    `holds` becomes 1 if the step before had a freeze: a freeze that continues then uses the same held numbers.
-    """
+    """End every fault of the message. `holds` becomes 1 if the step before had a freeze: a freeze that continues then
+    uses the same held numbers."""
     faults.holds = faults.freeze
     faults.drop, faults.freeze, faults.nan, faults.sigma = 0, 0, 0, 0.0
 
@@ -45,10 +43,7 @@ def codes(node: str) -> tuple[int, ...]:
 
 @compiled
 def apply(faults: MessageFault, codes: tuple[int, ...], fault: int, values: Floats) -> None:
-    """Apply a fault if it is one of `codes`; other faults change nothing here.
-
-    codes: result of the function `codes`; fault: code of the fault; values: its arguments.
-    """
+    """Apply a fault if it is one of `codes`, the result of that function; other faults change nothing here."""
     drop, freeze, nan, noise = codes
     if fault == drop:
         faults.drop = 1
@@ -62,10 +57,7 @@ def apply(faults: MessageFault, codes: tuple[int, ...], fault: int, values: Floa
 
 @compiled
 def numbers(faults: MessageFault, values: Floats, first: int) -> None:
-    """Freeze values (n,) or make them NaN, in place, as the faults in force require.
-
-    `held` stores the values from its element `first` on; first + n must be at most MAX_HELD_NUMBERS.
-    """
+    """Freeze values (n,) or make them NaN, in place. `held` stores them from its element `first` on."""
     for i in range(len(values)):
         if faults.freeze != 0:
             if faults.holds != 0:
@@ -86,17 +78,14 @@ def _mixed(x: np.uint64) -> np.uint64:
 
 @compiled
 def _uniform(seed: int, stamp: Nanoseconds, i: int) -> float:
-    """Return a random number in (0, 1) that depends only on (seed, stamp, i), not on earlier numbers.
-
-    Such a generator is counter-based (Salmon et al., SC 2011).
-    """
+    """Return a random number in (0, 1) that depends only on (seed, stamp, i), of a counter-based generator (Salmon et
+    al., SC 2011)."""
     x = _mixed(_mixed(_mixed(np.uint64(seed) + np.uint64(0x9E3779B97F4A7C15)) ^ np.uint64(stamp)) ^ np.uint64(i))
     return (float(x >> np.uint64(11)) + 0.5) * 2.0**-53
 
 
 @compiled
 def noise(faults: MessageFault, stamp: Nanoseconds, i: int) -> float:
-    """Return the white noise of number i of a message: sigma times a standard normal number (Box and Muller 1958).
-    stamp: of the step."""
+    """Return the white noise of number i of a message: sigma times a standard normal number (Box and Muller 1958)."""
     u, v = _uniform(faults.seed, stamp, 2 * i), _uniform(faults.seed, stamp, 2 * i + 1)
     return faults.sigma * math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)

@@ -1,12 +1,9 @@
 """Schedule of the injected faults of a simulated node: a record of the faults in force, and the unit that fills it.
 
-The law of the node checks the record once per step. It begins with these lines:
-
-    if schedule.pending(memory.schedule, stamp):
+    if schedule.pending(memory.schedule, stamp):    # beginning of the law of the node
         injected.take(memory, stamp)
 
-A node without a fault therefore behaves as if faults did not exist. `take` clears all faults, then applies again the
-fault of every row that is in force. No state must be restored after a fault.
+`take` clears all faults, then applies again the fault of every row that is in force. No state must be restored.
 """
 from collections.abc import Mapping, Sequence
 from typing import Annotated
@@ -94,9 +91,7 @@ def clear(schedule: np.void) -> None:
 
 
 class Simulated(Unit):
-    """Unit of simulated equipment. Its record has a field `schedule` (Schedule), which its law reads.
-    Its parameters have the field `inject`.
-    """
+    """Unit of simulated equipment. Its record has a field `schedule` (Schedule), its parameters the field `inject`."""
     FAULTS_OF = ''      # node of table.INJECTED_FAULTS whose faults it has; '': its own node
 
     @property

@@ -1,8 +1,5 @@
-"""Table of the faults that can be injected into simulated nodes. No ROS here, nothing compiled.
-
-A fault is a command that a simulated node accepts on its topic `NODE/inject` and in its parameter `inject`, for
-example '12 encoder_jump axis=azimuth size=0.01 duration=5'.
-"""
+"""Table of the faults that can be injected into simulated nodes. A fault is a command that a node accepts on its topic
+`NODE/inject` and in its parameter `inject`, for example '12 encoder_jump axis=azimuth size=0.01 duration=5'."""
 import typing
 
 from pedestal_common.parameters import ParameterError
@@ -11,13 +8,11 @@ from pedestal_common.wire.commands import Argument, Command, CommandDefinition, 
 
 
 class Fault(typing.NamedTuple):
-    """Fault that can be injected into a simulated node.
+    """Fault that can be injected into a simulated node; the first three fields define its command.
 
-    The first three fields are those of a commands.CommandDefinition, so a Fault also defines its command.
-
-    A fault that deletes a message or changes its stamp would stop a lockstep graph, because every node would wait for
-    the message. The faults `drop` and `delay` of the drive are allowed: each command arrives in its step, and the law
-    of the drive then ignores or delays its content.
+    A fault that deletes a message or changes its stamp would stop a lockstep graph. The faults `drop` and `delay` of
+    the drive are allowed: each command arrives in its step, and the law of the drive then ignores or delays its
+    content.
     """
     name: str
     doc: str
@@ -137,8 +132,7 @@ def code(node: str, name: str) -> int:
 
 
 def scheduled_commands(node: str, text: str) -> list[tuple[Nanoseconds, Command]]:
-    """Return the commands of the parameter `inject` of a node with their times, in order. Raise ParameterError for a
-    text that is no schedule."""
+    """Return the commands of the parameter `inject` of a node with their times, in order. Raises ParameterError."""
     return schedule('inject', text, INJECT_COMMANDS[node])
 
 

@@ -1,8 +1,5 @@
-"""Publisher of a node's diagnostics on the topic `diagnostics`; each node (shell.Shell) has one.
-
-The diagnostics contain the diagnosis of the node itself. In realtime they also contain the findings of the shell:
-stalls, steps of the host's clock, and dropped messages.
-"""
+"""Publisher of a node's diagnostics: the diagnosis of the node itself and, in realtime, the findings of its shell
+(stalls, steps of the host's clock, dropped messages)."""
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
@@ -47,8 +44,7 @@ class Diagnostics:
         self._send(self._diagnose(), stamp)
 
     def publish_urgent(self) -> bool:
-        """Publish the diagnostics in realtime at once, except within MIN_URGENT_PERIOD_NS after the last diagnostics.
-        Return True if they were published."""
+        """Publish in realtime at once, except within MIN_URGENT_PERIOD_NS after the last. Return True if published."""
         due = time.monotonic_ns() - self._published > MIN_URGENT_PERIOD_NS
         if due:
             self._publish_now()
@@ -69,8 +65,7 @@ class Diagnostics:
         self._write(messages.serialize(array))
 
     def _with_findings(self, diagnosis: Diagnosis, now: Nanoseconds, elapsed: Nanoseconds) -> Diagnosis:
-        """Return a Diagnosis with the findings of the shell of a realtime node, the worst first. elapsed: time since
-        the last diagnostics."""
+        """Return a Diagnosis with the findings of the shell, the worst first. elapsed: since the last one."""
         utc = self._node.utc
         findings: list[tuple[int, str]] = [*filter(None, (listener.finding(now) for listener in self._node.listeners))]
         if elapsed > STALL_LIMIT_NS:

@@ -1,5 +1,4 @@
-"""Settings of the middleware (rclpy and DDS) of every node: quality of service, discovery, parameter files, the
-executor."""
+"""Settings of the middleware (rclpy and DDS) of every node."""
 import importlib
 import os
 import pathlib
@@ -25,11 +24,7 @@ DDS_PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
 
 
 def qos(rate: str, role: str = 'lockstep') -> QoSProfile:
-    """Return the quality of service of the topics of a rate.
-
-    role: `lockstep` for publishers and subscribers in lockstep; `written`, `read` or `recorded` in realtime (see
-    topics.Qos).
-    """
+    """Return the quality of service of the topics of a rate. role: `lockstep`, or a field of topics.Qos."""
     row = topics.QOS_BY_RATE[rate]
     depth, reliable = getattr(row, role), role != 'read' or row.reliable
     return QoSProfile(history=HistoryPolicy.KEEP_LAST if depth else HistoryPolicy.KEEP_ALL, depth=depth or 1,
@@ -44,10 +39,8 @@ def message_class(type_name: str) -> type:
 
 
 def namespace(option: str, name: str) -> str:
-    """Return the namespace of a name such as ship_1, with a slash before it; '' for none.
-
-    option: beginning of the error, such as '--namespace '. Raises ValueError.
-    """
+    """Return the namespace of a name such as ship_1, with a slash before it; '' for none. option: beginning of the
+    error, such as '--namespace '. Raises ValueError."""
     place = f'/{name.strip("/")}'.rstrip('/')
     try:
         validate_namespace(place or '/')
@@ -60,9 +53,9 @@ def set_defaults() -> None:
     """Set the DDS profile of this process and its children by ROS_AUTOMATIC_DISCOVERY_RANGE, unless the user names a
     profile.
 
-    Not set, or LOCALHOST: the graph stays on this machine and on its loopback (fastdds.xml). rclpy then gets
-    SYSTEM_DEFAULT, because under LOCALHOST rmw_fastrtps opens transports of its own on every interface. SUBNET: the
-    graph may spread over several hosts, by UDP (fastdds_subnet.xml).
+    Not set, or LOCALHOST: the graph stays on the loopback of this machine. rclpy then gets SYSTEM_DEFAULT, because
+    under LOCALHOST rmw_fastrtps opens transports of its own on every interface. SUBNET: the graph may spread over
+    several hosts, by UDP.
     """
     scope = os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     if scope in DDS_PROFILES:
@@ -73,9 +66,8 @@ def set_defaults() -> None:
 
 
 def initialise(args: Sequence[str] | None = None) -> None:
-    """Initialise rclpy in this process with arguments, by default those of the command line. DDS is set as in
-    set_defaults, and signals are left to the caller. Logs go to stderr only, which needs neither a home nor a disk.
-    Raises ValueError for arguments that rcl refuses."""
+    """Initialise rclpy and DDS in this process; signals are left to the caller. Logs go to stderr only, which needs
+    neither a home nor a disk. Raises ValueError for arguments that rcl refuses."""
     set_defaults()
     given = list(sys.argv if args is None else args)
     for place in parameter_files(given):
@@ -99,9 +91,7 @@ def parameter_files(arguments: Sequence[str]) -> list[int]:
 
 def _as_read(path: FilePath) -> str:
     """Return the path of a copy of a parameter file in memory, which states the values as parameter_file reads them.
-
-    Without the copy, rcl would read 010 as 8 and `on` as true. Raises ParameterFileError.
-    """
+    Without the copy, rcl would read 010 as 8 and `on` as true. Raises ParameterFileError."""
     copy = os.memfd_create('parameters')
     with open(copy, 'w', closefd=False) as stream:
         stream.write(parameter_file.dumped(parameter_file.read(path)))
@@ -109,7 +99,7 @@ def _as_read(path: FilePath) -> str:
 
 
 def make_executor(context: Context | None = None) -> Executor:
-    """Return the executor that every node runs in. context: an rclpy.Context, None for the default."""
+    """Return the executor that every node runs in."""
     try:
         from rclpy.experimental.events_executor import EventsExecutor
         return EventsExecutor(context=context)

@@ -1,8 +1,4 @@
-"""Shell: base class of every ROS node of the project, and `main`, which runs the process of a node.
-
-The shell declares the parameters, reads the clock, opens topics of the table graph.topics, and waits for the other
-nodes of the graph.
-"""
+"""Shell: base class of every ROS node of the project, and `main`, which runs the process of a node."""
 import array
 import contextlib
 import gc
@@ -58,8 +54,8 @@ EXIT_DELAY_S = 0.1  # time for which a process stays after its publishers and su
 
 
 class Stopped(BaseException):  # noqa: N818  not an error: a signal stops the node
-    """Arrival of SIGINT or SIGTERM while a node waits or compiles. Like KeyboardInterrupt it is no Exception, because
-    numba would take an Exception for an error of the law that it compiles."""
+    """Arrival of a signal while a node waits or compiles. Like KeyboardInterrupt it is no Exception, because numba
+    would take an Exception for an error of the law that it compiles."""
 
 
 EXPECTED_ERRORS = (parameters.ParameterError, GraphError, ValueError, OSError, InvalidParameterTypeException,
@@ -84,7 +80,6 @@ STOP_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
 
 
 def _on_signal(_number: int, frame: FrameType | None) -> None:
-    """Note the signal, so that `main` stops the node. Raise Stopped if the process compiles laws."""
     _stop.append(True)
     if _compiling:
         ignored_stop.raise_stop(Stopped, frame)
@@ -98,8 +93,7 @@ def stop_on_signals() -> None:
 
 
 def readings() -> tuple[Nanoseconds, Nanoseconds]:
-    """Return a pair of readings (steady clock, system clock). The pair is read again, at most twice, if more than
-    0.1 ms passed between the two readings."""
+    """Return readings (steady clock, system clock), taken again at most twice if they lie 0.1 ms apart."""
     for _ in range(3):
         steady, system = time.monotonic_ns(), time.time_ns()
         if time.monotonic_ns() - steady < 100_000:
@@ -108,10 +102,8 @@ def readings() -> tuple[Nanoseconds, Nanoseconds]:
 
 
 def node_of(info: TopicEndpointInfo, root: str = '/') -> str:
-    """Return the name in the graph of the node that owns a publisher or subscriber, 'beam_2/acu' for example.
-
-    info: of the publisher or subscriber; root: namespace of the graph, with a '/' at its end.
-    """
+    """Return the name in the graph of the node that owns a publisher or subscriber, 'beam_2/acu' for example. root:
+    namespace of the graph, with a '/' at its end."""
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'.removeprefix(root)
 
 
@@ -130,12 +122,10 @@ def _descriptor(field: parameters.Field, read_only: bool) -> ParameterDescriptor
 
 
 class Shell(Node):
-    """Node of the graph.
+    """Node of the graph. The fields of its parameters become ROS parameters of the same dotted names.
 
-    parameters_type: the parameter dataclass of the node; its fields become ROS parameters of the same dotted names.
     live: prefixes of parameters that may change while the node runs; the node then implements `reconfigure()`. Raises
-    parameters.ParameterError for an unknown or refused parameter.
-
+    ParameterError for an unknown or refused parameter.
     """
     parameters: parameters.AnyParameters
 
@@ -166,15 +156,14 @@ class Shell(Node):
             """Take the node from the graph; rclpy does not state the type."""
 
     def _place(self, name: str) -> tuple[str, str]:
-        """Return (namespace of the graph, prefix of this node's beam in the graph), each with a '/' at its end. The
-        prefix is '' for a node without a beam."""
+        """Return (namespace of the graph, prefix of this node's beam or ''), each with a '/' at its end."""
         namespace = self.get_namespace().rstrip('/') + '/'
         prefix = next((prefix for prefix in nodes.prefixes(self.graph.beams) if name in nodes.NODE_NAMES
                        and nodes.row(name).of_beam and namespace.endswith('/' + prefix)), '')
         return namespace.removesuffix(prefix), prefix
 
     def _declare(self, live: Sequence[str]) -> None:
-        """Check the given ROS parameters, store them in `parameters` and `graph`, and declare them in ROS."""
+        """Check the given ROS parameters, store them, and declare them in ROS."""
         given = {name: given.value for name, given in self._parameter_overrides.items()}
         given = parameters.without_ros({name: list(value) if isinstance(value, array.array) else value
                                         for name, value in given.items()})
@@ -195,8 +184,6 @@ class Shell(Node):
 
     def _declare_all(self, values: Mapping[str, Value], fields: Iterable[tuple[str, parameters.Field]],
                      live: Sequence[str]) -> None:
-        """Declare a ROS parameter for each (name, field), with its value in `values`. A parameter whose name begins
-        with one of `live` is writable."""
         for name, field in fields:
             self.declare_parameter(name, values[name], _descriptor(field, not name.startswith(tuple(live))),
                                    ignore_override=True)
@@ -208,7 +195,6 @@ class Shell(Node):
                 if change.name in fields else change for change in changes]
 
     def _changed(self, changes: Iterable[Parameter]) -> parameters.Parameters:
-        """Return the parameters of the node with changed ROS parameters. Raises ParameterError."""
         values = parameters.as_dict(self.parameters)
         values.update({change.name: change.value for change in changes if change.name in values})
         changed = parameters.build(self._parameters_type, values)
@@ -216,7 +202,6 @@ class Shell(Node):
         return changed
 
     def _on_set(self, changes: Iterable[Parameter]) -> SetParametersResult:
-        """Accept or refuse changed ROS parameters, for rclpy."""
         try:
             self._changed(changes)
         except parameters.ParameterError as error:
@@ -224,7 +209,6 @@ class Shell(Node):
         return SetParametersResult(successful=True)
 
     def _post_set(self, changes: Iterable[Parameter]) -> None:
-        """Store accepted changes, for rclpy."""
         self.parameters = self._changed(changes)
         self.reconfigure()
 
@@ -232,8 +216,7 @@ class Shell(Node):
         """Take the changed `self.parameters`; overridden by a node with live parameters."""
 
     def _link(self, name: str) -> tuple[nodes.Link, str]:
-        """Return (nodes.Link, ROS name) of a topic of the graph. A node of a beam names the topics of its beam without
-        the prefix of the beam."""
+        """Return (nodes.Link, ROS name) of a topic, which a node of a beam names without the prefix of its beam."""
         link = self.links.get(self.beam + name) or self.links[name]
         return link, self._root + link.name if self.beam else link.name
 
@@ -243,11 +226,8 @@ class Shell(Node):
         return steady, self.utc.at(steady, system)
 
     def epoch(self, stamp: Nanoseconds) -> Nanoseconds:
-        """Return the stamp at which the time of the units is 0.
-
-        In lockstep this is 0. In realtime it is the parameter `graph.start`. If that is 0, it is the beginning of the
-        UTC day of the first `stamp`.
-        """
+        """Return the stamp at which the time of the units is 0. In lockstep this is 0. In realtime it is the parameter
+        `graph.start` or, if that is 0, the beginning of the UTC day of the first `stamp`."""
         if self._epoch is None:
             self._epoch = stamp // (SECONDS_PER_DAY * NS_PER_SECOND) * SECONDS_PER_DAY * NS_PER_SECOND
         return self._epoch
@@ -262,11 +242,12 @@ class Shell(Node):
 
     def reader(self, name: str, decode: Callable[[bytes], tuple[Nanoseconds | None, _M]],
                take: Callable[[_M, bool], None]) -> None:
-        """Subscribe to a topic of the graph, and call take(message, after_gap) for every message.
+        """Subscribe to a topic of the graph, and call take(message, after_gap) for every message. after_gap: True if
+        messages may be missing before this message.
 
-        decode(CDR bytes) returns (stamp or None, message). It raises ValueError for bytes that are no such
-        message. In lockstep such bytes from a node of the graph end this node. In all other cases they are dropped, as
-        are the messages that a PublisherGate refuses. after_gap: True if messages may be missing before this message.
+        decode(CDR bytes) returns (stamp or None, message), and raises ValueError for other bytes. In lockstep such
+        bytes from a node of the graph end this node. In all other cases they are dropped, as are the messages that a
+        PublisherGate refuses.
         """
         link, ros_name = self._link(name)
 
@@ -296,10 +277,8 @@ class Shell(Node):
                     lambda message, after_gap: take(message))
 
     def sample_reader(self, name: str, take: Callable[[Message], None]) -> None:
-        """Subscribe to a topic of rate `sample`, and call take(message) for every message.
-
-        Unlike message_reader this also drops messages whose stamp is in the future, or not newer than the last one.
-        """
+        """Subscribe to a topic of rate `sample`. Unlike message_reader this also drops messages whose stamp is in the
+        future, or not newer than the last one."""
         type_name = self._link(name)[0].type
         self.reader(name, lambda data: (messages.stamp_of(data) or None, messages.deserialize(data, type_name)),
                     lambda message, after_gap: take(message))
@@ -309,8 +288,8 @@ class Shell(Node):
         return self.create_timer(period, self._guarded(function), clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _guarded(self, function: Callable[..., object]) -> Callable[..., None]:
-        """Return a callback that calls `function` and stores an expected error for `main`. Without this, rclpy would
-        print a traceback first."""
+        """Return a callback that stores an expected error of `function` for `main`, before rclpy prints a traceback.
+        """
         def call(*args: object) -> None:
             try:
                 function(*args)
@@ -321,21 +300,17 @@ class Shell(Node):
         return call
 
     def diagnose_with(self, diagnose: Diagnose) -> None:
-        """Publish the diagnostics that diagnose() returns.
-
-        In lockstep they are published at every whole second of the drive's time. In realtime they are published once a
-        second of the wall clock, and in `diagnose_now`.
-        """
+        """Publish the diagnostics that diagnose() returns: in lockstep at every whole second of the drive's time, in
+        realtime once a second of the wall clock and in `diagnose_now`."""
         self.diagnostics = Diagnostics(self, diagnose)
 
     def diagnose_now(self) -> bool:
-        """Publish the diagnostics at once in realtime, because of a change. Return True if they were published. They
-        are not published in lockstep, or too soon after the last diagnostics."""
+        """Publish the diagnostics in realtime, unless the last are too new. Return True if they were published."""
         return self.diagnostics is not None and not self.graph.lockstep and self.diagnostics.publish_urgent()
 
     def begin_step(self, stamp: Nanoseconds) -> None:
-        """Note the stamp t_k of a step, before any message of the step is published. In lockstep the first call
-        waits for the graph, and diagnostics are published at every whole second. In realtime there is no wait."""
+        """Note the stamp t_k of a step, before any message of the step is published. In lockstep the first call waits
+        for the graph, and diagnostics are published at every whole second."""
         self._stamp = stamp
         if not self._started:
             self._started = True
@@ -353,8 +328,7 @@ class Shell(Node):
         self._started, self._stamp, self._next_second = False, 0, 0
 
     def prepare(self, unit: Unprepared) -> None:
-        """Compile the laws of a unit, which takes half a minute and more when they are not cached. Raises Stopped
-        after a signal."""
+        """Compile the laws of a unit, which may take half a minute. Raises Stopped after a signal."""
         _compiling.append(True)
         try:
             if _stop:
@@ -364,18 +338,16 @@ class Shell(Node):
             _compiling.clear()
 
     def await_acknowledged(self) -> None:
-        """Wait until every subscriber has received all messages of this node. Raises GraphError after graph.deadline.
-
-        The error names the recorder as silent: in lockstep all other nodes have answered the step before.
-        """
+        """Wait until every subscriber has received all messages of this node. Raises GraphError after graph.deadline,
+        with the recorder as silent: in lockstep all other nodes have answered the step before."""
         for link, publisher in self.publishers_by_link.items():
             if not publisher.wait_for_all_acked(Duration(seconds=self.graph.deadline)):
                 raise GraphError(f'a subscriber of {link.name} took no message in {self.graph.deadline:g} s',
                                  ('recorder',))
 
     def announce(self, publish: Callable[[bytes], None], message: Message) -> None:
-        """Publish a message without a stamp. In lockstep, wait before and after it until all subscribers have
-        acknowledged all messages, so that the order is deterministic."""
+        """Publish a message without a stamp. In lockstep all messages before and after it are acknowledged first, so
+        that the order is deterministic."""
         if self.graph.lockstep:
             self.await_acknowledged()
         publish(messages.serialize(message))
@@ -383,10 +355,8 @@ class Shell(Node):
             self.await_acknowledged()
 
     def await_graph(self) -> None:
-        """Wait until every topic that this node publishes has all its subscribers among the nodes of the graph.
-
-        Raises GraphError after START_DEADLINE_S, or when another graph publishes the same topics.
-        """
+        """Wait until every topic that this node publishes has all its subscribers among the nodes of the graph. Raises
+        GraphError after START_DEADLINE_S, or when another graph publishes the same topics."""
         deadline = time.monotonic() + START_DEADLINE_S
         for link, publisher in self.publishers_by_link.items():
             wanted = nodes.readers(link, self.graph.members)
@@ -403,8 +373,7 @@ class Shell(Node):
                                  f'{self.context.get_domain_id()}; set a free one')
 
     def _missing(self, publisher: Publisher, wanted: Sequence[str]) -> list[str]:
-        """Return the names of the wanted subscribers that a topic lacks. No other subscriber replaces a wanted one,
-        except a replay."""
+        """Return the wanted subscribers that a topic lacks. Only a replay replaces a wanted subscriber."""
         if not wanted:
             return []
         subscribers = self.get_subscriptions_info_by_topic(publisher.topic_name)
@@ -423,32 +392,30 @@ class Shell(Node):
         return 'messages'
 
     def draining(self) -> bool:
-        """Return True while a node that has finished must go on receiving before `close`; overridden by the
-        recorder."""
+        """Return True while a finished node must go on receiving before `close`; overridden by the recorder."""
         return False
 
     def close(self) -> None:
-        """Wait a little for the acknowledgement of the last messages, which would be lost with the node. Called once
-        before the node ends; overridden by a node with data to store."""
+        """Wait a little for the acknowledgement of the last messages, which would be lost with the node; overridden by
+        a node with data to store."""
         deadline = time.monotonic() + ACKNOWLEDGE_TIMEOUT_S
         for publisher in self.publishers_by_link.values():
             publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
 
 def _write_line(stream: TextIO, line: str) -> None:
-    """Write a last line without Python's buffer. A full disk or a closed pipe loses the line, and must not change the
-    reason of the end."""
+    """Write a last line without a buffer. A full disk or a closed pipe must not change the reason of the end."""
     with contextlib.suppress(OSError):
         os.write(stream.fileno(), f'{line}\n'.encode())
 
 
 def _end_process(node: Node, code: int) -> NoReturn:
-    """End the process with an exit code as soon as the publishers and subscribers of its node have left the graph.
+    """End the process as soon as the publishers and subscribers of its node have left the graph.
 
     The DDS participant of the process is not destroyed. In 1 of 100 ends of a graph, Fast DDS 2.14 hangs in the
     destructor while other participants leave. DomainParticipant::set_listener then waits for a callback and holds the
-    mutex that the callback needs. The process stays for EXIT_DELAY_S, so that the other nodes notice its departure. A
-    node that misses the departure of a subscriber waits for the subscriber until its DDS lease ends, 20 s.
+    mutex that the callback needs. The process stays for EXIT_DELAY_S, because a node that misses the departure of a
+    subscriber waits for it until its DDS lease ends, 20 s.
     """
     with node.handle, contextlib.suppress(OSError):
         node.destroy_node()
@@ -460,8 +427,8 @@ def _end_process(node: Node, code: int) -> NoReturn:
 def main(make_node: Callable[[], Shell], args: Sequence[str] | None = None) -> int:
     """Run the node of make_node() until it is finished or a signal stops it, and end the process.
 
-    The exit code is 0, or 1 after an error, which is one line on stderr. The node's `result`, if any, is printed on
-    stdout as a JSON object; an error adds {'error': the line, 'silent': the silent nodes}.
+    The exit code is 0, or 1 after an error, which is one line on stderr. The node's `result` is printed on stdout as a
+    JSON object; an error adds {'error': the line, 'silent': the silent nodes}.
     """
     stop_on_signals()
     node, code = None, 0

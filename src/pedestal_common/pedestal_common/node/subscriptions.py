@@ -1,7 +1,4 @@
-"""Subscriptions of a node: the messages of a topic that it accepts, and its report of the dropped messages.
-
-LockstepSubscriber is for a lockstep graph, TopicSubscriber for a realtime graph.
-"""
+"""Subscriptions of a node: the messages of a topic that it accepts, and its report of the dropped messages."""
 import collections
 import inspect
 from collections.abc import Callable, Mapping
@@ -39,8 +36,8 @@ MAX_RECENT_MESSAGES = 100
 
 
 def two_argument_callback(function: Take) -> Callable[..., None]:
-    """Return function(data, info) as a callback of a subscription. EventsExecutor (rclpy 7.1.6) passes one pair to a
-    callback of two arguments, SingleThreadedExecutor passes two arguments."""
+    """Return function(data, info) as a callback of a subscription. EventsExecutor (rclpy 7.1.6) passes one pair to it,
+    SingleThreadedExecutor two arguments."""
     def call(data: bytes, info: MessageInfo | None = None) -> None:
         function(*(data if info is None else (data, info)))
     vars(call)['__signature__'] = inspect.signature(lambda data, info: None)
@@ -48,10 +45,10 @@ def two_argument_callback(function: Take) -> Callable[..., None]:
 
 
 def subscribe(node: 'Shell', link: nodes.Link, ros_name: str, take: Take, role: str) -> list[Subscription]:
-    """Return the subscriptions of a node in realtime to the topic of a link, named ros_name in ROS.
+    """Return the subscriptions of a node in realtime to a topic, which call `take` once for each message. role: see
+    topics.Qos.
 
-    The subscriptions call `take` once for each message. role: `read` or `recorded`. A
-    latched subscriber does not match a volatile publisher. Where topics.Qos has `unlatched` there is therefore a
+    A latched subscriber does not match a volatile publisher. Where topics.Qos has `unlatched` there is therefore a
     second, volatile subscription. A latched publisher matches both; the second copy of its message is dropped.
     """
     def open_with(profile: QoSProfile, callback: Take,
@@ -76,21 +73,15 @@ def subscribe(node: 'Shell', link: nodes.Link, ros_name: str, take: Take, role: 
 
 
 def foreign_publishers(node: 'Shell', link: nodes.Link, ros_name: str) -> list[str] | None:
-    """Return the names of the nodes that publish a topic and are no publisher of its link.
-
-    Return None if no node of the graph publishes the link. A node before its discovery counts, because it may be
-    foreign.
-    """
+    """Return the names of the nodes that publish a topic and are no publisher of its link; None if no node of the
+    graph publishes the link. A node before its discovery counts, because it may be foreign."""
     if not any(writer in node.graph.members for writer in link.writers):
         return None
     return [name for name in node.publishers_of(ros_name) if name not in link.writers and name != nodes.REPLAY_NODE]
 
 
 class SoleNumbers:
-    """Check of the sequence numbers of a topic in lockstep: those of the publisher in the graph rise by 1.
-
-    node: the node that subscribes; link: the topic, named ros_name in ROS; first: as `next`
-    """
+    """Check of the sequence numbers of a topic in lockstep: those of the publisher in the graph rise by 1."""
 
     def __init__(self, node: 'Shell', link: nodes.Link, ros_name: str, first: int | None = None) -> None:
         self._node, self._link, self._ros_name = node, link, ros_name
@@ -110,12 +101,11 @@ class SoleNumbers:
 
 
 class LockstepSubscriber(Generic[_M]):
-    """Subscriber to one topic in lockstep, which passes the messages of the graph to take(message, False).
+    """Subscriber to one topic in lockstep, which passes the messages of the graph to take(message, False): no gap
+    precedes a message.
 
-    False states that no gap precedes the message. A message whose number is not the next (see SoleNumbers) is foreign
-    if ROS lists a foreign publisher, or if the message is unreadable. Foreign messages are dropped.
-
-    node, link, ros_name, decode: see TopicSubscriber. An unreadable message of the graph raises ValueError.
+    A message whose number is not the next is foreign if ROS lists a foreign publisher, or if the message is
+    unreadable. Foreign messages are dropped. An unreadable message of the graph raises ValueError.
     """
 
     def __init__(self, node: 'Shell', link: nodes.Link, ros_name: str,
@@ -147,11 +137,7 @@ class LockstepSubscriber(Generic[_M]):
 
 
 class TopicSubscriber(Generic[_M]):
-    """Subscriber to one topic, which passes the messages that its PublisherGate accepts to take(message, True after a
-    gap).
-
-    node: the node that subscribes; link: the topic, named ros_name in ROS; decode: see PublisherGate
-    """
+    """Subscriber to one topic in realtime, which passes the messages that its PublisherGate accepts to take."""
 
     def __init__(self, node: 'Shell', link: nodes.Link, ros_name: str,
                  decode: Callable[[bytes], tuple[Nanoseconds | None, _M]], take: Callable[[_M, bool], None]) -> None:
@@ -177,13 +163,12 @@ class TopicSubscriber(Generic[_M]):
         self._subscriptions = subscribe()
 
     def _hold(self, data: bytes, info: MessageInfo) -> None:
-        """Hold a text until every publisher of its topic has a name."""
         self._held.append((self._node.clock()[0], data, info))
         self._take_held()
 
     def _take_held(self) -> None:
-        """Take the held texts once every publisher has a name. A text that arrived while an unexpected publisher was
-        present is dropped. After that publisher has left, a new subscription brings the last text again."""
+        """Take the held texts once every publisher has a name. A text beside an unexpected publisher is dropped. After
+        that publisher has left, a new subscription brings the last text again."""
         while self._held and (not self._undiscovered() or self._node.clock()[0] - self._held[0][0] > MAX_DISCOVERY_NS):
             self._receive(*self._held.popleft()[1:])
         missed = self.gate.drops.counts[publisher_gate.DROP_OTHER_PUBLISHER]
@@ -197,7 +182,6 @@ class TopicSubscriber(Generic[_M]):
         return any(UNDISCOVERED_NODE_NAME in name for name in self._node.publishers_of(self._ros_name))
 
     def _receive(self, data: bytes, info: MessageInfo) -> None:
-        """Pass a message on if the PublisherGate accepts it; otherwise publish diagnostics for a serious reason."""
         gate = self.gate
         now, utc = self._node.clock()
         message = gate.take(data, info['publication_sequence_number'], info['source_timestamp'], now, utc)
@@ -207,13 +191,10 @@ class TopicSubscriber(Generic[_M]):
             self._node.diagnose_now()
 
     def unexpected_publishers(self) -> list[str]:
-        """Return the names of the publishers that the graph does not expect; [] in a graph without the expected
-        nodes."""
+        """Return the names of the publishers that the graph does not expect."""
         return foreign_publishers(self._node, self.link, self._ros_name) or []
 
     def _unexpected_count(self) -> int | None:
-        """Return the number of unexpected publishers for PublisherGate. A node before its discovery counts as
-        unexpected."""
         return len(self.unexpected_publishers()) if self._expected else None
 
     def _surplus_count(self) -> int:
@@ -221,8 +202,7 @@ class TopicSubscriber(Generic[_M]):
         return max(len(self._node.publishers_of(self._ros_name)) - 1, 0)
 
     def finding(self, now: Nanoseconds) -> tuple[int, str] | None:
-        """Return (level, text) for the diagnostics, about messages that Drops reports; None without any. now: steady
-        clock."""
+        """Return (level, text) about messages that Drops reports, for the diagnostics; None without any."""
         drops = self.gate.drops
         if not drops.reported(now):
             return None
@@ -234,8 +214,7 @@ class TopicSubscriber(Generic[_M]):
         return LEVEL_ERROR, f'{self.link.name}: {count} dropped: {kind}: {who}'
 
     def values(self) -> list[tuple[str, str]]:
-        """Return [(key, text)] for the diagnostics: the number of dropped messages, the smallest time from sending to
-        reception."""
+        """Return [(key, text)]: counts of dropped messages, smallest time from sending to reception."""
         gate = self.gate
         values = [(f'dropped {self.link.name}: {kind}', str(count)) for kind, count in gate.drops.counts.items()]
         if gate.offset is not None:

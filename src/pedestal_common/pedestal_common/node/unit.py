@@ -1,9 +1,5 @@
-"""Unit: the steps of one node with their state, without ROS.
-
-Drive, electronic array, receiver, control unit, ship and INS are units. The same unit runs in its node, in the closed
-loop, in a recomputed recording and in many trials. The caller passes a record with the numbers of the input topics
-(see wire.records), and receives a record with the numbers of the output topics.
-"""
+"""Unit: the steps of one node with their state, without ROS. The same unit runs in its node, in the closed loop, in a
+recomputed recording and in many trials."""
 import collections
 import typing
 from collections.abc import Callable, Iterable, Mapping
@@ -40,9 +36,8 @@ class Unit(typing.Protocol):
 
         law(memory, stamp, inputs, outputs)
 
-    stamp is the time t_k of the step. inputs and outputs are records of topics, and may hold further topics. In
-    the closed loop both are one record, which holds all topics of the step. The drive is the exception: its inputs are
-    the record of the step before.
+    inputs and outputs are records of topics, and may hold further topics. In the closed loop both are one record,
+    which holds all topics of the step. The drive is the exception: its inputs are the record of the step before.
     """
     NODE: nodes.Node                # row of nodes.NODES or nodes.HARDWARE_ROWS of the node that runs this unit
     # {type of its memory: (law of one step, law of many steps)}, compiled; the second takes many stamps and records
@@ -113,13 +108,11 @@ class Unit(typing.Protocol):
         return self.memory.record[0]
 
     def block(self, steps: int) -> Memory:
-        """Return the memory for this number of next steps, at most MAX_BLOCK_STEPS; overridden by a unit with
-        noise."""
+        """Return the memory for the next steps, at most MAX_BLOCK_STEPS; overridden by a unit with noise."""
         return self.memory
 
     def step(self, stamps: Stamps, inputs: Records, outputs: Records) -> None:
-        """Make the steps of stamps (n,), from inputs (n,) to outputs (n,). Scheduled commands are executed before
-        the step at which they are due."""
+        """Make n steps, with each scheduled command before the step at which it is due."""
         _, law_of_many = self.LAWS[type(self.memory)]
         first = 0
         while first < len(stamps):
@@ -130,8 +123,7 @@ class Unit(typing.Protocol):
             first = last
 
     def schedule(self) -> list[tuple[Nanoseconds, commands.Command]]:
-        """Return its scheduled commands with their times, in order; overridden by a unit with such
-        parameters."""
+        """Return its scheduled commands with their times, in order; overridden by a unit with such parameters."""
         return []
 
     @property
@@ -140,8 +132,8 @@ class Unit(typing.Protocol):
         return self._due[0][0] if self._due else NEVER_DUE_NS
 
     def execute_due(self, stamp: Nanoseconds) -> None:
-        """Execute the scheduled commands that are due at or before the step with this stamp. A unit that starts
-        later than its schedule skips the earlier commands."""
+        """Execute the scheduled commands that are due at or before a step. A unit that starts later than its schedule
+        skips the earlier commands."""
         while self._due and self._due[0][0] <= stamp:
             at, command = self._due.popleft()
             if self._last is not None or at == stamp:
@@ -149,8 +141,7 @@ class Unit(typing.Protocol):
         self._last = stamp
 
     def command(self, command: commands.Command) -> Reply:
-        """Execute a Command between two steps. The Command takes effect in the next step. The Reply is also added to
-        `pending_replies`."""
+        """Execute a Command between two steps. The Reply is also added to `pending_replies`."""
         try:
             self.admit(command)
             if command.verb in self.REQUESTS:
@@ -163,12 +154,10 @@ class Unit(typing.Protocol):
         return reply
 
     def admit(self, command: commands.Command) -> None:
-        """Raise ValueError where the client of a Command may not command; overridden by a unit with a client in
-        control."""
+        """Raise ValueError where the client of a Command may not command."""
 
     def execute(self, command: commands.Command, arguments: Mapping[str, Value]) -> Reply:
-        """Execute a Command of VERBS with its arguments {name: number or text} and return the Reply; overridden by a
-        unit with commands. Raises ValueError for a refusal."""
+        """Execute a Command of VERBS; overridden by a unit with commands. Raises ValueError for a refusal."""
         raise KeyError(command.verb)
 
     def decode(self, topic: str, message: Message) -> None:
@@ -188,8 +177,7 @@ class Unit(typing.Protocol):
         self.parameters = parameters
 
     def request(self, name: str) -> Reply:
-        """Execute one of REQUESTS between two steps and return the Reply. The request takes effect in the next step.
-        Clients call `command` instead."""
+        """Execute one of REQUESTS between two steps, with effect in the next step. Clients call `command` instead."""
         raise KeyError(name)
 
     def requests_for(self, topic: str, text: str) -> list[str]:
@@ -211,10 +199,9 @@ class Unit(typing.Protocol):
 
     @staticmethod
     def idle(numbers: Mapping[str, Message]) -> str:
-        """Return the reason why this unit did nothing in a recording, such as a receiver that never locked; '' if it
-        was active.
+        """Return the reason why this unit did nothing in a recording, such as a receiver that never locked, or ''.
 
-        numbers: the recorded topics, {topic: numbers (n, columns)} for stamped topics, {topic: texts} for the others.
+        numbers: {topic: numbers (n, columns)} of stamped topics, {topic: texts} of the others.
         """
         return ''
 
@@ -236,8 +223,7 @@ class Unit(typing.Protocol):
         return law_of_many, (self.memory, np.zeros(1, np.int64), self.inputs, self.outputs)
 
     def prepare_requests(self) -> None:
-        """Compile the functions behind the requests. A unit that calls other functions between two steps overrides
-        this method. `prepare` restores the records afterwards."""
+        """Compile the functions that a node calls between two steps. `prepare` restores the records afterwards."""
         for name in self.REQUESTS[:1]:
             self.request(name)
 
@@ -245,9 +231,8 @@ class Unit(typing.Protocol):
 def announced(unit: Unit, topic: str, stamps: Stamps, outputs: Records) -> tuple[Stamps, list[Message]]:
     """Return (stamps (m,), texts) of a text topic of a unit: a text for each change in outputs (n,).
 
-    stamps: of the steps (n,). A text has the stamp of the first stamped message that the unit writes in the same
-    step. If the unit answers late, this stamp is earlier than that of the step. Without such a message the text has
-    the stamp of the step.
+    A text has the stamp of the first stamped message that the unit writes in the same step, which is earlier than the
+    step for a unit that answers late. Without such a message the text has the stamp of the step.
     """
     answers = next(outputs[name]['stamp'] for name in unit.NODE.writes if not records.is_text(name))
     stamps = np.where(answers != records.NO_STAMP, answers, stamps)

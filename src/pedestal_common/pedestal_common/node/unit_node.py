@@ -1,13 +1,9 @@
 """ROS node that runs a unit (node.unit): it decodes the messages of a step, lets the unit make the step, and publishes
-the results.
-
-The class UnitNode runs every unit. Subclasses add tasks that are no law: the drive owns the time
-(drive_law.timekeeper_node), and the ship publishes NMEA sentences.
-"""
+the results. Subclasses add tasks that are no law, such as the time that the drive owns."""
 import collections
 import dataclasses
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from rclpy.timer import Timer
@@ -38,8 +34,7 @@ class LastText:
 
 
 class Port:
-    """Connection of a unit to its topics. prefix: prefix of the unit's beam in a node that serves several beams, else
-    ''."""
+    """Connection of a unit to its topics. prefix: of the unit's beam in a node that serves several beams, else ''."""
 
     def __init__(self, node: shell.Shell, unit: Unit, prefix: str = '') -> None:
         self.prefix = prefix
@@ -70,11 +65,9 @@ class Port:
         return self.prefix + topic if topic in nodes.BEAM_TOPICS else topic
 
     def step(self, stamp: Nanoseconds, values: Mapping[str, records.Decoded | None]) -> None:
-        """Make the step of a stamp. values: {topic: its message, or None if no message arrived}.
-
-        The unit receives stamps that count from the epoch (Shell.epoch), so that times in seconds keep their
-        resolution as floating-point numbers.
-        """
+        """Make the step of a stamp. values: {topic: its message, or None if no message arrived}. The unit receives
+        stamps that count from the epoch (Shell.epoch), so that times in seconds keep their resolution as
+        floating-point numbers."""
         self._epoch, self._last = self._epoch_of(stamp), stamp
         self.unit.epoch = self._epoch
         for name, decoder in self.decoders.items():
@@ -123,21 +116,19 @@ class Port:
                                    else self._stamped(text))
 
     def _stamped(self, message: Message) -> Message:
-        """Return a message with the stamp of the last step, before the first step with the time of now."""
         header = messages.header('')
         messages.put_stamp(header.stamp, self._clock()[1] if self._last is None else self._last)
         return dataclasses.replace(message, header=header)
 
 
 class UnitNode(shell.Shell):
-    """Node that runs the unit of a module (nodes.Node.module)."""
+    """Node that runs the unit of its row."""
 
     PRECEDENCE = 0
     """Amount by which the scheduling priority of this node exceeds graph.priority."""
 
-    def __init__(self, module: str, serves_beams: bool = False) -> None:
-        self.row = nodes.of_executable(module)
-        unit_type = self.row.unit_type()
+    def __init__(self, row: nodes.Node, serves_beams: bool = False) -> None:
+        self.row, unit_type = row, row.unit_type()
         super().__init__(self.row.name, self.row.parameters_type(), unit_type.LIVE)
         flags = [flag for flag in topics.TOPIC_FLAGS if getattr(self.parameters, flag, False)]
         reads = nodes.reads(self.row, self.graph.members, flags)
@@ -177,8 +168,7 @@ class UnitNode(shell.Shell):
                                        f'{refusal}')
 
     def _listen(self, port: Port) -> None:
-        """Subscribe to the topics that do not belong to a step: texts, topics of rate `once` or `sample`, commands.
-        """
+        """Subscribe to the topics that do not belong to a step: texts, topics of rate `once` or `sample`, commands."""
         if self.row.obeys:
             self.message_reader(port.named(self.row.obeys), self._command_taker(port))
         for name in port.unit.reads:
@@ -194,7 +184,6 @@ class UnitNode(shell.Shell):
                 self.sample_reader(port.named(name), self._sample_taker(port, name))
 
     def _command_taker(self, port: Port) -> Callable[[Message], None]:
-        """Return take(message), which passes a command to the unit."""
         def take(message: Message) -> None:
             try:
                 port.command(commands.of_message(message))
@@ -204,14 +193,12 @@ class UnitNode(shell.Shell):
         return take
 
     def _text_taker(self, port: Port, name: str) -> Callable[[Message], None]:
-        """Return take(message), which passes a text to the unit."""
         def take(message: Message) -> None:
             self._look_for_replay()
             port.unit.take_text(name, message.data)
         return take
 
     def _once_taker(self, port: Port, name: str) -> Callable[[Message], None]:
-        """Return take(message), which passes a message of rate `once` to the unit."""
         def take(message: Message) -> None:
             self._look_for_replay()
             stamp = messages.nanoseconds(message.header.stamp)
@@ -226,10 +213,8 @@ class UnitNode(shell.Shell):
         return take
 
     def _sample_taker(self, port: Port, name: str) -> Callable[[Message], None]:
-        """Return take(message), which passes a message of rate `sample` to the unit.
-
-        Messages before the first step are dropped, because the first step determines the epoch.
-        """
+        """Return take(message) of a topic of rate `sample`. It drops messages before the first step, because the first
+        step determines the epoch."""
         def take(message: Message) -> None:
             if not self._stamp:
                 return
@@ -259,11 +244,9 @@ class UnitNode(shell.Shell):
         self.follow(self.unit.trigger, self.unit.latencies)
 
     def follow(self, trigger: str, latencies: Mapping[str, Seconds]) -> None:
-        """Subscribe to the inputs of the steps, match the messages of each step (see Steps), and `answer` each step.
-
-        trigger: topic that begins a step; latencies: {other topic: age of its data at the step}. In lockstep a
-        step whose inputs are absent for graph.deadline ends the node with the names of the silent publishers.
-        """
+        """Match the messages of each step (see Steps), and `answer` each step. latencies: {other topic than the
+        trigger: age of its data at the step}. In lockstep a step whose inputs are absent for graph.deadline ends the
+        node with the names of the silent publishers."""
         self.steps = Steps(trigger, {name: round(latency * NS_PER_SECOND) for name, latency in latencies.items()},
                            self.graph.lockstep, self._answer, held=nodes.held(latencies))
         decoders = {name: decoder for port in self.ports for name, decoder in port.decoders.items()}
@@ -281,7 +264,7 @@ class UnitNode(shell.Shell):
             self.every(TRIGGER_POLL_S, self._watch_trigger)
 
     def _look_for_replay(self) -> None:
-        """Begin again if a new replay, which was not seen before, publishes the first input of the steps."""
+        """Begin again if a new replay publishes the first input of the steps."""
         if self.steps is None:
             return
         replays = {bytes(info.endpoint_gid) for info in
@@ -293,7 +276,6 @@ class UnitNode(shell.Shell):
         self._replay_left = bool(self._replays) and not replays
 
     def _begin_again(self) -> None:
-        """Discard all steps and messages, so that the node continues like a node that starts."""
         self.get_logger().info('begins again, for another replay')
         for port in self.ports:
             unit = type(port.unit)(self.parameters, port.unit.reads)
@@ -310,8 +292,7 @@ class UnitNode(shell.Shell):
         self.restart()
 
     def _step_taker(self, name: str) -> Callable[[records.Decoded, bool], None]:
-        """Return take(message, after_gap), which passes the messages of one input to the Steps. After a gap it first
-        resets the state that depends on earlier messages."""
+        """Return take(message, after_gap) of an input. A gap resets the state that depends on earlier messages."""
         assert self.steps
         steps = self.steps
 
@@ -366,13 +347,11 @@ class UnitNode(shell.Shell):
             self._called = calls
 
     def _log_refusal(self, name: str, response: Trigger.Response) -> None:
-        """Log the refusal of a called service."""
         if not response.success:
             self.get_logger().warning(f'{name}: {response.message}')
 
     def _watch_trigger(self) -> None:
-        """Set `silent` of the units in realtime while the trigger is absent, except after a stall of this node and
-        before graph.start."""
+        """Set `silent` of the units while the trigger is absent, except after a stall and before graph.start."""
         assert self.steps
         now, limit = time.monotonic_ns(), self.graph.silence * NS_PER_SECOND
         if self.clock()[1] < self.graph.start:
@@ -406,8 +385,7 @@ class UnitNode(shell.Shell):
                                    f'{self.graph.deadline:g} s', silent)
 
     def _service(self, name: str) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
-        """Return the callback of a service. The callback passes the request to every unit between two steps, and
-        answers with the Reply of the units."""
+        """Return the callback of a service, which passes the request to every unit between two steps."""
         def serve(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             # Each port receives the same commands, so all give the same reply.
             [reply] = {port.command(commands.Command(name, commands.SERVICE_CLIENT)) for port in self.ports}
@@ -450,8 +428,3 @@ def decoding(decoder: records.Decoder) -> Callable[[bytes], tuple[Nanoseconds, r
         message = decoded(data)
         return message[0], message
     return decode
-
-
-def main(module: str, args: Sequence[str] | None = None) -> int:
-    """Run the unit of a module and return the exit code."""
-    return shell.main(lambda: UnitNode(module), args)

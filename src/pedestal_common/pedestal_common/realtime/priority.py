@@ -1,15 +1,11 @@
-"""Scheduling priority of a node, whose steps have deadlines: the kernel runs a process with such a priority before all
-processes without one (sched(7))."""
+"""Scheduling priority of a node: the kernel runs it before all processes without a priority (sched(7))."""
 import contextlib
 import os
 
 
 def take(priority: int) -> str:
-    """Set the scheduling policy SCHED_RR at a priority (1 to 99) for every thread of this process. Return '', or the
-    reason why the system refuses.
-
-    The threads of the middleware are included, and new threads inherit the priority.
-    """
+    """Set the scheduling policy SCHED_RR at a priority (1 to 99) for every thread of this process, also those of the
+    middleware. New threads inherit it. Return '', or the reason why the system refuses."""
     try:
         for thread in os.listdir('/proc/self/task'):
             with contextlib.suppress(ProcessLookupError):

@@ -1,26 +1,22 @@
-"""Gate of a topic in a realtime graph: it accepts the messages of one publisher only, the active publisher.
+"""Gate of a topic in a realtime graph: it accepts the messages of one publisher only, the active publisher. An
+accepted message is valid and newer than the last one; all others are dropped and reported. A publisher becomes active:
 
-An accepted message is valid and newer than the last one. Messages of all other publishers are dropped and reported.
-The table states when a publisher becomes active:
-
-first publisher      at once
-restarted publisher  once the active publisher was silent for SILENCE_LIMIT_NS
-different node       after it was the only publisher for CONFIRMED_TAKEOVER_NS, while the graph shows no unexpected
-                     publisher
-unclear publishers   never
+    first publisher      at once
+    restarted publisher  once the active publisher was silent for SILENCE_LIMIT_NS
+    different node       after it was the only publisher for CONFIRMED_TAKEOVER_NS, while the graph shows no unexpected
+                         publisher, which should not publish the topic according to the table of nodes
+    unclear publishers   never: a message may be of several of them, so the motion that the topic commands stops
 
 The sequence numbers of a restarted publisher begin again. A publisher is a different node if it overlapped with the
-active publisher: both sent at the same time. It is also a different node if its numbers are too high for a restart in
-this silence. Publishers are unclear if a message may be of several of them. Because these messages are dropped, the
-motion that the topic commands stops. An unexpected publisher is a node that should not publish the topic, according to
-the table of nodes. The module uses neither ROS nor a clock.
+active publisher (both sent at the same time), or if its numbers are too high for a restart in this silence. The
+measurements are in docs/reliability.md.
 """
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from pedestal_common.quantities import Nanoseconds
 from pedestal_common.realtime.streams import Stream, Streams
-from pedestal_common.stream.drops import Drops
+from pedestal_common.stream import Drops
 
 SILENCE_LIMIT_NS = 200_000_000
 """Silence of the active publisher after which another may become active, and time after which stamps that went back
@@ -49,16 +45,12 @@ class PublisherGate(Generic[_M]):
     decode      decode(data) -> (stamp, None of a topic without stamps; message); ValueError for invalid data
     future      largest accepted lead of a stamp over this node's UTC
     unexpected  unexpected() -> number of unexpected publishers in the graph, None where it is unknown. It is called
-                when a candidate may become active. The candidate may itself be an unexpected publisher. It becomes
-                active only if at least as many other streams overlapped as there are unexpected publishers: then the
-                other streams are the unexpected publishers. `unexpected=None`: every publisher is accepted.
+                when a candidate, perhaps itself unexpected, may become active. The candidate becomes active only if at
+                least that many other streams overlapped: then these are the unexpected publishers.
+                `unexpected=None`: every publisher is accepted.
     paced       True if the messages come at a steady rate, by which publishers are distinguished. Otherwise every
-                message is dropped while the graph shows an unexpected publisher; the last accepted message stays
-                valid.
+                message is dropped while the graph shows an unexpected publisher; the last one stays valid.
     oldest      largest accepted time from sending to reception; None: any
-
-    Fields of a streams.Stream that this class uses: `overlapped`, `graph_check_time`, and growth(elapsed), the largest
-    growth of its numbers in a time.
     """
 
     def __init__(self, decode: Callable[[bytes], tuple[Nanoseconds | None, _M]], future: Nanoseconds,
@@ -81,11 +73,7 @@ class PublisherGate(Generic[_M]):
         self._back: Nanoseconds | None = None           # the newest of these
 
     def take(self, data: bytes, number: int, source: Nanoseconds, now: Nanoseconds, utc: Nanoseconds) -> _M | None:
-        """Return the decoded message, None for a dropped message.
-
-        data: CDR bytes; number: sequence number; source: time of sending, UTC; now, utc: time of reception, by
-        the steady clock and in UTC.
-        """
+        """Return the decoded message, None for a dropped one. source: time of sending; now, utc: of reception."""
         self.after_gap = False
         if not self._paced:
             if self._unexpected():
@@ -103,14 +91,12 @@ class PublisherGate(Generic[_M]):
             return None
         if stamp is not None and not self._in_order(stamp, now, utc):
             return None
-        self._note_offset(utc - source)
+        self.offset = utc - source if self.offset is None else min(self.offset, utc - source)
         return message
 
     def _admit(self, stream: Stream | None, now: Nanoseconds) -> bool:
-        """Return True if a message is of the active publisher, else drop the message.
-
-        A publisher that may take over becomes active first. stream: of the message, None if it is unclear.
-        """
+        """Return True if a message is of the active publisher, else drop it. A publisher that may take over becomes
+        active first."""
         if stream is not None and stream is self.active and self._may_be_another(stream, now):
             self.active = None
         if stream is None:
@@ -132,15 +118,14 @@ class PublisherGate(Generic[_M]):
     def _may_be_another(self, stream: Stream, now: Nanoseconds) -> bool:
         """Return True if a message of the active stream may be of another publisher.
 
-        The active publisher was silent, its numbers then jumped, and the graph shows an unexpected publisher that has
-        no stream of its own. Because this node may have stalled, the message may be of that publisher.
+        The active publisher was silent, its numbers then jumped, and the graph shows an unexpected publisher without a
+        stream. Because this node may have stalled, the message may be of that publisher.
         """
         assert self._active_at is not None
         return (now - self._active_at >= SILENCE_LIMIT_NS and stream.skipped[1] == stream.last
                 and (self._unexpected() or 0) > sum(other.overlapped for other in self._other_active(stream, now)))
 
     def _may_take_over(self, stream: Stream, now: Nanoseconds) -> bool:
-        """Return True if an inactive publisher becomes active now."""
         active = self.active
         silent = SILENCE_LIMIT_NS if active is None else now - active.arrival
         # A publisher that restarted counts from the beginning. A number too high for this silence is of a different
@@ -161,13 +146,11 @@ class PublisherGate(Generic[_M]):
         return free
 
     def _other_active(self, stream: Stream, now: Nanoseconds) -> list[Stream]:
-        """Return the streams except `stream` that had a message within SILENCE_LIMIT_NS before now."""
         return [other for other in self.streams.streams
                 if other is not stream and now - other.arrival < SILENCE_LIMIT_NS]
 
     def _in_order(self, stamp: Nanoseconds, now: Nanoseconds, utc: Nanoseconds) -> bool:
-        """Return True if a stamp is later than the last one and not ahead of the time. A stamp that goes back is
-        accepted once such stamps have arrived for SILENCE_LIMIT_NS."""
+        """Return True if a stamp is not ahead, and later than the last one or gone back for SILENCE_LIMIT_NS."""
         if stamp > utc + self._future:
             self.drops.drop(DROP_FUTURE, f'{(stamp - utc) * 1e-9:.3f} s ahead', now)
             return False
@@ -182,6 +165,3 @@ class PublisherGate(Generic[_M]):
             return True
         self.drops.drop(DROP_STALE, f'{(self._stamp - stamp) * 1e-9:.3f} s older than the last', now)
         return False
-
-    def _note_offset(self, offset: Nanoseconds) -> None:
-        self.offset = offset if self.offset is None else min(self.offset, offset)

@@ -105,7 +105,7 @@ class Stream:
         return paces[len(paces) // 2]
 
     def revive(self, stream: 'Stream') -> None:
-        """Take over the messages of `stream`, which turned out to be of the publisher of this stream."""
+        """Take over the messages of a stream that turned out to be of this publisher."""
         self._messages = stream._messages
         self.last, self.source, self.arrival = stream.last, stream.source, stream.arrival
         self.interval, self.owed, self.skipped = stream.interval, stream.owed, stream.skipped
@@ -122,8 +122,7 @@ class Streams:
         self._previous = -ACTIVE_LIMIT_NS
 
     def of(self, number: int, source: Nanoseconds, now: Nanoseconds) -> Stream | None:
-        """Return the stream of a message, a new one where it continues none; None where it may be of several. number:
-        its sequence number; source: time of sending, now: time of arrival."""
+        """Return the stream of a message, a new one where it continues none; None where it may be of several."""
         previous, self._previous = self._previous, now
         recent = [stream for stream in self.streams if previous - stream.arrival < RECENT_LIMIT_NS]
         active = [stream for stream in recent if previous - stream.arrival < ACTIVE_LIMIT_NS]
@@ -151,8 +150,6 @@ class Streams:
         return sum(now - stream.arrival < ACTIVE_LIMIT_NS for stream in self.streams) > 1
 
     def _silent(self, number: int, source: Nanoseconds) -> list[Stream]:
-        """Return [the stream with the latest message] among all streams that the message can continue; [] without
-        one."""
         return sorted((stream for stream in self.streams if stream.fits(number, source)),
                       key=lambda stream: stream.arrival)[-1:]
 
@@ -190,7 +187,6 @@ class Streams:
                 self._cleared([stream for _, stream in before])
 
     def _cleared(self, streams: list[Stream]) -> None:
-        """Keep these streams as identified, and delete the other unclear streams."""
         self.streams = [stream for stream in self.streams if not stream.unclear] + streams
         self._close = ()
         for stream in streams:

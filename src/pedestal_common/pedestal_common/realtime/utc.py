@@ -1,14 +1,11 @@
-"""UTC for the stamps of a node (shell.Shell): a time that follows the system's clock and never goes back.
+"""UTC for the stamps of a node: a time that follows the system's clock and never goes back. It reads no clock itself.
 
     t = steady + offset,    |d offset / d steady| <= MAX_SLEW_RATE
 
-t is the UTC of this module, steady the reading of the steady clock, and offset their difference. The module reads no
-clock; its caller passes pairs of readings. NTP or PTP corrects the system's clock, and the offset follows this clock
-at no more than MAX_SLEW_RATE.
-
-A change beyond MIN_CLOCK_STEP_NS is a step of the system's clock and is reported. After a step forward, t is at once
-set to the system's clock. After a step back, t runs slower than the system's clock, because otherwise a stamp would
-occur twice. Meanwhile t is ahead of the time of nodes that start later, by `ahead`; a restart of this node ends this.
+steady is the reading of the steady clock. The offset follows the system's clock, which NTP or PTP corrects. A change
+beyond MIN_CLOCK_STEP_NS is a step of that clock and is reported. After a step forward, t is at once set to it. After a
+step back, t runs slower, because otherwise a stamp would occur twice. Meanwhile t is ahead of the time of nodes that
+start later, by `ahead`; a restart of this node ends this.
 """
 from pedestal_common.quantities import Nanoseconds
 

@@ -1,9 +1,8 @@
 """Search for the columns of a table by their names, for csv_table and the readers of tracks.
 
 The name of a column has a quantity and behind it a unit, as in time_s, `az [deg]`, `Azimuth (rad)`. A column is a
-candidate for a quantity if its name consists of this quantity and a known unit. `az_rate` or `time_local` is no
-candidate, because `rate` and `local` are no units. Two candidates are refused, by an error that names both. If there
-is no candidate, the error names a column that begins with the quantity and has no known unit.
+candidate for a quantity if its name consists of this quantity and a known unit; `az_rate` or `time_local` is none. Two
+candidates are refused. Without a candidate, the error names a column that begins with the quantity.
 """
 import math
 import re
@@ -84,8 +83,8 @@ def quantity(name: str) -> Quantity:
 def find(names: Iterable[str], wanted: Quantity, required: bool = True) -> Column | None:
     """Return the Column of a Quantity among the names of a table; None if no name begins with the quantity.
 
-    Raises ColumnError for two candidates. Also raises ColumnError if names begin with the quantity, but none has a
-    known unit. The name of the rate or the error of a quantity is ignored if the quantity is not required.
+    Raises ColumnError for two candidates, or if names begin with the quantity but none has a known unit. The name of
+    the rate or the error of a quantity is ignored if the quantity is not required.
     """
     found, others = [], []
     for name in names:
@@ -126,8 +125,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def _known(name: str, wanted: Quantity) -> tuple[str, str] | None:
-    """Return (name of the quantity, rest without blanks and brackets) of a column's name; None if the name does not
-    begin with the quantity."""
+    """Return (name of the quantity, rest without blanks and brackets) of a column; None for another quantity."""
     for spaced in (name, _CAMEL_CASE_PATTERN.sub(' ', name)):
         text = ' '.join(spaced.lower().replace('_', ' ').replace('-', ' ').split())
         for known in sorted(wanted.names, key=len, reverse=True):
@@ -137,15 +135,13 @@ def _known(name: str, wanted: Quantity) -> tuple[str, str] | None:
 
 
 def _rest(name: str, wanted: Quantity) -> str:
-    """Return the rest of a name that begins with the quantity, see `_known`."""
     match = _known(name, wanted)
     assert match
     return match[1]
 
 
 def unit_of(name: str, wanted: Quantity) -> str | None:
-    """Return the unit of a column; '' if the words behind the quantity are no known unit; None if the name does not
-    begin with the quantity."""
+    """Return the unit of a column; '' for words that are no known unit, None for another quantity."""
     match = _known(name, wanted)
     if not match:
         return None

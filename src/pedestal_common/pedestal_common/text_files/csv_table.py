@@ -2,7 +2,7 @@
 
 A separator is a comma, a semicolon, a tab, a bar or blanks. If it is not a comma, numbers may have a decimal comma.
 Blank lines, titles and lines that begin with a comment mark are skipped. A line `sep=;` for example states the
-separator. The case of a name does not matter. In a file of JPL Horizons, the rows between $$SOE and $$EOE are read.
+separator. In a file of JPL Horizons, the rows between $$SOE and $$EOE are read.
 """
 import array
 import contextlib
@@ -19,7 +19,7 @@ import numpy as np
 
 from pedestal_common.quantities import Floats
 from pedestal_common.text_files import columns as _columns
-from pedestal_common.text_files import content, files
+from pedestal_common.text_files import files
 from pedestal_common.text_files.files import FilePath
 
 Cells: TypeAlias = Mapping[str, str | None]    # of a row, by the name of the column; None if the row ends before it
@@ -46,8 +46,7 @@ _DECIMAL_COMMA_PATTERN = re.compile(r'[-+]?\d+,\d+(?:[eE][-+]?\d+)?', re.ASCII)
 
 
 class TableError(ValueError):
-    """Error of a file that is no valid table. Its text is one line that names file, line, column, value and allowed
-    range."""
+    """Error of a file that is no valid table: one line that names file, line, column, value and allowed range."""
 
 
 class Rows(typing.NamedTuple):
@@ -61,9 +60,9 @@ def read(path: FilePath, columns: Mapping[str, tuple[float, float]], least_rows:
     """Return the Rows of a CSV file with a header. Raises TableError.
 
     columns, optional: {name: (low, high)}; the numbers (n, k) have the columns in this order. An optional column that
-    the file lacks is 0. A name ends with the unit of the values, as in time_s; the file may have another known unit,
-    as in `time [min]`. The first column grows from row to row, by at most max_step, which the error calls step_name.
-    A row that repeats the row before is skipped. Columns of other names are ignored.
+    the file lacks is 0. A name ends with the unit of the values, as in time_s; the file may have another known unit.
+    The first column grows from row to row, by at most max_step, which the error calls step_name. A row that repeats
+    the row before is skipped. Columns of other names are ignored.
     """
     first, *_ = columns
     unit = first.partition('_')[2]
@@ -95,11 +94,10 @@ def read(path: FilePath, columns: Mapping[str, tuple[float, float]], least_rows:
 
 @contextlib.contextmanager
 def stream(path: FilePath) -> Iterator[BinaryIO]:
-    """Yield the bytes of a file of at most MAX_CSV_BYTES, as a context. Raises TableError for a file that cannot be
-    read, and for a packed file."""
+    """Yield the bytes of a file of at most MAX_CSV_BYTES, as a context. Raises TableError, also for a packed file."""
     try:
         with files.open_regular(path, MAX_CSV_BYTES) as file:
-            packed = content.packed(file.read(content.MAX_MARK_BYTES))
+            packed = files.packed(file.read(files.MAX_MARK_BYTES))
             if packed:
                 raise TableError(f'{path}: {packed}')
             file.seek(0)
@@ -109,11 +107,11 @@ def stream(path: FilePath) -> Iterator[BinaryIO]:
 
 
 def text(path: FilePath) -> str:
-    """Return the text of a file, see `content.decode`. Raises TableError."""
+    """Return the text of a file, see `files.decode`. Raises TableError."""
     with stream(path) as file:
         read_bytes = file.read(MAX_CSV_BYTES)
     try:
-        return content.decode(read_bytes)
+        return files.decode(read_bytes)
     except UnicodeDecodeError as error:
         line = 1 + read_bytes.count(b'\n', 0, error.start)
         byte = f'byte {read_bytes[error.start]:#04x}' if error.start < len(read_bytes) else 'the end'
@@ -134,10 +132,8 @@ def opened(path: FilePath, bare: Sequence[str] = ()) -> Iterator['Table']:
 
 
 class Table:
-    """The rows of a CSV text as dictionaries {name of the column: cell}, without the blanks around a cell.
-
-    bare: names of the columns for a text without names: its first line is a row with as many cells.
-    """
+    """The rows of a CSV text as {name of the column: cell without blanks}. bare: names of the columns for a text
+    without names, whose first line is a row with as many cells."""
 
     def __init__(self, path: FilePath, content: str, bare: Sequence[str] = ()) -> None:
         self.path = path
@@ -173,7 +169,6 @@ class Table:
             yield dict(itertools.zip_longest(self.fieldnames, cells[:count]))
 
     def _cells(self) -> list[str] | None:
-        """Return the cells of the next row that is not blank, None at the end of the table."""
         for cells in self._rows:
             self.line_num = self._passed + self._rows.line_num
             if cells and cells[0].strip() == HORIZONS_MARKS[1]:
@@ -192,10 +187,8 @@ class Table:
     def column(self, quantity: _columns.Quantity, required: bool, without: str = '') -> _columns.Column | None: ...
 
     def column(self, quantity: _columns.Quantity, required: bool = True, without: str = '') -> _columns.Column | None:
-        """Return the column of a quantity; None if there is none and it is not required. Raises TableError.
-
-        without: name of a column that is not considered, '' for none.
-        """
+        """Return the column of a quantity; None if there is none and it is not required. Raises TableError. without:
+        name of a column that is not considered."""
         try:
             column = _columns.find([name for name in self.fieldnames if name != without], quantity, required)
         except _columns.ColumnError as error:
@@ -216,10 +209,7 @@ class Table:
         return f'{_columns.listed(self.fieldnames)} (separator {self.separator!r})'
 
     def number(self, column: _columns.Column, cell: str | None, low: float, high: float) -> float:
-        """Return the number in a cell of a column, in the unit of its quantity. Raises TableError.
-
-        cell: None if the row ends before the column; low, high: allowed range, in the unit of the quantity.
-        """
+        """Return the number in a cell, None beyond the row, in the unit of its quantity. Raises TableError."""
         if cell is None:
             raise TableError(f'{self.path}: line {self.line_num}: the row ends before the column {column.name!r:.60}')
         if _columns.is_time(column.unit) and _DATE_PATTERN.match(cell):
@@ -244,10 +234,7 @@ class Table:
 
 
 def _beginning(lines: TextIO) -> tuple[list[str], str, str]:
-    """Return (lines before the names of the columns, line of the names, separator that the file states or '').
-
-    lines: stream of the text, which is left behind the line of the names.
-    """
+    """Return (lines before the names of the columns, line of the names, separator that the file states or '')."""
     before, separator, horizons = [], '', None
     for line in itertools.islice(lines, MAX_HEAD_LINES):
         before.append(line)
@@ -269,10 +256,8 @@ def _beginning(lines: TextIO) -> tuple[list[str], str, str]:
 
 
 def _names_above(before: Sequence[str], separator: str, bare: Iterable[str]) -> list[str]:
-    """Return the cells of the last line with text before the first row, which may be names in a comment.
-
-    Names that are separated by blanks count if one of them begins like one of `bare` (see Table).
-    """
+    """Return the cells of the last line with text before the first row, which may be names in a comment. Names that
+    are separated by blanks count if one of them begins like one of `bare`."""
     line = next((line.strip().lstrip('#%/ \t') for line in reversed(before) if line.strip()), '')
     cells, words = next(csv.reader([line], delimiter=separator, skipinitialspace=True), []), line.split()
     named = any(word.lower().startswith(name[:2]) for word in words for name in bare)
@@ -287,7 +272,6 @@ def _is_title(line: str, after: Iterable[str]) -> bool:
 
 
 def _separator(begin: str, sample: str) -> str:
-    """Return the separator of the cells by the first line of a table and a sample of its lines."""
     for separators in SEPARATORS:
         there = ''.join(separator for separator in separators if separator in begin)
         with contextlib.suppress(csv.Error):

@@ -1,9 +1,5 @@
-"""Reader and writer of ROS 2 parameter files. `pedestal run`, the launch file and every node use this one reader, so
-that all accept and refuse the same files.
-
-A section of a file is for one node. In the files of a graph the name of a section is /**/acu for example, which means
-the node acu in any namespace.
-"""
+"""Reader and writer of ROS 2 parameter files, one for all programs, so that all accept and refuse the same files. A
+section is for one node; in the files of a graph its name is /**/acu for example: the node acu in any namespace."""
 import pathlib
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -60,8 +56,8 @@ def divided(section: str) -> tuple[str, str]:
 def node_of(section: str, namespace: str = '') -> str | None:
     """Return the node for which a section is, 'acu' or 'beam_2/acu', in a graph in a namespace such as '/ship_1'.
 
-    Return EVERY_NODE for each node of the namespace, None for no node of this namespace. A section without a slash,
-    such as acu, is for the node of the graph in any namespace. For all other sections the rules are those of rcl.
+    Return EVERY_NODE for each node of the namespace, None for no node of it. A section without a slash is for the node
+    of the graph in any namespace. For all other sections the rules are those of rcl.
     """
     place, node = divided(section)
     if node in ('*', '**'):
@@ -98,8 +94,7 @@ def _found(tree: Mapping[str, Json], place: str = '') -> Iterator[tuple[str, Jso
 
 
 def parse(content: str) -> dict[str, dict[str, Json]]:
-    """Return {section: {dotted name: value}} of the text of a file. Raises ParameterFileError, which does not name the
-    file."""
+    """Return {section: {dotted name: value}} of the text of a file. Raises ParameterFileError without the file."""
     try:
         tree = plain_yaml.parse(content)
     except yaml.YAMLError as error:

@@ -1,9 +1,9 @@
 """Reader and writer of the part of YAML that parameter files use: sections, lists, numbers, true, false and texts.
 
 YAML 1.1 reads 1:30 as 90, 010 as 8, 1_0 as 10, 2024-01-01 as a date and `on` as true. Here they are texts, so that a
-parameter which is a number refuses them. A section has each key once. Tags are refused. Aliases are refused in a
-parameter file, because rcl refuses them. Where aliases are accepted, MAX_VALUES counts them with all their values. A
-few lines can therefore not stand for billions of values.
+parameter which is a number refuses them. A section has each key once. Tags are refused, and aliases in a parameter
+file, because rcl refuses them. Elsewhere MAX_VALUES counts an alias with all its values, so that a few lines cannot
+stand for billions of values.
 """
 from __future__ import annotations
 
@@ -36,8 +36,6 @@ _PLAIN = ('null', 'bool', 'int', 'float', 'str', 'seq', 'map')
 
 
 class _Loader(_Base):
-    """Loader of the values of this module. Its own resolvers and constructors replace the rules of YAML 1.1."""
-
     yaml_implicit_resolvers: dict[str, object] = {}
     yaml_constructors = {tag: _Base.yaml_constructors[tag] for tag in (*(_TAG + name for name in _PLAIN), None)}
 
@@ -127,8 +125,7 @@ def _check(events: Iterable[yaml.Event], aliases: bool) -> None:
 
 
 def read(path: FilePath) -> Json:
-    """Return the values of a YAML file of at most MAX_YAML_BYTES bytes, aliases accepted. Raises OSError,
-    UnicodeDecodeError, yaml.YAMLError."""
+    """Return the values of a YAML file, aliases accepted. Raises OSError, UnicodeDecodeError, yaml.YAMLError."""
     return parse(files.read_text(path, MAX_YAML_BYTES), aliases=True)
 
 

@@ -1,9 +1,6 @@
-"""Places (byte positions) of the numbers of a message in its bytes, for the Decoder and the Encoder of `records`.
-
-The bytes are in CDR, the format of DDS. Messages of a topic that differ only in their numbers have their numbers at
-the same places. One message is therefore parsed by the definition of its type, and the others are read at the places
-found.
-"""
+"""Places (byte positions) of the numbers of a message in its CDR bytes, for the Decoder and the Encoder of `records`.
+Messages of a topic that differ only in their numbers have them at the same places: one message is parsed by the
+definition of its type, and the others are read at the places found."""
 import struct
 
 from rosbags.interfaces import Nodetype
@@ -45,15 +42,11 @@ class Places:
             raise ValueError(f'{len(data)} bytes are no {type_name}: {error}') from None
 
     def _fields(self, type_name: str, prefix: str) -> None:
-        """Find the places in the next bytes, which hold a value of this type. prefix: beginning of the paths of its
-        fields."""
         for name, node in ROS_TYPESTORE.fielddefs[type_name][1]:
             self._node(node, prefix + name)
 
     def _take(self, size: int, alignment: int, path: str) -> int:
-        """Return the start of the next `size` bytes, and move `stop` behind them. path: path of the field, for an
-        error.
-        """
+        """Return the start of the next `size` bytes, and move `stop` behind them."""
         self.stop += -(self.stop - CDR_HEADER_BYTES) % alignment     # CDR aligns numbers from the end of the header
         start, self.stop = self.stop, self.stop + size
         if self.stop > len(self.data):
@@ -61,13 +54,11 @@ class Places:
         return start
 
     def _length(self, path: str) -> int:
-        """Return the length of a text or a list, which stands before its content."""
         start = self._take(4, 4, path)
         self.fixed.append((start, self.stop))
         return struct.unpack_from(self.order + 'I', self.data, start)[0]
 
     def _node(self, node: FieldDesc, path: str) -> None:
-        """Find the places in the next bytes, which hold one field. node: type of the field, by rosbags."""
         if node[0] == Nodetype.NAME:
             self._fields(node[1], path + '.')
         elif node[0] == Nodetype.BASE and node[1][0] in ('string', 'wstring'):

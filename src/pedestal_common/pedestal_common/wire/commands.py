@@ -1,9 +1,8 @@
-"""Commands to a node, with arguments, and the replies to them.
+"""Commands to a node, with arguments, and the replies to them. No ROS here.
 
 On a topic a command is a diagnostic_msgs/DiagnosticStatus: name = command, hardware_id = client, message = number of
 the request, values = arguments as texts. The reply repeats these fields, with level OK or WARN and two more values,
-`granted` (true or false) and `reply`. In a parameter, commands stand in a schedule of entries 'AT COMMAND name=value',
-separated by semicolons. No ROS here.
+`granted` (true or false) and `reply`. In a parameter, commands stand in a schedule 'AT COMMAND name=value; ...'.
 """
 import math
 import re
@@ -90,10 +89,8 @@ class Definition(typing.Protocol):
 
 
 def values(definitions: Iterable[Definition], command: Command) -> dict[str, Value]:
-    """Return {argument: number or text} of a Command, with the defaults of left-out arguments. Raises ValueError.
-
-    definitions: of the node; one of them must have the name of the command.
-    """
+    """Return {argument: number or text} of a Command, with the defaults of left-out arguments. Raises ValueError. One
+    of the definitions must have the name of the command."""
     definition = next((row for row in definitions if row.name == command.verb), None)
     if definition is None:
         names = [row.name for row in definitions]
@@ -131,10 +128,7 @@ def _value(definition: Definition, argument: Argument, text: str | None) -> floa
 
 
 def _in_degrees(number: float, argument: Argument) -> str:
-    """Return a refused angle or rate and its range in degrees, '' for an Argument with another unit or for NaN.
-
-    `pedestal mode rate --az 500` gives degrees, and a client of the topic gives radians.
-    """
+    """Return a refused angle or rate and its range in degrees, as the verbs give it; '' for another unit or NaN."""
     if argument.unit not in ('rad', 'rad/s') or math.isnan(number):
         return ''
     given, low, high = (f'{math.degrees(value):.4g}' for value in (number, argument.low, argument.high))
@@ -197,8 +191,7 @@ def parsed(text: str) -> Command:
 
 
 def schedule(name: str, text: str, definitions: Iterable[Definition]) -> list[tuple[Nanoseconds, Command]]:
-    """Return the commands of the schedule in the parameter `name` with their times, in order. Raises ParameterError.
-    """
+    """Return the commands of the schedule in a parameter with their times, in order. Raises ParameterError."""
     due = []
     for part in filter(None, (part.strip() for part in text.split(';'))):
         at, _, rest = part.partition(' ')

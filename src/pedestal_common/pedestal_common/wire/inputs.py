@@ -1,10 +1,9 @@
 """Inputs of the control unit, made from the table of topics: the fields of their record, and the copy into this
 record.
 
-Topic.inputs gives the name of an input for each field of the topic. A name that stands for several numbers is an
-array. In addition to the fields of its layout, a message has the fields `stamp` and `came`. `stamp` is in seconds.
-`came` is 1 in a step in which the message arrived, else 0. The other inputs keep the values of the last message. A
-text has the field `code` only.
+Topic.inputs names an input for each field of the topic; a name that stands for several numbers is an array. A message
+also has the fields `stamp` [s] and `came`, which is 1 in a step in which the message arrived. The other inputs keep
+the values of the last message. A text has the field `code` only.
 """
 import itertools
 from collections.abc import Callable, Iterable, Iterator
@@ -39,7 +38,6 @@ def fields(names: Iterable[str]) -> list[tuple[str, str] | tuple[str, str, tuple
 
 
 def _lines(topic: str) -> Iterator[str]:
-    """Yield the source lines that copy the record of one topic, the message, into the inputs."""
     given = topics.TOPIC_BY_NAME[topic].inputs
     yield f'    message = records[{topic!r}]'
     if 'code' in given:

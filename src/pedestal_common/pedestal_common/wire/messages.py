@@ -1,9 +1,8 @@
 """Messages of the topics, as objects of the library rosbags: the same classes in a node, a bag and a test.
 
-Nodes publish bytes that rosbags serialised. The serialiser of rclpy leaves the alignment padding of CDR, the byte
-format of DDS, undefined. Two recordings would then never be identical: in 297 of 300 diagnostics, the padding had
-bytes of earlier messages. The serialiser of rosbags writes zeros there. rosbags also reads a JointState in half the
-time.
+The serialiser of rclpy leaves the alignment padding of CDR undefined, so two recordings would never be identical: in
+297 of 300 diagnostics, the padding had bytes of earlier messages. The serialiser of rosbags writes zeros there.
+rosbags also reads a JointState in half the time.
 """
 import struct
 from collections.abc import Callable, Sequence
@@ -56,8 +55,7 @@ def serialize(message: Message) -> bytes:
 
 
 def deserialize(data: bytes, type_name: str) -> Message:
-    """Return the message in CDR bytes. Raises ValueError, which names the type, for bytes without such a message and
-    for more than MAX_CDR_BYTES."""
+    """Return the message in CDR bytes, at most MAX_CDR_BYTES. Raises ValueError, which names the type."""
     if len(data) > MAX_CDR_BYTES:
         raise ValueError(f'{len(data)} bytes of a {type_name}, must be at most {MAX_CDR_BYTES}')
     try:
@@ -92,8 +90,7 @@ def put_stamp(stamp: Message, ns: Nanoseconds) -> None:
 
 
 def since(message: Message, epoch: Nanoseconds) -> Message:
-    """Change the stamp in the header of a message so that it counts from an epoch; a stamp 0 stays 0. Return the
-    message."""
+    """Make the stamp in the header of a message count from an epoch, unless it is 0; return the message."""
     stamp = nanoseconds(message.header.stamp)
     put_stamp(message.header.stamp, stamp - epoch if stamp else 0)
     return message
@@ -131,11 +128,7 @@ def _vector3_stamped(row: topics.Topic) -> Message:
 
 
 def _range(row: topics.Topic) -> Message:
-    """Return a Range measured by radio, at any distance.
-
-    The type has a code for ultrasound (0) and for infrared (1), but none for radio. The code is 0, because radio is no
-    light.
-    """
+    """Return a Range at any distance. The type has no code for radio, so the code is 0 (ultrasound)."""
     return Range(header=header(row.frame), radiation_type=0, field_of_view=0.0, min_range=0.0, max_range=float('inf'),
                  range=0.0, variance=0.0)
 

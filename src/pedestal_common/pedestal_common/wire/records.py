@@ -1,5 +1,4 @@
-"""Records: numpy records with the numbers of messages. A node has one record for a step; the closed loop and the
-reader of a bag have an array of records for many steps.
+"""Records: numpy records with the numbers of messages, one for a step of a node, many in the closed loop and a bag.
 
 A unit reads and writes one record that has a field for each of its topics:
 
@@ -7,8 +6,7 @@ A unit reads and writes one record that has a field for each of its topics:
                         that is not to be published
     text, list of texts an integer, its code; topics.NO_TEXT_CODE before the first
 
-A Decoder reads the numbers from the CDR bytes of a message, and an Encoder writes numbers into such bytes. Both use
-the places of the numbers (cdr.Places), and neither builds a message object.
+Decoder and Encoder use the places of the numbers in the bytes (cdr.Places), and build no message object.
 """
 import struct
 from collections.abc import Iterable, Sequence
@@ -74,8 +72,7 @@ def code_of(topic: str, text: str) -> int:
 
 
 class _Shape:
-    """Places of the columns of a topic, found in one message, and valid for messages that differ only in their
-    numbers."""
+    """Places of the columns of a topic in one message, valid for messages that differ only in their numbers."""
 
     def __init__(self, topic: str, data: bytes) -> None:
         type_name = topics.TOPIC_BY_NAME[topic].type
@@ -117,8 +114,7 @@ def _joined(fixed: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
 
 
 def _runs(fields: Iterable[tuple[int, int, str]]) -> list[tuple[slice, np.dtype[np.generic], int, int]]:
-    """Return [(columns as a slice, dtype, count, start)] of numbers [(column, start, dtype)], in which adjacent
-    numbers are merged."""
+    """Return [(columns as a slice, dtype, count, start)] of numbers [(column, start, dtype)], adjacent ones merged."""
     runs: list[tuple[int, np.dtype[np.generic], int, int]] = []
     for column, start, name in fields:
         dtype = np.dtype(name)
@@ -141,9 +137,8 @@ class Decoder:
         self._stamp, self._numbers = record[topic]['stamp'], numbers(record, topic)[0]
 
     def decoded(self, data: bytes) -> Decoded:
-        """Return the stamp and the numbers of CDR bytes. A number is NaN if the message does not contain it, or
-        marks it as no data (layouts.NO_DATA_MARKS). Raises ValueError for bytes that are no message of the topic's
-        type, and for an invalid stamp."""
+        """Return the stamp and the numbers of CDR bytes. A number is NaN if the message lacks it or marks it as no
+        data (layouts.NO_DATA_MARKS). Raises ValueError for other bytes and for an invalid stamp."""
         if not self._shape.fits(data):
             self._shape = _Shape(self.topic, data)
         seconds, nanoseconds = _STAMP.unpack_from(data, messages.CDR_HEADER_BYTES)
@@ -170,11 +165,8 @@ class Decoder:
 
 
 class Encoder:
-    """Maker of the messages of one stamped topic.
-
-    template: a message whose names, frames and constants stay; record: (1,), whose field of this topic holds the
-    numbers; None where only `bytes_of` is used.
-    """
+    """Maker of the messages of one stamped topic. template: a message whose names, frames and constants stay; record:
+    (1,) with the numbers, None where only `bytes_of` is used."""
 
     def __init__(self, topic: str, template: Message, record: Records | None = None) -> None:
         data = messages.serialize(template)
@@ -191,8 +183,7 @@ class Encoder:
         return self._stamp[0] != NO_STAMP
 
     def encoded(self, epoch: Nanoseconds = 0) -> bytes:
-        """Return the CDR bytes of the message with the numbers of the record. Its stamp is that of the record plus the
-        epoch."""
+        """Return the CDR bytes of the message with the numbers of the record, whose stamp counts from the epoch."""
         return self.bytes_of(self._stamp.item() + epoch, self._numbers)
 
     def bytes_of(self, stamp: Nanoseconds, values: Floats) -> bytes:

@@ -1,18 +1,12 @@
 """ROS node of a real INS: publishes its attitude and rates on ship/imu/data, and its alignment on ins/state.
 
-The unit `unit.InsInputUnit` reads the device. `entry` is imported first, so that a signal during the other imports
-ends the process without a message.
+The unit `unit.InsInputUnit` reads the device.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
-import sys
-from collections.abc import Sequence
-
 import numpy as np
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from pedestal_common.node import middleware, shell
+from pedestal_common.graph.nodes import Node
+from pedestal_common.node import middleware
 from pedestal_common.node.unit import Diagnosis
 from pedestal_common.parameters import ParameterError
 from pedestal_common.wire import messages
@@ -29,8 +23,8 @@ class InsInputNode(LineNode):
     """Node of an InsInputUnit."""
     parameters: InsInputParameters
 
-    def __init__(self) -> None:
-        super().__init__('pedestal_hardware.ins.ins_input_node')
+    def __init__(self, row: Node) -> None:
+        super().__init__(row)
         p, self.unit = self.parameters, InsInputUnit(self.parameters)
         self.prepare(self.unit)
         self.message, self.state = messages.template(ATTITUDE_TOPIC), ''
@@ -98,12 +92,3 @@ class InsInputNode(LineNode):
     def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of the unit."""
         return self.unit.diagnose(self.clock()[1])
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node to its end. Return the exit code."""
-    return shell.main(InsInputNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -52,6 +52,8 @@ class MountingParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class InsInputParameters(Parameters):
     """Parameters of ins_input_node."""
+    REALTIME_ONLY = ', because the INS has its own time'
+
     source: str = choice('nmea', ('nmea', 'imu'), 'NMEA sentences, or the sensor_msgs/Imu of a driver')
     nmea: NmeaInputParameters = group(NmeaInputParameters)
     imu: ImuInputParameters = group(ImuInputParameters)
@@ -84,8 +86,3 @@ class InsInputParameters(Parameters):
                                      'which has no time')
         if not self.imu.topic.strip():
             raise ParameterError("imu.topic = '': must be the name of a topic")
-
-    def check_graph(self, beams: int, lockstep: bool) -> None:
-        """Raise ParameterError for a graph in lockstep."""
-        if lockstep:
-            raise ParameterError('graph.pacing = lockstep: must be realtime, because the INS has its own time')

@@ -6,7 +6,7 @@ import numpy as np
 
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
 from pedestal_common.quantities import Degrees, Message, Nanoseconds, Quaternion, Radians, Radians2, Records, Vector3
-from pedestal_common.stream.drops import Drops
+from pedestal_common.stream import Drops
 from pedestal_common.wire import messages
 from pedestal_hardware.ins import frame_check, frames, input_law, sentences
 from pedestal_hardware.ins.input_law import Outcome

@@ -1,16 +1,10 @@
 """ROS node of a receiver with a level only: publishes each level on tracking_receiver/angle_error, with errors NaN.
 
-The unit `unit.LevelUnit` reads the lines. `entry` is imported first, so that a signal during the other imports ends
-the process without a message.
+The unit `unit.LevelUnit` reads the lines.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
 import math
-import sys
-from collections.abc import Sequence
 
-from pedestal_common.node import shell
+from pedestal_common.graph.nodes import Node
 from pedestal_common.node.unit import Diagnosis
 from pedestal_common.wire import messages
 from pedestal_hardware.level.unit import LevelReceiverParameters, LevelUnit
@@ -23,8 +17,8 @@ class LevelReceiverNode(LineNode):
     """Node of a LevelUnit. An error of 0 would state that the target is on the axis, so the errors are NaN."""
     parameters: LevelReceiverParameters
 
-    def __init__(self) -> None:
-        super().__init__('pedestal_hardware.level.level_receiver_node')
+    def __init__(self, row: Node) -> None:
+        super().__init__(row)
         self.unit, self.message = LevelUnit(self.parameters), messages.template(ERROR_TOPIC)
         self.message.vector.x = self.message.vector.y = math.nan
         self.publish = self.writer(ERROR_TOPIC)
@@ -48,12 +42,3 @@ class LevelReceiverNode(LineNode):
     def diagnosed(self) -> Diagnosis:
         """Return the Diagnosis of the unit."""
         return self.unit.diagnose(self.clock()[1])
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node to its end. Return the exit code."""
-    return shell.main(LevelReceiverNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

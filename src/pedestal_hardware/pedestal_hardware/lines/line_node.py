@@ -14,8 +14,7 @@ from pedestal_hardware.lines.reader import LineReader
 class LineNode(shell.Shell):
     """Node of a device that sends lines. `silence` of its parameters: longest time between two published messages."""
 
-    def __init__(self, module: str) -> None:
-        row = nodes.of_executable(module)
+    def __init__(self, row: nodes.Node) -> None:
         super().__init__(row.name, row.parameters_type())
         self.lock = threading.Lock()
         self.line_reader: LineReader | None = None      # None for a device that sends no lines

@@ -8,8 +8,7 @@ import time
 from collections.abc import Callable
 
 from pedestal_common.quantities import Seconds
-from pedestal_common.stream.connection import Connection
-from pedestal_common.stream.splitter import Overlong, Splitter
+from pedestal_common.stream import Connection, Overlong, Splitter
 from pedestal_hardware.lines import sources
 
 MAX_LINE_BYTES = 256  # largest length of a line; NMEA 0183 allows 82 bytes

@@ -4,7 +4,7 @@ import urllib.parse
 from typing import Protocol
 
 from pedestal_common.parameters import ParameterError
-from pedestal_common.stream.connection import bound
+from pedestal_common.stream import bound
 
 READ_TIMEOUT_S = 0.1  # longest wait for the next bytes [s]
 CONNECT_TIMEOUT_S = 3.0  # longest wait for a TCP connection [s]

@@ -1,17 +1,13 @@
 """ROS node of a monopulse receiver of I/Q samples: takes the place of `tracking_receiver_node`.
 
 A thread receives the samples. Each block of them is a step of the unit `unit.MonopulseReceiver`, whose law is in
-`front_end`. `entry` is imported first, so that a signal during the other imports ends the process without a message.
+`front_end`.
 """
-import pedestal_common.entry  # noqa: F401
-
-# isort: split
-import sys
 import threading
 import time
-from collections.abc import Sequence
 
-from pedestal_common.node import shell, unit_node
+from pedestal_common.graph.nodes import Node
+from pedestal_common.node import unit_node
 from pedestal_common.node.unit import Diagnosis
 from pedestal_common.quantities import Seconds
 from pedestal_hardware.monopulse import blocks, sigmf, sources
@@ -29,14 +25,14 @@ class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
     parameters: MonopulseParameters
     unit: MonopulseReceiver
 
-    def __init__(self) -> None:
+    def __init__(self, row: Node) -> None:
         self.source: sources.Source | None = None
         self.receiving: threading.Thread | None = None
         self.blocks: blocks.Blocks | None = None
         self.ending = False
         self.heard: Seconds | None = None       # time of the monotonic clock of the last samples
         self.fault = -FAULT_TIME_S, ''          # time and text of the last fault
-        super().__init__('pedestal_hardware.monopulse.monopulse_receiver_node')
+        super().__init__(row)
 
     def begin(self) -> None:
         """Open the source and receive."""
@@ -146,12 +142,3 @@ class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
             except blocks.StreamError as error:
                 self.get_logger().warning(f'the recording is cut: {error}')
         super().close()
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node to its end. Return the exit code."""
-    return shell.main(MonopulseReceiverNode, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -166,6 +166,8 @@ class SimulatedIqParameters(Parameters):
 class MonopulseParameters(TrackingReceiverNodeParameters):
     """Parameters of monopulse_receiver_node and of the simulated I/Q. The receiver uses `antenna.beamwidth`,
     `antenna.slope`, `receiver`, `source`, `feed`, `carrier` and `calibration`; the simulated I/Q uses all."""
+    REALTIME_ONLY = ' for a receiver of I/Q samples'
+
     source: SourceParameters = group(SourceParameters)
     feed: FeedParameters = group(FeedParameters)
     carrier: CarrierParameters = group(CarrierParameters)
@@ -204,10 +206,8 @@ class MonopulseParameters(TrackingReceiverNodeParameters):
                                      'which has no differences; feed.reference_phase turns the axes')
 
     def check_graph(self, beams: int, lockstep: bool) -> None:
-        """Raise ParameterError for lockstep and for an array."""
+        """Raise ParameterError for lockstep or an array."""
         super().check_graph(beams, lockstep)
-        if lockstep:
-            raise ParameterError('graph.pacing = lockstep: must be realtime for a receiver of I/Q samples')
         if beams:
             raise ParameterError(f'graph.beams = {beams}: must be 0 for a receiver of I/Q samples')
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.quantities import Nanoseconds, Seconds
-from pedestal_common.stream.connection import bound
+from pedestal_common.stream import bound
 from pedestal_hardware.monopulse import sigmf, vita49
 from pedestal_hardware.monopulse.blocks import ArrivalClock, Chunk, StreamError
 from pedestal_hardware.monopulse.params import CHANNELS, SCANNED_CHANNELS, MonopulseParameters, SourceParameters

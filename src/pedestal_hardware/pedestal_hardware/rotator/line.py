@@ -9,7 +9,7 @@ import typing
 import serial
 
 from pedestal_common.quantities import Degrees, Seconds
-from pedestal_common.stream.connection import Connection
+from pedestal_common.stream import Connection
 from pedestal_hardware.rotator.protocols import Accepted, Answer, Position, Refusal, RotatorProtocol
 
 READ_TIMEOUT_S = 0.02  # longest wait for the next byte [s]

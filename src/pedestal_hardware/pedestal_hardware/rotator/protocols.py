@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import ClassVar, NamedTuple, TypeAlias
 
 from pedestal_common.quantities import Degrees
-from pedestal_common.stream.splitter import Overlong, Splitter
+from pedestal_common.stream import Overlong, Splitter
 
 MAX_ANSWER_BYTES = 512  # largest length of a line; a longer one is refused
 MAX_ANGLE_DEG = 1000.0  # largest angle that a device may report [deg]

@@ -27,7 +27,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from pedestal_common.quantities import Json, Seconds
-from pedestal_common.stream.connection import listen
+from pedestal_common.stream import listen
 from pedestal_operator.page import page_security
 from pedestal_operator.page.page_security import Refused
 

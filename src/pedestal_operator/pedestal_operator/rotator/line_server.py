@@ -10,8 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeAlias, TypeVar
 
-from pedestal_common.stream.connection import listen
-from pedestal_common.stream.splitter import Overlong, Splitter
+from pedestal_common.stream import Overlong, Splitter, listen
 
 MAX_UNREAD_BYTES = 65_536  # largest size of unread answers of a client [bytes]; further answers are dropped
 MAX_WAITING_LINES = 100  # largest number of waiting lines of a client; further input is left unread

@@ -7,10 +7,10 @@ import os
 import pathlib
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
 
+from pedestal_common.node.run import command
 from pedestal_common.quantities import Seconds
 from pedestal_common.wire import messages
 from pedestal_recording import bag
@@ -32,9 +32,10 @@ def measure_recorder(path: pathlib.Path, again: str, rate: float) -> tuple[float
     path: bag that is replayed. again: new bag of the recorder. rate: speed of the replay as a multiple of real time.
     """
     with open(pathlib.Path(again).with_suffix('.log'), 'w+') as log:
-        recorder = subprocess.Popen([sys.executable, '-m', 'pedestal_recording.recorder_node', '--ros-args',
-                                     '--params-file', str(path.with_name(path.name + '.log') / 'parameters.yaml'),
-                                     '-p', f'recorder:bag:={again}'], stdout=log, stderr=subprocess.STDOUT)
+        recorder = subprocess.Popen(
+            command('recorder_node', '--ros-args', '--params-file',
+                    str(path.with_name(path.name + '.log') / 'parameters.yaml'), '-p', f'recorder:bag:={again}'),
+            stdout=log, stderr=subprocess.STDOUT)
         begun: list[float] = []     # wall time and CPU time of the recorder at the first message
         try:
             result = replay.replay(path, replay.ReplayOptions(rate=rate), lambda: begun.extend(

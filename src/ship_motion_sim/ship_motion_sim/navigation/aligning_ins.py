@@ -5,12 +5,12 @@ Its `ship` parameters serve only for the latitude and for the true velocity, whi
 """
 import math
 
+from pedestal_common import ring
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import quaternion, rotation, to_deck
 from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import Bit, Floats, Matrix3, MetersPerSecond, Nanoseconds, Records, Vector3
 from pedestal_common.record import Record
-from pedestal_common.stream import ring
 from ship_motion_sim import earth
 from ship_motion_sim.navigation import ins, navigator
 from ship_motion_sim.navigation.ins import NO_STAMP, LatencyRing

@@ -8,6 +8,7 @@ rate of the IMU with that of the law, and its status reports a difference. `alig
 import math
 from typing import Annotated, Protocol
 
+from pedestal_common import ring
 from pedestal_common.codes import codes
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import quaternion
@@ -23,7 +24,6 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
-from pedestal_common.stream import ring
 from ship_motion_sim import earth, imu
 from ship_motion_sim.params import InsParameters
 from ship_motion_sim.sea import motion
@@ -59,7 +59,7 @@ class Constants(Record):
 
 class LatencyRing(Record):
     """Ring of the samples whose latency has not passed."""
-    written: int            # numbers of samples in and out, see pedestal_common.stream.ring
+    written: int            # numbers of samples in and out, see pedestal_common.ring
     released: int
     ring_stamp_ns: Annotated[Ints, (LATENCY_RING_SIZE,)]
     quaternion: Annotated[Floats, (LATENCY_RING_SIZE, 4)]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator
 from typing import Any, NamedTuple, TypeAlias
 
 from pedestal_common.quantities import Seconds
-from pedestal_common.text_files import content, csv_table
+from pedestal_common.text_files import csv_table, files
 from tracking_receiver_sim.params import TargetParameters, TrackFileParameters
 from tracking_receiver_sim.tracks import course, directions, fixes, flight, gpx, lines, nmea, oem, stk, tables
 
@@ -74,7 +74,7 @@ def read(track: TrackFileParameters) -> tuple[FileKind, Data]:
         raise csv_table.TableError('track_file.path is empty: must name a file of one of the formats '
                                    + ', '.join(form.name for form in FILE_FORMATS))
     with csv_table.stream(track.path) as stream:
-        beginning = content.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
+        beginning = files.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
     for pattern, name in FOREIGN_FORMATS:
         if pattern.match(beginning):
             raise csv_table.TableError(f'{track.path}: {name}')

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 from xml.parsers import expat
 
-from pedestal_common.text_files import content, csv_table
+from pedestal_common.text_files import csv_table, files
 from tracking_receiver_sim.tracks import instant
 from tracking_receiver_sim.tracks.fixes import Fix, Log
 
@@ -27,7 +27,7 @@ def rows(path: str, log: Log) -> Iterator[Fix]:
     points = _Points(path, log)
     try:
         with csv_table.stream(path) as stream:
-            points.parse_with(content.xml_parser(stream))
+            points.parse_with(files.xml_parser(stream))
             while piece := stream.read(PARSE_CHUNK_BYTES):
                 points.parser.Parse(piece)
                 yield from points.taken_fixes()

@@ -15,7 +15,7 @@ import pynmea2
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Degrees, Seconds
-from pedestal_common.text_files import content, csv_table
+from pedestal_common.text_files import csv_table, files
 from tracking_receiver_sim.tracks import fixes, instant
 
 SENTENCE_PATTERN = re.compile(r'\$[A-Z]{2}([A-Z]{3}),[^$*]*(\*[0-9A-Fa-f]{2})?', re.ASCII)
@@ -95,7 +95,7 @@ def _missing(gga: pynmea2.NMEASentence) -> str:
 def _lines(path: str) -> Iterator[tuple[int, str]]:
     """Noise between the sentences becomes replacement characters."""
     with csv_table.stream(path) as stream:
-        encoding = content.marked_encoding(stream.read(content.MAX_MARK_BYTES)) or 'ascii'
+        encoding = files.marked_encoding(stream.read(files.MAX_MARK_BYTES)) or 'ascii'
         stream.seek(0)
         number, lines = 0, io.TextIOWrapper(stream, encoding, errors='replace', newline='')
         while line := lines.readline(MAX_LINE_CHARS):

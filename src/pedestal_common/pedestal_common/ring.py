@@ -1,8 +1,5 @@
-"""Ring of the entries whose latency has not passed, for compiled laws.
-
-A law declares a record with the fields of Ring, `ring_stamp_ns` as an array of the size of the ring, and an array of
-this size for each field of an entry.
-"""
+"""Ring of the entries whose latency has not passed, for compiled laws. A law declares a record with the fields of
+Ring, and an array of the size of `ring_stamp_ns` for each field of an entry."""
 from typing import Protocol
 
 from pedestal_common.compiled import compiled
