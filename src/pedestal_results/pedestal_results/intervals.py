@@ -80,10 +80,7 @@ def _finite(value: float) -> float | None:
 
 
 def meets(value: float | None, target: str) -> bool:
-    """Return True if a value meets a target: '<= 1', '>= 1', '< 1', '> 1', '1 +- 0.1' or '1 to 2'.
-
-    The value None meets no target.
-    """
+    """Return True if a value meets a target: '<= 1', '>= 1', '< 1', '> 1', '1 +- 0.1' or '1 to 2'. None meets none."""
     if value is None:
         return False
     first, word, end = ('', *target.split()) if len(target.split()) == 2 else target.split()

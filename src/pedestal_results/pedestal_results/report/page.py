@@ -28,8 +28,7 @@ PAPER_SCENARIOS = ('uav_flyby',)
 def write(bag_path: str | pathlib.Path, output: str | pathlib.Path | None = None,
           png_folder: str | pathlib.Path | None = None, beam: str = '', author: str = '',
           pdf: bool = False) -> pathlib.Path:
-    """Write the report of a bag, by default report.html in the bag (beside a bare .mcap), and return the path of its
-    file.
+    """Write the report of a bag, by default report.html beside its first file, and return the path of the report.
 
     png_folder   folder for the figures and the overview as PNG, None for no such files
     beam         name of one of several beams, '' for the first
@@ -100,9 +99,7 @@ def _labelled(parts: Mapping[str, object], *names: str) -> list[list[str]]:
 
 
 def _loop(bag: bags.Bag, run: RecordedRun, check: Report) -> list[list[str]]:
-    """Return rows on the control loop: its rate by the time of the drive, in realtime also by the wall time with its
-    jitter, lost steps, and steps missing in the recording.
-    """
+    """Return rows on the control loop: rates, in realtime the jitter, lost steps, and missing steps."""
     rows = []
     joints = run.table('joint_states')
     if joints is not None and joints['t'].size > 1 and joints['t'][-1] > joints['t'][0]:
