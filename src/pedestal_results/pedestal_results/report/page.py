@@ -172,10 +172,6 @@ def _gaps(bag: bags.Bag, check: Report) -> list[str]:
     return parts
 
 
-def _warnings(check: Report) -> list[str]:
-    return [line for line in (check.ending, check.loss, *check.foreign) if line]
-
-
 def _figures(specs: Iterable[figures.Spec], run: RecordedRun, of_paper: bool = False) -> list[str]:
     """Return some figures; of_paper: True if their titles name the figures of the paper."""
     return [elements.figure(spec._replace(title=f'{spec.title} (figure {spec.paper} of the paper)')
@@ -282,7 +278,8 @@ def _page(bag: bags.Bag, run: RecordedRun, check: Report, author: str) -> str:
     parts = [
         f'<h1>Tracking run: {html.escape(name)}</h1>',
         *([f'<p class="verdict{" bad" if found.failed else ""}">{html.escape(found.text)}</p>'] if found else []),
-        *(f'<p class="bad">{html.escape(line.capitalize())}.</p>' for line in _warnings(check)),
+        *(f'<p class="bad">{html.escape(line.capitalize())}.</p>'
+          for line in (check.ending, check.loss, *check.foreign) if line),
         _provenance_table(bag, run, author), *_parameters(bag), *_events(run),
         *_results(bag, run, check), *_gaps(bag, check),
         f'<h2 id="figures">Figures</h2><p class="soft">{paper}Grey: measured, blue: filtered or achieved, orange: '
