@@ -44,12 +44,9 @@ MAX_JSON_MARK_BYTES = 100  # number of first bytes by which a file of JSON is re
 STDOUT_PATH = pathlib.Path('/dev/stdout')  # path of the option --json without a file name, or with the file name -
 
 MAX_NAME_COLUMNS, MAX_CELL_COLUMNS, MIN_SENTENCE_COLUMNS = 44, 24, 40
-"""Widths in a list of show_list [characters].
-
-They are the largest width of the names, the largest width of the other cells, and the smallest width of the sentences.
-A longer cell moves the rest of its row to the right. On a narrower terminal, the sentences are printed below the
-cells.
-"""
+"""Largest width of the names in a list of show_list, of the other cells, and smallest width of the sentences
+[characters]. A longer cell moves the rest of its row to the right. On a narrower terminal, the sentences are printed
+below the cells."""
 
 MIN_TABLE_COLUMNS = 150
 """Smallest width of a table of results on any terminal, so that a row stays one line [characters]."""
@@ -58,10 +55,7 @@ MIN_TABLE_COLUMNS = 150
 @contextlib.contextmanager
 def _bar(columns: Callable[[ModuleType], _Columns], advance: Callable[..., None], description: str,
          total: float | None = None, rate: str = '') -> Iterator[Callable[..., None]]:
-    """Yield a function of the progress: on a terminal it calls advance(bar, task, ...), in a pipe it does nothing.
-
-    columns: function of the module rich.progress; description, total, rate: of the only task of the bar.
-    """
+    """Yield a function of the progress: on a terminal it calls advance(bar, task, ...), in a pipe it does nothing."""
     if not sys.stderr.isatty():
         yield lambda *_: None
         return
@@ -72,39 +66,34 @@ def _bar(columns: Callable[[ModuleType], _Columns], advance: Callable[..., None]
 
 def progress_of_run(duration: Seconds) -> AbstractContextManager[Callable[..., None]]:
     """Return a context with a function progress(time of the run): a bar on a terminal, nothing in a pipe."""
-    def columns(rich: ModuleType) -> _Columns:
-        return (rich.TextColumn('{task.description}'), rich.BarColumn(),
-                rich.TextColumn('{task.completed:.0f} / {task.total:.0f} s'), rich.TimeElapsedColumn())
-
     def advance(bar: progress.Progress, task: progress.TaskID, seconds: Seconds) -> None:
         bar.update(task, completed=seconds, description='running' if seconds > 0.0 else None)
-    return _bar(columns, advance, 'starting nodes (the first start compiles the laws)', duration)
+    return _bar(lambda rich: (rich.TextColumn('{task.description}'), rich.BarColumn(),
+                              rich.TextColumn('{task.completed:.0f} / {task.total:.0f} s'), rich.TimeElapsedColumn()),
+                advance, 'starting nodes (the first start compiles the laws)', duration)
 
 
 def progress_of_share() -> AbstractContextManager[Callable[..., None]]:
-    """Return a context with a function progress(share of the done work [-], text of the next item), as a bar."""
-    def columns(rich: ModuleType) -> _Columns:
-        return rich.BarColumn(), rich.TextColumn('{task.description}'), rich.TimeElapsedColumn()
-
+    """Return a context with a function progress(share of the work that is done [-], text): a bar on a terminal,
+    nothing in a pipe."""
     def advance(bar: progress.Progress, task: progress.TaskID, share: float, text: str) -> None:
         bar.update(task, completed=share, description=text)
-    return _bar(columns, advance, 'compiling the laws (first time only)', 1.0)
+    return _bar(lambda rich: (rich.BarColumn(), rich.TextColumn('{task.description}'), rich.TimeElapsedColumn()),
+                advance, 'compiling the laws (first time only)', 1.0)
 
 
 def progress_of_trials() -> AbstractContextManager[Callable[..., None]]:
-    """Return a context with a function progress(trials done, all trials), as a bar with their rate and the remaining
-    time.
-    """
-    def columns(rich: ModuleType) -> _Columns:
-        return (rich.BarColumn(), rich.MofNCompleteColumn(), rich.TextColumn('trials, {task.fields[rate]}'),
-                rich.TimeElapsedColumn(), rich.TextColumn('left'), rich.TimeRemainingColumn())
-
+    """Return a context with a function progress(trials done, all trials): a bar with the rate of the trials and the
+    remaining time on a terminal, nothing in a pipe."""
     def advance(bar: progress.Progress, task: progress.TaskID, done: int, total: int) -> None:
         speed = bar.tasks[0].speed
         bar.update(task, completed=done, total=total)
         if speed:
             bar.update(task, rate=f'{speed:.1f} a second')
-    return _bar(columns, advance, '', rate='compiling the laws (first time only)')
+    return _bar(lambda rich: (rich.BarColumn(), rich.MofNCompleteColumn(),
+                              rich.TextColumn('trials, {task.fields[rate]}'), rich.TimeElapsedColumn(),
+                              rich.TextColumn('left'), rich.TimeRemainingColumn()),
+                advance, '', rate='compiling the laws (first time only)')
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
@@ -132,10 +121,8 @@ def write_json(path: pathlib.Path | None, content: object) -> None:
 
 
 def show_list(rows: Iterable[Sequence[str]]) -> None:
-    """Print rows of texts in columns; the last text of a row is a sentence.
-
-    On a terminal the sentence is wrapped to the width of the terminal. In a pipe a row is one line.
-    """
+    """Print rows of texts in columns; the last text of a row is a sentence. On a terminal the sentence is wrapped to
+    its width. In a pipe a row is one line."""
     rows = list(rows)
     if not rows:
         return

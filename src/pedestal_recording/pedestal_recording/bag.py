@@ -64,10 +64,7 @@ def read(path: str | pathlib.Path, beam: str | None = None) -> 'Bag':
 
 
 def chosen_topics(bag: 'Bag', names: Iterable[str]) -> list[str]:
-    """Return the topics of a Bag with these names, without the leading '/', each once.
-
-    Raises BagError with the most similar name for a missing topic.
-    """
+    """Return the topics with these names, each once. Raises BagError with a similar name for a missing topic."""
     chosen = list(dict.fromkeys(name.lstrip('/') for name in names))
     for name in chosen:
         if name not in bag.topics:

@@ -49,10 +49,7 @@ def _git(*arguments: str) -> str:
 
 
 def git_revision() -> str:
-    """Return the revision of the source tree of this file, with '-dirty' if a tracked file is changed.
-
-    Return '' for an installed file, also in an environment inside another repository.
-    """
+    """Return the revision of this source tree, with '-dirty' if a file of it is changed; '' if installed."""
     if not _git('ls-files', '--error-unmatch', pathlib.Path(__file__).name):
         return ''
     # `git describe --dirty` would lock and write the index in spite of --no-optional-locks.

@@ -84,10 +84,7 @@ def reason(error: OSError) -> str:
 
 
 def frame(data: Data, at: int) -> tuple[int, int]:
-    """Return (opcode, stop) of the record that begins at a position of data.
-
-    Raises ValueError if no whole record begins there.
-    """
+    """Return (opcode, stop) of the record at a position of data. Raises ValueError if no whole record begins there."""
     if at + 9 > len(data):
         raise ValueError('the file ends')
     opcode, length = _RECORD.unpack_from(data, at)
@@ -151,9 +148,8 @@ _UNPACK: dict[str, Callable[[bytes, int], bytes]] = {
 
 
 class McapFile:
-    """An open MCAP file, which is read in pieces.
+    """An open MCAP file, which is read in pieces. locked: True if this process itself holds the lock of the file.
 
-    locked: True if this process itself writes the file and holds its lock. Otherwise a lock on the file is an error.
     Raises BagError if the file is missing, empty, not regular or not MCAP, or while its recorder still writes it.
     """
 

@@ -182,7 +182,8 @@ class RecorderNode(shell.Shell):
         return take
 
     def _lockstep_counter(self, index: int, topic: nodes.Link) -> _Counter:
-        """Return the function that checks the sequence numbers of a topic in lockstep, False for a foreign message.
+        """Return the function that checks the sequence numbers of a topic in lockstep. Its value is False for a
+        foreign message.
 
         The numbers of the graph's publisher rise by 1, and begin at 1 on a topic of every step. A gap counts as lost
         messages and ends the run.
@@ -209,7 +210,9 @@ class RecorderNode(shell.Shell):
         return count
 
     def _realtime_counter(self, index: int, topic: nodes.Link) -> _Counter:
-        """Return the function that counts the missing messages of a topic in realtime, False for a foreign message."""
+        """Return the function that counts the missing messages of a topic in realtime. It is False for a foreign
+        message.
+        """
         publishers = self._heard[topic.name] = TopicPublishers(self, topic)
 
         def count(data: bytes, info: MessageInfo) -> bool:

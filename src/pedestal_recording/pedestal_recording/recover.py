@@ -94,7 +94,7 @@ class Recovered:
 
 
 def recover(path: str | pathlib.Path, output: str | pathlib.Path | None = None) -> Recovered:
-    """Write the readable messages of the bag at a path to a new bag, by default beside it and named '-recovered'.
+    """Write the readable messages of a bag to a new bag, by default beside it, with '-recovered' after its name.
 
     Raises BagError if nothing is readable, if the old bag is being written, or if the new bag cannot be written. After
     an error, no part of the new bag remains.

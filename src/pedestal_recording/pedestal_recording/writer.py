@@ -129,10 +129,7 @@ class BagFile:
         self._mcap.start('ros2', 'pedestal')
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
-        """Add a message type: its name, and its definition (bytes of a text) in an encoding such as 'ros2msg'.
-
-        Return the number of the schema.
-        """
+        """Add a message type: its name, and its definition in an encoding such as 'ros2msg'. Return its number."""
         number = self._mcap.register_schema(name, encoding, data)
         return self._declared(records.Schema(id=number, name=name, encoding=encoding, data=data))
 
@@ -186,10 +183,7 @@ class BagFile:
         return self._in_file + self._in_chunk
 
     def close(self) -> None:
-        """Write the last chunk, the summary and metadata.yaml.
-
-        On a full disk, write the part that fits, and raise BagError.
-        """
+        """Write the last chunk, the summary and metadata.yaml, on a full disk as far as it fits. Raises BagError."""
         with contextlib.closing(self._disk.stream):
             try:
                 self.flush()

@@ -215,8 +215,8 @@ class Tracking:
         """Receiver error minus the error without noise [deg] over the evaluated part.
 
         The error without noise is the true error minus the boresight offset. The receiver of an electronic beam
-        measures the error in the middle of the interval between two steps, which is the mean of those at the beginning
-        and at the end.
+        measures the error in the middle of the interval between two steps. The true error there is the mean of those
+        at both ends.
         """
         true = 0.5 * (self.true + self.begun[self.tracking]) if self.electronic else self.true
         return (self.measured[self.tracking] - (true - self.boresight)) * DEG_PER_RAD
@@ -323,10 +323,9 @@ def _lever_arm(bag: Recording, attitude: Quaternions) -> Vectors3:
 
 
 def _arriving(bag: Recording, relative: Vectors3, velocity: Vectors3) -> Vectors3:
-    """Return the vector ENU [m] from the antenna to the apparent position of the target, which refraction and light
-    time shift.
+    """Return the vector ENU [m] from the antenna to the apparent position, shifted by refraction and light time.
 
-    relative: vector to its true position, ENU [m]; velocity: its velocity, ENU [m/s].
+    relative: vector to the true position, ENU [m]; velocity: of the target, ENU [m/s].
     """
     of_receiver = recordings.parameters(bag, 'tracking_receiver')
     given = {key: value for key, value in of_receiver.items() if key in ('path.refractivity', 'path.light_time')}

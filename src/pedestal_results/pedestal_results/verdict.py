@@ -97,12 +97,10 @@ def _replies(bag: Recording) -> Iterator[tuple[Seconds, commands.Command, comman
 
 
 def _refusals(bag: Recording) -> list[str]:
-    return [f'{command.verb} at {t:.4g} s refused: {_reason(reply.text)}' for t, command, reply in _replies(bag)
-            if command.who == commands.SCHEDULE_CLIENT and not reply.granted]
-
-
-def _reason(text: str) -> str:
-    return text.removeprefix('refused: ').partition('; mode is ')[0]
+    reasons = [(command.verb, t, reply.text.removeprefix('refused: ').partition('; mode is ')[0])
+               for t, command, reply in _replies(bag)
+               if command.who == commands.SCHEDULE_CLIENT and not reply.granted]
+    return [f'{verb} at {t:.4g} s refused: {reason}' for verb, t, reason in reasons]
 
 
 def _leads_to_tracking(mode: str, handover: bool) -> bool:

@@ -1,4 +1,5 @@
 """The table of results: what a run is measured by stands in it once, and only there."""
+import collections
 import dataclasses
 import math
 import pathlib
@@ -114,3 +115,20 @@ def test_the_loss_at_half_a_beamwidth_is_half_of_the_power():
             assert (moved.mean_power_loss, moved.max_power_loss) == pytest.approx(loss, abs=0.02)
     assert math.isnan(dataclasses.replace(run, tracking=np.zeros(run.t.size, bool)).mean_power_loss)
     assert math.isnan(dataclasses.replace(run, beamwidth=math.nan).max_power_loss)
+
+
+def test_a_recorded_run_decodes_each_topic_once(monkeypatch):
+    decoded = collections.Counter()
+
+    def counted(method):
+        def decode(self, topic):
+            decoded[method.__name__, topic] += 1
+            return method(self, topic)
+        return decode
+    for method in (bag.Bag.table, bag.Bag.messages):
+        monkeypatch.setattr(bag.Bag, method.__name__, counted(method))
+    run = RecordedRun(bag.read(REFERENCES / 'ship_pass'))
+    run.check_stamps()
+    assert run.parts and run.verdict and run.events and run.statuses and run.motors and run.raw_angles.size
+    assert {('table', 'joint_states'), ('messages', 'diagnostics')} <= set(decoded)
+    assert set(decoded.values()) == {1}

@@ -37,7 +37,6 @@ class LevelReceiverParameters(Parameters):
             raise ParameterError('scale = 0 dB: must not be 0')
 
 
-
 DROP_KINDS = 'unreadable', 'not_finite', 'out_of_range', 'not_newer'  # reasons to drop a line
 
 

@@ -28,8 +28,7 @@ PAPER_SCENARIOS = ('uav_flyby',)
 def write(bag_path: str | pathlib.Path, output: str | pathlib.Path | None = None,
           png_folder: str | pathlib.Path | None = None, beam: str = '', author: str = '',
           pdf: bool = False) -> pathlib.Path:
-    """Write the report of a bag, by default report.html in the bag (beside a bare .mcap), and return the path of its
-    file.
+    """Write the report of a bag, by default report.html beside its first file, and return the path of the report.
 
     png_folder   folder for the figures and the overview as PNG, None for no such files
     beam         name of one of several beams, '' for the first
@@ -100,9 +99,7 @@ def _labelled(parts: Mapping[str, object], *names: str) -> list[list[str]]:
 
 
 def _loop(bag: bags.Bag, run: RecordedRun, check: Report) -> list[list[str]]:
-    """Return rows on the control loop: its rate by the time of the drive, in realtime also by the wall time with its
-    jitter, lost steps, and steps missing in the recording.
-    """
+    """Return rows on the control loop: rates, in realtime the jitter, lost steps, and missing steps."""
     rows = []
     joints = run.table('joint_states')
     if joints is not None and joints['t'].size > 1 and joints['t'][-1] > joints['t'][0]:
@@ -173,10 +170,6 @@ def _gaps(bag: bags.Bag, check: Report) -> list[str]:
     if absent:
         parts.append(f'<p class="soft">Topics without a message in this bag: {", ".join(absent)}.</p>')
     return parts
-
-
-def _warnings(check: Report) -> list[str]:
-    return [line for line in (check.ending, check.loss, *check.foreign) if line]
 
 
 def _figures(specs: Iterable[figures.Spec], run: RecordedRun, of_paper: bool = False) -> list[str]:
@@ -285,7 +278,8 @@ def _page(bag: bags.Bag, run: RecordedRun, check: Report, author: str) -> str:
     parts = [
         f'<h1>Tracking run: {html.escape(name)}</h1>',
         *([f'<p class="verdict{" bad" if found.failed else ""}">{html.escape(found.text)}</p>'] if found else []),
-        *(f'<p class="bad">{html.escape(line.capitalize())}.</p>' for line in _warnings(check)),
+        *(f'<p class="bad">{html.escape(line.capitalize())}.</p>'
+          for line in (check.ending, check.loss, *check.foreign) if line),
         _provenance_table(bag, run, author), *_parameters(bag), *_events(run),
         *_results(bag, run, check), *_gaps(bag, check),
         f'<h2 id="figures">Figures</h2><p class="soft">{paper}Grey: measured, blue: filtered or achieved, orange: '
