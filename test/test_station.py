@@ -11,6 +11,7 @@ import subprocess
 import sys
 
 import pytest
+import yaml
 
 STATION = pathlib.Path(__file__).parents[1] / 'docs' / 'station'
 SERVICES = sorted(STATION.glob('*.service'))
@@ -33,7 +34,16 @@ def started_by(path):
 
 
 def test_there_is_a_service_for_each_part():
-    assert [started_by(path).name for path in SERVICES] == ['acu_node', 'adu_node', 'recorder_node']
+    assert [started_by(path).name for path in SERVICES] == [
+        'acu_node', 'adu_node', 'drive_node', 'easycomm_node', 'ins_input_node', 'level_receiver_node',
+        'operator_page', 'monopulse_receiver_node', 'recorder_node', 'rotator_node', 'rotctld_node']
+
+
+@pytest.mark.parametrize('alike', [('adu', 'drive', 'rotator'), ('receiver', 'level-receiver')], ids='-'.join)
+def test_one_service_alone_owns_the_drive_or_the_receiver(alike):
+    units = {f'pedestal-{name}.service' for name in alike}
+    for name in units:
+        assert set(unit(STATION / name)['Unit']['Conflicts'].split()) == units - {name}
 
 
 @pytest.mark.parametrize('path', SERVICES, ids=lambda path: path.stem)
@@ -60,10 +70,23 @@ def test_the_container_starts_an_installed_command():
     assert set(copied) == {f'src/{path.parent.name}' for path in STATION.parents[1].glob('src/*/setup.py')}
 
 
+PARAMETER_FILES = {
+    'parameters.yaml': ('acu', 'adu', 'recorder'),
+    'servo_drives.yaml': ('acu', 'drive', 'monopulse', 'recorder'),
+    'rotator.yaml': ('acu', 'rotator', 'level_receiver', 'ins_input', 'recorder')}
+"""{file of a kind of station: nodes that its services start}."""
+
+
+@pytest.mark.parametrize('name', PARAMETER_FILES)
+def test_the_position_stands_in_the_parameters(name):
+    values = yaml.safe_load((STATION / name).read_text())['/**/acu']['ros__parameters']
+    assert {f'prediction.station.{part}' for part in ('latitude_deg', 'longitude_deg', 'height')} <= set(values)
+
+
 @pytest.mark.thorough
-def test_the_parameters_start_every_service(start_node, connect):
-    started = [start_node(path.stem.removeprefix('pedestal-'), '--params-file', STATION / 'parameters.yaml')
-               for path in SERVICES]
+@pytest.mark.parametrize('name', PARAMETER_FILES)
+def test_the_parameters_start_every_service(name, start_node, connect):
+    started = [start_node(node, '--params-file', STATION / name) for node in PARAMETER_FILES[name]]
     for alone in started:
         client = connect(alone.domain_id)
         client.until(lambda client=client: client.node.count_publishers('diagnostics'))
