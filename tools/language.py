@@ -13,8 +13,8 @@ import sys
 import tokenize
 
 MAX_SENTENCE_WORDS = 35
-FORBIDDEN_WORD = re.compile(r'\b(told|tells|says|asked|anew|strangers?|whoever|somebody|nobody|hearers?|listeners?|held up|'
-                            r'moves unasked|parted|spoil(?:s|ed)?)\b', re.IGNORECASE)
+FORBIDDEN_WORD = re.compile(r'\b(told|tells|says|asked|anew|strangers?|whoever|somebody|nobody|hearers?|'
+                            r'listeners?|held up|moves unasked|parted|spoil(?:s|ed)?)\b', re.IGNORECASE)
 """Words that the rules of the language forbid: words with which machines speak, words for actors without a name, and
 words that a term of docs/glossary.md replaces (subscriber, stall, uncommanded motion, mismatch, inject)."""
 

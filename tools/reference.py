@@ -201,8 +201,11 @@ REFERENCE_TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': sc
 def with_tables(text, rows):
     """Return the text of a file in which every generated table and number is replaced by its present content.
 
-    A number of prose stands between <!-- number STUDY CASE METRIC FACTOR FORMAT --> and <!-- end -->: the value of
-    that row times the factor, as in <!-- number scenarios leo_pass pointing_rms_deg 1000 .2f -->2.38<!-- end -->.
+    A number of prose is the value of a row times a factor. It stands between two marks:
+
+        <!-- number scenarios leo_pass pointing_rms_deg 1000 .2f -->2.38<!-- end -->
+
+    The words are study, case, metric, factor and format.
 
     rows: published.Rows, the measured numbers of docs/rows.json. Raises KeyError for an unknown table.
     """
