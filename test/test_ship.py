@@ -20,7 +20,7 @@ from pedestal_common.wire import messages
 from pedestal_recording import bag as bags
 from pedestal_results import isolation, known_attitude, results, tracking
 from pedestal_workbench.again import difference, recompute
-from ship_motion_sim.sea import motion
+from ship_motion_sim import motion
 from tracking_receiver_sim import target
 
 

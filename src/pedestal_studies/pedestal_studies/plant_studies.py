@@ -22,7 +22,7 @@ from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Floats, NewtonMeters, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, TRUTH_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies import metrics
 from pedestal_studies.p000_ma import bode
 from pedestal_studies.result import Result, legend
@@ -75,7 +75,7 @@ def bode_study(source: str, progress: Progress) -> Result:
 
     def drawn(loop: str) -> Callable[[], Figure]:
         curves = {name: (responses[f'{loop}/{name}'], colour)
-                  for name, colour in zip(AXES, (FILTERED_COLOUR, TRUTH_COLOUR))}
+                  for name, colour in zip(AXES, (fig.FILTERED_COLOUR, fig.TRUTH_COLOUR))}
         return lambda: bode.bode_figure(f'{loop} loops of {plant.name}', curves, None)
 
     return Result(bode.rows(responses), {loop: drawn(loop) for loop in ('speed', 'position')},
@@ -145,11 +145,11 @@ def _bias_figure(kind: str, motion_of: Callable[[Run, int], tuple[Times, Floats]
 
     kind: title of the panels. motion_of: `_standstill` or `_reversals`.
     """
-    figure, axes = new_panels(2, height=4.6, sharex=True,
-                              y=f'{"error" if kind == "sine" else "angle"} [\N{MICRO SIGN}rad]')
+    figure, axes = fig.new_panels(2, height=4.6, sharex=True,
+                                  y=f'{"error" if kind == "sine" else "angle"} [\N{MICRO SIGN}rad]')
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
-        for end, colour, label in (('/bias-off', TRUTH_COLOUR, 'without bias'),
-                                   ('', FILTERED_COLOUR, 'as the scenario is')):
+        for end, colour, label in (('/bias-off', fig.TRUTH_COLOUR, 'without bias'),
+                                   ('', fig.FILTERED_COLOUR, 'as the scenario is')):
             t, remaining = motion_of(records[kind, end], i)
             panel.plot(t, 1e6 * remaining, color=colour, label=label)
         panel.set_title(f'{kind}, {name}')
@@ -180,12 +180,12 @@ def _metrics(records: Mapping[str, Run], i: int, torque: NewtonMeters) -> list[t
 
 def _figure(kind: str, run: Run) -> Figure:
     """Draw both axes over time: the angle, or the error of the sine [mrad]."""
-    figure, axes = new_panels(2, height=4.6, y='error [mrad]' if kind == 'sine' else 'angle [mrad]', sharex=True)
+    figure, axes = fig.new_panels(2, height=4.6, y='error [mrad]' if kind == 'sine' else 'angle [mrad]', sharex=True)
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
         values = _sine_error(run, i) if kind == 'sine' else _angle(run, i)
-        panel.plot(run.t, 1e3 * values, color=FILTERED_COLOUR)
+        panel.plot(run.t, 1e3 * values, color=fig.FILTERED_COLOUR)
         if kind == 'step':
-            panel.axhline(1e3 * STEP_SIZE_RAD, color=INK_COLOUR, lw=0.8, ls='--')
+            panel.axhline(1e3 * STEP_SIZE_RAD, color=fig.INK_COLOUR, lw=0.8, ls='--')
         panel.set_title(f'{kind}, {name}')
     return figure
 

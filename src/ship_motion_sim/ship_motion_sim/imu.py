@@ -21,9 +21,8 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
-from ship_motion_sim import earth
+from ship_motion_sim import earth, motion
 from ship_motion_sim.params import ShipMotionParameters
-from ship_motion_sim.sea import motion
 
 IMU_NORMALS_PER_STEP = 6  # number of standard normals of a step: three gyros, three accelerometers
 FIRST_GYRO_NORMAL, FIRST_ACCELEROMETER_NORMAL = 0, 3

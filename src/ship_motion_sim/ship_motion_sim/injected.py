@@ -9,7 +9,7 @@ from pedestal_common.injection import message_faults, schedule, table
 from pedestal_common.quantities import AnyRecord, Floats, Nanoseconds, Quaternion, Radians, Records, Vector3
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
-from ship_motion_sim.navigation import ins
+from ship_motion_sim import ins
 
 IMU_MESSAGE_FAULT_CODES, INS_MESSAGE_FAULT_CODES = message_faults.codes('ship_motion'), message_faults.codes('ins')
 IMU_BIAS_CODE = table.code('ship_motion', 'bias')

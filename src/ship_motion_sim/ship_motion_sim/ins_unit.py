@@ -17,8 +17,7 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnos
 from pedestal_common.quantities import AnyRecord, Bit, Floats, Nanoseconds, Records, Stamps
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
-from ship_motion_sim import injected
-from ship_motion_sim.navigation import aligning_ins, ins, navigator
+from ship_motion_sim import aligning_ins, injected, ins, navigator
 from ship_motion_sim.params import InsParameters
 
 IMU_RAW_TOPIC, ATTITUDE_TOPIC = 'ship/imu/data_raw', 'ship/imu/data'

@@ -12,11 +12,10 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnos
 from pedestal_common.quantities import AnyRecord, Floats, Nanoseconds, Records, Stamps
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
-from ship_motion_sim import imu, injected
+from ship_motion_sim import imu, injected, motion
 from ship_motion_sim.imu import Inputs as ImuInputs
 from ship_motion_sim.imu import Outputs as ImuOutputs
 from ship_motion_sim.params import ShipMotionParameters
-from ship_motion_sim.sea import motion
 
 SHIP_TRUTH_TOPIC, IMU_RAW_TOPIC = 'ship/truth', 'ship/imu/data_raw'
 

@@ -24,7 +24,7 @@ from pedestal_bringup.loop.closed_loop import Run
 from pedestal_common.quantities import Floats, Json, NewtonMeters, Radians, RadiansPerSecond, Row, Seconds, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies import metrics
 from pedestal_studies.p000_ma import servo
 from pedestal_studies.p000_ma.servo import Runs
@@ -210,12 +210,12 @@ def figures(done: Runs) -> Drawings:
 
 def standstill_figure(done: Runs) -> Figure:
     """Draw the limit cycle of the load at rest and the torque of both motors, without and with bias."""
-    figure, axes = new_panels(2, 2, height=4.6, y=('azimuth [\N{MICRO SIGN}rad]', 'torque [Nm]'), sharex=True,
-                              sharey='row')
+    figure, axes = fig.new_panels(2, 2, height=4.6, y=('azimuth [\N{MICRO SIGN}rad]', 'torque [Nm]'), sharex=True,
+                                  sharey='row')
     for column, name in enumerate(('bias-off', 'bias-on')):
         record = done['standstill', name]
         t, y = standstill(record)
-        axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(TRUTH_COLOUR, FILTERED_COLOUR)[column])
+        axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(fig.TRUTH_COLOUR, fig.FILTERED_COLOUR)[column])
         axes[0, column].set_title(f'{name}: {1e6 * np.ptp(y):.1f} \N{MICRO SIGN}rad peak to peak')
         draw_torques(axes[1, column], record)
     axes[0, 0].set_xlim(STANDSTILL_START_S, STANDSTILL_START_S + 0.5)
@@ -226,14 +226,14 @@ def standstill_figure(done: Runs) -> Figure:
 def reversal_figure(done: Runs) -> Figure:
     """Draw the effect of lash on a slow sine: reference, then the error without its part at the sine frequency."""
     error = 'error [\N{MICRO SIGN}rad]'
-    figure, axes = new_panels(3, height=5.6, y=('reference [rad]', error, error), sharex=True,
-                              height_ratios=(1, 1.2, 1.2))
+    figure, axes = fig.new_panels(3, height=5.6, y=('reference [rad]', error, error), sharex=True,
+                                  height_ratios=(1, 1.2, 1.2))
     t = done['reversal', 'bias-off'].t
     w = REVERSAL_FREQUENCIES_RAD_S['reversal']
-    axes[0, 0].plot(t, REVERSAL_AMPLITUDE_RAD * np.sin(w * t), color=INK_COLOUR)
+    axes[0, 0].plot(t, REVERSAL_AMPLITUDE_RAD * np.sin(w * t), color=fig.INK_COLOUR)
     for panel, name in zip(axes[1:, 0], ('bias-off', 'bias-on')):
         t, residual = steady_residual(done['reversal', name], REVERSAL_AMPLITUDE_RAD, w)
-        panel.plot(t, 1e6 * residual, color=TRUTH_COLOUR if name == 'bias-off' else FILTERED_COLOUR)
+        panel.plot(t, 1e6 * residual, color=fig.TRUTH_COLOUR if name == 'bias-off' else fig.FILTERED_COLOUR)
         panel.set_title(f'{name}: error without its fundamental')
     axes[2, 0].set_xlim(*reversal_window())
     return figure
@@ -248,7 +248,7 @@ def reversal_window() -> tuple[Seconds, Seconds]:
 
 def torques_figure(done: Runs) -> Figure:
     """Draw the torque of both motors over the reversal, a panel for each of PAPER_CASES."""
-    figure, axes = new_panels(len(PAPER_CASES), height=5.6, y='torque [Nm]', sharex=True, sharey=True)
+    figure, axes = fig.new_panels(len(PAPER_CASES), height=5.6, y='torque [Nm]', sharex=True, sharey=True)
     for panel, name in zip(axes[:, 0], PAPER_CASES):
         record = done['reversal', name]
         draw_torques(panel, record)
@@ -262,15 +262,15 @@ def schedules_figure(done: Runs) -> Figure:
     names = list(BIAS_SCHEDULES)
     sine = [1e6 * measured('sine', name, done['sine', name])['sine_residual_rad'][0] for name in names]
     step = [measured('step', name, done['step', name])['step_overshoot_percent'][0] for name in names]
-    figure, axes = new_panels(1, 2, height=3.2, sharey=True)
+    figure, axes = fig.new_panels(1, 2, height=3.2, sharey=True)
     for panel, values, bound, label in (
             (axes[0, 0], sine, 100.0, 'residual of the 0.4 Hz sine [\N{MICRO SIGN}rad]'),
             (axes[0, 1], step, 2.5, 'overshoot of the fast step [%]')):
-        bars = panel.barh(names, values, color=[FILTERED_COLOUR if name == 'hold-fade' else RAW_COLOUR
+        bars = panel.barh(names, values, color=[fig.FILTERED_COLOUR if name == 'hold-fade' else fig.RAW_COLOUR
                                                 for name in names])
         panel.bar_label(bars, [f'{value:.0f}' if value >= 100.0 else f'{value:.3g}' for value in values], padding=3,
                         bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 1.0})
-        panel.axvline(bound, color=INK_COLOUR, linewidth=0.8, linestyle='--')
+        panel.axvline(bound, color=fig.INK_COLOUR, linewidth=0.8, linestyle='--')
         panel.set_xlim(0.0, 1.2 * max(*values, bound))
         panel.grid(axis='y', visible=False)
         panel.set_xlabel(f'{label}, dashed: target')
@@ -280,11 +280,12 @@ def schedules_figure(done: Runs) -> Figure:
 
 def structures_figure(done: Runs) -> Figure:
     """Draw one speed loop on the mean speed beside a speed loop for each motor, over the step of the paper."""
-    figure, axes = new_panels(2, 2, height=4.6, y=('torque [Nm]', 'opposing torque [Nm]'), sharex=True, sharey='row')
+    figure, axes = fig.new_panels(2, 2, height=4.6, y=('torque [Nm]', 'opposing torque [Nm]'), sharex=True,
+                                  sharey='row')
     for column, name in enumerate(SPEED_LOOP_STRUCTURES):
         record = done['structure', name]
         draw_torques(axes[0, column], record)
-        axes[1, column].plot(record.t, opposing_torque(record), color=INK_COLOUR)
+        axes[1, column].plot(record.t, opposing_torque(record), color=fig.INK_COLOUR)
         axes[0, column].set_title(name)
     axes[0, 0].set_xlim(0.0, 1.0)
     return legend(figure)

@@ -26,7 +26,7 @@ from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.quantities import Pairs, Row
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies import ensemble, profiles
 from pedestal_studies.p000_ma import window_filter
 from pedestal_studies.result import Result
@@ -157,14 +157,14 @@ def remarks(found: Mapping[tuple[str, tuple[str, ...]], Tuned], runs: int) -> li
 def ratio_figure(table: list[Row], motions: Sequence[str]) -> Figure:
     """Draw the error of every filter over that of kalman, a panel for each tuning; motions: names of profiles."""
     value = {(r['case'], r['metric']): r['value'] for r in table}
-    figure, axes = new_panels(1, 2, x='rms error of the angle over that of kalman', height=3.8, sharey=True)
+    figure, axes = fig.new_panels(1, 2, x='rms error of the angle over that of kalman', height=3.8, sharey=True)
     for panel, tuning in zip(axes[0], TUNINGS):
         ratios = {motion: {name: value.get((f'{motion}/{name}/{tuning}', 'angle_ratio_to_kalman'), math.nan)
                            for name in FILTER_MEANINGS if name != 'kalman'} for motion in (MEAN_MOTION, *motions)}
-        panel.barh(list(ratios[MEAN_MOTION]), list(ratios[MEAN_MOTION].values()), color=FILTERED_COLOUR)
+        panel.barh(list(ratios[MEAN_MOTION]), list(ratios[MEAN_MOTION].values()), color=fig.FILTERED_COLOUR)
         for motion in motions:
-            panel.plot(list(ratios[motion].values()), list(ratios[motion]), 'o', color=RAW_COLOUR, ms=3.0)
-        panel.axvline(1.0, color=INK_COLOUR, linewidth=0.8)
+            panel.plot(list(ratios[motion].values()), list(ratios[motion]), 'o', color=fig.RAW_COLOUR, ms=3.0)
+        panel.axvline(1.0, color=fig.INK_COLOUR, linewidth=0.8)
         panel.set_title(f'{tuning}; bar: all motions, dots: each motion')
     axes[0, 0].invert_yaxis()
     return figure

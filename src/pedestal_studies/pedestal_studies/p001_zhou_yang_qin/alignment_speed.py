@@ -21,10 +21,10 @@ from matplotlib.figure import Figure
 from pedestal_common.quantities import Floats, Seconds
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies import metrics
-from pedestal_studies.p001_zhou_yang_qin import alignment
-from pedestal_studies.p001_zhou_yang_qin.alignment import (
+from pedestal_studies.p001_zhou_yang_qin import aligned_runs, alignment
+from pedestal_studies.p001_zhou_yang_qin.aligned_runs import (
     EVALUATION_PERIOD_S,
     INS_PARAMETERS,
     LEVEL_COLUMNS,
@@ -74,23 +74,23 @@ METRICS = {
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Align with every case, `runs` times."""
-    accuracy = alignment.accuracies({'': runs}, CASES, pool or monte_carlo.Pool(1), progress)['']
+    accuracy = aligned_runs.accuracies({'': runs}, CASES, pool or monte_carlo.Pool(1), progress)['']
     rows = [row(case, metric, a.over_parts(value), unit, runs=a.whole.runs)
             for case, a in accuracy.items() for metric, (unit, value) in METRICS.items()]
     return Result(rows, {'speed': lambda: speed_figure(accuracy)}, [
         'Every number is a statistic over all runs; its interval comes from the jackknife over '
-        f'{alignment.JACKKNIFE_PARTS} parts of the runs.',
+        f'{aligned_runs.JACKKNIFE_PARTS} parts of the runs.',
         f'The level counts as settled below {SETTLED_LEVEL_ARCMIN:g} arcmin. If its noise stays above this limit, it '
         'never settles, and the row has no value.'])
 
 
 def speed_figure(accuracy: Mapping[str, Accuracy]) -> Figure:
     """Draw the rms of level and azimuth over the runs."""
-    figure, axes = new_panels(2, height=6.4, y=('level [arcmin]', 'azimuth [arcmin]'), sharex=True)
+    figure, axes = fig.new_panels(2, height=6.4, y=('level [arcmin]', 'azimuth [arcmin]'), sharex=True)
     for (case, a), shade in zip(accuracy.items(), np.linspace(0.3, 1.0, len(accuracy))):
         t = EVALUATION_PERIOD_S * np.arange(1, len(a.rms) + 1)
         for panel, values in zip(axes[:, 0], (level_over_runs(a), a.azimuth)):
-            panel.semilogy(t, values, color=FILTERED_COLOUR, alpha=shade, label=case)
+            panel.semilogy(t, values, color=fig.FILTERED_COLOUR, alpha=shade, label=case)
     axes[0, 0].set_title('rms over the runs')
-    axes[1, 0].axhline(alignment.SETTLED_AZIMUTH_ARCMIN, color=INK_COLOUR, linewidth=0.8, linestyle='--')
+    axes[1, 0].axhline(alignment.SETTLED_AZIMUTH_ARCMIN, color=fig.INK_COLOUR, linewidth=0.8, linestyle='--')
     return legend(figure)

@@ -22,15 +22,10 @@ from typing import TypeAlias
 import numpy as np
 
 from pedestal_common.quantities import (
-    Decibels,
     Degrees,
     Floats,
     Json,
     Pairs,
-    Radians,
-    RadiansPerSecond,
-    Seconds,
-    Times,
 )
 from pedestal_results.intervals import row
 from pedestal_results.tracking import interval_start_error, rms
@@ -40,13 +35,31 @@ from pedestal_studies.p002_jia.angle_loop import (
     GRID_STEP_S,
     SMOOTHING_CODES,
     SMOOTHING_SAMPLES,
-    FilterLoop,
     PaperLoop,
     delay_limit,
     spectral_radius,
 )
+from pedestal_studies.p002_jia.compared_loops import (
+    COMPARED_CASES,
+    LOOP_DELAY_MS,
+    RECORD_DURATION_S,
+    SINE_ACCELERATION_DEG_S2,
+    SINE_RATE_DEG_S,
+    beam,
+    compared_errors,
+    compared_targets,
+    instants,
+    isolation,
+    max_error_at_ends,
+    noises,
+    ramp_target,
+    settled,
+    sine_target,
+    sway_target,
+    target_of,
+)
 from pedestal_studies.p002_jia.figures import Readings
-from pedestal_studies.result import Drawings, Result
+from pedestal_studies.result import FIRST_SEED, Drawings, Result
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
@@ -55,7 +68,7 @@ from tracking_receiver_sim.params import ReceiverParameters
 
 Line: TypeAlias = tuple[str, str, float | list[Degrees], str]   # case, metric, value or the values of all runs, unit
 
-DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case with noise; seed of the first run
+DEFAULT_RUNS = 40  # runs of each case with noise
 
 STEP_SIZE_RAD = math.radians(1.0)
 ALPHA_GAINS, LOOP_PERIODS_MS, LOOP_DELAYS_MS = (0.05, 0.1, 0.2, 0.3), (10, 5), (0, 20, 50, 80)
@@ -64,54 +77,13 @@ SLOPE_RATIOS = 0.5, 0.7, 1.0, 1.5, 2.0  # true slope over assumed slope of the r
 STEEP_SLOPE_RATIO = 2.0
 """Slope ratio of the cases that show the lag behind the ramp and the sine with a steeper slope [-]."""
 RAMP_RATES_DEG_S = (10, 20, 30, 40)  # rates of figure 6 [deg/s]
-SINE_RATE_DEG_S, SINE_ACCELERATION_DEG_S2 = 30.0, 10.0  # largest rate [deg/s] and acceleration [deg/s2] of figure 7
 
-SWAY_AMPLITUDE_RAD, SWAY_PERIOD_S = math.radians(10.0), 8.0
-"""Amplitude [rad] and period [s] of the ship's sway in figure 9."""
 
 RATE_COMPENSATIONS = (0.0, 0.85, 1.0)  # shares delta of the ship's rate that the loop compensates [-]
-LOOP_DELAY_MS = 20  # delay of figure 7 and of all loops of COMPARED_LOOPS [ms]
 
-RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S = map(math.radians, (0.05, 0.005, 0.01))
-"""1-sigma noise of one sample of 1 ms: error of the receiver [rad], attitude [rad] and rate [rad/s] of the INS."""
-
-INS_STAMP_ERROR_MS = 5  # error of the INS's stamps [ms]
-
-RECORD_DURATION_S, EVALUATION_START_S = 60.0, 30.0
-"""Duration of a record of a moving target, and start of its evaluation [s]."""
 
 BEAMWIDTH_RAD = math.radians(1.0)  # beamwidth of the array in the cases loss/... [rad].
 
-
-def jerk(q: float) -> float:
-    """Return the process noise of the filter [rad/s3/sqrt(Hz)]; q: spectral density of the jerk [deg2/s5]."""
-    return math.radians(math.sqrt(q))
-
-
-COMPARED_LOOPS: dict[str, PaperLoop | FilterLoop] = {
-    # The loop of the paper, with and without compensation of 0.85 of the ship's rate.
-    'paper': PaperLoop(delay=LOOP_DELAY_MS), 'paper-delta': PaperLoop(delay=LOOP_DELAY_MS, delta=0.85),
-    # The loop of the paper in a form that points the beam at R(k+1/k), the angle predicted for the next update.
-    'type-2': PaperLoop(delay=LOOP_DELAY_MS, form='type_2'),
-    'type-2-delta': PaperLoop(delay=LOOP_DELAY_MS, form='type_2', delta=0.85),
-    # Loops with filters that expect more or less jerk of the target; tracked-10ms commands the beam every 10 ms, the
-    # others every 1 ms.
-    'tracked-10ms': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD, hold=10),
-    'best': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD),
-    'fast': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD), 'faster': FilterLoop(jerk(10.0), RECEIVER_NOISE_RAD),
-    # `best` with a delay of 150 ms, and `best` which assumes a delay that is 10 ms too short.
-    'best-delay-150ms': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, delay=150),
-    'best-told-10ms-less': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, assumed_delay=LOOP_DELAY_MS - 10)}
-"""{name: loop} of the loops that are compared: the paper's loop, its type-2 form, and loops with a filter of constant
-acceleration (FilterLoop). All loops have the same receiver and the same beam."""
-
-INS_LOOPS = {
-    'best/sway-ins': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True, stamp_error=INS_STAMP_ERROR_MS),
-    'best/sway-ins/exact-stamps': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True),
-    'best/sway-ins/rate-only': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True, tau=0.0)}
-"""{case: loop} of loops with a filter in the earth frame. The attitude from the INS rotates the measured angle to this
-frame. The stamps of the INS are 5 ms wrong, or exact, or exact while the acceleration from the INS is not used
-(rate-only). Because the target stands still in the earth frame, the filter expects little jerk."""
 
 METRIC_TARGETS = {
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): '19.7 +- 0.5',
@@ -152,42 +124,6 @@ STUDY_REMARKS = [
     'each millisecond. There the error is larger by up to rate x 0.5 ms, 0.015 deg at 30 deg/s, and the isolation '
     'from the sway is never above 68 dB.']
 """Sentences that explain the rows."""
-
-
-def instants(seconds: Seconds) -> Times:
-    """Return the middles of the milliseconds of a record."""
-    return (np.arange(round(seconds / GRID_STEP_S), dtype=float) - 0.5) * GRID_STEP_S
-
-
-def sine(t: Times, amplitude: Radians, w: RadiansPerSecond) -> tuple[Floats, Floats]:
-    """Return angle [rad] and rate [rad/s] of a sine at times t."""
-    return amplitude * np.sin(w * t), amplitude * w * np.cos(w * t)
-
-
-def ramp_target(rate: float) -> Floats:
-    """Return the angle [rad] of figure 6's ramp; rate [deg/s]."""
-    return math.radians(rate) * instants(RECORD_DURATION_S)
-
-
-def sine_target(rate: float = SINE_RATE_DEG_S) -> Floats:
-    """Return the angle [rad] of a sine of the frequency of figure 7; rate: its largest rate [deg/s]."""
-    w = SINE_ACCELERATION_DEG_S2 / SINE_RATE_DEG_S
-    return sine(instants(RECORD_DURATION_S), math.radians(rate) / w, w)[0]
-
-
-def sway_target() -> tuple[Floats, Floats]:
-    """Return angle [rad] and rate [rad/s] of a fixed target, seen from the swaying deck."""
-    return sine(instants(RECORD_DURATION_S), SWAY_AMPLITUDE_RAD, 2.0 * math.pi / SWAY_PERIOD_S)
-
-
-def settled(x: Floats) -> Floats:
-    """Return the evaluated part of a record."""
-    return x[round(EVALUATION_START_S / GRID_STEP_S):]
-
-
-def isolation(error: Radians) -> Decibels:
-    """Return the isolation: amplitude of the ship's sway over a remaining error."""
-    return -20.0 * math.log10(error / SWAY_AMPLITUDE_RAD)
 
 
 def name(loop: PaperLoop) -> str:
@@ -290,46 +226,8 @@ def moving_rows() -> list[Line]:
     return rows
 
 
-def noises(run: int) -> list[Floats]:
-    """Return the noise of receiver [rad], INS attitude [rad] and INS rate [rad/s] of one run."""
-    rng = np.random.default_rng(FIRST_SEED + run)
-    return [sigma * rng.standard_normal(round(RECORD_DURATION_S / GRID_STEP_S))
-            for sigma in (RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S)]
-
-
-def compared_targets() -> dict[str, Floats]:
-    """Return {name: angle [rad]} of the targets of COMPARED_LOOPS."""
-    return {'ramp': ramp_target(30.0), 'sine': sine_target(), 'sway': sway_target()[0]}
-
-
-def max_error_at_ends(error: Floats, target: Floats) -> Radians:
-    """Return the largest error at the ends of the milliseconds, from the error [rad] in their middles.
-
-    At the ends the target [rad] is half-way between its neighbours, and the beam is that of the middle.
-    """
-    half = 0.5 * np.diff(target)
-    return max(peak(settled(error[:-1] + half)), peak(settled(error[1:] - half)))
-
-
-COMPARED_CASES = (*(f'{loop}/{target}' for loop in COMPARED_LOOPS for target in ('ramp', 'sine', 'sway')), *INS_LOOPS)
-"""Cases of COMPARED_LOOPS on all targets, and INS_LOOPS."""
-
 ALPHA_LOOPS = {f'noise/alpha={alpha:g}': PaperLoop(alpha=alpha) for alpha in ALPHA_GAINS}
 """{case: loop} of the paper's loop with each gain, whose jitter is measured on a target at rest."""
-
-
-def beam(case: str, run: int | None = None) -> Floats:
-    """Return the beam [rad] of one of COMPARED_CASES; run: number of the run, None for a run without noise."""
-    sway, rate = sway_target()
-    noise, ins_angle, ins_rate = 3 * (np.zeros(len(sway)),) if run is None else noises(run)
-    if case in INS_LOOPS:
-        beam_angles, _ = INS_LOOPS[case].run(sway, noise, attitude=sway + ins_angle, rate=rate + ins_rate)
-        return beam_angles
-    loop_name, target = case.split('/')
-    loop = COMPARED_LOOPS[loop_name]
-    ship_rate = {'rate': rate} if isinstance(loop, PaperLoop) and target == 'sway' else {}
-    beam_angles, _ = loop.run(compared_targets()[target], noise=noise, **ship_rate)
-    return beam_angles
 
 
 def jitter(item: tuple[str, int]) -> list[Degrees]:
@@ -347,17 +245,6 @@ def jitter(item: tuple[str, int]) -> list[Degrees]:
                 for i in range(runs)]
     clean = beam(case)
     return [math.degrees(rms(settled(beam(case, i) - clean))) for i in range(runs)]
-
-
-def compared_errors() -> dict[str, Floats]:
-    """Return {case: true error without noise [rad]} of COMPARED_CASES."""
-    targets = compared_targets()
-    return {case: targets[target_of(case)] - beam(case) for case in COMPARED_CASES}
-
-
-def target_of(case: str) -> str:
-    """Return the name of the target of one of COMPARED_CASES."""
-    return case.split('/')[1].removesuffix('-ins')
 
 
 def compared_rows(done: Mapping[str, Floats], jitters: Mapping[str, list[Degrees]]) -> list[Line]:

@@ -17,15 +17,16 @@ miss_ratio_to_kalman_cv                   miss of kalman-cv divided by this miss
 autotrack_percent                         share of the runs that stay in autotrack; the cases drive-... have their
                                           other rows only if all runs stay
 """
+import math
 from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from pedestal_common.quantities import Floats, Pairs, RadiansPerSecond, Records, Row
+from pedestal_common.quantities import Degrees, Floats, Pairs, RadiansPerSecond, Records, Row
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, MOTOR_1_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop, imm_feedforward
 from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     METRIC_UNITS,
@@ -34,7 +35,7 @@ from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     Source,
 )
 from pedestal_studies.profiles import S_MOTION_RATE_RAD_S
-from pedestal_studies.result import Item, Result, legend
+from pedestal_studies.result import FIRST_SEED, Item, Result, legend, of_cases
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
@@ -94,18 +95,14 @@ def batch(item: Item) -> Floats:
     return np.hstack([feedforward_loop.measures(axis, steps, rate), estimate_errors(axis, steps, rate)])
 
 
-def drive_batch(item: Item) -> Floats:
-    """Return the rms miss [deg] of every run (count, 1) of an item.
-
-    An item is (name of DRIVE_CASES, first run, number of runs).
-    """
-    name, first, count = item
-    seeds = range(feedforward_loop.NOISE_SEED + first, feedforward_loop.NOISE_SEED + first + count)
-    return np.array([imm_feedforward.drive_misses((DRIVE_CASES[name], seed))[:1] for seed in seeds])
+def drive_miss(name: str, run: int) -> Degrees:
+    """Return the rms miss of one run of one of DRIVE_CASES."""
+    _, error = imm_feedforward.drive_error(DRIVE_CASES[name], FIRST_SEED + run)
+    return math.degrees(tracking.rms(error))
 
 
 def rows(values: Mapping[str, Floats], of_drive: Mapping[str, Floats]) -> list[Row]:
-    """Return the rows of {case: metrics of every run (runs, 6)} and of {drive case: misses (runs, 1)}."""
+    """Return the rows of {case: metrics of every run (runs, 6)} and of {drive case: misses (runs,)}."""
     table = []
     for case, of_case in values.items():
         name = case.rpartition('/')[2]
@@ -118,9 +115,8 @@ def rows(values: Mapping[str, Floats], of_drive: Mapping[str, Floats]) -> list[R
         else:
             table += [row(case, f'{metric.partition("_rms")[0]}_ratio_to_imm', measured[metric] / imm[metric])
                       for metric in COMPARED_METRICS]
-    for case, of_case in of_drive.items():
-        misses, kept = of_case[:, 0], np.isfinite(of_case[:, 0])
-        conventional = of_drive[case.replace('drive-imm', 'drive-kalman-cv')][:, 0]
+    for case, misses in of_drive.items():
+        kept, conventional = np.isfinite(misses), of_drive[case.replace('drive-imm', 'drive-kalman-cv')]
         table.append(row(case, 'autotrack_percent', 100.0 * kept, '%'))
         if kept.all():
             table.append(row(case, 'miss_rms_deg', misses, 'deg'))
@@ -133,8 +129,8 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) 
     """Run CASES and DRIVE_CASES `runs` times."""
     pool = pool or monte_carlo.Pool(1)
     values = pool.of_cases(batch, CASES, runs, BATCH_RUNS, lambda share, text: progress(0.2 * share, text))
-    of_drive = pool.of_cases(drive_batch, DRIVE_CASES, runs, 1, lambda share, text: progress(
-        0.2 + 0.8 * share, f'the whole chain, {text}'))
+    of_drive = of_cases(drive_miss, DRIVE_CASES, runs, pool, lambda share, text: progress(
+        0.2 + 0.8 * share, f'the whole chain, {text}'), size=1)
     table = rows(values, of_drive)
     return Result(table, {'rates': lambda: rate_figure('30m_s')}, remarks(table),
                   [r for r in table if r['metric'] not in ('miss_worst_second_deg', 'miss_peak_deg')])
@@ -159,8 +155,8 @@ def rate_figure(speed: str) -> Figure:
     counts = t >= 0.5 * period
     since = t[counts] - 0.5 * period
     reversal = since[np.argmax(np.abs(target[counts, 2]))]
-    colours = dict(zip(sources(axis), (TRUTH_COLOUR, FILTERED_COLOUR, RAW_COLOUR, MOTOR_1_COLOUR)))
-    figure, axes = new_panels(len(colours), height=7.0, y='rate [deg/s]', sharex=True)
+    colours = dict(zip(sources(axis), (fig.TRUTH_COLOUR, fig.FILTERED_COLOUR, fig.RAW_COLOUR, fig.MOTOR_1_COLOUR)))
+    figure, axes = fig.new_panels(len(colours), height=7.0, y='rate [deg/s]', sharex=True)
     for panel, (name, colour) in zip(axes[:, 0], colours.items()):
         steps = feedforward_loop.steps_of(axis, sources(axis)[name], 0, 1, rate)
         panel.plot(since, np.degrees(steps['rate'][0, counts]), color=colour, label=name, linewidth=0.9)

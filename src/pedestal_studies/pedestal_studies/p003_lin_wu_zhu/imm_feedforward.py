@@ -40,7 +40,6 @@ from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
 from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     METRIC_UNITS,
     MISS_SIGMA_RAD,
-    NOISE_SEED,
     REVERSAL_S_BY_AXIS,
     MissStatistics,
     Source,
@@ -50,7 +49,7 @@ from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     imm,
     statistics,
 )
-from pedestal_studies.result import Drawings, Result, legend
+from pedestal_studies.result import FIRST_SEED, Drawings, Result, legend, of_cases
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
@@ -137,9 +136,9 @@ def drive_error(case: Case, seed: int) -> tuple[Times, Floats]:
     return record.t, error if np.all(record['acu/mode'] == Mode.AUTOTRACK) else np.full_like(error, math.nan)
 
 
-def drive_misses(item: tuple[Case, int]) -> tuple[Degrees, Degrees]:
-    """Return (rms, largest) miss of an item (case as `drive_case` returns, seed)."""
-    _, error = drive_error(*item)
+def drive_misses(name: str, run: int) -> tuple[Degrees, Degrees]:
+    """Return (rms, largest) miss of one run of one of DRIVE_CASES."""
+    _, error = drive_error(DRIVE_CASES[name], FIRST_SEED + run)
     return math.degrees(tracking.rms(error)), math.degrees(metrics.peak(error))
 
 
@@ -334,7 +333,7 @@ def drive_figure() -> Figure:
     for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[:, 0]):
         for name, colour in (('kalman-cv', fig.TRUTH_COLOUR), ('imm', fig.MOTOR_1_COLOUR),
                              ('imm-default', fig.FILTERED_COLOUR)):
-            t, miss = drive_error(DRIVE_CASES[f'{axis}/drive-{name}'], NOISE_SEED)
+            t, miss = drive_error(DRIVE_CASES[f'{axis}/drive-{name}'], FIRST_SEED)
             panel.plot(t, np.degrees(miss), color=colour, label=name)
         panel.set_xlim(DRIVE_EVALUATION_START_S, DRIVE_EVALUATION_START_S + 8.0)
         panel.set_title(f'{axis}: control unit, motors and gears, reversals of {REVERSAL_S_BY_AXIS[axis]:g} s')
@@ -345,8 +344,6 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) 
     """Run CASES and DRIVE_CASES `runs` times."""
     pool = pool or monte_carlo.Pool(1)
     misses = statistics(CASES, runs, pool, lambda share, text: progress(0.5 * share, text))
-    items = [(case, NOISE_SEED + i) for case in DRIVE_CASES.values() for i in range(runs)]
-    done = np.array(list(pool.map(drive_misses, items, lambda share, text: progress(
-        0.5 + 0.5 * share, f'the whole chain, {text}'))))
-    of_drive = dict(zip(DRIVE_CASES, done.reshape(len(DRIVE_CASES), runs, 2)))
+    of_drive = of_cases(drive_misses, DRIVE_CASES, runs, pool, lambda share, text: progress(
+        0.5 + 0.5 * share, f'the whole chain, {text}'), size=1)
     return Result(rows(misses) + drive_rows(of_drive), figures(misses), remarks(misses))

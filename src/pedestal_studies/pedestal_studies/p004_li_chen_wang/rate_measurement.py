@@ -47,8 +47,7 @@ from pedestal_results.intervals import row
 from pedestal_results.report import figures as fig
 from pedestal_studies import ensemble, profiles
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
-from pedestal_studies.result import Drawings, Item, Metrics, Result, legend
-from pedestal_workbench.trials import monte_carlo
+from pedestal_studies.result import Drawings, Metrics, Result, legend, of_cases
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 DEFAULT_RUNS = 40  # number of flybys
@@ -90,7 +89,7 @@ class FlybyRecord(typing.NamedTuple):
     estimate: Records   # axis_filter.Estimate (n,)
 
 
-BATCH_RUNS, NOISE_SEED = 25, 1  # flybys of one batch; seed of their noise
+NOISE_SEED = 1  # seed of the noise of the flybys
 
 
 def filter_of(a_max: RadiansPerSecond2, floor: float) -> FilterParameters:
@@ -225,17 +224,12 @@ def flyby_record(name: str, run: int) -> FlybyRecord:
     return FlybyRecord(y, y_rate, filtered(t, target, y, y_rate, R_rate))
 
 
-def batch(item: Item) -> Pairs:
-    """Return the rms errors of the angle [deg] and of the rate [deg/s] of every run of an item.
-
-    An item is (name, first run, number of runs).
-    """
-    name, first, count = item
+def flyby_errors(name: str, run: int) -> Floats:
+    """Return the rms errors of the angle [deg] and of the rate [deg/s] of one flyby."""
     t, target = flyby()
     counts = t >= SETTLING_TIME_S
-    estimates = [flyby_record(name, run).estimate for run in range(first, first + count)]
-    return np.degrees([[tracking.rms((out[field] - target[:, i])[counts]) for i, field in enumerate(('angle', 'rate'))]
-                       for out in estimates])
+    out = flyby_record(name, run).estimate
+    return np.degrees([tracking.rms((out[field] - target[:, i])[counts]) for i, field in enumerate(('angle', 'rate'))])
 
 
 FLYBY_CASES = (*RATE_SIGMAS_DEG_S, *DIFFERENCED_RATES)
@@ -353,6 +347,6 @@ def flyby_figure() -> Figure:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Identify the filters of CASES and run `runs` flybys."""
-    errors = (pool or monte_carlo.Pool(1)).of_cases(batch, FLYBY_CASES, runs, BATCH_RUNS, progress)
+    errors = of_cases(flyby_errors, FLYBY_CASES, runs, pool, progress, size=25)
     measured = {name: measures(*case) for name, case in CASES.items()}
     return Result(rows(measured, errors), figures(), remarks(measured, errors))

@@ -32,16 +32,14 @@ from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Floats, Matrix3, Row, Seconds, Times, Vector3, Vectors3
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies import ensemble
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S
 from pedestal_studies.p004_li_chen_wang.rate_measurement import ALPHA, ANGLE_SIGMA_RAD, differenced_rate, filtered
-from pedestal_studies.result import Drawings, Item, Result, legend
-from pedestal_workbench.trials import monte_carlo
+from pedestal_studies.result import Drawings, Result, legend, of_cases
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 DEFAULT_RUNS, NOISE_SEED = 40, 1  # number of flights; seed of their noise
-BATCH_RUNS = 5  # flights that one worker makes at a time
 
 TARGET_SPEED_M_S, MIN_GROUND_DISTANCE_M, TARGET_HEIGHT_M, CULMINATION_TIME_S = 300.0, 3000.0, 2500.0, 42.0
 """Speed [m/s], least distance over ground [m] and height [m] of the target; time of its least distance [s]."""
@@ -93,16 +91,12 @@ def flight_record(axis: str, run: int) -> tuple[Vectors3, Vectors3]:
     return np.column_stack((y, y_rate, difference)), np.column_stack([out[name] for name in QUANTITY_UNITS])
 
 
-def batch(item: Item) -> Floats:
-    """Return the rms errors (count, 2, 3) [deg, deg/s, deg/s2], measured and filtered, of an item.
-
-    An item is (axis, first run, number of runs).
-    """
-    axis, first, count = item
+def flight_errors(axis: str, run: int) -> Floats:
+    """Return the rms errors (2, 3) [deg, deg/s, deg/s2] of one flight, measured and filtered."""
     t, target = flight()
     counts = t >= FLIGHT_START_S + SETTLING_TIME_S
-    return np.degrees([[[tracking.rms(error) for error in (values - target[axis])[counts].T]
-                        for values in flight_record(axis, run)] for run in range(first, first + count)])
+    return np.degrees([[tracking.rms(error) for error in (values - target[axis])[counts].T]
+                       for values in flight_record(axis, run)])
 
 
 def model(T: Seconds) -> tuple[Matrix3, Vector3]:
@@ -138,7 +132,7 @@ def matrices() -> dict[str, tuple[Floats, Floats]]:
 
 
 def rows(errors: Mapping[str, Floats]) -> list[Row]:
-    """Return the rows of the study; errors: {axis: rms errors (runs, 2, 3) as `batch` returns}."""
+    """Return the rows of the study; errors: {axis: rms errors (runs, 2, 3) of `flight_errors`}."""
     table = []
     for axis, of_runs in errors.items():
         for name, column in zip(('measured', 'filtered'), of_runs.transpose(1, 2, 0)):
@@ -174,18 +168,18 @@ def axis_figure(axis: str, first_number: int) -> Figure:
 
     first_number: number of the first of the paper's four figures.
     """
-    figure, axes = new_panels(4, height=9.0)
+    figure, axes = fig.new_panels(4, height=9.0)
     t, target = flight()
     measured, filtered = flight_record(axis, run=0)
     # The second panel is a window of the first, so both show column 0, the angle.
     for i, (panel, column) in enumerate(zip(axes[:, 0], (0, 0, 1, 2))):
         begin, end = ZOOM_WINDOWS_S[axis] if i == 1 else (FLIGHT_START_S, FLIGHT_END_S)
         shown = (t >= begin) & (t <= end)
-        for values, colour, label, width in ((measured, RAW_COLOUR, 'measured', 0.5),
-                                             (filtered, FILTERED_COLOUR, 'filtered', 1.2)):
+        for values, colour, label, width in ((measured, fig.RAW_COLOUR, 'measured', 0.5),
+                                             (filtered, fig.FILTERED_COLOUR, 'filtered', 1.2)):
             panel.plot(t[shown], np.degrees(values[shown, column]), color=colour, label=label, linewidth=width)
-        panel.plot(t[shown], np.degrees(target[axis][shown, column]), color=INK_COLOUR, linestyle='--', linewidth=0.8,
-                   label='truth')
+        panel.plot(t[shown], np.degrees(target[axis][shown, column]), color=fig.INK_COLOUR, linestyle='--',
+                   linewidth=0.8, label='truth')
         name, unit = list(QUANTITY_UNITS.items())[column]
         panel.set_ylabel(f'{name} [{unit}]')
         panel.set_title(f'{axis}: {name} (figure {first_number + i} of the paper)')
@@ -195,5 +189,5 @@ def axis_figure(axis: str, first_number: int) -> Figure:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Fly `runs` flights."""
-    errors = (pool or monte_carlo.Pool(1)).of_cases(batch, AXES, runs, BATCH_RUNS, progress)
+    errors = of_cases(flight_errors, AXES, runs, pool, progress)
     return Result(rows(errors), figures(), remarks())

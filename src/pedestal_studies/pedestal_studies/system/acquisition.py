@@ -22,14 +22,12 @@ from acu_tracker.search.pattern import PATTERN_SPIRAL, PATTERN_SQUARE, SEARCH_PA
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_common.quantities import Floats, Pairs, Radians, Row, Seconds
 from pedestal_results.intervals import CONFIDENCE_LEVEL, row
-from pedestal_results.report.figures import FILTERED_COLOUR, new_panels
-from pedestal_studies.result import Item, Result
-from pedestal_workbench.trials import monte_carlo
+from pedestal_results.report import figures as fig
+from pedestal_studies.result import FIRST_SEED, Result, of_cases, seeds
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
-DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
-BATCH_RUNS = 5  # runs that one worker makes at a time
+DEFAULT_RUNS = 100  # runs of each case
 
 ERROR_TOPIC, MODE_TOPIC = 'tracking_receiver/angle_error', 'acu/mode'
 
@@ -112,25 +110,19 @@ def off_axis(run: Run) -> Floats:
     return np.hypot(*run.truth['error'].T) / run.units['tracking_receiver'].parameters.antenna.beamwidth
 
 
-def batch(item: Item) -> Pairs:
-    """Return the values of every run of an item (case, first run, number of runs).
+def measured(name: str, number: int) -> tuple[float, float]:
+    """Return tracked_after_s of one run, and 1 if the target is in the beam at the end, else 0.
 
-    The values of a run are tracked_after_s, and 1 if the target is in the beam at the end, else 0. For steptrack_geo
-    the values are the rms of the lost level [dB] and the largest error [beamwidths].
+    For steptrack_geo, return the rms of the lost level [dB] and the largest error [beamwidths].
     """
-    name, first, count = item
-    values = []
-    for seed in range(FIRST_SEED + first, FIRST_SEED + first + count):
-        run = case_of(name, seed).run()
-        off = off_axis(run)
-        if name == 'steptrack_geo':
-            settled = off[run.t > STEPTRACK_SETTLING_TIME_S]
-            level_loss_db = MAIN_LOBE_LOSS_DB * settled**2
-            values.append((math.sqrt(np.mean(level_loss_db**2)), settled.max()))
-        else:
-            after = tracked_after(run, name in SIGNAL_LOSS_CASES)
-            values.append((after, float(math.isfinite(after) and off[-1] < MAX_FOUND_ERROR_BEAMWIDTHS)))
-    return np.array(values)
+    run = case_of(name, FIRST_SEED + number).run()
+    off = off_axis(run)
+    if name == 'steptrack_geo':
+        settled = off[run.t > STEPTRACK_SETTLING_TIME_S]
+        level_loss_db = MAIN_LOBE_LOSS_DB * settled**2
+        return math.sqrt(np.mean(level_loss_db**2)), settled.max()
+    after = tracked_after(run, name in SIGNAL_LOSS_CASES)
+    return after, float(math.isfinite(after) and off[-1] < MAX_FOUND_ERROR_BEAMWIDTHS)
 
 
 def least_share(found: int, runs: int) -> float:
@@ -140,7 +132,7 @@ def least_share(found: int, runs: int) -> float:
 
 
 def rows(values: Mapping[str, Pairs]) -> list[Row]:
-    """Return the rows of the study; values: {case: as `batch` returns}."""
+    """Return the rows of the study; values: {case: as `measured` returns, of every run}."""
     table = []
     for name, of_runs in values.items():
         if name == 'steptrack_geo':
@@ -159,20 +151,19 @@ def rows(values: Mapping[str, Pairs]) -> list[Row]:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run every case `runs` times."""
-    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASE_NAMES, runs, BATCH_RUNS, progress)
+    values = of_cases(measured, CASE_NAMES, runs, pool, progress)
     return Result(rows(values), {'time': lambda: time_figure(values)},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. tracked_after_s is over the runs that found their '
-                   'target.'])
+                  [f'{seeds(runs)} tracked_after_s is over the runs that found their target.'])
 
 
 def time_figure(values: Mapping[str, Pairs]) -> Figure:
     """Draw tracked_after_s of every run that found its target; values as of `rows`."""
-    figure, axes = new_panels(1, height=3.8, x='time until the target is tracked [s]')
+    figure, axes = fig.new_panels(1, height=3.8, x='time until the target is tracked [s]')
     for name, of_runs in values.items():
         if name != 'steptrack_geo':
             tracked_after_s, in_beam = of_runs.T
             found = tracked_after_s[in_beam == 1.0]
-            axes[0, 0].plot(found, [name] * len(found), '|', color=FILTERED_COLOUR)
+            axes[0, 0].plot(found, [name] * len(found), '|', color=fig.FILTERED_COLOUR)
     axes[0, 0].invert_yaxis()
     axes[0, 0].set_xlim(left=0.0)
     return figure

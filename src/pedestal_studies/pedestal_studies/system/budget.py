@@ -28,16 +28,13 @@ from pedestal_common.parameters import defaults
 from pedestal_common.quantities import Degrees, Floats, Pairs, Row, Seconds, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import pseudo_values, row
-from pedestal_results.report.figures import new_panels
-from pedestal_studies.result import Result
-from pedestal_workbench.trials import monte_carlo
+from pedestal_results.report import figures as fig
+from pedestal_studies.result import FIRST_SEED, Result, of_cases, seeds
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 SCENARIO_NAME = 'station_real'  # scenario of all runs, in which all terms are on
-DEFAULT_RUNS, FIRST_SEED = 30, 1  # runs of the random terms; seed of the first run
-
-BATCH_RUNS, RANDOM_SHARE = 3, 0.8
-"""Runs that one worker makes at a time; part of the progress bar for the runs of the random terms [-]."""
+DEFAULT_RUNS = 30  # runs of the random terms
+RANDOM_SHARE = 0.8  # part of the progress bar for the runs of the random terms [-]
 
 EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1  # start and period of the evaluation of the error [s]
 TABLE_TIMES_S = (30, 90, 150, 210, 270)  # times of the pass at which contributions are shown with their signs [s]
@@ -156,11 +153,9 @@ def pass_angles(duration: Seconds | None) -> Pass:
     return Pass(run.t, azimuth, elevation)
 
 
-def batch(item: tuple[tuple[str, str], int, int], duration: Seconds | None = None) -> Floats:
-    """Return errors (count, n, 2) [deg], cross-elevation and elevation, of an item ((mode, on), first run, count)."""
-    (mode, on), first, count = item
-    return np.array([np.degrees(_run(mode, on, FIRST_SEED + first + i, duration).truth['error'])
-                     for i in range(count)])
+def errors(case: tuple[str, str], run: int, duration: Seconds | None = None) -> Pairs:
+    """Return the errors [deg], cross-elevation and elevation, of one run of a case (mode, on)."""
+    return np.degrees(_run(*case, FIRST_SEED + run, duration).truth['error'])
 
 
 def rms(errors: Floats) -> Floats:
@@ -215,20 +210,20 @@ class Budget:
         return self.combined / float(np.sqrt(np.mean(rms(self.whole) ** 2)))
 
 
-def budget(mode: str, runs: int, duration: Seconds | None, pool: Pool, progress: Progress) -> Budget:
+def budget(mode: str, runs: int, duration: Seconds | None, pool: Pool | None, progress: Progress) -> Budget:
     """Return the budget of a mode, with `runs` runs of the random terms."""
-    of_batch = functools.partial(batch, duration=duration)
+    measured = functools.partial(errors, duration=duration)
     seeded, once = ([term.name for term in active_terms(mode) if term.random == kind] for kind in (True, False))
     # Only in autotrack the noise of the receiver reaches the antenna, so only there the run without terms is random.
     random, systematic = [*seeded, ALL_TERMS], list(once)
     (random if mode == 'autotrack' else systematic).append(NO_TERMS)
-    errors = pool.of_cases(of_batch, [(mode, on) for on in random], runs, BATCH_RUNS,
-                           lambda share, text: progress(RANDOM_SHARE * share, text))
-    errors |= pool.of_cases(of_batch, [(mode, on) for on in systematic], 1, 1,
-                            lambda share, text: progress(RANDOM_SHARE + (1.0 - RANDOM_SHARE) * share, text))
-    base = errors[mode, NO_TERMS]
-    return Budget(base, {name: (errors[mode, name] - base[:1])[0] for name in once},
-                  {name: errors[mode, name] - base for name in seeded}, errors[mode, ALL_TERMS])
+    found = of_cases(measured, [(mode, on) for on in random], runs, pool,
+                    lambda share, text: progress(RANDOM_SHARE * share, text), size=3)
+    found |= of_cases(measured, [(mode, on) for on in systematic], 1, pool,
+                     lambda share, text: progress(RANDOM_SHARE + (1.0 - RANDOM_SHARE) * share, text), size=1)
+    base = found[mode, NO_TERMS]
+    return Budget(base, {name: (found[mode, name] - base[:1])[0] for name in once},
+                  {name: found[mode, name] - base for name in seeded}, found[mode, ALL_TERMS])
 
 
 def _sizes(case: str, e: Floats) -> list[Row]:
@@ -262,31 +257,24 @@ def rows(mode: str, made: Budget, place: Pass) -> list[Row]:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
         duration: Seconds | None = None) -> Result:
-    """Measure the budget of every mode.
-
-    duration: length of the pass, None for the length of the
-    scenario.
-    """
+    """Measure the budget of every mode; duration: length of the pass, None for that of the scenario."""
     if runs < 3:
         raise ValueError(f'--runs {runs}: must be at least 3, because random and systematic errors are separated by '
                          'their spread over the runs')
     def progress_of(i: int) -> Progress:
         return lambda share, text: progress((i + share) / len(MODE_OVERRIDES), text)
 
-    pool, place = pool or monte_carlo.Pool(1), pass_angles(duration)
-    made: dict[str, Budget] = {}
-    for i, mode in enumerate(MODE_OVERRIDES):
-        made[mode] = budget(mode, runs, duration, pool, progress_of(i))
+    place = pass_angles(duration)
+    made = {mode: budget(mode, runs, duration, pool, progress_of(i)) for i, mode in enumerate(MODE_OVERRIDES)}
     table = [line for mode, of_mode in made.items() for line in rows(mode, of_mode, place)]
     return Result(table, {'budget': functools.partial(figure, made, place)},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. `pedestal run {SCENARIO_NAME}` is a run of case '
-                   'autotrack/whole.'],
+                  [f'{seeds(runs)} `pedestal run {SCENARIO_NAME}` is a run of case autotrack/whole.'],
                   [line for line in table if not line['case'].endswith('s')])
 
 
 def figure(made: Mapping[str, Budget], place: Pass) -> Figure:
     """Draw the rms of all contributions in every mode, and the systematic sum beside the runs with all terms on."""
-    drawn, axes = new_panels(len(made), 2, height=7.0, x='')
+    drawn, axes = fig.new_panels(len(made), 2, height=7.0, x='')
     for (left, right), (mode, of_mode) in zip(axes, made.items()):
         sizes = {name: np.mean(rms(e)) for name, e in (*of_mode.systematic.items(), *of_mode.random.items())}
         left.barh(list(sizes), list(sizes.values()))

@@ -33,19 +33,18 @@ from pedestal_bringup.scenario.program import Plan
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.quantities import Degrees, Floats, Radians, Seconds
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import new_panels
+from pedestal_results.report import figures as fig
 from pedestal_results.tracking import rms
-from pedestal_studies.result import Result
+from pedestal_studies.result import FIRST_SEED, Result, of_cases
 from pedestal_workbench.calibration import collect, pointing, scan
 from pedestal_workbench.calibration.collect import Point
 from pedestal_workbench.calibration.offsets import Offsets
 from pedestal_workbench.calibration.pointing import Calibration
 from pedestal_workbench.calibration.terms import DEFAULT_TERMS
-from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 SCENARIO_NAME, SCAN_SCENARIO_NAME = 'station_new', 'station_sun'  # scenario of the passes, and of the scans of the sun
-DEFAULT_RUNS, FIRST_SEED = 30, 1  # number of runs; seed of the first run
+DEFAULT_RUNS = 30
 TERMS = (*DEFAULT_TERMS, 'P11', 'P13', 'P14')
 """Terms of the model: the default terms and the eccentricity of both encoders."""
 POINTS_PER_PASS = 9  # number of offsets from a pass
@@ -151,17 +150,9 @@ MEASURED_NAMES = ('raw_rms_deg', 'calibrated_rms_deg', 'residual_rms_deg', 'leav
 """Names of the numbers of a run, before the values and the sigmas of the terms."""
 
 
-def batch(item: tuple[None, int, int], duration: Seconds | None = None) -> Floats:
-    """Return numbers (count, k) of an item (None, first run, count).
-
-    The numbers are MEASURED_NAMES, then the values of TERMS and their sigmas.
-    """
-    _, first, count = item
-    return np.array([_numbers(FIRST_SEED + first + i, duration) for i in range(count)])
-
-
-def _numbers(seed: int, duration: Seconds | None) -> list[float]:
-    """Return the numbers of a run."""
+def numbers_of_run(case: None, run: int, duration: Seconds | None) -> list[float]:
+    """Return the numbers of a run: MEASURED_NAMES, then the values of TERMS and their sigmas."""
+    seed = FIRST_SEED + run
     offsets = measured(seed, duration)
     found, default = (pointing.calibrate(offsets, names, 'exact') for names in (TERMS, DEFAULT_TERMS))
     return [program_error(seed, (), duration), program_error(seed, overrides(found), duration),
@@ -178,12 +169,8 @@ def _of_terms(found: Calibration) -> tuple[float, ...]:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
         duration: Seconds | None = None) -> Result:
-    """Measure the calibration over seeds.
-
-    duration: length of a pass, None for that of the scenario.
-    """
-    pool = pool or monte_carlo.Pool(1)
-    numbers = pool.of_cases(functools.partial(batch, duration=duration), [None], runs, 1, progress)[None]
+    """Measure the calibration over seeds; duration: length of a pass, None for that of the scenario."""
+    numbers = of_cases(functools.partial(numbers_of_run, duration=duration), [None], runs, pool, progress, 1)[None]
     targets = {'calibrated_rms_deg': '<= 0.01'}
     rows = [row('program track', name, numbers[:, i], '' if name == 'points' else 'deg', target=targets.get(name))
             for i, name in enumerate(MEASURED_NAMES)]
@@ -204,7 +191,7 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
 
 def figure(numbers: Floats, errors: Floats, sigmas: Floats) -> Figure:
     """Draw the program-track error of each run before and after, and the errors of the terms in sigmas."""
-    drawn, ((left, right),) = new_panels(1, 2, height=3.0, x=('run', 'term'))
+    drawn, ((left, right),) = fig.new_panels(1, 2, height=3.0, x=('run', 'term'))
     for i, name in enumerate(('without a model', 'calibrated')):
         left.semilogy(np.arange(len(numbers)), numbers[:, i], '.', label=name)
     left.axhline(0.01, linewidth=0.8, linestyle='--')

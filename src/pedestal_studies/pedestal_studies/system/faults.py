@@ -50,7 +50,7 @@ from pedestal_common.graph.modes import MODE_ROWS, MODES
 from pedestal_common.injection import table
 from pedestal_common.quantities import Degrees, Floats, Radians, RadiansPerSecond, Row, Times, Vectors3
 from pedestal_results.intervals import missed, row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies.result import Result
 from pedestal_workbench.trials.monte_carlo import Progress
 from tracking_receiver_sim.params import LeoPassParameters
@@ -470,12 +470,12 @@ def figure(of_cases: Mapping[str, Floats]) -> Figure:
 
     of_cases: {case: error [deg]}.
     """
-    made, axes = new_panels(len(DRAWN_FAULTS), height=9.0, x='time from the onset [s]', y='[deg]', sharex=True)
+    made, axes = fig.new_panels(len(DRAWN_FAULTS), height=9.0, x='time from the onset [s]', y='[deg]', sharex=True)
     for panel, fault in zip(axes[:, 0], DRAWN_FAULTS):
         error = of_cases[f'{fault}/autotrack']
-        panel.plot(np.linspace(0.0, RUN_DURATION_S, len(error)) - FAULT_ONSET_S, error, color=FILTERED_COLOUR)
-        panel.axhline(0.5, color=RAW_COLOUR, linewidth=0.8)
-        panel.axvspan(0.0, FAULT_DURATION_S, color=INK_COLOUR, alpha=0.08)
+        panel.plot(np.linspace(0.0, RUN_DURATION_S, len(error)) - FAULT_ONSET_S, error, color=fig.FILTERED_COLOUR)
+        panel.axhline(0.5, color=fig.RAW_COLOUR, linewidth=0.8)
+        panel.axvspan(0.0, FAULT_DURATION_S, color=fig.INK_COLOUR, alpha=0.08)
         panel.set_title(fault)
     axes[-1, 0].set_xlim(-0.5, RUN_DURATION_S - FAULT_ONSET_S)
     return made

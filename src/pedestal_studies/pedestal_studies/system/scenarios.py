@@ -17,14 +17,12 @@ from pedestal_common.quantities import Floats, Row
 from pedestal_results import results, tracking
 from pedestal_results.intervals import row
 from pedestal_results.recorded_run import RecordedRun
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
-from pedestal_studies.result import Item, Result, legend
-from pedestal_workbench.trials import monte_carlo
+from pedestal_results.report import figures as fig
+from pedestal_studies.result import FIRST_SEED, Result, legend, of_cases, seeds
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
-DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case; seed of the first run
-BATCH_RUNS = 5  # runs that one worker makes at a time
+DEFAULT_RUNS = 40  # runs of each case
 
 NEAR_FLYBY_PARAMETERS = {'tracking_receiver.target.flyby.closest_distance': 60.0,
                          'tracking_receiver.target.flyby.height': 20.0}
@@ -115,11 +113,10 @@ def measured(case: Case) -> dict[str, float]:
     return {**values, **extra_results(values, run)}
 
 
-def batch(item: Item) -> Floats:
-    """Return the values (count, len(CASE_METRICS[case])) of an item (case, first run, number of runs)."""
-    name, first, count = item
-    runs = [measured(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)]
-    return np.array([[values[metric] for metric in CASE_METRICS[name]] for values in runs])
+def case_results(name: str, run: int) -> list[float]:
+    """Return the CASE_METRICS of one run of one of CASES."""
+    values = measured(CASES[name].with_seed(FIRST_SEED + run))
+    return [values[metric] for metric in CASE_METRICS[name]]
 
 
 def rows(values: Mapping[str, Floats]) -> list[Row]:
@@ -139,15 +136,15 @@ def rows(values: Mapping[str, Floats]) -> list[Row]:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run every case `runs` times."""
-    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
+    values = of_cases(case_results, CASES, runs, pool, progress)
     return Result(rows(values), {'pointing': lambda: pointing_figure(values), 'uav-flyby': flyby_figure},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. The variants as commands for the nodes:',
+                  [f'{seeds(runs)} The variants as commands for the nodes:',
                    *(f'{name}: {CASES[name].command()}' for name in ('ship_pass-late', 'uav_flyby-60m'))])
 
 
 def flyby_figure() -> Figure:
     """Draw paper 000's figures 7 to 11 for uav_flyby: error and angle before and after the filter, and the azimuth."""
-    figure, axes = new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
+    figure, axes = fig.new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
     case = CASES['uav_flyby'].with_seed(FIRST_SEED)
     flown = tracking.read(MemoryRecording(case.loaded(), case.run()))
     middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5
@@ -158,25 +155,25 @@ def flyby_figure() -> Figure:
     elevations = [error - flown.error[:, 1] + target_elevation for error in elevation_errors]
     for panel, curves, title in ((axes[0, 0], cross_elevations, 'error in cross-elevation (figures 7, 8)'),
                                  (axes[1, 0], elevations, 'elevation of the target (figures 9, 10)')):
-        for values, colour, label in zip(curves, (RAW_COLOUR, FILTERED_COLOUR, INK_COLOUR),
+        for values, colour, label in zip(curves, (fig.RAW_COLOUR, fig.FILTERED_COLOUR, fig.INK_COLOUR),
                                          ('receiver', 'filtered', 'truth')):
             panel.plot(flown.t[middle], np.degrees(values[middle]), color=colour, label=label,
                        linewidth=0.6 if label == 'receiver' else 1.2)
         panel.set_title(title)
-    axes[2, 0].plot(flown.t, np.degrees(flown.encoders[:, 0]), color=FILTERED_COLOUR)
+    axes[2, 0].plot(flown.t, np.degrees(flown.encoders[:, 0]), color=fig.FILTERED_COLOUR)
     axes[2, 0].set_title('azimuth of the antenna over the flight (figure 11)')
     return legend(figure)
 
 
 def pointing_figure(values: Mapping[str, Floats]) -> Figure:
     """Draw the pointing error of every seed, rms to the left and largest to the right; values as of `rows`."""
-    figure, axes = new_panels(1, 2, height=3.8, x=('pointing error, rms [deg]', 'pointing error, largest [deg]'),
-                              sharey=True)
+    figure, axes = fig.new_panels(1, 2, height=3.8, x=('pointing error, rms [deg]', 'pointing error, largest [deg]'),
+                                  sharey=True)
     for panel, metric in zip(axes[0], ('pointing_rms_deg', 'pointing_max_deg')):
         shown = [name for name in values if metric in CASE_METRICS[name]]
         for name in shown:
             column = values[name][:, CASE_METRICS[name].index(metric)]
-            panel.plot(column, [name] * len(column), '|', color=FILTERED_COLOUR)
+            panel.plot(column, [name] * len(column), '|', color=fig.FILTERED_COLOUR)
         panel.set_xlim(left=0.0)
     axes[0, 0].invert_yaxis()
     return figure

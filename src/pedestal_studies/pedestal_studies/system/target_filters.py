@@ -25,11 +25,10 @@ from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.quantities import Degrees, Floats, Json, Meters, MetersPerSecond, Radians, Row, Seconds, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies import profiles
-from pedestal_studies.result import Item, Result
+from pedestal_studies.result import FIRST_SEED, Result, of_cases, seeds
 from pedestal_studies.system.filters import MANOEUVRE_PARAMETERS
-from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
@@ -112,8 +111,7 @@ def write(path: pathlib.Path, name: str, duration: Seconds) -> None:
                header='time [s],azimuth [deg],elevation [deg]', comments='')
 
 
-DEFAULT_RUNS, FIRST_SEED = 30, 1  # runs of each case; seed of the first run
-BATCH_RUNS = 5  # runs that one worker makes at a time
+DEFAULT_RUNS = 30  # runs of each case
 SHIP_SUFFIX = '-ship'  # part of the name of a target seen from a ship
 
 FLYBY_PREFIX, ANGLE_PREFIX = 'tracking_receiver.target.flyby', 'tracking_receiver.target.angle'
@@ -205,19 +203,13 @@ def loaded(case: Case) -> Scenario:
         **case.parameters, 'tracking_receiver.target.track_file.path': path}).loaded()
 
 
-def pointing(case: Case) -> Degrees:
-    """Return the rms of the true pointing error of one run of a case, both axes; NaN if it left autotrack."""
-    tracked = tracking.read(memory_recording.record(loaded(case)))
+def pointing(name: str, run: int) -> Degrees:
+    """Return the rms of the true pointing error of one run of one of CASES, both axes; NaN if it left autotrack."""
+    tracked = tracking.read(memory_recording.record(loaded(CASES[name].with_seed(FIRST_SEED + run))))
     begun = np.flatnonzero(tracked.mode == 'autotrack')
     if not begun.size or np.any(tracked.mode[begun[0]:] != 'autotrack'):
         return math.nan
     return tracked.pointing(tracking.known_rms)
-
-
-def batch(item: Item) -> Floats:
-    """Return the pointing (count,) [deg] of an item (case, first run, number of runs)."""
-    name, first, count = item
-    return np.array([pointing(CASES[name].with_seed(FIRST_SEED + first + i)) for i in range(count)])
 
 
 def rows(values: Mapping[str, Floats]) -> list[Row]:
@@ -234,17 +226,16 @@ def rows(values: Mapping[str, Floats]) -> list[Row]:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run every case `runs` times."""
-    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
-    return Result(rows(values), {'pointing': lambda: figure(values)},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}.'])
+    values = of_cases(pointing, CASES, runs, pool, progress)
+    return Result(rows(values), {'pointing': lambda: figure(values)}, [seeds(runs)])
 
 
 def figure(values: Mapping[str, Floats]) -> Figure:
     """Draw the pointing error of every seed, divided by the mean of the tuned filter; values as of `rows`."""
-    drawn, axes = new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
+    drawn, axes = fig.new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
     for name, of_runs in values.items():
         relative = of_runs / values[f'{name.partition("/")[0]}/tuned'].mean()
-        axes[0, 0].semilogx(relative, [name] * len(relative), '|', color=FILTERED_COLOUR)
+        axes[0, 0].semilogx(relative, [name] * len(relative), '|', color=fig.FILTERED_COLOUR)
     axes[0, 0].axvline(MAX_POINTING_RATIO, linewidth=0.8)
     axes[0, 0].invert_yaxis()
     return drawn

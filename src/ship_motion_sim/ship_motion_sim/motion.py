@@ -25,9 +25,9 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
+from ship_motion_sim import recording, waves
 from ship_motion_sim.params import RecordedParameters, ShipParameters
-from ship_motion_sim.sea import recording, waves
-from ship_motion_sim.sea.waves import FREEDOM_COUNT, HEAVE, PITCH, ROLL, SURGE, SWAY, WAVE_COMPONENT_COUNT, YAW
+from ship_motion_sim.waves import FREEDOM_COUNT, HEAVE, PITCH, ROLL, SURGE, SWAY, WAVE_COMPONENT_COUNT, YAW
 
 MOTION_STATUS_TEXTS = ('ok', 'time is not finite')
 MOTION_OK, MOTION_BAD_TIME = range(len(MOTION_STATUS_TEXTS))

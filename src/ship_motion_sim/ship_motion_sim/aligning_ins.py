@@ -11,12 +11,10 @@ from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import Bit, Floats, Matrix3, MetersPerSecond, Nanoseconds, Records, Vector3
 from pedestal_common.record import Record
 from pedestal_common.stream import ring
-from ship_motion_sim import earth
-from ship_motion_sim.navigation import ins, navigator
-from ship_motion_sim.navigation.ins import NO_STAMP, LatencyRing
-from ship_motion_sim.navigation.navigator import State as NavigatorState
+from ship_motion_sim import earth, ins, motion, navigator
+from ship_motion_sim.ins import NO_STAMP, LatencyRing
+from ship_motion_sim.navigator import State as NavigatorState
 from ship_motion_sim.params import InsParameters
-from ship_motion_sim.sea import motion
 
 MAX_IMU_GAP_S = 0.1
 """Longest time between two usable IMU messages over which the INS integrates [s].

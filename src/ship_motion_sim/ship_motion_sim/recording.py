@@ -29,7 +29,7 @@ from ship_motion_sim.params import RecordedParameters
 MIN_ROWS, MAX_ROWS = 4, 16384
 """Least number of rows of a recording, which a not-a-knot spline needs, and largest number of rows.
 
-The largest number limits the constants of the law, whose arrays have a fixed length (sea.motion).
+The largest number limits the constants of the law, whose arrays have a fixed length (module `motion`).
 """
 MAX_PIECES = MAX_ROWS + 1  # largest number of pieces, those before and after the record included
 COEFFICIENTS_PER_PIECE = 6  # number of coefficients of a piece, highest power first

@@ -1,8 +1,8 @@
 """The INS of method `model`: the true attitude with parametrised errors, released after a latency.
 
 The node `ins` subscribes only to `ship/imu/data_raw`, which has no attitude (REP 145, the ROS convention for an IMU,
-reserves it for `imu/data`). So the INS evaluates the stateless law of the ship motion (sea.motion) at the stamp of
-each IMU message, and adds its errors. Its `ship` parameters must be those of ship_motion_node. The INS compares the
+reserves it for `imu/data`). So the INS evaluates the stateless law motion.truth at the stamp of each IMU message, and
+adds its errors. Its `ship` parameters must be those of ship_motion_node. The INS compares the
 rate of the IMU with that of the law, and its status reports a difference. `aligning_ins` integrates the IMU instead.
 """
 import math
@@ -24,9 +24,8 @@ from pedestal_common.quantities import (
 )
 from pedestal_common.record import Record
 from pedestal_common.stream import ring
-from ship_motion_sim import earth, imu
+from ship_motion_sim import earth, imu, motion
 from ship_motion_sim.params import InsParameters
-from ship_motion_sim.sea import motion
 
 INS_NORMALS_PER_STEP = 9
 """Number of standard normals of a step: three for the slow errors, three for the attitude, three for the rate."""
