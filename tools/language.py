@@ -17,13 +17,12 @@ FORBIDDEN_WORD = re.compile(r'\b(told|tells|says|asked|anew|strangers?|whoever|s
 """Words that the rules of the language forbid: words with which machines speak, and words for actors without a
 name."""
 
-ALLOWED = {
+ALLOWED = {  # {(path, part of a text): reason why that text may break a rule}
     ('src/pedestal_studies/pedestal_studies/p002_jia/compared_loops.py', 'best-told-10ms-less'):
         'a case of --json, which programs read',
     ('tools/language.py', 'told|tells'): 'the list of the forbidden words itself',
     ('tools/language.py', 'best-told-10ms-less'): 'the exception of the case above',
 }
-"""{(path, part of a text): reason why that text may break a rule}."""
 
 CONSTANT_NAME = re.compile(r'[A-Z][A-Z0-9_]*')
 ROOT = pathlib.Path(__file__).parents[1]

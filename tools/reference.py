@@ -24,12 +24,11 @@ from pedestal_results import results
 from pedestal_studies.system.faults import FAULT_EXPECTATIONS
 from pedestal_workbench.again import what_if
 
-GENERATED_PAGES = ('README.md', *(f'docs/{name}.md' for name in (
+GENERATED_PAGES = ('README.md', *(f'docs/{name}.md' for name in (  # files with generated tables
     'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools',
     'troubleshooting')))
-"""Files with generated tables."""
 
-TABLE_PARAMETERS = (
+TABLE_PARAMETERS = (  # the parameters in the table of docs/parameters.md
     'scenario.pacing', 'scenario.seed', 'adu.period', 'adu.transport_delay', 'adu.command_timeout',
     'adu.azimuth.speed_loop.proportional', 'adu.azimuth.bias.schedule',
     'adu.azimuth.speed_loop.disturbance_observer', 'adu.azimuth.structure.inertia_share', 'adu.wind.gust.kind',
@@ -43,7 +42,6 @@ TABLE_PARAMETERS = (
     'tracking_receiver.antenna.beamwidth', 'tracking_receiver.path.refractivity',
     'tracking_receiver.receiver.latency', 'ship_motion.ship.motion', 'ship_motion.ship.sea_state',
     'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
-"""The parameters in the table of docs/parameters.md."""
 
 RATE_TEXTS = {'step': 'every step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
               'reply': 'after each request', 'command': 'on request', 'sample': 'at any time, in realtime only'}

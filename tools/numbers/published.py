@@ -39,7 +39,7 @@ Maker: TypeAlias = Callable[['Rows'], Content]   # of a table
 
 ROWS_FILE = 'docs/rows.json'  # file of the rows in a checkout
 
-SCENARIO_RESULTS = (
+SCENARIO_RESULTS = (  # (text, case, metric) of the results of the study scenarios in docs/measured.md
     ('`leo_pass`: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
     ('`leo_pass`: largest pointing error', 'leo_pass', 'pointing_max_deg'),
     ('`leo_pass`: rms pointing error divided by the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
@@ -67,8 +67,7 @@ SCENARIO_RESULTS = (
     ('`uav_flyby` at 60 m (`pedestal study scenarios` prints its command): the same ratio, cross-elevation',
      'uav_flyby-60m', 'noise_reduction_cross_elevation'),
     ('`uav_flyby` at 60 m: the same ratio, elevation', 'uav_flyby-60m', 'noise_reduction_elevation'))
-"""(text, case, metric) of the results of the study scenarios in docs/measured.md."""
-HEADLINE_RESULTS = (
+HEADLINE_RESULTS = (  # (text, case, metric) of the results of the study scenarios in README.md
     ('a satellite pass ashore: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
     ('the same pass: rms pointing error divided by the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
     ('a UAV at 500 m: noise of a sample divided by noise of the estimate, elevation', 'uav_flyby',
@@ -77,7 +76,6 @@ HEADLINE_RESULTS = (
      'pointing_to_leo_pass'),
     ("a satellite pass from a ship in sea state 6: isolation from the ship's rotation", 'ship_pass_ss6',
      'isolation_db'))
-"""(text, case, metric) of the results of the study scenarios in README.md."""
 
 
 class Rows(dict[Key, Row]):
@@ -317,7 +315,7 @@ def acquisition_table(rows: Rows) -> Content:
         ('`steptrack_geo`: largest error after 90 s', *_cells(off), '', '', '')]
 
 
-CALIBRATION_RESULTS = (
+CALIBRATION_RESULTS = (  # (text, case, metric) of the results of the study calibration in docs/measured.md
     ('program track of the test pass without a model, rms', 'program track', 'raw_rms_deg'),
     ('program track of the test pass with the model, rms', 'program track', 'calibrated_rms_deg'),
     ('residuals of the fit, rms', 'program track', 'residual_rms_deg'),
@@ -325,7 +323,6 @@ CALIBRATION_RESULTS = (
     ('leave-one-out rms of the default terms alone', 'program track', 'leave_one_out_default_rms_deg'),
     ('share of the terms within three of their sigmas', 'terms', 'within_3_sigma'),
     ('number of terms, over all runs', 'terms', 'cases'))
-"""(text, case, metric) of the results of the study calibration in docs/measured.md."""
 
 MDEG_PER_DEG = 1e3
 
@@ -368,7 +365,7 @@ def direction_table(mode: str) -> Maker:
     return table
 
 
-TABLES: dict[str, Maker] = {
+TABLES: dict[str, Maker] = {  # {name of a table: function that makes it}
     'results over seeds': Results('scenarios', 'seeds', SCENARIO_RESULTS),
     'headline results': Results('scenarios', 'seeds', HEADLINE_RESULTS),
     **{f'budget of {mode}': budget_table(mode) for mode in budget.MODE_OVERRIDES},
@@ -379,12 +376,10 @@ TABLES: dict[str, Maker] = {
     'filters of paper 000': FAMILY_NUMBERS, 'feed forward by speed': SPEED_NUMBERS,
     'speed of alignment': ALIGNMENT_SPEED_NUMBERS, 'acquisition': acquisition_table, 'array loops': ARRAY_NUMBERS,
     'calibration': Results('calibration', 'runs', CALIBRATION_RESULTS), 'matrices': matrix_table}
-"""{name of a table: function that makes it}."""
 
-PUBLISHED_STUDIES = tuple(dict.fromkeys((
+PUBLISHED_STUDIES = tuple(dict.fromkeys((  # names of the studies whose rows are in the tables
     *(claim.study for of_paper in claims.CLAIMS_BY_PAPER.values() for claim in of_paper if claim.study),
     'filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration')))
-"""Names of the studies whose rows are in the tables."""
 
 
 def main(names: Sequence[str] = (), root: str | pathlib.Path = '.') -> int:

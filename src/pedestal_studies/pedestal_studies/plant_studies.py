@@ -1,14 +1,8 @@
 """Studies of your own plant: `pedestal study servo|backlash|bode --scenario FILE` measures both axes of a scenario.
 
-The antenna stands ashore and in still air. The plant is the drive with motors, gears and load.
-
-  bode      frequency response of the current, speed and position loops, each axis by itself; measured by
-            pedestal_workbench/tuning/frequency_response.py
-  servo     response to a step of STEP_SIZE_RAD, to a sine of SINE_AMPLITUDE_RAD at SINE_FREQUENCY_HZ, and to a gust.
-            The gust is a step of wind torque: GUST_TORQUE_SHARE times the largest torque of both motors on the load.
-            The response is the true angle of the dish
-  backlash  motion of the dish at rest after the step, and its error at the reversals of the sine; both with the bias
-            torque of the scenario and without bias torque
+The antenna stands ashore and in still air. The plant is the drive with motors, gears and load. `servo` measures the
+true angle of the dish after a step, in a sine and in a gust of wind torque on the load. `backlash` measures the motion
+at rest after the step and the error at the reversals of the sine, with and without bias torque.
 """
 import functools
 import math
@@ -127,7 +121,6 @@ def backlash_study(source: str, progress: Progress) -> Result:
 
 
 def _standstill(run: Run, i: int) -> tuple[Times, Floats]:
-    """Return (times, angle minus its mean [rad]) of axis i at rest; i: index in AXES, here and below."""
     stands = run.t >= STANDSTILL_START_S
     angle = _angle(run, i)[stands]
     return run.t[stands], angle - np.mean(angle)
@@ -141,10 +134,6 @@ def _reversals(run: Run, i: int) -> tuple[Times, Floats]:
 
 def _bias_figure(kind: str, motion_of: Callable[[Run, int], tuple[Times, Floats]],
                  records: Mapping[tuple[str, str], Run]) -> Figure:
-    """Draw the remaining motion of both axes, with the bias torque of the scenario and without bias torque.
-
-    kind: title of the panels. motion_of: `_standstill` or `_reversals`.
-    """
     figure, axes = fig.new_panels(2, height=4.6, sharex=True,
                                   y=f'{"error" if kind == "sine" else "angle"} [\N{MICRO SIGN}rad]')
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
@@ -157,17 +146,14 @@ def _bias_figure(kind: str, motion_of: Callable[[Run, int], tuple[Times, Floats]
 
 
 def _angle(run: Run, i: int) -> Floats:
-    """Return the true angle [rad] of an axis from its initial angle."""
     return run['adu/truth']['position'][:, i] - START_ANGLES_RAD[i]
 
 
 def _sine_error(run: Run, i: int) -> Floats:
-    """Return the sine minus the true angle [rad] of an axis."""
     return SINE_AMPLITUDE_RAD * np.sin(2.0 * math.pi * SINE_FREQUENCY_HZ * run.t) - _angle(run, i)
 
 
 def _metrics(records: Mapping[str, Run], i: int, torque: NewtonMeters) -> list[tuple[str, float, str]]:
-    """Return [(metric, value, unit)] of axis i; torque: of the gust."""
     step, gust, sine = (records[name] for name in ('step', 'gust', 'sine'))
     after, settled = _angle(gust, i)[gust.t >= GUST_START_S], sine.t >= 1.0 / SINE_FREQUENCY_HZ
     return [('step_overshoot_percent', metrics.overshoot_percent(_angle(step, i), STEP_SIZE_RAD), '%'),
@@ -179,7 +165,6 @@ def _metrics(records: Mapping[str, Run], i: int, torque: NewtonMeters) -> list[t
 
 
 def _figure(kind: str, run: Run) -> Figure:
-    """Draw both axes over time: the angle, or the error of the sine [mrad]."""
     figure, axes = fig.new_panels(2, height=4.6, y='error [mrad]' if kind == 'sine' else 'angle [mrad]', sharex=True)
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
         values = _sine_error(run, i) if kind == 'sine' else _angle(run, i)

@@ -38,11 +38,8 @@ def lap(folder: str, number: int) -> tuple[float, float]:
 
 
 def latencies(path: pathlib.Path) -> Floats:
-    """Return the latencies [s] of the graph in a bag, by the wall clock.
-
-    A latency is the time from the publication of joint_states to the publication of the acu/rate_command with the same
-    stamp.
-    """
+    """Return the latencies [s] of the graph in a bag, by the wall clock: from the publication of joint_states to that
+    of the acu/rate_command with the same stamp."""
     sent = {topic: {log: published for _, log, published, _ in bag.read(path).raw(topic)}
             for topic in ('joint_states', 'acu/rate_command')}
     return np.array([(published - sent['joint_states'][stamp]) * 1e-9

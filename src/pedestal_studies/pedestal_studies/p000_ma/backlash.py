@@ -5,15 +5,8 @@ reversals and fast moves with each schedule of the bias torque. The study also c
 with a speed loop for each motor.
 
 Three cases have the controller of paper 000, as in the scenarios. The sine and the fast step run with the controller
-`best` of the study servo and with every schedule. `pedestal run servo_step|servo_sine --param ...` runs every case too
-(Case.command). The demand is the torque per motor that the speed loop commands. The schedules of the bias torque are:
-
-    off         no bias torque
-    constant    the same bias torque at every demand
-    fade        full at demand 0; it falls to 0 as the demand grows to the parameter `out`
-    hold_fade   full up to the demand `hold`; it then falls to 0 at the demand `out`
-
-The metrics fight_torque_... are the opposing torque of the motors beyond the commanded bias, see `opposing_torque`.
+`best` of the study servo and with every schedule. `pedestal run servo_step|servo_sine --param ...` runs every case
+too.
 """
 import math
 
@@ -45,19 +38,21 @@ The slow sine shows the lash alone. The fast sine has a peak rate of 0.2 rad/s, 
 
 def bias(schedule: str, torque: NewtonMeters = 12.0, hold: NewtonMeters = 14.0,
          out: NewtonMeters = 45.0) -> dict[str, Json]:
-    """Return the parameters of a schedule of the bias torque; torques of one motor.
+    """Return the parameters of a schedule of the bias torque, which depends on the demanded torque of one motor.
 
-    torque: full bias torque; hold: demand up to which it is full; out: demand at which it is 0.
+    off         no bias torque
+    constant    the same bias torque at every demand
+    fade        full at demand 0; it falls to 0 as the demand grows to the parameter `out`
+    hold_fade   full up to the demand `hold`; it then falls to 0 at the demand `out`
     """
     return {'adu.azimuth.bias.schedule': schedule, 'adu.azimuth.bias.torque': torque,
             'adu.azimuth.bias.hold': hold, 'adu.azimuth.bias.out': out}
 
 
-PAPER_CASES = {
+PAPER_CASES = {  # {case with the controller of the paper: parameters}
     'bias-off': bias('off'),
     'bias-on': {},                          # no change: the bias of the scenario, 5 Nm, fading, as in the paper
     'hold-fade': bias('hold_fade')}
-"""{case with the controller of the paper: parameters}."""
 
 BIAS_SCHEDULES = {
     'off': bias('off'), 'constant-5': bias('constant', torque=5.0), 'constant-12': bias('constant', torque=12.0),
@@ -70,19 +65,15 @@ SPEED_LOOP_STRUCTURES = {
     'independent-loops': {'adu.azimuth.speed_loop.structure': 'independent'}}
 """{case: parameters} of one speed loop on the mean speed, and of one speed loop for each motor."""
 
-METRIC_TARGETS = {
+METRIC_TARGETS = {  # {(case, metric): target}
     ('bias-off', 'standstill_peak_to_peak_rad'): '> 5e-4', ('bias-on', 'standstill_peak_to_peak_rad'): '< 2e-6',
     ('hold-fade', 'standstill_peak_to_peak_rad'): '< 2e-6', ('bias-on', 'reversal_ratio_off_to_on'): '> 30',
     ('hold-fade', 'reversal_ratio_off_to_on'): '> 30',
     ('hold-fade', 'sine_residual_rad'): '<= 1e-4', ('hold-fade', 'step_overshoot_percent'): '<= 2.5'}
-"""{(case, metric): target}."""
 
 
 def reversal_case(kind: str, name: str) -> Case:
-    """Return the Case of three periods of a sine.
-
-    kind: key of REVERSAL_FREQUENCIES_RAD_S; name: key of PAPER_CASES.
-    """
+    """Return the Case of three periods of a sine; kind: of REVERSAL_FREQUENCIES_RAD_S; name: of PAPER_CASES."""
     return cases.sine_case(Case(name, 'servo_sine', {
         **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE_RAD}),
         REVERSAL_FREQUENCIES_RAD_S[kind], 3)
@@ -101,10 +92,8 @@ def standstill(record: Run) -> tuple[Times, Floats]:
 
 
 def steady_residual(record: Run, amplitude: Radians, w: RadiansPerSecond) -> tuple[Times, Floats]:
-    """Return (times, error [rad] without its part at the frequency of the sine) of a sine run.
-
-    amplitude, w: of the sine. Only whole periods after the first are evaluated.
-    """
+    """Return (times, error [rad] without its part at the frequency w of the sine), over whole periods after the
+    first."""
     t, period = record.t, 2.0 * math.pi / w
     error = amplitude * np.sin(w * t) - record['adu/truth']['position'][:, 0]
     steady = metrics.whole_periods(t, period, period)

@@ -3,17 +3,10 @@
 The paper (introduction) names these five filters for the angle of a target and states that the Kalman filter has the
 better effect. It prints no number. Its Kalman filter is that of the 'current' statistical model.
 
-Cases are MOTION/FILTER/TUNING. The motions are those of profiles.py, measured at 100 Hz with white noise of 0.03
-deg. MOTION all is the geometric mean over the motions. TUNING is own-tuning if the filter was tuned for this motion,
-and one-tuning if one tuning serves all motions. A tuning minimises the rms of the angle over records of other seeds.
-
-least_squares      polynomial of degree 1 or 2 over a window; tuned: degree and window
-alpha_beta, alpha_beta_gamma    constant gains; tuned: alpha
-wiener             Wiener filter over a window of 6 s (window_filter.py); tuned: model of the acceleration
-kalman             Kalman filter current_statistical; tuned: alpha and a_max
-imm                default filter of the product, without tuning
-
-angle_ratio_to_kalman, rate_ratio_to_kalman   rms error divided by that of kalman, in the run of equal noise
+Cases are MOTION/FILTER/TUNING. The motions are those of profiles.py, measured at 100 Hz with white noise of 0.03 deg;
+MOTION all is their geometric mean. TUNING is own-tuning, for this motion, or one-tuning, for all motions. A tuning
+minimises the rms of the angle over records of other seeds. A ratio divides the rms error by that of kalman in the run
+of equal noise.
 """
 import math
 from collections.abc import Mapping, Sequence
@@ -81,10 +74,8 @@ def errors(tuned: Tuned, motion: str, seed: int, first: int, count: int) -> Pair
 
 
 def tune(item: tuple[str, tuple[str, ...]]) -> Tuned:
-    """Return the tuned filter of an item (filter, motions), tuned on the records of filters.TUNING_SEED.
-
-    The criterion is the geometric mean over the motions of the rms error of the angle.
-    """
+    """Return the tuned filter of an item (filter, motions). Its geometric mean over the motions of the rms error of
+    the angle is smallest on the records of filters.TUNING_SEED."""
     name, motions = item
 
     def criterion(params: FilterParameters | Window) -> float:
@@ -104,10 +95,7 @@ def batch(item: tuple[tuple[str, Tuned], int, int]) -> Pairs:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
         motions: Sequence[str] = profiles.PROFILES) -> Result:
-    """Tune all filters and run them `runs` times.
-
-    motions: names of profiles.
-    """
+    """Tune all filters and run them `runs` times; motions: names of profiles."""
     pool = pool or monte_carlo.Pool(1)
     groups = dict.fromkeys((*((motion,) for motion in motions), tuple(motions)))
     items = [(name, of) for name in TUNED_FILTERS for of in groups]

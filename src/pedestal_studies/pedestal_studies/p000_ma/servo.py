@@ -59,11 +59,10 @@ the shortfall by tau w^2 / K. K, D: bandwidth [1/s] and derivative gain [-] of t
 rate; w: frequency of the sine [rad/s]; J: inertia; K_p: proportional gain of the speed loop.
 """
 
-DRIVE_PARAMETERS = {
+DRIVE_PARAMETERS = {  # speed loop and bias torque of the cases best and adrc
     'adu.azimuth.speed_loop.proportional': 8.0, 'adu.azimuth.speed_loop.integral': 50.0,
     'adu.azimuth.bias.schedule': 'hold_fade', 'adu.azimuth.bias.torque': 12.0, 'adu.azimuth.bias.hold': 14.0,
     'adu.azimuth.bias.out': 45.0}
-"""Speed loop and bias torque of the cases best and adrc."""
 
 SHAPER_PARAMETERS = {
     'acu.azimuth.shaper.rate': 2.42, 'acu.azimuth.shaper.acceleration': 31.0, 'acu.azimuth.shaper.jerk': 8000.0,
@@ -98,7 +97,7 @@ CASE_PARAMETERS: dict[str, dict[str, Json]] = {
     'best-full-torque': FULL_TORQUE_PARAMETERS, 'adrc': ADRC_PARAMETERS}
 """{case: parameters}; 252 and 168 kg m2 are 20 % more and less than the inertia of the load, 210 kg m2."""
 
-METRIC_TARGETS = {
+METRIC_TARGETS = {  # {case: {metric: target}}; target: 'value +- tolerance', 'low to high', or a limit
     **{name: {'step_overshoot_percent': '12 +- 1.5', 'step_settling_2percent_s': '0.20 +- 0.03',
               'step_crossings': '1 +- 0', 'sine_0p4hz_max_error_rad': '0.0397 +- 0.002',
               'sine_0p4hz_rms_error_rad': '0.0281 +- 0.001', 'sine_0p4hz_amplitude_rad': '0.868 to 0.8695',
@@ -113,7 +112,6 @@ METRIC_TARGETS = {
     'best-inertia-plus': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15'},
     'best-inertia-minus': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15'},
 }
-"""{case: {metric: target}}; target: 'value +- tolerance', 'low to high', or a limit."""
 PAPER_VALUES = {'step_overshoot_percent': 12.0, 'step_settling_2percent_s': 0.2, 'max_error_rad': 0.04,
                 'rms_error_rad': 0.0281, 'amplitude_rad': 0.869, 'peak_error_percent': 0.12, 'max_error_percent': 4.6}
 """{metric without the prefix of the sine: number that the paper prints}."""
@@ -172,14 +170,13 @@ def gust_metrics(record: Run) -> dict[str, float]:
     return {'gust_1000nm_peak_rad': metrics.peak(y[t >= GUST_START_S] - y[t < GUST_START_S][-1])}
 
 
-CASE_RUNS = {
+CASE_RUNS = {  # {case: kinds of its runs}: step, sine of one reading, gust
     'paper-r1': ('step', '0p4hz', '0p4rads', 'gust'), 'paper-r2': ('step', '0p4rads'),
     'paper-all': ('step', '0p4hz'),
     'best': ('step', '0p4rads', '0p4hz', 'gust'), 'best-inertia-plus': ('step',),
     'best-inertia-minus': ('step',), 'best-full-torque': ('step',),
     'adrc': ('step', '0p4rads', '0p4hz', 'gust'),
 }
-"""{case: kinds of its runs}: step, sine of one reading, gust."""
 
 
 def records(cases: Iterable[str], progress: Progress) -> Runs:
@@ -208,10 +205,10 @@ def rows(done: Runs) -> list[Row]:
 
 
 def bang_bang(step: Radians, adu: AduParameters) -> tuple[Seconds, Seconds]:
-    """Return (time of the whole move, time to its 2 % band) of the fastest rest-to-rest move of the azimuth axis.
+    """Return (time of the whole move, time to its 2 % band) of the fastest rest-to-rest move of the azimuth.
 
-    step: size of the move. The motors have full torque forwards, then backwards. Coulomb
-    friction opposes the acceleration and supports the deceleration.
+    The motors have full torque forwards, then backwards. Coulomb friction opposes the acceleration and supports the
+    deceleration.
     """
     p = adu.azimuth
     N = p.gear_train.ratio

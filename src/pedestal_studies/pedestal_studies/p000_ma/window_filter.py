@@ -44,20 +44,16 @@ def displacement(n: int, alpha: float) -> Floats:
 
 @functools.lru_cache(maxsize=8)
 def wiener(n: int, alpha: float, sigma: RadiansPerSecond2, noise: Radians) -> Floats:
-    """Return the weights (2, n) of angle and rate [1/s], newest first, of the Wiener filter over n measurements.
-
-    alpha [1/s], sigma: of the acceleration. noise: standard deviation of a measurement.
-    """
+    """Return the weights (2, n) of angle and rate [1/s], newest first, of the Wiener filter over n measurements; alpha
+    [1/s], sigma: of the acceleration."""
     B = polynomial(n, degree=1)
     scaled = solve(sigma**2 * displacement(n, alpha) + noise**2 * np.eye(n), B, assume_a='pos')
     return np.linalg.solve(B.T @ scaled, scaled.T)
 
 
 def estimates(weights: Floats, y: Floats) -> Floats:
-    """Return angle and rate (2, runs, m) of filtered measurements y (runs, m), with weights (2, n).
-
-    The first n - 1 estimates lack measurements and are NaN.
-    """
+    """Return angle and rate (2, runs, m) of filtered measurements y (runs, m), with weights (2, n). The first n - 1
+    estimates lack measurements and are NaN."""
     n = weights.shape[1]
     out = np.full((2, *y.shape), np.nan)
     for i, line in enumerate(weights):

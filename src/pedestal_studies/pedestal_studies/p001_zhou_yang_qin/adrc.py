@@ -166,11 +166,10 @@ def azimuth_sigma(constants: Constants, conditions: alignment.Conditions, observ
 @compiled
 def level_sigma(constants: Constants, conditions: alignment.Conditions, observer: alignment.Observer,
                 t: Seconds) -> Radians:
-    """Return the 1 sigma of level at the time t after power-up.
+    """Return the 1 sigma of level at the time t after power-up, the root sum square of two parts.
 
-    The result is the root sum square of two parts. The first part is the observed tilt or the 1 sigma of the settled
-    loop, whichever is larger. Innovations above the expected ones increase that 1 sigma. The second part is the share
-    of the initial tilt that the observer, with all poles at w_o, has not observed yet.
+    The first part is the larger of the observed tilt and the 1 sigma of the settled loop, which innovations above the
+    expected ones increase. The second part is the share of the initial tilt that the observer has not observed yet.
     """
     x = constants.w_o * t
     unobserved = alignment.INITIAL_LEVEL_SIGMA_RAD * (1.0 + x + 0.5 * x * x) * math.exp(-x)

@@ -202,11 +202,8 @@ class Batch:
 
 @compiled
 def simulate(sensors: Sensors, normals: Floats, velocity: Vectors3, out: Increments) -> None:
-    """Simulate an IMU on its ship and fill `out`.
-
-    normals: standard normal noise (n, IMU_NORMALS_PER_STEP). velocity (n + 1, 3): added to the velocity of the ship,
-    ENU [m/s].
-    """
+    """Fill `out` from an IMU on its ship; normals (n, IMU_NORMALS_PER_STEP); velocity (n + 1, 3): added to that of the
+    ship, ENU [m/s]."""
     u, truth, measured = sensors.inputs[0], sensors.truth[0], sensors.outputs[0]
     dt = u.dt
     for k in range(len(out.angle)):
@@ -226,10 +223,8 @@ def simulate(sensors: Sensors, normals: Floats, velocity: Vectors3, out: Increme
 @compiled
 def align(state: Records, constants: Records, angle: Vectors3, force: Vectors3, dt: Seconds, every: int,
           estimates: Records) -> None:
-    """Run a navigator over increments angle, force, each over dt.
-
-    After each block of `every` increments, its AlignmentEstimate is written to the next record of `estimates`.
-    """
+    """Run a navigator over increments of dt, and write its AlignmentEstimate after each block of `every`
+    increments."""
     for k in range(len(angle)):
         methods.step(state[0], constants[0], angle[k], force[k], dt)
         if (k + 1) % every == 0:
@@ -247,10 +242,8 @@ def quaternion(axis: int, angle: Radians) -> Quaternion:
 
 
 def misaligned(attitude: Quaternion, angles: Vector3) -> Quaternion | Xyzw:
-    """Return the attitude deck -> n' for a given attitude deck -> n: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T.
-
-    n: the ENU frame; n': the misaligned frame that the INS takes for ENU. angles: a_x, a_y, a_z [rad].
-    """
+    """Return the attitude deck -> n' for an attitude deck -> ENU: C_n^n' = R_y(a_y)^T R_x(a_x)^T R_z(a_z)^T; n': the
+    frame that the INS takes for ENU."""
     turned: Quaternion | Xyzw = attitude
     for axis in (2, 0, 1):      # z, x, y: the order of the factors from right to left
         turned = product(quaternion(axis, -angles[axis]), turned)
@@ -304,11 +297,8 @@ def simulated_run(batch: Batch, run: int) -> tuple[Increments, Quaternion | Xyzw
 
 
 def errors(estimated: Quaternions, attitude: Quaternions) -> Vectors3:
-    """Return the errors about east, north, up [rad] of an estimated attitude against the true one.
-
-    The errors are the rotation vector of the product: estimated attitude times inverse of the true attitude. A
-    quaternion describes two rotations; the sign of w selects the shorter one.
-    """
+    """Return the errors about east, north, up [rad] of an estimated attitude: the rotation vector of estimated times
+    inverse true attitude. The sign of w selects the shorter of two rotations."""
     x, y, z, w = product(estimated.T, (attitude * (-1.0, -1.0, -1.0, 1.0)).T)
     size = np.sqrt(x * x + y * y + z * z)
     angle = 2.0 * np.arctan2(size, np.abs(w)) * np.sign(np.where(w == 0.0, 1.0, w))
@@ -342,8 +332,8 @@ def align_batch(item: tuple[Batch, Mapping[str, Method]]) -> dict[str, Sums]:
 def limit() -> InformationLimit:
     """Return the 1 sigmas that the method riccati_eso states for a motionless IMU without noise.
 
-    The covariance of riccati_eso depends on the assumed noises, not on the measurements. Noise and sway could only
-    enlarge the 1 sigmas, because innovations larger than expected increase them.
+    The covariance depends on the assumed noises, not on the measurements. Noise and sway could only enlarge the 1
+    sigmas, because innovations larger than expected increase them.
     """
     constants = methods.constants(INS_PARAMETERS, 'riccati_eso', math.radians(SHIP_PARAMETERS.latitude_deg))
     state, n = methods.initial_state(constants, (0.0, 0.0, 0.0, 1.0)), round(RUN_DURATION_S / IMU_PERIOD_S)

@@ -1,15 +1,11 @@
 """Alignment of the INS: paper 001's figures 3 and 4 for five methods, over many seeds, beside the information limit.
 
-The INS measures the attitude of the deck. The alignment removes the error of its initial attitude (misalignment), here
-3, 3 and 180 deg. CASE_MEANINGS describes the five methods.
+The alignment removes the error of the initial attitude (misalignment), here 3, 3 and 180 deg. Cases <method> have the
+conditions of the paper. Cases <method>/swell have an additional velocity of 0.5 m/s at 0.1 Hz on every axis. Cases
+<method>/quadrant-N have any heading of the ship, an initial azimuth error in quadrant N, and random biases.
 
-Cases <method> have the conditions of the paper. Cases <method>/swell have an additional velocity of 0.5 m/s at 0.1 Hz
-on every axis. Cases <method>/quadrant-N have any heading of the ship, an initial azimuth error in quadrant N, and
-random biases.
-
-The case `limit` is the information limit: the smallest 1 sigma that the gyros and the velocity permit. This limit is
-the root sum square of the 1 sigma of the Riccati filter and of the azimuth error due to the bias of an east gyro. The
-latter is bias / (earth rate * cos latitude).
+The case `limit` is the smallest 1 sigma that the gyros and the velocity permit. This limit is the root sum square of
+the 1 sigma of the Riccati filter and of the error by the bias of an east gyro, bias / (earth rate * cos latitude).
 """
 import functools
 import math
@@ -56,16 +52,14 @@ With 50 runs an rms is known only to 10 %, which is more than the difference bet
 """
 
 
-CASE_METHODS = {method.replace('_', '-'): method for method in METHODS}
-"""{case: method}."""
-CASE_MEANINGS = {
+CASE_METHODS = {method.replace('_', '-'): method for method in METHODS}  # {case: method}
+CASE_MEANINGS = {  # {case: description} of the methods and of the limit, for the table of the documentation
     'classical': 'gyrocompass: the level error that a wrong azimuth causes corrects the azimuth',
     'adrc': 'paper 001, corrected: active disturbance rejection control (ADRC) levels, its commands give the azimuth',
     'adrc-scheduled': 'ADRC whose observer begins with a high bandwidth, which then falls as 6/t',
     'riccati-eso': 'extended state observer (ESO) with the gains of a Kalman filter (Riccati equation)',
     'oba': 'optimisation-based alignment: the rotation that best maps the measured specific force onto gravity',
     'limit': 'information limit: 1 sigma of the Riccati filter and of the error by the bias of an east gyro'}
-"""{case: description} of the methods and of the limit, for the table of the documentation."""
 CASE_COLOURS = dict(zip(CASE_METHODS, (fig.RAW_COLOUR, fig.TRUTH_COLOUR, fig.MOTOR_1_COLOUR,
                                        fig.FILTERED_COLOUR, fig.MOTOR_2_COLOUR)))
 SETTLED_AZIMUTH_ARCMIN = 12.0  # rms over the runs below which the azimuth counts as settled [arcmin]

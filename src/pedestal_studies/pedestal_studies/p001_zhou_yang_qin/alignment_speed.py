@@ -3,14 +3,9 @@
 The paper (section 6) states that other parameters of the ADRC make the level converge faster and so shorten the
 alignment of the azimuth, and that a faster convergence lowers the precision. It prints no number.
 
-A case adrc/K is the method adrc with all its times divided by K. The bandwidths of observer and level control are then
-K times the default. The azimuth uses the level commands after 1 / K of the default time. Ship, sea, sensors and
-misalignment are those of the study alignment, and all cases get the same IMU samples.
-
-level_settling_s         time after which the rms of the level over the runs stays below 30 arcmin
-time_to_12arcmin_rms_s   time after which the rms of the azimuth over the runs stays below 12 arcmin
-level_rms_arcmin         rms of the level from 300 s on
-azimuth_rms_arcmin_Ts    rms of the azimuth after T s
+A case adrc/K is the method adrc with all its times divided by K: its bandwidths are K times the default, and the
+azimuth uses the level commands after 1 / K of the default time. All else is as in the study alignment, and all cases
+get the same IMU samples.
 """
 import dataclasses
 from collections.abc import Mapping
@@ -64,12 +59,11 @@ def level_settling(accuracy: Accuracy) -> Seconds:
                                  SETTLED_LEVEL_ARCMIN)
 
 
-METRICS = {
+METRICS = {  # {metric: (unit, function of an Accuracy)}
     'level_settling_s': ('s', level_settling),
     **{name: alignment.KIND_METRICS[''][name] for name in (
         'time_to_12arcmin_rms_s', 'azimuth_rms_arcmin_100s', 'azimuth_rms_arcmin_250s', 'level_rms_arcmin',
         'azimuth_rms_arcmin_600s')}}
-"""{metric: (unit, function of an Accuracy)}."""
 
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:

@@ -65,9 +65,9 @@ class State(Record):
 def steady_covariance(A: Floats, Q: Floats) -> Floats:
     """Return the P (n, n) that solves P = A P A^T + Q, of a stable loop x(k+1) = A x(k) + noise of covariance Q.
 
-    The equation is linear in the elements of P, stacked to a vector: (1 - kron(A, A)) P = Q. The covariance becomes a
-    constant of a law. `reproducible.solution` therefore takes the place of numpy.linalg.solve, whose last bits differ
-    between processors.
+    The elements of P, stacked to a vector, are the solution of (1 - kron(A, A)) P = Q. Because the covariance becomes
+    a constant of a law, `reproducible.solution` takes the place of numpy.linalg.solve, whose last bits differ between
+    processors.
     """
     n = len(A)
     return np.reshape(solution(np.eye(n * n) - np.kron(A, A), Q.ravel()), (n, n))

@@ -27,11 +27,7 @@ MAX_JACOBI_SWEEPS = 12  # largest number of sweeps of Jacobi rotations; 4 to 6 a
 
 
 class State(Record):
-    """State of the method.
-
-    The observer does not change the attitude. Its covariance is the information limit: the least that any linear
-    method can reach with these measurements (ship_motion_sim alignment).
-    """
+    """State of the method. The observer gives 1 sigmas and does not change the attitude."""
     t: Seconds                          # since power-up
     observer: alignment.Observer        # gives the 1 sigmas from the x, y parts of a
     count: float                        # number of pairs (a, b)
@@ -47,10 +43,7 @@ class State(Record):
 @compiled
 def gravity_integral(t: Seconds,
                      conditions: alignment.Conditions) -> tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond]:
-    """Return b in n0 after t, in closed form.
-
-    b is the integral of the reaction to gravity, which turns with the earth.
-    """
+    """Return b in n0 after t, in closed form: the integral of the reaction to gravity, which turns with the earth."""
     north, up = conditions.earth_rate[1], conditions.earth_rate[2]
     w = math.sqrt(north * north + up * up)
     n, u = north / w, up / w

@@ -120,7 +120,7 @@ def compared_targets() -> dict[str, Floats]:
 def max_error_at_ends(error: Floats, target: Floats) -> Radians:
     """Return the largest error at the ends of the milliseconds, from the error [rad] in their middles.
 
-    At the ends the target [rad] is half-way between its neighbours, and the beam is that of the middle.
+    At the ends the target is half-way between its neighbours, and the beam is that of the middle.
     """
     half = 0.5 * np.diff(target)
     return max(peak(settled(error[:-1] + half)), peak(settled(error[1:] - half)))

@@ -1,17 +1,12 @@
 """Paper 002's angle loop of a phased array: figures 3 to 7 and 9, limits of stability and of lock, a better loop.
 
-The array steers its beam electronically. The loop moves the beam after the target by the error that the receiver
-measures. alpha is the gain of the loop from the error to the angle [-], T the time between two updates. Cases run the
-loops of angle_loop.py; cases graph/... run the scenario phased_array_sway in the closed loop.
-
-S0, S1 and S2 are the kinds of smoothing in the receiver: none, the paper's recursion, and a moving average, with n =
-20 samples at 1 kHz. A case without S0, S1 or S2 in its name has S1.
+Cases run the loops of angle_loop.py, with the gain alpha [-] from the error to the angle and the time T between two
+updates; cases graph/... run the scenario phased_array_sway in the closed loop. S0, S1 and S2 are the kinds of
+smoothing in the receiver (SMOOTHING_CODES), with 20 samples at 1 kHz. A case without one of them in its name has S1.
 
 lag_deg          largest error that the receiver measures, as in the paper's figures
 true_lag_deg     largest true error of the beam
-max_error_deg    largest true error without noise
 jitter_rms_deg   rms of the motion of the beam due to the noise, 0.05 deg in each millisecond
-crossings        crossings of the target by the response to a step
 """
 import dataclasses
 import functools
@@ -85,7 +80,7 @@ RATE_COMPENSATIONS = (0.0, 0.85, 1.0)  # shares delta of the ship's rate that th
 BEAMWIDTH_RAD = math.radians(1.0)  # beamwidth of the array in the cases loss/... [rad].
 
 
-METRIC_TARGETS = {
+METRIC_TARGETS = {  # {(case, metric): target}
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): '19.7 +- 0.5',
     ('step/alpha=0.1/T=10ms/S1', 'overshoot_percent'): '24.4 +- 0.5',
     ('step/alpha=0.1/T=5ms/S1', 'overshoot_percent'): '34.1 +- 1',
@@ -97,15 +92,13 @@ METRIC_TARGETS = {
     ('best/ramp', 'max_error_deg'): '<= 0.01', ('best/sine', 'max_error_deg'): '<= 0.025',
     ('best/sine', 'jitter_rms_deg'): '<= 0.006', ('best/sway', 'isolation_db'): '>= 48',
     ('best/sway-ins', 'isolation_db'): '>= 60', ('best/sway-ins/exact-stamps', 'isolation_db'): '>= 90'}
-"""{(case, metric): target}."""
 
-PAPER_VALUES = {
+PAPER_VALUES = {  # {(case, metric): number that the paper prints}
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): 20.0, ('step/alpha=0.1/T=10ms/S1', 'overshoot_percent'): 20.0,
     ('step/alpha=0.1/T=10ms/S2', 'overshoot_percent'): 20.0,
     ('ramp/30deg_s/T=10ms', 'lag_deg'): 0.3, ('ramp/30deg_s/T=5ms', 'lag_deg'): 0.15, ('sine', 'lag_deg'): 0.3}
-"""{(case, metric): number that the paper prints}."""
 
-STUDY_REMARKS = [
+STUDY_REMARKS = [  # sentences that explain the rows
     'sine: the paper prints 0.30 deg, which is v T alone (v: largest rate, T: time between two updates). The measured '
     'error is sqrt((v T)^2 + (a T^2 / beta)^2), because the acceleration needs an innovation too (a: largest '
     'acceleration, beta: gain of the loop on the rate). The two shares are 0.30 and 0.19 deg, a quarter of a period '
@@ -123,7 +116,6 @@ STUDY_REMARKS = [
     'millisecond causes no error, by construction. ends_max_error_deg and ends_isolation_db are read at both ends of '
     'each millisecond. There the error is larger by up to rate x 0.5 ms, 0.015 deg at 30 deg/s, and the isolation '
     'from the sway is never above 68 dB.']
-"""Sentences that explain the rows."""
 
 
 def name(loop: PaperLoop) -> str:
@@ -159,10 +151,8 @@ def step_rows(done: Mapping[PaperLoop, Floats]) -> list[Line]:
 
 
 def eigenvalue_limit(loop: PaperLoop, near: int) -> int:
-    """Return the largest delay [ms] at which all eigenvalues of a loop are inside the unit circle.
-
-    near: delay at which the search starts [ms].
-    """
+    """Return the largest delay [ms] at which all eigenvalues of a loop are inside the unit circle, searched from the
+    delay `near` [ms]."""
     def inside(delay: int) -> bool:
         return spectral_radius(dataclasses.replace(loop, delay=delay)) < 1.0
 
@@ -196,10 +186,7 @@ def limit_rows(delays: Mapping[PaperLoop, tuple[int, int]]) -> list[Line]:
 
 def lag_rows(case: str, loop: PaperLoop, target: Floats,
              rate: Floats | None = None) -> list[tuple[str, str, float, str]]:
-    """Return the rows of lag_deg of a loop, and of true_lag_deg with each smoothing.
-
-    target, rate: as of PaperLoop.run.
-    """
+    """Return the rows of lag_deg of a loop, and of true_lag_deg with each smoothing; arguments as of PaperLoop.run."""
     rows = [(case, 'lag_deg', math.degrees(peak(settled(loop.run(target, rate)[1]))), 'deg')]
     for S in SMOOTHING_CODES:
         beam, _ = dataclasses.replace(loop, smoothing=S).run(target, rate)
@@ -231,10 +218,8 @@ ALPHA_LOOPS = {f'noise/alpha={alpha:g}': PaperLoop(alpha=alpha) for alpha in ALP
 
 
 def jitter(item: tuple[str, int]) -> list[Degrees]:
-    """Return the rms of the beam's motion due to noise, for every run of an item.
-
-    An item is (one of COMPARED_CASES, ALPHA_LOOPS or GRAPH_CASES, number of runs).
-    """
+    """Return the rms of the beam's motion due to noise in every run of an item (one of COMPARED_CASES, ALPHA_LOOPS or
+    GRAPH_CASES, number of runs)."""
     case, runs = item
     if case in ALPHA_LOOPS:
         at_rest = np.zeros(round(RECORD_DURATION_S / GRID_STEP_S))
@@ -299,11 +284,8 @@ def max_kept_rate(loop: PaperLoop) -> float:
 
 
 def loss_rows() -> list[Line]:
-    """Return the rows of loops with a receiver that loses the signal.
-
-    The metrics are the largest rate of the sine at which the loop keeps the target, and the error at this rate with a
-    linear receiver, which loses no signal.
-    """
+    """Return the rows of loops with a receiver that loses the signal: the largest rate of the sine that the loop
+    keeps, and the error at this rate with a linear receiver, which loses no signal."""
     rows: list[Line] = []
     for form in ('type_1', 'type_2'):
         for kind in RECEIVER_LOSS_POWERS:
@@ -330,10 +312,7 @@ NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 110.0, 'ins.tilt_
 
 
 def graph_case(case: str, quiet: bool = False) -> Case:
-    """Return the case of one of GRAPH_CASES.
-
-    quiet: True for a case without noise in receiver and INS, with the gains of the noisy case.
-    """
+    """Return one of GRAPH_CASES; quiet: without noise in receiver and INS, but with the gains of the noisy case."""
     noisy = Case(case, 'phased_array_sway', GRAPH_CASES[case])
     if not quiet:
         return noisy
@@ -349,19 +328,13 @@ GRAPH_EVALUATION_START_S = 10.0  # start of the evaluation of the runs of GRAPH_
 
 
 def graph_error(case: str, quiet: bool = False, seed: int | None = None) -> Pairs:
-    """Return the true error [rad] of one of GRAPH_CASES at the ends of the evaluated intervals.
-
-    Arguments as of `graph_case`.
-    """
+    """Return the true error [rad] of one of GRAPH_CASES at the ends of the evaluated intervals."""
     run = graph_case(case, quiet).with_seed(seed).run()
     return run.truth['error'][run.t >= GRAPH_EVALUATION_START_S]
 
 
 def graph_rows(jitters: Mapping[str, list[Degrees]]) -> list[Line]:
-    """Return the rows of GRAPH_CASES: cross-elevation and elevation together, at both ends of the intervals.
-
-    jitters: {case: rms of every run}, in elevation.
-    """
+    """Return the rows of GRAPH_CASES, over both axes and both ends of the intervals; jitters: of the elevation."""
     rows: list[Line] = []
     for case in GRAPH_CASES:
         quiet = graph_case(case, quiet=True).run()

@@ -1,21 +1,14 @@
 """Feed-forward of paper 003 with differenced angles, and with targets of 30 and 50 m/s.
 
 The paper (introduction and section 1) states that targets fly at 30 to 50 m/s, and that an IMM estimates rate and
-acceleration better than differences and than a conventional Kalman filter. Its test stand shows 30 m/s only. The loop,
-its noise and its filters are those of the study imm-feedforward, without another tuning. At 50 m/s the rates, and so
-the accelerations of the reversals, are 5/3 of those at 30 m/s.
+acceleration better than differences and than a conventional Kalman filter. Its test stand shows 30 m/s only. Loop,
+noise, filters and names of the sources are those of the study imm-feedforward. At 50 m/s the rates, and so the
+accelerations of the reversals, are 5/3 of those at 30 m/s.
 
-Cases are AXIS/SPEED/SOURCE. SOURCE is the source of the rate and acceleration that are fed forward:
-
-kalman-cv, imm      as in the study imm-feedforward
-difference-N        first and second difference of the measured angles over N steps of 10 ms, N and 2 N steps long
-drive-...           filter of this name in the whole chain: receiver, control unit, motors, gears
-
-rate_rms_deg_s, acceleration_rms_deg_s2   rms error at the instant of the measured miss, over the whole motion
-..._ratio_to_imm                          this metric divided by that of imm in the run of equal noise
-miss_ratio_to_kalman_cv                   miss of kalman-cv divided by this miss
-autotrack_percent                         share of the runs that stay in autotrack; the cases drive-... have their
-                                          other rows only if all runs stay
+Cases are AXIS/SPEED/SOURCE. The source difference-N is the first and second difference of the measured angles over N
+steps of 10 ms. rate_rms_deg_s and acceleration_rms_deg_s2 are errors at the instant of the measured miss, over the
+whole motion. A ratio divides by the metric in the run of equal noise. The cases drive-... have rows other than
+autotrack_percent only if all runs stay in autotrack.
 """
 import math
 from collections.abc import Mapping
@@ -61,10 +54,9 @@ CASES = {f'{axis}/{speed}/{name}': (axis, source, rate) for axis in REVERSAL_S_B
          for speed, rate in RATES_RAD_S.items() for name, source in sources(axis).items()}
 """{case: (axis, Source, rate of the target [rad/s])}."""
 
-DRIVE_CASES = {f'{axis}/{DRIVE_SPEED}/drive-{name}': imm_feedforward.drive_case(
+DRIVE_CASES = {f'{axis}/{DRIVE_SPEED}/drive-{name}': imm_feedforward.drive_case(  # {case: Case} of the whole chain
     axis, sources(axis)[name].own_filter, RATES_RAD_S[DRIVE_SPEED])
     for axis in REVERSAL_S_BY_AXIS for name in ('kalman-cv', 'imm')}
-"""{case: Case} of the whole chain."""
 
 UNITS = {**METRIC_UNITS, 'rate_rms_deg_s': 'deg/s', 'acceleration_rms_deg_s2': 'deg/s2'}  # {metric of a run: unit}
 
@@ -75,10 +67,8 @@ IMM_RATIO_TARGET = '>= 3'  # required ratio: miss of kalman-cv divided by miss o
 
 
 def estimate_errors(axis: str, steps: Records, rate: RadiansPerSecond) -> Pairs:
-    """Return the rms errors of rate [deg/s] and acceleration [deg/s2] of every run.
-
-    The errors are against the truth at the instant of the measured miss. Arguments as of feedforward_loop.measures.
-    """
+    """Return the rms errors of rate [deg/s] and acceleration [deg/s2] of every run, against the truth at the instant
+    of the measured miss."""
     t, target, period = feedforward_loop.motion(axis, rate)
     counts = t[MISS_DELAY_STEPS:] >= 0.5 * period
     late = target[:-MISS_DELAY_STEPS]

@@ -74,7 +74,7 @@ FEEDFORWARD_SOURCES = {
     'kalman-ca-40-predicted': dataclasses.replace(ca(40.0), predicted=True)}
 """{name: Source} of rate and acceleration. The argument of ca and q_ca of imm are process noises [deg/s3/sqrt(Hz)]."""
 
-SOURCE_MEANINGS = {
+SOURCE_MEANINGS = {  # {name of a case without its axis: description}, for the table of the documentation
     'kalman-cv': 'conventional Kalman filter of constant velocity, with the noise that comes nearest to the paper',
     'imm': 'IMM of cv, ca and current_statistical, tuned on the azimuth',
     'imm-predicted': 'the same IMM, predicted over the delay of the miss to the middle of the interval of the command',
@@ -83,7 +83,6 @@ SOURCE_MEANINGS = {
     'drive-kalman-cv': 'kalman-cv in receiver, control unit, motors and gears',
     'drive-imm': 'imm in receiver, control unit, motors and gears',
     'drive-imm-default': 'the default IMM of the product in receiver, control unit, motors and gears'}
-"""{name of a case without its axis: description}, for the table of the documentation."""
 
 
 def cv_name(axis: str, q: float) -> str:
@@ -91,19 +90,18 @@ def cv_name(axis: str, q: float) -> str:
     return f'{axis}/kalman-cv' if q == PAPER_CV_NOISES[axis] else f'{axis}/kalman-cv-{q:g}'
 
 
-CASES = {
+CASES = {  # {case: (axis, Source)}
     **{f'{axis}/kalman-cv': (axis, cv(q)) for axis, q in PAPER_CV_NOISES.items()},
     **{f'{axis}/{name}': (axis, source)
        for axis in REVERSAL_S_BY_AXIS for name, source in FEEDFORWARD_SOURCES.items()},
     **{cv_name(axis, q): (axis, cv(q)) for axis in REVERSAL_S_BY_AXIS for q in CV_NOISES}}
-"""{case: (axis, Source)}."""
 
 
 def drive_case(axis: str, tuned: FilterParameters, rate: RadiansPerSecond = profiles.S_MOTION_RATE_RAD_S) -> Case:
-    """Return the case of the whole chain, in which the target follows a sine on an axis.
+    """Return the case of the whole chain, in which the target follows a sine on an axis, with this largest rate.
 
-    tuned: filter of this axis. rate: largest rate of the target. The target's range of 510 m is the
-    reference_range of the scenario uav_flyby, at which the receiver has its nominal C/N0.
+    tuned: filter of this axis. The target's range of 510 m is the reference_range of the scenario uav_flyby, at which
+    the receiver has its nominal C/N0.
     """
     w = math.pi / REVERSAL_S_BY_AXIS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
@@ -118,18 +116,15 @@ def drive_case(axis: str, tuned: FilterParameters, rate: RadiansPerSecond = prof
            if value != as_dict(FilterParameters())[name]}}, DRIVE_DURATION_S)
 
 
-DRIVE_CASES = {
+DRIVE_CASES = {  # {case: Case} of the whole chain
     f'{axis}/drive-{name}': drive_case(axis, tuned) for axis in REVERSAL_S_BY_AXIS for name, tuned in {
         'kalman-cv': cv(PAPER_CV_NOISES[axis]).own_filter, 'imm': FEEDFORWARD_SOURCES['imm'].own_filter,
         'imm-default': filter_of('imm')}.items()}
-"""{case: Case} of the whole chain."""
 
 
 def drive_error(case: Case, seed: int) -> tuple[Times, Floats]:
-    """Return (times, true pointing error of the axis [rad]) from DRIVE_EVALUATION_START_S on.
-
-    case: as `drive_case` returns. The errors are NaN if the run left autotrack.
-    """
+    """Return (times, true pointing error of the axis [rad]) of one of `drive_case` from DRIVE_EVALUATION_START_S on,
+    NaN if the run left autotrack."""
     record = case.with_seed(seed).run()
     record = record.where(record.t >= DRIVE_EVALUATION_START_S)
     error = record.truth['error'][:, list(REVERSAL_S_BY_AXIS).index(case.name)]
@@ -142,10 +137,9 @@ def drive_misses(name: str, run: int) -> tuple[Degrees, Degrees]:
     return math.degrees(tracking.rms(error)), math.degrees(metrics.peak(error))
 
 
-MISS_TARGETS_DEG = {
+MISS_TARGETS_DEG = {  # targets of miss_rms_deg
     'azimuth/kalman-cv': '0.16 to 0.17', 'azimuth/imm': '<= 0.036', 'azimuth/imm-predicted': '<= 0.025',
     'elevation/kalman-cv': '0.085 to 0.095', 'elevation/imm': '<= 0.028', 'elevation/imm-predicted': '<= 0.018'}
-"""Targets of miss_rms_deg."""
 
 PAPER_MISSES_DEG = {'azimuth/kalman-cv': 0.17, 'azimuth/imm': 0.035, 'elevation/kalman-cv': 0.1, 'elevation/imm': 0.03}
 """{case: number of the paper [deg]}. The paper names it the largest miss (RMS); we read it as the rms of the miss."""
@@ -167,20 +161,14 @@ def conventional_curve(misses: Misses, axis: str) -> Floats:
 
 
 def at_rate_noise(misses: Misses, axis: str, rate_noise: Floats) -> Floats:
-    """Return the miss [deg] of a conventional filter tuned to a rate noise [deg/s] in each run.
-
-    The miss is interpolated between the filters of CV_NOISES on logarithmic scales. If even the quietest of these
-    filters is noisier, the miss of this filter is returned, which is too small.
-    """
+    """Return the miss [deg] of a conventional filter tuned to a rate noise [deg/s] in each run, log-log between
+    CV_NOISES. If even the quietest filter is noisier, its miss is returned, which is too small."""
     noises, curve = np.log(conventional_curve(misses, axis))
     return np.exp([np.interp(*run) for run in zip(np.log(rate_noise), noises.T, curve.T)])
 
 
 def rows(misses: Misses) -> list[Row]:
-    """Return the rows of all cases.
-
-    A ratio divides the misses of two filters in runs with the same noise.
-    """
+    """Return the rows of all cases. A ratio divides the misses of two filters in runs with the same noise."""
     table = []
     for name, case in misses.items():
         axis, miss = case.axis, case.of('miss_rms_deg')

@@ -72,11 +72,8 @@ def motion() -> tuple[Times, Motion, dict[Seconds, Bools]]:
 
 
 def batch(item: Item) -> tuple[Records, Floats]:
-    """Return (Moments (n,) over the runs, rms (count, len(REVERSAL_DURATIONS_S), 2)) of an item.
-
-    An item is (filter, first run, number of runs). The rms are those of rate [deg/s] and acceleration [deg/s2] of
-    every run inside the reversals.
-    """
+    """Return (Moments (n,) over the runs, rms of rate [deg/s] and acceleration [deg/s2] of every run inside the
+    reversals, (count, len(REVERSAL_DURATIONS_S), 2)) of an item (filter, first run, number of runs)."""
     name, first, count = item
     t, truth, reversals = motion()
     sums = ensemble.moments(FILTERS[name], t, truth, MEASUREMENT_NOISE, ensemble.records(truth, MEASUREMENT_NOISE,
@@ -141,10 +138,8 @@ def remarks(values: Errors) -> list[str]:
 
 
 def moments_figure(sums_of: Mapping[str, Records], what: str, label: str) -> Figure:
-    """Draw truth and mean estimates above, mean errors +-1 sigma below (paper 003, figures 3 and 4).
-
-    sums_of: {filter: Moments (n,) of the errors, estimate minus truth}; what: 'rate' or 'acceleration'.
-    """
+    """Draw truth and mean estimates above, mean errors +-1 sigma below (paper 003, figures 3 and 4); what: 'rate' or
+    'acceleration'."""
     t, truth, _ = motion()
     figure, axes = fig.new_panels(2, height=5.4, y=(label, f'error of the {label}'), sharex=True)
     true_value = truth[('angle', 'rate', 'acceleration').index(what)]

@@ -39,23 +39,20 @@ REFERENCE_POINT = ('reference', 0.0)  # key of REFERENCE_SOURCE beside the keys 
 
 
 def _current_statistical(a_max: float) -> Source:
-    """Return the source of a 'current' statistical filter; a_max: largest acceleration of its model [deg/s2]."""
     return Source(feedforward_loop.filter_of('current_statistical', current_statistical={
         'alpha': 0.5, 'a_max': math.radians(a_max)}))
 
 
 def _logarithmic(low: float, high: float, points: int) -> list[float]:
-    """Return `points` values from low to high at equal ratios, rounded to three digits."""
     return [float(f'{value:.3g}') for value in np.geomspace(low, high, points)]
 
 
-FILTER_TUNINGS = {
+FILTER_TUNINGS = {  # {filter: (name of the tuned parameter, its values, function value -> Source)}; q: process noise
     'cv': ('q [deg/s2/sqrt(Hz)]', _logarithmic(0.05, 50.0, 13), feedforward_loop.cv),
     'ca': ('q [deg/s3/sqrt(Hz)]', _logarithmic(0.05, 500.0, 13), feedforward_loop.ca),
     'current_statistical': ('a_max [deg/s2], alpha 0.5 1/s', _logarithmic(0.5, 1000.0, 13), _current_statistical),
     'imm': ('q of its ca [deg/s3/sqrt(Hz)]', _logarithmic(0.5, 500.0, 10),
             lambda q: feedforward_loop.imm(q_ca=q, predicted=True))}
-"""{filter: (name of the tuned parameter, its values, function value -> Source)}; q: process noise."""
 
 FILTER_MEANINGS = {'cv': 'Kalman filter of constant rate', 'ca': 'Kalman filter of constant acceleration',
                    'current_statistical': "'current' statistical model of paper 000",
@@ -95,10 +92,8 @@ def curve(points: Points, name: str) -> Floats:
 
 
 def frontier(points: Points, name: str) -> Floats:
-    """Return the Pareto frontier of the curve of a filter, an array (2, n) of (rate noise, miss) by rising rate noise.
-
-    It holds the tunings for which no other tuning has both less rate noise and less miss.
-    """
+    """Return the Pareto frontier of the curve of a filter, (2, n) of (rate noise, miss) by rising rate noise: the
+    tunings for which no other tuning has both less rate noise and less miss."""
     kept: list[tuple[float, float]] = []
     for noise, miss in sorted(map(tuple, curve(points, name).T)):
         if not kept or miss < kept[-1][1]:

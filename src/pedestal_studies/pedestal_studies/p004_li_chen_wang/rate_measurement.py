@@ -74,12 +74,11 @@ SETTLING_TIME_S = 5.0  # time of the flyby from which the errors are evaluated [
 DIFFERENCED_RATES = {'differenced-1': 1, 'differenced-20': 20}
 """{case: steps of T over which the measured angles are differenced to a rate}."""
 
-RATE_SOURCE_MEANINGS = {
+RATE_SOURCE_MEANINGS = {  # {case of the flyby: source of its rate}, for the table of the documentation
     'position': 'none: only the angle is measured', 'position-rate': 'sensor of its own, noise 0.1 deg/s',
     'position-rate-0.02': 'sensor of its own, noise 0.02 deg/s',
     'differenced-1': 'difference of the measured angles over one step of 10 ms',
     'differenced-20': 'difference of the measured angles over 20 steps, 0.2 s'}
-"""{case of the flyby: source of its rate}, for the table of the documentation."""
 
 
 class FlybyRecord(typing.NamedTuple):
@@ -93,20 +92,13 @@ NOISE_SEED = 1  # seed of the noise of the flybys
 
 
 def filter_of(a_max: RadiansPerSecond2, floor: float) -> FilterParameters:
-    """Return a 'current' statistical filter that uses the measured rate.
-
-    a_max: largest acceleration of its model; floor: least sigma_a over a_max [-].
-    """
+    """Return a 'current' statistical filter that uses the measured rate; floor: least sigma_a over a_max [-]."""
     model = dataclasses.replace(FilterParameters().current_statistical, alpha=ALPHA, a_max=a_max, floor=floor)
     return FilterParameters(kind='current_statistical', rate_measurement=True, current_statistical=model)
 
 
 @compiled
 def _settle(filters: Records, constants: Records, rate: RadiansPerSecond, R_rate: float, steps: int) -> None:
-    """Run the filter for `steps` on a target at rest.
-
-    rate: measured rate, 0, or NaN without a measured rate. R_rate: its variance [rad2/s2].
-    """
     axis_filter.start(filters[0], constants[0], 0.0, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, 1.0)
     for _ in range(steps):
         axis_filter.predict(filters[0], constants[0], T)
@@ -116,18 +108,14 @@ def _settle(filters: Records, constants: Records, rate: RadiansPerSecond, R_rate
 
 @compiled
 def _step(filters: Records, constants: Records, y: Radians, y_rate: RadiansPerSecond, R_rate: float) -> None:
-    """Run one step of the filter with a measured angle y and a rate y_rate of variance R_rate [rad2/s2]."""
     axis_filter.predict(filters[0], constants[0], T)
     axis_filter.correct(filters[0], constants[0],
                         AxisMeasurement(y, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, y_rate, R_rate))
 
 
 def steady_state_matrices(sigma_a: float, rate_sigma: float) -> tuple[Floats, Floats]:
-    """Return (A (3, 3), B (3, 2)) of X+ = A X + B (y, y') with constant gains.
-
-    sigma_a [deg/s2]; rate_sigma: noise of the measured rate [deg/s], NaN without a measured rate. B then has a column
-    of zeros for the rate.
-    """
+    """Return (A (3, 3), B (3, 2)) of X+ = A X + B (y, y') with constant gains; rate_sigma: noise of the rate [deg/s],
+    NaN without a measured rate, for which B has a column of zeros."""
     c = axis_filter.constants(filter_of(math.radians(sigma_a), 1.0))        # floor 1: sigma_a = a_max at all times
     R_rate = math.radians(rate_sigma) ** 2
     zero_rate = 0.0 if math.isfinite(R_rate) else math.nan
@@ -181,20 +169,15 @@ CASES = {name if sigma_a == MAIN_SIGMA_DEG_S2 else f'{name}/sigma_a-{sigma_a:g}'
 
 
 def differenced_rate(y: Floats, steps: int) -> tuple[Floats, float]:
-    """Return (rate [rad/s], its variance) from differences of angles y [rad] over `steps` T.
-
-    The first `steps` rates are NaN.
-    """
+    """Return (rate [rad/s], its variance) from differences of angles y [rad] over `steps` T, the first `steps` NaN."""
     rate = np.full(len(y), math.nan)
     rate[steps:] = (y[steps:] - y[:-steps]) / (steps * T)
     return rate, 2.0 * (ANGLE_SIGMA_RAD / (steps * T)) ** 2
 
 
 def filtered(t: Times, target: Vectors3, y: Floats, y_rate: Floats, R_rate: float) -> Records:
-    """Return the axis_filter.Estimate (n,) of the filter from measured angles y [rad] and rates y_rate [rad/s].
-
-    target: true angle, rate and acceleration. R_rate: variance of y_rate [rad2/s2].
-    """
+    """Return the axis_filter.Estimate (n,) from measured angles y [rad] and rates y_rate [rad/s] of variance R_rate;
+    target: true angle, rate and acceleration."""
     c = axis_filter.constants(filter_of(MAX_ACCELERATION_RATIO * np.abs(target[:, 2]).max(), MIN_SIGMA_RATIO))
     out = np.zeros(len(t), axis_filter.Estimate.dtype)
     axis_filter.estimates(c, t, y, np.full(len(t), ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD), y_rate, np.full(len(t), R_rate),
@@ -209,10 +192,7 @@ def flyby() -> tuple[Times, Vectors3]:
 
 
 def flyby_record(name: str, run: int) -> FlybyRecord:
-    """Return the record of one flyby.
-
-    name: one of FLYBY_CASES. The noise depends only on `run`.
-    """
+    """Return the record of one flyby of one of FLYBY_CASES. The noise depends only on `run`."""
     t, target = flyby()
     normals = ensemble.normal_draws(NOISE_SEED, run, 1, len(t))[:, 0]
     y = target[:, 0] + ANGLE_SIGMA_RAD * normals[0]
@@ -239,10 +219,8 @@ METRIC_TARGETS = {('position-rate', 'rate_bandwidth_ratio'): '>= 1.5',
 
 
 def rows(measured: Mapping[str, Metrics], errors: Mapping[str, Pairs]) -> list[Row]:
-    """Return the rows of measured {case: as of `measures`} and errors {name of FLYBY_CASES: rms of every run}.
-
-    The rms are in [deg, deg/s].
-    """
+    """Return the rows of measured {case: as `measures`} and errors {name of FLYBY_CASES: rms [deg, deg/s] of every
+    run}."""
     table = []
     for name, values in measured.items():
         table += [row(name, metric, value, unit, target='< 1' if metric == 'largest_eigenvalue' else None)

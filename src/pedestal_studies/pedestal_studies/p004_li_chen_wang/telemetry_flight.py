@@ -78,10 +78,8 @@ def flight() -> tuple[Times, dict[str, Vectors3]]:
 
 
 def flight_record(axis: str, run: int) -> tuple[Vectors3, Vectors3]:
-    """Return (measured, filtered) angle, rate and acceleration of one flight.
-
-    The noise depends only on the axis and the run.
-    """
+    """Return (measured, filtered) angle, rate and acceleration of one flight. The noise depends only on axis and
+    run."""
     t, target = flight()
     truth = target[axis]
     nu, nu_rate = ensemble.normal_draws(NOISE_SEED + AXES.index(axis), first=run, count=1, n=len(t))[:, 0]
@@ -164,10 +162,7 @@ def figures() -> Drawings:
 
 
 def axis_figure(axis: str, first_number: int) -> Figure:
-    """Draw angle, a part of it, rate and acceleration of one flight, measured, filtered and true.
-
-    first_number: number of the first of the paper's four figures.
-    """
+    """Draw angle, a part of it, rate and acceleration of one flight; first_number: of the paper's four figures."""
     figure, axes = fig.new_panels(4, height=9.0)
     t, target = flight()
     measured, filtered = flight_record(axis, run=0)

@@ -1,13 +1,9 @@
 """Acquisition: time to track a target, from power-up or after a loss, and share of searches that find the target.
 
-A case <scenario> runs the closed loop of a scenario with many seeds. In late_tle the satellite is 1 to 3 s late. A
-case search-<pattern> has one round of a search. Its target stands still anywhere in the searched area, with equal
-probability. The case steptrack_geo tracks a geostationary satellite by its signal level alone and has other metrics.
-
-tracked_after_s     time from the start, or from the loss of the signal, until the antenna remains in autotrack with
-                    the receiver locked
-found_percent       share of the runs that end in autotrack with the target in the beam
-found_percent_low   lower limit of its 95 % interval (Clopper and Pearson 1934)
+In late_tle the satellite is 1 to 3 s late. A case search-<pattern> has one round of a search. Its target stands still
+anywhere in the searched area, with equal probability. The case steptrack_geo tracks a geostationary satellite by its
+signal level alone and has other metrics. tracked_after_s is the time until the antenna remains in autotrack with the
+receiver locked. found_percent is the share of the runs that end so with the target in the beam.
 """
 import math
 from collections.abc import Mapping
@@ -76,8 +72,8 @@ def case_of(name: str, seed: int) -> Case:
 def offset(pattern: int, rng: np.random.Generator, beamwidth: Radians = 0.0175) -> tuple[Radians, Radians]:
     """Return the (cross-elevation, elevation) of a random place in the full search area, from its centre.
 
-    pattern: code of the search pattern. beamwidth: that of the scenario sidelobe. The area of a spiral and of a square
-    pattern is a circle; a place outside the circle is drawn again. The area of the other patterns is a rectangle.
+    The area of a spiral and of a square pattern is a circle; a place outside the circle is drawn again. The area of
+    the other patterns is a rectangle.
     """
     p = SearchParameters()
     while True:
@@ -89,10 +85,8 @@ def offset(pattern: int, rng: np.random.Generator, beamwidth: Radians = 0.0175) 
 
 
 def tracked_after(run: Run, from_loss: bool) -> Seconds:
-    """Return the time until the target is tracked for the rest of the run; NaN if it is not tracked at the end.
-
-    from_loss: True to measure the time from the first loss of the signal in autotrack, False from the start.
-    """
+    """Return the time until the target is tracked for the rest of the run, or NaN; from_loss: True to measure from the
+    first loss of the signal in autotrack, False from the start."""
     tracked = (run[MODE_TOPIC] == Mode.AUTOTRACK) & np.isfinite(run[ERROR_TOPIC]['vector'][:, 0])
     if not tracked[-1]:
         return math.nan
@@ -111,10 +105,8 @@ def off_axis(run: Run) -> Floats:
 
 
 def measured(name: str, number: int) -> tuple[float, float]:
-    """Return tracked_after_s of one run, and 1 if the target is in the beam at the end, else 0.
-
-    For steptrack_geo, return the rms of the lost level [dB] and the largest error [beamwidths].
-    """
+    """Return tracked_after_s of one run, and 1 if the target is in the beam at the end, else 0. For steptrack_geo,
+    return the rms of the lost level [dB] and the largest error [beamwidths]."""
     run = case_of(name, FIRST_SEED + number).run()
     off = off_axis(run)
     if name == 'steptrack_geo':

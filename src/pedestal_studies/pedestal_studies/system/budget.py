@@ -135,10 +135,8 @@ class Pass:
 
 
 def _run(mode: str, on: str, seed: int, duration: Seconds | None) -> Run:
-    """Return the run of a mode, with a step every EVALUATION_PERIOD_S from EVALUATION_START_S on.
-
-    on: as of `overrides`. duration: length of the run, None for that of the scenario.
-    """
+    """Return the run of a mode, with a step every EVALUATION_PERIOD_S from EVALUATION_START_S on; on: as of
+    `overrides`; duration: None for that of the scenario."""
     chosen = scenario.load(SCENARIO_NAME, [*overrides(mode, on), f'adu.wind.field.seed={seed}'], seed=seed,
                            duration=duration)
     run = closed_loop.Loop(chosen).run()
@@ -188,11 +186,8 @@ class Budget:
 
     @property
     def random(self) -> dict[str, Floats]:
-        """Random contributions {name: (runs, n, 2)}: deviations from the mean over the runs.
-
-        Because the mean of n runs follows their errors, the deviations are too small. The factor sqrt(n / (n - 1))
-        corrects this.
-        """
+        """Random contributions {name: (runs, n, 2)}: deviations from the mean over the runs. Because this mean follows
+        the errors, the deviations are too small; the factor sqrt(n / (n - 1)) corrects this."""
         off = {'noise': self.base} if len(self.base) > 1 else {}
         return {name: (e - e.mean(axis=0)) * np.sqrt(len(e) / (len(e) - 1.0))
                 for name, e in (off | self.seeded).items()}
@@ -227,7 +222,6 @@ def budget(mode: str, runs: int, duration: Seconds | None, pool: Pool | None, pr
 
 
 def _sizes(case: str, e: Floats) -> list[Row]:
-    """Return the rows of the rms of an error e (n, 2), or of the error of several runs (runs, n, 2) [deg]."""
     return [row(case, 'rms_deg', rms(e), 'deg'),
             *(row(case, f'{axis}_rms_deg', tracking.rms(e[..., i], axis=-1), 'deg')
               for i, axis in enumerate(ERROR_COLUMNS))]

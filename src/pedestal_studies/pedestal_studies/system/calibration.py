@@ -5,18 +5,13 @@ run has its own seed of receiver noise and wind:
 
     1. four passes in autotrack, which begin with a search, on a calm day with measured refractivity; `calibrate
        pointing` takes POINTS_PER_PASS offsets from each of them
-    2. four scans of the sun on the same days, scenario station_sun; `calibrate pointing` takes an offset from each of
-       them, 40 offsets in all
+    2. four scans of the sun on the same days, scenario station_sun; an offset from each of them
     3. a fifth pass in program track, in directions that were not used, with the wind and the refractivity of the
-       scenario: the pointing error without a model (`raw`), and with the model of steps 1 and 2
-       (`calibrated`)
+       scenario: the pointing error without a model (`raw`), and with the model of TERMS (`calibrated`)
 
-The model has the default terms and those of the eccentric encoders (TERMS). `leave_one_out_default_rms_deg` is the
-leave-one-out rms of the default terms alone, by which an operator decides for more terms.
-
-The rows of case `terms` state the terms of the model and their true values. `within_3_sigma` is the share of the
-terms, over all runs, whose error is below three of their sigmas; `cases` is their number. A term that was dropped
-counts with the value 0 and the sigma that it had before.
+`leave_one_out_default_rms_deg` is that of the default terms alone, by which an operator decides for more terms.
+`within_3_sigma` is the share of the terms, over all runs, whose error is below three of their sigmas. A term that was
+dropped counts with the value 0 and the sigma that it had before.
 """
 import functools
 import math
@@ -68,12 +63,8 @@ EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1  # start and period of the e
 
 def of_pass(begin: str, seed: int, changes: Sequence[str] = (), duration: Seconds | None = None,
             name: str = SCENARIO_NAME, low: Radians = -np.pi) -> Scenario:
-    """Return the scenario of a pass or a scan that begins at a UTC.
-
-    The antenna begins at the first predicted direction.
-
-    low: least azimuth at which the antenna begins
-    """
+    """Return the scenario of a pass or a scan that begins at a UTC. The antenna begins at the first predicted
+    direction; low: least azimuth at which it begins."""
     chosen = [f'tracking_receiver.target.leo_pass.start_time={begin}', f'adu.wind.field.seed={seed}', *changes]
     _, angles = Plan(scenario.load(name, chosen, seed, duration)).tables['']
     azimuth, elevation = float(np.remainder(angles[0, 0] - low, 2.0 * np.pi) + low), float(angles[0, 1])
@@ -89,10 +80,8 @@ def offsets_of(begin: str, seed: int, duration: Seconds | None = None) -> tuple[
 
 
 def offset_of_sun(begin: str, seed: int) -> tuple[str, list[Point]]:
-    """Return (label, points) of a scan of the sun, for collect.joined.
-
-    The azimuth begins on the turn of the wrap that holds the whole day of the sun.
-    """
+    """Return (label, points) of a scan of the sun, for collect.joined. The azimuth begins on the turn of the wrap that
+    holds the whole day of the sun."""
     chosen = of_pass(begin, seed, SCAN_OVERRIDES, None, SCAN_SCENARIO_NAME, -1.5 * np.pi)
     return begin, collect.listed('scan', scan.points(memory_recording.record(chosen), [])[:3])
 
@@ -119,10 +108,8 @@ def measured(seed: int, duration: Seconds | None = None) -> Offsets:
 
 
 def bending(axis: AxisParameters) -> Radians:
-    """Return the largest deflection of the dish by its unbalance, at elevation 0.
-
-    The stiffness of the structure follows from the frequency at which the dish swings on it.
-    """
+    """Return the largest deflection of the dish by its unbalance, at elevation 0, on a structure whose stiffness
+    follows from the frequency at which the dish swings on it."""
     structure, load = axis.structure, axis.load
     return load.unbalance / ((2.0 * math.pi * structure.frequency)**2 * structure.inertia_share * load.inertia)
 
@@ -161,7 +148,6 @@ def numbers_of_run(case: None, run: int, duration: Seconds | None) -> list[float
 
 
 def _of_terms(found: Calibration) -> tuple[float, ...]:
-    """Return the values of TERMS, then their sigmas."""
     values = dict(zip(found.fit.names, zip(found.fit.values, found.fit.sigma)))
     values |= {name: (0.0, sigma) for name, _, sigma in found.dropped}
     return *(values[name][0] for name in TERMS), *(values[name][1] for name in TERMS)

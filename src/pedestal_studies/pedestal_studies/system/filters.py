@@ -109,10 +109,7 @@ def noise_of(noise: str, name: str) -> Noise:
 
 
 def measured(params: FilterParameters, profile: str, noise: Noise, seed: int, first: int, count: int) -> Records:
-    """Return ensemble.Moments (count, n) of one filter.
-
-    The runs are first ... first + count - 1.
-    """
+    """Return ensemble.Moments (count, n) of one filter in the runs first ... first + count - 1."""
     t = times()
     truth = profiles.truth(profile, t)
     return ensemble.moments(params, t, truth, noise, ensemble.records(truth, noise, seed, first, count))
@@ -142,10 +139,8 @@ THINNING_STEPS = 10  # steps between two measurements that the figures show
 
 
 def batch(item: tuple[str, str, dict[str, FilterParameters], int, int]) -> dict[str, tuple[Records, Records]]:
-    """Return {filter: (Moments (count,) of every run, Moments of all runs at the drawn times)} of an item.
-
-    An item is (profile, noise, {filter: parameters}, first run, number of runs).
-    """
+    """Return {filter: (Moments (count,) of every run, Moments of all runs at the drawn times)} of an item (profile,
+    noise, {filter: parameters}, first run, number of runs)."""
     profile, noise, filters, first, count = item
     sums_of: dict[str, tuple[Records, Records]] = {}
     for name, params in filters.items():
@@ -161,10 +156,7 @@ def batch(item: tuple[str, str, dict[str, FilterParameters], int, int]) -> dict[
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None, on: Sequence[str] = profiles.PROFILES,
         noises: Sequence[str] = tuple(NOISE_CASES)) -> Result:
-    """Compare all filters in `runs` runs of each case.
-
-    on: names of profiles; noises: names of NOISE_CASES.
-    """
+    """Compare all filters in `runs` runs of each case; on: names of profiles; noises: names of NOISE_CASES."""
     pool = pool or monte_carlo.Pool(1)
     applicable = {noise: [name for name in FILTERS if NOISE_CASES[noise].bandwidth
                           or name not in NOISE_AWARE_FILTERS] for noise in noises}
@@ -194,10 +186,9 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None, 
 def metrics(sums: Records) -> dict[str, tuple[Floats, str]]:
     """Return {metric: (values (runs,), unit)} of Moments (runs,).
 
-    `reduction`: rms of the measured angle over that of the estimate. nis, nees: normalised innovation squared and
-    normalised estimation error squared. `..._over_sigma`: rms error over the sigma that the filter states. A
-    consistent filter has a nis_mean equal to its degrees of freedom. Its nees_mean (angle and rate, per degree of
-    freedom) and both ..._over_sigma are 1.
+    `reduction`: rms of the measured angle over that of the estimate. `..._over_sigma`: rms error over the sigma that
+    the filter states. A consistent filter has a nis_mean equal to its degrees of freedom. Its nees_mean (angle and
+    rate, per degree of freedom) and both ..._over_sigma are 1.
     """
     angle, rate, raw = (ensemble.rms(sums, name) for name in ('angle', 'rate', 'raw'))
     n = sums['runs']
@@ -221,7 +212,6 @@ def shown(table: list[Row]) -> list[Row]:
 
 
 def _cell(measured: Mapping[str, float] | None) -> str:
-    """Return a cell of the printed table, 34 characters."""
     if measured is None:
         return 34 * ' '
     return (f'{measured["angle_rms_deg"]:.4f} ({measured["reduction"]:.1f})  {measured["rate_rms_deg_s"]:.4f}  '
@@ -229,10 +219,7 @@ def _cell(measured: Mapping[str, float] | None) -> str:
 
 
 def remarks(values: Means, tuned: Mapping[tuple[str, str], Mapping[str, FilterParameters]], runs: int) -> list[str]:
-    """Return the sentences that explain the rows, with a table of the profiles.
-
-    tuned: {(profile, noise): {filter: its parameters}}.
-    """
+    """Return the sentences that explain the rows, with a table of the profiles; tuned: {(profile, noise): filters}."""
     lines = [f'{runs} runs of each case. The columns are angle rms [deg] (reduction), rate rms [deg/s], and the error '
              f'over own sigma of angle and rate, for the noise {SHOWN_NOISE} deg. --json gives the rows of all cases.']
     on = [profile for profile, noise in tuned if noise == SHOWN_NOISE]
@@ -286,10 +273,7 @@ FILTER_COLOURS = {'current_statistical': fig.RAW_COLOUR, 'current_statistical-ra
 
 
 def errors_figure(over_time: Mapping[CaseName, Records], on: Sequence[str], what: str = 'angle') -> Figure:
-    """Draw the error over time: mean +-1 sigma over the runs, and dashed the sigma that the filter states.
-
-    over_time: {case: Moments of all runs at the drawn times}; on: names of profiles, here and below.
-    """
+    """Draw the error over time: mean +-1 sigma over the runs, and dashed the sigma that the filter states."""
     unit = 'deg' if what == 'angle' else 'deg/s'
     figure, axes = fig.new_panels(len(on), len(FILTER_COLOURS), height=1.0 + 1.4 * len(on),
                                   y=[f'{profile}\n[{unit}]' for profile in on], sharex=True, sharey='row')
@@ -322,11 +306,8 @@ def profile_panels(on: Sequence[str]) -> tuple[Figure, fig.Panels]:
 
 def bars(values: Means, on: Sequence[str], metric: Callable[[str, Mapping[str, float]], float], label: str,
          colour: Callable[[str], str], text: Callable[[str, Mapping[str, float]], str]) -> tuple[Figure, fig.Panels]:
-    """Return (figure, panels) with a panel of bars for each profile.
-
-    metric, text: functions (filter, its metrics) that return the length of a bar and the text at its end. label: of
-    the x axis. colour: function that returns the colour of a filter.
-    """
+    """Return (figure, panels) with a panel of bars for each profile; metric, text: functions (filter, its metrics)
+    that return the length of a bar and the text at its end; colour: of a filter."""
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
         measured = {name: values.get((profile, name, SHOWN_NOISE)) for name in SHOWN_FILTERS}
@@ -343,7 +324,6 @@ def bars(values: Means, on: Sequence[str], metric: Callable[[str, Mapping[str, f
 
 
 def _colour(name: str) -> str:
-    """Return the colour of a filter in a figure."""
     if name in UNTUNED_FILTERS:
         return fig.TRUTH_COLOUR
     return fig.FILTERED_COLOUR if name in RATE_SIGMAS_RAD_S else fig.RAW_COLOUR

@@ -1,9 +1,8 @@
 """Scenarios over many seeds: the results of `pedestal run`, with confidence intervals over the seeds.
 
-Every run is the closed loop of the scenario without ROS, with another seed. The results are computed as from a
-recording of the run. Cases are <scenario> or <scenario>-<variant>; CASES gives the parameters that a variant changes.
-A ratio to another case divides the results of two runs with the same seed. `pedestal run --explain` defines the
-metrics, except the metrics of `extra_results`.
+Every run is the closed loop of the scenario without ROS, with another seed. Cases are <scenario> or
+<scenario>-<variant>. A ratio to another case divides the results of two runs with the same seed. `pedestal run
+--explain` defines the metrics, except the metrics of `extra_results`.
 """
 import math
 from collections.abc import Mapping
@@ -35,14 +34,13 @@ NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 120.0, 'acu.track
 less assumed noise, the filter would take even the smallest deviation of the target from the motion model for motion,
 not for noise."""
 
-CASES = {case.name: case for case in (
+CASES = {case.name: case for case in (  # {name: Case}
     Case('leo_pass', 'leo_pass'), Case('ship_pass', 'ship_pass'),
     Case('ship_pass-late', 'ship_pass', {'ins.latency': 0.02}),
     Case('ship_pass-quiet', 'ship_pass', NOISELESS_PARAMETERS),
     Case('ship_pass_ss6', 'ship_pass_ss6'), Case('ship_overhead', 'ship_overhead'),
     Case('ship_align_and_track', 'ship_align_and_track'), Case('uav_flyby', 'uav_flyby'),
     Case('uav_flyby-60m', 'uav_flyby', NEAR_FLYBY_PARAMETERS))}
-"""{name: Case}."""
 
 TRACKING_METRICS = ('pointing_rms_deg', 'pointing_max_deg', 'single_sample_noise_deg', 'pointing_to_noise', 'loss_s')
 """Results of the pointing error."""
@@ -54,19 +52,18 @@ NOISE_METRICS = ('noise_reduction_cross_elevation', 'noise_reduction_elevation')
 ALIGNMENT_METRICS = ('aligned_s', 'heading_sigma_at_alignment_deg', 'heading_error_rms_deg',
                      'autotrack_after_alignment_s')
 """Results of the alignment of the INS, and of the autotrack that follows it."""
-CASE_METRICS = {
+CASE_METRICS = {  # {case: names of its results}, of pedestal_results/results.py or of `extra_results`
     'leo_pass': TRACKING_METRICS, 'ship_pass': (*TRACKING_METRICS, *ISOLATION_METRICS),
     'ship_pass-late': (*TRACKING_METRICS, *ISOLATION_METRICS),
     'ship_pass-quiet': ('pointing_rms_deg', 'isolation_db'), 'ship_pass_ss6': (*TRACKING_METRICS, *ISOLATION_METRICS),
     'ship_overhead': ('loss_s', 'keyhole_loss_predicted_s', 'loss_to_predicted'),
     'ship_align_and_track': (*ALIGNMENT_METRICS, *TRACKING_METRICS), 'uav_flyby': (*TRACKING_METRICS, *NOISE_METRICS),
     'uav_flyby-60m': (*TRACKING_METRICS, *NOISE_METRICS)}
-"""{case: names of its results}, of pedestal_results/results.py or of `extra_results`."""
 
 SHIP_CASES = ('ship_pass', 'ship_pass-late', 'ship_pass_ss6')
 """Cases whose pointing is compared with the pointing of leo_pass."""
 
-METRIC_TARGETS = {
+METRIC_TARGETS = {  # {(case, metric): target}
     **{(case, 'pointing_to_noise'): '<= 0.4' for case in ('leo_pass', 'ship_pass', 'ship_pass-late')},
     ('ship_pass', 'pointing_to_leo_pass'): '<= 1.3', ('ship_pass-late', 'pointing_to_leo_pass'): '<= 1.5',
     ('ship_pass_ss6', 'pointing_to_leo_pass'): '<= 1.5',
@@ -75,7 +72,6 @@ METRIC_TARGETS = {
     ('ship_overhead', 'loss_to_predicted'): '0.8 to 1.2',
     **{('uav_flyby', metric): '>= 7' for metric in NOISE_METRICS},
     **{('uav_flyby-60m', metric): '>= 3' for metric in NOISE_METRICS}}
-"""{(case, metric): target}."""
 
 EXTRA_METRIC_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 'autotrack_after_alignment_s': 's'}
 """{metric of `extra_results`: unit}."""

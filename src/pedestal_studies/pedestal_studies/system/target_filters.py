@@ -1,14 +1,9 @@
 """The default target filter beside filters tuned for one target each: pointing in the closed loop.
 
-Cases are <target>/<filter>:
-
-default               target filter with its default parameters
-tuned                 filter of one motion model, whose process noise gives the smallest pointing error at this target
-manoeuvre             IMM that expects a manoeuvre at any time
-current-statistical   filter of paper 000 with its default a_max, the largest acceleration of its model
-
-A ratio divides the pointing error of a case by that of `tuned` under the same seed. A target whose name ends in -ship
-is seen from the deck of the scenario ship_pass. The targets that manoeuvre hard are those of HARD_TARGETS.
+Cases are <target>/<filter>. The filter `tuned` has one motion model, whose process noise gives the smallest pointing
+error at this target. `manoeuvre` is an IMM that expects a manoeuvre at any time. `current-statistical` is the filter
+of paper 000 with its default a_max. A ratio divides the pointing error of a case by that of `tuned` under the same
+seed. A target whose name ends in -ship is seen from the deck of the scenario ship_pass.
 """
 import dataclasses
 import functools
@@ -40,12 +35,10 @@ STEP_RATE_HZ = 100.0  # rate of the rows of a table
 
 
 def _seen(east: Floats, north: Floats, up: Floats) -> tuple[Floats, Floats]:
-    """Return (azimuth, elevation) of positions [m]."""
     return np.unwrap(np.arctan2(east, north)), np.arctan2(up, np.hypot(east, north))
 
 
 def _integrated(t: Times, rate: Floats, start: float) -> Floats:
-    """Return the integral of `rate` (n,) over t by the rule of the trapezium, from a value `start`."""
     return start + np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))))
 
 
@@ -77,11 +70,8 @@ def launch_vehicle(t: Times) -> tuple[Floats, Floats]:
 
 def _turning(t: Times, speed: MetersPerSecond, turn: Radians, leg: Seconds, load: float,
              start: tuple[Meters, Meters, Meters]) -> tuple[Floats, Floats]:
-    """Return (azimuth, elevation) of an aircraft that turns left and right alternately, with straight legs between.
-
-    turn: angle of each turn; leg: duration of a straight leg; load: lateral acceleration [g]; start: position at the
-    start, on the way to the east.
-    """
+    """Return (azimuth, elevation) of an aircraft that turns left and right alternately, with straight legs of duration
+    `leg` between; turn: angle of each turn; load: lateral acceleration [g]."""
     rate = load * G_M_S2 / speed
     half, r = np.divmod(t, leg + turn / rate)
     turning = np.where(r >= leg, rate, 0.0) * (1.0 - 2.0 * (half % 2))
@@ -119,13 +109,12 @@ FIXED_TARGET_PARAMETERS = {'tracking_receiver.target.kind': 'step', f'{ANGLE_PRE
                            f'{ANGLE_PREFIX}.elevation_amplitude': 0.0, f'{ANGLE_PREFIX}.range': 5e5}
 """Parameters of a target that stands still, with the C/N0 of a satellite."""
 
-TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {
+TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {  # {target: (scenario, parameters that it changes)}
     'uav-60m': ('uav_flyby', {f'{FLYBY_PREFIX}.closest_distance': 60.0, f'{FLYBY_PREFIX}.height': 20.0}),
     'uav-150m': ('uav_flyby', {f'{FLYBY_PREFIX}.closest_distance': 150.0, f'{FLYBY_PREFIX}.height': 40.0}),
     'uav-500m': ('uav_flyby', {}), 'leo': ('leo_pass', {}), 'geo': ('leo_pass', FIXED_TARGET_PARAMETERS),
     'leo-ship': ('ship_pass', {}), 'leo-ship-ss6': ('ship_pass_ss6', {}),
     'geo-ship': ('ship_pass', FIXED_TARGET_PARAMETERS)}
-"""{target: (scenario, parameters that it changes)}."""
 
 HARD_TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {
     'ashore': ('track_file', {}), 'ship': ('ship_pass', {'tracking_receiver.target.kind': 'track_file'})}
@@ -137,17 +126,14 @@ HARD_TARGET_DURATION_S = 60.0
 
 
 def _both(**changes: Json) -> dict[str, Json]:
-    """Return parameters of the control unit with the same changes for the filters of both axes."""
     return {f'{axis}.filter.{name}': value for axis in ('azimuth', 'elevation') for name, value in changes.items()}
 
 
 def _one(kind: str, azimuth: float, elevation: float) -> dict[str, Json]:
-    """Return parameters of a filter cv or ca with a noise in each axis."""
     return {**_both(kind=kind), f'azimuth.filter.{kind}.noise': azimuth, f'elevation.filter.{kind}.noise': elevation}
 
 
 def _singer(alpha: float, sigma_deg: float) -> dict[str, Json]:
-    """Return parameters of a filter singer: alpha [1/s], sigma [deg/s2]."""
     return _both(kind='singer', **{'singer.alpha': alpha, 'singer.sigma': math.radians(sigma_deg)})
 
 
@@ -165,7 +151,6 @@ HARD_TARGETS had two seeds from 101 on. The other targets had three seeds, and a
 
 
 def _ashore(target: str) -> str:
-    """Return the name that a target has ashore."""
     return target.partition(SHIP_SUFFIX)[0]
 
 
@@ -176,10 +161,9 @@ def filters(target: str) -> dict[str, dict[str, Json]]:
             'current-statistical': _both(kind='current_statistical')}
 
 
-CASES = {f'{target}/{name}': Case(f'{target}/{name}', at, {
+CASES = {f'{target}/{name}': Case(f'{target}/{name}', at, {  # {name: Case}
     **parameters, **{f'acu.{key}': value for key, value in changes.items()}})
     for target, (at, parameters) in TARGET_SCENARIOS.items() for name, changes in filters(target).items()}
-"""{name: Case}."""
 
 MAX_POINTING_RATIO = 1.15
 """Largest permitted ratio of the pointing with the default filter to the pointing with the tuned filter."""
@@ -187,7 +171,6 @@ MAX_POINTING_RATIO = 1.15
 
 @functools.cache
 def _folder() -> tempfile.TemporaryDirectory[str]:
-    """Return the folder of the tables of hard targets; it ends with the process."""
     return tempfile.TemporaryDirectory(prefix='pedestal-targets-')
 
 
