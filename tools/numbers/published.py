@@ -1,10 +1,7 @@
 """The numbers of the documentation: rows of the studies, kept in docs/rows.json, and the tables made from these rows.
 
-`python -m tools.numbers.published [STUDY ...]` (`make numbers`) runs all published studies, or the named studies only.
-The program writes the rows that the tables use. `make docs` writes the tables from these rows.
-
-A row is a measured number with study, case, metric, value, unit, interval and target. A table is (heads of the
-columns, lines of cells).
+`python -m tools.numbers.published [STUDY ...]` (`make numbers`) runs all published studies, or the named studies only,
+and writes the rows that the tables use. `make docs` writes the tables from these rows.
 """
 import dataclasses
 import inspect
@@ -113,23 +110,18 @@ def write(rows: Rows, root: str | pathlib.Path = '.') -> None:
 
 
 def _cells(row: Row) -> tuple[str, str, str]:
-    """Return the texts of a row: value with unit, interval, number of runs."""
     value = f'{row_text.number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
     return value, row_text.interval(row), str(row.get('runs', ''))
 
 
 def _target_text(row: Row) -> str:
-    """Return the target of a row with its unit, marked MISSED if the row misses it."""
     if row['target'] is None:
         return ''
     return ' '.join(filter(None, (row['target'], row['unit'].removeprefix('-'), 'MISSED' if missed(row) else '')))
 
 
 def _spread(row: Row) -> str:
-    """Return the mean of a row and half its interval to two digits, 'a +- b'.
-
-    Return the mean alone if all runs give the same value.
-    """
+    """Return the mean of a row and half its interval to two digits, or the mean alone if all runs are equal."""
     half = 0.5 * (row['ci_high'] - row['ci_low']) if 'runs' in row else 0.0
     if half <= 1e-9 * abs(row['value']):
         return row_text.number(row['value'])
@@ -158,7 +150,6 @@ class Line(typing.NamedTuple):
 
 
 def _line(labels: tuple[str, ...], case: str, *metrics: str) -> Line:
-    """Return the line of metrics of one case."""
     return Line(labels, [(case, metric) for metric in metrics])
 
 
@@ -181,7 +172,7 @@ class Numbers:
 
 
 def claim_table(paper: str) -> Maker:
-    """Return the function that makes the table of the claims of a paper; paper: its number, such as '000'."""
+    """Return the function that makes the table of the claims of a paper."""
     def table(rows: Rows) -> Content:
         lines = []
         for claim in claims.CLAIMS_BY_PAPER[paper]:
@@ -199,7 +190,6 @@ COLOURED_NOISE = filters.SHOWN_NOISE.replace('white', 'coloured')
 
 
 def _filter_cells(case: str) -> list[tuple[str, str]]:
-    """Return the cells of a filter on a motion; case: motion/filter."""
     white = [(f'{case}/{filters.SHOWN_NOISE}', metric) for metric in (
         'angle_rms_deg', 'reduction', 'rate_rms_deg_s', 'nis_mean', 'rate_over_sigma')]
     return [*white, (f'{case}/{COLOURED_NOISE}', 'reduction')]
@@ -328,13 +318,12 @@ MDEG_PER_DEG = 1e3
 
 
 def _milli(row: Row) -> str:
-    """Return a row in degrees as text in millidegrees, mean and half its interval."""
     return _spread({key: value * MDEG_PER_DEG if key in ('value', 'ci_low', 'ci_high') else value
                     for key, value in row.items()})
 
 
 def budget_table(mode: str) -> Maker:
-    """Return the function that makes the table of the error budget of a mode: each term alone, then the sums."""
+    """Return the function that makes the table of the error budget of a mode."""
     sums = {'systematic': ('', 'sum of the systematic terms, added as signed vectors'),
             'whole': ('', 'runs with every term on')}
 
@@ -383,10 +372,8 @@ PUBLISHED_STUDIES = tuple(dict.fromkeys((  # names of the studies whose rows are
 
 
 def main(names: Sequence[str] = (), root: str | pathlib.Path = '.') -> int:
-    """Run PUBLISHED_STUDIES with their default number of runs and write ROWS_FILE. Return exit code 0.
-
-    names: studies to run, () for all; the rows of the other studies stay. root: folder of the checkout.
-    """
+    """Run PUBLISHED_STUDIES, or `names` alone, with their default number of runs and write ROWS_FILE. Return exit code
+    0."""
     rows_of = json.loads(pathlib.Path(root, ROWS_FILE).read_text()) if names else {}
     with monte_carlo.Pool() as pool, console.progress_of_share() as progress:
         for name in names or PUBLISHED_STUDIES:

@@ -10,7 +10,7 @@ import importlib
 import pathlib
 import types
 
-STUDIES = {
+STUDIES = {  # {folder: its modules that are studies}; a name has hyphens for the underscores of its module
     'p000_ma': ('backlash', 'bode', 'filter_families', 'servo'),
     'p001_zhou_yang_qin': ('alignment', 'alignment_speed'),
     'p002_jia': ('phased_array',),
@@ -18,7 +18,6 @@ STUDIES = {
     'p004_li_chen_wang': ('rate_measurement', 'telemetry_flight'),
     'system': ('acquisition', 'budget', 'calibration', 'consistency', 'faults', 'filters', 'scenarios',
                'target_filters')}
-"""{folder: its modules that are studies}. The name of a study has hyphens for the underscores of its module."""
 
 _STUDY_MODULES = {module.replace('_', '-'): f'{folder}.{module}'
                   for folder, modules in STUDIES.items() for module in modules}

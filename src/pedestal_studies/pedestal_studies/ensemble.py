@@ -31,12 +31,10 @@ from pedestal_studies import profiles
 
 MEASUREMENT_PERIOD_S = 0.01  # time between measurements in all studies of filters [s]
 
-INITIAL_RATE_SIGMA_RAD_S = TrackerParameters().initial_rate
-"""Standard deviation of the rate that a filter assumes at its start [rad/s]."""
+INITIAL_RATE_SIGMA_RAD_S = TrackerParameters().initial_rate  # that a filter assumes at its start [rad/s]
 
 
 ESTIMATE_TYPE, UNSCENTED_TYPE = axis_filter.Estimate.dtype, unscented.State.dtype
-"""Types of records that a compiled law makes; it cannot take them from their class."""
 
 
 class Moments(Record):

@@ -35,7 +35,6 @@ settling time over the size of the step [-]; periods of the sine, of which the f
 GUST_START_S, STANDSTILL_START_S = 4.0, 5.0  # start of the gust; start of the evaluated standstill after the step [s]
 
 BIAS_PARAMETERS = {'': {}, '/bias-off': {f'adu.{name}.bias.schedule': 'off' for name in AXES}}
-"""{suffix of a case: parameters}: with the bias torque of the scenario, and without bias torque."""
 
 REST_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'scenario.program.source': 'none', 'acu.initial_mode': 'preset',
                    **{f'adu.initial_{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
@@ -176,4 +175,3 @@ def _figure(kind: str, run: Run) -> Figure:
 
 
 PLANT_STUDIES = {'backlash': backlash_study, 'bode': bode_study, 'servo': servo_study}
-"""{study: function(source, progress) -> Result} of the studies that measure any plant."""

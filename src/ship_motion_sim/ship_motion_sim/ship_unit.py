@@ -108,10 +108,7 @@ class ShipMotion(Simulated):
         return ship['pieces'] > 0 and self.parts['last'] * 1e-9 > ship['breaks'][ship['pieces'] - 1]
 
     def diagnose(self) -> Diagnosis:
-        """Return the Diagnosis, with roll and pitch as its values.
-
-        The level is ERROR if truth or IMU is not valid, and WARN past the end of a recorded motion.
-        """
+        """Return the Diagnosis: ERROR if truth or IMU is not valid, WARN past the end of a recorded motion."""
         truth = self.parts['truth']
         values = [(f'{name}_deg', f'{np.degrees(truth[name]):.3f}') for name in ('roll', 'pitch')]
         for status, texts in ((truth['status'], motion.MOTION_STATUS_TEXTS),

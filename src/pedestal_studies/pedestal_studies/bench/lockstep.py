@@ -20,8 +20,7 @@ from pedestal_results.results import row
 from pedestal_studies.bench import show
 
 ROUND_COUNT = 3  # number of runs in lockstep, of which the median counts
-RUN_DURATION_S, LATENCY_DURATION_S = 15.0, 10.0
-"""Simulated durations of a run of the graph in lockstep and in realtime [s]."""
+RUN_DURATION_S, LATENCY_DURATION_S = 15.0, 10.0  # of the graph in lockstep and in realtime [s]
 
 
 def graph_run(folder: str, number: int | str, pacing: str, seconds: Seconds) -> tuple[Outcome, pathlib.Path]:

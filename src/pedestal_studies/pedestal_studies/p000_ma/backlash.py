@@ -54,16 +54,14 @@ PAPER_CASES = {  # {case with the controller of the paper: parameters}
     'bias-on': {},                          # no change: the bias of the scenario, 5 Nm, fading, as in the paper
     'hold-fade': bias('hold_fade')}
 
-BIAS_SCHEDULES = {
+BIAS_SCHEDULES = {  # {schedule: parameters}; the number in a name is the bias torque [Nm]
     'off': bias('off'), 'constant-5': bias('constant', torque=5.0), 'constant-12': bias('constant', torque=12.0),
     'fade-5': bias('fade', torque=5.0, hold=0.0, out=30.0), 'fade-12': bias('fade', torque=12.0, hold=0.0, out=30.0),
     'hold-fade': bias('hold_fade')}
-"""{name of a schedule: parameters}; the number in a name is the bias torque [Nm], hold-fade has 12 Nm."""
 
-SPEED_LOOP_STRUCTURES = {
+SPEED_LOOP_STRUCTURES = {  # {case: parameters}
     'mean-speed': {'adu.azimuth.speed_loop.structure': 'mean'},
     'independent-loops': {'adu.azimuth.speed_loop.structure': 'independent'}}
-"""{case: parameters} of one speed loop on the mean speed, and of one speed loop for each motor."""
 
 METRIC_TARGETS = {  # {(case, metric): target}
     ('bias-off', 'standstill_peak_to_peak_rad'): '> 5e-4', ('bias-on', 'standstill_peak_to_peak_rad'): '< 2e-6',
@@ -80,7 +78,6 @@ def reversal_case(kind: str, name: str) -> Case:
 
 
 FAST_STEP_PARAMETERS = {**servo.FULL_TORQUE_PARAMETERS, 'acu.azimuth.shaper.acceleration': 40.0}
-"""Controller of a step at 40 rad/s2, which needs the full torque."""
 
 MOVE_DURATION_S = 0.5  # time at which the step of the cases SPEED_LOOP_STRUCTURES is over [s]
 
@@ -92,8 +89,7 @@ def standstill(record: Run) -> tuple[Times, Floats]:
 
 
 def steady_residual(record: Run, amplitude: Radians, w: RadiansPerSecond) -> tuple[Times, Floats]:
-    """Return (times, error [rad] without its part at the frequency w of the sine), over whole periods after the
-    first."""
+    """Return (times, error [rad] without its part at the frequency w of the sine), over whole later periods."""
     t, period = record.t, 2.0 * math.pi / w
     error = amplitude * np.sin(w * t) - record['adu/truth']['position'][:, 0]
     steady = metrics.whole_periods(t, period, period)

@@ -40,7 +40,6 @@ def controller(name: str) -> Case:
 FAST_LOOP_PARAMETERS = {'acu.azimuth.feedforward.bandwidth': 40.0}  # position loop of higher bandwidth
 STRUCTURE_PARAMETERS = {**FAST_LOOP_PARAMETERS, 'adu.azimuth.structure.inertia_share': 0.5,
                         'adu.azimuth.structure.frequency': 8.0}
-"""Position loop of higher bandwidth with a flexible load, of which one half swings on the other."""
 NOTCH_PARAMETERS = {**STRUCTURE_PARAMETERS, 'acu.azimuth.notch.frequency': 7.5, 'acu.azimuth.notch.width': 0.5,
                     'acu.azimuth.notch.depth': 0.3}
 """Position loop of higher bandwidth with a flexible load and a notch at the resonance of the loop without notch."""

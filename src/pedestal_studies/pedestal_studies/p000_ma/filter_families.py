@@ -42,7 +42,6 @@ FILTER_MEANINGS = {'least_squares': 'least squares', 'alpha_beta': 'the alpha-be
                    'alpha_beta_gamma': 'the alpha-beta-gamma filter', 'wiener': 'the Wiener filter',
                    'kalman': "the Kalman filter of the 'current' statistical model",
                    'imm': 'the untuned default filter of the product'}
-"""{filter: description}."""
 
 TUNED_FILTERS = tuple(name for name in FILTER_MEANINGS if name != 'imm')
 KALMAN_KINDS = {'kalman': 'current_statistical', 'alpha_beta': 'alpha_beta', 'alpha_beta_gamma': 'alpha_beta_gamma',

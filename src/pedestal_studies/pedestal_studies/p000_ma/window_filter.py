@@ -1,15 +1,13 @@
 """Filters with a fixed window of measurements: least squares, and the Wiener filter of finite memory.
 
-The estimate is a weighted sum of the last n measurements of an angle. The weights give the best linear unbiased
-estimate of angle and rate at the newest measurement, if the motion is a polynomial of the time plus a random
-displacement:
+The weights of the last n measurements give the best linear unbiased estimate of angle and rate at the newest one, if
+the motion is a polynomial of the time plus a random displacement d:
 
     y_i = angle - rate tau_i + (1/2) acceleration tau_i^2 + d_i + noise_i,      tau_i = i T, i = 0 ... n - 1
 
 Least squares has no displacement d. In the Wiener filter (Zadeh and Ragazzini, Journal of Applied Physics 21 (1950)
 645) d is the displacement by a stationary random acceleration with the standard deviation sigma and the
-autocorrelation exp(-alpha |tau|). Its polynomial has the degree 1, without the acceleration. The weights never change,
-so both filters are linear and time-invariant.
+autocorrelation exp(-alpha |tau|). Its polynomial has the degree 1, without the acceleration.
 """
 import functools
 

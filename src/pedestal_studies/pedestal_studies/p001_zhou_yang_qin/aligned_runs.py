@@ -48,17 +48,14 @@ BATCH_RUNS = 5  # runs that one worker makes at a time
 
 BASE_SEED, QUADRANT_SEED, SWELL_SEED = 1, 2, 3
 IMU_PERIOD_S, LAW_STEP_S, EVALUATION_PERIOD_S = 0.01, 0.02, 1.0
-"""Periods of the IMU samples, of the alignment laws and of the evaluated errors [s]."""
 
 RUN_DURATION_S, SHORT_RUN_DURATION_S = 600.0, 300.0  # duration of a run, and of a run in a quadrant or on swell [s]
 
 ARCMIN_RAD = math.radians(1.0 / 60.0)
 HOUR_S = 3600.0
-GYRO_BIAS_RAD_S, GYRO_NOISE_DENSITY = math.radians(0.01) / HOUR_S, math.radians(0.005) / 60.0
-"""Bias [rad/s] and noise [rad/sqrt(s)] of the gyros, from paper 001, section 5."""
+GYRO_BIAS_RAD_S, GYRO_NOISE_DENSITY = math.radians(0.01) / HOUR_S, math.radians(0.005) / 60.0  # [rad/s, rad/sqrt(s)]
 G = 9.80665  # acceleration [m/s2] in whose unit the paper states errors of accelerometers
-ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_NOISE_DENSITY = 3e-5 * G, 6e-6 * G
-"""Bias [m/s2] and noise [m/s/sqrt(s)] of the accelerometers, from paper 001, section 5."""
+ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_NOISE_DENSITY = 3e-5 * G, 6e-6 * G  # [m/s2, m/s/sqrt(s)]
 
 SHIP_PARAMETERS = ShipParameters(motion='plain', speed=0.0, latitude_deg=34.0, plain=PlainParameters(
     roll_amplitude_deg=7.0, roll_period=1.0 / 0.3, pitch_amplitude_deg=5.0, pitch_period=1.0 / 0.5,
@@ -69,7 +66,6 @@ about x is our pitch."""
 MISALIGNMENT_RAD = np.radians((3.0, 3.0, 180.0))  # misalignment a_x, a_y, a_z about east, north, up [rad]
 
 VELOCITY_NOISE_M_S, SWELL_VELOCITY_M_S, SWELL_FREQUENCY_HZ = 0.05, 0.5, 0.1
-"""1 sigma of the white velocity [m/s]; velocity amplitude [m/s] and frequency [Hz] of the swell."""
 
 INS_PARAMETERS = MethodParameters(AlignmentParameters(
     step=LAW_STEP_S, velocity_disturbance=VELOCITY_NOISE_M_S, gyro_noise=GYRO_NOISE_DENSITY,
@@ -102,8 +98,7 @@ class Increments(NamedTuple):
     attitude: Quaternions   # true attitude at the end of each sample
 
 
-AZIMUTH_COLUMN, EAST_TILT_COLUMN, LEVEL_COLUMNS = 2, 0, slice(0, 2)
-"""Columns of an error about east, north, up: the error of azimuth, the tilt about east, both level errors."""
+AZIMUTH_COLUMN, EAST_TILT_COLUMN, LEVEL_COLUMNS = 2, 0, slice(0, 2)  # of an error about east, north, up
 
 
 class Conditions(NamedTuple):
@@ -202,8 +197,7 @@ class Batch:
 
 @compiled
 def simulate(sensors: Sensors, normals: Floats, velocity: Vectors3, out: Increments) -> None:
-    """Fill `out` from an IMU on its ship; normals (n, IMU_NORMALS_PER_STEP); velocity (n + 1, 3): added to that of the
-    ship, ENU [m/s]."""
+    """Fill `out` from an IMU on its ship; velocity (n + 1, 3): added to that of the ship, ENU [m/s]."""
     u, truth, measured = sensors.inputs[0], sensors.truth[0], sensors.outputs[0]
     dt = u.dt
     for k in range(len(out.angle)):
@@ -223,8 +217,7 @@ def simulate(sensors: Sensors, normals: Floats, velocity: Vectors3, out: Increme
 @compiled
 def align(state: Records, constants: Records, angle: Vectors3, force: Vectors3, dt: Seconds, every: int,
           estimates: Records) -> None:
-    """Run a navigator over increments of dt, and write its AlignmentEstimate after each block of `every`
-    increments."""
+    """Run a navigator over increments of dt, and write its AlignmentEstimate after every `every` increments."""
     for k in range(len(angle)):
         methods.step(state[0], constants[0], angle[k], force[k], dt)
         if (k + 1) % every == 0:

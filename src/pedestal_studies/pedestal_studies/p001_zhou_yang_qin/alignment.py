@@ -95,7 +95,6 @@ METRIC_TARGETS = {
 """{(case, metric): target}. The targets are ours, because the paper prints only PAPER_VALUES. A time with a tolerance
 is the time that these conditions gave when the study was written. This target shows a later change of the laws."""
 PAPER_VALUES = {('classical', 'time_to_12arcmin_rms_s'): 420, ('adrc', 'time_to_12arcmin_rms_s'): 250}
-"""{(case, metric): number that the paper prints}."""
 
 
 KIND_METRICS: dict[str, dict[str, tuple[str, Callable[[Accuracy], float]]]] = {
@@ -108,7 +107,6 @@ KIND_METRICS: dict[str, dict[str, tuple[str, Callable[[Accuracy], float]]]] = {
               f'azimuth_error_over_sigma_{SWELL_EVALUATION_TIME_S}s': (
                   '-', lambda a: value_at(a.ratio, SWELL_EVALUATION_TIME_S))},
     'quadrant': {'azimuth_rms_arcmin_300s': ('arcmin', lambda a: value_at(a.azimuth, 300))}}
-"""{kind of runs: {metric: (unit, function of an Accuracy)}}."""
 
 
 def rows(accuracy: Mapping[str, Mapping[str, Accuracy]], bound: InformationLimit) -> list[Row]:

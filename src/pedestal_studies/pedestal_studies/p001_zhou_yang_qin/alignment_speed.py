@@ -33,8 +33,7 @@ from pedestal_workbench.trials.monte_carlo import Pool, Progress
 DEFAULT_RUNS = 100  # runs of each case
 SPEEDS = (0.5, 1.0, 2.0, 4.0)  # factors K by which the times of the method are divided [-]; 1: the default parameters
 
-SETTLED_LEVEL_ARCMIN = 30.0
-"""Rms over the runs below which the level counts as settled [arcmin], a sixth of the initial tilt of 3 deg."""
+SETTLED_LEVEL_ARCMIN = 30.0  # rms over the runs below which the level counts as settled, a sixth of the initial tilt
 
 
 def faster(speed: float) -> MethodParameters:

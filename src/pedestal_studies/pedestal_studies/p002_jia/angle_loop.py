@@ -1,12 +1,8 @@
 """The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop, and a loop with a target filter.
 
-The study phased-array runs both loops. Each loop is one compiled function of the laws that the nodes run: the
-smoothing and the pattern of the receiver, the loop of the beam or a target filter, and the electronic beam.
-
-Symbols of paper 002: R, v: angle [rad] and rate [rad/s] that the loop predicts for the target; T: time between two
-updates [s]; alpha, beta: gains from the error to R and to v T [-]. beta follows from alpha (Benedict and Bordner).
-
-The grid, with h = GRID_STEP_S:
+Each loop is one compiled function of the laws that the nodes run. Symbols of paper 002: R, v: angle [rad] and rate
+[rad/s] that the loop predicts; T: time between two updates [s]; alpha, beta: gains from the error to R and to v T [-].
+beta follows from alpha (Benedict and Bordner). The grid, with h = GRID_STEP_S:
 
     stamp    (i-1) h                 i h                 (i+1) h
                 |------ sample i ------|---- sample i+1 ----|
@@ -44,7 +40,6 @@ S2: the moving average. The paper calls eq. (1) a moving average, so S1 and S2 a
 SMOOTHING_SAMPLES = 20  # number n of samples in the smoothing S1 and S2, as in the paper's example
 
 FULL_SCALE_BEAMWIDTHS, K_M = ReceiverParameters().full_scale, AntennaParameters().slope
-"""Full scale of the receiver [beamwidths], and slope of the difference pattern of its antenna [1/beamwidth]."""
 
 
 class Smoothers(Record):
@@ -180,8 +175,7 @@ def receiver_reading(offset: Radians, receiver: Receiver) -> Radians:
 
 @compiled
 def command(inputs: electronic_beam.Inputs, stamp: int, due: bool, beam: Radians) -> None:
-    """Put a command with a stamp, in samples of the grid, into the inputs of the electronic beam; due: True for a new
-    one."""
+    """Put a command with a stamp, in samples of the grid, into the inputs of the beam; due: True for a new one."""
     inputs.stamp_ns = inputs.command_stamp_ns = stamp * GRID_STEP_NS
     inputs.due = 1 if due else 0
     inputs.position[0] = beam

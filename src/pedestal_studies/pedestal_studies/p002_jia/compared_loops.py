@@ -24,8 +24,7 @@ from pedestal_studies.result import FIRST_SEED
 
 SINE_RATE_DEG_S, SINE_ACCELERATION_DEG_S2 = 30.0, 10.0  # largest rate [deg/s] and acceleration [deg/s2] of figure 7
 
-SWAY_AMPLITUDE_RAD, SWAY_PERIOD_S = math.radians(10.0), 8.0
-"""Amplitude [rad] and period [s] of the ship's sway in figure 9."""
+SWAY_AMPLITUDE_RAD, SWAY_PERIOD_S = math.radians(10.0), 8.0  # of the ship's sway in figure 9
 
 LOOP_DELAY_MS = 20  # delay of figure 7 and of all loops of COMPARED_LOOPS [ms]
 
@@ -34,8 +33,7 @@ RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S = map(math.radians
 
 INS_STAMP_ERROR_MS = 5  # error of the INS's stamps [ms]
 
-RECORD_DURATION_S, EVALUATION_START_S = 60.0, 30.0
-"""Duration of a record of a moving target, and start of its evaluation [s]."""
+RECORD_DURATION_S, EVALUATION_START_S = 60.0, 30.0  # of a record of a moving target
 
 
 def jerk(q: float) -> float:
@@ -127,7 +125,6 @@ def max_error_at_ends(error: Floats, target: Floats) -> Radians:
 
 
 COMPARED_CASES = (*(f'{loop}/{target}' for loop in COMPARED_LOOPS for target in ('ramp', 'sine', 'sway')), *INS_LOOPS)
-"""Cases of COMPARED_LOOPS on all targets, and INS_LOOPS."""
 
 
 def beam(case: str, run: int | None = None) -> Floats:

@@ -67,10 +67,8 @@ DEFAULT_RUNS = 40  # runs of each case with noise
 
 STEP_SIZE_RAD = math.radians(1.0)
 ALPHA_GAINS, LOOP_PERIODS_MS, LOOP_DELAYS_MS = (0.05, 0.1, 0.2, 0.3), (10, 5), (0, 20, 50, 80)
-"""Gains alpha [-], periods and delays of the loop [ms] in figures 3 to 5 and in the limits of stability."""
 SLOPE_RATIOS = 0.5, 0.7, 1.0, 1.5, 2.0  # true slope over assumed slope of the receiver [-]
-STEEP_SLOPE_RATIO = 2.0
-"""Slope ratio of the cases that show the lag behind the ramp and the sine with a steeper slope [-]."""
+STEEP_SLOPE_RATIO = 2.0  # slope ratio of the cases with a steeper slope [-]
 RAMP_RATES_DEG_S = (10, 20, 30, 40)  # rates of figure 6 [deg/s]
 
 
@@ -151,8 +149,7 @@ def step_rows(done: Mapping[PaperLoop, Floats]) -> list[Line]:
 
 
 def eigenvalue_limit(loop: PaperLoop, near: int) -> int:
-    """Return the largest delay [ms] at which all eigenvalues of a loop are inside the unit circle, searched from the
-    delay `near` [ms]."""
+    """Return the largest delay [ms] with all eigenvalues inside the unit circle, searched from `near` [ms]."""
     def inside(delay: int) -> bool:
         return spectral_radius(dataclasses.replace(loop, delay=delay)) < 1.0
 
@@ -214,7 +211,6 @@ def moving_rows() -> list[Line]:
 
 
 ALPHA_LOOPS = {f'noise/alpha={alpha:g}': PaperLoop(alpha=alpha) for alpha in ALPHA_GAINS}
-"""{case: loop} of the paper's loop with each gain, whose jitter is measured on a target at rest."""
 
 
 def jitter(item: tuple[str, int]) -> list[Degrees]:
@@ -300,7 +296,6 @@ def loss_rows() -> list[Line]:
 
 PAPER_LOOP_PARAMETERS = {f'acu.{axis}.beam.{key}': value for axis in ('azimuth', 'elevation')
                          for key, value in (('form', 'type_1'), ('rate_compensation', 0.85))}
-"""Parameters of the control unit with the paper's loop."""
 
 GRAPH_CASES: dict[str, dict[str, Json]] = {'graph/T=10ms': {}, 'graph/T=1ms': {'adu.period': 0.001},
                'graph/T=10ms/paper-delta': PAPER_LOOP_PARAMETERS}
@@ -308,7 +303,6 @@ GRAPH_CASES: dict[str, dict[str, Json]] = {'graph/T=10ms': {}, 'graph/T=1ms': {'
 
 NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 110.0, 'ins.tilt_noise': 0.0, 'ins.heading_noise': 0.0,
                         'ins.rate_noise': 0.0}
-"""Parameters of an INS without noise, and of a signal so strong that the noise of the receiver has no effect."""
 
 
 def graph_case(case: str, quiet: bool = False) -> Case:

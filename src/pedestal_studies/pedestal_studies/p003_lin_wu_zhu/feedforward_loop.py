@@ -1,18 +1,11 @@
 """The position loop of paper 003 on one axis: measured miss, with rate and acceleration of the target fed forward.
 
-The studies imm-feedforward and pareto use this loop. The miss, a term of the paper, is the pointing error: angle of
-the target minus angle of the antenna. The target moves to and fro; in a reversal its rate is half a cosine. Every T =
-10 ms the tracker measures the miss, with noise and the delay d. The encoder angle of that instant plus the miss is the
-angle y of the target. A filter of acu_tracker.estimation.filters.axis_filter estimates from y the rate v and the
-acceleration a of the target. The command u of the rate loop W(s) is
+The miss, a term of the paper, is the pointing error: angle of the target minus angle of the antenna. Every T = 10 ms
+the tracker measures the miss, with noise and the delay d. The encoder angle of that instant plus the miss is the angle
+y of the target, from which a filter estimates rate v and acceleration a of the target. The command u [rad/s] of the
+rate loop W(s), of bandwidth w and damping zeta, is
 
-    u = K_p miss(t - d) + k_v v + k_a a,        W(s) = w^2 / (s^2 + 2 zeta w s + w^2),
-
-    u       commanded rate of the antenna [rad/s]
-    K_p     gain of the miss [1/s]
-    k_v     gain of the rate v [rad/s], no unit
-    k_a     gain of the acceleration a [rad/s2], in s
-    w, zeta bandwidth [rad/s] and damping [-] of the rate loop
+    u = K_p miss(t - d) + k_v v + k_a a,        W(s) = w^2 / (s^2 + 2 zeta w s + w^2)
 
 k_v + k_a s are the first two terms of the series of 1 / W(s). Therefore a constant acceleration leaves no miss.
 """
@@ -189,8 +182,7 @@ def differenced(y: Floats, steps: int) -> Pairs:
 
 def steps_of(axis: str, source: Source, first: int, count: int,
              rate: RadiansPerSecond = S_MOTION_RATE_RAD_S) -> Records:
-    """Return the Steps (count, n) of runs first ... first + count - 1 of a source. The noise of run i depends only on
-    i."""
+    """Return the Steps (count, n) of runs first ... of a source. The noise of run i depends only on i."""
     t, target, _ = motion(axis, rate)
     lead = (MISS_DELAY_STEPS + 0.5) * T if source.predicted else 0.0
     known = np.zeros((0, 2))

@@ -39,8 +39,7 @@ RATES_RAD_S = {f'{speed}m_s': S_MOTION_RATE_RAD_S * speed / 30.0 for speed in (3
 
 DRIVE_SPEED = '50m_s'  # speed of the cases drive-...; the study imm-feedforward has these cases at 30 m/s
 
-DIFFERENCE_STEPS = (1, 15)
-"""Distances of the differenced angles [steps of 10 ms]: one step, and the distance of the least rate error."""
+DIFFERENCE_STEPS = (1, 15)  # steps of 10 ms: one step, and the distance of the least rate error
 
 
 def sources(axis: str) -> dict[str, Source]:
@@ -61,14 +60,12 @@ DRIVE_CASES = {f'{axis}/{DRIVE_SPEED}/drive-{name}': imm_feedforward.drive_case(
 UNITS = {**METRIC_UNITS, 'rate_rms_deg_s': 'deg/s', 'acceleration_rms_deg_s2': 'deg/s2'}  # {metric of a run: unit}
 
 COMPARED_METRICS = ('miss_rms_deg', 'rate_rms_deg_s', 'acceleration_rms_deg_s2')
-"""Metrics that the rows ..._ratio_to_imm compare."""
 
 IMM_RATIO_TARGET = '>= 3'  # required ratio: miss of kalman-cv divided by miss of imm [-]
 
 
 def estimate_errors(axis: str, steps: Records, rate: RadiansPerSecond) -> Pairs:
-    """Return the rms errors of rate [deg/s] and acceleration [deg/s2] of every run, against the truth at the instant
-    of the measured miss."""
+    """Return the rms errors of rate [deg/s] and acceleration [deg/s2] at the instant of the measured miss."""
     t, target, period = feedforward_loop.motion(axis, rate)
     counts = t[MISS_DELAY_STEPS:] >= 0.5 * period
     late = target[:-MISS_DELAY_STEPS]

@@ -1,22 +1,11 @@
 """Feed-forward of estimated rate and acceleration (paper 003): a conventional Kalman filter beside the IMM.
 
-An IMM (interacting multiple model) filter mixes several Kalman filters by the probabilities of their models. The miss,
-a term of the paper, is the pointing error: the angle from the axis of the antenna to the target. The loop is that of
-feedforward_loop.py. Its target moves to and fro through 20 deg at 3.5 deg/s. Every T = 10 ms the loop gets a
-measured miss, which is d = 40 ms old, and gives a command.
-
-Cases are AXIS/SOURCE. SOURCE is the source of the rate and acceleration that are fed forward:
-
-kalman-cv, kalman-cv-Q   conventional filter of constant velocity; Q: process noise [deg/s2/sqrt(Hz)]
-kalman-ca-Q              filter of constant acceleration; Q: process noise [deg/s3/sqrt(Hz)]
-imm, imm-b               IMM whose ca model has a process noise of 40 and of 5 deg/s3/sqrt(Hz)
-perfect-state            truth in the middle of the interval in which the command is in force
-...-predicted            filter of this name, predicted from the time of the miss to that middle, d + T / 2 later
-drive-...                filter of this name in the whole chain: receiver of latency d, control unit, motors, gears
-drive-imm-default        IMM with its default parameters in the whole chain
-
-All filters get the same noise. In the cases drive-... the target reverses without a uniform part, so its motion is a
-sine.
+An IMM (interacting multiple model) filter mixes several Kalman filters by the probabilities of their models. The loop
+is that of feedforward_loop.py. Cases are AXIS/SOURCE; SOURCE_MEANINGS describes the sources of the rate and
+acceleration that are fed forward. kalman-cv-Q and kalman-ca-Q have the process noise Q. A source ...-predicted is
+predicted from the time of the miss to the middle of the interval in which the command is in force, d + T / 2 later. A
+source drive-... is in the whole chain: receiver of latency d, control unit, motors, gears. All filters get the same
+noise. In the cases drive-... the target reverses without a uniform part, so its motion is a sine.
 """
 import dataclasses
 import math
@@ -58,9 +47,7 @@ Misses: TypeAlias = dict[str, MissStatistics]   # {case: its statistics}
 
 DEFAULT_RUNS = 50  # runs of each case, with independent noise
 
-DRIVE_DURATION_S, DRIVE_EVALUATION_START_S, DRIVE_ELEVATION_RAD = 36.0, 6.0, 0.5
-"""Duration of a run of the whole chain from receiver to gears [s], start of its evaluation in autotrack [s], and
-elevation of the target [rad]."""
+DRIVE_DURATION_S, DRIVE_EVALUATION_START_S, DRIVE_ELEVATION_RAD = 36.0, 6.0, 0.5  # of the whole chain [s, s, rad]
 
 CV_NOISES = (0.1, 0.2, 0.3, 0.5, 4.0)  # process noises of the conventional filter [deg/s2/sqrt(Hz)]
 
@@ -144,9 +131,8 @@ MISS_TARGETS_DEG = {  # targets of miss_rms_deg
 PAPER_MISSES_DEG = {'azimuth/kalman-cv': 0.17, 'azimuth/imm': 0.035, 'elevation/kalman-cv': 0.1, 'elevation/imm': 0.03}
 """{case: number of the paper [deg]}. The paper names it the largest miss (RMS); we read it as the rms of the miss."""
 
-MAIN_CASES = {f'{axis}/{name}' for axis in REVERSAL_S_BY_AXIS
+MAIN_CASES = {f'{axis}/{name}' for axis in REVERSAL_S_BY_AXIS  # cases that have all rows
               for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state')}
-"""Cases that have all rows."""
 
 MISS_RATIO_TARGETS = {'azimuth/imm': ('>= 4', None), 'azimuth/imm-predicted': ('>= 6', None),
                       'elevation/imm': ('>= 3', 3.0), 'elevation/imm-predicted': ('>= 5', None)}

@@ -1,15 +1,9 @@
 """Effect of an independent measurement of the rate on the filter (paper 004): bandwidth and dynamic error.
 
-With constant sigma_a and noises, the 'current' statistical filter settles to constant gains: X+ = A X + B (y, y').
-
-    X, X+     estimate (angle, rate, acceleration) of one measurement and of the next
-    y, y'     measured angle [rad] and measured rate [rad/s]
-    sigma_a   standard deviation of the acceleration of the target that the filter assumes
-    T, w, t   time between two measurements [s]; angular frequency [rad/s]; time [s]
-    j, e^jwt  imaginary unit; sine of frequency w as a complex exponential
-
-A and B are identified on the compiled filter itself, with one unit state and one unit measurement at a time. A sine
-y = e^jwt, y' = jw y then gives the response G of the estimate:
+With constant sigma_a (assumed acceleration of the target) and noises, the 'current' statistical filter settles to
+constant gains: X+ = A X + B (y, y'), with the estimate X of angle, rate and acceleration. A and B are identified on
+the compiled filter itself, with one unit state and one unit measurement at a time. A sine y = e^jwt, y' = jw y then
+gives the response G of the estimate:
 
     G(jw) = (1 - A e^-jwT)^-1 B (1, jw)',        angle: G_1,  rate: G_2 / jw,  dynamic error: |1 - G_1|.
 
@@ -56,7 +50,6 @@ ALPHA = 0.5  # reciprocal of the time for which the filter expects an accelerati
 ACCELERATION_SIGMAS_DEG_S2 = (0.05, 0.5, 3.0)  # values of sigma_a [deg/s2]
 
 RATE_SIGMAS_DEG_S = {'position': math.nan, 'position-rate': 0.1, 'position-rate-0.02': 0.02}
-"""{case: noise of a measured rate [deg/s]}, NaN without a measured rate."""
 
 MAIN_SIGMA_DEG_S2 = 0.5  # sigma_a of the cases whose name does not state it [deg/s2]
 DYNAMIC_ERROR_FREQUENCY_HZ = 0.2  # frequency of the dynamic error [Hz]
@@ -213,14 +206,12 @@ def flyby_errors(name: str, run: int) -> Floats:
 
 
 FLYBY_CASES = (*RATE_SIGMAS_DEG_S, *DIFFERENCED_RATES)
-"""Cases of the flyby, by the source of the rate (RATE_SOURCE_MEANINGS)."""
 METRIC_TARGETS = {('position-rate', 'rate_bandwidth_ratio'): '>= 1.5',
                   ('position-rate', 'dynamic_error_ratio'): '>= 9'}
 
 
 def rows(measured: Mapping[str, Metrics], errors: Mapping[str, Pairs]) -> list[Row]:
-    """Return the rows of measured {case: as `measures`} and errors {name of FLYBY_CASES: rms [deg, deg/s] of every
-    run}."""
+    """Return the rows of measured {case: of `measures`} and errors {of FLYBY_CASES: rms [deg, deg/s] of runs}."""
     table = []
     for name, values in measured.items():
         table += [row(name, metric, value, unit, target='< 1' if metric == 'largest_eigenvalue' else None)

@@ -1,25 +1,17 @@
 """Paper 004's filter on a flight of the same kind (figures 1 to 8), and the matrices of its proof of stability.
 
-The filter estimates angle, rate and acceleration of one axis from measured angle and rate. The paper prints T = 0.01 s
-and the windows of its figures, and that the filter begins with the first measured angle and rate. The flight, the
-noises and the parameters of the filter are ours. A target flies straight past the antenna and is nearest at
-CULMINATION_TIME_S, inside the paper's figures 2 and 6. Cases <axis>/filtered are the 'current' statistical filter on
-angle and rate. Cases <axis>/measured are the measured angle and rate, and the acceleration as the difference of the
-measured rate over DIFFERENCE_STEPS steps.
+The paper prints T = 0.01 s and the windows of its figures, and that the filter begins with the first measured angle
+and rate. The flight, the noises and the parameters of the filter are ours. A target flies straight past the antenna.
+Cases <axis>/filtered are the 'current' statistical filter on angle and rate. Cases <axis>/measured are the measured
+angle and rate, and the difference of the measured rate over DIFFERENCE_STEPS steps.
 
-The model of the filter is x+ = Phi x + U abar, y = H x. The two matrices of the proof are
+The model of the filter is x+ = Phi x + U abar, y = H x, with the mean acceleration abar. The matrices of the proof are
 
     controllability (U, Phi U, Phi^2 U),        observability (H', (H Phi)', (H Phi^2)')'.
 
-    x, x+   state (angle, rate, acceleration) of one measurement and of the next, T later
-    y       measured numbers
-    abar    mean acceleration of the target, the input of the model
-    Phi, U  transition of the state over T, effect of abar over T
-    H, '    measurement matrix; ' means transposed
-
 The condition number of a matrix is its largest singular value over its smallest. `condition` is measured with T in
-place of the second as the unit of time, so that the entries are of one size. In seconds the entries differ by up to
-1 / T^2, and `condition_in_seconds` shows only this difference.
+place of the second as the unit of time, so that the entries are of one size. In seconds the entries differ by up to 1
+/ T^2, and `condition_in_seconds` shows only this difference.
 """
 import math
 from collections.abc import Mapping
@@ -42,13 +34,11 @@ from pedestal_workbench.trials.monte_carlo import Pool, Progress
 DEFAULT_RUNS, NOISE_SEED = 40, 1  # number of flights; seed of their noise
 
 TARGET_SPEED_M_S, MIN_GROUND_DISTANCE_M, TARGET_HEIGHT_M, CULMINATION_TIME_S = 300.0, 3000.0, 2500.0, 42.0
-"""Speed [m/s], least distance over ground [m] and height [m] of the target; time of its least distance [s]."""
 
 FLIGHT_START_S, FLIGHT_END_S = 20.0, 100.0  # times of the paper's figures [s]; the filter begins at the first
 SETTLING_TIME_S = 5.0  # time after FLIGHT_START_S from which the rows are evaluated [s]
 
-ZOOM_WINDOWS_S = {'azimuth': (39.0, 43.5), 'elevation': (41.5, 45.0)}
-"""{axis: (begin, end) [s] of the time that figure 2 or 6 shows}."""
+ZOOM_WINDOWS_S = {'azimuth': (39.0, 43.5), 'elevation': (41.5, 45.0)}  # {axis: (begin, end) [s] of figure 2 or 6}
 
 RATE_SIGMA_RAD_S = math.radians(0.1)  # noise of a measured rate [rad/s]
 DIFFERENCE_STEPS = 20  # steps over which the measured rate is differenced
@@ -78,8 +68,7 @@ def flight() -> tuple[Times, dict[str, Vectors3]]:
 
 
 def flight_record(axis: str, run: int) -> tuple[Vectors3, Vectors3]:
-    """Return (measured, filtered) angle, rate and acceleration of one flight. The noise depends only on axis and
-    run."""
+    """Return (measured, filtered) angle, rate and acceleration of a flight, with noise by axis and run alone."""
     t, target = flight()
     truth = target[axis]
     nu, nu_rate = ensemble.normal_draws(NOISE_SEED + AXES.index(axis), first=run, count=1, n=len(t))[:, 0]
@@ -104,8 +93,7 @@ def model(T: Seconds) -> tuple[Matrix3, Vector3]:
             np.array([0.5 * T * T - angle, T - rate, 1.0 - kept]))
 
 
-MEASUREMENT_MATRICES = {'angle': np.eye(3)[:1], 'angle-rate': np.eye(3)[:2]}
-"""{case: H}: only the angle is measured, or angle and rate."""
+MEASUREMENT_MATRICES = {'angle': np.eye(3)[:1], 'angle-rate': np.eye(3)[:2]}  # {case: H}
 
 
 def controllability(Phi: Matrix3, U: Vector3) -> Matrix3:

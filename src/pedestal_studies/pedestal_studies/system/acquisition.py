@@ -35,15 +35,12 @@ TARGET_ELEVATION_RAD = 0.6  # elevation of the target of the search cases [rad]
 
 SEARCH_PARAMETERS = {'acu.commands': '3 search', 'acu.search.rounds': 1, 'acu.acquisition.expected_dbhz': 0.0,
                      'tracking_receiver.receiver.cn0_dbhz': 46.4}
-"""Parameters that turn the scenario sidelobe into a case search-<pattern>."""
 
-SEARCH_DURATIONS_S = {'spiral': 85.0, 'raster': 55.0, 'square': 115.0, 'sector': 55.0}
-"""{pattern: duration of a run with one round and the acquisition after it [s]}."""
+SEARCH_DURATIONS_S = {'spiral': 85.0, 'raster': 55.0, 'square': 115.0, 'sector': 55.0}  # one round and acquisition
 
 FOUND_PERCENT_TARGET = '>= 99'  # target of found_percent
 
 CASE_NAMES = (*POWER_UP_CASES, *SIGNAL_LOSS_CASES, 'steptrack_geo', *(f'search-{name}' for name in SEARCH_PATTERNS))
-"""Names of all cases."""
 
 MAX_FOUND_ERROR_BEAMWIDTHS = 0.2  # largest true pointing error at which the target counts as in the beam [beamwidths]
 

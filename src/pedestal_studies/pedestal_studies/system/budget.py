@@ -1,15 +1,14 @@
 """The error budget of scenario station_real: each term alone, the sum of all terms, and the run with all terms.
 
-A term is a source of error, such as the tilt of the azimuth axis. Its contribution is the pointing error of a run with
-this term on, minus the error of a run with all terms off. The two runs have the same seed and are subtracted step by
-step. Systematic contributions are added as signed vectors along the pass, random contributions as squares:
+The contribution of a term is the pointing error of a run with this term on, minus the error of a run with all terms
+off. The two runs have the same seed and are subtracted step by step. Systematic contributions are added as signed
+vectors along the pass, random contributions as squares:
 
     combined^2 = mean |servo + sum of systematic|^2 + sum of mean |random|^2
 
 A random term has both contributions: <term>-mean is its mean over the seeds and systematic, its deviation from this
-mean is random. `servo` is the error with all terms off (lag, friction, quantisation, bending of the structure by the
-unbalance of its axis). `noise` is the deviation of that error between the seeds of the receiver. Cases are
-<mode>/<term>. Cases <mode>/<time>s give the signed contributions at that time of the pass.
+mean is random. `servo` is the error with all terms off. `noise` is the deviation of that error between the seeds of
+the receiver. Cases are <mode>/<term>. Cases <mode>/<time>s give the signed contributions at that time of the pass.
 """
 import dataclasses
 import functools
@@ -41,7 +40,6 @@ TABLE_TIMES_S = (30, 90, 150, 210, 270)  # times of the pass at which contributi
 ERROR_COLUMNS = ('cross_elevation', 'elevation')  # names of the two columns of an error
 
 MODE_OVERRIDES = {'program': ('acu.tracker.handover=false',), 'autotrack': ()}
-"""{mode: overrides (texts node.key=value) with which the antenna points in this mode}."""
 
 
 class Term(typing.NamedTuple):
@@ -85,8 +83,7 @@ ERROR_TERMS = (
          'level lost by polarisation mismatch'))
 NO_TERMS, ALL_TERMS = 'none', 'whole'  # values of `on` in place of the name of a term: no term, every term
 
-RECEIVER_TERMS = ('boresight', 'multipath', 'scintillation', 'polarisation')
-"""Terms of the receiver, which do not affect program track."""
+RECEIVER_TERMS = ('boresight', 'multipath', 'scintillation', 'polarisation')  # have no effect in program track
 
 
 def active_terms(mode: str) -> list[Term]:

@@ -40,8 +40,7 @@ from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 SCENARIO_NAME, SCAN_SCENARIO_NAME = 'station_new', 'station_sun'  # scenario of the passes, and of the scans of the sun
 DEFAULT_RUNS = 30
-TERMS = (*DEFAULT_TERMS, 'P11', 'P13', 'P14')
-"""Terms of the model: the default terms and the eccentricity of both encoders."""
+TERMS = (*DEFAULT_TERMS, 'P11', 'P13', 'P14')  # with the eccentricity of both encoders
 POINTS_PER_PASS = 9  # number of offsets from a pass
 
 CALIBRATION_PASSES = ('2019-12-09T16:38:33Z', '2019-12-10T17:26:30Z', '2019-12-11T16:38:10Z', '2019-12-10T12:35:55Z')
@@ -54,9 +53,7 @@ SCANS = '2019-12-09T09:00:00Z', '2019-12-10T10:20:00Z', '2019-12-10T12:00:00Z', 
 SCAN_OVERRIDES = ('adu.wind.field.speed=2',)  # overrides of the scans: the wind of the calibration passes
 SEEDS_PER_RUN = len(CALIBRATION_PASSES) + len(SCANS) + 1  # number of passes and scans of a run, and thus of its seeds
 PROGRAM_OVERRIDES = 'acu.initial_mode=program', 'acu.tracker.handover=false'
-"""Overrides with which the antenna follows the program track alone."""
-TEST_PASS = '2019-12-12T15:49:47Z'
-"""UTC of the begin of the pass on which the model is tested; the culmination is 48 deg."""
+TEST_PASS = '2019-12-12T15:49:47Z'  # UTC of the begin of the test pass; the culmination is 48 deg
 
 EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1  # start and period of the evaluation of the error [s]
 
@@ -134,7 +131,6 @@ def truth() -> dict[str, Degrees]:
 
 MEASURED_NAMES = ('raw_rms_deg', 'calibrated_rms_deg', 'residual_rms_deg', 'leave_one_out_rms_deg',
                   'leave_one_out_default_rms_deg', 'points')
-"""Names of the numbers of a run, before the values and the sigmas of the terms."""
 
 
 def numbers_of_run(case: None, run: int, duration: Seconds | None) -> list[float]:

@@ -1,9 +1,8 @@
 """Consistency of the default target filter, second by second after its start.
 
-NEES is the squared error of angle and rate over the covariance that the filter states, against the direction that
-sensors without noise would measure (`pedestal_results.consistency`). A consistent filter has 2. A larger
-value means that the filter is too sure. Cases are scenarios; a metric nees_AXIS_T_s is the mean of one second about
-T [s] after the first estimate of the filter.
+NEES is the squared error of angle and rate over the covariance that the filter states
+(`pedestal_results.consistency`). A consistent filter has 2. A larger value means that the filter is too sure. Cases
+are scenarios; a metric nees_AXIS_T_s is the mean of one second about T [s] after the first estimate of the filter.
 """
 import functools
 from collections.abc import Mapping

@@ -83,15 +83,12 @@ EXPECT_TRIP = Expectation(4, STANDBY_MODE, HALF_BEAMWIDTH_DEG)
 
 MOVING_MODES = ('rate',)  # mode that moves the axes on the deck
 FOLLOWING_MODES = tuple(row.name for row in MODE_ROWS if row.follows and not row.by_level)
-"""Modes that follow a direction in earth angles, for which the attitude is needed."""
 STILL_MODES = tuple(row.name for row in MODE_ROWS if not row.follows and row.name not in MOVING_MODES)
-"""Modes in which the axes end at rest on the deck."""
 LEVEL_INDEPENDENT_MODES = (*STILL_MODES, *MOVING_MODES, *FOLLOWING_MODES)  # modes that do not use the signal level
 
 
 def _in_every_mode(expected: Expectation) -> Expectations:
-    """Return one expectation for every mode. Because the antenna does not point in standby, at least half a beamwidth
-    is permitted there."""
+    """Return one expectation for every mode. Because standby does not point, it permits half a beamwidth."""
     resting = expected._replace(error=max(expected.error or HALF_BEAMWIDTH_DEG, HALF_BEAMWIDTH_DEG))
     return {**dict.fromkeys(LEVEL_INDEPENDENT_MODES, expected), 'standby': resting}
 
@@ -210,26 +207,20 @@ _LEVEL_INDEPENDENT_EXPECTATIONS = {
 FAULT_EXPECTATIONS = {name: {**of_modes, **_signal_level_modes(of_modes, *name.split('.')),
                              'unstow': _unstow_expectation(name, of_modes)}
                       for name, of_modes in _LEVEL_INDEPENDENT_EXPECTATIONS.items()}
-"""{'NODE.FAULT': {mode: Expectation}} of every fault with its defaults and a duration of 5 s."""
 
 
 SCENARIO_NAME, FAULT_ONSET_S, FAULT_DURATION_S, RUN_DURATION_S = 'ship_pass', 10.0, 5.0, 20.0
-"""Scenario of all cases; onset and duration of the fault, and duration of a run [s]."""
 BASELINE_START_S = 5.0
 """Time from which the reports of a run without a fault are collected; earlier reports belong to the start [s]."""
 
-AZIMUTH_RATE_RAD_S, SLAVE_DIRECTION_RAD = 0.02, (0.5, 0.6)
-"""Commanded azimuth rate in mode rate [rad/s]; azimuth and elevation in mode slave [rad]."""
+AZIMUTH_RATE_RAD_S, SLAVE_DIRECTION_RAD = 0.02, (0.5, 0.6)  # commands of modes rate and slave
 
-RATE_COMMANDS = '; '.join(f'{t:g} rate azimuth={AZIMUTH_RATE_RAD_S}'
+RATE_COMMANDS = '; '.join(f'{t:g} rate azimuth={AZIMUTH_RATE_RAD_S}'  # repeated, because one is valid for 0.5 s
                           for t in np.arange(BASELINE_START_S, RUN_DURATION_S + 0.5, 0.25))
-"""Commands of mode rate, repeated because a rate command is valid for 0.5 s."""
 
-PROGRAM_OFFSET_RAD = 0.05
-"""Elevation error of the program track in mode search [rad], so that the search takes some time."""
+PROGRAM_OFFSET_RAD = 0.05  # elevation error of the program track in mode search, so that the search takes some time
 
-START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
-"""Parameter with the time of the start of a run (UTC)."""
+START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'  # UTC
 
 _SPECIAL_MODE_PARAMETERS = {
     'stop': ['acu.commands=1 stop'],
@@ -251,12 +242,10 @@ _SPECIAL_MODE_PARAMETERS = {
 time of tle gives the pass of the other modes. At the start time of sun the sun is above the horizon."""
 
 MODE_PARAMETERS = {mode: _SPECIAL_MODE_PARAMETERS.get(mode, [f'acu.initial_mode={mode}']) for mode in MODES}
-"""{mode: overrides with which a run is in this mode at the onset of the fault}."""
 
 ALARM_SOURCE = 'alarm'  # source of a report that is an alarm, in place of the name of a node
 
-ON_TARGET_MODES = ('program', 'tle', 'autotrack')
-"""Modes that follow the target; a change between them does not count as leaving the mode."""
+ON_TARGET_MODES = ('program', 'tle', 'autotrack')  # a change between them does not count as leaving the mode
 
 TOWARDS_TARGET_MODES = ('search', 'acquire', 'steptrack', *ON_TARGET_MODES)
 """Modes that use the signal level, and the modes to which they lead. A change between them does not count
@@ -428,7 +417,6 @@ def run(progress: Progress) -> Result:
 
 DRAWN_FAULTS = ('adu.gust', 'adu.motor_loss', 'adu.drop', 'tracking_receiver.fade', 'tracking_receiver.wrong_slope',
                 'ins.drop')
-"""Faults of the figure."""
 
 
 def figure(of_cases: Mapping[str, Floats]) -> Figure:

@@ -1,15 +1,9 @@
 """Filters compared: angle and rate noise of every filter on four target motions, white and coloured noise.
 
-Cases are <profile>/<filter>/<noise>. A profile is a target motion of profiles.py, whose angle is measured at 100
-Hz. Every filter except UNTUNED_FILTERS is tuned for each profile and noise. The tuning minimises the angle rms over
-TUNING_RUNS records of other seeds (pedestal_workbench/tuning/parameter_search.py).
-
-imm             IMM with its default parameters
-imm-manoeuvre   IMM that expects a manoeuvre at any time
-...-rate-X      filter with an independent rate measurement with a noise of X deg/s rms
-...-expecting   filter that knows the bandwidth of coloured noise; it has no case with white noise
-
-Every run gives its own rms and means, from SETTLING_TIME_S on.
+Cases are <profile>/<filter>/<noise>, with the profiles of profiles.py, measured at 100 Hz. Every filter except
+UNTUNED_FILTERS is tuned for each profile and noise, for the smallest angle rms over TUNING_RUNS records of other
+seeds. A filter ...-rate-X has an independent rate measurement with a noise of X deg/s rms. A filter ...-expecting
+knows the bandwidth of coloured noise; it has no case with white noise.
 """
 import dataclasses
 import math
@@ -40,7 +34,6 @@ DEFAULT_RUNS = 200  # runs of each case
 BATCH_RUNS = 25  # runs that one worker makes at a time
 
 NOISE_SEED, TUNING_SEED, TUNING_RUNS = 1, 2, 4
-"""Seeds of the noise and of the noise for the tuning; records of a tuning."""
 
 SETTLING_TIME_S = 3.0  # start of the evaluation [s]
 
@@ -50,11 +43,9 @@ NOISE_CASES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
 with the same rms."""
 
 RATE_SIGMAS_RAD_S = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
-"""{filter with a rate measurement: standard deviation of the measured rate [rad/s]}."""
 
 MANOEUVRE_PARAMETERS = {'imm.models': 'cv ca current_statistical', 'imm.rungs': 1, 'imm.dwell': 5.0,
                         'imm.cv.noise': math.radians(0.003), 'imm.ca.noise': math.radians(0.1)}
-"""Parameters of the filter imm-manoeuvre."""
 
 NOISE_AWARE_FILTERS = ('ca-expecting', 'imm-expecting')  # filters that know the bandwidth of the noise
 
@@ -269,7 +260,6 @@ def figures(values: Means, over_time: Mapping[CaseName, Records]) -> Drawings:
 
 FILTER_COLOURS = {'current_statistical': fig.RAW_COLOUR, 'current_statistical-rate-0.1': fig.FILTERED_COLOUR,
                   'imm': fig.TRUTH_COLOUR}
-"""{filter of the error figures: its colour}."""
 
 
 def errors_figure(over_time: Mapping[CaseName, Records], on: Sequence[str], what: str = 'angle') -> Figure:

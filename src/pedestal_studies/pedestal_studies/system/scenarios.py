@@ -25,7 +25,6 @@ DEFAULT_RUNS = 40  # runs of each case
 
 NEAR_FLYBY_PARAMETERS = {'tracking_receiver.target.flyby.closest_distance': 60.0,
                          'tracking_receiver.target.flyby.height': 20.0}
-"""Parameters of the case uav_flyby-60m, whose target passes at a distance of 60 m."""
 
 NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 120.0, 'acu.tracker.receiver.sigma_floor': 5e-4,
                         **{f'ins.{name}': 0.0 for name in ('tilt_noise', 'heading_noise', 'rate_noise', 'tilt_wander',
@@ -43,7 +42,6 @@ CASES = {case.name: case for case in (  # {name: Case}
     Case('uav_flyby-60m', 'uav_flyby', NEAR_FLYBY_PARAMETERS))}
 
 TRACKING_METRICS = ('pointing_rms_deg', 'pointing_max_deg', 'single_sample_noise_deg', 'pointing_to_noise', 'loss_s')
-"""Results of the pointing error."""
 ISOLATION_METRICS = ('isolation_db', 'isolation_limit_db')
 """Isolation from the rotation of the ship, and the isolation that a perfect antenna would show with the noise and the
 length of the run."""
@@ -51,7 +49,6 @@ NOISE_METRICS = ('noise_reduction_cross_elevation', 'noise_reduction_elevation')
 """Noise of one receiver sample, divided by the error of the filtered line of sight."""
 ALIGNMENT_METRICS = ('aligned_s', 'heading_sigma_at_alignment_deg', 'heading_error_rms_deg',
                      'autotrack_after_alignment_s')
-"""Results of the alignment of the INS, and of the autotrack that follows it."""
 CASE_METRICS = {  # {case: names of its results}, of pedestal_results/results.py or of `extra_results`
     'leo_pass': TRACKING_METRICS, 'ship_pass': (*TRACKING_METRICS, *ISOLATION_METRICS),
     'ship_pass-late': (*TRACKING_METRICS, *ISOLATION_METRICS),
@@ -60,8 +57,7 @@ CASE_METRICS = {  # {case: names of its results}, of pedestal_results/results.py
     'ship_align_and_track': (*ALIGNMENT_METRICS, *TRACKING_METRICS), 'uav_flyby': (*TRACKING_METRICS, *NOISE_METRICS),
     'uav_flyby-60m': (*TRACKING_METRICS, *NOISE_METRICS)}
 
-SHIP_CASES = ('ship_pass', 'ship_pass-late', 'ship_pass_ss6')
-"""Cases whose pointing is compared with the pointing of leo_pass."""
+SHIP_CASES = ('ship_pass', 'ship_pass-late', 'ship_pass_ss6')  # compared with leo_pass
 
 METRIC_TARGETS = {  # {(case, metric): target}
     **{(case, 'pointing_to_noise'): '<= 0.4' for case in ('leo_pass', 'ship_pass', 'ship_pass-late')},
@@ -74,7 +70,6 @@ METRIC_TARGETS = {  # {(case, metric): target}
     **{('uav_flyby-60m', metric): '>= 3' for metric in NOISE_METRICS}}
 
 EXTRA_METRIC_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 'autotrack_after_alignment_s': 's'}
-"""{metric of `extra_results`: unit}."""
 
 
 def extra_results(values: Mapping[str, float], run: Run) -> dict[str, float]:

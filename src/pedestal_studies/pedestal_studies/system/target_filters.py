@@ -90,7 +90,6 @@ HARD_TARGETS: dict[str, Callable[[Times], tuple[Floats, Floats]]] = {
                                      start=(-250.0, 750.0, 250.0)),
     'helicopter': functools.partial(_turning, speed=50.0, turn=0.5 * math.pi, leg=12.0, load=0.4,
                                     start=(-1000.0, 2000.0, 500.0))}
-"""{name of a target that manoeuvres hard: function of t}."""
 
 
 def write(path: pathlib.Path, name: str, duration: Seconds) -> None:
@@ -116,9 +115,8 @@ TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {  # {target: (scenar
     'leo-ship': ('ship_pass', {}), 'leo-ship-ss6': ('ship_pass_ss6', {}),
     'geo-ship': ('ship_pass', FIXED_TARGET_PARAMETERS)}
 
-HARD_TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {
+HARD_TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {  # {place: (scenario, its parameters)}
     'ashore': ('track_file', {}), 'ship': ('ship_pass', {'tracking_receiver.target.kind': 'track_file'})}
-"""{place: (scenario, its parameters)} of a target of HARD_TARGETS."""
 TARGET_SCENARIOS |= {name.replace('_', '-') + suffix: HARD_TARGET_SCENARIOS[place] for name in HARD_TARGETS
                      for place, suffix in (('ashore', ''), ('ship', SHIP_SUFFIX))}
 
@@ -165,8 +163,7 @@ CASES = {f'{target}/{name}': Case(f'{target}/{name}', at, {  # {name: Case}
     **parameters, **{f'acu.{key}': value for key, value in changes.items()}})
     for target, (at, parameters) in TARGET_SCENARIOS.items() for name, changes in filters(target).items()}
 
-MAX_POINTING_RATIO = 1.15
-"""Largest permitted ratio of the pointing with the default filter to the pointing with the tuned filter."""
+MAX_POINTING_RATIO = 1.15  # of the default filter over the tuned filter
 
 
 @functools.cache
