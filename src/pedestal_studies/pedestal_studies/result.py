@@ -29,8 +29,10 @@ _Case = TypeVar('_Case', bound=Hashable)
 
 def of_cases(measured: Callable[[_Case, int], ArrayLike], cases: Collection[_Case], runs: int, pool: Pool | None,
             progress: Progress, size: int = 5) -> dict[_Case, Floats]:
-    """Return {case: array (runs, ...) of measured(case, run)} for runs 0, 1, ... of each case; measured: function of a
-    module; pool: None for this process; size: runs that one worker makes at a time."""
+    """Return {case: array (runs, ...) of measured(case, run)} for runs 0, 1, ... of each case.
+
+    measured: function of a module. pool: None for this process. size: runs that one worker makes at a time.
+    """
     return (pool or monte_carlo.Pool(1)).of_cases(functools.partial(_batch, measured), cases, runs, size, progress)
 
 

@@ -189,8 +189,10 @@ def tilt(observer: Observer, conditions: Conditions) -> Radians:
 
 @compiled
 def sigmas(observer: Observer, conditions: Conditions, swell: float) -> tuple[Radians, Radians]:
-    """Return the (azimuth, level) 1 sigma from the covariance, which innovations larger than expected increase, and
-    the biases of the sensors; swell: variance of z3 due to swell [m2/s6]."""
+    """Return the (azimuth, level) 1 sigma from the covariance and the biases of the sensors.
+
+    Innovations that are larger than expected increase the covariance. swell: variance of z3 due to swell [m2/s6].
+    """
     factor, g, w_N = max(observer.innovation_ratio, 1.0), conditions.gravity, conditions.earth_rate[1]
     azimuth_variance = ((factor * observer.p[5] + swell) / g**2 + conditions.gyro_bias**2) / w_N**2
     level_variance = (factor * observer.p[3] + conditions.accelerometer_bias**2) / g**2
@@ -213,8 +215,8 @@ def differentiated(v1: MetersPerSecond, v2: MetersPerSecond2, reference: MetersP
 @compiled
 def command(z1: MetersPerSecond, z2: MetersPerSecond2, z3: float, v1: MetersPerSecond, v2: MetersPerSecond2, b0: float,
             w_c: RadiansPerSecond) -> RadiansPerSecond:
-    """Return the command u of a channel, within MAX_LEVELLING_RATE_RAD_S, which brings z1, z2 to the references v1, v2
-    with the bandwidth w_c and cancels z3; b0 [m/s2 per rad]."""
+    """Return the command u of a channel, within MAX_LEVELLING_RATE_RAD_S. It brings z1, z2 to the references v1, v2
+    with the bandwidth w_c, and cancels z3; b0 [m/s2 per rad]."""
     u0 = fhan(z1 - v1, DAMPING_COEFFICIENT * (z2 - v2), FHAN_LIMIT_M_S3, 1.0 / w_c)
     return min(max((u0 - z3) / b0, -MAX_LEVELLING_RATE_RAD_S), MAX_LEVELLING_RATE_RAD_S)
 
@@ -260,8 +262,8 @@ def advance_covariance(observer: Observer, conditions: Conditions,
 @compiled
 def step(state: State, conditions: Conditions, v_east: MetersPerSecond, v_north: MetersPerSecond, h: Seconds,
          w_c: RadiansPerSecond) -> None:
-    """Execute one step h after the last; v_east, v_north: velocity error in n'; w_c: bandwidth of the level control,
-    which does not affect the estimate, because the observer receives its exact commands."""
+    """Execute one step h after the last; v_east, v_north: velocity error in n'. The bandwidth w_c of the level control
+    does not affect the estimate, because the observer receives its exact commands."""
     observer = state.observer
     # The wanted velocity error is zero, so v1 and v2 start at zero and stay there. The differentiator is part of the
     # ADRC of paper 001.

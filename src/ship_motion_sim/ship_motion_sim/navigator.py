@@ -3,8 +3,8 @@
 The strapdown integration runs at the rate of the IMU, the alignment every `step` seconds; its commands rotate n'.
 Navigation begins as soon as the 1 sigma of azimuth is small enough. Without an aid, the INS navigates by the IMU
 alone. With an aid, which measures the velocity of the ship in deck axes (log), the alignment continues. It uses the
-difference of the velocities of strapdown and aid, so that level and azimuth keep improving. n' is ENU turned about the
-vertical by the azimuth, which is unknown at first, and tilted by small level errors.
+difference of the velocities of strapdown and aid, so that level and azimuth keep improving. The frame n' is ENU turned
+about the vertical by the azimuth, which is unknown at first, and tilted by small level errors.
 """
 import math
 from collections.abc import Iterable

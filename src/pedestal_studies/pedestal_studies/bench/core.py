@@ -152,8 +152,8 @@ def filter_rows() -> list[Row]:
 
 
 def drive_rows() -> list[Row]:
-    """Return the rows of the time of a plant sub-step, in one drive and on a lane, and of the trial speed: simulated
-    time of all lanes over the CPU time of one core."""
+    """Return the rows of the time of a plant sub-step, in one drive and on a lane, and of the trial speed. The trial
+    speed is the simulated time of all lanes over the CPU time of one core."""
     params = AduParameters(initial_elevation=0.7)
     one = adu_unit.DriveRecord.zeros()
     one['state'], one['constants'] = drive_unit.initial_state(params), drive_unit.constants(params)

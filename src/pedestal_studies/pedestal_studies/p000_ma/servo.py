@@ -1,9 +1,9 @@
 """Paper 000's step and sine (figures 5, 6), then a better controller on the same plant.
 
 The plant is the azimuth axis with two motors, gears and load. The paper prints a sine of "0.4 rad/s", which is read in
-two ways: 0.4 Hz (paper-r1) and 0.4 rad/s (paper-r2). paper-all has the controller of the paper with gains for all
-numbers of figures 5 and 6. best has feed-forward; best-full-torque has no reserve for a heavier load. `pedestal run
-servo_step|servo_sine --param ...` runs every case too (Case.command).
+two ways: 0.4 Hz (paper-r1) and 0.4 rad/s (paper-r2). The case paper-all has the controller of the paper with gains for
+all numbers of figures 5 and 6. The case best has feed-forward. The case best-full-torque has no reserve for a heavier
+load. `pedestal run servo_step|servo_sine --param ...` runs every case too (Case.command).
 """
 import functools
 import math

@@ -1,7 +1,7 @@
 """Filters with a fixed window of measurements: least squares, and the Wiener filter of finite memory.
 
-The weights of the last n measurements give the best linear unbiased estimate of angle and rate at the newest one, if
-the motion is a polynomial of the time plus a random displacement d:
+The estimate is a weighted sum of the last n measurements. The weights give the best linear unbiased estimate of angle
+and rate at the newest measurement. The motion is a polynomial of the time plus a random displacement d:
 
     y_i = angle - rate tau_i + (1/2) acceleration tau_i^2 + d_i + noise_i,      tau_i = i T, i = 0 ... n - 1
 

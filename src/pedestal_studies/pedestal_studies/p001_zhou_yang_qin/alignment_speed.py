@@ -3,9 +3,8 @@
 The paper (section 6) states that other parameters of the ADRC make the level converge faster and so shorten the
 alignment of the azimuth, and that a faster convergence lowers the precision. It prints no number.
 
-A case adrc/K is the method adrc with all its times divided by K: its bandwidths are K times the default, and the
-azimuth uses the level commands after 1 / K of the default time. All else is as in the study alignment, and all cases
-get the same IMU samples.
+A case adrc/K is the method adrc with all its times divided by K. Its bandwidths are K times the default. The azimuth
+uses the level commands after 1 / K of the default time. All cases get the same IMU samples.
 """
 import dataclasses
 from collections.abc import Mapping

@@ -103,8 +103,10 @@ class PaperLoop:
     lost_power_ratio: float = 0.0
 
     def run(self, target: Floats, rate: Floats | None = None, noise: Floats | None = None) -> tuple[Floats, Floats]:
-        """Return (beam, smoothed error in the loop) [rad] of a target [rad]; rate: of the target due to the carrier
-        [rad/s]; noise: of the samples [rad]; None for zeros."""
+        """Return (beam, smoothed error in the loop) [rad] of a target [rad].
+
+        rate: of the target due to the carrier [rad/s]. noise: of the samples [rad]. None for zeros.
+        """
         zeros, beam, errors = np.zeros(len(target)), np.zeros(len(target)), np.zeros(len(target))
         constants = PaperLoopConstants(beam_loop.LOOP_FORMS.index(self.form), self.alpha, self.period, self.delta,
                                        SMOOTHING_CODES[self.smoothing])
@@ -131,8 +133,11 @@ class FilterLoop:
 
     def run(self, target: Floats, noise: Floats | None = None, attitude: Floats | None = None,
             rate: Floats | None = None) -> tuple[Floats, Floats]:
-        """Return (beam, innovation of the filter) [rad] of a target [rad]; noise: of the samples [rad]; attitude, rate
-        [rad, rad/s]: rotation by the carrier as the INS measures it, needed with use_ins."""
+        """Return (beam, innovation of the filter) [rad] of a target [rad].
+
+        noise: of the samples [rad]. attitude, rate: rotation by the carrier as the INS measures it, needed with
+        use_ins.
+        """
         n = len(target)
         zeros, beam, errors = np.zeros(n), np.zeros(n), np.zeros(n)
         measured = np.maximum(np.arange(n) - self.stamp_error, 0)
@@ -161,8 +166,8 @@ def _beam(delay: int, hold: int) -> Beam:
 
 @compiled
 def receiver_reading(offset: Radians, receiver: Receiver) -> Radians:
-    """Return the error that a receiver measures for an offset of the target from the beam, NaN if the signal is lost:
-    linear with the beamwidth 0, else the monopulse pattern within full scale."""
+    """Return the error that a receiver measures for an offset of the target, NaN if the signal is lost. With the
+    beamwidth 0 the error is linear, else it follows the monopulse pattern within full scale."""
     slope, beamwidth, lost_power_ratio = receiver
     if beamwidth == 0.0:
         return slope * offset
@@ -239,7 +244,7 @@ def _filter_loop(constants: FilterLoopConstants, target: Target, smoothers: Reco
 
 
 def is_stable(loop: PaperLoop, size: Radians = 1e-9, seconds: Seconds = 20.0) -> bool:
-    """Return True if the error of a loop falls after a step of `size`: its largest values in the second and in the
+    """Return True if the error of a loop falls after a step of `size`. Its largest values in the second and in the
     last third of the time are compared."""
     n = round(seconds / GRID_STEP_S)
     error = np.abs(size - loop.run(np.full(n, size))[0])

@@ -1,8 +1,9 @@
 """Paper 002's angle loop of a phased array: figures 3 to 7 and 9, limits of stability and of lock, a better loop.
 
-Cases run the loops of angle_loop.py, with the gain alpha [-] from the error to the angle and the time T between two
-updates; cases graph/... run the scenario phased_array_sway in the closed loop. S0, S1 and S2 are the kinds of
-smoothing in the receiver (SMOOTHING_CODES), with 20 samples at 1 kHz. A case without one of them in its name has S1.
+Cases run the loops of angle_loop.py; cases graph/... run the scenario phased_array_sway in the closed loop. Symbols
+are alpha, the gain [-] from the error to the angle, and T, the time between two updates. S0, S1 and S2 are the kinds
+of smoothing in the receiver (SMOOTHING_CODES), with 20 samples at 1 kHz. A case without one of them in its name has
+S1.
 
 lag_deg          largest error that the receiver measures, as in the paper's figures
 true_lag_deg     largest true error of the beam
@@ -280,8 +281,11 @@ def max_kept_rate(loop: PaperLoop) -> float:
 
 
 def loss_rows() -> list[Line]:
-    """Return the rows of loops with a receiver that loses the signal: the largest rate of the sine that the loop
-    keeps, and the error at this rate with a linear receiver, which loses no signal."""
+    """Return the rows of loops with a receiver that loses the signal.
+
+    The metrics are the largest rate of the sine that the loop keeps, and the error at this rate with a linear
+    receiver, which loses no signal.
+    """
     rows: list[Line] = []
     for form in ('type_1', 'type_2'):
         for kind in RECEIVER_LOSS_POWERS:

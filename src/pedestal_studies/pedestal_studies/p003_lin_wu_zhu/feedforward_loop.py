@@ -55,14 +55,18 @@ BATCH_RUNS, NOISE_SEED = 25, 1  # runs of one batch; seed of their noise
 
 
 def feedforward_gains(w: RadiansPerSecond, zeta: float) -> tuple[float, Seconds]:
-    """Return (k_v [-], k_a [s]) of 1 / W(s) = 1 + 2 zeta s / w + s^2 / w^2: the paper's c_1 and c_2, whose formulas
-    are corrected here (acu_tracker/servo/controllers.py)."""
+    """Return (k_v [-], k_a [s]) of 1 / W(s) = 1 + 2 zeta s / w + s^2 / w^2.
+
+    The paper calls these gains c_1 and c_2. Its formulas are corrected here (acu_tracker/servo/controllers.py).
+    """
     return 1.0, 2.0 * zeta / w
 
 
 def rate_loop_step(w: RadiansPerSecond, zeta: float) -> Floats:
-    """Return the matrix M (3, 4) of a step of the antenna over T: x(t + T) = M (x(t), u), exact for a constant u; x:
-    angle [rad], rate [rad/s], acceleration [rad/s2] of the antenna."""
+    """Return the matrix M (3, 4) of a step over T: x(t + T) = M (x(t), u), exact for a constant u.
+
+    The state x is angle [rad], rate [rad/s] and acceleration [rad/s2] of the antenna.
+    """
     A = np.zeros((4, 4))
     A[0, 1] = A[1, 2] = 1.0
     A[2, 1:] = -w * w, -2.0 * zeta * w, w * w
@@ -161,8 +165,10 @@ def imm(q_ca: float, predicted: bool) -> Source:
 
 
 def motion(axis: str, rate: RadiansPerSecond = S_MOTION_RATE_RAD_S) -> tuple[Times, Vectors3, Seconds]:
-    """Return (times, angle, rate and acceleration of the target, period) of the motion on an axis: half a period to
-    settle and EVALUATED_PERIODS; rate: between reversals."""
+    """Return (times, angle, rate and acceleration of the target, period) of the motion on an axis.
+
+    The times are half a period to settle and EVALUATED_PERIODS. rate: between reversals.
+    """
     reversal = REVERSAL_S_BY_AXIS[axis]
     period = 2.0 * (S_MOTION_STROKE_RAD / rate + reversal * (1.0 - 2.0 / math.pi))
     t = T * np.arange(round((0.5 + EVALUATED_PERIODS) * period / T), dtype=float)

@@ -6,9 +6,9 @@ noise, filters and names of the sources are those of the study imm-feedforward. 
 accelerations of the reversals, are 5/3 of those at 30 m/s.
 
 Cases are AXIS/SPEED/SOURCE. The source difference-N is the first and second difference of the measured angles over N
-steps of 10 ms. rate_rms_deg_s and acceleration_rms_deg_s2 are errors at the instant of the measured miss, over the
-whole motion. A ratio divides by the metric in the run of equal noise. The cases drive-... have rows other than
-autotrack_percent only if all runs stay in autotrack.
+steps of 10 ms. The errors rate_rms_deg_s and acceleration_rms_deg_s2 are those at the instant of the measured miss. A
+ratio divides by the metric in the run of equal noise. The cases drive-... have rows other than autotrack_percent only
+if all runs stay in autotrack.
 """
 import math
 from collections.abc import Mapping

@@ -86,8 +86,10 @@ def curve(points: Points, name: str) -> Floats:
 
 
 def frontier(points: Points, name: str) -> Floats:
-    """Return the Pareto frontier of the curve of a filter, (2, n) of (rate noise, miss) by rising rate noise: the
-    tunings for which no other tuning has both less rate noise and less miss."""
+    """Return the Pareto frontier of the curve of a filter, (2, n) of (rate noise, miss) by rising rate noise.
+
+    It holds the tunings for which no other tuning has both less rate noise and less miss.
+    """
     kept: list[tuple[float, float]] = []
     for noise, miss in sorted(map(tuple, curve(points, name).T)):
         if not kept or miss < kept[-1][1]:

@@ -1,9 +1,9 @@
 """Effect of an independent measurement of the rate on the filter (paper 004): bandwidth and dynamic error.
 
-With constant sigma_a (assumed acceleration of the target) and noises, the 'current' statistical filter settles to
-constant gains: X+ = A X + B (y, y'), with the estimate X of angle, rate and acceleration. A and B are identified on
-the compiled filter itself, with one unit state and one unit measurement at a time. A sine y = e^jwt, y' = jw y then
-gives the response G of the estimate:
+With constant sigma_a and noises, the 'current' statistical filter settles to constant gains: X+ = A X + B (y, y'). X
+is the estimate of angle, rate and acceleration; sigma_a is the acceleration of the target that the filter assumes. A
+and B are identified on the compiled filter itself, with one unit state and one unit measurement at a time. A sine y =
+e^jwt, y' = jw y then gives the response G of the estimate:
 
     G(jw) = (1 - A e^-jwT)^-1 B (1, jw)',        angle: G_1,  rate: G_2 / jw,  dynamic error: |1 - G_1|.
 
@@ -107,8 +107,10 @@ def _step(filters: Records, constants: Records, y: Radians, y_rate: RadiansPerSe
 
 
 def steady_state_matrices(sigma_a: float, rate_sigma: float) -> tuple[Floats, Floats]:
-    """Return (A (3, 3), B (3, 2)) of X+ = A X + B (y, y') with constant gains; rate_sigma: noise of the rate [deg/s],
-    NaN without a measured rate, for which B has a column of zeros."""
+    """Return (A (3, 3), B (3, 2)) of X+ = A X + B (y, y') with constant gains.
+
+    rate_sigma: noise of the rate [deg/s], NaN without a measured rate. B then has a column of zeros.
+    """
     c = axis_filter.constants(filter_of(math.radians(sigma_a), 1.0))        # floor 1: sigma_a = a_max at all times
     R_rate = math.radians(rate_sigma) ** 2
     zero_rate = 0.0 if math.isfinite(R_rate) else math.nan

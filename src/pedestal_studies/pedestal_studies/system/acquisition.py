@@ -2,8 +2,8 @@
 
 In late_tle the satellite is 1 to 3 s late. A case search-<pattern> has one round of a search. Its target stands still
 anywhere in the searched area, with equal probability. The case steptrack_geo tracks a geostationary satellite by its
-signal level alone and has other metrics. tracked_after_s is the time until the antenna remains in autotrack with the
-receiver locked. found_percent is the share of the runs that end so with the target in the beam.
+signal level alone and has other metrics. The metric tracked_after_s is the time until the antenna remains in autotrack
+with the receiver locked. The metric found_percent is the share of the runs that end so with the target in the beam.
 """
 import math
 from collections.abc import Mapping
@@ -82,8 +82,10 @@ def offset(pattern: int, rng: np.random.Generator, beamwidth: Radians = 0.0175) 
 
 
 def tracked_after(run: Run, from_loss: bool) -> Seconds:
-    """Return the time until the target is tracked for the rest of the run, or NaN; from_loss: True to measure from the
-    first loss of the signal in autotrack, False from the start."""
+    """Return the time until the target is tracked for the rest of the run, or NaN.
+
+    from_loss: True to measure from the first loss of the signal in autotrack, False from the start.
+    """
     tracked = (run[MODE_TOPIC] == Mode.AUTOTRACK) & np.isfinite(run[ERROR_TOPIC]['vector'][:, 0])
     if not tracked[-1]:
         return math.nan

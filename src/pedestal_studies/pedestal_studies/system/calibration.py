@@ -105,7 +105,7 @@ def measured(seed: int, duration: Seconds | None = None) -> Offsets:
 
 
 def bending(axis: AxisParameters) -> Radians:
-    """Return the largest deflection of the dish by its unbalance, at elevation 0, on a structure whose stiffness
+    """Return the largest deflection of the dish by its unbalance, at elevation 0. The stiffness of the structure
     follows from the frequency at which the dish swings on it."""
     structure, load = axis.structure, axis.load
     return load.unbalance / ((2.0 * math.pi * structure.frequency)**2 * structure.inertia_share * load.inertia)

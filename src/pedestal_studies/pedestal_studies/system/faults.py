@@ -277,8 +277,10 @@ class FaultOutcome(typing.NamedTuple):
 
 
 def run_of(mode: str, inject: str = '') -> tuple[Run, list[Report]]:
-    """Return a run of a mode and its reports: active alarms and diagnoses at each step at which they are read; inject:
-    text NODE.inject=... of the fault, '' for none."""
+    """Return a run of a mode and its reports: active alarms and diagnoses at each step at which they are read.
+
+    inject: text NODE.inject=... of the fault, '' for a run without a fault.
+    """
     chosen = scenario.load(SCENARIO_NAME, [*MODE_PARAMETERS[mode], 'scenario.program.time_offset=0',
                                            *filter(None, [inject])],
                            duration=RUN_DURATION_S, pacing='realtime')

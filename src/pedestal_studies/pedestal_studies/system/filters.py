@@ -171,7 +171,8 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None, 
     means = {case: {metric: float(value.mean()) for metric, (value, _) in measured.items()}
              for case, measured in values.items()}
     table = rows(values)
-    return Result(table, figures(means, over_time), remarks(means, tuned, runs), shown=shown(table))
+    # Because all rows are too many for a terminal, only those with a target are printed.
+    return Result(table, figures(means, over_time), remarks(means, tuned, runs), [r for r in table if r['target']])
 
 
 def metrics(sums: Records) -> dict[str, tuple[Floats, str]]:
@@ -195,11 +196,6 @@ def rows(values: Mapping[CaseName, dict[str, tuple[Floats, str]]]) -> list[Row]:
     return [row('/'.join(case), metric, value, unit,
                 target=METRIC_TARGETS.get((*case[:2], metric)) if case[2] == SHOWN_NOISE else None)
             for case, measured in values.items() for metric, (value, unit) in measured.items()]
-
-
-def shown(table: list[Row]) -> list[Row]:
-    """Return the rows that are printed: the rows with a target, because all rows are too many for a terminal."""
-    return [row for row in table if row['target']]
 
 
 def _cell(measured: Mapping[str, float] | None) -> str:
@@ -296,8 +292,10 @@ def profile_panels(on: Sequence[str]) -> tuple[Figure, fig.Panels]:
 
 def bars(values: Means, on: Sequence[str], metric: Callable[[str, Mapping[str, float]], float], label: str,
          colour: Callable[[str], str], text: Callable[[str, Mapping[str, float]], str]) -> tuple[Figure, fig.Panels]:
-    """Return (figure, panels) with a panel of bars for each profile; metric, text: functions (filter, its metrics)
-    that return the length of a bar and the text at its end; colour: of a filter."""
+    """Return (figure, panels) with a panel of bars for each profile.
+
+    metric, text: functions (filter, its metrics) that return the length of a bar and the text at its end.
+    """
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
         measured = {name: values.get((profile, name, SHOWN_NOISE)) for name in SHOWN_FILTERS}

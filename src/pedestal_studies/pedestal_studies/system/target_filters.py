@@ -70,8 +70,10 @@ def launch_vehicle(t: Times) -> tuple[Floats, Floats]:
 
 def _turning(t: Times, speed: MetersPerSecond, turn: Radians, leg: Seconds, load: float,
              start: tuple[Meters, Meters, Meters]) -> tuple[Floats, Floats]:
-    """Return (azimuth, elevation) of an aircraft that turns left and right alternately, with straight legs of duration
-    `leg` between; turn: angle of each turn; load: lateral acceleration [g]."""
+    """Return (azimuth, elevation) of an aircraft that turns left and right by `turn`, with straight legs between.
+
+    leg: duration of a straight leg. load: lateral acceleration [g]. start: position, on the way to the east.
+    """
     rate = load * G_M_S2 / speed
     half, r = np.divmod(t, leg + turn / rate)
     turning = np.where(r >= leg, rate, 0.0) * (1.0 - 2.0 * (half % 2))
