@@ -24,13 +24,12 @@ from pedestal_workbench.trials.cases import Case
 from pedestal_workbench.trials.monte_carlo import Progress
 from pedestal_workbench.tuning import loops
 
-STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 0.02, 0.1, 0.2
-"""Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; torque of the gust over the largest torque
-of both motors [-]."""
+STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ = 0.02, 0.02, 0.1
+GUST_TORQUE_SHARE = 0.2  # torque of the gust over the largest torque of both motors [-]
 
-RUN_DURATION_S, START_ANGLES_RAD, SETTLING_BAND, SINE_PERIODS = 10.0, (0.0, 0.6), 0.02, 3
-"""Duration of the step and gust runs [s]; initial angles of azimuth and elevation [rad]. Half-width of the band of the
-settling time over the size of the step [-]; periods of the sine, of which the first is not evaluated."""
+START_ANGLES_RAD = (0.0, 0.6)  # initial angles of azimuth and elevation [rad]
+SETTLING_BAND = 0.02  # half-width of the band of the settling time over the size of the step [-]
+RUN_DURATION_S, SINE_PERIODS = 10.0, 3  # of step and gust [s]; of the sine, of which the first is not evaluated
 
 GUST_START_S, STANDSTILL_START_S = 4.0, 5.0  # start of the gust; start of the evaluated standstill after the step [s]
 

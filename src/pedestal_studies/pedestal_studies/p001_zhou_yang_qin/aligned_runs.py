@@ -131,9 +131,7 @@ class Sums(NamedTuple):
                     self.steps + more.steps, self.runs + more.runs)
 
 
-JACKKNIFE_PARTS = 20
-"""Number of parts into which the runs are divided for the jackknife (intervals.pseudo_values), which gives the
-intervals of statistics over all runs."""
+JACKKNIFE_PARTS = 20  # parts of the runs for the jackknife (intervals.pseudo_values) of statistics over all runs
 
 
 @dataclasses.dataclass(frozen=True)

@@ -45,11 +45,8 @@ from pedestal_studies.result import Drawings, Result, legend
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
-DEFAULT_RUNS = 400
-"""Runs of the cases without a suffix and of swell; each quadrant has a quarter of them.
-
-With 50 runs an rms is known only to 10 %, which is more than the difference between the best methods.
-"""
+DEFAULT_RUNS = 400  # of the cases without a suffix and of swell; each quadrant has a quarter of them
+"""With 50 runs an rms is known only to 10 %, which is more than the difference between the best methods."""
 
 
 CASE_METHODS = {method.replace('_', '-'): method for method in METHODS}  # {case: method}

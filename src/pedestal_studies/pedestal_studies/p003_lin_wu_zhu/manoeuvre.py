@@ -30,9 +30,7 @@ BATCH_RUNS, NOISE_SEED = 25, 1  # runs of one batch; seed of their noise
 
 REVERSAL_DURATIONS_S = (4.0, 2.0, 1.0, 0.5, 0.35)  # their peak accelerations are 2.7 to 31 deg/s2
 
-LEAD_TIME_S = 5.0
-"""Time at which the target is in the middle of its stroke before the first reversal [s]; its motion is uniform until
-then."""
+LEAD_TIME_S = 5.0  # of uniform motion, until the target is in the middle of its stroke [s]
 
 MEASUREMENT_NOISE = ensemble.Noise(feedforward_loop.MISS_SIGMA_RAD)  # noise of the measured angle
 

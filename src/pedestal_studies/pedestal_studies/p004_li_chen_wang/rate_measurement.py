@@ -58,9 +58,8 @@ SETTLING_STEPS = 20000  # steps after which the gains are constant, also with th
 
 FLYBY_PROFILE = 'flyby-60m'
 
-MAX_ACCELERATION_RATIO, MIN_SIGMA_RATIO = 1.2, 0.3
-"""Parameters of the filter of a flight: its a_max over the largest acceleration of the flight [-], and the least
-sigma_a over a_max [-]."""
+MAX_ACCELERATION_RATIO = 1.2  # a_max of the filter over the largest acceleration of the flight [-]
+MIN_SIGMA_RATIO = 0.3  # least sigma_a over a_max [-]
 
 SETTLING_TIME_S = 5.0  # time of the flyby from which the errors are evaluated [s]
 
