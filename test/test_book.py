@@ -34,7 +34,7 @@ def test_every_parameter_verb_and_law_is_there(pages):
     laws = (pages / 'reference' / 'laws.md').read_text()
     for module, test in (('acu_tracker.estimation.filters.kalman', 'test_kalman.py'),
                          ('adu_drive.plant.mechanics', 'test_laws.py'),
-                         ('ship_motion_sim.sea.motion', 'test_motion.py')):
+                         ('ship_motion_sim.motion', 'test_motion.py')):
         section = laws.partition(f'\n### {module}\n')[2].partition('\n### ')[0]
         assert '```text' in section and f'`{test}`' in section
 

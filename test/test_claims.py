@@ -12,12 +12,13 @@ from drive_law.params import AduParameters
 from pedestal_bringup.loop import closed_loop
 from pedestal_results.intervals import missed
 from pedestal_studies.p000_ma import backlash, servo
-from pedestal_studies.p001_zhou_yang_qin import alignment, methods
+from pedestal_studies.p001_zhou_yang_qin import aligned_runs, methods
+from pedestal_studies.p001_zhou_yang_qin.aligned_runs import ARCMIN_RAD
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop as loop
 from ship_motion_sim import earth
 
 ROOT = pathlib.Path(__file__).parents[1]
-LATITUDE = math.radians(alignment.SHIP_PARAMETERS.latitude_deg)
+LATITUDE = math.radians(aligned_runs.SHIP_PARAMETERS.latitude_deg)
 
 
 def reading(paper, begin):
@@ -74,19 +75,19 @@ def test_longitude_and_height_of_the_alignment():
 def test_without_noise_an_alignment_reaches_the_limits_of_the_paper(monkeypatch):
     """grad / g and eps / w_N: sway, biases and scale errors of the paper, one run."""
     for name in ('VELOCITY_NOISE_M_S', 'GYRO_NOISE_DENSITY', 'ACCELEROMETER_NOISE_DENSITY'):
-        monkeypatch.setattr(alignment, name, 0.0)
-    (angle, force, attitude), start = alignment.simulated_run(alignment.Batch('', 0, 1), 0)
-    every = round(alignment.EVALUATION_PERIOD_S / alignment.IMU_PERIOD_S)
+        monkeypatch.setattr(aligned_runs, name, 0.0)
+    (angle, force, attitude), start = aligned_runs.simulated_run(aligned_runs.Batch('', 0, 1), 0)
+    every = round(aligned_runs.EVALUATION_PERIOD_S / aligned_runs.IMU_PERIOD_S)
     found = {}
     for method in ('classical', 'adrc'):
-        constants = methods.constants(alignment.INS_PARAMETERS, method, LATITUDE)
-        estimates = np.zeros(len(angle) // every, alignment.AlignmentEstimate.dtype)
-        alignment.align(methods.initial_state(constants, start), constants, angle, force, alignment.IMU_PERIOD_S,
-                        every, estimates)
-        errors = alignment.errors(estimates['quaternion'], attitude[every - 1::every])[550:] / alignment.ARCMIN_RAD
+        constants = methods.constants(aligned_runs.INS_PARAMETERS, method, LATITUDE)
+        estimates = np.zeros(len(angle) // every, aligned_runs.AlignmentEstimate.dtype)
+        aligned_runs.align(methods.initial_state(constants, start), constants, angle, force,
+                           aligned_runs.IMU_PERIOD_S, every, estimates)
+        errors = aligned_runs.errors(estimates['quaternion'], attitude[every - 1::every])[550:] / ARCMIN_RAD
         found[method] = np.abs(errors.mean(axis=0))
-    level = alignment.ACCELEROMETER_BIAS_M_S2 / earth.gravity(LATITUDE) / alignment.ARCMIN_RAD
-    azimuth = alignment.GYRO_BIAS_RAD_S / earth.rate(LATITUDE)[1] / alignment.ARCMIN_RAD
+    level = aligned_runs.ACCELEROMETER_BIAS_M_S2 / earth.gravity(LATITUDE) / ARCMIN_RAD
+    azimuth = aligned_runs.GYRO_BIAS_RAD_S / earth.rate(LATITUDE)[1] / ARCMIN_RAD
     for east, north, up in found.values():
         assert (east, north) == pytest.approx((level, level), rel=0.06) and up == pytest.approx(azimuth, rel=0.05)
     text = reading('001', 'limit of the level')

@@ -12,7 +12,7 @@ from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.program import Plan
 from pedestal_common.text_files import parameter_file
 from pedestal_common.wire import commands, messages
-from ship_motion_sim.sea import motion
+from ship_motion_sim import motion
 
 NODES = {'ship_motion': 'ship_motion_node', 'acu': 'acu_node',
          'tracking_receiver': 'tracking_receiver_node', 'adu': 'adu_node'}

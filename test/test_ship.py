@@ -21,7 +21,7 @@ from pedestal_recording import bag as bags
 from pedestal_results import isolation, known_attitude, results, tracking
 from pedestal_workbench.again import difference, recompute
 from pedestal_workbench.again.feed import FedRecording
-from ship_motion_sim.sea import motion
+from ship_motion_sim import motion
 from tracking_receiver_sim import target
 
 

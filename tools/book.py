@@ -11,6 +11,7 @@ import pathlib
 import re
 import shutil
 import sys
+from collections.abc import Iterator
 
 from tools import notebooks
 
@@ -25,8 +26,8 @@ LAW_PACKAGES = ('pedestal_common', 'receiver_law', 'drive_law', 'tracking_receiv
 """Packages with laws, in the order of the page of laws."""
 
 
-def parameter_page():
-    """Return the lines of the page of parameters: default, range, unit and meaning of every parameter."""
+def parameter_page() -> list[str]:
+    """Return the lines of the page of parameters."""
     lines = ['# Parameters', '', 'Every parameter of every node, as the node declares it. `pedestal parameters NODE` '
              'prints the same. The units are SI units and radians. A name that ends in `_deg` or `_dbhz` has this '
              'unit instead.']
@@ -44,8 +45,8 @@ def parameter_page():
     return lines
 
 
-def verb_page():
-    """Return the lines of the page of verbs: purpose and options of every verb, as its --help prints them."""
+def verb_page() -> list[str]:
+    """Return the lines of the page of verbs, as their --help prints them."""
     lines = ['# Verbs', '', 'The help texts that `pedestal VERB --help` prints.']
     for name, (_, summary) in cli.VERBS.items():
         verb = cli.found(name)
@@ -58,9 +59,8 @@ def verb_page():
     return lines
 
 
-def law_page(root):
-    """Return the lines of the page of laws: docstring, compiled functions and tests of every module with laws. root:
-    folder of the checkout."""
+def law_page(root: pathlib.Path) -> list[str]:
+    """Return the lines of the page of laws: docstring, compiled functions and tests of every module with laws."""
     lines = ['# Laws', '', 'Every control law, filter, motor and wave is a compiled function in a small module. This '
              'page is a copy of the docstrings of these modules: equations, symbols, sources.']
     for package in LAW_PACKAGES:
@@ -78,21 +78,19 @@ def law_page(root):
     return lines
 
 
-def _docstring(module):
-    """Return the docstring of a module. module: path of its file."""
+def _docstring(module: pathlib.Path) -> str:
     return ast.get_docstring(ast.parse(module.read_text())) or ''
 
 
-def _imported(test):
-    """Yield the dotted names that a test module imports with `from`. test: path of its file."""
+def _imported(test: pathlib.Path) -> Iterator[str]:
+    """Yield the dotted names that a test module imports with `from`."""
     for node in ast.walk(ast.parse(test.read_text())):
         if isinstance(node, ast.ImportFrom):
-            yield from (node.module, *(f'{node.module}.{alias.name}' for alias in node.names))
+            yield from (str(node.module), *(f'{node.module}.{alias.name}' for alias in node.names))
 
 
-def _laws(module):
-    """Return [(signature, first paragraph of the docstring)] of the public compiled functions of a module; None for a
-    module without compiled functions. module: path of its file."""
+def _laws(module: pathlib.Path) -> list[tuple[str, str]] | None:
+    """Return [(signature, first paragraph of the docstring)] of the public compiled functions of a module, or None."""
     compiled = [node for node in ast.parse(module.read_text()).body if isinstance(node, ast.FunctionDef) and any(
         ast.unparse(decorator) in ('compiled', 'inlined') for decorator in node.decorator_list)]
     return [(f'{node.name}({", ".join(argument.arg for argument in node.args.args)})',
@@ -100,16 +98,17 @@ def _laws(module):
             for node in compiled if not node.name.startswith('_')] if compiled else None
 
 
-def contributing_page(root):
-    """Return the text of CONTRIBUTING.md for the book. Its links to docs/ fit the new place, and its links to other
-    files outside docs/ become plain text."""
+def contributing_page(root: pathlib.Path) -> str:
+    """Return CONTRIBUTING.md for the book, whose links to files outside docs/ become plain text."""
     text = (root / 'CONTRIBUTING.md').read_text().replace('](docs/', '](')
     return re.sub(r'\[([^]]*)\]\([A-Z][^)]*\)', r'\1', text)
 
 
-def main(folder, root='.', execute=True) -> int:
-    """Write all pages of the book of a checkout (root) into a folder, whose old content is deleted. Return the exit
-    code 0. execute: True to run the notebooks, whose pages otherwise have no output."""
+def main(folder: str | pathlib.Path, root: str | pathlib.Path = '.', *, execute: bool = True) -> int:
+    """Write all pages of the book of a checkout into a folder, whose old content is deleted. Return exit code 0.
+
+    execute: True to run the notebooks, whose pages otherwise have no output.
+    """
     root, folder = pathlib.Path(root), pathlib.Path(folder)
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(root / 'docs', folder)

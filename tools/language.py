@@ -11,6 +11,11 @@ import pathlib
 import re
 import sys
 import tokenize
+from collections.abc import Iterator, Sequence
+from typing import TypeAlias
+
+Text: TypeAlias = tuple[int, str, bool]     # line number, text, True if it consists of sentences
+Fault: TypeAlias = tuple[int, str, str]     # line number, broken rule, text
 
 MAX_SENTENCE_WORDS = 35
 FORBIDDEN_WORD = re.compile(r'\b(told|tells|says|asked|anew|strangers?|whoever|somebody|nobody|hearers?|'
@@ -18,13 +23,12 @@ FORBIDDEN_WORD = re.compile(r'\b(told|tells|says|asked|anew|strangers?|whoever|s
 """Words that the rules of the language forbid: words with which machines speak, words for actors without a name, and
 words that a term of docs/glossary.md replaces (subscriber, stall, uncommanded motion, mismatch, inject)."""
 
-ALLOWED = {
-    ('src/pedestal_studies/pedestal_studies/p002_jia/phased_array.py', 'best-told-10ms-less'):
+ALLOWED = {  # {(path, part of a text): reason why that text may break a rule}
+    ('src/pedestal_studies/pedestal_studies/p002_jia/compared_loops.py', 'best-told-10ms-less'):
         'a case of --json, which programs read',
     ('tools/language.py', 'told|tells'): 'the list of the forbidden words itself',
     ('tools/language.py', 'best-told-10ms-less'): 'the exception of the case above',
 }
-"""{(path, part of a text): reason why that text may break a rule}."""
 
 CONSTANT_NAME = re.compile(r'[A-Z][A-Z0-9_]*')
 ROOT = pathlib.Path(__file__).parents[1]
@@ -33,7 +37,7 @@ _ABBREVIATION = re.compile(r'\b(e\.g|i\.e|cf|eq|Eq|fig|Fig|sec|Sec|vs|approx|No|
 _TABLE_ROW = re.compile(r'^\s+\S|\S {2,}\S|^\s*[|>]|^\s*$')
 
 
-def paths():
+def paths() -> list[pathlib.Path]:
     """Return every file whose language is checked."""
     pages = (ROOT / name for name in ('README.md', 'CONTRIBUTING.md', 'CHANGELOG.md'))
     modules = (path for folder in ('src', 'tools') for path in sorted((ROOT / folder).glob('**/*.py')))
@@ -41,13 +45,15 @@ def paths():
             *(path for path in modules if 'test' not in path.parts and path.name != 'setup.py')]
 
 
-def markdown_texts(text):
-    """Yield (line number, text, True if it consists of sentences) of each paragraph, heading and table cell of a
-    Markdown page. Code and comments of the page are omitted."""
-    blank = lambda match: '\n' * match[0].count('\n')  # noqa: E731  keeps line numbers
+def markdown_texts(text: str) -> Iterator[Text]:
+    """Yield each paragraph, heading and table cell of a Markdown page, without its code and comments."""
+    def blank(match: re.Match[str]) -> str:     # keeps line numbers
+        return '\n' * match[0].count('\n')
+
     text = re.sub(r'(?ms)^ *(```|~~~).*?^ *\1[^\n]*$', blank, text)
     text = re.sub(r'(?s)<!--.*?-->', blank, text)
-    paragraph, start, after_blank = [], 0, True
+    paragraph: list[str] = []
+    start, after_blank = 0, True
     for number, line in enumerate([*text.split('\n'), ''], 1):
         item = re.match(r'\s*([-*+]|\d+\.)\s', line)
         code = line.startswith('    ') and after_blank and not item
@@ -63,7 +69,7 @@ def markdown_texts(text):
         after_blank = not line.strip() or code
 
 
-def docstrings(tree):
+def docstrings(tree: ast.Module) -> Iterator[tuple[int, str]]:
     """Yield (line number, docstring) of a module, its classes, functions and constants."""
     for node in ast.walk(tree):
         for child in () if isinstance(node, (ast.Lambda, ast.IfExp)) else getattr(node, 'body', ()):
@@ -72,15 +78,15 @@ def docstrings(tree):
                     yield child.lineno, text
 
 
-def python_texts(source):
-    """Yield (line number, text, True if it consists of sentences) of the docstrings, comments and string constants of
-    a module. source: text of the module."""
+def python_texts(source: str) -> Iterator[Text]:
+    """Yield the docstrings, comments and string constants of a module."""
     tree = ast.parse(source)
     documented = dict(docstrings(tree))
     for start, text in documented.items():
-        paragraph, first = [], start
+        paragraph: list[str] = []
+        first = start
         for number, line in enumerate([*text.split('\n'), ''], start):
-            indented = number > start and re.match(r' *', line).end() > _indent(text)
+            indented = number > start and len(line) - len(line.lstrip(' ')) > _indent(text)
             if indented or _TABLE_ROW.search(line.strip() or '') or not line.strip():
                 if paragraph:
                     yield first, ' '.join(paragraph), True
@@ -97,20 +103,20 @@ def python_texts(source):
             yield token.start[0], token.string, False
 
 
-def _indent(text):
+def _indent(text: str) -> int:
     """Return the number of spaces before the text of a docstring, below its first line."""
     lines = [line for line in text.split('\n')[1:] if line.strip()]
     return min((len(line) - len(line.lstrip()) for line in lines), default=0)
 
 
-def sentences(text):
+def sentences(text: str) -> list[str]:
     """Return the sentences of a paragraph. Inline code becomes one word each, and links lose their address."""
     text = re.sub(r'\]\([^)]*\)', ']', re.sub(r'`[^`]*`', '`x`', text))
     return _SENTENCE_END.split(_ABBREVIATION.sub(r'\1 ', text))
 
 
-def faults(path):
-    """Yield (line number, broken rule, text) for each text of a file that breaks a rule."""
+def faults(path: pathlib.Path) -> Iterator[Fault]:
+    """Yield each text of a file that breaks a rule."""
     source = path.read_text(encoding='utf-8')
     for line, text, prose in (python_texts if path.suffix == '.py' else markdown_texts)(source):
         for word in FORBIDDEN_WORD.findall(re.sub(r'`[^`]*`', '', text)):
@@ -120,29 +126,28 @@ def faults(path):
                 yield line, f'{len(sentence.split())} words', sentence
 
 
-def allowed(path):
+def allowed(path: pathlib.Path) -> list[str]:
     """Return the parts of texts that ALLOWED lists for a file, and that may therefore break a rule."""
     return [part for name, part in ALLOWED if path.resolve() == ROOT / name]
 
 
-def broken_rules(path):
-    """Return [(line number, broken rule, text)] of a file without the exceptions of ALLOWED."""
+def broken_rules(path: pathlib.Path) -> list[Fault]:
+    """Return the faults of a file without the exceptions of ALLOWED."""
     parts = allowed(path)
     return [fault for fault in faults(path) if not any(part in fault[2] for part in parts)]
 
 
-def public_constants(path):
+def public_constants(path: pathlib.Path) -> list[str]:
     """Return the names of the public constants of a module."""
-    targets = []
+    targets: list[ast.expr | None] = []
     for node in ast.parse(path.read_text(encoding='utf-8')).body:
         for target in node.targets if isinstance(node, ast.Assign) else [getattr(node, 'target', None)]:
             targets += target.elts if isinstance(target, ast.Tuple) else [target]
     return [target.id for target in targets if isinstance(target, ast.Name) and CONSTANT_NAME.fullmatch(target.id)]
 
 
-def main(names):
-    """Print the broken rules of the files and folders of these names, or of all files if there is no name. Return the
-    exit code: 1 if a rule is broken, otherwise 0."""
+def main(names: Sequence[str]) -> int:
+    """Print the broken rules of the named files and folders, or of all files. Return 1 if a rule is broken, else 0."""
     named = [pathlib.Path(name).resolve() for name in names]
     missing = [str(path) for path in named if not path.exists()]
     if missing:

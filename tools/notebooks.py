@@ -1,5 +1,6 @@
 """Notebooks as pages of the book: the text, the code, and the output of each cell as Markdown."""
 import base64
+import pathlib
 import tempfile
 
 import nbclient
@@ -8,9 +9,9 @@ import nbformat
 CELL_TIME_S = 1200  # largest time of a cell [s]; the first cell compiles the laws if they are not cached
 
 
-def read(path, execute):
-    """Return the notebook of a file. execute: True to run its cells, so that it holds their output."""
-    notebook = nbformat.read(path, as_version=4)
+def read(path: pathlib.Path, execute: bool) -> nbformat.NotebookNode:
+    """Return the notebook of a file; execute: True to run its cells, so that it holds their output."""
+    notebook = nbformat.read(path, as_version=4)     # type: ignore[no-untyped-call]     # nbformat has no types here
     if execute:
         with tempfile.TemporaryDirectory() as folder:
             nbclient.NotebookClient(notebook, timeout=CELL_TIME_S, kernel_name='python3',
@@ -18,9 +19,8 @@ def read(path, execute):
     return notebook
 
 
-def write_page(notebook, path):
-    """Write the Markdown page of a notebook into the folder of its file, and each figure as a PNG file beside it.
-    path: file of the notebook."""
+def write_page(notebook: nbformat.NotebookNode, path: pathlib.Path) -> None:
+    """Write the Markdown page of a notebook beside its file `path`, and each figure as a PNG file."""
     parts, figures = [], 0
     for cell in notebook.cells:
         if cell.cell_type == 'markdown':

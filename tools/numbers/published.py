@@ -1,16 +1,15 @@
 """The numbers of the documentation: rows of the studies, kept in docs/rows.json, and the tables made from these rows.
 
-`python -m tools.numbers.published [STUDY ...]` (`make numbers`) runs all published studies, or the named studies only.
-The program writes the rows that the tables use. `make docs` writes the tables from these rows.
-
-A row is a measured number with study, case, metric, value, unit, interval and target. A table is (heads of the
-columns, lines of cells).
+`python -m tools.numbers.published [STUDY ...]` (`make numbers`) runs all published studies, or the named studies only,
+and writes the rows that the tables use. `make docs` writes the tables from these rows.
 """
+import dataclasses
 import inspect
 import json
 import math
 import pathlib
 import sys
+import typing
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
@@ -22,7 +21,7 @@ from pedestal_common.quantities import Row
 from pedestal_results.intervals import interval_text, missed, number
 from pedestal_studies.p000_ma import filter_families
 from pedestal_studies.p001_zhou_yang_qin import alignment, alignment_speed
-from pedestal_studies.p002_jia import phased_array
+from pedestal_studies.p002_jia import compared_loops, phased_array
 from pedestal_studies.p003_lin_wu_zhu import feedforward_speed, imm_feedforward, manoeuvre, pareto
 from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import REVERSAL_S_BY_AXIS
 from pedestal_studies.p004_li_chen_wang import rate_measurement, telemetry_flight
@@ -36,7 +35,7 @@ Maker: TypeAlias = Callable[['Rows'], Content]   # of a table
 
 ROWS_FILE = 'docs/rows.json'  # file of the rows in a checkout
 
-SCENARIO_RESULTS = (
+SCENARIO_RESULTS = (  # (text, case, metric) of the results of the study scenarios in docs/measured.md
     ('`leo_pass`: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
     ('`leo_pass`: largest pointing error', 'leo_pass', 'pointing_max_deg'),
     ('`leo_pass`: rms pointing error divided by the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
@@ -64,8 +63,7 @@ SCENARIO_RESULTS = (
     ('`uav_flyby` at 60 m (`pedestal study scenarios` prints its command): the same ratio, cross-elevation',
      'uav_flyby-60m', 'noise_reduction_cross_elevation'),
     ('`uav_flyby` at 60 m: the same ratio, elevation', 'uav_flyby-60m', 'noise_reduction_elevation'))
-"""(text, case, metric) of the results of the study scenarios in docs/measured.md."""
-HEADLINE_RESULTS = (
+HEADLINE_RESULTS = (  # (text, case, metric) of the results of the study scenarios in README.md
     ('a satellite pass ashore: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
     ('the same pass: rms pointing error divided by the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
     ('a UAV at 500 m: noise of a sample divided by noise of the estimate, elevation', 'uav_flyby',
@@ -74,7 +72,6 @@ HEADLINE_RESULTS = (
      'pointing_to_leo_pass'),
     ("a satellite pass from a ship in sea state 6: isolation from the ship's rotation", 'ship_pass_ss6',
      'isolation_db'))
-"""(text, case, metric) of the results of the study scenarios in README.md."""
 
 
 class Rows(dict[Key, Row]):
@@ -112,23 +109,18 @@ def write(rows: Rows, root: str | pathlib.Path = '.') -> None:
 
 
 def _cells(row: Row) -> tuple[str, str, str]:
-    """Return the texts of a row: value with unit, interval, number of runs."""
     value = f'{number(row["value"])} {row["unit"].removeprefix("-")}'.strip()
     return value, interval_text(row), str(row.get('runs', ''))
 
 
 def _target_text(row: Row) -> str:
-    """Return the target of a row with its unit, marked MISSED if the row misses it."""
     if row['target'] is None:
         return ''
     return ' '.join(filter(None, (row['target'], row['unit'].removeprefix('-'), 'MISSED' if missed(row) else '')))
 
 
 def _spread(row: Row) -> str:
-    """Return the mean of a row and half its interval to two digits, 'a +- b'.
-
-    Return the mean alone if all runs give the same value.
-    """
+    """Return the mean of a row and half its interval to two digits, or the mean alone if all runs are equal."""
     half = 0.5 * (row['ci_high'] - row['ci_low']) if 'runs' in row else 0.0
     if half <= 1e-9 * abs(row['value']):
         return number(row['value'])
@@ -136,17 +128,50 @@ def _spread(row: Row) -> str:
     return f'{row["value"]:.{decimals}f} +- {half:.{decimals}f}'
 
 
-def results_table(results: Sequence[tuple[str, str, str]]) -> Maker:
-    """Return the function that makes the table of results, which are given as SCENARIO_RESULTS is."""
-    def table(rows: Rows) -> Content:
-        of_results = [rows['scenarios', case, metric] for _, case, metric in results]
-        return ('result', 'mean', '95 % interval', 'seeds', 'target'), [
-            (text, *_cells(row), _target_text(row)) for (text, *_), row in zip(results, of_results)]
-    return table
+@dataclasses.dataclass(frozen=True)
+class Results:
+    """Table of results of a study, one row in each line."""
+    study: str
+    runs: str   # head of the number of runs
+    results: Sequence[tuple[str, str, str]]     # text, case, metric
+
+    def __call__(self, rows: Rows) -> Content:
+        """Return the table."""
+        of_results = [(text, rows[self.study, case, metric]) for text, case, metric in self.results]
+        return ('result', 'mean', '95 % interval', self.runs, 'target'), [
+            (text, *_cells(row), _target_text(row)) for text, row in of_results]
+
+
+class Line(typing.NamedTuple):
+    """Line of a table of numbers."""
+    labels: tuple[str, ...]
+    cells: Sequence[tuple[str, str]]    # case, metric
+
+
+def _line(labels: tuple[str, ...], case: str, *metrics: str) -> Line:
+    return Line(labels, [(case, metric) for metric in metrics])
+
+
+@dataclasses.dataclass(frozen=True)
+class Numbers:
+    """Table of a study: labels, then means with half their intervals. The last cells of a short line are empty."""
+    study: str
+    head: tuple[str, ...]
+    lines: Sequence[Line]
+    optional: tuple[str, ...] = ()  # metrics that have no row in some cases
+    missing: str = ''   # cell of a metric without a row
+
+    def __call__(self, rows: Rows) -> Content:
+        """Return the table. Raises KeyError for a missing row of a metric that is not optional."""
+        lines = [(*labels, *(self._cell(rows, (self.study, *cell)) for cell in cells)) for labels, cells in self.lines]
+        return self.head, [(*line, *[''] * (len(self.head) - len(line))) for line in lines]
+
+    def _cell(self, rows: Rows, key: Key) -> str:
+        return self.missing if key[2] in self.optional and key not in rows else _spread(rows[key])
 
 
 def claim_table(paper: str) -> Maker:
-    """Return the function that makes the table of the claims of a paper; paper: its number, such as '000'."""
+    """Return the function that makes the table of the claims of a paper."""
     def table(rows: Rows) -> Content:
         lines = []
         for claim in claims.CLAIMS_BY_PAPER[paper]:
@@ -161,81 +186,95 @@ def claim_table(paper: str) -> Maker:
 
 COLOURED_NOISE = filters.SHOWN_NOISE.replace('white', 'coloured')
 """Name of the coloured noise with the rms of SHOWN_NOISE."""
-FILTER_METRICS = ('angle_rms_deg', 'reduction', 'rate_rms_deg_s', 'nis_mean', 'rate_over_sigma')
-"""Metrics of the study filters in its table."""
 
 
-def filter_numbers(rows: Rows) -> Content:
-    """Return the table of angle rms, reduction, rate rms and consistency of every filter on every motion."""
-    lines = []
-    for name in filters.SHOWN_FILTERS:
-        cases = {profile: f'{profile}/{name}/{filters.SHOWN_NOISE}' for profile in PROFILES}
-        lines += [(name, profile, *(_spread(rows['filters', case, metric]) for metric in FILTER_METRICS),
-                   _spread(rows['filters', f'{profile}/{name}/{COLOURED_NOISE}', 'reduction']))
-                  for profile, case in cases.items() if ('filters', case, 'reduction') in rows]
-    return ('filter', 'motion', 'angle rms deg', 'reduction', 'rate rms deg/s', 'mean NIS',
-            'rate error divided by own sigma', 'reduction, noise within 5 Hz'), lines
+def _filter_cells(case: str) -> list[tuple[str, str]]:
+    white = [(f'{case}/{filters.SHOWN_NOISE}', metric) for metric in (
+        'angle_rms_deg', 'reduction', 'rate_rms_deg_s', 'nis_mean', 'rate_over_sigma')]
+    return [*white, (f'{case}/{COLOURED_NOISE}', 'reduction')]
 
 
-def manoeuvre_numbers(rows: Rows) -> Content:
-    """Return the table of the errors of rate and acceleration inside every reversal."""
-    lines = [(name, f'{reversal:g} s', *(_spread(rows['manoeuvre', f'reversal-{reversal:g}s/{name}', metric])
-                                         for metric in ('rate_rms_deg_s', 'acceleration_rms_deg_s2')))
-             for name in manoeuvre.FILTERS for reversal in manoeuvre.REVERSAL_DURATIONS_S]
-    return ('filter', 'reversal', 'rate deg/s', 'acceleration deg/s2'), lines
+FILTER_NUMBERS = Numbers(
+    'filters', ('filter', 'motion', 'angle rms deg', 'reduction', 'rate rms deg/s', 'mean NIS',
+                'rate error divided by own sigma', 'reduction, noise within 5 Hz'),
+    [Line((name, profile), _filter_cells(f'{profile}/{name}'))
+     for name in filters.SHOWN_FILTERS if name not in filters.NOISE_AWARE_FILTERS
+     for profile in ((filters.RANGED_PROFILE,) if name == 'imm_ukf' else PROFILES)])
+
+MANOEUVRE_NUMBERS = Numbers(
+    'manoeuvre', ('filter', 'reversal', 'rate deg/s', 'acceleration deg/s2'),
+    [_line((name, f'{reversal:g} s'), f'reversal-{reversal:g}s/{name}', 'rate_rms_deg_s', 'acceleration_rms_deg_s2')
+     for name in manoeuvre.FILTERS for reversal in manoeuvre.REVERSAL_DURATIONS_S])
 
 
-def feedforward_numbers(rows: Rows) -> Content:
-    """Return the table of paper 003's feed-forward: miss and rate noise for each source of rate and acceleration.
-
-    The miss is the pointing error, a term of the paper.
-    """
-    lines = []
-    for axis in REVERSAL_S_BY_AXIS:
-        for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state', 'kalman-ca-40-predicted'):
-            case = f'{axis}/{name}'
-            ratio = _spread(rows['imm-feedforward', case, 'miss_ratio_at_equal_rate_noise']) if (
-                case in imm_feedforward.MISS_RATIO_TARGETS) else ''
-            lines.append((case, *(_spread(rows['imm-feedforward', case, metric]) for metric in (
-                'miss_rms_deg', 'rate_noise_deg_s')), ratio))
-        lines += [(case, _spread(rows['imm-feedforward', case, 'miss_rms_deg']), '', '')
-                  for case in imm_feedforward.DRIVE_CASES if case.startswith(axis)]
-    return ('case', 'meaning', 'miss rms deg', 'rate noise deg/s',
-            'miss of a conventional filter of equal rate noise, divided by this miss'), [
-        (case, imm_feedforward.SOURCE_MEANINGS[case.partition('/')[2]], *numbers) for case, *numbers in lines]
+def _feedforward_line(case: str, *metrics: str) -> Line:
+    return _line((case, imm_feedforward.SOURCE_MEANINGS[case.partition('/')[2]]), case, *metrics)
 
 
-def family_numbers(rows: Rows) -> Content:
-    """Return the table of the filters that paper 000 compares: geometric means of the errors over all motions."""
-    lines = []
-    for name, meaning in filter_families.FILTER_MEANINGS.items():
-        cells = [_spread(rows['filter-families', case, metric]) if ('filter-families', case, metric) in rows else ''
-                 for case in (f'{filter_families.MEAN_MOTION}/{name}/{tuning}' for tuning in filter_families.TUNINGS)
-                 for metric in ('angle_rms_deg', 'rate_rms_deg_s')]
-        lines.append((name, meaning, *cells))
-    return ('filter', 'meaning', *(f'{what}, {how}' for how in ('tuned for each motion', 'one tuning')
-                                   for what in ('angle rms deg', 'rate rms deg/s'))), lines
+FEEDFORWARD_NUMBERS = Numbers(
+    'imm-feedforward', ('case', 'meaning', 'miss rms deg', 'rate noise deg/s',
+                        'miss of a conventional filter of equal rate noise, divided by this miss'),
+    [line for axis in REVERSAL_S_BY_AXIS for line in (
+        *(_feedforward_line(f'{axis}/{name}', 'miss_rms_deg', 'rate_noise_deg_s', 'miss_ratio_at_equal_rate_noise')
+          for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state', 'kalman-ca-40-predicted')),
+        *(_feedforward_line(case, 'miss_rms_deg') for case in imm_feedforward.DRIVE_CASES if case.startswith(axis)))],
+    optional=('miss_ratio_at_equal_rate_noise',))
 
+FAMILY_NUMBERS = Numbers(
+    'filter-families', ('filter', 'meaning', *(f'{what}, {how}' for how in ('tuned for each motion', 'one tuning')
+                                               for what in ('angle rms deg', 'rate rms deg/s'))),
+    [Line((name, meaning), [(f'{filter_families.MEAN_MOTION}/{name}/{tuning}', metric)
+                            for tuning in filter_families.TUNINGS for metric in ('angle_rms_deg', 'rate_rms_deg_s')])
+     for name, meaning in filter_families.FILTER_MEANINGS.items()],
+    optional=('angle_rms_deg', 'rate_rms_deg_s'))
 
-def speed_numbers(rows: Rows) -> Content:
-    """Return the table of paper 003's feed-forward with differences, and with targets of 30 and 50 m/s."""
-    lines = [(case, *(_spread(rows['feedforward-speed', case, metric]) for metric in (
-        'miss_rms_deg', 'rate_noise_deg_s', 'rate_rms_deg_s', 'acceleration_rms_deg_s2')))
-             for case in feedforward_speed.CASES]
-    lines += [(case, _spread(rows['feedforward-speed', case, 'miss_rms_deg'])
-               if ('feedforward-speed', case, 'miss_rms_deg') in rows else 'leaves autotrack', '', '', '')
-              for case in feedforward_speed.DRIVE_CASES]
-    return ('case', 'miss rms deg', 'rate noise deg/s', 'rate error deg/s', 'acceleration error deg/s2'), lines
+SPEED_NUMBERS = Numbers(
+    'feedforward-speed', ('case', 'miss rms deg', 'rate noise deg/s', 'rate error deg/s', 'acceleration error deg/s2'),
+    [*(_line((case,), case, 'miss_rms_deg', 'rate_noise_deg_s', 'rate_rms_deg_s', 'acceleration_rms_deg_s2')
+       for case in feedforward_speed.CASES),
+     *(_line((case,), case, 'miss_rms_deg') for case in feedforward_speed.DRIVE_CASES)],
+    optional=('miss_rms_deg',), missing='leaves autotrack')
 
+ALIGNMENT_SPEED_NUMBERS = Numbers(
+    'alignment-speed', ('times divided by', 'bandwidth of the observer, rad/s', 'level below 30 arcmin after, s',
+                        'azimuth below 12 arcmin after, s', 'azimuth at 100 s, arcmin', 'azimuth at 250 s, arcmin',
+                        'level, arcmin', 'azimuth at 600 s, arcmin'),
+    [_line((f'{speed:g}', f'{alignment_speed.faster(speed).adrc.observer:g}'), f'adrc/{speed:g}',
+           *alignment_speed.METRICS) for speed in alignment_speed.SPEEDS])
 
-def alignment_speed_numbers(rows: Rows) -> Content:
-    """Return the table of the ADRC alignment with all its times divided by a factor."""
-    lines = [(f'{speed:g}', f'{alignment_speed.faster(speed).adrc.observer:g}',
-              *(_spread(rows['alignment-speed', f'adrc/{speed:g}', metric]) for metric in alignment_speed.METRICS))
-             for speed in alignment_speed.SPEEDS]
-    return ('times divided by', 'bandwidth of the observer, rad/s', 'level below 30 arcmin after, s',
-            'azimuth below 12 arcmin after, s', 'azimuth at 100 s, arcmin', 'azimuth at 250 s, arcmin',
-            'level, arcmin', 'azimuth at 600 s, arcmin'), lines
+PARETO_NUMBERS = Numbers(
+    'pareto', ('filter', 'meaning', 'least miss of any tuning, deg', 'rate noise at the least miss, deg/s',
+               'miss at the rate noise of imm-predicted, divided by the miss of imm-predicted'),
+    [_line((name, pareto.FILTER_MEANINGS[name]), name, 'least_miss_deg', 'rate_noise_at_least_miss_deg_s',
+           'miss_ratio_at_equal_rate_noise') for name in pareto.FILTER_TUNINGS],
+    optional=('miss_ratio_at_equal_rate_noise',))
+
+FLYBY_NUMBERS = Numbers(
+    'rate-measurement', ('case', 'source of the rate', 'angle rms deg', 'rate rms deg/s'),
+    [_line((name, rate_measurement.RATE_SOURCE_MEANINGS[name]), f'{rate_measurement.FLYBY_PROFILE}/{name}',
+           'angle_rms_deg', 'rate_rms_deg_s') for name in rate_measurement.FLYBY_CASES])
+
+ALIGNMENT_METRICS = ('time_to_12arcmin_rms_s', *(f'azimuth_rms_arcmin_{t}s' for t in alignment.EVALUATION_TIMES_S),
+                     'level_rms_arcmin')
+SWELL_METRICS = alignment.KIND_METRICS['swell']
+ALIGNMENT_NUMBERS = Numbers(
+    'alignment', ('method', 'meaning', 'time to 12 arcmin, s',
+                  *(f'azimuth at {t} s, arcmin' for t in alignment.EVALUATION_TIMES_S), 'level, arcmin',
+                  'azimuth on swell at 200 s, arcmin', 'that error divided by own sigma'),
+    [*(Line((name, alignment.CASE_MEANINGS[name]), [*((name, metric) for metric in ALIGNMENT_METRICS),
+                                                    *((f'{name}/swell', metric) for metric in SWELL_METRICS)])
+       for name in alignment.CASE_METHODS),
+     _line(('limit', alignment.CASE_MEANINGS['limit']), 'limit', *ALIGNMENT_METRICS)])
+
+ARRAY_LOOPS = ('paper', 'paper-delta', 'type-2', 'type-2-delta', 'tracked-10ms', 'best')
+"""Loops of the study phased-array in the table of its loops. A loop ...-delta differs on the sway alone."""
+ARRAY_CASES = (*(f'{loop}/{target}' for loop in ARRAY_LOOPS
+                 for target in (('sway',) if loop.endswith('-delta') else ('ramp', 'sine', 'sway'))),
+               *compared_loops.INS_LOOPS, *phased_array.GRAPH_CASES)
+ARRAY_NUMBERS = Numbers(
+    'phased-array', ('loop', 'largest error without noise, deg', 'isolation dB', 'jitter rms deg'),
+    [_line((case,), case, 'max_error_deg', 'isolation_db', 'jitter_rms_deg') for case in ARRAY_CASES],
+    optional=('isolation_db',))
 
 
 def matrix_table(rows: Rows) -> Content:
@@ -248,39 +287,7 @@ def matrix_table(rows: Rows) -> Content:
             'condition, time in seconds'), lines
 
 
-def pareto_numbers(rows: Rows) -> Content:
-    """Return the table of the least miss of each filter over its tunings, and the miss at the IMM's rate noise."""
-    lines = [(name, pareto.FILTER_MEANINGS[name], *(_spread(rows['pareto', name, metric]) for metric in (
-        'least_miss_deg', 'rate_noise_at_least_miss_deg_s')),
-        _spread(rows['pareto', name, 'miss_ratio_at_equal_rate_noise'])
-        if ('pareto', name, 'miss_ratio_at_equal_rate_noise') in rows else '') for name in pareto.FILTER_TUNINGS]
-    return ('filter', 'meaning', 'least miss of any tuning, deg', 'rate noise at the least miss, deg/s',
-            'miss at the rate noise of imm-predicted, divided by the miss of imm-predicted'), lines
-
-
-def flyby_numbers(rows: Rows) -> Content:
-    """Return the table of the errors on the 60 m flyby with a measured rate and with a differenced rate."""
-    lines = [(name, rate_measurement.RATE_SOURCE_MEANINGS[name],
-              *(_spread(rows['rate-measurement', f'{rate_measurement.FLYBY_PROFILE}/{name}', metric])
-                      for metric in ('angle_rms_deg', 'rate_rms_deg_s'))) for name in rate_measurement.FLYBY_CASES]
-    return ('case', 'source of the rate', 'angle rms deg', 'rate rms deg/s'), lines
-
-
-def alignment_numbers(rows: Rows) -> Content:
-    """Return the table of the methods of alignment beside the information limit."""
-    metrics = ('time_to_12arcmin_rms_s', *(f'azimuth_rms_arcmin_{t}s' for t in (100, 250, 300, 600)),
-               'level_rms_arcmin')
-    swell = [f'azimuth_{metric}_{alignment.SWELL_EVALUATION_TIME_S}s' for metric in ('rms_arcmin', 'error_over_sigma')]
-    lines = [(name, alignment.CASE_MEANINGS[name], *(_spread(rows['alignment', name, metric]) for metric in metrics),
-              *(_spread(rows['alignment', f'{name}/swell', metric]) for metric in swell))
-             for name in alignment.CASE_METHODS]
-    return ('method', 'meaning', 'time to 12 arcmin, s', *(f'azimuth at {t} s, arcmin' for t in (100, 250, 300, 600)),
-            'level, arcmin', 'azimuth on swell at 200 s, arcmin', 'that error divided by own sigma'), [
-        *lines, ('limit', alignment.CASE_MEANINGS['limit'],
-                 *(_spread(rows['alignment', 'limit', metric]) for metric in metrics), '', '')]
-
-
-def acquisition_numbers(rows: Rows) -> Content:
+def acquisition_table(rows: Rows) -> Content:
     """Return the table of the time that acquisition takes, and of the share of runs in which it succeeds."""
     lines = []
     for case in acquisition.CASE_NAMES:
@@ -297,7 +304,7 @@ def acquisition_numbers(rows: Rows) -> Content:
         ('`steptrack_geo`: largest error after 90 s', *_cells(off), '', '', '')]
 
 
-CALIBRATION_RESULTS = (
+CALIBRATION_RESULTS = (  # (text, case, metric) of the results of the study calibration in docs/measured.md
     ('program track of the test pass without a model, rms', 'program track', 'raw_rms_deg'),
     ('program track of the test pass with the model, rms', 'program track', 'calibrated_rms_deg'),
     ('residuals of the fit, rms', 'program track', 'residual_rms_deg'),
@@ -305,44 +312,17 @@ CALIBRATION_RESULTS = (
     ('leave-one-out rms of the default terms alone', 'program track', 'leave_one_out_default_rms_deg'),
     ('share of the terms within three of their sigmas', 'terms', 'within_3_sigma'),
     ('number of terms, over all runs', 'terms', 'cases'))
-"""(text, case, metric) of the results of the study calibration in docs/measured.md."""
-
-
-def calibration_numbers(rows: Rows) -> Content:
-    """Return the table of the calibration of a new station."""
-    of_results = [rows['calibration', case, metric] for _, case, metric in CALIBRATION_RESULTS]
-    return ('result', 'mean', '95 % interval', 'runs', 'target'), [
-        (text, *_cells(row), _target_text(row)) for (text, *_), row in zip(CALIBRATION_RESULTS, of_results)]
-
-
-ARRAY_LOOPS = ('paper', 'paper-delta', 'type-2', 'type-2-delta', 'tracked-10ms', 'best')
-"""Loops of the study phased-array in the table of its loops."""
-
-
-def array_numbers(rows: Rows) -> Content:
-    """Return the table of the loops of paper 002's plant: true errors without noise, and jitter due to noise."""
-    lines = []
-    for case in (*(f'{loop}/{target}' for loop in ARRAY_LOOPS for target in ('ramp', 'sine', 'sway')
-                   if target == 'sway' or not loop.endswith('-delta')),
-                 *phased_array.INS_LOOPS, *phased_array.GRAPH_CASES):
-        isolation = _spread(rows['phased-array', case, 'isolation_db']) if (
-            'phased-array', case, 'isolation_db') in rows else ''
-        lines.append((case, _spread(rows['phased-array', case, 'max_error_deg']), isolation,
-                      _spread(rows['phased-array', case, 'jitter_rms_deg'])))
-    return ('loop', 'largest error without noise, deg', 'isolation dB', 'jitter rms deg'), lines
-
 
 MDEG_PER_DEG = 1e3
 
 
 def _milli(row: Row) -> str:
-    """Return a row in degrees as text in millidegrees, mean and half its interval."""
     return _spread({key: value * MDEG_PER_DEG if key in ('value', 'ci_low', 'ci_high') else value
                     for key, value in row.items()})
 
 
 def budget_table(mode: str) -> Maker:
-    """Return the function that makes the table of the error budget of a mode: each term alone, then the sums."""
+    """Return the function that makes the table of the error budget of a mode."""
     sums = {'systematic': ('', 'sum of the systematic terms, added as signed vectors'),
             'whole': ('', 'runs with every term on')}
 
@@ -373,28 +353,26 @@ def direction_table(mode: str) -> Maker:
     return table
 
 
-TABLES = {'results over seeds': results_table(SCENARIO_RESULTS), 'headline results': results_table(HEADLINE_RESULTS),
-          **{f'budget of {mode}': budget_table(mode) for mode in budget.MODE_OVERRIDES},
-          **{f'directions of {mode}': direction_table(mode) for mode in budget.MODE_OVERRIDES},
-          **{f'claims of paper {paper}': claim_table(paper) for paper in claims.CLAIMS_BY_PAPER},
-          'filters compared': filter_numbers, 'manoeuvre': manoeuvre_numbers, 'feed forward': feedforward_numbers,
-          'pareto': pareto_numbers, 'flyby with a rate': flyby_numbers, 'alignment': alignment_numbers,
-          'filters of paper 000': family_numbers, 'feed forward by speed': speed_numbers,
-          'speed of alignment': alignment_speed_numbers, 'acquisition': acquisition_numbers,
-          'array loops': array_numbers, 'calibration': calibration_numbers, 'matrices': matrix_table}
-"""{name of a table: function that makes it}."""
+TABLES: dict[str, Maker] = {  # {name of a table: function that makes it}
+    'results over seeds': Results('scenarios', 'seeds', SCENARIO_RESULTS),
+    'headline results': Results('scenarios', 'seeds', HEADLINE_RESULTS),
+    **{f'budget of {mode}': budget_table(mode) for mode in budget.MODE_OVERRIDES},
+    **{f'directions of {mode}': direction_table(mode) for mode in budget.MODE_OVERRIDES},
+    **{f'claims of paper {paper}': claim_table(paper) for paper in claims.CLAIMS_BY_PAPER},
+    'filters compared': FILTER_NUMBERS, 'manoeuvre': MANOEUVRE_NUMBERS, 'feed forward': FEEDFORWARD_NUMBERS,
+    'pareto': PARETO_NUMBERS, 'flyby with a rate': FLYBY_NUMBERS, 'alignment': ALIGNMENT_NUMBERS,
+    'filters of paper 000': FAMILY_NUMBERS, 'feed forward by speed': SPEED_NUMBERS,
+    'speed of alignment': ALIGNMENT_SPEED_NUMBERS, 'acquisition': acquisition_table, 'array loops': ARRAY_NUMBERS,
+    'calibration': Results('calibration', 'runs', CALIBRATION_RESULTS), 'matrices': matrix_table}
 
-PUBLISHED_STUDIES = tuple(dict.fromkeys((
+PUBLISHED_STUDIES = tuple(dict.fromkeys((  # names of the studies whose rows are in the tables
     *(claim.study for of_paper in claims.CLAIMS_BY_PAPER.values() for claim in of_paper if claim.study),
     'filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration')))
-"""Names of the studies whose rows are in the tables."""
 
 
 def main(names: Sequence[str] = (), root: str | pathlib.Path = '.') -> int:
-    """Run PUBLISHED_STUDIES with their default number of runs and write ROWS_FILE. Return exit code 0.
-
-    names: studies to run, () for all; the rows of the other studies stay. root: folder of the checkout.
-    """
+    """Run PUBLISHED_STUDIES, or `names` alone, with their default number of runs and write ROWS_FILE. Return exit code
+    0."""
     rows_of = json.loads(pathlib.Path(root, ROWS_FILE).read_text()) if names else {}
     with monte_carlo.Pool() as pool, console.progress_of_share() as progress:
         for name in names or PUBLISHED_STUDIES:

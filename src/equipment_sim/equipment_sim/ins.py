@@ -12,9 +12,8 @@ import tty
 from typing import Protocol
 
 from pedestal_common.quantities import AnyRecord, Hertz, Nanoseconds, RadiansPerSecond
-from ship_motion_sim import nmea
+from ship_motion_sim import motion, nmea
 from ship_motion_sim.params import ShipParameters
-from ship_motion_sim.sea import motion
 
 
 class Sink(Protocol):

@@ -10,8 +10,8 @@ from equipment_sim import ins as simulator
 from pedestal_common.parameters import build
 from pedestal_hardware.ins.params import InsInputParameters
 from pedestal_hardware.ins.unit import InsInputUnit
+from ship_motion_sim import motion
 from ship_motion_sim.params import ShipParameters
-from ship_motion_sim.sea import motion
 
 NOON, STEP = (20_000 * 86_400 + 43_200) * 1_000_000_000, 50_000_000
 

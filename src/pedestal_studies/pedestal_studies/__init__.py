@@ -1,22 +1,16 @@
 """Studies: the compiled closed loop measured against the claims of papers and against our own targets.
 
 `pedestal study NAME` runs a study, a module of STUDIES. The first line of its docstring describes the study. Its
-function `run(progress)` returns a result.Result and may call progress(fraction done, text of the next part). In a
-study of many runs the function is `run(progress, runs=DEFAULT_RUNS, pool=None)`, where pool is a monte_carlo.Pool.
-Without a pool the runs are made in this process.
-
-A folder p000 to p004 holds the studies of one paper of docs/papers.md and what only they use; `system` holds our own
-studies. The modules beside the folders are used by the studies of several papers.
-
-A case is one configuration that a study measures, such as a filter on a motion. If a case is a scenario with changed
-parameters, `pedestal run SCENARIO --param ...` runs it with separate nodes.
+function `run(progress)` returns a result.Result. In a study of many runs the function is `run(progress,
+runs=DEFAULT_RUNS, pool=None)`. A case is one configuration that a study measures, such as a filter on a motion. If it
+is a scenario with changed parameters, `pedestal run SCENARIO --param ...` runs it with separate nodes.
 """
 import ast
 import importlib
 import pathlib
 import types
 
-STUDIES = {
+STUDIES = {  # {folder: its modules that are studies}; a name has hyphens for the underscores of its module
     'p000_ma': ('backlash', 'bode', 'filter_families', 'servo'),
     'p001_zhou_yang_qin': ('alignment', 'alignment_speed'),
     'p002_jia': ('phased_array',),
@@ -24,7 +18,6 @@ STUDIES = {
     'p004_li_chen_wang': ('rate_measurement', 'telemetry_flight'),
     'system': ('acquisition', 'budget', 'calibration', 'consistency', 'faults', 'filters', 'scenarios',
                'target_filters')}
-"""{folder: its modules that are studies}. The name of a study has hyphens for the underscores of its module."""
 
 _STUDY_MODULES = {module.replace('_', '-'): f'{folder}.{module}'
                   for folder, modules in STUDIES.items() for module in modules}

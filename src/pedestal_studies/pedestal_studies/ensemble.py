@@ -1,8 +1,7 @@
 """Runs of a filter of acu_tracker over many noisy records of one motion, reduced to the moments of its errors.
 
-The filter studies use this module. The moments are sums over the runs of the errors and of their squares. The noise of
-a run depends only on a seed and the number of the run. Every filter, motion and kind of noise therefore has the same
-draws, for any division of the runs into batches.
+The noise of a run depends only on a seed and the number of the run. Every filter, motion and kind of noise therefore
+has the same draws, for any division of the runs into batches.
 """
 import dataclasses
 import math
@@ -32,12 +31,10 @@ from pedestal_studies import profiles
 
 MEASUREMENT_PERIOD_S = 0.01  # time between measurements in all studies of filters [s]
 
-INITIAL_RATE_SIGMA_RAD_S = TrackerParameters().initial_rate
-"""Standard deviation of the rate that a filter assumes at its start [rad/s]."""
+INITIAL_RATE_SIGMA_RAD_S = TrackerParameters().initial_rate  # that a filter assumes at its start [rad/s]
 
 
 ESTIMATE_TYPE, UNSCENTED_TYPE = axis_filter.Estimate.dtype, unscented.State.dtype
-"""Types of records that a compiled law makes; it cannot take them from their class."""
 
 
 class Moments(Record):
@@ -109,10 +106,8 @@ def records(truth: profiles.Motion, noise: Noise, seed: int, first: int, count: 
 
 def moments(params: FilterParameters, t: Times, truth: profiles.Motion, noise: Noise,
             measured: tuple[Floats, Floats]) -> Records:
-    """Return Moments (runs, n) of a filter, each for one run and time; measured: as `records` returns.
-
-    The filter knows sigma and rate_sigma of the Noise. A filter that does not know the bandwidth assumes white noise.
-    """
+    """Return Moments (runs, n) of a filter, each for one run and time; measured: as `records` returns. The filter
+    knows sigma and rate_sigma of the Noise. Without the bandwidth it assumes white noise."""
     y, y_rate = measured
     c = axis_filter.constants(dataclasses.replace(params, rate_measurement=noise.rate_sigma is not None),
                               (noise.bandwidth or 0.0) if noise.expected else 0.0)
@@ -125,7 +120,6 @@ def moments(params: FilterParameters, t: Times, truth: profiles.Motion, noise: N
 @compiled
 def _add_runs(constants: Records, truth: profiles.Motion, measured: Series, initial_rate: RadiansPerSecond,
               out: Records, sums: Records) -> None:
-    """Add the errors of a filter to Moments `sums` (runs, n); out: working memory, Estimate (n,)."""
     for run in range(len(measured.y)):
         axis_filter.estimates(constants, measured.t, measured.y[run], measured.R, measured.y_rate[run],
                               measured.R_rate, initial_rate, out)
@@ -135,7 +129,6 @@ def _add_runs(constants: Records, truth: profiles.Motion, measured: Series, init
 
 @compiled
 def _add(sums: Moments, estimate: axis_filter.Estimate, truth: profiles.Motion, k: int, y: Radians) -> None:
-    """Add the errors of an estimate at step k to the sums; y: measured angle."""
     s, o, angle = sums, estimate, truth.angle[k]
     d1, d2, d3, raw = o.angle - angle, o.rate - truth.rate[k], o.acceleration - truth.acceleration[k], y - angle
     s.runs += 1.0
@@ -177,10 +170,6 @@ def unscented_moments(params: UkfParameters, truth: profiles.Motion, distance: F
 @compiled
 def _add_unscented_runs(constants: Records, T: Seconds, truth: profiles.Motion, measured: RangedSeries,
                         rate_variance: float, sums: Records) -> None:
-    """Add the errors in azimuth, with a measurement every T, to Moments `sums` (runs, n).
-
-    rate_variance: at the start [rad2/s2].
-    """
     R, R_range = measured.R, measured.R_range
     out = np.zeros(1, ESTIMATE_TYPE)
     o = out[0]

@@ -1,7 +1,5 @@
 """Metrics of the response to a step and to a sine, such as overshoot and settling time, for the servo studies.
 
-t: times (n,) [s] with equal distances; y: response (n,) at these times, an angle [rad]; w: angular frequency [rad/s].
-
 Libraries are not used here, because their numbers differ. `control.step_info` rounds a settling time to the grid of
 times, and these metrics interpolate. `scipy.optimize.curve_fit` gives amplitude and period of a sine that differ by
 7e-13 from the published rows.
@@ -19,10 +17,7 @@ def overshoot_percent(y: Floats, size: float) -> float:
 
 
 def settling_time(t: Times, y: Floats, size: float, band: float = 0.02) -> Seconds:
-    """Return the time from which y stays within size +-band * size, or NaN if it does not settle.
-
-    The time is interpolated linearly between two samples.
-    """
+    """Return the interpolated time from which y stays within size +-band * size, or NaN if it does not settle."""
     excess = np.abs(y / size - 1.0) - band
     outside = np.flatnonzero(excess > 0.0)
     if outside.size == 0:
@@ -40,10 +35,8 @@ def crossings(y: Floats, size: float, band: float = 0.005) -> int:
 
 
 def whole_periods(t: Times, period: Seconds, skip: Seconds) -> Bools:
-    """Return the mask of the times in whole periods of `period`, counted from `skip` after the start.
-
-    Raises ValueError for a record without a whole period.
-    """
+    """Return the mask of the times in whole periods of `period`, counted from `skip` after the start. Raises
+    ValueError for a record without a whole period."""
     # The small tolerances keep a last period or a first sample that rounding errors put just outside.
     t = t - t[0]
     whole = math.floor((t[-1] - skip) / period + 1e-6)

@@ -1,14 +1,8 @@
 """Studies of your own plant: `pedestal study servo|backlash|bode --scenario FILE` measures both axes of a scenario.
 
-The antenna stands ashore and in still air. The plant is the drive with motors, gears and load.
-
-  bode      frequency response of the current, speed and position loops, each axis by itself; measured by
-            pedestal_workbench/tuning/frequency_response.py
-  servo     response to a step of STEP_SIZE_RAD, to a sine of SINE_AMPLITUDE_RAD at SINE_FREQUENCY_HZ, and to a gust.
-            The gust is a step of wind torque: GUST_TORQUE_SHARE times the largest torque of both motors on the load.
-            The response is the true angle of the dish
-  backlash  motion of the dish at rest after the step, and its error at the reversals of the sine; both with the bias
-            torque of the scenario and without bias torque
+The antenna stands ashore and in still air. The plant is the drive with motors, gears and load. `servo` measures the
+true angle of the dish after a step, in a sine and in a gust of wind torque on the load. `backlash` measures the motion
+at rest after the step and the error at the reversals of the sine, with and without bias torque.
 """
 import functools
 import math
@@ -24,25 +18,23 @@ from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Floats, NewtonMeters, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, TRUTH_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies import metrics
 from pedestal_studies.p000_ma import bode
 from pedestal_studies.result import Result, legend
 from pedestal_workbench.trials.monte_carlo import Progress
 from pedestal_workbench.tuning import loops
 
-STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ, GUST_TORQUE_SHARE = 0.02, 0.02, 0.1, 0.2
-"""Size of the step [rad]; amplitude [rad] and frequency [Hz] of the sine; torque of the gust over the largest torque
-of both motors [-]."""
+STEP_SIZE_RAD, SINE_AMPLITUDE_RAD, SINE_FREQUENCY_HZ = 0.02, 0.02, 0.1
+GUST_TORQUE_SHARE = 0.2  # torque of the gust over the largest torque of both motors [-]
 
-RUN_DURATION_S, START_ANGLES_RAD, SETTLING_BAND, SINE_PERIODS = 10.0, (0.0, 0.6), 0.02, 3
-"""Duration of the step and gust runs [s]; initial angles of azimuth and elevation [rad]. Half-width of the band of the
-settling time over the size of the step [-]; periods of the sine, of which the first is not evaluated."""
+START_ANGLES_RAD = (0.0, 0.6)  # initial angles of azimuth and elevation [rad]
+SETTLING_BAND = 0.02  # half-width of the band of the settling time over the size of the step [-]
+RUN_DURATION_S, SINE_PERIODS = 10.0, 3  # of step and gust [s]; of the sine, of which the first is not evaluated
 
 GUST_START_S, STANDSTILL_START_S = 4.0, 5.0  # start of the gust; start of the evaluated standstill after the step [s]
 
 BIAS_PARAMETERS = {'': {}, '/bias-off': {f'adu.{name}.bias.schedule': 'off' for name in AXES}}
-"""{suffix of a case: parameters}: with the bias torque of the scenario, and without bias torque."""
 
 REST_PARAMETERS = {**loops.STILL_AIR_PARAMETERS, 'scenario.program.source': 'none', 'acu.initial_mode': 'preset',
                    **{f'adu.initial_{name}': start for name, start in zip(AXES, START_ANGLES_RAD)},
@@ -76,7 +68,7 @@ def bode_study(source: str, progress: Progress) -> Result:
 
     def drawn(loop: str) -> Callable[[], Figure]:
         curves = {name: (responses[f'{loop}/{name}'], colour)
-                  for name, colour in zip(AXES, (FILTERED_COLOUR, TRUTH_COLOUR))}
+                  for name, colour in zip(AXES, (fig.FILTERED_COLOUR, fig.TRUTH_COLOUR))}
         return lambda: bode.bode_figure(f'{loop} loops of {plant.name}', curves, None)
 
     return Result(bode.rows(responses), {loop: drawn(loop) for loop in ('speed', 'position')},
@@ -129,7 +121,6 @@ def backlash_study(source: str, progress: Progress) -> Result:
 
 
 def _standstill(run: Run, i: int) -> tuple[Times, Floats]:
-    """Return (times, angle minus its mean [rad]) of axis i at rest; i: index in AXES, here and below."""
     stands = run.t >= STANDSTILL_START_S
     angle = _angle(run, i)[stands]
     return run.t[stands], angle - np.mean(angle)
@@ -143,15 +134,11 @@ def _reversals(run: Run, i: int) -> tuple[Times, Floats]:
 
 def _bias_figure(kind: str, motion_of: Callable[[Run, int], tuple[Times, Floats]],
                  records: Mapping[tuple[str, str], Run]) -> Figure:
-    """Draw the remaining motion of both axes, with the bias torque of the scenario and without bias torque.
-
-    kind: title of the panels. motion_of: `_standstill` or `_reversals`.
-    """
-    figure, axes = new_panels(2, height=4.6, sharex=True,
-                              y=f'{"error" if kind == "sine" else "angle"} [\N{MICRO SIGN}rad]')
+    figure, axes = fig.new_panels(2, height=4.6, sharex=True,
+                                  y=f'{"error" if kind == "sine" else "angle"} [\N{MICRO SIGN}rad]')
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
-        for end, colour, label in (('/bias-off', TRUTH_COLOUR, 'without bias'),
-                                   ('', FILTERED_COLOUR, 'as the scenario is')):
+        for end, colour, label in (('/bias-off', fig.TRUTH_COLOUR, 'without bias'),
+                                   ('', fig.FILTERED_COLOUR, 'as the scenario is')):
             t, remaining = motion_of(records[kind, end], i)
             panel.plot(t, 1e6 * remaining, color=colour, label=label)
         panel.set_title(f'{kind}, {name}')
@@ -159,17 +146,14 @@ def _bias_figure(kind: str, motion_of: Callable[[Run, int], tuple[Times, Floats]
 
 
 def _angle(run: Run, i: int) -> Floats:
-    """Return the true angle [rad] of an axis from its initial angle."""
     return run['adu/truth']['position'][:, i] - START_ANGLES_RAD[i]
 
 
 def _sine_error(run: Run, i: int) -> Floats:
-    """Return the sine minus the true angle [rad] of an axis."""
     return SINE_AMPLITUDE_RAD * np.sin(2.0 * math.pi * SINE_FREQUENCY_HZ * run.t) - _angle(run, i)
 
 
 def _metrics(records: Mapping[str, Run], i: int, torque: NewtonMeters) -> list[tuple[str, float, str]]:
-    """Return [(metric, value, unit)] of axis i; torque: of the gust."""
     step, gust, sine = (records[name] for name in ('step', 'gust', 'sine'))
     after, settled = _angle(gust, i)[gust.t >= GUST_START_S], sine.t >= 1.0 / SINE_FREQUENCY_HZ
     return [('step_overshoot_percent', metrics.overshoot_percent(_angle(step, i), STEP_SIZE_RAD), '%'),
@@ -181,16 +165,14 @@ def _metrics(records: Mapping[str, Run], i: int, torque: NewtonMeters) -> list[t
 
 
 def _figure(kind: str, run: Run) -> Figure:
-    """Draw both axes over time: the angle, or the error of the sine [mrad]."""
-    figure, axes = new_panels(2, height=4.6, y='error [mrad]' if kind == 'sine' else 'angle [mrad]', sharex=True)
+    figure, axes = fig.new_panels(2, height=4.6, y='error [mrad]' if kind == 'sine' else 'angle [mrad]', sharex=True)
     for i, (panel, name) in enumerate(zip(axes[:, 0], AXES)):
         values = _sine_error(run, i) if kind == 'sine' else _angle(run, i)
-        panel.plot(run.t, 1e3 * values, color=FILTERED_COLOUR)
+        panel.plot(run.t, 1e3 * values, color=fig.FILTERED_COLOUR)
         if kind == 'step':
-            panel.axhline(1e3 * STEP_SIZE_RAD, color=INK_COLOUR, lw=0.8, ls='--')
+            panel.axhline(1e3 * STEP_SIZE_RAD, color=fig.INK_COLOUR, lw=0.8, ls='--')
         panel.set_title(f'{kind}, {name}')
     return figure
 
 
 PLANT_STUDIES = {'backlash': backlash_study, 'bode': bode_study, 'servo': servo_study}
-"""{study: function(source, progress) -> Result} of the studies that measure any plant."""

@@ -58,11 +58,7 @@ def flyby(t: Times, w: RadiansPerSecond) -> Motion:
 
 
 def s_turn(t: Times) -> Motion:
-    """Return the motion of an S-turn.
-
-    The target turns to one side, twice as long to the other side, and a third time back to the old course. Before
-    and after these turns the target flies straight.
-    """
+    """Return the motion of an S-turn: to one side, twice as long to the other, back to the old course."""
     motion, before = Motion(*3 * (np.zeros(t.shape),)), 0.0
     for at, side in TURN_SCHEDULE.items():
         jump = (side - before) * TURN_ACCELERATION_M_S2 / TURN_DISTANCE_M
@@ -72,10 +68,7 @@ def s_turn(t: Times) -> Motion:
 
 
 def _step(t: Times, width: Seconds) -> Motion:
-    """Return the motion whose acceleration is a step from 0 to 1 at t = 0.
-
-    The step rises as half a cosine over `width`.
-    """
+    """Return the motion whose acceleration rises from 0 to 1 at t = 0, as half a cosine over `width`."""
     x = np.clip(t / width + 0.5, 0.0, 1.0)
     after = np.maximum(t - 0.5 * width, 0.0)
     return Motion(
@@ -84,10 +77,10 @@ def _step(t: Times, width: Seconds) -> Motion:
 
 
 def s_motion(t: Times, stroke: Radians, rate: RadiansPerSecond, reversal: Seconds) -> Motion:
-    """Return a motion to and fro over `stroke` at +-rate.
+    """Return a motion to and fro over `stroke` at +-rate, with reversals of half a cosine in rate.
 
-    Each reversal is half a cosine in rate. At t = 0 the target is in the middle and moves forward. The largest
-    acceleration is pi rate / reversal. Raises ValueError if the reversals alone are longer than the stroke.
+    At t = 0 the target is in the middle and moves forward. The largest acceleration is pi rate / reversal. Raises
+    ValueError if the reversals alone are longer than the stroke.
     """
     uniform = stroke / rate - 2.0 * reversal / math.pi
     if uniform < 0.0:

@@ -1,24 +1,49 @@
-"""The result of a study, which its function `run` returns and `pedestal study` prints and draws.
-
-All figures have one style. They are saved as PNG and, on request, as a vector file.
-"""
+"""What the studies share: the runs of their cases, and the result that `pedestal study` prints and draws."""
 import dataclasses
+import functools
 import pathlib
-from collections.abc import Callable
-from typing import TypeAlias
+from collections.abc import Callable, Collection, Hashable
+from typing import TypeAlias, TypeVar
 
 import matplotlib
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from pedestal_bringup.loop.closed_loop import Run
-from pedestal_common.quantities import Row
+from pedestal_common.quantities import Floats, Row
 from pedestal_results.report import figures
+from pedestal_workbench.trials import monte_carlo
+from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 Drawings: TypeAlias = dict[str, Callable[[], Figure]]   # {name of a figure: function that draws it}
 Metrics: TypeAlias = dict[str, tuple[float, str]]       # {metric: (value, unit)}
 Item: TypeAlias = tuple[str, int, int]  # of a batch: case, number of the first run, number of runs
+
+FIRST_SEED = 1  # seed of run 0 of each case
+
+_Case = TypeVar('_Case', bound=Hashable)
+
+
+def of_cases(measured: Callable[[_Case, int], ArrayLike], cases: Collection[_Case], runs: int, pool: Pool | None,
+            progress: Progress, size: int = 5) -> dict[_Case, Floats]:
+    """Return {case: array (runs, ...) of measured(case, run)} for runs 0, 1, ... of each case.
+
+    measured: function of a module. pool: None for this process. size: runs that one worker makes at a time.
+    """
+    return (pool or monte_carlo.Pool(1)).of_cases(functools.partial(_batch, measured), cases, runs, size, progress)
+
+
+def _batch(measured: Callable[[_Case, int], ArrayLike], item: tuple[_Case, int, int]) -> Floats:
+    case, first, count = item
+    return np.array([measured(case, run) for run in range(first, first + count)])
+
+
+def seeds(runs: int) -> str:
+    """Return the sentence on the seeds of a study of this many runs."""
+    return f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}.'
 
 
 @dataclasses.dataclass

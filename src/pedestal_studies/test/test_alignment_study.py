@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pedestal_studies.p001_zhou_yang_qin import alignment
-from ship_motion_sim.navigation import navigator
+from pedestal_studies.p001_zhou_yang_qin import aligned_runs, alignment, methods
 
 RUNS = 30
 
@@ -14,22 +13,21 @@ RUNS = 30
 @pytest.fixture(scope='module')
 def on_swell():
     """[(Increments, attitude at the start)] of RUNS runs on swell."""
-    return [alignment.simulated_run(alignment.Batch('swell', 0, RUNS), run) for run in range(RUNS)]
+    return [aligned_runs.simulated_run(aligned_runs.Batch('swell', 0, RUNS), run) for run in range(RUNS)]
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize('method', ['adrc', 'riccati_eso'])
 def test_the_stated_sigma_is_honest_on_swell_without_log_or_gnss(on_swell, method):
     """Rms over the runs of the error in azimuth over its 1 sigma, from 150 s on: within a factor of 1.3 of 1."""
-    constants = navigator.constants(alignment.INS_PARAMETERS, method, 'none',
-                                    math.radians(alignment.SHIP_PARAMETERS.latitude_deg))
-    every, ratios = round(alignment.EVALUATION_PERIOD_S / alignment.IMU_PERIOD_S), []
+    constants = methods.constants(aligned_runs.INS_PARAMETERS, method,
+                                  math.radians(aligned_runs.SHIP_PARAMETERS.latitude_deg))
+    every, ratios = round(aligned_runs.EVALUATION_PERIOD_S / aligned_runs.IMU_PERIOD_S), []
     for (angle, force, attitude), start in on_swell:
-        estimates = np.zeros(len(angle) // every, alignment.AlignmentEstimate.dtype)
-        alignment.align(navigator.initial_state(constants, start), constants, angle, force, alignment.IMU_PERIOD_S,
-                        every,
-                        estimates)
-        error = alignment.errors(estimates['quaternion'], attitude[every - 1::every])[:, 2]
+        estimates = np.zeros(len(angle) // every, aligned_runs.AlignmentEstimate.dtype)
+        aligned_runs.align(methods.initial_state(constants, start), constants, angle, force,
+                           aligned_runs.IMU_PERIOD_S, every, estimates)
+        error = aligned_runs.errors(estimates['quaternion'], attitude[every - 1::every])[:, 2]
         ratios.append(error / estimates['azimuth_sigma'])
     ratio = np.sqrt(np.mean(np.square(ratios), axis=0))
     shown = {t: round(float(alignment.value_at(ratio, t)), 2) for t in (150, 200, 250, 300)}

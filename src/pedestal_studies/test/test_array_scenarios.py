@@ -9,7 +9,7 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.sections import ScenarioError
 from pedestal_results import results, tracking
-from pedestal_studies.p002_jia import phased_array
+from pedestal_studies.p002_jia import compared_loops
 from pedestal_studies.p002_jia.angle_loop import PaperLoop
 
 SWAY, FOUR = 'phased_array_sway', 'phased_array_four'
@@ -109,7 +109,7 @@ def test_the_papers_loop_through_the_cores_reads_what_its_kernel_does(delta, rea
                for key, value in (('form', 'type_1'), ('rate_compensation', delta))]
     run = composed(*QUIET, *QUIET_INS, *of_axes, 'adu.transport_delay=0', duration=14.0)
     read = np.degrees(np.abs(run['tracking_receiver/angle_error']['vector'][run.t > 6.0, :2]).max())
-    target, rate = phased_array.sway_target()
-    kernel = np.degrees(np.abs(phased_array.settled(PaperLoop(delta=delta).run(target, rate)[1])).max())
+    target, rate = compared_loops.sway_target()
+    kernel = np.degrees(np.abs(compared_loops.settled(PaperLoop(delta=delta).run(target, rate)[1])).max())
     assert kernel == pytest.approx(reading, rel=0.005)
     assert read == pytest.approx(kernel, rel=0.01)

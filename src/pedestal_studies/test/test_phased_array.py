@@ -9,7 +9,7 @@ from scipy import linalg
 from acu_tracker.estimation.filters.kalman import benedict_bordner
 from pedestal_results import intervals, tracking
 from pedestal_studies import metrics
-from pedestal_studies.p002_jia import phased_array
+from pedestal_studies.p002_jia import compared_loops, phased_array
 from pedestal_studies.p002_jia.angle_loop import (
     GRID_STEP_S,
     SMOOTHING_SAMPLES,
@@ -18,7 +18,7 @@ from pedestal_studies.p002_jia.angle_loop import (
     Receiver,
     receiver_reading,
 )
-from pedestal_studies.p002_jia.phased_array import instants, settled
+from pedestal_studies.p002_jia.compared_loops import instants, settled
 from pedestal_studies.result import save
 from receiver_law import monopulse
 
@@ -76,7 +76,7 @@ def test_the_beam_is_lost_when_its_lag_passes_half_a_beamwidth(values):
 @pytest.mark.thorough
 def test_the_graph_has_no_more_than_half_a_period_and_the_loops_own_error(values):
     """A beam that stands for T is off by half of it at either end; the paper's loop lags by more."""
-    rate = math.degrees(phased_array.SWAY_AMPLITUDE_RAD) * 2.0 * math.pi / phased_array.SWAY_PERIOD_S
+    rate = math.degrees(compared_loops.SWAY_AMPLITUDE_RAD) * 2.0 * math.pi / compared_loops.SWAY_PERIOD_S
     for T in (0.01, 0.001):
         hold = 0.5 * rate * T
         assert hold * 0.99 < values[f'graph/T={T * 1e3:g}ms', 'max_error_deg'] < hold + 1e-3
@@ -98,8 +98,8 @@ def test_figures_are_drawn(result, tmp_path):
 def test_a_beam_that_is_right_in_the_middle_is_off_at_the_ends_of_its_millisecond(values):
     """By the rate of the target: 30 deg/s, and what is left of the sway's 7.85 deg/s."""
     assert values['best/ramp', 'ends_max_error_deg'] == pytest.approx(0.015, abs=1e-4)
-    rate = phased_array.SWAY_AMPLITUDE_RAD * 2.0 * math.pi / phased_array.SWAY_PERIOD_S
-    limit = phased_array.isolation(0.5 * rate * GRID_STEP_S)
+    rate = compared_loops.SWAY_AMPLITUDE_RAD * 2.0 * math.pi / compared_loops.SWAY_PERIOD_S
+    limit = compared_loops.isolation(0.5 * rate * GRID_STEP_S)
     for case in ('best/sway-ins', 'best/sway-ins/exact-stamps'):
         assert values[case, 'ends_isolation_db'] == pytest.approx(limit, abs=4.0)
         assert values[case, 'ends_isolation_db'] < limit + 0.01
@@ -133,10 +133,10 @@ def test_jitter_is_that_of_the_steady_filter():
 
 def test_with_the_ins_only_what_the_attitude_is_late_is_left():
     """A fixed target on a swaying deck: exact stamps leave almost nothing, late ones what the filter cannot follow."""
-    sway, rate = phased_array.sway_target()
+    sway, rate = compared_loops.sway_target()
     loops = {late: FilterLoop(1e-4, 1e-3, use_ins=True, stamp_error=late) for late in (0, 5, 20)}
     errors = {late: settled(sway - loop.run(sway, None, sway, rate)[0]) for late, loop in loops.items()}
-    assert metrics.peak(errors[0]) < 2e-5 * phased_array.SWAY_AMPLITUDE_RAD
+    assert metrics.peak(errors[0]) < 2e-5 * compared_loops.SWAY_AMPLITUDE_RAD
     # The attitude error is a sine of rate x late, of which the slow filter takes little away again.
     assert metrics.peak(errors[20]) / metrics.peak(errors[5]) == pytest.approx(4.0, rel=0.1)
 

@@ -9,6 +9,7 @@ from scipy.stats import binomtest
 from acu_tracker.modes import Mode
 from acu_tracker.search.pattern import PATTERN_SPIRAL, PATTERN_SQUARE, SEARCH_PATTERNS
 from pedestal_results.intervals import missed
+from pedestal_studies.result import of_cases
 from pedestal_studies.system import acquisition as study
 
 
@@ -70,5 +71,5 @@ def test_rows():
 
 @pytest.mark.thorough
 def test_the_runs_do_not_depend_on_their_batch():
-    together = study.batch(('sidelobe', 0, 2))
-    assert np.array_equal(together[1:], study.batch(('sidelobe', 1, 1)))
+    together = of_cases(study.measured, ['sidelobe'], 2, None, lambda share, text: None)['sidelobe']
+    assert np.array_equal(together[1], study.measured('sidelobe', 1))

@@ -9,6 +9,7 @@ from pedestal_bringup.scenario import scenario
 from pedestal_recording import bag
 from pedestal_results import results
 from pedestal_results.recorded_run import RecordedRun
+from pedestal_studies.result import of_cases
 from pedestal_studies.system import scenarios as study
 
 REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'
@@ -25,8 +26,8 @@ def test_a_run_in_memory_has_the_results_of_its_recording(name):
 
 
 def test_the_runs_do_not_depend_on_their_batch():
-    together = study.batch(('uav_flyby', 0, 2))
-    assert np.array_equal(together[1:], study.batch(('uav_flyby', 1, 1)))
+    together = of_cases(study.case_results, ['uav_flyby'], 2, None, lambda share, text: None)['uav_flyby']
+    assert np.array_equal(together[1], study.case_results('uav_flyby', 1))
     assert not np.array_equal(together[0], together[1])
 
 

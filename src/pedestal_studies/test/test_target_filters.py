@@ -9,6 +9,10 @@ from pedestal_bringup.scenario.variant import Variant
 from pedestal_studies.system import target_filters as study
 
 
+def pointing(case):
+    return np.array([study.pointing(case, run) for run in range(2)])
+
+
 def test_the_default_is_a_scenario_without_a_filter_and_tuned_is_one_of_one_model():
     for target, (_, parameters) in study.TARGET_SCENARIOS.items():
         assert study.CASES[f'{target}/default'] == Variant(study.TARGET_SCENARIOS[target][0]).with_(parameters)
@@ -36,7 +40,7 @@ def test_tables_of_hard_targets_have_the_accelerations_of_their_texts(tmp_path):
 @pytest.mark.thorough
 @pytest.mark.parametrize('place', ['', '-ship'])
 def test_a_target_that_reverses_stays_in_autotrack(place):
-    default, tuned = (study.batch((f's-motion{place}/{name}', 0, 2)) for name in ('default', 'tuned'))
+    default, tuned = (pointing(f's-motion{place}/{name}') for name in ('default', 'tuned'))
     assert np.all(default < study.MAX_POINTING_RATIO * tuned)
 
 
@@ -52,12 +56,12 @@ def test_rows_of_every_case():
 
 @pytest.mark.thorough
 def test_the_default_rules_out_the_noisy_models_on_a_target_that_stands_still():
-    pointing = {name: study.batch((f'geo/{name}', 0, 2)) for name in ('default', 'tuned', 'manoeuvre')}
-    assert np.all(pointing['default'] < 1.5 * pointing['tuned'])
-    assert np.all(pointing['default'] < 0.5 * pointing['manoeuvre'])
+    found = {name: pointing(f'geo/{name}') for name in ('default', 'tuned', 'manoeuvre')}
+    assert np.all(found['default'] < 1.5 * found['tuned'])
+    assert np.all(found['default'] < 0.5 * found['manoeuvre'])
 
 
 @pytest.mark.thorough
 def test_on_a_ship_what_the_ins_wanders_by_is_no_manoeuvre():
-    default, tuned = (study.batch((f'geo-ship/{name}', 0, 2)) for name in ('default', 'tuned'))
+    default, tuned = (pointing(f'geo-ship/{name}') for name in ('default', 'tuned'))
     assert np.all(default < study.MAX_POINTING_RATIO * tuned)

@@ -7,20 +7,14 @@ and x2 walks at random by q.
 
     dx1/dt = x2, dx2/dt = x3 + b0 u, dx3/dt = 0, y = x1        paper 001 equation (9)
 
-    n, n'       ENU; frame that the INS computes for ENU, rotated by a_z about up and by small a_x, a_y about the level
-                axes
     x1, x2, x3  of the north and of the east channel: velocity error [m/s], its rate [m/s2], the rate of x2 without
-                command [m/s3]
+                command [m/s3]; z1, z2, z3: their estimates; v1, v2: references of x1 and x2
                 north: x2 = g a_x, x3 = g (-sin az w_N - eps_E), b0 = g
                 east: x2 = -g a_y, x3 = -g ((1 - cos az) w_N - eps_N), b0 = -g
-    eps_E, eps_N    east and north component of the gyro bias [rad/s]
-    z1, z2, z3  estimates of x1, x2, x3; p11 to p33: elements of their covariance
-    v1, v2      reference of x1 and x2 from the tracking differentiator
-    u, b0 u     level command of a channel [rad/s]; its effect on the rate of x2 [m/s3]
-    l1, l2, l3  gains of the observer
+    a_x, a_y    tilts of n' about east and north; az: its azimuth; eps_E, eps_N: gyro bias [rad/s]
+    u           level command of a channel [rad/s]
     r, q        variance of the measured velocity per step [m2/s2]; growth of the variance of x2, the random walk of
-                the gyros times g [(m/s2)2/s]
-    w_N, g, h   north part of the rate of the earth [rad/s], gravity [m/s2], step [s]
+                the gyros times g [(m/s2)2/s]; w_N: north part of the rate of the earth
 
 The level commands are those of paper 001, equations (7), (8), (11). The correct form of (11) is u = (u0 - z3) / b0,
 but the paper prints u0 - z3 / b0. With the printed form the east channel (b0 < 0) has positive feedback and ends at
@@ -96,19 +90,13 @@ def predicted(z1: MetersPerSecond, z2: MetersPerSecond2, z3: float, b0_u: float,
 
 @compiled
 def kalman_gains(p11: float, p12: float, p13: float, r: float) -> tuple[float, float, float]:
-    """Return the gains (l1 [-], l2 [1/s], l3 [1/s2]) that give the smallest covariance.
-
-    p11, p12, p13: elements of the covariance; r: variance of the measured velocity [m2/s2].
-    """
+    """Return the gains (l1 [-], l2 [1/s], l3 [1/s2]) that give the smallest covariance."""
     return p11 / (p11 + r), p12 / (p11 + r), p13 / (p11 + r)
 
 
 @compiled
 def innovation_ratio(ratio: float, e_east: MetersPerSecond, e_north: MetersPerSecond, s: float, h: Seconds) -> float:
-    """Return the running mean `ratio`, h later, of innovation^2 divided by its expected variance s [m2/s2].
-
-    e_east, e_north: innovations. The mean is 1 if the disturbance is as expected.
-    """
+    """Return the mean `ratio`, h later, of innovation^2 over its variance s [m2/s2]; 1 on a sea as expected."""
     return ratio + h / INNOVATION_TIME_CONSTANT_S * (0.5 * (e_east * e_east + e_north * e_north) / s - ratio)
 
 
@@ -152,10 +140,7 @@ def predict_covariance(observer: Observer, conditions: Conditions, h: Seconds) -
 
 @compiled
 def correct_covariance(observer: Observer, l1: float, l2: float, l3: float, r: float) -> None:
-    """Correct the covariance p for any gains l = (l1, l2, l3): (I - l H) p (I - l H)^T + l r l^T with H = (1, 0, 0).
-
-    r: variance of the measured velocity [m2/s2].
-    """
+    """Correct p for any gains l = (l1, l2, l3): (I - l H) p (I - l H)^T + l r l^T with H = (1, 0, 0)."""
     p = observer.p
     p11, p12, p13 = p[0], p[1], p[2]
     p22, p23, p33 = p[3], p[4], p[5]
@@ -179,10 +164,7 @@ def predict(observer: Observer, h: Seconds) -> None:
 @compiled
 def correct(observer: Observer, v_east: MetersPerSecond, v_north: MetersPerSecond, l1: float, l2: float, l3: float,
             s: float, h: Seconds) -> None:
-    """Correct z of both channels with measured velocities.
-
-    l1, l2, l3: gains; s: expected variance of the innovations [m2/s2].
-    """
+    """Correct z of both channels with measured velocities; s: expected variance of the innovations [m2/s2]."""
     e_east, e_north = v_east - observer.z[0, 0], v_north - observer.z[1, 0]
     observer.innovation_ratio = innovation_ratio(observer.innovation_ratio, e_east, e_north, s, h)
     for i in range(2):
@@ -225,21 +207,16 @@ MAX_LEVELLING_RATE_RAD_S = 0.5  # limit of a level command [rad/s]
 @compiled
 def differentiated(v1: MetersPerSecond, v2: MetersPerSecond2, reference: MetersPerSecond,
                    h: Seconds) -> tuple[MetersPerSecond, MetersPerSecond2]:
-    """Return (v1, v2) of the tracking differentiator one step h later.
-
-    With the parameters r0 = 1/h^2, h0 = h, c0 = 1 of the paper, it reaches the reference in two steps.
-    """
+    """Return (v1, v2) of the tracking differentiator h later. With r0 = 1/h^2, h0 = h, c0 = 1 of the paper, it reaches
+    the reference in two steps."""
     return v1 + h * v2, v2 + h * fhan(v1 - reference, v2, 1.0 / (h * h), h)
 
 
 @compiled
 def command(z1: MetersPerSecond, z2: MetersPerSecond2, z3: float, v1: MetersPerSecond, v2: MetersPerSecond2, b0: float,
             w_c: RadiansPerSecond) -> RadiansPerSecond:
-    """Return the command u of a channel, within MAX_LEVELLING_RATE_RAD_S.
-
-    The command brings z1, z2 to the references v1, v2 with the bandwidth w_c, and cancels z3. b0: effect of u
-    on the rate of x2 [m/s2 per rad].
-    """
+    """Return the command u of a channel, within MAX_LEVELLING_RATE_RAD_S. It brings z1, z2 to the references v1, v2
+    with the bandwidth w_c, and cancels z3; b0 [m/s2 per rad]."""
     u0 = fhan(z1 - v1, DAMPING_COEFFICIENT * (z2 - v2), FHAN_LIMIT_M_S3, 1.0 / w_c)
     return min(max((u0 - z3) / b0, -MAX_LEVELLING_RATE_RAD_S), MAX_LEVELLING_RATE_RAD_S)
 
@@ -247,10 +224,7 @@ def command(z1: MetersPerSecond, z2: MetersPerSecond2, z3: float, v1: MetersPerS
 @compiled
 def level(observer: Observer, conditions: Conditions, v1: Pair, v2: Pair, w_c: RadiansPerSecond,
           out: Vector3) -> None:
-    """Put the commands of both channels into out (w_cE, w_cN, w_cU) [rad/s].
-
-    v1, v2: references [m/s, m/s2]; w_c: bandwidth. The observer receives the limited command.
-    """
+    """Put the commands into out (w_cE, w_cN, w_cU) [rad/s]. The observer receives the limited command."""
     g = conditions.gravity
     out[1] = command(observer.z[0, 0], observer.z[0, 1], observer.z[0, 2], v1[0], v2[0], -g, w_c)
     out[0] = command(observer.z[1, 0], observer.z[1, 1], observer.z[1, 2], v1[1], v2[1], g, w_c)
@@ -276,10 +250,7 @@ class State(Record):
 @compiled
 def advance_covariance(observer: Observer, conditions: Conditions,
                        h: Seconds) -> tuple[float, float, float, float]:
-    """Advance the covariance of the observer by one step h with its measurement.
-
-    Return (l1, l2, l3, expected variance of the innovation [m2/s2]).
-    """
+    """Advance the covariance by a step h with its measurement. Return (l1, l2, l3, variance of the innovation)."""
     r = conditions.velocity_density / h
     predict_covariance(observer, conditions, h)
     s = observer.p[0] + r
@@ -291,11 +262,8 @@ def advance_covariance(observer: Observer, conditions: Conditions,
 @compiled
 def step(state: State, conditions: Conditions, v_east: MetersPerSecond, v_north: MetersPerSecond, h: Seconds,
          w_c: RadiansPerSecond) -> None:
-    """Execute one step h after the last; v_east, v_north: velocity error in n'.
-
-    w_c: bandwidth of the level control. The level control does not affect the estimate, because the observer receives
-    its exact commands.
-    """
+    """Execute one step h after the last; v_east, v_north: velocity error in n'. The bandwidth w_c of the level control
+    does not affect the estimate, because the observer receives its exact commands."""
     observer = state.observer
     # The wanted velocity error is zero, so v1 and v2 start at zero and stay there. The differentiator is part of the
     # ADRC of paper 001.

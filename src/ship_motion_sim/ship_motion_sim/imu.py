@@ -1,6 +1,4 @@
-"""A strapdown IMU at the origin of the deck: specific force and angular rate by REP 145. The unit of the ship uses it.
-
-    inputs['t'], inputs['dt'] = time, step [s]; step(state, constants, ship, inputs, truth, outputs, normals)
+"""A strapdown IMU at the origin of the deck: specific force and angular rate by REP 145.
 
 output 'sample'      the rates at the stamp
 output 'increment'   the mean rates since the last sample: increments of an integrating IMU, divided by the interval.
@@ -21,9 +19,8 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
-from ship_motion_sim import earth
+from ship_motion_sim import earth, motion
 from ship_motion_sim.params import ShipMotionParameters
-from ship_motion_sim.sea import motion
 
 IMU_NORMALS_PER_STEP = 6  # number of standard normals of a step: three gyros, three accelerometers
 FIRST_GYRO_NORMAL, FIRST_ACCELEROMETER_NORMAL = 0, 3
@@ -105,13 +102,10 @@ def inertial_rate(truth: motion.Truth,
 @compiled
 def specific_force(truth: motion.Truth, earth_rate: Vector3,
                    gravity: MetersPerSecond2) -> tuple[MetersPerSecond2, MetersPerSecond2, MetersPerSecond2]:
-    """Return the specific force mat_ed^T (a + 2 w_ie x v - g), FLU.
-
-    a, v: acceleration [m/s2] and velocity [m/s] of the truth, ENU; earth_rate: w_ie, ENU [rad/s].
+    """Return the specific force mat_ed^T (a + 2 w_ie x v - g), FLU; earth_rate: w_ie, ENU [rad/s].
 
     The earth is a rotating plane, the tangent plane of the truth, in which g is constant along -z. The model omits
     that the vertical turns as the ship moves over the round earth (transport rate, 1e-6 rad/s at 7 m/s).
-    `inertial_rate` omits it too.
     """
     a, v, e = truth.acceleration, truth.velocity, earth_rate
     return to_deck(truth.mat_ed,
@@ -142,10 +136,11 @@ def mean_rates(state: State, constants: Constants, ship: motion.Constants, t: Se
 @compiled
 def add_sensor_errors(errors: SensorErrors, dt: Seconds, values: Vector3, normals: Floats, first: int,
                       remainder: Vector3) -> None:
-    """Add the errors of three gyros or accelerometers to the true values, measured over dt.
+    """Add the errors of three sensors to the true values, measured over dt; the normals are used from index `first`
+    on.
 
-    White noise is given as a density, so a sample has the noise density / sqrt(dt). The normals are used from index
-    `first` on. remainder: part of the increment that quantisation cut off, kept for the next sample.
+    White noise is given as a density, so a sample has the noise density / sqrt(dt). remainder: part of the increment
+    that quantisation cut off, kept for the next sample.
     """
     x, y, z = values[0], values[1], values[2]
     per_sample = 1.0 / math.sqrt(dt)

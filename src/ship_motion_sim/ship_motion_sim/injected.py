@@ -9,7 +9,7 @@ from pedestal_common.injection import message_faults, schedule, table
 from pedestal_common.quantities import AnyRecord, Floats, Nanoseconds, Quaternion, Radians, Records, Vector3
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
-from ship_motion_sim.navigation import ins
+from ship_motion_sim import ins
 
 IMU_MESSAGE_FAULT_CODES, INS_MESSAGE_FAULT_CODES = message_faults.codes('ship_motion'), message_faults.codes('ins')
 IMU_BIAS_CODE = table.code('ship_motion', 'bias')
@@ -80,7 +80,6 @@ def apply_due_imu_faults(imu: FaultyImu, stamp: Nanoseconds) -> None:
 
 @compiled
 def _apply_imu_fault(faults: ImuInjected, fault: int, values: Floats) -> None:
-    """Add a fault; values: its arguments, in the order of injection/table.py."""
     message_faults.apply(faults.message_fault, IMU_MESSAGE_FAULT_CODES, fault, values)
     if fault == IMU_BIAS_CODE:
         faults.rate[int(values[0])] += values[1]
@@ -121,7 +120,6 @@ def apply_due_ins_faults(unit: FaultyIns, stamp: Nanoseconds) -> None:
 
 @compiled
 def _apply_ins_fault(constants: ins.LateIns, faults: InsInjected, fault: int, values: Floats) -> None:
-    """Add a fault; values: its arguments, in the order of injection/table.py."""
     message_faults.apply(faults.message_fault, INS_MESSAGE_FAULT_CODES, fault, values)
     if fault == INS_DELAY_CODE:
         constants.latency_ns += round(values[0] * NS_PER_SECOND)

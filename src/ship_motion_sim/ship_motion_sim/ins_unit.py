@@ -1,7 +1,6 @@
 """The unit of the INS: from IMU data to attitude, deck rate and the state of the alignment.
 
-The INS of the method `model` is the true attitude with parametrised errors; it publishes no ins/state. The INS of
-every other method aligns itself.
+The INS of the method `model` publishes no ins/state. The INS of every other method aligns itself.
 """
 import math
 import typing
@@ -17,8 +16,7 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnos
 from pedestal_common.quantities import AnyRecord, Bit, Floats, Nanoseconds, Records, Stamps
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
-from ship_motion_sim import injected
-from ship_motion_sim.navigation import aligning_ins, ins, navigator
+from ship_motion_sim import aligning_ins, injected, ins, navigator
 from ship_motion_sim.params import InsParameters
 
 IMU_RAW_TOPIC, ATTITUDE_TOPIC = 'ship/imu/data_raw', 'ship/imu/data'
@@ -57,10 +55,7 @@ class ModelMemory(typing.NamedTuple):
 
 
 class AligningMemory(typing.NamedTuple):
-    """Memory of an aligning INS.
-
-    Because the types differ, a run with the method `model` does not compile the law of an aligning INS.
-    """
+    """Memory of an aligning INS. Because the types differ, a run with the method `model` does not compile its law."""
     record: Records     # AligningRecord (1,)
     normals: Floats     # as in ModelMemory
 
@@ -172,10 +167,7 @@ class Ins(Simulated):
         return self.memory._replace(normals=self._noise.standard_normal((steps, ins.INS_NORMALS_PER_STEP)))
 
     def diagnose(self) -> Diagnosis:
-        """Return the Diagnosis, with the estimated 1 sigmas of the INS among its values.
-
-        The level is ERROR after a status other than OK since the last diagnosis, and WARN while the INS aligns.
-        """
+        """Return the Diagnosis: ERROR after a status other than OK since the last one, WARN while the INS aligns."""
         outputs, status = self.parts['outputs'], int(self.parts['worst'])
         self.parts['worst'] = 0
         stage, sigma, p = int(outputs['stage']), outputs['variance']**0.5, self.parameters

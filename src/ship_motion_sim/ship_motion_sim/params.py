@@ -78,8 +78,7 @@ class ShipParameters(Parameters):
     recorded: RecordedParameters = group(RecordedParameters)
 
     def check(self) -> None:
-        """Raise ParameterError if `motion`, `spectrum` or `sea_state` lacks a file or a wave height that it needs, or
-        does not use a given one."""
+        """Raise ParameterError for a missing or useless file, wave height or heading."""
         if (self.motion == 'recorded') != bool(self.recorded.path):
             raise ParameterError(f"recorded.path = '{self.recorded.path}': must name a CSV file with motion = "
                                  'recorded, and be empty otherwise')

@@ -1,8 +1,7 @@
 """ROS node of the ship: its truth and the data of its IMU at every step of the drive; NMEA for other equipment.
 
-The unit ship_unit.ShipMotion holds the law. To change the model of the ship or of its IMU, edit
-ship_motion_sim/ship_unit.py. This module adds the NMEA datagrams. They contain the true attitude, because they stand
-for an instrument of the ship whose errors are not modelled.
+The unit ship_unit.ShipMotion holds the law. The NMEA datagrams contain the true attitude, because they stand for an
+instrument of the ship whose errors are not modelled.
 """
 import socket
 from collections.abc import Mapping
@@ -47,11 +46,8 @@ class ShipMotionNode(unit_node.UnitNode):
             self.send_attitude(stamp)
 
     def send_attitude(self, stamp: Nanoseconds) -> None:
-        """Send one datagram; missing equipment only causes a warning in the next diagnostics.
-
-        Linux reports a datagram without a receiver when the next one is sent, which then fails. So every second
-        datagram to missing equipment succeeds.
-        """
+        """Send one datagram; missing equipment only causes a warning in the next diagnostics. Linux reports a datagram
+        without a receiver when the next one is sent, so every second datagram to it succeeds."""
         period_ns = round(1e9 / self.parameters.nmea.rate)
         # Datagrams are due at whole multiples of the period: the next multiple after this stamp.
         self.next_datagram_ns = stamp - stamp % period_ns + period_ns

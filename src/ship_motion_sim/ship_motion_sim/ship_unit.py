@@ -12,11 +12,10 @@ from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnos
 from pedestal_common.quantities import AnyRecord, Floats, Nanoseconds, Records, Stamps
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
-from ship_motion_sim import imu, injected
+from ship_motion_sim import imu, injected, motion
 from ship_motion_sim.imu import Inputs as ImuInputs
 from ship_motion_sim.imu import Outputs as ImuOutputs
 from ship_motion_sim.params import ShipMotionParameters
-from ship_motion_sim.sea import motion
 
 SHIP_TRUTH_TOPIC, IMU_RAW_TOPIC = 'ship/truth', 'ship/imu/data_raw'
 
@@ -109,10 +108,7 @@ class ShipMotion(Simulated):
         return ship['pieces'] > 0 and self.parts['last'] * 1e-9 > ship['breaks'][ship['pieces'] - 1]
 
     def diagnose(self) -> Diagnosis:
-        """Return the Diagnosis, with roll and pitch as its values.
-
-        The level is ERROR if truth or IMU is not valid, and WARN past the end of a recorded motion.
-        """
+        """Return the Diagnosis: ERROR if truth or IMU is not valid, WARN past the end of a recorded motion."""
         truth = self.parts['truth']
         values = [(f'{name}_deg', f'{np.degrees(truth[name]):.3f}') for name in ('roll', 'pitch')]
         for status, texts in ((truth['status'], motion.MOTION_STATUS_TEXTS),

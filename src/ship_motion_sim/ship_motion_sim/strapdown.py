@@ -1,15 +1,9 @@
 """Strapdown integration of the INS: attitude and velocity from the increments of the IMU, at a fixed position.
 
-The result is in the frame n', which the INS computes as its estimate of ENU (east, north, up).
-
-    step(state, angle, force, dt, earth_rate, command, gravity)
-
     dC/dt = C [w_ib x] - [(w_ie + w_c) x] C
     dv/dt = C f - (2 w_ie + w_c) x v - g u
 
-    C               rotation deck -> n'; [w x]: matrix of the cross product with w
-    v               velocity in n' [m/s]
-    f, g, u         specific force [m/s2], gravity [m/s2], upward unit vector
+    C, v, u         rotation deck -> n'; velocity [m/s] and upward unit vector in n'
     w_ib, w_ie      rates of the deck and of the earth against inertial space [rad/s]
     w_c             rate at which an alignment rotates n', and with it the components of the velocity [rad/s]
 
@@ -73,11 +67,10 @@ def coning(a: Vector3, b: Vector3) -> tuple[Radians, Radians, Radians]:
 @compiled
 def sculling(a: Vector3, f: Vector3, last_a: Vector3,
              last_f: Vector3) -> tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond]:
-    """Return the velocity increment in the deck axes at the start of an interval.
+    """Return the velocity increment in the deck axes at the start of an interval, from increments a [rad], f [m/s].
 
-    a [rad], f [m/s]: increments of angle and force in the interval; last_a, last_f: increments of the
-    previous interval. For steady rates the result is f + a x f / 2 + a x (a x f) / 6. Under quick sway the term
-    a x (a x f) / 6 changes the vertical acceleration by 1 ug.
+    For steady rates the result is f + a x f / 2 + a x (a x f) / 6. Under quick sway the term a x (a x f) / 6 changes
+    the vertical acceleration by 1 ug.
     """
     rx, ry, rz = cross(a[0], a[1], a[2], f[0], f[1], f[2])
     ux, uy, uz = cross(a[0], a[1], a[2], rx, ry, rz)
@@ -90,11 +83,8 @@ def sculling(a: Vector3, f: Vector3, last_a: Vector3,
 @compiled
 def step(state: State, angle: Vector3, force: Vector3, dt: Seconds, earth_rate: Vector3, command: Vector3,
          gravity: MetersPerSecond2) -> None:
-    """Integrate one IMU interval of dt.
-
-    angle, force: integrals of w_ib and f over the interval, FLU [rad, m/s]; earth_rate, command: w_ie, w_c in n'
-    [rad/s]; gravity: g.
-    """
+    """Integrate one IMU interval of dt; angle, force: integrals of w_ib and f, FLU [rad, m/s]; earth_rate, command:
+    w_ie, w_c in n' [rad/s]."""
     v, q = state.velocity, state.quaternion
     dx, dy, dz = sculling(angle, force, state.last_angle, state.last_force)
     gx, gy, gz = to_earth(state.mat, dx, dy, dz)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ship_motion_sim import earth, imu
+from ship_motion_sim import earth, imu, motion
 from ship_motion_sim.params import ImuParameters, PlainParameters, ShipMotionParameters, ShipParameters
-from ship_motion_sim.sea import motion
 
 IDEAL = ImuParameters(gyro_bias_x=0.0, gyro_bias_y=0.0, gyro_bias_z=0.0, gyro_noise=0.0, accelerometer_bias_x=0.0,
                       accelerometer_bias_y=0.0, accelerometer_bias_z=0.0, accelerometer_noise=0.0)

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ship_motion_sim import imu
-from ship_motion_sim.navigation import ins
+from ship_motion_sim import imu, ins, motion
 from ship_motion_sim.params import InsParameters, PlainParameters, ShipMotionParameters, ShipParameters
-from ship_motion_sim.sea import motion
 
 STEP = 5_000_000
 PERFECT = InsParameters(tilt_wander=0.0, heading_wander=0.0, tilt_noise=0.0, heading_noise=0.0, rate_noise=0.0,

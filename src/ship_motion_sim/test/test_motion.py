@@ -6,8 +6,8 @@ import pytest
 from scipy import integrate
 from scipy.spatial.transform import Rotation
 
+from ship_motion_sim import motion, waves
 from ship_motion_sim.params import PlainParameters, ShipParameters
-from ship_motion_sim.sea import motion, waves
 
 STILL = PlainParameters(roll_amplitude_deg=0.0)
 WILD = PlainParameters(roll_amplitude_deg=30.0, pitch_amplitude_deg=20.0, pitch_period=5.0, yaw_amplitude_deg=40.0,

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from pedestal_common import parameters
 from pedestal_common.wire import records
+from ship_motion_sim import ins, navigator
 from ship_motion_sim.ins_unit import ATTITUDE_TOPIC, IMU_RAW_TOPIC, INS_STATE_TOPIC, Ins
-from ship_motion_sim.navigation import ins, navigator
 from ship_motion_sim.params import InsParameters, ShipMotionParameters
 from ship_motion_sim.ship_unit import SHIP_TRUTH_TOPIC, ShipMotion
 

@@ -6,8 +6,8 @@ import pytest
 
 from pedestal_common.parameters import ParameterError
 from pedestal_common.text_files.csv_table import TableError
+from ship_motion_sim import motion, recording
 from ship_motion_sim.params import RecordedParameters, ShipParameters
-from ship_motion_sim.sea import motion, recording
 
 SAMPLED = ShipParameters(sea_state=6, wave_angle_deg=60.0, heading_deg=358.0, speed=6.0)
 PERIOD, LENGTH = 0.1, 60.0

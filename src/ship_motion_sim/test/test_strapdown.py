@@ -9,9 +9,8 @@ import pyins.transform
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ship_motion_sim import earth, imu, strapdown
+from ship_motion_sim import earth, imu, motion, strapdown
 from ship_motion_sim.params import ImuParameters, PlainParameters, ShipMotionParameters, ShipParameters
-from ship_motion_sim.sea import motion
 
 DT = 0.01
 LATITUDE = math.radians(34.0)

@@ -6,8 +6,8 @@ from scipy import integrate, signal
 
 from pedestal_common.parameters import ParameterError
 from pedestal_common.text_files import csv_table
+from ship_motion_sim import motion, waves
 from ship_motion_sim.params import HullParameters, ShipParameters
-from ship_motion_sim.sea import motion, waves
 
 G = 9.81
 HULL = HullParameters()

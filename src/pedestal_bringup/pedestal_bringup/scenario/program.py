@@ -11,7 +11,7 @@ from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
 from pedestal_common.quantities import Message, Nanoseconds, Pairs, Seconds, Times
 from pedestal_common.wire import messages
-from ship_motion_sim.sea import motion
+from ship_motion_sim import motion
 from tracking_receiver_sim import target, wave_path
 from tracking_receiver_sim.params import TargetParameters
 

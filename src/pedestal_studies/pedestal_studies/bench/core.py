@@ -35,14 +35,13 @@ SUBSTEPS_PER_STEP = 2 * 100  # sub-steps of the plant in one drive step of 5 ms:
 
 @compiled
 def _drive_steps(state: Records, constants: Records, inputs: Records, outputs: Records, count: int) -> None:
-    """Run `count` steps of one drive."""
     for _ in range(count):
         drive_unit.step(state[0], constants[0], inputs[0], outputs[0])
 
 
 @compiled
 def _steps_on_lanes(drives: AnyRecord, count: int) -> None:
-    """Run `count` steps of the drives on all lanes; the processor computes all lanes, one trial each, together."""
+    """Run the drives on all lanes; the processor computes all lanes together."""
     moving = adu_unit.DRIVE_LANES(drives)
     for _ in range(count):
         drive_unit.step(moving.state, moving.constants, moving.inputs, moving.outputs)
@@ -64,7 +63,6 @@ def filter_step(**parameters: Json) -> float:
 
 @compiled
 def _filter_steps(state: Records, constants: Records, t: Times, y: Floats, R: Floats) -> None:
-    """Run a filter over angles y [rad] of variance R at times t."""
     f, c = state[0], constants[0]
     axis_filter.start(f, c, y[0], R[0], 0.1)
     for k in range(1, len(y)):
@@ -83,7 +81,6 @@ def unscented_step() -> float:
 
 @compiled
 def _unscented_steps(state: Records, constants: Records, measured: Vectors3) -> None:
-    """Run the Cartesian filters over measured azimuth, elevation [rad] and range [m]."""
     s, c = state[0], constants[0]
     R = 2.5e-7
     known = AxisVariances(R, 0.0, 0.01)
@@ -99,11 +96,8 @@ def _unscented_steps(state: Records, constants: Records, measured: Vectors3) -> 
 
 
 def filterpy_unscented() -> IMMEstimator:
-    """Return filterpy's IMMEstimator of two UnscentedKalmanFilter, as a counterpart of the compiled Cartesian filters.
-
-    The nine states x are position (east, north, up) [m], velocity and acceleration. The three measured numbers are
-    azimuth [rad], elevation [rad] and range [m].
-    """
+    """Return filterpy's counterpart of the compiled Cartesian filters: states position (east, north, up) [m],
+    velocity, acceleration; measured azimuth, elevation [rad], range [m]."""
     def unscented_filter() -> UnscentedKalmanFilter:
         made = UnscentedKalmanFilter(
             9, 3, FILTER_PERIOD_S, lambda x: np.array([np.arctan2(x[0], x[1]), np.arctan2(x[2], np.hypot(x[0], x[1])),
@@ -121,11 +115,8 @@ def filterpy_unscented() -> IMMEstimator:
 
 
 def filterpy_steps() -> list[float]:
-    """Return the times [us] of predict and update of three filters of filterpy.
-
-    The filters are a KalmanFilter of three states, an IMMEstimator of three of them, and an IMMEstimator of two
-    unscented filters.
-    """
+    """Return the times [us] of predict and update of filterpy's KalmanFilter of three states, IMMEstimator of three of
+    them, and IMMEstimator of two unscented filters."""
     def kalman_filter() -> KalmanFilter:
         made = KalmanFilter(3, 1)
         made.F = np.array([[1.0, FILTER_PERIOD_S, 0.5 * FILTER_PERIOD_S**2], [0.0, 1.0, FILTER_PERIOD_S],
@@ -147,10 +138,7 @@ def filterpy_steps() -> list[float]:
 
 
 def filter_rows() -> list[Row]:
-    """Return the rows of the time of a filter step, of our filters and of the filters of filterpy.
-
-    The filters are a Kalman filter of one axis, an IMM of three of them, and an IMM of two unscented filters.
-    """
+    """Return the rows of the time of a filter step, of our filters and of the filters of filterpy."""
     steps = (filter_step(kind='current_statistical'),
              filter_step(**{'kind': 'imm', 'imm.models': 'cv ca current_statistical',
                                                       'imm.rungs': 1}), unscented_step())
@@ -164,10 +152,8 @@ def filter_rows() -> list[Row]:
 
 
 def drive_rows() -> list[Row]:
-    """Return the rows of the time of a plant sub-step, in one drive and on a lane, and of the trial speed.
-
-    The trial speed is the simulated time of all lanes over the CPU time of one core.
-    """
+    """Return the rows of the time of a plant sub-step, in one drive and on a lane, and of the trial speed. The trial
+    speed is the simulated time of all lanes over the CPU time of one core."""
     params = AduParameters(initial_elevation=0.7)
     one = adu_unit.DriveRecord.zeros()
     one['state'], one['constants'] = drive_unit.initial_state(params), drive_unit.constants(params)

@@ -20,8 +20,7 @@ from pedestal_results.intervals import single
 from pedestal_studies.bench import Measured
 
 ROUND_COUNT = 3  # number of runs in lockstep, of which the median counts
-RUN_DURATION_S, LATENCY_DURATION_S = 15.0, 10.0
-"""Simulated durations of a run of the graph in lockstep and in realtime [s]."""
+RUN_DURATION_S, LATENCY_DURATION_S = 15.0, 10.0  # of the graph in lockstep and in realtime [s]
 
 
 def graph_run(folder: str, number: int | str, pacing: str, seconds: Seconds) -> tuple[Outcome, pathlib.Path]:
@@ -38,11 +37,8 @@ def lap(folder: str, number: int) -> tuple[float, float]:
 
 
 def latencies(path: pathlib.Path) -> Floats:
-    """Return the latencies [s] of the graph in a bag, by the wall clock.
-
-    A latency is the time from the publication of joint_states to the publication of the acu/rate_command with the same
-    stamp.
-    """
+    """Return the latencies [s] of the graph in a bag, by the wall clock: from the publication of joint_states to that
+    of the acu/rate_command with the same stamp."""
     sent = {topic: {log: published for _, log, published, _ in bag.read(path).raw(topic)}
             for topic in ('joint_states', 'acu/rate_command')}
     return np.array([(published - sent['joint_states'][stamp]) * 1e-9

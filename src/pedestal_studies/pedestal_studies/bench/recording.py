@@ -27,10 +27,8 @@ DISK_TEST_BYTES = 200_000_000  # size of the file that is written for the rate o
 
 
 def measure_recorder(path: pathlib.Path, again: str, rate: float) -> tuple[float, int, float]:
-    """Return (messages/s, number of lost messages, CPU time over wall time) of a recorder that receives a bag.
-
-    path: bag that is replayed. again: new bag of the recorder. rate: speed of the replay as a multiple of real time.
-    """
+    """Return (messages/s, number of lost messages, CPU time over wall time) of a recorder that receives a replayed
+    bag; again: its new bag; rate: multiple of real time."""
     with open(pathlib.Path(again).with_suffix('.log'), 'w+') as log:
         recorder = subprocess.Popen(
             command('recorder_node', '--ros-args', '--params-file',
@@ -58,7 +56,6 @@ def measure_recorder(path: pathlib.Path, again: str, rate: float) -> tuple[float
 
 
 def _cpu_time(pid: int) -> Seconds:
-    """Return the CPU time that a process has used."""
     # The fields after the name in parentheses; utime and stime are the 12th and 13th of them (proc(5)).
     fields = pathlib.Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
     user_ticks, system_ticks = map(int, fields[11:13])

@@ -5,16 +5,8 @@ reversals and fast moves with each schedule of the bias torque. The study also c
 with a speed loop for each motor.
 
 Three cases have the controller of paper 000, as in the scenarios. The sine and the fast step run with the controller
-`best` of the study servo and with every schedule. `pedestal run servo_step|servo_sine --param ...` runs every case too
-(Variant.command). The demand is the torque per motor that the speed loop commands. The schedules of the bias torque
-are:
-
-    off         no bias torque
-    constant    the same bias torque at every demand
-    fade        full at demand 0; it falls to 0 as the demand grows to the parameter `out`
-    hold_fade   full up to the demand `hold`; it then falls to 0 at the demand `out`
-
-The metrics fight_torque_... are the opposing torque of the motors beyond the commanded bias, see `opposing_torque`.
+`best` of the study servo and with every schedule. `pedestal run servo_step|servo_sine --param ...` runs every case
+too.
 """
 import math
 
@@ -27,7 +19,7 @@ from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Floats, Json, NewtonMeters, Radians, RadiansPerSecond, Row, Seconds, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, TRUTH_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies import metrics
 from pedestal_studies.p000_ma import servo
 from pedestal_studies.p000_ma.servo import Runs
@@ -46,51 +38,46 @@ The slow sine shows the lash alone. The fast sine has a peak rate of 0.2 rad/s, 
 
 def bias(schedule: str, torque: NewtonMeters = 12.0, hold: NewtonMeters = 14.0,
          out: NewtonMeters = 45.0) -> dict[str, Json]:
-    """Return the parameters of a schedule of the bias torque; torques of one motor.
+    """Return the parameters of a schedule of the bias torque, which depends on the demanded torque of one motor.
 
-    torque: full bias torque; hold: demand up to which it is full; out: demand at which it is 0.
+    off         no bias torque
+    constant    the same bias torque at every demand
+    fade        full at demand 0; it falls to 0 as the demand grows to the parameter `out`
+    hold_fade   full up to the demand `hold`; it then falls to 0 at the demand `out`
     """
     return {'adu.azimuth.bias.schedule': schedule, 'adu.azimuth.bias.torque': torque,
             'adu.azimuth.bias.hold': hold, 'adu.azimuth.bias.out': out}
 
 
-PAPER_CASES = {
+PAPER_CASES = {  # {case with the controller of the paper: parameters}
     'bias-off': bias('off'),
     'bias-on': {},                          # no change: the bias of the scenario, 5 Nm, fading, as in the paper
     'hold-fade': bias('hold_fade')}
-"""{case with the controller of the paper: parameters}."""
 
-BIAS_SCHEDULES = {
+BIAS_SCHEDULES = {  # {schedule: parameters}; the number in a name is the bias torque [Nm]
     'off': bias('off'), 'constant-5': bias('constant', torque=5.0), 'constant-12': bias('constant', torque=12.0),
     'fade-5': bias('fade', torque=5.0, hold=0.0, out=30.0), 'fade-12': bias('fade', torque=12.0, hold=0.0, out=30.0),
     'hold-fade': bias('hold_fade')}
-"""{name of a schedule: parameters}; the number in a name is the bias torque [Nm], hold-fade has 12 Nm."""
 
-SPEED_LOOP_STRUCTURES = {
+SPEED_LOOP_STRUCTURES = {  # {case: parameters}
     'mean-speed': {'adu.azimuth.speed_loop.structure': 'mean'},
     'independent-loops': {'adu.azimuth.speed_loop.structure': 'independent'}}
-"""{case: parameters} of one speed loop on the mean speed, and of one speed loop for each motor."""
 
-METRIC_TARGETS = {
+METRIC_TARGETS = {  # {(case, metric): target}
     ('bias-off', 'standstill_peak_to_peak_rad'): '> 5e-4', ('bias-on', 'standstill_peak_to_peak_rad'): '< 2e-6',
     ('hold-fade', 'standstill_peak_to_peak_rad'): '< 2e-6', ('bias-on', 'reversal_ratio_off_to_on'): '> 30',
     ('hold-fade', 'reversal_ratio_off_to_on'): '> 30',
     ('hold-fade', 'sine_residual_rad'): '<= 1e-4', ('hold-fade', 'step_overshoot_percent'): '<= 2.5'}
-"""{(case, metric): target}."""
 
 
 def reversal_case(kind: str, name: str) -> Variant:
-    """Return the variant of three periods of a sine.
-
-    kind: key of REVERSAL_FREQUENCIES_RAD_S; name: key of PAPER_CASES.
-    """
+    """Return the variant of three periods of a sine; kind: of REVERSAL_FREQUENCIES_RAD_S; name: of PAPER_CASES."""
     return servo.of_sine(Variant('servo_sine').with_({
         **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE_RAD}),
         REVERSAL_FREQUENCIES_RAD_S[kind], 3)
 
 
 FAST_STEP_PARAMETERS = {**servo.FULL_TORQUE_PARAMETERS, 'acu.azimuth.shaper.acceleration': 40.0}
-"""Controller of a step at 40 rad/s2, which needs the full torque."""
 
 MOVE_DURATION_S = 0.5  # time at which the step of the cases SPEED_LOOP_STRUCTURES is over [s]
 
@@ -102,10 +89,7 @@ def standstill(record: Run) -> tuple[Times, Floats]:
 
 
 def steady_residual(record: Run, amplitude: Radians, w: RadiansPerSecond) -> tuple[Times, Floats]:
-    """Return (times, error [rad] without its part at the frequency of the sine) of a sine run.
-
-    amplitude, w: of the sine. Only whole periods after the first are evaluated.
-    """
+    """Return (times, error [rad] without its part at the frequency w of the sine), over whole later periods."""
     t, period = record.t, 2.0 * math.pi / w
     error = amplitude * np.sin(w * t) - record['adu/truth']['position'][:, 0]
     steady = metrics.whole_periods(t, period, period)
@@ -211,12 +195,12 @@ def figures(done: Runs) -> Drawings:
 
 def standstill_figure(done: Runs) -> Figure:
     """Draw the limit cycle of the load at rest and the torque of both motors, without and with bias."""
-    figure, axes = new_panels(2, 2, height=4.6, y=('azimuth [\N{MICRO SIGN}rad]', 'torque [Nm]'), sharex=True,
-                              sharey='row')
+    figure, axes = fig.new_panels(2, 2, height=4.6, y=('azimuth [\N{MICRO SIGN}rad]', 'torque [Nm]'), sharex=True,
+                                  sharey='row')
     for column, name in enumerate(('bias-off', 'bias-on')):
         record = done['standstill', name]
         t, y = standstill(record)
-        axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(TRUTH_COLOUR, FILTERED_COLOUR)[column])
+        axes[0, column].plot(t, 1e6 * (y - np.mean(y)), color=(fig.TRUTH_COLOUR, fig.FILTERED_COLOUR)[column])
         axes[0, column].set_title(f'{name}: {1e6 * np.ptp(y):.1f} \N{MICRO SIGN}rad peak to peak')
         draw_torques(axes[1, column], record)
     axes[0, 0].set_xlim(STANDSTILL_START_S, STANDSTILL_START_S + 0.5)
@@ -227,14 +211,14 @@ def standstill_figure(done: Runs) -> Figure:
 def reversal_figure(done: Runs) -> Figure:
     """Draw the effect of lash on a slow sine: reference, then the error without its part at the sine frequency."""
     error = 'error [\N{MICRO SIGN}rad]'
-    figure, axes = new_panels(3, height=5.6, y=('reference [rad]', error, error), sharex=True,
-                              height_ratios=(1, 1.2, 1.2))
+    figure, axes = fig.new_panels(3, height=5.6, y=('reference [rad]', error, error), sharex=True,
+                                  height_ratios=(1, 1.2, 1.2))
     t = done['reversal', 'bias-off'].t
     w = REVERSAL_FREQUENCIES_RAD_S['reversal']
-    axes[0, 0].plot(t, REVERSAL_AMPLITUDE_RAD * np.sin(w * t), color=INK_COLOUR)
+    axes[0, 0].plot(t, REVERSAL_AMPLITUDE_RAD * np.sin(w * t), color=fig.INK_COLOUR)
     for panel, name in zip(axes[1:, 0], ('bias-off', 'bias-on')):
         t, residual = steady_residual(done['reversal', name], REVERSAL_AMPLITUDE_RAD, w)
-        panel.plot(t, 1e6 * residual, color=TRUTH_COLOUR if name == 'bias-off' else FILTERED_COLOUR)
+        panel.plot(t, 1e6 * residual, color=fig.TRUTH_COLOUR if name == 'bias-off' else fig.FILTERED_COLOUR)
         panel.set_title(f'{name}: error without its fundamental')
     axes[2, 0].set_xlim(*reversal_window())
     return figure
@@ -249,7 +233,7 @@ def reversal_window() -> tuple[Seconds, Seconds]:
 
 def torques_figure(done: Runs) -> Figure:
     """Draw the torque of both motors over the reversal, a panel for each of PAPER_CASES."""
-    figure, axes = new_panels(len(PAPER_CASES), height=5.6, y='torque [Nm]', sharex=True, sharey=True)
+    figure, axes = fig.new_panels(len(PAPER_CASES), height=5.6, y='torque [Nm]', sharex=True, sharey=True)
     for panel, name in zip(axes[:, 0], PAPER_CASES):
         record = done['reversal', name]
         draw_torques(panel, record)
@@ -263,15 +247,15 @@ def schedules_figure(done: Runs) -> Figure:
     names = list(BIAS_SCHEDULES)
     sine = [1e6 * measured('sine', name, done['sine', name])['sine_residual_rad'][0] for name in names]
     step = [measured('step', name, done['step', name])['step_overshoot_percent'][0] for name in names]
-    figure, axes = new_panels(1, 2, height=3.2, sharey=True)
+    figure, axes = fig.new_panels(1, 2, height=3.2, sharey=True)
     for panel, values, bound, label in (
             (axes[0, 0], sine, 100.0, 'residual of the 0.4 Hz sine [\N{MICRO SIGN}rad]'),
             (axes[0, 1], step, 2.5, 'overshoot of the fast step [%]')):
-        bars = panel.barh(names, values, color=[FILTERED_COLOUR if name == 'hold-fade' else RAW_COLOUR
+        bars = panel.barh(names, values, color=[fig.FILTERED_COLOUR if name == 'hold-fade' else fig.RAW_COLOUR
                                                 for name in names])
         panel.bar_label(bars, [f'{value:.0f}' if value >= 100.0 else f'{value:.3g}' for value in values], padding=3,
                         bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 1.0})
-        panel.axvline(bound, color=INK_COLOUR, linewidth=0.8, linestyle='--')
+        panel.axvline(bound, color=fig.INK_COLOUR, linewidth=0.8, linestyle='--')
         panel.set_xlim(0.0, 1.2 * max(*values, bound))
         panel.grid(axis='y', visible=False)
         panel.set_xlabel(f'{label}, dashed: target')
@@ -281,11 +265,12 @@ def schedules_figure(done: Runs) -> Figure:
 
 def structures_figure(done: Runs) -> Figure:
     """Draw one speed loop on the mean speed beside a speed loop for each motor, over the step of the paper."""
-    figure, axes = new_panels(2, 2, height=4.6, y=('torque [Nm]', 'opposing torque [Nm]'), sharex=True, sharey='row')
+    figure, axes = fig.new_panels(2, 2, height=4.6, y=('torque [Nm]', 'opposing torque [Nm]'), sharex=True,
+                                  sharey='row')
     for column, name in enumerate(SPEED_LOOP_STRUCTURES):
         record = done['structure', name]
         draw_torques(axes[0, column], record)
-        axes[1, column].plot(record.t, opposing_torque(record), color=INK_COLOUR)
+        axes[1, column].plot(record.t, opposing_torque(record), color=fig.INK_COLOUR)
         axes[0, column].set_title(name)
     axes[0, 0].set_xlim(0.0, 1.0)
     return legend(figure)

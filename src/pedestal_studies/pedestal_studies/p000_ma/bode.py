@@ -1,13 +1,11 @@
 """Frequency response of the current, speed and position loops, measured by multisine on the simulated plant.
 
-A multisine is a sum of sines of many frequencies. With it pedestal_workbench/tuning/frequency_response.py measures the
-open loop L. The dashed line of a figure is the open loop for which the gains were designed. Sampling, delay and
-elasticity cause the difference between the design and the measurement. The open loops of the design are
+The dashed line of a figure is the open loop for which the gains were designed. Sampling, delay and elasticity cause
+the difference between the design and the measurement. The open loops of the design are
 
     w_c / s                     current loop; w_c: bandwidth [rad/s]
-    (K_p + K_i / s) / (J s)     speed loop of a rigid drive; K_p, K_i: proportional and integral gain; J: inertia at
-                                the motor
-    K_p / s + K_i / s^2         position loop; K_p, K_i: proportional and integral gain
+    (K_p + K_i / s) / (J s)     speed loop of a rigid drive; J: inertia at the motor
+    K_p / s + K_i / s^2         position loop
 """
 import dataclasses
 import functools
@@ -46,7 +44,6 @@ def controller(name: str) -> Variant:
 FAST_LOOP_PARAMETERS = {'acu.azimuth.feedforward.bandwidth': 40.0}  # position loop of higher bandwidth
 STRUCTURE_PARAMETERS = {**FAST_LOOP_PARAMETERS, 'adu.azimuth.structure.inertia_share': 0.5,
                         'adu.azimuth.structure.frequency': 8.0}
-"""Position loop of higher bandwidth with a flexible load, of which one half swings on the other."""
 NOTCH_PARAMETERS = {**STRUCTURE_PARAMETERS, 'acu.azimuth.notch.frequency': 7.5, 'acu.azimuth.notch.width': 0.5,
                     'acu.azimuth.notch.depth': 0.3}
 """Position loop of higher bandwidth with a flexible load and a notch at the resonance of the loop without notch."""
@@ -75,10 +72,7 @@ MAX_DRAWN_DEVIATION = 0.2
 
 
 def nonlinearity(measured: Response, smaller: Response) -> float:
-    """Return the largest relative change of L between two excitations, within MARGIN_BAND_FACTOR.
-
-    measured, smaller: responses to the larger and to the smaller excitation.
-    """
+    """Return the largest relative change of L between a larger and a smaller excitation, within MARGIN_BAND_FACTOR."""
     change = np.abs(smaller.open_loop / measured.open_loop - 1.0)
     return float(change[np.abs(np.log(np.abs(measured.open_loop))) < math.log(MARGIN_BAND_FACTOR)].max())
 
@@ -169,11 +163,10 @@ def degrees(x: Complexes) -> Floats:
 
 
 def bode_figure(title: str, curves: Mapping[str, tuple[Response, str]], design: Design | None) -> Figure:
-    """Draw Bode diagrams of the open and the closed loop.
+    """Draw Bode diagrams of the open and the closed loop of curves {label: (response, colour)}.
 
-    curves: {label: (response, colour)}.
-    Crosses mark the crossover in gain and phase, and the legend gives the margins. The first of two or more curves is
-    drawn wide, so that it remains visible behind a curve that coincides with it.
+    Crosses mark the crossover, and the legend gives the margins. The first of two or more curves is drawn wide, so
+    that it remains visible behind a curve that coincides with it.
     """
     figure, axes = fig.new_panels(2, 2, height=5.4, x='frequency [Hz]', y=('gain [dB]', 'phase [deg]'), sharex=True)
     figure.suptitle(title)

@@ -3,17 +3,10 @@
 The paper (introduction) names these five filters for the angle of a target and states that the Kalman filter has the
 better effect. It prints no number. Its Kalman filter is that of the 'current' statistical model.
 
-Cases are MOTION/FILTER/TUNING. The motions are those of profiles.py, measured at 100 Hz with white noise of 0.03
-deg. MOTION all is the geometric mean over the motions. TUNING is own-tuning if the filter was tuned for this motion,
-and one-tuning if one tuning serves all motions. A tuning minimises the rms of the angle over records of other seeds.
-
-least_squares      polynomial of degree 1 or 2 over a window; tuned: degree and window
-alpha_beta, alpha_beta_gamma    constant gains; tuned: alpha
-wiener             Wiener filter over a window of 6 s (window_filter.py); tuned: model of the acceleration
-kalman             Kalman filter current_statistical; tuned: alpha and a_max
-imm                default filter of the product, without tuning
-
-angle_ratio_to_kalman, rate_ratio_to_kalman   rms error divided by that of kalman, in the run of equal noise
+Cases are MOTION/FILTER/TUNING. The motions are those of profiles.py, measured at 100 Hz with white noise of 0.03 deg;
+MOTION all is their geometric mean. TUNING is own-tuning, for this motion, or one-tuning, for all motions. A tuning
+minimises the rms of the angle over records of other seeds. A ratio divides the rms error by that of kalman in the run
+of equal noise.
 """
 import math
 from collections.abc import Mapping, Sequence
@@ -26,7 +19,7 @@ from acu_tracker.estimation.params import FilterParameters
 from pedestal_common.quantities import Pairs, Row
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies import ensemble, profiles
 from pedestal_studies.p000_ma import window_filter
 from pedestal_studies.result import Result
@@ -49,7 +42,6 @@ FILTER_MEANINGS = {'least_squares': 'least squares', 'alpha_beta': 'the alpha-be
                    'alpha_beta_gamma': 'the alpha-beta-gamma filter', 'wiener': 'the Wiener filter',
                    'kalman': "the Kalman filter of the 'current' statistical model",
                    'imm': 'the untuned default filter of the product'}
-"""{filter: description}."""
 
 TUNED_FILTERS = tuple(name for name in FILTER_MEANINGS if name != 'imm')
 KALMAN_KINDS = {'kalman': 'current_statistical', 'alpha_beta': 'alpha_beta', 'alpha_beta_gamma': 'alpha_beta_gamma',
@@ -81,10 +73,8 @@ def errors(tuned: Tuned, motion: str, seed: int, first: int, count: int) -> Pair
 
 
 def tune(item: tuple[str, tuple[str, ...]]) -> Tuned:
-    """Return the tuned filter of an item (filter, motions), tuned on the records of filters.TUNING_SEED.
-
-    The criterion is the geometric mean over the motions of the rms error of the angle.
-    """
+    """Return the tuned filter of an item (filter, motions). Its geometric mean over the motions of the rms error of
+    the angle is smallest on the records of filters.TUNING_SEED."""
     name, motions = item
 
     def criterion(params: FilterParameters | Window) -> float:
@@ -104,10 +94,7 @@ def batch(item: tuple[tuple[str, Tuned], int, int]) -> Pairs:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
         motions: Sequence[str] = profiles.PROFILES) -> Result:
-    """Tune all filters and run them `runs` times.
-
-    motions: names of profiles.
-    """
+    """Tune all filters and run them `runs` times; motions: names of profiles."""
     pool = pool or monte_carlo.Pool(1)
     groups = dict.fromkeys((*((motion,) for motion in motions), tuple(motions)))
     items = [(name, of) for name in TUNED_FILTERS for of in groups]
@@ -157,14 +144,14 @@ def remarks(found: Mapping[tuple[str, tuple[str, ...]], Tuned], runs: int) -> li
 def ratio_figure(table: list[Row], motions: Sequence[str]) -> Figure:
     """Draw the error of every filter over that of kalman, a panel for each tuning; motions: names of profiles."""
     value = {(r['case'], r['metric']): r['value'] for r in table}
-    figure, axes = new_panels(1, 2, x='rms error of the angle over that of kalman', height=3.8, sharey=True)
+    figure, axes = fig.new_panels(1, 2, x='rms error of the angle over that of kalman', height=3.8, sharey=True)
     for panel, tuning in zip(axes[0], TUNINGS):
         ratios = {motion: {name: value.get((f'{motion}/{name}/{tuning}', 'angle_ratio_to_kalman'), math.nan)
                            for name in FILTER_MEANINGS if name != 'kalman'} for motion in (MEAN_MOTION, *motions)}
-        panel.barh(list(ratios[MEAN_MOTION]), list(ratios[MEAN_MOTION].values()), color=FILTERED_COLOUR)
+        panel.barh(list(ratios[MEAN_MOTION]), list(ratios[MEAN_MOTION].values()), color=fig.FILTERED_COLOUR)
         for motion in motions:
-            panel.plot(list(ratios[motion].values()), list(ratios[motion]), 'o', color=RAW_COLOUR, ms=3.0)
-        panel.axvline(1.0, color=INK_COLOUR, linewidth=0.8)
+            panel.plot(list(ratios[motion].values()), list(ratios[motion]), 'o', color=fig.RAW_COLOUR, ms=3.0)
+        panel.axvline(1.0, color=fig.INK_COLOUR, linewidth=0.8)
         panel.set_title(f'{tuning}; bar: all motions, dots: each motion')
     axes[0, 0].invert_yaxis()
     return figure

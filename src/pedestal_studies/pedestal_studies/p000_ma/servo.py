@@ -1,17 +1,9 @@
 """Paper 000's step and sine (figures 5, 6), then a better controller on the same plant.
 
 The plant is the azimuth axis with two motors, gears and load. The paper prints a sine of "0.4 rad/s", which is read in
-two ways: 0.4 Hz (r1) and 0.4 rad/s (r2).
-
-paper-r1, paper-r2   controller of the paper, with gains for one reading of the sine
-paper-all            controller of the paper, with gains for all numbers of figures 5 and 6; the sine is 0.4 Hz
-best                 controller with feed-forward
-best-inertia-plus    controller of best, with 20 % more load inertia
-best-inertia-minus   controller of best, with 20 % less load inertia
-best-full-torque     controller that uses the full torque, with no reserve for a heavier load
-adrc                 active disturbance rejection control (ADRC)
-
-`pedestal run servo_step|servo_sine --param ...` runs every case too (Variant.command).
+two ways: 0.4 Hz (paper-r1) and 0.4 rad/s (paper-r2). The case paper-all has the controller of the paper with gains for
+all numbers of figures 5 and 6. The case best has feed-forward. The case best-full-torque has no reserve for a heavier
+load. `pedestal run servo_step|servo_sine --param ...` runs every case too (Variant.command).
 """
 import functools
 import math
@@ -43,11 +35,9 @@ SINE_PERIODS = 4  # periods of each sine, of which the first belongs to the tran
 GUST_TORQUE_NM, GUST_START_S = 1000.0, 0.2  # step of wind torque on the azimuth [Nm] and its start [s]
 SETTLING_BAND = 0.02  # half-width of the band of the settling time, divided by the step
 
-PAPER_R1_PARAMETERS: dict[str, float] = {}
-"""No changes: the scenarios servo_step and servo_sine have the gains for the reading 0.4 Hz."""
+PAPER_R1_PARAMETERS: dict[str, float] = {}  # the scenarios have the gains for 0.4 Hz
 
 PAPER_R2_PARAMETERS = {'acu.azimuth.pid.bandwidth': 8.75, 'acu.azimuth.pid.derivative': 0.0}
-"""Gains for the reading 0.4 rad/s."""
 
 PAPER_ALL_PARAMETERS = {'acu.azimuth.pid.bandwidth': 54.0, 'acu.azimuth.pid.derivative': 0.45,
                         'adu.azimuth.speed_loop.proportional': 1.5, 'adu.azimuth.speed_loop.integral': 7.0}
@@ -59,16 +49,14 @@ the shortfall by tau w^2 / K. K, D: bandwidth [1/s] and derivative gain [-] of t
 rate; w: frequency of the sine [rad/s]; J: inertia; K_p: proportional gain of the speed loop.
 """
 
-DRIVE_PARAMETERS = {
+DRIVE_PARAMETERS = {  # speed loop and bias torque of the cases best and adrc
     'adu.azimuth.speed_loop.proportional': 8.0, 'adu.azimuth.speed_loop.integral': 50.0,
     'adu.azimuth.bias.schedule': 'hold_fade', 'adu.azimuth.bias.torque': 12.0, 'adu.azimuth.bias.hold': 14.0,
     'adu.azimuth.bias.out': 45.0}
-"""Speed loop and bias torque of the cases best and adrc."""
 
-SHAPER_PARAMETERS = {
+SHAPER_PARAMETERS = {  # a quarter of the torque remains for a load heavier than assumed
     'acu.azimuth.shaper.rate': 2.42, 'acu.azimuth.shaper.acceleration': 31.0, 'acu.azimuth.shaper.jerk': 8000.0,
     'acu.azimuth.shaper.h0': 0.006}
-"""Shaper whose acceleration leaves a quarter of the torque as a reserve for a load heavier than assumed."""
 
 BEST_PARAMETERS = {
     **DRIVE_PARAMETERS, **SHAPER_PARAMETERS, 'adu.azimuth.speed_loop.disturbance_observer': 400.0,
@@ -84,7 +72,6 @@ gust by 6 % and lets the load ring on the gear for 0.2 s.
 
 FULL_TORQUE_PARAMETERS = {**BEST_PARAMETERS, 'acu.azimuth.shaper.acceleration': 38.0,
                           'acu.azimuth.shaper.jerk': 4000.0, 'acu.azimuth.shaper.h0': 0.01}
-"""Controller with hardly any reserve of torque, and therefore with a gentler end of the move."""
 
 ADRC_PARAMETERS = {**DRIVE_PARAMETERS, **SHAPER_PARAMETERS, 'adu.azimuth.speed_loop.proportional': 6.0,
                    'adu.azimuth.speed_loop.integral': 200.0, 'acu.azimuth.controller': 'adrc'}
@@ -98,7 +85,7 @@ CASE_PARAMETERS: dict[str, dict[str, Json]] = {
     'best-full-torque': FULL_TORQUE_PARAMETERS, 'adrc': ADRC_PARAMETERS}
 """{case: parameters}; 252 and 168 kg m2 are 20 % more and less than the inertia of the load, 210 kg m2."""
 
-METRIC_TARGETS = {
+METRIC_TARGETS = {  # {case: {metric: target}}; target: 'value +- tolerance', 'low to high', or a limit
     **{name: {'step_overshoot_percent': '12 +- 1.5', 'step_settling_2percent_s': '0.20 +- 0.03',
               'step_crossings': '1 +- 0', 'sine_0p4hz_max_error_rad': '0.0397 +- 0.002',
               'sine_0p4hz_rms_error_rad': '0.0281 +- 0.001', 'sine_0p4hz_amplitude_rad': '0.868 to 0.8695',
@@ -113,10 +100,8 @@ METRIC_TARGETS = {
     'best-inertia-plus': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15'},
     'best-inertia-minus': {'step_overshoot_percent': '<= 0.5', 'step_settling_2percent_s': '<= 0.15'},
 }
-"""{case: {metric: target}}; target: 'value +- tolerance', 'low to high', or a limit."""
 PAPER_VALUES = {'step_overshoot_percent': 12.0, 'step_settling_2percent_s': 0.2, 'max_error_rad': 0.04,
                 'rms_error_rad': 0.0281, 'amplitude_rad': 0.869, 'peak_error_percent': 0.12, 'max_error_percent': 4.6}
-"""{metric without the prefix of the sine: number that the paper prints}."""
 SUFFIX_UNITS = {'percent': '%', 's': 's', 'rad': 'rad', 'crossings': ''}  # {last word of a metric: unit}
 
 
@@ -182,14 +167,13 @@ def gust_metrics(record: Run) -> dict[str, float]:
     return {'gust_1000nm_peak_rad': metrics.peak(y[t >= GUST_START_S] - y[t < GUST_START_S][-1])}
 
 
-CASE_RUNS = {
+CASE_RUNS = {  # {case: kinds of its runs}: step, sine of one reading, gust
     'paper-r1': ('step', '0p4hz', '0p4rads', 'gust'), 'paper-r2': ('step', '0p4rads'),
     'paper-all': ('step', '0p4hz'),
     'best': ('step', '0p4rads', '0p4hz', 'gust'), 'best-inertia-plus': ('step',),
     'best-inertia-minus': ('step',), 'best-full-torque': ('step',),
     'adrc': ('step', '0p4rads', '0p4hz', 'gust'),
 }
-"""{case: kinds of its runs}: step, sine of one reading, gust."""
 
 
 def records(cases: Iterable[str], progress: Progress) -> Runs:
@@ -206,7 +190,6 @@ def records(cases: Iterable[str], progress: Progress) -> Runs:
 RUN_METRICS: dict[str, Callable[[Run], dict[str, float]]] = {
     'step': step_metrics, 'gust': gust_metrics,
     **{reading: functools.partial(sine_metrics, reading=reading) for reading in SINE_FREQUENCIES_RAD_S}}
-"""{kind of run: function that returns {metric: value} of its run}."""
 
 
 def rows(done: Runs) -> list[Row]:
@@ -218,10 +201,10 @@ def rows(done: Runs) -> list[Row]:
 
 
 def bang_bang(step: Radians, adu: AduParameters) -> tuple[Seconds, Seconds]:
-    """Return (time of the whole move, time to its 2 % band) of the fastest rest-to-rest move of the azimuth axis.
+    """Return (time of the whole move, time to its 2 % band) of the fastest rest-to-rest move of the azimuth.
 
-    step: size of the move. The motors have full torque forwards, then backwards. Coulomb
-    friction opposes the acceleration and supports the deceleration.
+    The motors have full torque forwards, then backwards. Coulomb friction opposes the acceleration and supports the
+    deceleration.
     """
     p = adu.azimuth
     N = p.gear_train.ratio

@@ -1,15 +1,13 @@
 """Filters with a fixed window of measurements: least squares, and the Wiener filter of finite memory.
 
-The estimate is a weighted sum of the last n measurements of an angle. The weights give the best linear unbiased
-estimate of angle and rate at the newest measurement, if the motion is a polynomial of the time plus a random
-displacement:
+The estimate is a weighted sum of the last n measurements. The weights give the best linear unbiased estimate of angle
+and rate at the newest measurement. The motion is a polynomial of the time plus a random displacement d:
 
     y_i = angle - rate tau_i + (1/2) acceleration tau_i^2 + d_i + noise_i,      tau_i = i T, i = 0 ... n - 1
 
 Least squares has no displacement d. In the Wiener filter (Zadeh and Ragazzini, Journal of Applied Physics 21 (1950)
 645) d is the displacement by a stationary random acceleration with the standard deviation sigma and the
-autocorrelation exp(-alpha |tau|). Its polynomial has the degree 1, without the acceleration. The weights never change,
-so both filters are linear and time-invariant.
+autocorrelation exp(-alpha |tau|). Its polynomial has the degree 1, without the acceleration.
 """
 import functools
 
@@ -44,20 +42,16 @@ def displacement(n: int, alpha: float) -> Floats:
 
 @functools.lru_cache(maxsize=8)
 def wiener(n: int, alpha: float, sigma: RadiansPerSecond2, noise: Radians) -> Floats:
-    """Return the weights (2, n) of angle and rate [1/s], newest first, of the Wiener filter over n measurements.
-
-    alpha [1/s], sigma: of the acceleration. noise: standard deviation of a measurement.
-    """
+    """Return the weights (2, n) of angle and rate [1/s], newest first, of the Wiener filter over n measurements; alpha
+    [1/s], sigma: of the acceleration."""
     B = polynomial(n, degree=1)
     scaled = solve(sigma**2 * displacement(n, alpha) + noise**2 * np.eye(n), B, assume_a='pos')
     return np.linalg.solve(B.T @ scaled, scaled.T)
 
 
 def estimates(weights: Floats, y: Floats) -> Floats:
-    """Return angle and rate (2, runs, m) of filtered measurements y (runs, m), with weights (2, n).
-
-    The first n - 1 estimates lack measurements and are NaN.
-    """
+    """Return angle and rate (2, runs, m) of filtered measurements y (runs, m), with weights (2, n). The first n - 1
+    estimates lack measurements and are NaN."""
     n = weights.shape[1]
     out = np.full((2, *y.shape), np.nan)
     for i, line in enumerate(weights):

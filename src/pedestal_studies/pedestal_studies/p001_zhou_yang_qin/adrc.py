@@ -2,22 +2,18 @@
 
 The ADRC consists of tracking differentiator, extended state observer and nonlinear combination (ship_motion_sim
 alignment, with a correction of equation (11) of the paper). The observer of the paper is linear too, because its delta
-= 20000 keeps the nonlinear function fal in its linear zone. After levelling, the commands only cancel the tilt that
-the rotation of the earth causes. For an INS at rest, equations (14) and (15) of the paper then give equation (19):
+= 20000 keeps the nonlinear function fal in its linear zone. After levelling, the commands w_cE, w_cN only cancel the
+tilt that the rotation of the earth causes. For an INS at rest, equations (14) and (15) of the paper then give (19):
 
-    sin az = w_cE / w_N,    cos az = 1 + w_cN / w_N
+    sin az = w_cE / w_N,    cos az = 1 + w_cN / w_N          az: rotation of n' about up against ENU
+                                                             w_N: north part of the rate of the earth
 
-    n'              frame that the INS computes for east, north, up (ENU)
-    az              azimuth misalignment: rotation of n' about up, against ENU          [rad]
-    w_cE, w_cN      commanded rates of n' about east and north                          [rad/s]
-    w_N, g          north part of the rate of the earth, gravity                        [rad/s, m/s2]
-    w_o             bandwidth of the observer                                           [rad/s]
+adrc: the noise of the commands is a derivative of the noise of the velocity. A plain mean of the commands therefore
+keeps the noise at the two ends of the window. The least-squares slope of their integral since `start` gives these ends
+the smallest weight, and so suppresses the noise.
 
-adrc            The noise of the commands is a derivative of the noise of the velocity. A plain mean of the commands
-                therefore keeps the noise at the two ends of the window. The least-squares slope of their integral
-                since `start` gives these ends the smallest weight, and so suppresses the noise.
-adrc_scheduled  The bandwidth 6 / t, with the time t since power-up, makes the observer fast at first and its noise
-                small later. The azimuth is that of the estimate z3.
+adrc_scheduled: the observer's bandwidth 6 / t, with the time t since power-up, makes the observer fast at first and
+its noise small later. The azimuth is that of the estimate z3.
 """
 import cmath
 import dataclasses
@@ -34,8 +30,7 @@ from pedestal_studies.p001_zhou_yang_qin.classical import steady_covariance
 from ship_motion_sim import alignment
 
 BANDWIDTH_TIME_PRODUCT = 6.0  # product of observer bandwidth and time of adrc_scheduled, w_o t [-]
-MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1
-"""Limits of the bandwidth of observer and of level control of adrc_scheduled [rad/s]."""
+MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1  # of adrc_scheduled [rad/s]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -166,11 +161,10 @@ def azimuth_sigma(constants: Constants, conditions: alignment.Conditions, observ
 @compiled
 def level_sigma(constants: Constants, conditions: alignment.Conditions, observer: alignment.Observer,
                 t: Seconds) -> Radians:
-    """Return the 1 sigma of level at the time t after power-up.
+    """Return the 1 sigma of level at the time t after power-up, the root sum square of two parts.
 
-    The result is the root sum square of two parts. The first part is the observed tilt or the 1 sigma of the settled
-    loop, whichever is larger. Innovations above the expected ones increase that 1 sigma. The second part is the share
-    of the initial tilt that the observer, with all poles at w_o, has not observed yet.
+    The first part is the larger of the observed tilt and the 1 sigma of the settled loop, which innovations above the
+    expected ones increase. The second part is the share of the initial tilt that the observer has not observed yet.
     """
     x = constants.w_o * t
     unobserved = alignment.INITIAL_LEVEL_SIGMA_RAD * (1.0 + x + 0.5 * x * x) * math.exp(-x)

@@ -5,10 +5,7 @@
 
     v, f            velocity error (v_E, v_N) [m/s] and specific force [m/s2], both level, in n'
     w_cE .. w_cU    commanded rates of n' about east, north and up [rad/s]
-    s, s0           Laplace variable, bandwidth [rad/s]
-    n', az          frame that the INS computes for east, north, up; its azimuth misalignment [rad]
-    w_N, g          north part of the rate of the earth [rad/s], gravity [m/s2]
-    K1, k2, K3, K4  gains of the loop; a_x: tilt of n' about east [rad]
+    s, s0           Laplace variable, bandwidth [rad/s]; w_N: north part of the rate of the earth [rad/s]
 
 All four poles are at -s0 +- j s0. An azimuth error of 180 deg is an unstable equilibrium. Because the loop is closed
 from power-up, the transient of the first levelling leaves this equilibrium. The velocities are those of a gyrocompass,
@@ -34,8 +31,7 @@ from pedestal_common.record import Record
 from pedestal_common.reproducible import solution
 from ship_motion_sim import alignment
 
-MAX_AZIMUTH_RATE_RAD_S = 0.1
-"""Limit of the azimuth command [rad/s]; without it the first levelling would reach 0.2 rad/s."""
+MAX_AZIMUTH_RATE_RAD_S = 0.1  # without this limit the first levelling would reach 0.2 rad/s
 
 
 class Constants(Record):
@@ -65,9 +61,9 @@ class State(Record):
 def steady_covariance(A: Floats, Q: Floats) -> Floats:
     """Return the P (n, n) that solves P = A P A^T + Q, of a stable loop x(k+1) = A x(k) + noise of covariance Q.
 
-    The equation is linear in the elements of P, stacked to a vector: (1 - kron(A, A)) P = Q. The covariance becomes a
-    constant of a law. `reproducible.solution` therefore takes the place of numpy.linalg.solve, whose last bits differ
-    between processors.
+    The elements of P, stacked to a vector, are the solution of (1 - kron(A, A)) P = Q. Because the covariance becomes
+    a constant of a law, `reproducible.solution` takes the place of numpy.linalg.solve, whose last bits differ between
+    processors.
     """
     n = len(A)
     return np.reshape(solution(np.eye(n * n) - np.kron(A, A), Q.ravel()), (n, n))

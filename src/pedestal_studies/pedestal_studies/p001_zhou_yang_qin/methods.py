@@ -1,9 +1,8 @@
 """A strapdown INS at rest that aligns by one of the five methods which the study of paper 001 compares.
 
-The strapdown integration runs at the rate of the IMU, the method every `step` seconds. The commands of the method
-rotate n', the frame that the INS computes for ENU. The method oba commands no rotation. Its strapdown integrates in
-inertial space: earth rate, command and gravity are zero. riccati_eso is the method of the product (ship_motion_sim
-alignment); the others exist for this comparison only.
+The commands of the method rotate n', the frame that the INS computes for ENU. The method oba commands no rotation. Its
+strapdown integrates in inertial space: earth rate, command and gravity are zero. riccati_eso is the method of the
+product (ship_motion_sim alignment).
 """
 import dataclasses
 import math

@@ -5,14 +5,11 @@ The attitude follows from sums of vectors, without a feedback loop. An observer 
     a = int C_b^b0 f dt        integral of the measured specific force f, turned by the gyros only [m/s]
     b = -int C_n^n0 g dt       integral of the reaction to gravity g, turned by the rotation of the earth [m/s]
 
-    C_x^y     rotation from a frame x to a frame y; x and y are one of these frames:
-    b0, n0    frames of the deck and of ENU at power-up, fixed in inertial space
-    b, n      frames of the deck and of ENU now; as an index of C, b is this frame, otherwise the vector above
-
-Except for the velocity of the ship, a is C_n0^b0 b. The rotation b0 -> n0 that brings the vectors a onto b with least
-squares is an eigenvector of a 4 x 4 matrix (Horn 1987). The mean of all a and the mean of all b are subtracted, which
-removes the unknown velocity of the ship at power-up. If this velocity is assumed to be zero, as is usual, the error
-of the alignment at 100 s is 15 times larger. The velocity of the swell after power-up averages out.
+C_x^y: rotation x to y; b0, n0: deck and ENU at power-up, fixed in inertial space; index b, n: deck and ENU now. Except
+for the velocity of the ship, a is C_n0^b0 b. The rotation b0 -> n0 that brings the vectors a onto b with least squares
+is an eigenvector of a 4 x 4 matrix (Horn 1987). The mean of all a and the mean of all b are subtracted, which removes
+the unknown velocity of the ship at power-up. If this velocity is assumed to be zero, as is usual, the error of the
+alignment at 100 s is 15 times larger. The velocity of the swell after power-up averages out.
 """
 import math
 from typing import Annotated
@@ -27,11 +24,7 @@ MAX_JACOBI_SWEEPS = 12  # largest number of sweeps of Jacobi rotations; 4 to 6 a
 
 
 class State(Record):
-    """State of the method.
-
-    The observer does not change the attitude. Its covariance is the information limit: the least that any linear
-    method can reach with these measurements (ship_motion_sim alignment).
-    """
+    """State of the method. The observer gives 1 sigmas and does not change the attitude."""
     t: Seconds                          # since power-up
     observer: alignment.Observer        # gives the 1 sigmas from the x, y parts of a
     count: float                        # number of pairs (a, b)
@@ -47,10 +40,7 @@ class State(Record):
 @compiled
 def gravity_integral(t: Seconds,
                      conditions: alignment.Conditions) -> tuple[MetersPerSecond, MetersPerSecond, MetersPerSecond]:
-    """Return b in n0 after t, in closed form.
-
-    b is the integral of the reaction to gravity, which turns with the earth.
-    """
+    """Return b in n0 after t, in closed form: the integral of the reaction to gravity, which turns with the earth."""
     north, up = conditions.earth_rate[1], conditions.earth_rate[2]
     w = math.sqrt(north * north + up * up)
     n, u = north / w, up / w

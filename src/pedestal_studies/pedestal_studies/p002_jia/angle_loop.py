@@ -1,12 +1,8 @@
 """The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop, and a loop with a target filter.
 
-The study phased-array runs both loops. Each loop is one compiled function of the laws that the nodes run: the
-smoothing and the pattern of the receiver, the loop of the beam or a target filter, and the electronic beam.
-
-Symbols of paper 002: R, v: angle [rad] and rate [rad/s] that the loop predicts for the target; T: time between two
-updates [s]; alpha, beta: gains from the error to R and to v T [-]. beta follows from alpha (Benedict and Bordner).
-
-The grid, with h = GRID_STEP_S:
+Each loop is one compiled function of the laws that the nodes run. Symbols of paper 002: R, v: angle [rad] and rate
+[rad/s] that the loop predicts; T: time between two updates [s]; alpha, beta: gains from the error to R and to v T [-].
+beta follows from alpha (Benedict and Bordner). The grid, with h = GRID_STEP_S:
 
     stamp    (i-1) h                 i h                 (i+1) h
                 |------ sample i ------|---- sample i+1 ----|
@@ -44,7 +40,6 @@ S2: the moving average. The paper calls eq. (1) a moving average, so S1 and S2 a
 SMOOTHING_SAMPLES = 20  # number n of samples in the smoothing S1 and S2, as in the paper's example
 
 FULL_SCALE_BEAMWIDTHS, K_M = ReceiverParameters().full_scale, AntennaParameters().slope
-"""Full scale of the receiver [beamwidths], and slope of the difference pattern of its antenna [1/beamwidth]."""
 
 
 class Smoothers(Record):
@@ -110,7 +105,7 @@ class PaperLoop:
     def run(self, target: Floats, rate: Floats | None = None, noise: Floats | None = None) -> tuple[Floats, Floats]:
         """Return (beam, smoothed error in the loop) [rad] of a target [rad].
 
-        rate: rate of the target due to the carrier [rad/s]. noise: noise of the samples [rad]. None for zeros.
+        rate: of the target due to the carrier [rad/s]. noise: of the samples [rad]. None for zeros.
         """
         zeros, beam, errors = np.zeros(len(target)), np.zeros(len(target)), np.zeros(len(target))
         constants = PaperLoopConstants(controllers.LOOP_FORMS.index(self.form), self.alpha, self.period, self.delta,
@@ -124,11 +119,8 @@ class PaperLoop:
 
 @dataclasses.dataclass(frozen=True)
 class FilterLoop:
-    """Loop with a target filter.
-
-    The input of the filter is the angle of the target: beam in force + error of the receiver. The command is the
-    prediction of the filter for the middle of the interval in which the command will be in force.
-    """
+    """Loop with a target filter, whose input is the beam in force + error of the receiver. The command is its
+    prediction for the middle of the interval in which the command will be in force."""
     jerk: float         # noise of the constant-acceleration filter [rad/s3/sqrt(Hz)]
     sigma: Radians      # noise of one sample
     period: int = 10    # number of samples that are averaged to one measurement
@@ -143,8 +135,8 @@ class FilterLoop:
             rate: Floats | None = None) -> tuple[Floats, Floats]:
         """Return (beam, innovation of the filter) [rad] of a target [rad].
 
-        noise: noise of the samples [rad]. attitude, rate [rad, rad/s]: rotation of the target by the carrier, as the
-        INS measures it; needed with use_ins.
+        noise: of the samples [rad]. attitude, rate: rotation by the carrier as the INS measures it, needed with
+        use_ins.
         """
         n = len(target)
         zeros, beam, errors = np.zeros(n), np.zeros(n), np.zeros(n)
@@ -165,7 +157,6 @@ class FilterLoop:
 
 
 def _beam(delay: int, hold: int) -> Beam:
-    """Return a beam at rest at 0; delay, hold: in samples of the grid."""
     return Beam(electronic_beam.initial_state(0.0, 0.0),
                 electronic_beam.constants(GRID_STEP_S, transport_delay=delay * GRID_STEP_S,
                                           timeout=2 * hold * GRID_STEP_S),
@@ -175,11 +166,8 @@ def _beam(delay: int, hold: int) -> Beam:
 
 @compiled
 def receiver_reading(offset: Radians, receiver: Receiver) -> Radians:
-    """Return the error that a receiver measures for an offset of the target from the beam.
-
-    With the beamwidth 0 the error is linear. With any other beamwidth the error follows the monopulse pattern within
-    full scale, and it is NaN if the signal is lost.
-    """
+    """Return the error that a receiver measures for an offset of the target, NaN if the signal is lost. With the
+    beamwidth 0 the error is linear, else it follows the monopulse pattern within full scale."""
     slope, beamwidth, lost_power_ratio = receiver
     if beamwidth == 0.0:
         return slope * offset
@@ -192,10 +180,7 @@ def receiver_reading(offset: Radians, receiver: Receiver) -> Radians:
 
 @compiled
 def command(inputs: electronic_beam.Inputs, stamp: int, due: bool, beam: Radians) -> None:
-    """Put a command into the inputs of the electronic beam.
-
-    stamp: its sample on the grid. due: True for a new command. beam: commanded angle.
-    """
+    """Put a command with a stamp, in samples of the grid, into the inputs of the beam; due: True for a new one."""
     inputs.stamp_ns = inputs.command_stamp_ns = stamp * GRID_STEP_NS
     inputs.due = 1 if due else 0
     inputs.position[0] = beam
@@ -204,7 +189,6 @@ def command(inputs: electronic_beam.Inputs, stamp: int, due: bool, beam: Radians
 @compiled
 def _paper_loop(constants: PaperLoopConstants, receiver: Receiver, target: Target, smoothers: Records, plant: Beam,
                 beam: Floats, errors: Floats) -> None:
-    """Run paper 002's loop over a target into beam and errors [rad]."""
     form, alpha, period, delta, kind = constants
     s, beta, T = smoothers[0].error, kalman.benedict_bordner(alpha), period * GRID_STEP_S
     R = v = error = 0.0
@@ -225,7 +209,6 @@ def _paper_loop(constants: PaperLoopConstants, receiver: Receiver, target: Targe
 @compiled
 def _filter_loop(constants: FilterLoopConstants, target: Target, smoothers: Records, filters: Records, plant: Beam,
                  beam: Floats, errors: Floats) -> None:
-    """Run the loop with a target filter over a target into beam and innovations [rad]."""
     s, f, c = smoothers[0].error, filters[0], constants.filter[0]
     period, hold, rate = constants.period, constants.hold, target.rate
     # beam_command [rad]: newest command; last_sample: last sample of the newest measurement.
@@ -261,10 +244,8 @@ def _filter_loop(constants: FilterLoopConstants, target: Target, smoothers: Reco
 
 
 def is_stable(loop: PaperLoop, size: Radians = 1e-9, seconds: Seconds = 20.0) -> bool:
-    """Return True if the error of a loop falls for `seconds` after a step of `size`.
-
-    The largest errors in the second and in the last third of this time are compared.
-    """
+    """Return True if the error of a loop falls after a step of `size`. Its largest values in the second and in the
+    last third of the time are compared."""
     n = round(seconds / GRID_STEP_S)
     error = np.abs(size - loop.run(np.full(n, size))[0])
     middle, last = error[n // 3:2 * n // 3].max(), error[2 * n // 3:].max()

@@ -1,7 +1,4 @@
-"""Figures of the study phased-array: the figures of paper 002 for each smoothing, and figures of loops with a filter.
-
-S0, S1 and S2 are the kinds of smoothing in the receiver, see SMOOTHING_TITLES.
-"""
+"""Figures of the study phased-array: those of paper 002 for each smoothing, and figures of loops with a filter."""
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
@@ -28,10 +25,7 @@ def side_by_side(rows: int, **options: Any) -> tuple[Figure, fig.Panels]:    # o
 
 
 def steps(done: Mapping[PaperLoop, Floats], label: Callable[[PaperLoop], str], title: str, seconds: Seconds) -> Figure:
-    """Draw step responses {PaperLoop: beam over step} with a column for each smoothing.
-
-    label: function that returns the name of a loop in the legend. seconds: end of the time axis.
-    """
+    """Draw step responses {PaperLoop: beam over step} with a column for each smoothing; label: name of a loop."""
     figure, axes = side_by_side(1, y='beam over step')
     for panel, S in zip(axes[0], SMOOTHING_TITLES):
         loops = [loop for loop in done if loop.smoothing == S]
@@ -46,10 +40,7 @@ def steps(done: Mapping[PaperLoop, Floats], label: Callable[[PaperLoop], str], t
 
 
 def lags(done: Mapping[str, Readings], title: str, seconds: tuple[Seconds, Seconds]) -> Figure:
-    """Draw errors {label: readings [rad]}, measured errors above true errors.
-
-    seconds: (begin, end) of the drawn time, here and below.
-    """
+    """Draw errors {label: readings [rad]}, measured above true ones; seconds: (begin, end) of the drawn time."""
     figure, axes = side_by_side(2, y=('measured error [deg]', 'true error [deg]'))
     for (label, by_smoothing), colour in zip(done.items(), LINE_COLOURS):
         for column, S in zip(axes.T, SMOOTHING_TITLES):

@@ -1,17 +1,13 @@
 """Paper 002's angle loop of a phased array: figures 3 to 7 and 9, limits of stability and of lock, a better loop.
 
-The array steers its beam electronically. The loop moves the beam after the target by the error that the receiver
-measures. alpha is the gain of the loop from the error to the angle [-], T the time between two updates. Cases run the
-loops of angle_loop.py; cases graph/... run the scenario phased_array_sway in the closed loop.
-
-S0, S1 and S2 are the kinds of smoothing in the receiver: none, the paper's recursion, and a moving average, with n =
-20 samples at 1 kHz. A case without S0, S1 or S2 in its name has S1.
+Cases run the loops of angle_loop.py; cases graph/... run the scenario phased_array_sway in the closed loop. Symbols
+are alpha, the gain [-] from the error to the angle, and T, the time between two updates. S0, S1 and S2 are the kinds
+of smoothing in the receiver (SMOOTHING_CODES), with 20 samples at 1 kHz. A case without one of them in its name has
+S1.
 
 lag_deg          largest error that the receiver measures, as in the paper's figures
 true_lag_deg     largest true error of the beam
-max_error_deg    largest true error without noise
 jitter_rms_deg   rms of the motion of the beam due to the noise, 0.05 deg in each millisecond
-crossings        crossings of the target by the response to a step
 """
 import dataclasses
 import functools
@@ -24,15 +20,10 @@ import numpy as np
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import (
-    Decibels,
     Degrees,
     Floats,
     Json,
     Pairs,
-    Radians,
-    RadiansPerSecond,
-    Seconds,
-    Times,
 )
 from pedestal_results.intervals import row
 from pedestal_results.tracking import interval_start_error, rms
@@ -42,13 +33,31 @@ from pedestal_studies.p002_jia.angle_loop import (
     GRID_STEP_S,
     SMOOTHING_CODES,
     SMOOTHING_SAMPLES,
-    FilterLoop,
     PaperLoop,
     delay_limit,
     spectral_radius,
 )
+from pedestal_studies.p002_jia.compared_loops import (
+    COMPARED_CASES,
+    LOOP_DELAY_MS,
+    RECORD_DURATION_S,
+    SINE_ACCELERATION_DEG_S2,
+    SINE_RATE_DEG_S,
+    beam,
+    compared_errors,
+    compared_targets,
+    instants,
+    isolation,
+    max_error_at_ends,
+    noises,
+    ramp_target,
+    settled,
+    sine_target,
+    sway_target,
+    target_of,
+)
 from pedestal_studies.p002_jia.figures import Readings
-from pedestal_studies.result import Drawings, Result
+from pedestal_studies.result import FIRST_SEED, Drawings, Result
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 from receiver_law import detector
@@ -56,65 +65,22 @@ from tracking_receiver_sim.params import ReceiverParameters
 
 Line: TypeAlias = tuple[str, str, float | list[Degrees], str]   # case, metric, value or the values of all runs, unit
 
-DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case with noise; seed of the first run
+DEFAULT_RUNS = 40  # runs of each case with noise
 
 STEP_SIZE_RAD = math.radians(1.0)
 ALPHA_GAINS, LOOP_PERIODS_MS, LOOP_DELAYS_MS = (0.05, 0.1, 0.2, 0.3), (10, 5), (0, 20, 50, 80)
-"""Gains alpha [-], periods and delays of the loop [ms] in figures 3 to 5 and in the limits of stability."""
 SLOPE_RATIOS = 0.5, 0.7, 1.0, 1.5, 2.0  # true slope over assumed slope of the receiver [-]
-STEEP_SLOPE_RATIO = 2.0
-"""Slope ratio of the cases that show the lag behind the ramp and the sine with a steeper slope [-]."""
+STEEP_SLOPE_RATIO = 2.0  # slope ratio of the cases with a steeper slope [-]
 RAMP_RATES_DEG_S = (10, 20, 30, 40)  # rates of figure 6 [deg/s]
-SINE_RATE_DEG_S, SINE_ACCELERATION_DEG_S2 = 30.0, 10.0  # largest rate [deg/s] and acceleration [deg/s2] of figure 7
 
-SWAY_AMPLITUDE_RAD, SWAY_PERIOD_S = math.radians(10.0), 8.0
-"""Amplitude [rad] and period [s] of the ship's sway in figure 9."""
 
 RATE_COMPENSATIONS = (0.0, 0.85, 1.0)  # shares delta of the ship's rate that the loop compensates [-]
-LOOP_DELAY_MS = 20  # delay of figure 7 and of all loops of COMPARED_LOOPS [ms]
 
-RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S = map(math.radians, (0.05, 0.005, 0.01))
-"""1-sigma noise of one sample of 1 ms: error of the receiver [rad], attitude [rad] and rate [rad/s] of the INS."""
-
-INS_STAMP_ERROR_MS = 5  # error of the INS's stamps [ms]
-
-RECORD_DURATION_S, EVALUATION_START_S = 60.0, 30.0
-"""Duration of a record of a moving target, and start of its evaluation [s]."""
 
 BEAMWIDTH_RAD = math.radians(1.0)  # beamwidth of the array in the cases loss/... [rad].
 
 
-def jerk(q: float) -> float:
-    """Return the process noise of the filter [rad/s3/sqrt(Hz)]; q: spectral density of the jerk [deg2/s5]."""
-    return math.radians(math.sqrt(q))
-
-
-COMPARED_LOOPS: dict[str, PaperLoop | FilterLoop] = {
-    # The loop of the paper, with and without compensation of 0.85 of the ship's rate.
-    'paper': PaperLoop(delay=LOOP_DELAY_MS), 'paper-delta': PaperLoop(delay=LOOP_DELAY_MS, delta=0.85),
-    # The loop of the paper in a form that points the beam at R(k+1/k), the angle predicted for the next update.
-    'type-2': PaperLoop(delay=LOOP_DELAY_MS, form='type_2'),
-    'type-2-delta': PaperLoop(delay=LOOP_DELAY_MS, form='type_2', delta=0.85),
-    # Loops with filters that expect more or less jerk of the target; tracked-10ms commands the beam every 10 ms, the
-    # others every 1 ms.
-    'tracked-10ms': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD, hold=10),
-    'best': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD),
-    'fast': FilterLoop(jerk(1.0), RECEIVER_NOISE_RAD), 'faster': FilterLoop(jerk(10.0), RECEIVER_NOISE_RAD),
-    # `best` with a delay of 150 ms, and `best` which assumes a delay that is 10 ms too short.
-    'best-delay-150ms': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, delay=150),
-    'best-told-10ms-less': FilterLoop(jerk(0.1), RECEIVER_NOISE_RAD, assumed_delay=LOOP_DELAY_MS - 10)}
-"""{name: loop} of the loops that are compared: the paper's loop, its type-2 form, and loops with a filter of constant
-acceleration (FilterLoop). All loops have the same receiver and the same beam."""
-
-INS_LOOPS = {
-    'best/sway-ins': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True, stamp_error=INS_STAMP_ERROR_MS),
-    'best/sway-ins/exact-stamps': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True),
-    'best/sway-ins/rate-only': FilterLoop(jerk(1e-3), RECEIVER_NOISE_RAD, use_ins=True, tau=0.0)}
-"""{case: loop} of loops with a filter in the earth frame. The attitude from the INS rotates the measured angle to this
-frame. The stamps of the INS are 5 ms wrong, or exact, or exact while the acceleration from the INS is not used
-(rate-only). Because the target stands still in the earth frame, the filter expects little jerk."""
-
-METRIC_TARGETS = {
+METRIC_TARGETS = {  # {(case, metric): target}
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): '19.7 +- 0.5',
     ('step/alpha=0.1/T=10ms/S1', 'overshoot_percent'): '24.4 +- 0.5',
     ('step/alpha=0.1/T=5ms/S1', 'overshoot_percent'): '34.1 +- 1',
@@ -126,15 +92,13 @@ METRIC_TARGETS = {
     ('best/ramp', 'max_error_deg'): '<= 0.01', ('best/sine', 'max_error_deg'): '<= 0.025',
     ('best/sine', 'jitter_rms_deg'): '<= 0.006', ('best/sway', 'isolation_db'): '>= 48',
     ('best/sway-ins', 'isolation_db'): '>= 60', ('best/sway-ins/exact-stamps', 'isolation_db'): '>= 90'}
-"""{(case, metric): target}."""
 
-PAPER_VALUES = {
+PAPER_VALUES = {  # {(case, metric): number that the paper prints}
     ('step/alpha=0.1/T=10ms/S0', 'overshoot_percent'): 20.0, ('step/alpha=0.1/T=10ms/S1', 'overshoot_percent'): 20.0,
     ('step/alpha=0.1/T=10ms/S2', 'overshoot_percent'): 20.0,
     ('ramp/30deg_s/T=10ms', 'lag_deg'): 0.3, ('ramp/30deg_s/T=5ms', 'lag_deg'): 0.15, ('sine', 'lag_deg'): 0.3}
-"""{(case, metric): number that the paper prints}."""
 
-STUDY_REMARKS = [
+STUDY_REMARKS = [  # sentences that explain the rows
     'sine: the paper prints 0.30 deg, which is v T alone (v: largest rate, T: time between two updates). The measured '
     'error is sqrt((v T)^2 + (a T^2 / beta)^2), because the acceleration needs an innovation too (a: largest '
     'acceleration, beta: gain of the loop on the rate). The two shares are 0.30 and 0.19 deg, a quarter of a period '
@@ -152,43 +116,6 @@ STUDY_REMARKS = [
     'millisecond causes no error, by construction. ends_max_error_deg and ends_isolation_db are read at both ends of '
     'each millisecond. There the error is larger by up to rate x 0.5 ms, 0.015 deg at 30 deg/s, and the isolation '
     'from the sway is never above 68 dB.']
-"""Sentences that explain the rows."""
-
-
-def instants(seconds: Seconds) -> Times:
-    """Return the middles of the milliseconds of a record."""
-    return (np.arange(round(seconds / GRID_STEP_S), dtype=float) - 0.5) * GRID_STEP_S
-
-
-def sine(t: Times, amplitude: Radians, w: RadiansPerSecond) -> tuple[Floats, Floats]:
-    """Return angle [rad] and rate [rad/s] of a sine at times t."""
-    return amplitude * np.sin(w * t), amplitude * w * np.cos(w * t)
-
-
-def ramp_target(rate: float) -> Floats:
-    """Return the angle [rad] of figure 6's ramp; rate [deg/s]."""
-    return math.radians(rate) * instants(RECORD_DURATION_S)
-
-
-def sine_target(rate: float = SINE_RATE_DEG_S) -> Floats:
-    """Return the angle [rad] of a sine of the frequency of figure 7; rate: its largest rate [deg/s]."""
-    w = SINE_ACCELERATION_DEG_S2 / SINE_RATE_DEG_S
-    return sine(instants(RECORD_DURATION_S), math.radians(rate) / w, w)[0]
-
-
-def sway_target() -> tuple[Floats, Floats]:
-    """Return angle [rad] and rate [rad/s] of a fixed target, seen from the swaying deck."""
-    return sine(instants(RECORD_DURATION_S), SWAY_AMPLITUDE_RAD, 2.0 * math.pi / SWAY_PERIOD_S)
-
-
-def settled(x: Floats) -> Floats:
-    """Return the evaluated part of a record."""
-    return x[round(EVALUATION_START_S / GRID_STEP_S):]
-
-
-def isolation(error: Radians) -> Decibels:
-    """Return the isolation: amplitude of the ship's sway over a remaining error."""
-    return -20.0 * math.log10(error / SWAY_AMPLITUDE_RAD)
 
 
 def name(loop: PaperLoop) -> str:
@@ -224,10 +151,7 @@ def step_rows(done: Mapping[PaperLoop, Floats]) -> list[Line]:
 
 
 def eigenvalue_limit(loop: PaperLoop, near: int) -> int:
-    """Return the largest delay [ms] at which all eigenvalues of a loop are inside the unit circle.
-
-    near: delay at which the search starts [ms].
-    """
+    """Return the largest delay [ms] with all eigenvalues inside the unit circle, searched from `near` [ms]."""
     def inside(delay: int) -> bool:
         return spectral_radius(dataclasses.replace(loop, delay=delay)) < 1.0
 
@@ -261,10 +185,7 @@ def limit_rows(delays: Mapping[PaperLoop, tuple[int, int]]) -> list[Line]:
 
 def lag_rows(case: str, loop: PaperLoop, target: Floats,
              rate: Floats | None = None) -> list[tuple[str, str, float, str]]:
-    """Return the rows of lag_deg of a loop, and of true_lag_deg with each smoothing.
-
-    target, rate: as of PaperLoop.run.
-    """
+    """Return the rows of lag_deg of a loop, and of true_lag_deg with each smoothing; arguments as of PaperLoop.run."""
     rows = [(case, 'lag_deg', math.degrees(peak(settled(loop.run(target, rate)[1]))), 'deg')]
     for S in SMOOTHING_CODES:
         beam, _ = dataclasses.replace(loop, smoothing=S).run(target, rate)
@@ -291,53 +212,12 @@ def moving_rows() -> list[Line]:
     return rows
 
 
-def noises(run: int) -> list[Floats]:
-    """Return the noise of receiver [rad], INS attitude [rad] and INS rate [rad/s] of one run."""
-    rng = np.random.default_rng(FIRST_SEED + run)
-    return [sigma * rng.standard_normal(round(RECORD_DURATION_S / GRID_STEP_S))
-            for sigma in (RECEIVER_NOISE_RAD, INS_ANGLE_NOISE_RAD, INS_RATE_NOISE_RAD_S)]
-
-
-def compared_targets() -> dict[str, Floats]:
-    """Return {name: angle [rad]} of the targets of COMPARED_LOOPS."""
-    return {'ramp': ramp_target(30.0), 'sine': sine_target(), 'sway': sway_target()[0]}
-
-
-def max_error_at_ends(error: Floats, target: Floats) -> Radians:
-    """Return the largest error at the ends of the milliseconds, from the error [rad] in their middles.
-
-    At the ends the target [rad] is half-way between its neighbours, and the beam is that of the middle.
-    """
-    half = 0.5 * np.diff(target)
-    return max(peak(settled(error[:-1] + half)), peak(settled(error[1:] - half)))
-
-
-COMPARED_CASES = (*(f'{loop}/{target}' for loop in COMPARED_LOOPS for target in ('ramp', 'sine', 'sway')), *INS_LOOPS)
-"""Cases of COMPARED_LOOPS on all targets, and INS_LOOPS."""
-
 ALPHA_LOOPS = {f'noise/alpha={alpha:g}': PaperLoop(alpha=alpha) for alpha in ALPHA_GAINS}
-"""{case: loop} of the paper's loop with each gain, whose jitter is measured on a target at rest."""
-
-
-def beam(case: str, run: int | None = None) -> Floats:
-    """Return the beam [rad] of one of COMPARED_CASES; run: number of the run, None for a run without noise."""
-    sway, rate = sway_target()
-    noise, ins_angle, ins_rate = 3 * (np.zeros(len(sway)),) if run is None else noises(run)
-    if case in INS_LOOPS:
-        beam_angles, _ = INS_LOOPS[case].run(sway, noise, attitude=sway + ins_angle, rate=rate + ins_rate)
-        return beam_angles
-    loop_name, target = case.split('/')
-    loop = COMPARED_LOOPS[loop_name]
-    ship_rate = {'rate': rate} if isinstance(loop, PaperLoop) and target == 'sway' else {}
-    beam_angles, _ = loop.run(compared_targets()[target], noise=noise, **ship_rate)
-    return beam_angles
 
 
 def jitter(item: tuple[str, int]) -> list[Degrees]:
-    """Return the rms of the beam's motion due to noise, for every run of an item.
-
-    An item is (one of COMPARED_CASES, ALPHA_LOOPS or GRAPH_CASES, number of runs).
-    """
+    """Return the rms of the beam's motion due to noise in every run of an item (one of COMPARED_CASES, ALPHA_LOOPS or
+    GRAPH_CASES, number of runs)."""
     case, runs = item
     if case in ALPHA_LOOPS:
         at_rest = np.zeros(round(RECORD_DURATION_S / GRID_STEP_S))
@@ -348,17 +228,6 @@ def jitter(item: tuple[str, int]) -> list[Degrees]:
                 for i in range(runs)]
     clean = beam(case)
     return [math.degrees(rms(settled(beam(case, i) - clean))) for i in range(runs)]
-
-
-def compared_errors() -> dict[str, Floats]:
-    """Return {case: true error without noise [rad]} of COMPARED_CASES."""
-    targets = compared_targets()
-    return {case: targets[target_of(case)] - beam(case) for case in COMPARED_CASES}
-
-
-def target_of(case: str) -> str:
-    """Return the name of the target of one of COMPARED_CASES."""
-    return case.split('/')[1].removesuffix('-ins')
 
 
 def compared_rows(done: Mapping[str, Floats], jitters: Mapping[str, list[Degrees]]) -> list[Line]:
@@ -415,8 +284,8 @@ def max_kept_rate(loop: PaperLoop) -> float:
 def loss_rows() -> list[Line]:
     """Return the rows of loops with a receiver that loses the signal.
 
-    The metrics are the largest rate of the sine at which the loop keeps the target, and the error at this rate with a
-    linear receiver, which loses no signal.
+    The metrics are the largest rate of the sine that the loop keeps, and the error at this rate with a linear
+    receiver, which loses no signal.
     """
     rows: list[Line] = []
     for form in ('type_1', 'type_2'):
@@ -432,7 +301,6 @@ def loss_rows() -> list[Line]:
 
 PAPER_LOOP_PARAMETERS = {f'acu.{axis}.beam.{key}': value for axis in ('azimuth', 'elevation')
                          for key, value in (('form', 'type_1'), ('rate_compensation', 0.85))}
-"""Parameters of the control unit with the paper's loop."""
 
 GRAPH_CASES: dict[str, dict[str, Json]] = {'graph/T=10ms': {}, 'graph/T=1ms': {'adu.period': 0.001},
                'graph/T=10ms/paper-delta': PAPER_LOOP_PARAMETERS}
@@ -440,14 +308,11 @@ GRAPH_CASES: dict[str, dict[str, Json]] = {'graph/T=10ms': {}, 'graph/T=1ms': {'
 
 NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 110.0, 'ins.tilt_noise': 0.0, 'ins.heading_noise': 0.0,
                         'ins.rate_noise': 0.0}
-"""Parameters of an INS without noise, and of a signal so strong that the noise of the receiver has no effect."""
 
 
 def graph_case(case: str, quiet: bool = False) -> Variant:
-    """Return the variant of one of GRAPH_CASES.
-
-    quiet: True for a case without noise in receiver and INS, with the gains of the noisy case.
-    """
+    """Return the variant of one of GRAPH_CASES; quiet: without noise in receiver and INS, but with the gains of the
+    noisy case."""
     noisy = Variant('phased_array_sway').with_(GRAPH_CASES[case])
     if not quiet:
         return noisy
@@ -462,19 +327,13 @@ GRAPH_EVALUATION_START_S = 10.0  # start of the evaluation of the runs of GRAPH_
 
 
 def graph_error(case: str, quiet: bool = False, seed: int | None = None) -> Pairs:
-    """Return the true error [rad] of one of GRAPH_CASES at the ends of the evaluated intervals.
-
-    Arguments as of `graph_case`.
-    """
+    """Return the true error [rad] of one of GRAPH_CASES at the ends of the evaluated intervals."""
     run = closed_loop.Loop(graph_case(case, quiet).with_(seed=seed).load()).run()
     return run.truth['error'][run.t >= GRAPH_EVALUATION_START_S]
 
 
 def graph_rows(jitters: Mapping[str, list[Degrees]]) -> list[Line]:
-    """Return the rows of GRAPH_CASES: cross-elevation and elevation together, at both ends of the intervals.
-
-    jitters: {case: rms of every run}, in elevation.
-    """
+    """Return the rows of GRAPH_CASES, over both axes and both ends of the intervals; jitters: of the elevation."""
     rows: list[Line] = []
     for case in GRAPH_CASES:
         quiet = closed_loop.Loop(graph_case(case, quiet=True).load()).run()

@@ -1,18 +1,11 @@
 """The position loop of paper 003 on one axis: measured miss, with rate and acceleration of the target fed forward.
 
-The studies imm-feedforward and pareto use this loop. The miss, a term of the paper, is the pointing error: angle of
-the target minus angle of the antenna. The target moves to and fro; in a reversal its rate is half a cosine. Every T =
-10 ms the tracker measures the miss, with noise and the delay d. The encoder angle of that instant plus the miss is the
-angle y of the target. A filter of acu_tracker.estimation.filters.axis_filter estimates from y the rate v and the
-acceleration a of the target. The command u of the rate loop W(s) is
+The miss, a term of the paper, is the pointing error: angle of the target minus angle of the antenna. Every T = 10 ms
+the tracker measures the miss, with noise and the delay d. The encoder angle of that instant plus the miss is the angle
+y of the target, from which a filter estimates rate v and acceleration a of the target. The command u [rad/s] of the
+rate loop W(s), of bandwidth w and damping zeta, is
 
-    u = K_p miss(t - d) + k_v v + k_a a,        W(s) = w^2 / (s^2 + 2 zeta w s + w^2),
-
-    u       commanded rate of the antenna [rad/s]
-    K_p     gain of the miss [1/s]
-    k_v     gain of the rate v [rad/s], no unit
-    k_a     gain of the acceleration a [rad/s2], in s
-    w, zeta bandwidth [rad/s] and damping [-] of the rate loop
+    u = K_p miss(t - d) + k_v v + k_a a,        W(s) = w^2 / (s^2 + 2 zeta w s + w^2)
 
 k_v + k_a s are the first two terms of the series of 1 / W(s). Therefore a constant acceleration leaves no miss.
 """
@@ -70,9 +63,9 @@ def feedforward_gains(w: RadiansPerSecond, zeta: float) -> tuple[float, Seconds]
 
 
 def rate_loop_step(w: RadiansPerSecond, zeta: float) -> Floats:
-    """Return the matrix M (3, 4) of a step of the antenna over T: x(t + T) = M (x(t), u), exact for a constant u.
+    """Return the matrix M (3, 4) of a step over T: x(t + T) = M (x(t), u), exact for a constant u.
 
-    x = (theta, omega, omega'): angle [rad], rate [rad/s] and acceleration [rad/s2] of the antenna; u: rate command.
+    The state x is angle [rad], rate [rad/s] and acceleration [rad/s2] of the antenna.
     """
     A = np.zeros((4, 4))
     A[0, 1] = A[1, 2] = 1.0
@@ -96,13 +89,8 @@ def _follow(target: Vectors3, known: Pairs, filters: Records, constants: Records
             normals: Floats, out: Records) -> None:
     """Run the loop once for each row of `normals` (runs, n) and write its Steps to `out` (runs, n).
 
-    target          true angle, rate and acceleration of the target
-    known           rate and acceleration to feed forward; if it is (0, 2), the filter estimates them
-    lead            time from the instant of the miss to the instant for which the filter predicts
-    M               as of `rate_loop_step`
-    normals         standard normal noise of the miss
-
-    Step j is the step in which the miss was measured that arrives in step k.
+    known: rate and acceleration to feed forward; if it is (0, 2), the filter estimates them. lead: time from the
+    instant of the miss to that of the prediction. M: of `rate_loop_step`. The miss of step j arrives in step k.
     """
     R = MISS_SIGMA_RAD * MISS_SIGMA_RAD
     encoder = np.empty(len(target))
@@ -164,11 +152,8 @@ def ca(q: float) -> Source:
 
 
 def imm(q_ca: float, predicted: bool) -> Source:
-    """Return the source of an IMM of the models cv, ca and current_statistical.
-
-    A model holds for a mean dwell of 5 s. cv has a low process noise, and ca has q_ca [deg/s3/sqrt(Hz)]. For fast
-    manoeuvres current_statistical has a largest acceleration of 40 deg/s2. predicted: as in Source.
-    """
+    """Return the source of an IMM of cv with little process noise, ca with q_ca [deg/s3/sqrt(Hz)], and
+    current_statistical up to 40 deg/s2 for fast manoeuvres. A model holds for a mean dwell of 5 s."""
     default = FilterParameters().imm
     bank = {
         'models': 'cv ca current_statistical', 'rungs': 1, 'dwell': 5.0,
@@ -180,10 +165,9 @@ def imm(q_ca: float, predicted: bool) -> Source:
 
 
 def motion(axis: str, rate: RadiansPerSecond = S_MOTION_RATE_RAD_S) -> tuple[Times, Vectors3, Seconds]:
-    """Return (times, target, period) of the motion on an axis; rate: between reversals.
+    """Return (times, angle, rate and acceleration of the target, period) of the motion on an axis.
 
-    target: angle [rad], rate [rad/s] and acceleration [rad/s2]. The times are half a period to settle and
-    EVALUATED_PERIODS.
+    The times are half a period to settle and EVALUATED_PERIODS. rate: between reversals.
     """
     reversal = REVERSAL_S_BY_AXIS[axis]
     period = 2.0 * (S_MOTION_STROKE_RAD / rate + reversal * (1.0 - 2.0 / math.pi))
@@ -192,11 +176,8 @@ def motion(axis: str, rate: RadiansPerSecond = S_MOTION_RATE_RAD_S) -> tuple[Tim
 
 
 def differenced(y: Floats, steps: int) -> Pairs:
-    """Return rate [rad/s] and acceleration [rad/s2] by the differences of measured angles y [rad].
-
-    steps: distance of the differenced angles, in T. The values are 0 until there are enough angles. The angle of step
-    k arrives MISS_DELAY_STEPS later, in the row k + MISS_DELAY_STEPS.
-    """
+    """Return rate [rad/s] and acceleration [rad/s2] by the differences of angles y [rad] over `steps` T; 0 until there
+    are enough angles. The angle of step k is in the row k + MISS_DELAY_STEPS, in which it arrives."""
     known, span = np.zeros((len(y), 2)), steps * T
     rate = (y[steps:] - y[:-steps]) / span
     acceleration = (rate[steps:] - rate[:-steps]) / span
@@ -207,10 +188,7 @@ def differenced(y: Floats, steps: int) -> Pairs:
 
 def steps_of(axis: str, source: Source, first: int, count: int,
              rate: RadiansPerSecond = S_MOTION_RATE_RAD_S) -> Records:
-    """Return the Steps (count, n) of runs first ... first + count - 1 of a source on an axis.
-
-    The noise of run i depends only on i. rate: as in `motion`.
-    """
+    """Return the Steps (count, n) of runs first ... of a source. The noise of run i depends only on i."""
     t, target, _ = motion(axis, rate)
     lead = (MISS_DELAY_STEPS + 0.5) * T if source.predicted else 0.0
     known = np.zeros((0, 2))
@@ -237,10 +215,7 @@ forward while the rate of the target is uniform."""
 
 
 def measures(axis: str, steps: Records, rate: RadiansPerSecond = S_MOTION_RATE_RAD_S) -> Floats:
-    """Return the metrics of METRIC_UNITS of every run, an array (runs, 4); steps: Steps (runs, n).
-
-    rate: as in `motion`.
-    """
+    """Return the metrics of METRIC_UNITS of every run, an array (runs, 4); steps: Steps (runs, n)."""
     t, target, period = motion(axis, rate)
     counts = t >= 0.5 * period
     second = round(1.0 / T)
@@ -254,10 +229,8 @@ def measures(axis: str, steps: Records, rate: RadiansPerSecond = S_MOTION_RATE_R
 
 
 def batch(item: tuple[str, Source, int, int]) -> tuple[Floats, Floats]:
-    """Return (miss (n,) [rad] summed over the runs; metrics of METRIC_UNITS of every run (count, 4)) of an item.
-
-    An item is (axis, source, first run, number of runs).
-    """
+    """Return (miss (n,) [rad] summed over the runs; metrics of METRIC_UNITS of every run (count, 4)) of an item (axis,
+    source, first run, number of runs)."""
     axis, source, first, count = item
     steps = steps_of(axis, source, first, count)
     return steps['miss'].sum(axis=0), measures(axis, steps)

@@ -1,22 +1,11 @@
 """Feed-forward of estimated rate and acceleration (paper 003): a conventional Kalman filter beside the IMM.
 
-An IMM (interacting multiple model) filter mixes several Kalman filters by the probabilities of their models. The miss,
-a term of the paper, is the pointing error: the angle from the axis of the antenna to the target. The loop is that of
-feedforward_loop.py. Its target moves to and fro through 20 deg at 3.5 deg/s. Every T = 10 ms the loop gets a
-measured miss, which is d = 40 ms old, and gives a command.
-
-Cases are AXIS/SOURCE. SOURCE is the source of the rate and acceleration that are fed forward:
-
-kalman-cv, kalman-cv-Q   conventional filter of constant velocity; Q: process noise [deg/s2/sqrt(Hz)]
-kalman-ca-Q              filter of constant acceleration; Q: process noise [deg/s3/sqrt(Hz)]
-imm, imm-b               IMM whose ca model has a process noise of 40 and of 5 deg/s3/sqrt(Hz)
-perfect-state            truth in the middle of the interval in which the command is in force
-...-predicted            filter of this name, predicted from the time of the miss to that middle, d + T / 2 later
-drive-...                filter of this name in the whole chain: receiver of latency d, control unit, motors, gears
-drive-imm-default        IMM with its default parameters in the whole chain
-
-All filters get the same noise. In the cases drive-... the target reverses without a uniform part, so its motion is a
-sine.
+An IMM (interacting multiple model) filter mixes several Kalman filters by the probabilities of their models. The loop
+is that of feedforward_loop.py. Cases are AXIS/SOURCE; SOURCE_MEANINGS describes the sources of the rate and
+acceleration that are fed forward. kalman-cv-Q and kalman-ca-Q have the process noise Q. A source ...-predicted is
+predicted from the time of the miss to the middle of the interval in which the command is in force, d + T / 2 later. A
+source drive-... is in the whole chain: receiver of latency d, control unit, motors, gears. All filters get the same
+noise. In the cases drive-... the target reverses without a uniform part, so its motion is a sine.
 """
 import dataclasses
 import math
@@ -42,7 +31,6 @@ from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
 from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     METRIC_UNITS,
     MISS_SIGMA_RAD,
-    NOISE_SEED,
     REVERSAL_S_BY_AXIS,
     MissStatistics,
     Source,
@@ -52,7 +40,7 @@ from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (
     imm,
     statistics,
 )
-from pedestal_studies.result import Drawings, Result, legend
+from pedestal_studies.result import FIRST_SEED, Drawings, Result, legend, of_cases
 from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
@@ -60,9 +48,7 @@ Misses: TypeAlias = dict[str, MissStatistics]   # {case: its statistics}
 
 DEFAULT_RUNS = 50  # runs of each case, with independent noise
 
-DRIVE_DURATION_S, DRIVE_EVALUATION_START_S, DRIVE_ELEVATION_RAD = 36.0, 6.0, 0.5
-"""Duration of a run of the whole chain from receiver to gears [s], start of its evaluation in autotrack [s], and
-elevation of the target [rad]."""
+DRIVE_DURATION_S, DRIVE_EVALUATION_START_S, DRIVE_ELEVATION_RAD = 36.0, 6.0, 0.5  # of the whole chain [s, s, rad]
 
 CV_NOISES = (0.1, 0.2, 0.3, 0.5, 4.0)  # process noises of the conventional filter [deg/s2/sqrt(Hz)]
 
@@ -76,7 +62,7 @@ FEEDFORWARD_SOURCES = {
     'kalman-ca-40-predicted': dataclasses.replace(ca(40.0), predicted=True)}
 """{name: Source} of rate and acceleration. The argument of ca and q_ca of imm are process noises [deg/s3/sqrt(Hz)]."""
 
-SOURCE_MEANINGS = {
+SOURCE_MEANINGS = {  # {name of a case without its axis: description}, for the table of the documentation
     'kalman-cv': 'conventional Kalman filter of constant velocity, with the noise that comes nearest to the paper',
     'imm': 'IMM of cv, ca and current_statistical, tuned on the azimuth',
     'imm-predicted': 'the same IMM, predicted over the delay of the miss to the middle of the interval of the command',
@@ -85,7 +71,6 @@ SOURCE_MEANINGS = {
     'drive-kalman-cv': 'kalman-cv in receiver, control unit, motors and gears',
     'drive-imm': 'imm in receiver, control unit, motors and gears',
     'drive-imm-default': 'the default IMM of the product in receiver, control unit, motors and gears'}
-"""{name of a case without its axis: description}, for the table of the documentation."""
 
 
 def cv_name(axis: str, q: float) -> str:
@@ -93,12 +78,11 @@ def cv_name(axis: str, q: float) -> str:
     return f'{axis}/kalman-cv' if q == PAPER_CV_NOISES[axis] else f'{axis}/kalman-cv-{q:g}'
 
 
-CASES = {
+CASES = {  # {case: (axis, Source)}
     **{f'{axis}/kalman-cv': (axis, cv(q)) for axis, q in PAPER_CV_NOISES.items()},
     **{f'{axis}/{name}': (axis, source)
        for axis in REVERSAL_S_BY_AXIS for name, source in FEEDFORWARD_SOURCES.items()},
     **{cv_name(axis, q): (axis, cv(q)) for axis in REVERSAL_S_BY_AXIS for q in CV_NOISES}}
-"""{case: (axis, Source)}."""
 
 
 class DriveCase(NamedTuple):
@@ -109,10 +93,10 @@ class DriveCase(NamedTuple):
 
 def drive_case(axis: str, tuned: FilterParameters,
                rate: RadiansPerSecond = profiles.S_MOTION_RATE_RAD_S) -> DriveCase:
-    """Return the case of the whole chain, in which the target follows a sine on an axis.
+    """Return the case of the whole chain, in which the target follows a sine on an axis, with this largest rate.
 
-    tuned: filter of this axis. rate: largest rate of the target. The target's range of 510 m is the
-    reference_range of the scenario uav_flyby, at which the receiver has its nominal C/N0.
+    tuned: filter of this axis. The target's range of 510 m is the reference_range of the scenario uav_flyby, at which
+    the receiver has its nominal C/N0.
     """
     w = math.pi / REVERSAL_S_BY_AXIS[axis]
     amplitudes = {f'tracking_receiver.target.angle.{name}_amplitude':
@@ -127,41 +111,36 @@ def drive_case(axis: str, tuned: FilterParameters,
            if value != as_dict(FilterParameters())[name]}}))
 
 
-DRIVE_CASES = {
+DRIVE_CASES = {  # {case: DriveCase} of the whole chain
     f'{axis}/drive-{name}': drive_case(axis, tuned) for axis in REVERSAL_S_BY_AXIS for name, tuned in {
         'kalman-cv': cv(PAPER_CV_NOISES[axis]).own_filter, 'imm': FEEDFORWARD_SOURCES['imm'].own_filter,
         'imm-default': filter_of('imm')}.items()}
-"""{case: DriveCase}."""
 
 
 def drive_error(case: DriveCase, seed: int) -> tuple[Times, Floats]:
-    """Return (times, true pointing error of the axis [rad]) from DRIVE_EVALUATION_START_S on.
-
-    case: as `drive_case` returns. The errors are NaN if the run left autotrack.
-    """
+    """Return (times, true pointing error of the axis [rad]) of one of `drive_case` from DRIVE_EVALUATION_START_S on,
+    NaN if the run left autotrack."""
     record = closed_loop.Loop(case.variant.with_(seed=seed).load()).run()
     record = record.where(record.t >= DRIVE_EVALUATION_START_S)
     error = record.truth['error'][:, list(REVERSAL_S_BY_AXIS).index(case.axis)]
     return record.t, error if np.all(record['acu/mode'] == Mode.AUTOTRACK) else np.full_like(error, math.nan)
 
 
-def drive_misses(item: tuple[DriveCase, int]) -> tuple[Degrees, Degrees]:
-    """Return (rms, largest) miss of an item (case as `drive_case` returns, seed)."""
-    _, error = drive_error(*item)
+def drive_misses(name: str, run: int) -> tuple[Degrees, Degrees]:
+    """Return (rms, largest) miss of one run of one of DRIVE_CASES."""
+    _, error = drive_error(DRIVE_CASES[name], FIRST_SEED + run)
     return math.degrees(tracking.rms(error)), math.degrees(metrics.peak(error))
 
 
-MISS_TARGETS_DEG = {
+MISS_TARGETS_DEG = {  # targets of miss_rms_deg
     'azimuth/kalman-cv': '0.16 to 0.17', 'azimuth/imm': '<= 0.036', 'azimuth/imm-predicted': '<= 0.025',
     'elevation/kalman-cv': '0.085 to 0.095', 'elevation/imm': '<= 0.028', 'elevation/imm-predicted': '<= 0.018'}
-"""Targets of miss_rms_deg."""
 
 PAPER_MISSES_DEG = {'azimuth/kalman-cv': 0.17, 'azimuth/imm': 0.035, 'elevation/kalman-cv': 0.1, 'elevation/imm': 0.03}
 """{case: number of the paper [deg]}. The paper names it the largest miss (RMS); we read it as the rms of the miss."""
 
-MAIN_CASES = {f'{axis}/{name}' for axis in REVERSAL_S_BY_AXIS
+MAIN_CASES = {f'{axis}/{name}' for axis in REVERSAL_S_BY_AXIS  # cases that have all rows
               for name in ('kalman-cv', 'imm', 'imm-predicted', 'perfect-state')}
-"""Cases that have all rows."""
 
 MISS_RATIO_TARGETS = {'azimuth/imm': ('>= 4', None), 'azimuth/imm-predicted': ('>= 6', None),
                       'elevation/imm': ('>= 3', 3.0), 'elevation/imm-predicted': ('>= 5', None)}
@@ -176,20 +155,14 @@ def conventional_curve(misses: Misses, axis: str) -> Floats:
 
 
 def at_rate_noise(misses: Misses, axis: str, rate_noise: Floats) -> Floats:
-    """Return the miss [deg] of a conventional filter tuned to a rate noise [deg/s] in each run.
-
-    The miss is interpolated between the filters of CV_NOISES on logarithmic scales. If even the quietest of these
-    filters is noisier, the miss of this filter is returned, which is too small.
-    """
+    """Return the miss [deg] of a conventional filter tuned to a rate noise [deg/s] in each run, log-log between
+    CV_NOISES. If even the quietest filter is noisier, its miss is returned, which is too small."""
     noises, curve = np.log(conventional_curve(misses, axis))
     return np.exp([np.interp(*run) for run in zip(np.log(rate_noise), noises.T, curve.T)])
 
 
 def rows(misses: Misses) -> list[Row]:
-    """Return the rows of all cases.
-
-    A ratio divides the misses of two filters in runs with the same noise.
-    """
+    """Return the rows of all cases. A ratio divides the misses of two filters in runs with the same noise."""
     table = []
     for name, case in misses.items():
         axis, miss = case.axis, case.of('miss_rms_deg')
@@ -342,7 +315,7 @@ def drive_figure() -> Figure:
     for axis, panel in zip(REVERSAL_S_BY_AXIS, axes[:, 0]):
         for name, colour in (('kalman-cv', fig.TRUTH_COLOUR), ('imm', fig.MOTOR_1_COLOUR),
                              ('imm-default', fig.FILTERED_COLOUR)):
-            t, miss = drive_error(DRIVE_CASES[f'{axis}/drive-{name}'], NOISE_SEED)
+            t, miss = drive_error(DRIVE_CASES[f'{axis}/drive-{name}'], FIRST_SEED)
             panel.plot(t, np.degrees(miss), color=colour, label=name)
         panel.set_xlim(DRIVE_EVALUATION_START_S, DRIVE_EVALUATION_START_S + 8.0)
         panel.set_title(f'{axis}: control unit, motors and gears, reversals of {REVERSAL_S_BY_AXIS[axis]:g} s')
@@ -353,8 +326,6 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) 
     """Run CASES and DRIVE_CASES `runs` times."""
     pool = pool or monte_carlo.Pool(1)
     misses = statistics(CASES, runs, pool, lambda share, text: progress(0.5 * share, text))
-    items = [(case, NOISE_SEED + i) for case in DRIVE_CASES.values() for i in range(runs)]
-    done = np.array(list(pool.map(drive_misses, items, lambda share, text: progress(
-        0.5 + 0.5 * share, f'the whole chain, {text}'))))
-    of_drive = dict(zip(DRIVE_CASES, done.reshape(len(DRIVE_CASES), runs, 2)))
+    of_drive = of_cases(drive_misses, DRIVE_CASES, runs, pool, lambda share, text: progress(
+        0.5 + 0.5 * share, f'the whole chain, {text}'), size=1)
     return Result(rows(misses) + drive_rows(of_drive), figures(misses), remarks(misses))

@@ -1,10 +1,9 @@
 """Rate and acceleration of filters through ever sharper reversals (paper 003, figures 3 and 4).
 
-A target moves to and fro through 20 deg at 3.5 deg/s. In a reversal its rate is half a cosine. The reversals last 4,
-2, 1, 0.5 and 0.35 s, one after the other. The angle is measured at 100 Hz with a noise of 0.02 deg. Cases are
-reversal-<seconds>/<filter>; their metrics are the rms errors of rate and acceleration inside the reversal. `cv` and
-`ca` are conventional filters of constant velocity and of constant acceleration. `imm-a` and `imm-b` are IMMs whose ca
-model has a process noise of 40 and of 5 deg/s3/sqrt(Hz), as in `imm` and `imm-b` of the study imm-feedforward.
+A target moves to and fro through 20 deg at 3.5 deg/s. In a reversal its rate is half a cosine. Cases are
+reversal-<seconds>/<filter>; their metrics are the rms errors of rate and acceleration inside the reversal. `imm-a` and
+`imm-b` are IMMs whose ca model has a process noise of 40 and of 5 deg/s3/sqrt(Hz), as in `imm` and `imm-b` of the
+study imm-feedforward.
 """
 import math
 from collections.abc import Mapping
@@ -29,12 +28,9 @@ Errors: TypeAlias = dict[tuple[Seconds, str], Floats]
 DEFAULT_RUNS = 200  # runs of the motion; the paper has 50
 BATCH_RUNS, NOISE_SEED = 25, 1  # runs of one batch; seed of their noise
 
-REVERSAL_DURATIONS_S = (4.0, 2.0, 1.0, 0.5, 0.35)
-"""Durations of the reversals [s]; their peak accelerations are 2.7 to 31 deg/s2."""
+REVERSAL_DURATIONS_S = (4.0, 2.0, 1.0, 0.5, 0.35)  # their peak accelerations are 2.7 to 31 deg/s2
 
-LEAD_TIME_S = 5.0
-"""Time at which the target is in the middle of its stroke before the first reversal [s]; its motion is uniform until
-then."""
+LEAD_TIME_S = 5.0  # of uniform motion, until the target is in the middle of its stroke [s]
 
 MEASUREMENT_NOISE = ensemble.Noise(feedforward_loop.MISS_SIGMA_RAD)  # noise of the measured angle
 
@@ -72,11 +68,8 @@ def motion() -> tuple[Times, Motion, dict[Seconds, Bools]]:
 
 
 def batch(item: Item) -> tuple[Records, Floats]:
-    """Return (Moments (n,) over the runs, rms (count, len(REVERSAL_DURATIONS_S), 2)) of an item.
-
-    An item is (filter, first run, number of runs). The rms are those of rate [deg/s] and acceleration [deg/s2] of
-    every run inside the reversals.
-    """
+    """Return (Moments (n,) over the runs, rms of rate [deg/s] and acceleration [deg/s2] of every run inside the
+    reversals, (count, len(REVERSAL_DURATIONS_S), 2)) of an item (filter, first run, number of runs)."""
     name, first, count = item
     t, truth, reversals = motion()
     sums = ensemble.moments(FILTERS[name], t, truth, MEASUREMENT_NOISE, ensemble.records(truth, MEASUREMENT_NOISE,
@@ -141,10 +134,7 @@ def remarks(values: Errors) -> list[str]:
 
 
 def moments_figure(sums_of: Mapping[str, Records], what: str, label: str) -> Figure:
-    """Draw truth and mean estimates above, mean errors +-1 sigma below (paper 003, figures 3 and 4).
-
-    sums_of: {filter: Moments (n,) of the errors, estimate minus truth}; what: 'rate' or 'acceleration'.
-    """
+    """Draw truth and mean estimates, mean errors +-1 sigma below (figures 3, 4); what: 'rate', 'acceleration'."""
     t, truth, _ = motion()
     figure, axes = fig.new_panels(2, height=5.4, y=(label, f'error of the {label}'), sharex=True)
     true_value = truth[('angle', 'rate', 'acceleration').index(what)]

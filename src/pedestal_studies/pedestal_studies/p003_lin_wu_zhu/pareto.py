@@ -1,13 +1,10 @@
 """Miss over rate noise for all tunings of every filter: a fair comparison of paper 003's feed-forward.
 
-The loop is that of the study imm-feedforward, azimuth, with prediction over the delay for all filters. The miss is the
-pointing error: the angle from the axis of the antenna to the target. The rate noise is the rms error of the rate that
-is fed forward while the rate of the target is constant. Any filter has a small miss if its rate may be noisy. Each
-filter is therefore tuned from low to high bandwidth, which gives a curve of miss over rate noise. This curve is
-compared with one point, the case imm-predicted: the IMM with the tuning of the study imm-feedforward.
-
-A case <filter> gives three numbers of the curve of a filter: the miss at the rate noise of imm-predicted, the rate
-noise at the miss of imm-predicted, and the least miss. The case `imm` is the curve of the IMM over its tunings.
+The loop is that of the study imm-feedforward, azimuth, with prediction over the delay for all filters. The rate noise
+is the rms error of the rate that is fed forward while the rate of the target is constant. Any filter has a small miss
+if its rate may be noisy. Each filter is therefore tuned from low to high bandwidth, which gives a curve of miss over
+rate noise. This curve is compared with one point, the case imm-predicted: the IMM with the tuning of the study
+imm-feedforward.
 """
 import dataclasses
 import math
@@ -32,41 +29,35 @@ Points: TypeAlias = Mapping[Tuning, tuple[float, Degrees] | Floats]     # {tunin
 DEFAULT_RUNS = 50  # runs of each tuning, as many as in the paper
 LOOP_AXIS = 'azimuth'  # axis of all runs
 
-REFERENCE_SOURCE = feedforward_loop.imm(q_ca=40.0, predicted=True)
-"""Case imm-predicted of the study imm-feedforward, with which the curves are compared."""
+REFERENCE_SOURCE = feedforward_loop.imm(q_ca=40.0, predicted=True)  # case imm-predicted of imm-feedforward
 
 REFERENCE_POINT = ('reference', 0.0)  # key of REFERENCE_SOURCE beside the keys (filter, value) of the tunings
 
 
 def _current_statistical(a_max: float) -> Source:
-    """Return the source of a 'current' statistical filter; a_max: largest acceleration of its model [deg/s2]."""
     return Source(feedforward_loop.filter_of('current_statistical', current_statistical={
         'alpha': 0.5, 'a_max': math.radians(a_max)}))
 
 
 def _logarithmic(low: float, high: float, points: int) -> list[float]:
-    """Return `points` values from low to high at equal ratios, rounded to three digits."""
     return [float(f'{value:.3g}') for value in np.geomspace(low, high, points)]
 
 
-FILTER_TUNINGS = {
+FILTER_TUNINGS = {  # {filter: (name of the tuned parameter, its values, function value -> Source)}; q: process noise
     'cv': ('q [deg/s2/sqrt(Hz)]', _logarithmic(0.05, 50.0, 13), feedforward_loop.cv),
     'ca': ('q [deg/s3/sqrt(Hz)]', _logarithmic(0.05, 500.0, 13), feedforward_loop.ca),
     'current_statistical': ('a_max [deg/s2], alpha 0.5 1/s', _logarithmic(0.5, 1000.0, 13), _current_statistical),
     'imm': ('q of its ca [deg/s3/sqrt(Hz)]', _logarithmic(0.5, 500.0, 10),
             lambda q: feedforward_loop.imm(q_ca=q, predicted=True))}
-"""{filter: (name of the tuned parameter, its values, function value -> Source)}; q: process noise."""
 
 FILTER_MEANINGS = {'cv': 'Kalman filter of constant rate', 'ca': 'Kalman filter of constant acceleration',
                    'current_statistical': "'current' statistical model of paper 000",
                    'imm': 'IMM of cv, ca and current_statistical, with other noises of its ca'}
-"""{filter: description}, for the table of the documentation."""
 
 FILTER_COLOURS = {'cv': fig.TRUTH_COLOUR, 'ca': fig.RAW_COLOUR, 'current_statistical': fig.MOTOR_2_COLOUR,
                   'imm': fig.FILTERED_COLOUR}
 
 MISS_RATIO_TARGET = '>= 5'
-"""Target of the miss of cv at the rate noise of imm-predicted, divided by the miss of imm-predicted."""
 
 
 def cases() -> dict[Tuning, tuple[str, Source]]:
@@ -95,7 +86,7 @@ def curve(points: Points, name: str) -> Floats:
 
 
 def frontier(points: Points, name: str) -> Floats:
-    """Return the Pareto frontier of the curve of a filter, an array (2, n) of (rate noise, miss) by rising rate noise.
+    """Return the Pareto frontier of the curve of a filter, (2, n) of (rate noise, miss) by rising rate noise.
 
     It holds the tunings for which no other tuning has both less rate noise and less miss.
     """

@@ -1,15 +1,9 @@
 """Effect of an independent measurement of the rate on the filter (paper 004): bandwidth and dynamic error.
 
-With constant sigma_a and noises, the 'current' statistical filter settles to constant gains: X+ = A X + B (y, y').
-
-    X, X+     estimate (angle, rate, acceleration) of one measurement and of the next
-    y, y'     measured angle [rad] and measured rate [rad/s]
-    sigma_a   standard deviation of the acceleration of the target that the filter assumes
-    T, w, t   time between two measurements [s]; angular frequency [rad/s]; time [s]
-    j, e^jwt  imaginary unit; sine of frequency w as a complex exponential
-
-A and B are identified on the compiled filter itself, with one unit state and one unit measurement at a time. A sine
-y = e^jwt, y' = jw y then gives the response G of the estimate:
+With constant sigma_a and noises, the 'current' statistical filter settles to constant gains: X+ = A X + B (y, y'). X
+is the estimate of angle, rate and acceleration; sigma_a is the acceleration of the target that the filter assumes. A
+and B are identified on the compiled filter itself, with one unit state and one unit measurement at a time. A sine y =
+e^jwt, y' = jw y then gives the response G of the estimate:
 
     G(jw) = (1 - A e^-jwT)^-1 B (1, jw)',        angle: G_1,  rate: G_2 / jw,  dynamic error: |1 - G_1|.
 
@@ -47,8 +41,7 @@ from pedestal_results.intervals import row
 from pedestal_results.report import figures as fig
 from pedestal_studies import ensemble, profiles
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
-from pedestal_studies.result import Drawings, Item, Metrics, Result, legend
-from pedestal_workbench.trials import monte_carlo
+from pedestal_studies.result import Drawings, Metrics, Result, legend, of_cases
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 DEFAULT_RUNS = 40  # number of flybys
@@ -57,7 +50,6 @@ ALPHA = 0.5  # reciprocal of the time for which the filter expects an accelerati
 ACCELERATION_SIGMAS_DEG_S2 = (0.05, 0.5, 3.0)  # values of sigma_a [deg/s2]
 
 RATE_SIGMAS_DEG_S = {'position': math.nan, 'position-rate': 0.1, 'position-rate-0.02': 0.02}
-"""{case: noise of a measured rate [deg/s]}, NaN without a measured rate."""
 
 MAIN_SIGMA_DEG_S2 = 0.5  # sigma_a of the cases whose name does not state it [deg/s2]
 DYNAMIC_ERROR_FREQUENCY_HZ = 0.2  # frequency of the dynamic error [Hz]
@@ -66,21 +58,19 @@ SETTLING_STEPS = 20000  # steps after which the gains are constant, also with th
 
 FLYBY_PROFILE = 'flyby-60m'
 
-MAX_ACCELERATION_RATIO, MIN_SIGMA_RATIO = 1.2, 0.3
-"""Parameters of the filter of a flight: its a_max over the largest acceleration of the flight [-], and the least
-sigma_a over a_max [-]."""
+MAX_ACCELERATION_RATIO = 1.2  # a_max of the filter over the largest acceleration of the flight [-]
+MIN_SIGMA_RATIO = 0.3  # least sigma_a over a_max [-]
 
 SETTLING_TIME_S = 5.0  # time of the flyby from which the errors are evaluated [s]
 
 DIFFERENCED_RATES = {'differenced-1': 1, 'differenced-20': 20}
 """{case: steps of T over which the measured angles are differenced to a rate}."""
 
-RATE_SOURCE_MEANINGS = {
+RATE_SOURCE_MEANINGS = {  # {case of the flyby: source of its rate}, for the table of the documentation
     'position': 'none: only the angle is measured', 'position-rate': 'sensor of its own, noise 0.1 deg/s',
     'position-rate-0.02': 'sensor of its own, noise 0.02 deg/s',
     'differenced-1': 'difference of the measured angles over one step of 10 ms',
     'differenced-20': 'difference of the measured angles over 20 steps, 0.2 s'}
-"""{case of the flyby: source of its rate}, for the table of the documentation."""
 
 
 class FlybyRecord(typing.NamedTuple):
@@ -90,24 +80,17 @@ class FlybyRecord(typing.NamedTuple):
     estimate: Records   # axis_filter.Estimate (n,)
 
 
-BATCH_RUNS, NOISE_SEED = 25, 1  # flybys of one batch; seed of their noise
+NOISE_SEED = 1  # seed of the noise of the flybys
 
 
 def filter_of(a_max: RadiansPerSecond2, floor: float) -> FilterParameters:
-    """Return a 'current' statistical filter that uses the measured rate.
-
-    a_max: largest acceleration of its model; floor: least sigma_a over a_max [-].
-    """
+    """Return a 'current' statistical filter that uses the measured rate; floor: least sigma_a over a_max [-]."""
     model = dataclasses.replace(FilterParameters().current_statistical, alpha=ALPHA, a_max=a_max, floor=floor)
     return FilterParameters(kind='current_statistical', rate_measurement=True, current_statistical=model)
 
 
 @compiled
 def _settle(filters: Records, constants: Records, rate: RadiansPerSecond, R_rate: float, steps: int) -> None:
-    """Run the filter for `steps` on a target at rest.
-
-    rate: measured rate, 0, or NaN without a measured rate. R_rate: its variance [rad2/s2].
-    """
     axis_filter.start(filters[0], constants[0], 0.0, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, 1.0)
     for _ in range(steps):
         axis_filter.predict(filters[0], constants[0], T)
@@ -117,7 +100,6 @@ def _settle(filters: Records, constants: Records, rate: RadiansPerSecond, R_rate
 
 @compiled
 def _step(filters: Records, constants: Records, y: Radians, y_rate: RadiansPerSecond, R_rate: float) -> None:
-    """Run one step of the filter with a measured angle y and a rate y_rate of variance R_rate [rad2/s2]."""
     axis_filter.predict(filters[0], constants[0], T)
     axis_filter.correct(filters[0], constants[0],
                         AxisMeasurement(y, ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD, y_rate, R_rate))
@@ -126,8 +108,7 @@ def _step(filters: Records, constants: Records, y: Radians, y_rate: RadiansPerSe
 def steady_state_matrices(sigma_a: float, rate_sigma: float) -> tuple[Floats, Floats]:
     """Return (A (3, 3), B (3, 2)) of X+ = A X + B (y, y') with constant gains.
 
-    sigma_a [deg/s2]; rate_sigma: noise of the measured rate [deg/s], NaN without a measured rate. B then has a column
-    of zeros for the rate.
+    rate_sigma: noise of the rate [deg/s], NaN without a measured rate. B then has a column of zeros.
     """
     c = axis_filter.constants(filter_of(math.radians(sigma_a), 1.0))        # floor 1: sigma_a = a_max at all times
     R_rate = math.radians(rate_sigma) ** 2
@@ -182,20 +163,15 @@ CASES = {name if sigma_a == MAIN_SIGMA_DEG_S2 else f'{name}/sigma_a-{sigma_a:g}'
 
 
 def differenced_rate(y: Floats, steps: int) -> tuple[Floats, float]:
-    """Return (rate [rad/s], its variance) from differences of angles y [rad] over `steps` T.
-
-    The first `steps` rates are NaN.
-    """
+    """Return (rate [rad/s], its variance) from differences of angles y [rad] over `steps` T, the first `steps` NaN."""
     rate = np.full(len(y), math.nan)
     rate[steps:] = (y[steps:] - y[:-steps]) / (steps * T)
     return rate, 2.0 * (ANGLE_SIGMA_RAD / (steps * T)) ** 2
 
 
 def filtered(t: Times, target: Vectors3, y: Floats, y_rate: Floats, R_rate: float) -> Records:
-    """Return the axis_filter.Estimate (n,) of the filter from measured angles y [rad] and rates y_rate [rad/s].
-
-    target: true angle, rate and acceleration. R_rate: variance of y_rate [rad2/s2].
-    """
+    """Return the axis_filter.Estimate (n,) from measured angles y [rad] and rates y_rate [rad/s] of variance R_rate;
+    target: true angle, rate and acceleration."""
     c = axis_filter.constants(filter_of(MAX_ACCELERATION_RATIO * np.abs(target[:, 2]).max(), MIN_SIGMA_RATIO))
     out = np.zeros(len(t), axis_filter.Estimate.dtype)
     axis_filter.estimates(c, t, y, np.full(len(t), ANGLE_SIGMA_RAD * ANGLE_SIGMA_RAD), y_rate, np.full(len(t), R_rate),
@@ -210,10 +186,7 @@ def flyby() -> tuple[Times, Vectors3]:
 
 
 def flyby_record(name: str, run: int) -> FlybyRecord:
-    """Return the record of one flyby.
-
-    name: one of FLYBY_CASES. The noise depends only on `run`.
-    """
+    """Return the record of one flyby of one of FLYBY_CASES. The noise depends only on `run`."""
     t, target = flyby()
     normals = ensemble.normal_draws(NOISE_SEED, run, 1, len(t))[:, 0]
     y = target[:, 0] + ANGLE_SIGMA_RAD * normals[0]
@@ -225,30 +198,21 @@ def flyby_record(name: str, run: int) -> FlybyRecord:
     return FlybyRecord(y, y_rate, filtered(t, target, y, y_rate, R_rate))
 
 
-def batch(item: Item) -> Pairs:
-    """Return the rms errors of the angle [deg] and of the rate [deg/s] of every run of an item.
-
-    An item is (name, first run, number of runs).
-    """
-    name, first, count = item
+def flyby_errors(name: str, run: int) -> Floats:
+    """Return the rms errors of the angle [deg] and of the rate [deg/s] of one flyby."""
     t, target = flyby()
     counts = t >= SETTLING_TIME_S
-    estimates = [flyby_record(name, run).estimate for run in range(first, first + count)]
-    return np.degrees([[tracking.rms((out[field] - target[:, i])[counts]) for i, field in enumerate(('angle', 'rate'))]
-                       for out in estimates])
+    out = flyby_record(name, run).estimate
+    return np.degrees([tracking.rms((out[field] - target[:, i])[counts]) for i, field in enumerate(('angle', 'rate'))])
 
 
 FLYBY_CASES = (*RATE_SIGMAS_DEG_S, *DIFFERENCED_RATES)
-"""Cases of the flyby, by the source of the rate (RATE_SOURCE_MEANINGS)."""
 METRIC_TARGETS = {('position-rate', 'rate_bandwidth_ratio'): '>= 1.5',
                   ('position-rate', 'dynamic_error_ratio'): '>= 9'}
 
 
 def rows(measured: Mapping[str, Metrics], errors: Mapping[str, Pairs]) -> list[Row]:
-    """Return the rows of measured {case: as of `measures`} and errors {name of FLYBY_CASES: rms of every run}.
-
-    The rms are in [deg, deg/s].
-    """
+    """Return the rows of measured {case: of `measures`} and errors {of FLYBY_CASES: rms [deg, deg/s] of runs}."""
     table = []
     for name, values in measured.items():
         table += [row(name, metric, value, unit, target='< 1' if metric == 'largest_eigenvalue' else None)
@@ -353,6 +317,6 @@ def flyby_figure() -> Figure:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Identify the filters of CASES and run `runs` flybys."""
-    errors = (pool or monte_carlo.Pool(1)).of_cases(batch, FLYBY_CASES, runs, BATCH_RUNS, progress)
+    errors = of_cases(flyby_errors, FLYBY_CASES, runs, pool, progress, size=25)
     measured = {name: measures(*case) for name, case in CASES.items()}
     return Result(rows(measured, errors), figures(), remarks(measured, errors))

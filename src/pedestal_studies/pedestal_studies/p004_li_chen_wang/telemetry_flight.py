@@ -1,25 +1,17 @@
 """Paper 004's filter on a flight of the same kind (figures 1 to 8), and the matrices of its proof of stability.
 
-The filter estimates angle, rate and acceleration of one axis from measured angle and rate. The paper prints T = 0.01 s
-and the windows of its figures, and that the filter begins with the first measured angle and rate. The flight, the
-noises and the parameters of the filter are ours. A target flies straight past the antenna and is nearest at
-CULMINATION_TIME_S, inside the paper's figures 2 and 6. Cases <axis>/filtered are the 'current' statistical filter on
-angle and rate. Cases <axis>/measured are the measured angle and rate, and the acceleration as the difference of the
-measured rate over DIFFERENCE_STEPS steps.
+The paper prints T = 0.01 s and the windows of its figures, and that the filter begins with the first measured angle
+and rate. The flight, the noises and the parameters of the filter are ours. A target flies straight past the antenna.
+Cases <axis>/filtered are the 'current' statistical filter on angle and rate. Cases <axis>/measured are the measured
+angle and rate, and the difference of the measured rate over DIFFERENCE_STEPS steps.
 
-The model of the filter is x+ = Phi x + U abar, y = H x. The two matrices of the proof are
+The model of the filter is x+ = Phi x + U abar, y = H x, with the mean acceleration abar. The matrices of the proof are
 
     controllability (U, Phi U, Phi^2 U),        observability (H', (H Phi)', (H Phi^2)')'.
 
-    x, x+   state (angle, rate, acceleration) of one measurement and of the next, T later
-    y       measured numbers
-    abar    mean acceleration of the target, the input of the model
-    Phi, U  transition of the state over T, effect of abar over T
-    H, '    measurement matrix; ' means transposed
-
 The condition number of a matrix is its largest singular value over its smallest. `condition` is measured with T in
-place of the second as the unit of time, so that the entries are of one size. In seconds the entries differ by up to
-1 / T^2, and `condition_in_seconds` shows only this difference.
+place of the second as the unit of time, so that the entries are of one size. In seconds the entries differ by up to 1
+/ T^2, and `condition_in_seconds` shows only this difference.
 """
 import math
 from collections.abc import Mapping
@@ -32,25 +24,21 @@ from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Floats, Matrix3, Row, Seconds, Times, Vector3, Vectors3
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies import ensemble
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S
 from pedestal_studies.p004_li_chen_wang.rate_measurement import ALPHA, ANGLE_SIGMA_RAD, differenced_rate, filtered
-from pedestal_studies.result import Drawings, Item, Result, legend
-from pedestal_workbench.trials import monte_carlo
+from pedestal_studies.result import Drawings, Result, legend, of_cases
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 DEFAULT_RUNS, NOISE_SEED = 40, 1  # number of flights; seed of their noise
-BATCH_RUNS = 5  # flights that one worker makes at a time
 
 TARGET_SPEED_M_S, MIN_GROUND_DISTANCE_M, TARGET_HEIGHT_M, CULMINATION_TIME_S = 300.0, 3000.0, 2500.0, 42.0
-"""Speed [m/s], least distance over ground [m] and height [m] of the target; time of its least distance [s]."""
 
 FLIGHT_START_S, FLIGHT_END_S = 20.0, 100.0  # times of the paper's figures [s]; the filter begins at the first
 SETTLING_TIME_S = 5.0  # time after FLIGHT_START_S from which the rows are evaluated [s]
 
-ZOOM_WINDOWS_S = {'azimuth': (39.0, 43.5), 'elevation': (41.5, 45.0)}
-"""{axis: (begin, end) [s] of the time that figure 2 or 6 shows}."""
+ZOOM_WINDOWS_S = {'azimuth': (39.0, 43.5), 'elevation': (41.5, 45.0)}  # {axis: (begin, end) [s] of figure 2 or 6}
 
 RATE_SIGMA_RAD_S = math.radians(0.1)  # noise of a measured rate [rad/s]
 DIFFERENCE_STEPS = 20  # steps over which the measured rate is differenced
@@ -80,10 +68,7 @@ def flight() -> tuple[Times, dict[str, Vectors3]]:
 
 
 def flight_record(axis: str, run: int) -> tuple[Vectors3, Vectors3]:
-    """Return (measured, filtered) angle, rate and acceleration of one flight.
-
-    The noise depends only on the axis and the run.
-    """
+    """Return (measured, filtered) angle, rate and acceleration of a flight, with noise by axis and run alone."""
     t, target = flight()
     truth = target[axis]
     nu, nu_rate = ensemble.normal_draws(NOISE_SEED + AXES.index(axis), first=run, count=1, n=len(t))[:, 0]
@@ -93,16 +78,12 @@ def flight_record(axis: str, run: int) -> tuple[Vectors3, Vectors3]:
     return np.column_stack((y, y_rate, difference)), np.column_stack([out[name] for name in QUANTITY_UNITS])
 
 
-def batch(item: Item) -> Floats:
-    """Return the rms errors (count, 2, 3) [deg, deg/s, deg/s2], measured and filtered, of an item.
-
-    An item is (axis, first run, number of runs).
-    """
-    axis, first, count = item
+def flight_errors(axis: str, run: int) -> Floats:
+    """Return the rms errors (2, 3) [deg, deg/s, deg/s2] of one flight, measured and filtered."""
     t, target = flight()
     counts = t >= FLIGHT_START_S + SETTLING_TIME_S
-    return np.degrees([[[tracking.rms(error) for error in (values - target[axis])[counts].T]
-                        for values in flight_record(axis, run)] for run in range(first, first + count)])
+    return np.degrees([[tracking.rms(error) for error in (values - target[axis])[counts].T]
+                       for values in flight_record(axis, run)])
 
 
 def model(T: Seconds) -> tuple[Matrix3, Vector3]:
@@ -112,8 +93,7 @@ def model(T: Seconds) -> tuple[Matrix3, Vector3]:
             np.array([0.5 * T * T - angle, T - rate, 1.0 - kept]))
 
 
-MEASUREMENT_MATRICES = {'angle': np.eye(3)[:1], 'angle-rate': np.eye(3)[:2]}
-"""{case: H}: only the angle is measured, or angle and rate."""
+MEASUREMENT_MATRICES = {'angle': np.eye(3)[:1], 'angle-rate': np.eye(3)[:2]}  # {case: H}
 
 
 def controllability(Phi: Matrix3, U: Vector3) -> Matrix3:
@@ -138,7 +118,7 @@ def matrices() -> dict[str, tuple[Floats, Floats]]:
 
 
 def rows(errors: Mapping[str, Floats]) -> list[Row]:
-    """Return the rows of the study; errors: {axis: rms errors (runs, 2, 3) as `batch` returns}."""
+    """Return the rows of the study; errors: {axis: rms errors (runs, 2, 3) of `flight_errors`}."""
     table = []
     for axis, of_runs in errors.items():
         for name, column in zip(('measured', 'filtered'), of_runs.transpose(1, 2, 0)):
@@ -170,22 +150,19 @@ def figures() -> Drawings:
 
 
 def axis_figure(axis: str, first_number: int) -> Figure:
-    """Draw angle, a part of it, rate and acceleration of one flight, measured, filtered and true.
-
-    first_number: number of the first of the paper's four figures.
-    """
-    figure, axes = new_panels(4, height=9.0)
+    """Draw angle, a part of it, rate and acceleration of one flight; first_number: of the paper's four figures."""
+    figure, axes = fig.new_panels(4, height=9.0)
     t, target = flight()
     measured, filtered = flight_record(axis, run=0)
     # The second panel is a window of the first, so both show column 0, the angle.
     for i, (panel, column) in enumerate(zip(axes[:, 0], (0, 0, 1, 2))):
         begin, end = ZOOM_WINDOWS_S[axis] if i == 1 else (FLIGHT_START_S, FLIGHT_END_S)
         shown = (t >= begin) & (t <= end)
-        for values, colour, label, width in ((measured, RAW_COLOUR, 'measured', 0.5),
-                                             (filtered, FILTERED_COLOUR, 'filtered', 1.2)):
+        for values, colour, label, width in ((measured, fig.RAW_COLOUR, 'measured', 0.5),
+                                             (filtered, fig.FILTERED_COLOUR, 'filtered', 1.2)):
             panel.plot(t[shown], np.degrees(values[shown, column]), color=colour, label=label, linewidth=width)
-        panel.plot(t[shown], np.degrees(target[axis][shown, column]), color=INK_COLOUR, linestyle='--', linewidth=0.8,
-                   label='truth')
+        panel.plot(t[shown], np.degrees(target[axis][shown, column]), color=fig.INK_COLOUR, linestyle='--',
+                   linewidth=0.8, label='truth')
         name, unit = list(QUANTITY_UNITS.items())[column]
         panel.set_ylabel(f'{name} [{unit}]')
         panel.set_title(f'{axis}: {name} (figure {first_number + i} of the paper)')
@@ -195,5 +172,5 @@ def axis_figure(axis: str, first_number: int) -> Figure:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Fly `runs` flights."""
-    errors = (pool or monte_carlo.Pool(1)).of_cases(batch, AXES, runs, BATCH_RUNS, progress)
+    errors = of_cases(flight_errors, AXES, runs, pool, progress)
     return Result(rows(errors), figures(), remarks())

@@ -1,13 +1,9 @@
 """Acquisition: time to track a target, from power-up or after a loss, and share of searches that find the target.
 
-A case <scenario> runs the closed loop of a scenario with many seeds. In late_tle the satellite is 1 to 3 s late. A
-case search-<pattern> has one round of a search. Its target stands still anywhere in the searched area, with equal
-probability. The case steptrack_geo tracks a geostationary satellite by its signal level alone and has other metrics.
-
-tracked_after_s     time from the start, or from the loss of the signal, until the antenna remains in autotrack with
-                    the receiver locked
-found_percent       share of the runs that end in autotrack with the target in the beam
-found_percent_low   lower limit of its 95 % interval (Clopper and Pearson 1934)
+In late_tle the satellite is 1 to 3 s late. A case search-<pattern> has one round of a search. Its target stands still
+anywhere in the searched area, with equal probability. The case steptrack_geo tracks a geostationary satellite by its
+signal level alone and has other metrics. The metric tracked_after_s is the time until the antenna remains in autotrack
+with the receiver locked. The metric found_percent is the share of the runs that end so with the target in the beam.
 """
 import math
 from collections.abc import Mapping
@@ -24,13 +20,11 @@ from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Floats, Pairs, Radians, Row, Seconds
 from pedestal_results.intervals import CONFIDENCE_LEVEL, row
-from pedestal_results.report.figures import FILTERED_COLOUR, new_panels
-from pedestal_studies.result import Item, Result
-from pedestal_workbench.trials import monte_carlo
+from pedestal_results.report import figures as fig
+from pedestal_studies.result import FIRST_SEED, Result, of_cases, seeds
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
-DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
-BATCH_RUNS = 5  # runs that one worker makes at a time
+DEFAULT_RUNS = 100  # runs of each case
 
 ERROR_TOPIC, MODE_TOPIC = 'tracking_receiver/angle_error', 'acu/mode'
 
@@ -42,15 +36,12 @@ TARGET_ELEVATION_RAD = 0.6  # elevation of the target of the search cases [rad]
 
 SEARCH_PARAMETERS = {'acu.commands': '3 search', 'acu.search.rounds': 1, 'acu.acquisition.expected_dbhz': 0.0,
                      'tracking_receiver.receiver.cn0_dbhz': 46.4}
-"""Parameters that turn the scenario sidelobe into a case search-<pattern>."""
 
-SEARCH_DURATIONS_S = {'spiral': 85.0, 'raster': 55.0, 'square': 115.0, 'sector': 55.0}
-"""{pattern: duration of a run with one round and the acquisition after it [s]}."""
+SEARCH_DURATIONS_S = {'spiral': 85.0, 'raster': 55.0, 'square': 115.0, 'sector': 55.0}  # one round and acquisition
 
 FOUND_PERCENT_TARGET = '>= 99'  # target of found_percent
 
 CASE_NAMES = (*POWER_UP_CASES, *SIGNAL_LOSS_CASES, 'steptrack_geo', *(f'search-{name}' for name in SEARCH_PATTERNS))
-"""Names of all cases."""
 
 MAX_FOUND_ERROR_BEAMWIDTHS = 0.2  # largest true pointing error at which the target counts as in the beam [beamwidths]
 
@@ -78,8 +69,8 @@ def case_of(name: str, seed: int) -> Variant:
 def offset(pattern: int, rng: np.random.Generator, beamwidth: Radians = 0.0175) -> tuple[Radians, Radians]:
     """Return the (cross-elevation, elevation) of a random place in the full search area, from its centre.
 
-    pattern: code of the search pattern. beamwidth: that of the scenario sidelobe. The area of a spiral and of a square
-    pattern is a circle; a place outside the circle is drawn again. The area of the other patterns is a rectangle.
+    The area of a spiral and of a square pattern is a circle; a place outside the circle is drawn again. The area of
+    the other patterns is a rectangle.
     """
     p = SearchParameters()
     while True:
@@ -91,9 +82,9 @@ def offset(pattern: int, rng: np.random.Generator, beamwidth: Radians = 0.0175) 
 
 
 def tracked_after(run: Run, from_loss: bool) -> Seconds:
-    """Return the time until the target is tracked for the rest of the run; NaN if it is not tracked at the end.
+    """Return the time until the target is tracked for the rest of the run, or NaN.
 
-    from_loss: True to measure the time from the first loss of the signal in autotrack, False from the start.
+    from_loss: True to measure from the first loss of the signal in autotrack, False from the start.
     """
     tracked = (run[MODE_TOPIC] == Mode.AUTOTRACK) & np.isfinite(run[ERROR_TOPIC]['vector'][:, 0])
     if not tracked[-1]:
@@ -112,25 +103,17 @@ def off_axis(run: Run) -> Floats:
     return np.hypot(*run.truth['error'].T) / run.units['tracking_receiver'].parameters.antenna.beamwidth
 
 
-def batch(item: Item) -> Pairs:
-    """Return the values of every run of an item (case, first run, number of runs).
-
-    The values of a run are tracked_after_s, and 1 if the target is in the beam at the end, else 0. For steptrack_geo
-    the values are the rms of the lost level [dB] and the largest error [beamwidths].
-    """
-    name, first, count = item
-    values = []
-    for seed in range(FIRST_SEED + first, FIRST_SEED + first + count):
-        run = closed_loop.Loop(case_of(name, seed).load()).run()
-        off = off_axis(run)
-        if name == 'steptrack_geo':
-            settled = off[run.t > STEPTRACK_SETTLING_TIME_S]
-            level_loss_db = MAIN_LOBE_LOSS_DB * settled**2
-            values.append((math.sqrt(np.mean(level_loss_db**2)), settled.max()))
-        else:
-            after = tracked_after(run, name in SIGNAL_LOSS_CASES)
-            values.append((after, float(math.isfinite(after) and off[-1] < MAX_FOUND_ERROR_BEAMWIDTHS)))
-    return np.array(values)
+def measured(name: str, number: int) -> tuple[float, float]:
+    """Return tracked_after_s of one run, and 1 if the target is in the beam at the end, else 0. For steptrack_geo,
+    return the rms of the lost level [dB] and the largest error [beamwidths]."""
+    run = closed_loop.Loop(case_of(name, FIRST_SEED + number).load()).run()
+    off = off_axis(run)
+    if name == 'steptrack_geo':
+        settled = off[run.t > STEPTRACK_SETTLING_TIME_S]
+        level_loss_db = MAIN_LOBE_LOSS_DB * settled**2
+        return math.sqrt(np.mean(level_loss_db**2)), settled.max()
+    after = tracked_after(run, name in SIGNAL_LOSS_CASES)
+    return after, float(math.isfinite(after) and off[-1] < MAX_FOUND_ERROR_BEAMWIDTHS)
 
 
 def least_share(found: int, runs: int) -> float:
@@ -140,7 +123,7 @@ def least_share(found: int, runs: int) -> float:
 
 
 def rows(values: Mapping[str, Pairs]) -> list[Row]:
-    """Return the rows of the study; values: {case: as `batch` returns}."""
+    """Return the rows of the study; values: {case: as `measured` returns, of every run}."""
     table = []
     for name, of_runs in values.items():
         if name == 'steptrack_geo':
@@ -159,20 +142,19 @@ def rows(values: Mapping[str, Pairs]) -> list[Row]:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run every case `runs` times."""
-    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASE_NAMES, runs, BATCH_RUNS, progress)
+    values = of_cases(measured, CASE_NAMES, runs, pool, progress)
     return Result(rows(values), {'time': lambda: time_figure(values)},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. tracked_after_s is over the runs that found their '
-                   'target.'])
+                  [f'{seeds(runs)} tracked_after_s is over the runs that found their target.'])
 
 
 def time_figure(values: Mapping[str, Pairs]) -> Figure:
     """Draw tracked_after_s of every run that found its target; values as of `rows`."""
-    figure, axes = new_panels(1, height=3.8, x='time until the target is tracked [s]')
+    figure, axes = fig.new_panels(1, height=3.8, x='time until the target is tracked [s]')
     for name, of_runs in values.items():
         if name != 'steptrack_geo':
             tracked_after_s, in_beam = of_runs.T
             found = tracked_after_s[in_beam == 1.0]
-            axes[0, 0].plot(found, [name] * len(found), '|', color=FILTERED_COLOUR)
+            axes[0, 0].plot(found, [name] * len(found), '|', color=fig.FILTERED_COLOUR)
     axes[0, 0].invert_yaxis()
     axes[0, 0].set_xlim(left=0.0)
     return figure

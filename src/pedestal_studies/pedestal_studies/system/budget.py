@@ -1,15 +1,14 @@
 """The error budget of scenario station_real: each term alone, the sum of all terms, and the run with all terms.
 
-A term is a source of error, such as the tilt of the azimuth axis. Its contribution is the pointing error of a run with
-this term on, minus the error of a run with all terms off. The two runs have the same seed and are subtracted step by
-step. Systematic contributions are added as signed vectors along the pass, random contributions as squares:
+The contribution of a term is the pointing error of a run with this term on, minus the error of a run with all terms
+off. The two runs have the same seed and are subtracted step by step. Systematic contributions are added as signed
+vectors along the pass, random contributions as squares:
 
     combined^2 = mean |servo + sum of systematic|^2 + sum of mean |random|^2
 
 A random term has both contributions: <term>-mean is its mean over the seeds and systematic, its deviation from this
-mean is random. `servo` is the error with all terms off (lag, friction, quantisation, bending of the structure by the
-unbalance of its axis). `noise` is the deviation of that error between the seeds of the receiver. Cases are
-<mode>/<term>. Cases <mode>/<time>s give the signed contributions at that time of the pass.
+mean is random. `servo` is the error with all terms off. `noise` is the deviation of that error between the seeds of
+the receiver. Cases are <mode>/<term>. Cases <mode>/<time>s give the signed contributions at that time of the pass.
 """
 import dataclasses
 import functools
@@ -28,23 +27,19 @@ from pedestal_common.parameters import defaults
 from pedestal_common.quantities import Degrees, Floats, Pairs, Row, Seconds, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import pseudo_values, row
-from pedestal_results.report.figures import new_panels
-from pedestal_studies.result import Result
-from pedestal_workbench.trials import monte_carlo
+from pedestal_results.report import figures as fig
+from pedestal_studies.result import FIRST_SEED, Result, of_cases, seeds
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 SCENARIO_NAME = 'station_real'  # scenario of all runs, in which all terms are on
-DEFAULT_RUNS, FIRST_SEED = 30, 1  # runs of the random terms; seed of the first run
-
-BATCH_RUNS, RANDOM_SHARE = 3, 0.8
-"""Runs that one worker makes at a time; part of the progress bar for the runs of the random terms [-]."""
+DEFAULT_RUNS = 30  # runs of the random terms
+RANDOM_SHARE = 0.8  # part of the progress bar for the runs of the random terms [-]
 
 EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1  # start and period of the evaluation of the error [s]
 TABLE_TIMES_S = (30, 90, 150, 210, 270)  # times of the pass at which contributions are shown with their signs [s]
 ERROR_COLUMNS = ('cross_elevation', 'elevation')  # names of the two columns of an error
 
 MODE_OVERRIDES = {'program': ('acu.tracker.handover=false',), 'autotrack': ()}
-"""{mode: overrides (texts node.key=value) with which the antenna points in this mode}."""
 
 
 class Term(typing.NamedTuple):
@@ -88,8 +83,7 @@ ERROR_TERMS = (
          'level lost by polarisation mismatch'))
 NO_TERMS, ALL_TERMS = 'none', 'whole'  # values of `on` in place of the name of a term: no term, every term
 
-RECEIVER_TERMS = ('boresight', 'multipath', 'scintillation', 'polarisation')
-"""Terms of the receiver, which do not affect program track."""
+RECEIVER_TERMS = ('boresight', 'multipath', 'scintillation', 'polarisation')  # have no effect in program track
 
 
 def active_terms(mode: str) -> list[Term]:
@@ -138,10 +132,8 @@ class Pass:
 
 
 def _run(mode: str, on: str, seed: int, duration: Seconds | None) -> Run:
-    """Return the run of a mode, with a step every EVALUATION_PERIOD_S from EVALUATION_START_S on.
-
-    on: as of `overrides`. duration: length of the run, None for that of the scenario.
-    """
+    """Return the run of a mode, with a step every EVALUATION_PERIOD_S from EVALUATION_START_S on; on: as of
+    `overrides`; duration: None for that of the scenario."""
     chosen = scenario.load(SCENARIO_NAME, [*overrides(mode, on), f'adu.wind.field.seed={seed}'], seed=seed,
                            duration=duration)
     run = closed_loop.Loop(chosen).run()
@@ -156,11 +148,9 @@ def pass_angles(duration: Seconds | None) -> Pass:
     return Pass(run.t, azimuth, elevation)
 
 
-def batch(item: tuple[tuple[str, str], int, int], duration: Seconds | None = None) -> Floats:
-    """Return errors (count, n, 2) [deg], cross-elevation and elevation, of an item ((mode, on), first run, count)."""
-    (mode, on), first, count = item
-    return np.array([np.degrees(_run(mode, on, FIRST_SEED + first + i, duration).truth['error'])
-                     for i in range(count)])
+def errors(case: tuple[str, str], run: int, duration: Seconds | None = None) -> Pairs:
+    """Return the errors [deg], cross-elevation and elevation, of one run of a case (mode, on)."""
+    return np.degrees(_run(*case, FIRST_SEED + run, duration).truth['error'])
 
 
 def rms(errors: Floats) -> Floats:
@@ -193,11 +183,8 @@ class Budget:
 
     @property
     def random(self) -> dict[str, Floats]:
-        """Random contributions {name: (runs, n, 2)}: deviations from the mean over the runs.
-
-        Because the mean of n runs follows their errors, the deviations are too small. The factor sqrt(n / (n - 1))
-        corrects this.
-        """
+        """Random contributions {name: (runs, n, 2)}: deviations from the mean over the runs. Because this mean follows
+        the errors, the deviations are too small; the factor sqrt(n / (n - 1)) corrects this."""
         off = {'noise': self.base} if len(self.base) > 1 else {}
         return {name: (e - e.mean(axis=0)) * np.sqrt(len(e) / (len(e) - 1.0))
                 for name, e in (off | self.seeded).items()}
@@ -215,24 +202,23 @@ class Budget:
         return self.combined / float(np.sqrt(np.mean(rms(self.whole) ** 2)))
 
 
-def budget(mode: str, runs: int, duration: Seconds | None, pool: Pool, progress: Progress) -> Budget:
+def budget(mode: str, runs: int, duration: Seconds | None, pool: Pool | None, progress: Progress) -> Budget:
     """Return the budget of a mode, with `runs` runs of the random terms."""
-    of_batch = functools.partial(batch, duration=duration)
+    measured = functools.partial(errors, duration=duration)
     seeded, once = ([term.name for term in active_terms(mode) if term.random == kind] for kind in (True, False))
     # Only in autotrack the noise of the receiver reaches the antenna, so only there the run without terms is random.
     random, systematic = [*seeded, ALL_TERMS], list(once)
     (random if mode == 'autotrack' else systematic).append(NO_TERMS)
-    errors = pool.of_cases(of_batch, [(mode, on) for on in random], runs, BATCH_RUNS,
-                           lambda share, text: progress(RANDOM_SHARE * share, text))
-    errors |= pool.of_cases(of_batch, [(mode, on) for on in systematic], 1, 1,
-                            lambda share, text: progress(RANDOM_SHARE + (1.0 - RANDOM_SHARE) * share, text))
-    base = errors[mode, NO_TERMS]
-    return Budget(base, {name: (errors[mode, name] - base[:1])[0] for name in once},
-                  {name: errors[mode, name] - base for name in seeded}, errors[mode, ALL_TERMS])
+    found = of_cases(measured, [(mode, on) for on in random], runs, pool,
+                    lambda share, text: progress(RANDOM_SHARE * share, text), size=3)
+    found |= of_cases(measured, [(mode, on) for on in systematic], 1, pool,
+                     lambda share, text: progress(RANDOM_SHARE + (1.0 - RANDOM_SHARE) * share, text), size=1)
+    base = found[mode, NO_TERMS]
+    return Budget(base, {name: (found[mode, name] - base[:1])[0] for name in once},
+                  {name: found[mode, name] - base for name in seeded}, found[mode, ALL_TERMS])
 
 
 def _sizes(case: str, e: Floats) -> list[Row]:
-    """Return the rows of the rms of an error e (n, 2), or of the error of several runs (runs, n, 2) [deg]."""
     return [row(case, 'rms_deg', rms(e), 'deg'),
             *(row(case, f'{axis}_rms_deg', tracking.rms(e[..., i], axis=-1), 'deg')
               for i, axis in enumerate(ERROR_COLUMNS))]
@@ -262,31 +248,24 @@ def rows(mode: str, made: Budget, place: Pass) -> list[Row]:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
         duration: Seconds | None = None) -> Result:
-    """Measure the budget of every mode.
-
-    duration: length of the pass, None for the length of the
-    scenario.
-    """
+    """Measure the budget of every mode; duration: length of the pass, None for that of the scenario."""
     if runs < 3:
         raise ValueError(f'--runs {runs}: must be at least 3, because random and systematic errors are separated by '
                          'their spread over the runs')
     def progress_of(i: int) -> Progress:
         return lambda share, text: progress((i + share) / len(MODE_OVERRIDES), text)
 
-    pool, place = pool or monte_carlo.Pool(1), pass_angles(duration)
-    made: dict[str, Budget] = {}
-    for i, mode in enumerate(MODE_OVERRIDES):
-        made[mode] = budget(mode, runs, duration, pool, progress_of(i))
+    place = pass_angles(duration)
+    made = {mode: budget(mode, runs, duration, pool, progress_of(i)) for i, mode in enumerate(MODE_OVERRIDES)}
     table = [line for mode, of_mode in made.items() for line in rows(mode, of_mode, place)]
     return Result(table, {'budget': functools.partial(figure, made, place)},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. `pedestal run {SCENARIO_NAME}` is a run of case '
-                   'autotrack/whole.'],
+                  [f'{seeds(runs)} `pedestal run {SCENARIO_NAME}` is a run of case autotrack/whole.'],
                   [line for line in table if not line['case'].endswith('s')])
 
 
 def figure(made: Mapping[str, Budget], place: Pass) -> Figure:
     """Draw the rms of all contributions in every mode, and the systematic sum beside the runs with all terms on."""
-    drawn, axes = new_panels(len(made), 2, height=7.0, x='')
+    drawn, axes = fig.new_panels(len(made), 2, height=7.0, x='')
     for (left, right), (mode, of_mode) in zip(axes, made.items()):
         sizes = {name: np.mean(rms(e)) for name, e in (*of_mode.systematic.items(), *of_mode.random.items())}
         left.barh(list(sizes), list(sizes.values()))

@@ -5,18 +5,13 @@ run has its own seed of receiver noise and wind:
 
     1. four passes in autotrack, which begin with a search, on a calm day with measured refractivity; `calibrate
        pointing` takes POINTS_PER_PASS offsets from each of them
-    2. four scans of the sun on the same days, scenario station_sun; `calibrate pointing` takes an offset from each of
-       them, 40 offsets in all
+    2. four scans of the sun on the same days, scenario station_sun; an offset from each of them
     3. a fifth pass in program track, in directions that were not used, with the wind and the refractivity of the
-       scenario: the pointing error without a model (`raw`), and with the model of steps 1 and 2
-       (`calibrated`)
+       scenario: the pointing error without a model (`raw`), and with the model of TERMS (`calibrated`)
 
-The model has the default terms and those of the eccentric encoders (TERMS). `leave_one_out_default_rms_deg` is the
-leave-one-out rms of the default terms alone, by which an operator decides for more terms.
-
-The rows of case `terms` state the terms of the model and their true values. `within_3_sigma` is the share of the
-terms, over all runs, whose error is below three of their sigmas; `cases` is their number. A term that was dropped
-counts with the value 0 and the sigma that it had before.
+`leave_one_out_default_rms_deg` is that of the default terms alone, by which an operator decides for more terms.
+`within_3_sigma` is the share of the terms, over all runs, whose error is below three of their sigmas. A term that was
+dropped counts with the value 0 and the sigma that it had before.
 """
 import dataclasses
 import functools
@@ -34,21 +29,19 @@ from pedestal_bringup.scenario.program import Plan
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.quantities import Degrees, Floats, Radians, Seconds
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import new_panels
+from pedestal_results.report import figures as fig
 from pedestal_results.tracking import rms
-from pedestal_studies.result import Result
+from pedestal_studies.result import FIRST_SEED, Result, of_cases
 from pedestal_workbench.calibration import collect, pointing, scan
 from pedestal_workbench.calibration.collect import Point
 from pedestal_workbench.calibration.offsets import Offsets
 from pedestal_workbench.calibration.pointing import PointingCalibration
 from pedestal_workbench.calibration.terms import DEFAULT_TERMS
-from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 SCENARIO_NAME, SCAN_SCENARIO_NAME = 'station_new', 'station_sun'  # scenario of the passes, and of the scans of the sun
-DEFAULT_RUNS, FIRST_SEED = 30, 1  # number of runs; seed of the first run
-TERMS = (*DEFAULT_TERMS, 'P11', 'P13', 'P14')
-"""Terms of the model: the default terms and the eccentricity of both encoders."""
+DEFAULT_RUNS = 30
+TERMS = (*DEFAULT_TERMS, 'P11', 'P13', 'P14')  # with the eccentricity of both encoders
 POINTS_PER_PASS = 9  # number of offsets from a pass
 
 CALIBRATION_PASSES = ('2019-12-09T16:38:33Z', '2019-12-10T17:26:30Z', '2019-12-11T16:38:10Z', '2019-12-10T12:35:55Z')
@@ -61,21 +54,15 @@ SCANS = '2019-12-09T09:00:00Z', '2019-12-10T10:20:00Z', '2019-12-10T12:00:00Z', 
 SCAN_OVERRIDES = ('adu.wind.field.speed=2',)  # overrides of the scans: the wind of the calibration passes
 SEEDS_PER_RUN = len(CALIBRATION_PASSES) + len(SCANS) + 1  # number of passes and scans of a run, and thus of its seeds
 PROGRAM_OVERRIDES = 'acu.initial_mode=program', 'acu.tracker.handover=false'
-"""Overrides with which the antenna follows the program track alone."""
-TEST_PASS = '2019-12-12T15:49:47Z'
-"""UTC of the begin of the pass on which the model is tested; the culmination is 48 deg."""
+TEST_PASS = '2019-12-12T15:49:47Z'  # UTC of the begin of the test pass; the culmination is 48 deg
 
 EVALUATION_START_S, EVALUATION_PERIOD_S = 15.0, 0.1  # start and period of the evaluation of the error [s]
 
 
 def of_pass(begin: str, seed: int, changes: Sequence[str] = (), duration: Seconds | None = None,
             name: str = SCENARIO_NAME, low: Radians = -np.pi) -> Scenario:
-    """Return the scenario of a pass or a scan that begins at a UTC.
-
-    The antenna begins at the first predicted direction.
-
-    low: least azimuth at which the antenna begins
-    """
+    """Return the scenario of a pass or a scan that begins at a UTC. The antenna begins at the first predicted
+    direction; low: least azimuth at which it begins."""
     chosen = [f'tracking_receiver.target.leo_pass.start_time={begin}', f'adu.wind.field.seed={seed}', *changes]
     _, angles = Plan(scenario.load(name, chosen, seed, duration)).tables['']
     azimuth, elevation = float(np.remainder(angles[0, 0] - low, 2.0 * np.pi) + low), float(angles[0, 1])
@@ -91,10 +78,8 @@ def offsets_of(begin: str, seed: int, duration: Seconds | None = None) -> tuple[
 
 
 def offset_of_sun(begin: str, seed: int) -> tuple[str, list[Point]]:
-    """Return (label, points) of a scan of the sun, for collect.joined.
-
-    The azimuth begins on the turn of the wrap that holds the whole day of the sun.
-    """
+    """Return (label, points) of a scan of the sun, for collect.joined. The azimuth begins on the turn of the wrap that
+    holds the whole day of the sun."""
     chosen = of_pass(begin, seed, SCAN_OVERRIDES, None, SCAN_SCENARIO_NAME, -1.5 * np.pi)
     return begin, collect.listed('scan', scan.points(memory_recording.record(chosen), [])[:3])
 
@@ -122,10 +107,8 @@ def measured(seed: int, duration: Seconds | None = None) -> Offsets:
 
 
 def bending(axis: AxisParameters) -> Radians:
-    """Return the largest deflection of the dish by its unbalance, at elevation 0.
-
-    The stiffness of the structure follows from the frequency at which the dish swings on it.
-    """
+    """Return the largest deflection of the dish by its unbalance, at elevation 0. The stiffness of the structure
+    follows from the frequency at which the dish swings on it."""
     structure, load = axis.structure, axis.load
     return load.unbalance / ((2.0 * math.pi * structure.frequency)**2 * structure.inertia_share * load.inertia)
 
@@ -150,20 +133,11 @@ def truth() -> dict[str, Degrees]:
 
 MEASURED_NAMES = ('raw_rms_deg', 'calibrated_rms_deg', 'residual_rms_deg', 'leave_one_out_rms_deg',
                   'leave_one_out_default_rms_deg', 'points')
-"""Names of the numbers of a run, before the values and the sigmas of the terms."""
 
 
-def batch(item: tuple[None, int, int], duration: Seconds | None = None) -> Floats:
-    """Return numbers (count, k) of an item (None, first run, count).
-
-    The numbers are MEASURED_NAMES, then the values of TERMS and their sigmas.
-    """
-    _, first, count = item
-    return np.array([_numbers(FIRST_SEED + first + i, duration) for i in range(count)])
-
-
-def _numbers(seed: int, duration: Seconds | None) -> list[float]:
-    """Return the numbers of a run."""
+def numbers_of_run(case: None, run: int, duration: Seconds | None) -> list[float]:
+    """Return the numbers of a run: MEASURED_NAMES, then the values of TERMS and their sigmas."""
+    seed = FIRST_SEED + run
     offsets = measured(seed, duration)
     found, default = (pointing.calibrate(offsets, names, 'exact') for names in (TERMS, DEFAULT_TERMS))
     return [program_error(seed, (), duration), program_error(seed, overrides(found), duration),
@@ -172,7 +146,6 @@ def _numbers(seed: int, duration: Seconds | None) -> list[float]:
 
 
 def _of_terms(found: PointingCalibration) -> tuple[float, ...]:
-    """Return the values of TERMS, then their sigmas."""
     values = dict(zip(found.fit.names, zip(found.fit.values, found.fit.sigma)))
     values |= {name: (0.0, sigma) for name, _, sigma in found.dropped}
     return *(values[name][0] for name in TERMS), *(values[name][1] for name in TERMS)
@@ -180,12 +153,8 @@ def _of_terms(found: PointingCalibration) -> tuple[float, ...]:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
         duration: Seconds | None = None) -> Result:
-    """Measure the calibration over seeds.
-
-    duration: length of a pass, None for that of the scenario.
-    """
-    pool = pool or monte_carlo.Pool(1)
-    numbers = pool.of_cases(functools.partial(batch, duration=duration), [None], runs, 1, progress)[None]
+    """Measure the calibration over seeds; duration: length of a pass, None for that of the scenario."""
+    numbers = of_cases(functools.partial(numbers_of_run, duration=duration), [None], runs, pool, progress, 1)[None]
     targets = {'calibrated_rms_deg': '<= 0.01'}
     rows = [row('program track', name, numbers[:, i], '' if name == 'points' else 'deg', target=targets.get(name))
             for i, name in enumerate(MEASURED_NAMES)]
@@ -206,7 +175,7 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None,
 
 def figure(numbers: Floats, errors: Floats, sigmas: Floats) -> Figure:
     """Draw the program-track error of each run before and after, and the errors of the terms in sigmas."""
-    drawn, ((left, right),) = new_panels(1, 2, height=3.0, x=('run', 'term'))
+    drawn, ((left, right),) = fig.new_panels(1, 2, height=3.0, x=('run', 'term'))
     for i, name in enumerate(('without a model', 'calibrated')):
         left.semilogy(np.arange(len(numbers)), numbers[:, i], '.', label=name)
     left.axhline(0.01, linewidth=0.8, linestyle='--')

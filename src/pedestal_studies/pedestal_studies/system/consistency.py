@@ -1,9 +1,8 @@
 """Consistency of the default target filter, second by second after its start.
 
-NEES is the squared error of angle and rate over the covariance that the filter states, against the direction that
-sensors without noise would measure (`pedestal_results.consistency`). A consistent filter has 2. A larger
-value means that the filter is too sure. Cases are scenarios; a metric nees_AXIS_T_s is the mean of one second about
-T [s] after the first estimate of the filter.
+NEES is the squared error of angle and rate over the covariance that the filter states
+(`pedestal_results.consistency`). A consistent filter has 2. A larger value means that the filter is too sure. Cases
+are scenarios; a metric nees_AXIS_T_s is the mean of one second about T [s] after the first estimate of the filter.
 """
 import functools
 from collections.abc import Mapping
@@ -17,13 +16,11 @@ from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Floats, Pairs, Row
 from pedestal_results import consistency, tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, TRUTH_COLOUR, new_panels
-from pedestal_studies.result import Item, Result, legend
-from pedestal_workbench.trials import monte_carlo
+from pedestal_results.report import figures as fig
+from pedestal_studies.result import FIRST_SEED, Result, legend, of_cases, seeds
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
-DEFAULT_RUNS, FIRST_SEED = 100, 1  # runs of each case; seed of the first run
-BATCH_RUNS = 5  # runs that one worker makes at a time
+DEFAULT_RUNS = 100  # runs of each case
 TIMES_S = (5.0, 10.0, 30.0, 60.0, 120.0)  # times after the first estimate [s]
 DURATION_S = 125.0
 WINDOW_S = 1.0  # span of a mean [s]
@@ -35,9 +32,9 @@ CASES = {name: Variant(name, duration=DURATION_S) for name in SCENARIOS}
 MAX_NEES = 2.4  # largest NEES of a filter that is not too sure: 2 plus 20 %
 
 
-def nees(variant: Variant) -> Pairs:
-    """Return the NEES of one run at TIMES_S, NaN without an estimate at that time."""
-    recorded = memory_recording.record(variant.load())
+def nees(name: str, run: int) -> Pairs:
+    """Return the NEES of one run of one of CASES at TIMES_S, NaN without an estimate at that time."""
+    recorded = memory_recording.record(CASES[name].with_(seed=FIRST_SEED + run).load())
     found = consistency.read(recorded, tracking.read(recorded))
     assert found is not None
     known = np.isfinite(found.nees[:, 0])
@@ -46,12 +43,6 @@ def nees(variant: Variant) -> Pairs:
     after = found.t - found.t[np.argmax(known)]
     values = [found.nees[(np.abs(after - time) <= 0.5 * WINDOW_S) & known] for time in TIMES_S]
     return np.array([value.mean(axis=0) if len(value) else (np.nan, np.nan) for value in values])
-
-
-def batch(item: Item) -> Floats:
-    """Return the NEES (count, len(TIMES_S), 2) of an item (case, first run, number of runs)."""
-    name, first, count = item
-    return np.array([nees(CASES[name].with_(seed=FIRST_SEED + first + i)) for i in range(count)])
 
 
 def rows(values: Mapping[str, Floats]) -> list[Row]:
@@ -63,16 +54,16 @@ def rows(values: Mapping[str, Floats]) -> list[Row]:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run every case `runs` times."""
-    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
+    values = of_cases(nees, CASES, runs, pool, progress)
     return Result(rows(values), {'nees': functools.partial(figure, values)},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. A filter is too sure above {MAX_NEES:g}.'])
+                  [f'{seeds(runs)} A filter is too sure above {MAX_NEES:g}.'])
 
 
 def figure(values: Mapping[str, Floats]) -> Figure:
     """Draw the mean NEES of both axes over the time after the start, a panel for each scenario."""
-    drawn, axes = new_panels(len(values), height=1.1 * len(values) + 1.0, y='NEES', sharex=True)
+    drawn, axes = fig.new_panels(len(values), height=1.1 * len(values) + 1.0, y='NEES', sharex=True)
     for panel, (name, of_runs) in zip(axes[:, 0], values.items()):
-        for i, (axis, colour) in enumerate(zip(AXES, (FILTERED_COLOUR, TRUTH_COLOUR))):
+        for i, (axis, colour) in enumerate(zip(AXES, (fig.FILTERED_COLOUR, fig.TRUTH_COLOUR))):
             known = np.isfinite(of_runs[:, :, i]).any(axis=0)
             panel.semilogy(np.array(TIMES_S)[known], np.nanmean(of_runs[:, known, i], axis=0), 'o-', color=colour,
                            label=axis)

@@ -1,35 +1,26 @@
 """Every fault that can be injected, in every mode, against the expectation of an operator.
 
 A case NODE.FAULT/MODE is the closed loop of the scenario ship_pass in a mode. At 10 s a fault with its defaults is
-injected for 5 s, and the run ends 5 s after the fault. FAULT_EXPECTATIONS holds the expectations. The study
-measures three numbers of each case:
-
-told_after_steps    number of steps from the onset to the first report; a report is an alarm, or a diagnostic text that
-                    the node does not publish without the fault
-ends_as_expected    1 if the mode at the end is one of the expected modes, else 0
-largest_error_deg   largest error against truth while the mode is kept
-
-The error depends on the mode:
+injected for 5 s, and the run ends 5 s after the fault. The study measures the steps from the onset to the first
+report, whether the mode at the end is expected, and the largest error while the mode is kept. A report is an alarm, or
+a diagnostic text that the node does not publish without the fault. The error depends on the mode:
 
 TOWARDS_TARGET_MODES   pointing error, the angle from the true beam to the true target
 slave, sun             angle from the true beam to the commanded direction, or to the sun
 rate                   angle on the deck to a place that moves with the commanded rate from the place at the onset
 all other modes        angle on the deck to the place at the onset
 
-The expectations are those of an operator. They follow from the purpose of the antenna, and were written without regard
-to the behaviour of the product. An error of half a beamwidth (0.5 deg) lowers the signal level by 3 dB, and the
-receiver error still leads the beam back to the target. An error of a tenth of the beamwidth (0.1 deg) costs 0.12 dB
-and counts as on target. In standby the antenna stays at its place within half a beamwidth. A step is 5 ms: 20 steps
-are 0.1 s, 60 steps 0.3 s, 100 steps 0.5 s, 200 steps 1 s.
+The expectations follow from the purpose of the antenna, and were written without regard to the behaviour of the
+product. An error of half a beamwidth (0.5 deg) lowers the signal level by 3 dB, and the receiver error still leads the
+beam back to the target. An error of a tenth of the beamwidth (0.1 deg) costs 0.12 dB and counts as on target. In
+standby the antenna stays at its place within half a beamwidth. A step is 5 ms.
 
 The drive must report a trip or missing commands within 0.1 s. A fault that shows only in motion must be reported
 within 1 s. Nothing moves by itself after a fault that ended in standby.
 
-The modes that use the signal level (search, acquire, steptrack) lead to autotrack. The permitted error in these modes
-is the largest distance of their beam from the target. This is the distance across the searched area, the distance in
-the look-around (short motions of the beam about a peak of the level), or half a beamwidth.
-Because they point by the attitude as program does, the expectations of program hold for them. The faults of the
-receiver are the exception: they affect these modes as they affect autotrack.
+The modes that use the signal level (search, acquire, steptrack) lead to autotrack. Because they point by the attitude
+as program does, the expectations of program hold for them. The faults of the receiver are the exception: they affect
+these modes as they affect autotrack.
 """
 import typing
 from collections.abc import Mapping, Sequence
@@ -50,7 +41,7 @@ from pedestal_common.graph.modes import MODE_ROWS, MODES
 from pedestal_common.injection import table
 from pedestal_common.quantities import Degrees, Floats, Radians, RadiansPerSecond, Row, Times, Vectors3
 from pedestal_results.intervals import missed, row
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies.result import Result
 from pedestal_workbench.trials.monte_carlo import Progress
 from tracking_receiver_sim.params import LeoPassParameters
@@ -92,31 +83,21 @@ EXPECT_TRIP = Expectation(4, STANDBY_MODE, HALF_BEAMWIDTH_DEG)
 
 MOVING_MODES = ('rate',)  # mode that moves the axes on the deck
 FOLLOWING_MODES = tuple(row.name for row in MODE_ROWS if row.follows and not row.by_level)
-"""Modes that follow a direction in earth angles, for which the attitude is needed."""
 STILL_MODES = tuple(row.name for row in MODE_ROWS if not row.follows and row.name not in MOVING_MODES)
-"""Modes in which the axes end at rest on the deck."""
 LEVEL_INDEPENDENT_MODES = (*STILL_MODES, *MOVING_MODES, *FOLLOWING_MODES)  # modes that do not use the signal level
 
 
 def _in_every_mode(expected: Expectation) -> Expectations:
-    """Return one expectation for every mode.
-
-    Because the antenna does not point in standby, at least half a beamwidth is permitted there.
-    """
+    """Return one expectation for every mode. Because standby does not point, it permits half a beamwidth."""
     resting = expected._replace(error=max(expected.error or HALF_BEAMWIDTH_DEG, HALF_BEAMWIDTH_DEG))
     return {**dict.fromkeys(LEVEL_INDEPENDENT_MODES, expected), 'standby': resting}
 
 
 def _when_moving(expected: Expectation, still: Expectation = EXPECT_NO_EFFECT) -> Expectations:
-    """Return `expected` for the modes that move the axes, `still` for the modes at rest."""
     return {**_in_every_mode(still), **dict.fromkeys((*MOVING_MODES, *FOLLOWING_MODES), expected)}
 
 
 def _in_autotrack(report_steps: int | None, error: Degrees | None, *end: str) -> Expectations:
-    """Return the expectations of a fault that affects only autotrack, where the receiver closes the loop.
-
-    end: permitted modes at the end.
-    """
     return {**_in_every_mode(EXPECT_NO_EFFECT), 'autotrack': Expectation(report_steps, end, error)}
 
 
@@ -125,20 +106,15 @@ _STANDBY_OR_SAME_MODE = {mode: ('standby', mode) for mode in LEVEL_INDEPENDENT_M
 
 def _attitude_fault(report_steps: int | None, error: Degrees | None,
                     still_report_steps: int | None = None) -> Expectations:
-    """Return the expectations of a wrong or missing attitude.
-
-    Without attitude no target can be followed, so a mode may end in standby. A mode that bridges the fault may remain.
-    still_report_steps: as report_steps, for the modes that do not need the attitude.
-    """
+    """Return the expectations of a wrong or missing attitude. Without attitude no target can be followed, so a mode
+    may end in standby. A mode that bridges the fault may remain."""
     return {**_in_every_mode(Expectation(still_report_steps, SAME_MODE, TENTH_BEAMWIDTH_DEG)),
             **{mode: Expectation(report_steps, _STANDBY_OR_SAME_MODE[mode], error) for mode in FOLLOWING_MODES}}
 
 
 def _heading_fault() -> Expectations:
-    """Return the expectations of an attitude that is wrong by more than half a beamwidth.
-
-    Only autotrack can point better than the attitude is known.
-    """
+    """Return the expectations of an attitude that is wrong by more than half a beamwidth. Only autotrack can point
+    better than the attitude is known."""
     return {**_in_every_mode(EXPECT_NO_EFFECT),
             **{mode: Expectation(200, (mode, 'standby'), None) for mode in FOLLOWING_MODES},
             'autotrack': Expectation(200, ('autotrack', 'program'), HALF_BEAMWIDTH_DEG)}
@@ -160,10 +136,6 @@ SIGNAL_LOSS_FAULTS, WRONG_ERROR_FAULTS = ('drop', 'freeze', 'nan', 'clock_step')
 
 
 def _signal_level_modes(of_modes: Expectations, node: str, fault: str) -> Expectations:
-    """Return the expectations of the modes that use the signal level, derived from the other modes.
-
-    of_modes: expectations of the other modes. node, fault: names of the node and of its fault.
-    """
     (report_steps, end, error), permitted_errors = of_modes['program'], LEVEL_MODE_ERRORS_DEG
     if node == 'tracking_receiver' and fault == 'fade':
         report_steps, end = None, ('program',)
@@ -179,10 +151,8 @@ def _signal_level_modes(of_modes: Expectations, node: str, fault: str) -> Expect
 
 
 def _unstow_expectation(fault: str, of_modes: Expectations) -> Expectation:
-    """Return the expectation in mode unstow, derived from that in standby.
-
-    In both modes the brakes hold the antenna. A trip need not end the mode unstow.
-    """
+    """Return the expectation in mode unstow, derived from that in standby. In both modes the brakes hold the antenna.
+    A trip need not end the mode unstow."""
     expected = of_modes['standby']
     expected = expected._replace(end=expected.end and _STANDBY_OR_SAME_MODE['unstow'])
     # An inverter that is off has no effect until the drive commands torque.
@@ -237,26 +207,20 @@ _LEVEL_INDEPENDENT_EXPECTATIONS = {
 FAULT_EXPECTATIONS = {name: {**of_modes, **_signal_level_modes(of_modes, *name.split('.')),
                              'unstow': _unstow_expectation(name, of_modes)}
                       for name, of_modes in _LEVEL_INDEPENDENT_EXPECTATIONS.items()}
-"""{'NODE.FAULT': {mode: Expectation}} of every fault with its defaults and a duration of 5 s."""
 
 
 SCENARIO_NAME, FAULT_ONSET_S, FAULT_DURATION_S, RUN_DURATION_S = 'ship_pass', 10.0, 5.0, 20.0
-"""Scenario of all cases; onset and duration of the fault, and duration of a run [s]."""
 BASELINE_START_S = 5.0
 """Time from which the reports of a run without a fault are collected; earlier reports belong to the start [s]."""
 
-AZIMUTH_RATE_RAD_S, SLAVE_DIRECTION_RAD = 0.02, (0.5, 0.6)
-"""Commanded azimuth rate in mode rate [rad/s]; azimuth and elevation in mode slave [rad]."""
+AZIMUTH_RATE_RAD_S, SLAVE_DIRECTION_RAD = 0.02, (0.5, 0.6)  # commands of modes rate and slave
 
-RATE_COMMANDS = '; '.join(f'{t:g} rate azimuth={AZIMUTH_RATE_RAD_S}'
+RATE_COMMANDS = '; '.join(f'{t:g} rate azimuth={AZIMUTH_RATE_RAD_S}'  # repeated, because one is valid for 0.5 s
                           for t in np.arange(BASELINE_START_S, RUN_DURATION_S + 0.5, 0.25))
-"""Commands of mode rate, repeated because a rate command is valid for 0.5 s."""
 
-PROGRAM_OFFSET_RAD = 0.05
-"""Elevation error of the program track in mode search [rad], so that the search takes some time."""
+PROGRAM_OFFSET_RAD = 0.05  # elevation error of the program track in mode search, so that the search takes some time
 
-START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
-"""Parameter with the time of the start of a run (UTC)."""
+START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'  # UTC
 
 _SPECIAL_MODE_PARAMETERS = {
     'stop': ['acu.commands=1 stop'],
@@ -278,12 +242,10 @@ _SPECIAL_MODE_PARAMETERS = {
 time of tle gives the pass of the other modes. At the start time of sun the sun is above the horizon."""
 
 MODE_PARAMETERS = {mode: _SPECIAL_MODE_PARAMETERS.get(mode, [f'acu.initial_mode={mode}']) for mode in MODES}
-"""{mode: overrides with which a run is in this mode at the onset of the fault}."""
 
 ALARM_SOURCE = 'alarm'  # source of a report that is an alarm, in place of the name of a node
 
-ON_TARGET_MODES = ('program', 'tle', 'autotrack')
-"""Modes that follow the target; a change between them does not count as leaving the mode."""
+ON_TARGET_MODES = ('program', 'tle', 'autotrack')  # a change between them does not count as leaving the mode
 
 TOWARDS_TARGET_MODES = ('search', 'acquire', 'steptrack', *ON_TARGET_MODES)
 """Modes that use the signal level, and the modes to which they lead. A change between them does not count
@@ -315,10 +277,9 @@ class FaultOutcome(typing.NamedTuple):
 
 
 def run_of(mode: str, inject: str = '') -> tuple[Run, list[Report]]:
-    """Return a run of a mode and its reports.
+    """Return a run of a mode and its reports: active alarms and diagnoses at each step at which they are read.
 
-    inject: text NODE.inject=... of the fault, '' for a run without a fault. The reports are the active alarms and the
-    diagnosis of every node, at each step at which they are read.
+    inject: text NODE.inject=... of the fault, '' for a run without a fault.
     """
     chosen = scenario.load(SCENARIO_NAME, [*MODE_PARAMETERS[mode], 'scenario.program.time_offset=0',
                                            *filter(None, [inject])],
@@ -342,10 +303,8 @@ def run_of(mode: str, inject: str = '') -> tuple[Run, list[Report]]:
 
 
 def errors(run: Run, mode: str) -> Floats:
-    """Return the error [deg] of every step from the onset until the mode is left; NaN before and after.
-
-    A change within ON_TARGET_MODES or TOWARDS_TARGET_MODES does not leave the mode.
-    """
+    """Return the error [deg] of every step from the onset until the mode is left; NaN before and after. A change
+    within ON_TARGET_MODES or TOWARDS_TARGET_MODES does not leave the mode."""
     onset = int(np.searchsorted(run.t, FAULT_ONSET_S - 1e-9))
     same_modes = next((group for group in (ON_TARGET_MODES, TOWARDS_TARGET_MODES) if mode in group), (mode,))
     if mode in TOWARDS_TARGET_MODES:
@@ -368,10 +327,8 @@ def direction_error(run: Run, directions: Vectors3) -> Floats:
 
 
 def deck_error(run: Run, onset: int, azimuth_rate: RadiansPerSecond) -> Floats:
-    """Return the angle [rad] on the deck between the axes and their expected place.
-
-    The expected place is that before step `onset`, and moves on from there with azimuth_rate.
-    """
+    """Return the angle [rad] on the deck between the axes and their place before step `onset`, which moves on from
+    there with azimuth_rate."""
     angles = run['adu/truth']['position']
     azimuth, elevation = angles[onset - 1]
     turned = azimuth_rate * (run.t - run.t[onset - 1])
@@ -462,20 +419,16 @@ def run(progress: Progress) -> Result:
 
 DRAWN_FAULTS = ('adu.gust', 'adu.motor_loss', 'adu.drop', 'tracking_receiver.fade', 'tracking_receiver.wrong_slope',
                 'ins.drop')
-"""Faults of the figure."""
 
 
 def figure(of_cases: Mapping[str, Floats]) -> Figure:
-    """Draw the error of DRAWN_FAULTS in autotrack over time, with a line at half a beamwidth.
-
-    of_cases: {case: error [deg]}.
-    """
-    made, axes = new_panels(len(DRAWN_FAULTS), height=9.0, x='time from the onset [s]', y='[deg]', sharex=True)
+    """Draw the error [deg] of DRAWN_FAULTS in autotrack over time, with a line at half a beamwidth."""
+    made, axes = fig.new_panels(len(DRAWN_FAULTS), height=9.0, x='time from the onset [s]', y='[deg]', sharex=True)
     for panel, fault in zip(axes[:, 0], DRAWN_FAULTS):
         error = of_cases[f'{fault}/autotrack']
-        panel.plot(np.linspace(0.0, RUN_DURATION_S, len(error)) - FAULT_ONSET_S, error, color=FILTERED_COLOUR)
-        panel.axhline(0.5, color=RAW_COLOUR, linewidth=0.8)
-        panel.axvspan(0.0, FAULT_DURATION_S, color=INK_COLOUR, alpha=0.08)
+        panel.plot(np.linspace(0.0, RUN_DURATION_S, len(error)) - FAULT_ONSET_S, error, color=fig.FILTERED_COLOUR)
+        panel.axhline(0.5, color=fig.RAW_COLOUR, linewidth=0.8)
+        panel.axvspan(0.0, FAULT_DURATION_S, color=fig.INK_COLOUR, alpha=0.08)
         panel.set_title(fault)
     axes[-1, 0].set_xlim(-0.5, RUN_DURATION_S - FAULT_ONSET_S)
     return made

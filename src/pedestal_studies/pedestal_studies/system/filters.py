@@ -1,15 +1,9 @@
 """Filters compared: angle and rate noise of every filter on four target motions, white and coloured noise.
 
-Cases are <profile>/<filter>/<noise>. A profile is a target motion of profiles.py, whose angle is measured at 100
-Hz. Every filter except UNTUNED_FILTERS is tuned for each profile and noise. The tuning minimises the angle rms over
-TUNING_RUNS records of other seeds (pedestal_workbench/tuning/parameter_search.py).
-
-imm             IMM with its default parameters
-imm-manoeuvre   IMM that expects a manoeuvre at any time
-...-rate-X      filter with an independent rate measurement with a noise of X deg/s rms
-...-expecting   filter that knows the bandwidth of coloured noise; it has no case with white noise
-
-Every run gives its own rms and means, from SETTLING_TIME_S on.
+Cases are <profile>/<filter>/<noise>, with the profiles of profiles.py, measured at 100 Hz. Every filter except
+UNTUNED_FILTERS is tuned for each profile and noise, for the smallest angle rms over TUNING_RUNS records of other
+seeds. A filter ...-rate-X has an independent rate measurement with a noise of X deg/s rms. A filter ...-expecting
+knows the bandwidth of coloured noise; it has no case with white noise.
 """
 import dataclasses
 import math
@@ -40,7 +34,6 @@ DEFAULT_RUNS = 200  # runs of each case
 BATCH_RUNS = 25  # runs that one worker makes at a time
 
 NOISE_SEED, TUNING_SEED, TUNING_RUNS = 1, 2, 4
-"""Seeds of the noise and of the noise for the tuning; records of a tuning."""
 
 SETTLING_TIME_S = 3.0  # start of the evaluation [s]
 
@@ -50,11 +43,9 @@ NOISE_CASES = {f'{colour}-{sigma}': Noise(math.radians(sigma), bandwidth)
 with the same rms."""
 
 RATE_SIGMAS_RAD_S = {f'current_statistical-rate-{sigma}': math.radians(sigma) for sigma in (0.5, 0.1, 0.02)}
-"""{filter with a rate measurement: standard deviation of the measured rate [rad/s]}."""
 
 MANOEUVRE_PARAMETERS = {'imm.models': 'cv ca current_statistical', 'imm.rungs': 1, 'imm.dwell': 5.0,
                         'imm.cv.noise': math.radians(0.003), 'imm.ca.noise': math.radians(0.1)}
-"""Parameters of the filter imm-manoeuvre."""
 
 NOISE_AWARE_FILTERS = ('ca-expecting', 'imm-expecting')  # filters that know the bandwidth of the noise
 
@@ -109,10 +100,7 @@ def noise_of(noise: str, name: str) -> Noise:
 
 
 def measured(params: FilterParameters, profile: str, noise: Noise, seed: int, first: int, count: int) -> Records:
-    """Return ensemble.Moments (count, n) of one filter.
-
-    The runs are first ... first + count - 1.
-    """
+    """Return ensemble.Moments (count, n) of one filter in the runs first ... first + count - 1."""
     t = times()
     truth = profiles.truth(profile, t)
     return ensemble.moments(params, t, truth, noise, ensemble.records(truth, noise, seed, first, count))
@@ -142,10 +130,8 @@ THINNING_STEPS = 10  # steps between two measurements that the figures show
 
 
 def batch(item: tuple[str, str, dict[str, FilterParameters], int, int]) -> dict[str, tuple[Records, Records]]:
-    """Return {filter: (Moments (count,) of every run, Moments of all runs at the drawn times)} of an item.
-
-    An item is (profile, noise, {filter: parameters}, first run, number of runs).
-    """
+    """Return {filter: (Moments (count,) of every run, Moments of all runs at the drawn times)} of an item (profile,
+    noise, {filter: parameters}, first run, number of runs)."""
     profile, noise, filters, first, count = item
     sums_of: dict[str, tuple[Records, Records]] = {}
     for name, params in filters.items():
@@ -161,10 +147,7 @@ def batch(item: tuple[str, str, dict[str, FilterParameters], int, int]) -> dict[
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None, on: Sequence[str] = profiles.PROFILES,
         noises: Sequence[str] = tuple(NOISE_CASES)) -> Result:
-    """Compare all filters in `runs` runs of each case.
-
-    on: names of profiles; noises: names of NOISE_CASES.
-    """
+    """Compare all filters in `runs` runs of each case; on: names of profiles; noises: names of NOISE_CASES."""
     pool = pool or monte_carlo.Pool(1)
     applicable = {noise: [name for name in FILTERS if NOISE_CASES[noise].bandwidth
                           or name not in NOISE_AWARE_FILTERS] for noise in noises}
@@ -188,16 +171,16 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None, 
     means = {case: {metric: float(value.mean()) for metric, (value, _) in measured.items()}
              for case, measured in values.items()}
     table = rows(values)
-    return Result(table, figures(means, over_time), remarks(means, tuned, runs), shown=shown(table))
+    # Because all rows are too many for a terminal, only those with a target are printed.
+    return Result(table, figures(means, over_time), remarks(means, tuned, runs), [r for r in table if r['target']])
 
 
 def metrics(sums: Records) -> dict[str, tuple[Floats, str]]:
     """Return {metric: (values (runs,), unit)} of Moments (runs,).
 
-    `reduction`: rms of the measured angle over that of the estimate. nis, nees: normalised innovation squared and
-    normalised estimation error squared. `..._over_sigma`: rms error over the sigma that the filter states. A
-    consistent filter has a nis_mean equal to its degrees of freedom. Its nees_mean (angle and rate, per degree of
-    freedom) and both ..._over_sigma are 1.
+    `reduction`: rms of the measured angle over that of the estimate. `..._over_sigma`: rms error over the sigma that
+    the filter states. A consistent filter has a nis_mean equal to its degrees of freedom. Its nees_mean (angle and
+    rate, per degree of freedom) and both ..._over_sigma are 1.
     """
     angle, rate, raw = (ensemble.rms(sums, name) for name in ('angle', 'rate', 'raw'))
     n = sums['runs']
@@ -215,13 +198,7 @@ def rows(values: Mapping[CaseName, dict[str, tuple[Floats, str]]]) -> list[Row]:
             for case, measured in values.items() for metric, (value, unit) in measured.items()]
 
 
-def shown(table: list[Row]) -> list[Row]:
-    """Return the rows that are printed: the rows with a target, because all rows are too many for a terminal."""
-    return [row for row in table if row['target']]
-
-
 def _cell(measured: Mapping[str, float] | None) -> str:
-    """Return a cell of the printed table, 34 characters."""
     if measured is None:
         return 34 * ' '
     return (f'{measured["angle_rms_deg"]:.4f} ({measured["reduction"]:.1f})  {measured["rate_rms_deg_s"]:.4f}  '
@@ -229,10 +206,7 @@ def _cell(measured: Mapping[str, float] | None) -> str:
 
 
 def remarks(values: Means, tuned: Mapping[tuple[str, str], Mapping[str, FilterParameters]], runs: int) -> list[str]:
-    """Return the sentences that explain the rows, with a table of the profiles.
-
-    tuned: {(profile, noise): {filter: its parameters}}.
-    """
+    """Return the sentences that explain the rows, with a table of the profiles; tuned: {(profile, noise): filters}."""
     lines = [f'{runs} runs of each case. The columns are angle rms [deg] (reduction), rate rms [deg/s], and the error '
              f'over own sigma of angle and rate, for the noise {SHOWN_NOISE} deg. --json gives the rows of all cases.']
     on = [profile for profile, noise in tuned if noise == SHOWN_NOISE]
@@ -282,14 +256,10 @@ def figures(values: Means, over_time: Mapping[CaseName, Records]) -> Drawings:
 
 FILTER_COLOURS = {'current_statistical': fig.RAW_COLOUR, 'current_statistical-rate-0.1': fig.FILTERED_COLOUR,
                   'imm': fig.TRUTH_COLOUR}
-"""{filter of the error figures: its colour}."""
 
 
 def errors_figure(over_time: Mapping[CaseName, Records], on: Sequence[str], what: str = 'angle') -> Figure:
-    """Draw the error over time: mean +-1 sigma over the runs, and dashed the sigma that the filter states.
-
-    over_time: {case: Moments of all runs at the drawn times}; on: names of profiles, here and below.
-    """
+    """Draw the error over time: mean +-1 sigma over the runs, and dashed the sigma that the filter states."""
     unit = 'deg' if what == 'angle' else 'deg/s'
     figure, axes = fig.new_panels(len(on), len(FILTER_COLOURS), height=1.0 + 1.4 * len(on),
                                   y=[f'{profile}\n[{unit}]' for profile in on], sharex=True, sharey='row')
@@ -324,8 +294,7 @@ def bars(values: Means, on: Sequence[str], metric: Callable[[str, Mapping[str, f
          colour: Callable[[str], str], text: Callable[[str, Mapping[str, float]], str]) -> tuple[Figure, fig.Panels]:
     """Return (figure, panels) with a panel of bars for each profile.
 
-    metric, text: functions (filter, its metrics) that return the length of a bar and the text at its end. label: of
-    the x axis. colour: function that returns the colour of a filter.
+    metric, text: functions (filter, its metrics) that return the length of a bar and the text at its end.
     """
     figure, panels = profile_panels(on)
     for panel, profile in zip(panels, on):
@@ -343,7 +312,6 @@ def bars(values: Means, on: Sequence[str], metric: Callable[[str, Mapping[str, f
 
 
 def _colour(name: str) -> str:
-    """Return the colour of a filter in a figure."""
     if name in UNTUNED_FILTERS:
         return fig.TRUTH_COLOUR
     return fig.FILTERED_COLOUR if name in RATE_SIGMAS_RAD_S else fig.RAW_COLOUR

@@ -1,9 +1,8 @@
 """Scenarios over many seeds: the results of `pedestal run`, with confidence intervals over the seeds.
 
-Every run is the closed loop of the scenario without ROS, with another seed. The results are computed as from a
-recording of the run. Cases are <scenario> or <scenario>-<variant>; CASES gives the parameters that a variant changes.
-A ratio to another case divides the results of two runs with the same seed. `pedestal run --explain` defines the
-metrics, except the metrics of `extra_results`.
+Every run is the closed loop of the scenario without ROS, with another seed. Cases are <scenario> or
+<scenario>-<variant>. A ratio to another case divides the results of two runs with the same seed. `pedestal run
+--explain` defines the metrics, except the metrics of `extra_results`.
 """
 import math
 from collections.abc import Mapping
@@ -19,17 +18,14 @@ from pedestal_common.quantities import Floats, Row
 from pedestal_results import results, tracking
 from pedestal_results.intervals import row
 from pedestal_results.recorded_run import RecordedRun
-from pedestal_results.report.figures import FILTERED_COLOUR, INK_COLOUR, RAW_COLOUR, new_panels
-from pedestal_studies.result import Item, Result, legend
-from pedestal_workbench.trials import monte_carlo
+from pedestal_results.report import figures as fig
+from pedestal_studies.result import FIRST_SEED, Result, legend, of_cases, seeds
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
-DEFAULT_RUNS, FIRST_SEED = 40, 1  # runs of each case; seed of the first run
-BATCH_RUNS = 5  # runs that one worker makes at a time
+DEFAULT_RUNS = 40  # runs of each case
 
 NEAR_FLYBY_PARAMETERS = {'tracking_receiver.target.flyby.closest_distance': 60.0,
                          'tracking_receiver.target.flyby.height': 20.0}
-"""Parameters of the case uav_flyby-60m, whose target passes at a distance of 60 m."""
 
 NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 120.0, 'acu.tracker.receiver.sigma_floor': 5e-4,
                         **{f'ins.{name}': 0.0 for name in ('tilt_noise', 'heading_noise', 'rate_noise', 'tilt_wander',
@@ -38,7 +34,7 @@ NOISELESS_PARAMETERS = {'tracking_receiver.receiver.cn0_dbhz': 120.0, 'acu.track
 less assumed noise, the filter would take even the smallest deviation of the target from the motion model for motion,
 not for noise."""
 
-CASES = {
+CASES = {  # {name: Variant}
     'leo_pass': Variant('leo_pass'), 'ship_pass': Variant('ship_pass'),
     'ship_pass-late': Variant('ship_pass').with_({'ins.latency': 0.02}),
     'ship_pass-quiet': Variant('ship_pass').with_(NOISELESS_PARAMETERS),
@@ -47,7 +43,6 @@ CASES = {
     'uav_flyby-60m': Variant('uav_flyby').with_(NEAR_FLYBY_PARAMETERS)}
 
 TRACKING_METRICS = ('pointing_rms_deg', 'pointing_max_deg', 'single_sample_noise_deg', 'pointing_to_noise', 'loss_s')
-"""Results of the pointing error."""
 ISOLATION_METRICS = ('isolation_db', 'isolation_limit_db')
 """Isolation from the rotation of the ship, and the isolation that a perfect antenna would show with the noise and the
 length of the run."""
@@ -55,20 +50,17 @@ NOISE_METRICS = ('noise_reduction_cross_elevation', 'noise_reduction_elevation')
 """Noise of one receiver sample, divided by the error of the filtered line of sight."""
 ALIGNMENT_METRICS = ('aligned_s', 'heading_sigma_at_alignment_deg', 'heading_error_rms_deg',
                      'autotrack_after_alignment_s')
-"""Results of the alignment of the INS, and of the autotrack that follows it."""
-CASE_METRICS = {
+CASE_METRICS = {  # {case: names of its results}, of pedestal_results/results.py or of `extra_results`
     'leo_pass': TRACKING_METRICS, 'ship_pass': (*TRACKING_METRICS, *ISOLATION_METRICS),
     'ship_pass-late': (*TRACKING_METRICS, *ISOLATION_METRICS),
     'ship_pass-quiet': ('pointing_rms_deg', 'isolation_db'), 'ship_pass_ss6': (*TRACKING_METRICS, *ISOLATION_METRICS),
     'ship_overhead': ('loss_s', 'keyhole_loss_predicted_s', 'loss_to_predicted'),
     'ship_align_and_track': (*ALIGNMENT_METRICS, *TRACKING_METRICS), 'uav_flyby': (*TRACKING_METRICS, *NOISE_METRICS),
     'uav_flyby-60m': (*TRACKING_METRICS, *NOISE_METRICS)}
-"""{case: names of its results}, of pedestal_results/results.py or of `extra_results`."""
 
-SHIP_CASES = ('ship_pass', 'ship_pass-late', 'ship_pass_ss6')
-"""Cases whose pointing is compared with the pointing of leo_pass."""
+SHIP_CASES = ('ship_pass', 'ship_pass-late', 'ship_pass_ss6')  # compared with leo_pass
 
-METRIC_TARGETS = {
+METRIC_TARGETS = {  # {(case, metric): target}
     **{(case, 'pointing_to_noise'): '<= 0.4' for case in ('leo_pass', 'ship_pass', 'ship_pass-late')},
     ('ship_pass', 'pointing_to_leo_pass'): '<= 1.3', ('ship_pass-late', 'pointing_to_leo_pass'): '<= 1.5',
     ('ship_pass_ss6', 'pointing_to_leo_pass'): '<= 1.5',
@@ -77,10 +69,8 @@ METRIC_TARGETS = {
     ('ship_overhead', 'loss_to_predicted'): '0.8 to 1.2',
     **{('uav_flyby', metric): '>= 7' for metric in NOISE_METRICS},
     **{('uav_flyby-60m', metric): '>= 3' for metric in NOISE_METRICS}}
-"""{(case, metric): target}."""
 
 EXTRA_METRIC_UNITS = {'loss_to_predicted': '', 'keyhole_loss_predicted_s': 's', 'autotrack_after_alignment_s': 's'}
-"""{metric of `extra_results`: unit}."""
 
 
 def extra_results(values: Mapping[str, float], run: Run) -> dict[str, float]:
@@ -116,11 +106,10 @@ def measured(variant: Variant) -> dict[str, float]:
     return {**values, **extra_results(values, run)}
 
 
-def batch(item: Item) -> Floats:
-    """Return the values (count, len(CASE_METRICS[case])) of an item (case, first run, number of runs)."""
-    name, first, count = item
-    runs = [measured(CASES[name].with_(seed=FIRST_SEED + first + i)) for i in range(count)]
-    return np.array([[values[metric] for metric in CASE_METRICS[name]] for values in runs])
+def case_results(name: str, run: int) -> list[float]:
+    """Return the CASE_METRICS of one run of one of CASES."""
+    values = measured(CASES[name].with_(seed=FIRST_SEED + run))
+    return [values[metric] for metric in CASE_METRICS[name]]
 
 
 def rows(values: Mapping[str, Floats]) -> list[Row]:
@@ -140,15 +129,15 @@ def rows(values: Mapping[str, Floats]) -> list[Row]:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run every case `runs` times."""
-    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
+    values = of_cases(case_results, CASES, runs, pool, progress)
     return Result(rows(values), {'pointing': lambda: pointing_figure(values), 'uav-flyby': flyby_figure},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}. The variants as commands for the nodes:',
+                  [f'{seeds(runs)} The variants as commands for the nodes:',
                    *(f'{name}: {CASES[name].command()}' for name in ('ship_pass-late', 'uav_flyby-60m'))])
 
 
 def flyby_figure() -> Figure:
     """Draw paper 000's figures 7 to 11 for uav_flyby: error and angle before and after the filter, and the azimuth."""
-    figure, axes = new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
+    figure, axes = fig.new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
     flown = tracking.read(memory_recording.record(CASES['uav_flyby'].with_(seed=FIRST_SEED).load()))
     middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5
     cross_elevations, elevation_errors = zip(*(errors.T for errors in (flown.measured, flown.filtered, flown.error)))
@@ -158,25 +147,25 @@ def flyby_figure() -> Figure:
     elevations = [error - flown.error[:, 1] + target_elevation for error in elevation_errors]
     for panel, curves, title in ((axes[0, 0], cross_elevations, 'error in cross-elevation (figures 7, 8)'),
                                  (axes[1, 0], elevations, 'elevation of the target (figures 9, 10)')):
-        for values, colour, label in zip(curves, (RAW_COLOUR, FILTERED_COLOUR, INK_COLOUR),
+        for values, colour, label in zip(curves, (fig.RAW_COLOUR, fig.FILTERED_COLOUR, fig.INK_COLOUR),
                                          ('receiver', 'filtered', 'truth')):
             panel.plot(flown.t[middle], np.degrees(values[middle]), color=colour, label=label,
                        linewidth=0.6 if label == 'receiver' else 1.2)
         panel.set_title(title)
-    axes[2, 0].plot(flown.t, np.degrees(flown.encoders[:, 0]), color=FILTERED_COLOUR)
+    axes[2, 0].plot(flown.t, np.degrees(flown.encoders[:, 0]), color=fig.FILTERED_COLOUR)
     axes[2, 0].set_title('azimuth of the antenna over the flight (figure 11)')
     return legend(figure)
 
 
 def pointing_figure(values: Mapping[str, Floats]) -> Figure:
     """Draw the pointing error of every seed, rms to the left and largest to the right; values as of `rows`."""
-    figure, axes = new_panels(1, 2, height=3.8, x=('pointing error, rms [deg]', 'pointing error, largest [deg]'),
-                              sharey=True)
+    figure, axes = fig.new_panels(1, 2, height=3.8, x=('pointing error, rms [deg]', 'pointing error, largest [deg]'),
+                                  sharey=True)
     for panel, metric in zip(axes[0], ('pointing_rms_deg', 'pointing_max_deg')):
         shown = [name for name in values if metric in CASE_METRICS[name]]
         for name in shown:
             column = values[name][:, CASE_METRICS[name].index(metric)]
-            panel.plot(column, [name] * len(column), '|', color=FILTERED_COLOUR)
+            panel.plot(column, [name] * len(column), '|', color=fig.FILTERED_COLOUR)
         panel.set_xlim(left=0.0)
     axes[0, 0].invert_yaxis()
     return figure

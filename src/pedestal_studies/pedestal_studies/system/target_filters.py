@@ -1,14 +1,9 @@
 """The default target filter beside filters tuned for one target each: pointing in the closed loop.
 
-Cases are <target>/<filter>:
-
-default               target filter with its default parameters
-tuned                 filter of one motion model, whose process noise gives the smallest pointing error at this target
-manoeuvre             IMM that expects a manoeuvre at any time
-current-statistical   filter of paper 000 with its default a_max, the largest acceleration of its model
-
-A ratio divides the pointing error of a case by that of `tuned` under the same seed. A target whose name ends in -ship
-is seen from the deck of the scenario ship_pass. The targets that manoeuvre hard are those of HARD_TARGETS.
+Cases are <target>/<filter>. The filter `tuned` has one motion model, whose process noise gives the smallest pointing
+error at this target. `manoeuvre` is an IMM that expects a manoeuvre at any time. `current-statistical` is the filter
+of paper 000 with its default a_max. A ratio divides the pointing error of a case by that of `tuned` under the same
+seed. A target whose name ends in -ship is seen from the deck of the scenario ship_pass.
 """
 import functools
 import math
@@ -25,11 +20,10 @@ from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Degrees, Floats, Json, Meters, MetersPerSecond, Radians, Row, Seconds, Times
 from pedestal_results import tracking
 from pedestal_results.intervals import row
-from pedestal_results.report.figures import FILTERED_COLOUR, new_panels
+from pedestal_results.report import figures as fig
 from pedestal_studies import profiles
-from pedestal_studies.result import Item, Result
+from pedestal_studies.result import FIRST_SEED, Result, of_cases, seeds
 from pedestal_studies.system.filters import MANOEUVRE_PARAMETERS
-from pedestal_workbench.trials import monte_carlo
 from pedestal_workbench.trials.monte_carlo import Pool, Progress
 
 # Targets that manoeuvre hard. Positions are in metres east, north and up of the antenna. Each function takes times at
@@ -40,12 +34,10 @@ STEP_RATE_HZ = 100.0  # rate of the rows of a table
 
 
 def _seen(east: Floats, north: Floats, up: Floats) -> tuple[Floats, Floats]:
-    """Return (azimuth, elevation) of positions [m]."""
     return np.unwrap(np.arctan2(east, north)), np.arctan2(up, np.hypot(east, north))
 
 
 def _integrated(t: Times, rate: Floats, start: float) -> Floats:
-    """Return the integral of `rate` (n,) over t by the rule of the trapezium, from a value `start`."""
     return start + np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))))
 
 
@@ -77,10 +69,9 @@ def launch_vehicle(t: Times) -> tuple[Floats, Floats]:
 
 def _turning(t: Times, speed: MetersPerSecond, turn: Radians, leg: Seconds, load: float,
              start: tuple[Meters, Meters, Meters]) -> tuple[Floats, Floats]:
-    """Return (azimuth, elevation) of an aircraft that turns left and right alternately, with straight legs between.
+    """Return (azimuth, elevation) of an aircraft that turns left and right by `turn`, with straight legs between.
 
-    turn: angle of each turn; leg: duration of a straight leg; load: lateral acceleration [g]; start: position at the
-    start, on the way to the east.
+    leg: duration of a straight leg. load: lateral acceleration [g]. start: position, on the way to the east.
     """
     rate = load * G_M_S2 / speed
     half, r = np.divmod(t, leg + turn / rate)
@@ -100,7 +91,6 @@ HARD_TARGETS: dict[str, Callable[[Times], tuple[Floats, Floats]]] = {
                                      start=(-250.0, 750.0, 250.0)),
     'helicopter': functools.partial(_turning, speed=50.0, turn=0.5 * math.pi, leg=12.0, load=0.4,
                                     start=(-1000.0, 2000.0, 500.0))}
-"""{name of a target that manoeuvres hard: function of t}."""
 
 
 def write(path: pathlib.Path, name: str, duration: Seconds) -> None:
@@ -111,8 +101,7 @@ def write(path: pathlib.Path, name: str, duration: Seconds) -> None:
                header='time [s],azimuth [deg],elevation [deg]', comments='')
 
 
-DEFAULT_RUNS, FIRST_SEED = 30, 1  # runs of each case; seed of the first run
-BATCH_RUNS = 5  # runs that one worker makes at a time
+DEFAULT_RUNS = 30  # runs of each case
 SHIP_SUFFIX = '-ship'  # part of the name of a target seen from a ship
 
 FLYBY_PREFIX, ANGLE_PREFIX = 'tracking_receiver.target.flyby', 'tracking_receiver.target.angle'
@@ -120,17 +109,15 @@ FIXED_TARGET_PARAMETERS = {'tracking_receiver.target.kind': 'step', f'{ANGLE_PRE
                            f'{ANGLE_PREFIX}.elevation_amplitude': 0.0, f'{ANGLE_PREFIX}.range': 5e5}
 """Parameters of a target that stands still, with the C/N0 of a satellite."""
 
-TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {
+TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {  # {target: (scenario, parameters that it changes)}
     'uav-60m': ('uav_flyby', {f'{FLYBY_PREFIX}.closest_distance': 60.0, f'{FLYBY_PREFIX}.height': 20.0}),
     'uav-150m': ('uav_flyby', {f'{FLYBY_PREFIX}.closest_distance': 150.0, f'{FLYBY_PREFIX}.height': 40.0}),
     'uav-500m': ('uav_flyby', {}), 'leo': ('leo_pass', {}), 'geo': ('leo_pass', FIXED_TARGET_PARAMETERS),
     'leo-ship': ('ship_pass', {}), 'leo-ship-ss6': ('ship_pass_ss6', {}),
     'geo-ship': ('ship_pass', FIXED_TARGET_PARAMETERS)}
-"""{target: (scenario, parameters that it changes)}."""
 
-HARD_TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {
+HARD_TARGET_SCENARIOS: dict[str, tuple[str, dict[str, Json]]] = {  # {place: (scenario, its parameters)}
     'ashore': ('track_file', {}), 'ship': ('ship_pass', {'tracking_receiver.target.kind': 'track_file'})}
-"""{place: (scenario, its parameters)} of a target of HARD_TARGETS."""
 TARGET_SCENARIOS |= {name.replace('_', '-') + suffix: HARD_TARGET_SCENARIOS[place] for name in HARD_TARGETS
                      for place, suffix in (('ashore', ''), ('ship', SHIP_SUFFIX))}
 
@@ -138,17 +125,14 @@ HARD_TARGET_DURATION_S = 60.0
 
 
 def _both(**changes: Json) -> dict[str, Json]:
-    """Return parameters of the control unit with the same changes for the filters of both axes."""
     return {f'{axis}.filter.{name}': value for axis in ('azimuth', 'elevation') for name, value in changes.items()}
 
 
 def _one(kind: str, azimuth: float, elevation: float) -> dict[str, Json]:
-    """Return parameters of a filter cv or ca with a noise in each axis."""
     return {**_both(kind=kind), f'azimuth.filter.{kind}.noise': azimuth, f'elevation.filter.{kind}.noise': elevation}
 
 
 def _singer(alpha: float, sigma_deg: float) -> dict[str, Json]:
-    """Return parameters of a filter singer: alpha [1/s], sigma [deg/s2]."""
     return _both(kind='singer', **{'singer.alpha': alpha, 'singer.sigma': math.radians(sigma_deg)})
 
 
@@ -166,7 +150,6 @@ HARD_TARGETS had two seeds from 101 on. The other targets had three seeds, and a
 
 
 def _ashore(target: str) -> str:
-    """Return the name that a target has ashore."""
     return target.partition(SHIP_SUFFIX)[0]
 
 
@@ -177,17 +160,15 @@ def filters(target: str) -> dict[str, dict[str, Json]]:
             'current-statistical': _both(kind='current_statistical')}
 
 
-CASES = {f'{target}/{name}': Variant(at).with_({
+CASES = {f'{target}/{name}': Variant(at).with_({  # {name: Variant}
     **parameters, **{f'acu.{key}': value for key, value in changes.items()}})
     for target, (at, parameters) in TARGET_SCENARIOS.items() for name, changes in filters(target).items()}
 
-MAX_POINTING_RATIO = 1.15
-"""Largest permitted ratio of the pointing with the default filter to the pointing with the tuned filter."""
+MAX_POINTING_RATIO = 1.15  # of the default filter over the tuned filter
 
 
 @functools.cache
 def _folder() -> tempfile.TemporaryDirectory[str]:
-    """Return the folder of the tables of hard targets; it ends with the process."""
     return tempfile.TemporaryDirectory(prefix='pedestal-targets-')
 
 
@@ -203,19 +184,13 @@ def loaded(case: str, seed: int | None = None) -> Scenario:
                          duration=HARD_TARGET_DURATION_S).load()
 
 
-def pointing(case: str, seed: int) -> Degrees:
-    """Return the rms of the true pointing error of one run of a case, both axes; NaN if it left autotrack."""
-    tracked = tracking.read(memory_recording.record(loaded(case, seed)))
+def pointing(name: str, run: int) -> Degrees:
+    """Return the rms of the true pointing error of one run of one of CASES, both axes; NaN if it left autotrack."""
+    tracked = tracking.read(memory_recording.record(loaded(name, FIRST_SEED + run)))
     begun = np.flatnonzero(tracked.mode == 'autotrack')
     if not begun.size or np.any(tracked.mode[begun[0]:] != 'autotrack'):
         return math.nan
     return tracked.pointing(tracking.known_rms)
-
-
-def batch(item: Item) -> Floats:
-    """Return the pointing (count,) [deg] of an item (case, first run, number of runs)."""
-    name, first, count = item
-    return np.array([pointing(name, FIRST_SEED + first + i) for i in range(count)])
 
 
 def rows(values: Mapping[str, Floats]) -> list[Row]:
@@ -232,17 +207,16 @@ def rows(values: Mapping[str, Floats]) -> list[Row]:
 
 def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
     """Run every case `runs` times."""
-    values = (pool or monte_carlo.Pool(1)).of_cases(batch, CASES, runs, BATCH_RUNS, progress)
-    return Result(rows(values), {'pointing': lambda: figure(values)},
-                  [f'Seeds {FIRST_SEED} to {FIRST_SEED + runs - 1}.'])
+    values = of_cases(pointing, CASES, runs, pool, progress)
+    return Result(rows(values), {'pointing': lambda: figure(values)}, [seeds(runs)])
 
 
 def figure(values: Mapping[str, Floats]) -> Figure:
     """Draw the pointing error of every seed, divided by the mean of the tuned filter; values as of `rows`."""
-    drawn, axes = new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
+    drawn, axes = fig.new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
     for name, of_runs in values.items():
         relative = of_runs / values[f'{name.partition("/")[0]}/tuned'].mean()
-        axes[0, 0].semilogx(relative, [name] * len(relative), '|', color=FILTERED_COLOUR)
+        axes[0, 0].semilogx(relative, [name] * len(relative), '|', color=fig.FILTERED_COLOUR)
     axes[0, 0].axvline(MAX_POINTING_RATIO, linewidth=0.8)
     axes[0, 0].invert_yaxis()
     return drawn

@@ -1,7 +1,6 @@
 """A seaway as a sum of sine waves, and the response of the hull to each wave. Plain numpy, run once at the start.
 
-The elevation of the surface at the ship is zeta = sum Re(a e^{j(w_e t + phase)}) with the amplitudes a [m] of the
-waves. The package defines the wave number k and the encounter frequency w_e. A wave that travels along the unit
+The elevation of the surface at the ship is zeta = sum Re(a e^{j(w_e t + phase)}). A wave that travels along the unit
 vector (d_x, d_y) of the deck (FLU) has zeta ~ e^{-j k (d_x x + d_y y)}. Its slope along x is -j k d_x a.
 """
 import math
@@ -42,10 +41,7 @@ class Waves(typing.NamedTuple):
 
 
 def shape(w: Floats, tp: Seconds, gamma: float) -> Floats:
-    """Return the density of JONSWAP at w [rad/s] > 0, apart from a constant factor (Hasselmann et al. 1973).
-
-    tp: peak period; gamma: peak enhancement.
-    """
+    """Return the density of JONSWAP at w [rad/s] > 0, apart from a constant factor (Hasselmann et al. 1973)."""
     wp = 2.0 * math.pi / tp
     width = np.where(w <= wp, 0.07, 0.09)
     return power(w, -5.0) * exp(-1.25 * power(wp / w, 4.0)) * power(gamma, exp(-0.5 * ((w - wp) / (width * wp)) ** 2))
@@ -58,12 +54,11 @@ def band(tp: Seconds) -> tuple[RadiansPerSecond, RadiansPerSecond]:
 
 
 def _grid(tp: Seconds) -> Floats:
-    """Return the frequencies [rad/s] at which a spectrum of peak period tp is integrated."""
     return np.linspace(*band(tp), WAVE_COMPONENT_COUNT * _GRID_STEPS_PER_COMPONENT + 1)
 
 
 def _integral(x: Floats, y: Floats) -> Floats:
-    """Return the integral of y over x from x[0] to each x, by the trapezoidal rule."""
+    """Return the integral of y from x[0] to each x, by the trapezoidal rule."""
     return np.concatenate(((0.0,), np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(x))))
 
 
@@ -76,30 +71,21 @@ def spectrum(w: Floats, hs: Meters, tp: Seconds, gamma: float) -> Floats:
 
 
 def _second_order(w: Floats, period: Seconds, damping: float) -> Complexes:
-    """Return w_n^2 / (w_n^2 - w^2 + 2 j z w_n w), the response of an oscillator to e^{jwt}; 1 at w = 0.
-
-    period: 2 pi / w_n; damping: ratio z.
-    """
+    """Return w_n^2 / (w_n^2 - w^2 + 2 j z w_n w), the response of an oscillator to e^{jwt}; z: damping."""
     wn = 2.0 * math.pi / period
     stiffness: Complexes = wn ** 2 - w ** 2 + 2j * damping * wn * w
     return wn ** 2 / stiffness
 
 
 def _mean_over(u: Floats) -> Floats:
-    """Return sin u / u: the mean of a sine wave over a length, relative to the value in the middle.
-
-    u: half of the phase of the wave along the length [rad].
-    """
+    """Return sin u / u: the mean of a sine wave over a length, relative to its middle; u: half of its phase."""
     v = np.where(u == 0.0, 1.0, u)
     return np.where(u == 0.0, 1.0, sin(v) / v)
 
 
 def _slope_over(u: Floats) -> Floats:
-    """Return 3 (sin u - u cos u) / u^3: the slope of the best straight line through a sine wave over a length.
-
-    The result is relative to the slope of the wave in the middle. u: half of the phase of the wave along the length
-    [rad].
-    """
+    """Return 3 (sin u - u cos u) / u^3: the slope of the best straight line through a sine wave over a length. The
+    slope is relative to that in the middle; u: as of _mean_over."""
     small = np.abs(u) < 1e-2
     v = np.where(small, 1.0, u)
     return np.where(small, 1.0 - u ** 2 / 10.0, 3.0 * (sin(v) - v * cos(v)) / (v * v * v))
@@ -107,15 +93,12 @@ def _slope_over(u: Floats) -> Floats:
 
 def transfer(hull: HullParameters, w: Floats, mu: Floats, speed: MetersPerSecond,
              gravity: MetersPerSecond2) -> tuple[Floats, Complexes]:
-    """Return (w_e, RAO): encounter frequency [rad/s] and response amplitude operator (..., 6).
+    """Return (w_e, RAO): encounter frequency [rad/s] and response amplitude operator (..., 6) to a wave of 1 m.
 
-    The RAO is the response to a wave of amplitude 1 m: surge, sway, heave [m], roll, pitch, yaw [rad]. w, mu:
-    frequency [rad/s] and direction [rad] of the wave.
-
-    The pressure of a wave falls with the depth (Smith correction e^{-k draught / 2}) and averages over length and beam
-    of the hull. Roll and pitch follow the slope of the wave. Surge and sway are the orbital motion of the water. At a
-    crest the water moves in the direction of the wave, so its displacement is -j times the elevation. Yaw follows the
-    change of sway along the hull.
+    The freedoms are surge, sway, heave [m], roll, pitch, yaw [rad]. The pressure of a wave falls with the depth (Smith
+    correction e^{-k draught / 2}) and averages over length and beam of the hull. Roll and pitch follow the slope of
+    the wave. Surge and sway are the orbital motion of the water. At a crest the water moves in the direction of the
+    wave, so its displacement is -j times the elevation. Yaw follows the change of sway along the hull.
     """
     k = w ** 2 / gravity
     d_x, d_y = cos(mu), -sin(mu)
@@ -143,11 +126,7 @@ def measured(params: ShipParameters) -> csv_table.Rows:
 
 
 def density(params: ShipParameters) -> tuple[Floats, Floats]:
-    """Return (w [rad/s], S [m2 s/rad]) of the sea state or the measured spectrum. Raises csv_table.TableError.
-
-    The grid has WAVE_COMPONENT_COUNT bins of _GRID_STEPS_PER_COMPONENT steps each. A measured density is interpolated
-    linearly between its rows.
-    """
+    """Return (w [rad/s], S [m2 s/rad]) of the sea state or the measured spectrum. Raises csv_table.TableError."""
     if params.spectrum == 'file':
         frequency, level = measured(params).numbers.T
         w = 2.0 * math.pi * frequency
@@ -161,9 +140,8 @@ def density(params: ShipParameters) -> tuple[Floats, Floats]:
 def seaway(params: ShipParameters) -> tuple[Floats, Floats, Floats, Floats]:
     """Return the waves: (w [rad/s], amplitude [m], phase [rad], mu [rad]), each (WAVE_COMPONENT_COUNT,).
 
-    The band is divided into WAVE_COMPONENT_COUNT equal bins with one wave each, at a random frequency within the bin.
-    This avoids the repetition of waves of equal spacing dw after 2 pi / dw. A wave has the whole energy of its bin, so
-    sum a^2/2 = Hs^2/16 for every seed.
+    Each of equal bins of the band has one wave at a random frequency. This avoids the repetition of waves of equal
+    spacing dw after 2 pi / dw. A wave has the whole energy of its bin, so sum a^2/2 = Hs^2/16 for every seed.
     """
     grid, S = density(params)
     energy = _integral(grid, S)

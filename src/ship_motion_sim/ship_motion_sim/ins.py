@@ -1,9 +1,9 @@
 """The INS of method `model`: the true attitude with parametrised errors, released after a latency.
 
-The node `ins` subscribes only to `ship/imu/data_raw`, which has no attitude (REP 145, the ROS convention for an IMU,
-reserves it for `imu/data`). So the INS evaluates the stateless law of the ship motion (sea.motion) at the stamp of
-each IMU message, and adds its errors. Its `ship` parameters must be those of ship_motion_node. The INS compares the
-rate of the IMU with that of the law, and its status reports a difference. `aligning_ins` integrates the IMU instead.
+The node `ins` subscribes only to `ship/imu/data_raw`, which has no attitude (REP 145 reserves it for `imu/data`). So
+the INS evaluates the stateless law motion.truth at the stamp of each IMU message, and adds its errors. Its `ship`
+parameters must be those of ship_motion_node. The INS compares the rate of the IMU with that of the law, and its status
+reports a difference.
 """
 import math
 from typing import Annotated, Protocol
@@ -24,9 +24,8 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
-from ship_motion_sim import earth, imu
+from ship_motion_sim import earth, imu, motion
 from ship_motion_sim.params import InsParameters
-from ship_motion_sim.sea import motion
 
 INS_NORMALS_PER_STEP = 9
 """Number of standard normals of a step: three for the slow errors, three for the attitude, three for the rate."""
@@ -139,11 +138,8 @@ def initial_state() -> Records:
 
 @compiled
 def wander(constants: Constants, state: State, stamp_ns: Nanoseconds, normals: Floats) -> None:
-    """Advance the slow errors [rad] of roll, pitch and yaw to stamp_ns; normals: three or more.
-
-    The errors are first-order Gauss-Markov processes. The step is exact for any length, and the first errors have the
-    final rms.
-    """
+    """Advance the slow errors [rad] of roll, pitch and yaw, first-order Gauss-Markov processes. The step is exact for
+    any length, and the first errors have the final rms; normals: three or more."""
     kept = 0.0      # share of the last error in the new error
     if state.last_stamp_ns != NO_STAMP:
         kept = math.exp(-1e-9 * (stamp_ns - state.last_stamp_ns) / constants.wander_time)
@@ -178,10 +174,7 @@ def measure(constants: Constants, state: State, stamp_ns: Nanoseconds, force: Ve
 
 @compiled
 def release(constants: LateIns, samples: LatencyRing, now_ns: Nanoseconds, out: Outputs) -> None:
-    """Put the newest sample whose age at now_ns has reached the latency into the outputs `out`.
-
-    out.due is 0 if no sample has reached the latency since the last step.
-    """
+    """Put the newest sample that is older than the latency into `out`; out.due is 0 if there is no new one."""
     n = ring.release(samples, now_ns - constants.latency_ns)
     out.due = 0 if n == ring.NONE_DUE else 1
     if out.due == 1:
@@ -197,11 +190,8 @@ def release(constants: LateIns, samples: LatencyRing, now_ns: Nanoseconds, out: 
 
 @compiled
 def step(state: State, constants: Constants, inputs: Inputs, out: Outputs, normals: Floats) -> None:
-    """Take one IMU message; normals: (INS_NORMALS_PER_STEP,).
-
-    A stamp that does not advance changes nothing, and a message that is not finite gives no sample. The status reports
-    both.
-    """
+    """Take one IMU message; normals (INS_NORMALS_PER_STEP,). A stamp that does not advance changes nothing, and a
+    message that is not finite gives no sample. The status reports both."""
     out.status, out.due, out.stage = Status.OK, 0, NO_STAGE
     if inputs.stamp_ns <= state.last_stamp_ns:
         out.status = Status.BAD_STAMP

@@ -1,16 +1,10 @@
-"""A strapdown INS from power-up on: alignment, then navigation. aligning_ins calls `step`.
+"""A strapdown INS from power-up on: alignment, then navigation.
 
-aligning    The strapdown integration runs at the rate of the IMU, the alignment every `step` seconds. The commands of
-            the alignment rotate n'.
-aligned     Navigation begins as soon as the 1 sigma of azimuth is small enough. Without an aid, the INS navigates by
-            the IMU alone. With an aid, the alignment continues. It uses the difference of the velocities of strapdown
-            and aid, so that level and azimuth keep improving.
-
-An aid measures the velocity of the ship in deck axes (log).
-
-n, n'       ENU; frame that the INS computes as its estimate of n. n' is n turned about the vertical by the azimuth,
-            which is unknown at first, and tilted by small level errors
-h           time since the last step of the alignment [s]
+The strapdown integration runs at the rate of the IMU, the alignment every `step` seconds; its commands rotate n'.
+Navigation begins as soon as the 1 sigma of azimuth is small enough. Without an aid, the INS navigates by the IMU
+alone. With an aid, which measures the velocity of the ship in deck axes (log), the alignment continues. It uses the
+difference of the velocities of strapdown and aid, so that level and azimuth keep improving. The frame n' is ENU turned
+about the vertical by the azimuth, which is unknown at first, and tilted by small level errors.
 """
 import math
 from collections.abc import Iterable
@@ -114,11 +108,8 @@ def attitude(state: State) -> tuple[float, float, float, float]:
 
 @compiled
 def begin_navigation(state: State, constants: Constants, aid: Vector3) -> None:
-    """Rotate n' onto n and start to navigate; aid: velocity [m/s].
-
-    The velocity of the strapdown becomes that of the aid. Without an aid, the part that the alignment attributed to an
-    error is subtracted.
-    """
+    """Rotate n' onto ENU and start to navigate, with the velocity of the aid [m/s]. Without an aid, the part that the
+    alignment attributed to an error is subtracted."""
     conditions, v, observer = constants.conditions, state.strapdown.velocity, state.alignment.observer
     qx, qy, qz, qw = attitude(state)
     cos, sin = math.cos(state.azimuth), math.sin(state.azimuth)
@@ -141,11 +132,8 @@ def begin_navigation(state: State, constants: Constants, aid: Vector3) -> None:
 
 @compiled
 def grow_unaided_sigmas(state: State, conditions: alignment.Conditions, h: Seconds) -> None:
-    """Increase the 1 sigmas of an INS without aid over h.
-
-    The causes are the random walk and the bias of the gyros. The level is also tilted by the earth rate, whose
-    components are computed with a heading that is wrong by its 1 sigma.
-    """
+    """Increase the 1 sigmas of an INS without aid over h, by random walk and bias of the gyros. The earth rate, whose
+    components are computed with a heading that is wrong by its 1 sigma, also tilts the level."""
     state.unaided_time += h
     t, bias = state.unaided_time, conditions.gyro_bias
     walk = conditions.gyro_noise**2 * t
@@ -156,10 +144,7 @@ def grow_unaided_sigmas(state: State, conditions: alignment.Conditions, h: Secon
 
 @compiled
 def step(state: State, constants: Constants, angle: Vector3, force: Vector3, dt: Seconds, aid: Vector3) -> None:
-    """Process one IMU interval of dt.
-
-    angle, force: increments of the interval, FLU [rad, m/s]; aid [m/s], finite.
-    """
+    """Process one IMU interval of dt; angle, force: increments, FLU [rad, m/s]; aid [m/s], finite."""
     conditions = constants.conditions
     strapdown.step(state.strapdown, angle, force, dt, conditions.earth_rate, state.command, conditions.gravity)
     # The tolerance of half an interval avoids a step that rounding errors delay by one interval.

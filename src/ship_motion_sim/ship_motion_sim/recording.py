@@ -1,15 +1,10 @@
 """A recorded motion of a ship as piecewise polynomials with a continuous second derivative, made once at the start.
 
-Columns of the file:
-
     time_s      [s], growing; stamp 0 of the run is `start` after the first row
     roll_deg    positive with the port side up, as in FLU
-    pitch_deg   positive with the bow up, as ship's instruments state it (NMEA sentence PASHR); in FLU it is positive
-                with the bow down
+    pitch_deg   positive with the bow up, as ship's instruments state it (NMEA sentence PASHR), opposite to FLU
     heading_deg clockwise from north, 0 to 360 or -180 to 180
-    surge_m     forward along the mean heading; surge, sway and heave are optional, 0 if missing
-    sway_m      to port
-    heave_m     up
+    surge_m     forward along the mean heading; surge, sway (to port) and heave (up) are optional, 0 if missing
 
 A cubic spline (not-a-knot ends) runs through all rows, so rates and accelerations are exact derivatives of the motion.
 Because the recorded values are taken as the truth, a noisy recording must be smoothed before. Outside the record the
@@ -29,7 +24,7 @@ from ship_motion_sim.params import RecordedParameters
 MIN_ROWS, MAX_ROWS = 4, 16384
 """Least number of rows of a recording, which a not-a-knot spline needs, and largest number of rows.
 
-The largest number limits the constants of the law, whose arrays have a fixed length (sea.motion).
+The largest number limits the constants of the law, whose arrays have a fixed length (module `motion`).
 """
 MAX_PIECES = MAX_ROWS + 1  # largest number of pieces, those before and after the record included
 COEFFICIENTS_PER_PIECE = 6  # number of coefficients of a piece, highest power first
@@ -88,10 +83,8 @@ def spline_with_ends(times: Times, freedoms: Floats) -> tuple[Times, Floats]:
 
 @compiled
 def evaluate(breaks: Times, coefficients: Floats, count: int, t: Seconds, freedoms: Floats) -> None:
-    """Fill freedoms (3, 6) from the first `count` pieces at t: value, first and second derivative of the six.
-
-    Outside the pieces, the values are those at the nearest end, where the ship is at rest.
-    """
+    """Fill freedoms (3, 6) from the first `count` pieces at t: value, first and second derivative. Outside the pieces,
+    the ship is at rest at the nearest end."""
     t = min(max(t, breaks[0]), breaks[count])
     piece = interval(breaks[:count + 1], t)
     s = t - breaks[piece]

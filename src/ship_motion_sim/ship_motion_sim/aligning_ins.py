@@ -1,6 +1,5 @@
 """The INS of method riccati_eso: integration of the IMU, alignment, navigation and estimated accuracy.
 
-This INS takes the messages of `ship/imu/data_raw` and puts out attitude and deck rate after a latency, as `ins` does.
 Its `ship` parameters serve only for the latitude and for the true velocity, which an aid measures with noise.
 """
 import math
@@ -11,12 +10,10 @@ from pedestal_common.geometry.line_of_sight import quaternion, rotation, to_deck
 from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import Bit, Floats, Matrix3, MetersPerSecond, Nanoseconds, Records, Vector3
 from pedestal_common.record import Record
-from ship_motion_sim import earth
-from ship_motion_sim.navigation import ins, navigator
-from ship_motion_sim.navigation.ins import NO_STAMP, LatencyRing
-from ship_motion_sim.navigation.navigator import State as NavigatorState
+from ship_motion_sim import earth, ins, motion, navigator
+from ship_motion_sim.ins import NO_STAMP, LatencyRing
+from ship_motion_sim.navigator import State as NavigatorState
 from ship_motion_sim.params import InsParameters
-from ship_motion_sim.sea import motion
 
 MAX_IMU_GAP_S = 0.1
 """Longest time between two usable IMU messages over which the INS integrates [s].
@@ -54,8 +51,7 @@ class State(LatencyRing, _Ship):
 
 
 def constants(params: InsParameters) -> Records:
-    """Return the Constants (1,). Raises ParameterError if the azimuth cannot reach
-    alignment.aligned_sigma."""
+    """Return the Constants (1,). Raises ParameterError if the azimuth cannot reach alignment.aligned_sigma."""
     record, latitude = Constants.zeros(), math.radians(params.ship.latitude_deg)
     record['ship'] = motion.constants(params.ship)
     record['earth_rate'] = earth.rate(latitude)
@@ -89,11 +85,11 @@ def measure_aid(constants: Constants, state: State, stamp_ns: Nanoseconds, norma
 
 @compiled
 def integrate(constants: Constants, state: State, stamp_ns: Nanoseconds, rate: Vector3, force: Vector3) -> bool:
-    """Integrate an IMU message, rate [rad/s] and force [m/s2], at stamp_ns.
+    """Integrate an IMU message, rate [rad/s] and force [m/s2]. Return False after a gap above MAX_IMU_GAP_S.
 
-    Return False after a gap above MAX_IMU_GAP_S, which resets the INS to the state at power-up. Mean rates directly
-    give the increments; rates at the stamps are integrated by the trapezoidal rule. The first message after power-up
-    is not integrated, because its interval began before power-up.
+    A gap resets the INS to the state at power-up. Mean rates directly give the increments; rates at the stamps are
+    integrated by the trapezoidal rule. The first message is not integrated, because its interval began before
+    power-up.
     """
     dt = 1e-9 * (stamp_ns - state.imu_stamp_ns) if state.imu_stamp_ns != NO_STAMP else 0.0
     if dt > MAX_IMU_GAP_S:

@@ -1,9 +1,6 @@
-"""The truth of the ship at an instant: position, attitude and their exact derivatives. Stateless.
+"""The truth of the ship at an instant: position, attitude and their exact derivatives.
 
-The unit of the ship and the INS of method `model` call `truth`:
-
-    outputs = Truth.zeros()
-    truth(constants(params)[0], 12.5, outputs[0])
+The law is stateless: the same seed and time give the same bits in any order.
 """
 import math
 from typing import Annotated
@@ -25,9 +22,9 @@ from pedestal_common.quantities import (
     Vector3,
 )
 from pedestal_common.record import Record
+from ship_motion_sim import recording, waves
 from ship_motion_sim.params import RecordedParameters, ShipParameters
-from ship_motion_sim.sea import recording, waves
-from ship_motion_sim.sea.waves import FREEDOM_COUNT, HEAVE, PITCH, ROLL, SURGE, SWAY, WAVE_COMPONENT_COUNT, YAW
+from ship_motion_sim.waves import FREEDOM_COUNT, HEAVE, PITCH, ROLL, SURGE, SWAY, WAVE_COMPONENT_COUNT, YAW
 
 MOTION_STATUS_TEXTS = ('ok', 'time is not finite')
 MOTION_OK, MOTION_BAD_TIME = range(len(MOTION_STATUS_TEXTS))
@@ -67,10 +64,7 @@ class Truth(Record):
 
 
 def constants(params: ShipParameters) -> Records:
-    """Return the Constants (1,): seaway of the seed and mean course, or a recorded motion.
-
-    Raises csv_table.TableError for a file that cannot be used.
-    """
+    """Return the Constants (1,) of a seaway or of a recorded motion. Raises csv_table.TableError."""
     record = Constants.zeros()
     if params.motion == 'recorded':
         yaw = _put_recorded(record, params.recorded)
@@ -83,11 +77,8 @@ def constants(params: ShipParameters) -> Records:
 
 
 def summary(params: ShipParameters, duration: Seconds = math.inf) -> tuple[str, ...]:
-    """Return a line on the file of the motion, with the columns that were taken; () without a file.
-
-    duration: of the run; a second line states that a recorded motion ends before. Raises csv_table.TableError for
-    a file that cannot be used.
-    """
+    """Return a line on the file of the motion, () without a file, and one if a recorded motion ends before the run.
+    Raises csv_table.TableError for a file that cannot be used."""
     if params.motion == 'recorded':
         times, _, description = recording.read(params.recorded)
         ends = (f'the recorded motion of the ship ends after {times[-1]:.4g} s of the run; the deck is at rest after '
@@ -121,9 +112,8 @@ def _put_recorded(record: Records, params: RecordedParameters) -> Radians:
 def sin_cos(angle: Radians) -> tuple[float, float]:
     """Return (sin, cos) of an angle, with errors below 1e-15 up to 1e6 rad.
 
-    Over an array this function is four times as fast as those of libm, because the compiler vectorises it. The
-    reduction of the angle and the polynomials are those of fdlibm (Sun Microsystems 1993: e_rem_pio2.c, k_sin.c,
-    k_cos.c).
+    Over an array this function is four times as fast as those of libm, because the compiler vectorises it. Reduction
+    and polynomials are those of fdlibm (Sun Microsystems 1993: e_rem_pio2.c, k_sin.c, k_cos.c).
     """
     # n quarter turns, subtracted as three parts of pi / 2, so that the remainder r has no rounding error.
     n = math.floor(angle * (2.0 / math.pi) + 0.5)
@@ -164,11 +154,8 @@ def sum_components(ship: Constants, t: Seconds, freedoms: Floats) -> None:
 def body_rates(roll: Radians, pitch: Radians, roll_1: RadiansPerSecond, pitch_1: RadiansPerSecond,
                yaw_1: RadiansPerSecond, roll_2: RadiansPerSecond2, pitch_2: RadiansPerSecond2,
                yaw_2: RadiansPerSecond2) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Return the rate of the deck w [rad/s] and its derivative dw [rad/s2], FLU.
-
-    roll, pitch: angles about fixed axes; .._1, .._2: their first and second derivatives. The result follows from the
-    derivatives of mat_ed = Rz(yaw) Ry(pitch) Rx(roll).
-    """
+    """Return the rate of the deck w [rad/s] and its derivative dw [rad/s2], FLU, from the derivatives .._1, .._2 of
+    mat_ed = Rz(yaw) Ry(pitch) Rx(roll)."""
     sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
     wx = roll_1 - yaw_1 * sp
     wy = pitch_1 * cr + yaw_1 * sr * cp

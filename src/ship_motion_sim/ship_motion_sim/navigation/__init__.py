@@ -1,1 +1,0 @@
-"""Inertial navigation systems: a model with stated errors, or an alignment and a strapdown computer."""

@@ -1,1 +1,0 @@
-"""The seaway and the motion of a ship on it."""
