@@ -10,6 +10,7 @@ from acu_tracker.params import AcuParameters
 from acu_tracker.program.prediction import PredictionParameters
 from acu_tracker.unit import Acu
 from acu_tracker.unit_law import DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, MODE_TOPIC, RATE_COMMAND_TOPIC
+from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.graph import topics
 from pedestal_common.graph.modes import MODES
 from pedestal_common.wire import messages, records
@@ -51,7 +52,7 @@ def test_the_diagnosis_says_what_a_request_would_be_refused_for(drive):
     """Of every mode at once, as each is refused when it is asked for, and nothing changes by it."""
     def unit():
         made = Acu(AcuParameters(initial_mode='stop', prediction=PredictionParameters(
-            line_1=LINES[0], line_2=LINES[1], start_time='2019-12-10T09:00:00')), ())
+            line_1=LINES[0], line_2=LINES[1], start_time='2019-12-10T09:00:00', station=StationParameters())), ())
         made.inputs[JOINT_STATES_TOPIC]['stamp'] = 0
         made.take_text(DRIVE_STATE_TOPIC, drive)
         made.step(np.zeros(1, np.int64), made.inputs, made.outputs)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.geometry.geodesy import STATION_NAMES
 from pedestal_common.wire import messages
 from pedestal_common.wire.commands import Command, Reply
-from pedestal_operator.page import page_log, page_passes, page_security, page_server, page_sky, page_state
+from pedestal_operator.page import page_log, page_passes, page_security, page_server, page_sky
 from pedestal_operator.page.page_requests import JOG_TIMEOUT_S, MAX_STATE_AGE_S, PAGE_REPLY_TIMEOUT_S, PageRequests
 from pedestal_operator.page.page_security import Access, Refused, Request
 from pedestal_operator.remote_node import Requests
@@ -219,7 +220,7 @@ class Station:
     LINES = {'line_1': '1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',
              'line_2': '2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482'}
     DIAGNOSTICS = {'acu': LINES, 'tracking_receiver': {}}
-    PLACE = dict(zip((f'prediction.station.{name}' for name in page_state.STATION_PARAMETERS), (47.4, 8.5, 500.0)))
+    PLACE = dict(zip((f'prediction.station.{name}' for name in STATION_NAMES), (47.4, 8.5, 500.0)))
 
     def __init__(self, now, diagnostics=DIAGNOSTICS, **configuration):
         self.now, self._diagnostics, self.configuration = now, diagnostics, {**self.PLACE, **configuration}
