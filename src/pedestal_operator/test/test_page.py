@@ -9,7 +9,7 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.geometry.geodesy import STATION_NAMES
 from pedestal_common.wire import messages
 from pedestal_common.wire.commands import Command, Reply
-from pedestal_operator.page import page_log, page_passes, page_security, page_server, page_sky
+from pedestal_operator.page import page_log, page_passes, page_security, page_server, page_sky, page_state
 from pedestal_operator.page.page_requests import JOG_TIMEOUT_S, MAX_STATE_AGE_S, PAGE_REPLY_TIMEOUT_S, PageRequests
 from pedestal_operator.page.page_security import Access, Refused, Request
 from pedestal_operator.remote_node import Requests
@@ -255,6 +255,19 @@ def test_the_next_passes_are_those_of_skyfield_in_the_time_of_the_graph():
         times = [each[name] for each in found[:2] for name in ('aos', 'los')]
         assert times == pytest.approx([t + ahead for t in SKYFIELD], abs=0.5)
         assert len(found) == page_passes.MAX_PASSES and all(each['highest'] >= 10.0 for each in found)
+
+
+@pytest.mark.parametrize(('changes', 'text'), (
+    ({}, '47.40 N 8.50 E, 500 m: the default'),
+    ({'prediction.station.latitude_deg': -33.9}, '33.90 S 8.50 E, 500 m'),
+    ({'prediction.station.height': math.nan}, 'not given')))
+def test_the_sky_names_the_position_of_the_antenna(changes, text):
+    antenna = Station(1575909000.0, {'acu': {}}, **changes)
+    antenna.present, antenna.path, antenna.pointing_model = lambda topic: False, None, None
+    assert page_state.sky(antenna, ())['station'] == text
+    assert (page_passes.pass_query(Station(1575909000.0, **changes)) is None) == (text == 'not given')
+    antenna.configuration.clear()       # the control unit has not yet answered
+    assert page_state.sky(antenna, ())['station'] == ''
 
 
 def test_without_elements_station_or_utc_no_pass_is_looked_for():
