@@ -476,7 +476,7 @@ def station(reserve_domain, tmp_path_factory, patient):
                reserve_domain(lasting=True), tmp_path_factory.mktemp('station'))
     try:
         with _clients() as connect:
-            said = begins_with(run.process, 6)
+            said = begins_with(run.process, 7)
             client = connect(run.domain_id)
             for name in ('acu/mode', 'joint_states'):
                 client.read(name)

@@ -417,6 +417,7 @@ def test_an_operator_at_the_page(antenna, browser):
     requests = []
     page = opened(browser[1], site.urls['operator'], requests)
     reads(page, '#link', 'live')
+    reads(page, '#passes', 'position 47.40 N 8.50 E, 500 m: the default')
     page.locator('#name').fill('anna')
     page.locator('#name').press('Enter')
     reads(page, '#link', 'live')

@@ -10,12 +10,15 @@ import subprocess
 import sys
 
 import pytest
+import yaml
 
 import pedestal
 from pedestal import cli
 from pedestal.console import EXIT_DISTURBED
 from pedestal.verbs import design
 from pedestal_bringup.scenario import files, scenario
+from pedestal_common import parameters
+from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_workbench.trials import plan as trial_plans
 from tracking_receiver_sim.params import LeoPassParameters
 
@@ -196,6 +199,12 @@ def test_samples_are_the_files_of_the_package(tmp_path):
         name: (shipped / name).read_bytes() for name in design.SAMPLE_FILES}
     default = LeoPassParameters()
     assert (tmp_path / 'iss.tle').read_text() == f'ISS (ZARYA)\n{default.line_1}\n{default.line_2}\n'
+
+
+def test_the_antenna_of_the_samples_states_its_position():
+    sample = yaml.safe_load((pathlib.Path(pedestal.__file__).parent / 'samples' / 'my_antenna.yaml').read_text())
+    station = sample['/**/tracking_receiver']['ros__parameters']['target']['station']
+    assert station == parameters.as_dict(StationParameters())
 
 
 def test_samples_are_never_overwritten(tmp_path, capsys, one_line):

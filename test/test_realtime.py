@@ -66,6 +66,12 @@ def test_a_run_goes_at_the_pace_of_the_clock(run):
     assert verify(load(run.bag)).complete
 
 
+def test_a_run_names_the_position_and_no_value_of_a_real_antenna(run):
+    assert run.result.stdout.startswith('antenna at 47.40 N 8.50 E, 500 m: the default\n')
+    logs = ''.join(path.read_text() for path in run.log.glob('*.log'))
+    assert 'ready, waits for' in logs and 'the default' not in logs and 'not given' not in logs
+
+
 def test_who_has_a_step_to_make_goes_first(run):
     if subprocess.run([sys.executable, '-c', 'import os; os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(10))'],
                       stderr=subprocess.DEVNULL, timeout=60.0).returncode:

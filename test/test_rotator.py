@@ -70,10 +70,15 @@ def station(device, start_process, connect, reserve_domain):
 
 def ask(client, verb, **arguments):
     """Command the control unit, and wait until it grants the command."""
+    assert (reply := asked(client, verb, **arguments)).granted, reply
+
+
+def asked(client, verb, **arguments):
+    """Return the Reply of the control unit to a command."""
     number = str(len(client.heard['acu/command_result']) + 1)
     client.publish('acu/command', commands.message(commands.Command(verb, 'client', number, arguments)))
     reply = client.until(lambda: client.heard['acu/command_result'][int(number) - 1:])[-1]
-    assert commands.of_reply(reply)[1].granted, reply
+    return commands.of_reply(reply)[1]
 
 
 def distance(client, azimuth, elevation):
@@ -91,6 +96,10 @@ def test_a_rotator_goes_where_a_preset_says(station):
     client.diagnosed('follows within')
     assert client.heard['acu/mode'][-1].data == 'preset'
     assert client.heard['adu/state'][-1].data == 'enabled'
+    for mode in ('sun', 'tle'):     # the file of the how-to states no position
+        reply = asked(client, mode)
+        assert not reply.granted and reply.text.startswith(
+            'refused: position of the antenna not given, set `prediction.station.latitude_deg`, ')
 
 
 @pytest.mark.thorough

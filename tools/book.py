@@ -39,8 +39,7 @@ def parameter_page() -> list[str]:
         for name, field in parameters.flatten(kind):
             meta, value = field.metadata, values[name]
             allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ()))
-            text = f'{value:g}' if isinstance(value, float) else str(value)
-            cells = (f'`{name}`', text, allowed, meta.get('unit', ''), meta['doc'])
+            cells = (f'`{name}`', parameters.value_text(value), allowed, meta.get('unit', ''), meta['doc'])
             lines.append('| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |')
     return lines
 

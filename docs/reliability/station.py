@@ -40,7 +40,8 @@ class Station:
         self.file = self.folder / 'parameters.yaml'
         names = dict.fromkeys(map(nodes.plain, (*self.nodes, 'operator')))
         told = {'graph.nodes': ','.join(names), 'graph.beams': self.scenario.header.graph_beams,
-                'graph.priority': self.scenario.header.priority, 'graph.start': self.start_time}
+                'graph.priority': self.scenario.header.priority, 'graph.start': self.start_time,
+                'graph.simulated': True}
         given = {node: {**self.scenario.given(node), **told} for node in (*self.nodes, 'recorder')}
         given[nodes.DRIVE_NODE]['duration'] = given['recorder']['duration'] = 0.0    # until they are told to stop
         given['recorder']['bag'] = str(self.folder / 'bag')

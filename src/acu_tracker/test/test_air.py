@@ -13,6 +13,7 @@ from acu_tracker.unit import Acu
 from acu_tracker.unit_law import JOINT_STATES_TOPIC
 from pedestal_common.geometry import refraction
 from pedestal_common.geometry.earth_orientation import EarthOrientationParameters
+from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.parameters import ParameterError
 from pedestal_common.wire import messages
 from pedestal_common.wire.commands import Command
@@ -135,7 +136,7 @@ def test_a_reading_without_a_stamp_or_of_the_future_is_dropped():
 
 def acu(**values):
     unit = Acu(AcuParameters(initial_mode='stop', prediction=PredictionParameters(
-        line_1=LINES[0], line_2=LINES[1], start_time=START), **values), ())
+        line_1=LINES[0], line_2=LINES[1], start_time=START, station=StationParameters()), **values), ())
     unit.inputs[JOINT_STATES_TOPIC]['stamp'] = 0
     return unit
 
@@ -234,7 +235,8 @@ def test_the_horizon_is_the_apparent_one():
         return reply.partition('next rise at ')[2].partition(';')[0]
     late = '2019-12-10T06:00:00'
     true, raised = (rise(Acu(AcuParameters(initial_mode='stop', refraction=kind, prediction=PredictionParameters(
-        line_1=LINES[0], line_2=LINES[1], start_time=late)), ())) for kind in (RefractionParameters(), RADIO))
+        line_1=LINES[0], line_2=LINES[1], start_time=late, station=StationParameters())), ()))
+        for kind in (RefractionParameters(), RADIO))
     assert '2019-12-10' in raised and raised < true
 
 
@@ -243,7 +245,8 @@ def test_the_diagnosis_names_what_is_wrong(tmp_path):
     file.write_text('\n'.join(f'{"":7}{mjd:8.2f} I {0.1:9.6f}{0:9.6f} {0.3:9.6f}{0:9.6f}  I{-0.1:10.7f}'.ljust(187)
                               for mjd in (58000.0, 58001.0)))
     unit = Acu(AcuParameters(initial_mode='stop', refraction=RADIO, prediction=PredictionParameters(
-        start_time=START, earth_orientation=EarthOrientationParameters(file=str(file)))), ())
+        start_time=START, station=StationParameters(),
+        earth_orientation=EarthOrientationParameters(file=str(file)))), ())
     unit.inputs[JOINT_STATES_TOPIC]['stamp'] = 0
     run(unit, 0.0, 0.1)
     unit.decode('weather/humidity', weather_message('weather/humidity', 55.0, 0.05))

@@ -20,7 +20,8 @@ STATION = StationParameters()
 
 
 def predictor(start=START, lines=LINES, **values):
-    return Predictor(PredictionParameters(line_1=lines[0], line_2=lines[1], start_time=start, **values))
+    return Predictor(PredictionParameters(line_1=lines[0], line_2=lines[1], start_time=start,
+                                          **{'station': STATION, **values}))
 
 
 def test_the_sun_of_meeus():

@@ -10,6 +10,8 @@ from acu_tracker.params import AcuParameters
 from acu_tracker.program.prediction import PredictionParameters
 from acu_tracker.unit import Acu
 from acu_tracker.unit_law import DRIVE_STATE_TOPIC, JOINT_STATES_TOPIC, MODE_TOPIC, RATE_COMMAND_TOPIC
+from pedestal_common import parameters
+from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.graph import topics
 from pedestal_common.graph.modes import MODES
 from pedestal_common.wire import messages, records
@@ -51,7 +53,7 @@ def test_the_diagnosis_says_what_a_request_would_be_refused_for(drive):
     """Of every mode at once, as each is refused when it is asked for, and nothing changes by it."""
     def unit():
         made = Acu(AcuParameters(initial_mode='stop', prediction=PredictionParameters(
-            line_1=LINES[0], line_2=LINES[1], start_time='2019-12-10T09:00:00')), ())
+            line_1=LINES[0], line_2=LINES[1], start_time='2019-12-10T09:00:00', station=StationParameters())), ())
         made.inputs[JOINT_STATES_TOPIC]['stamp'] = 0
         made.take_text(DRIVE_STATE_TOPIC, drive)
         made.step(np.zeros(1, np.int64), made.inputs, made.outputs)
@@ -65,6 +67,31 @@ def test_the_diagnosis_says_what_a_request_would_be_refused_for(drive):
         assert reply.granted == (mode not in refused), mode
         assert reply.granted or reply.text.startswith(f'refused: {refused[mode].partition(":")[0]}'), reply
     assert refused['tle'] == ('below the horizon' if drive == 'enabled' else 'drive not ready: emergency stop')
+
+
+@pytest.mark.parametrize(('station', 'absent'), (
+    ({}, ('latitude_deg', 'longitude_deg', 'height')), ({'latitude_deg': -33.9, 'longitude_deg': 18.4}, ('height',)),
+    ({'latitude_deg': 47.4, 'longitude_deg': 8.5, 'height': 500.0}, ())))
+def test_without_a_position_no_satellite_and_no_sun_are_followed(station, absent):
+    """By service, by command and on the page: each refusal names the parameters. Nothing is predicted."""
+    made = Acu(parameters.build(AcuParameters, {
+        'initial_mode': 'stop', 'prediction.line_1': LINES[0], 'prediction.line_2': LINES[1],
+        'prediction.start_time': '2019-12-10T09:25:00',
+        **{f'prediction.station.{name}': value for name, value in station.items()}}), ())
+    made.inputs[JOINT_STATES_TOPIC]['stamp'] = 0
+    made.take_text(DRIVE_STATE_TOPIC, 'enabled')
+    made.step(np.zeros(1, np.int64), made.inputs, made.outputs)
+    values = dict(made.diagnose().values)
+    assert ('sun_azimuth_deg' in values) == (not absent)
+    text = 'position of the antenna not given, set ' + ', '.join(f'`prediction.station.{name}`' for name in absent)
+    for mode in ('tle', 'sun'):
+        replies = made.request(f'acu/{mode}'), made.command(Command(mode))
+        if absent:
+            assert replies == 2 * ((False, f'refused: {text}; mode is {values["mode"]}'),)
+            assert values[f'refused {mode}'] == text
+        else:
+            assert not any('position' in reply.text for reply in replies)
+            assert 'position' not in values.get(f'refused {mode}', '')
 
 
 def test_the_diagnosis_says_by_which_elements_it_predicts():

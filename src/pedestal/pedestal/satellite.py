@@ -7,14 +7,13 @@ import typing
 
 from pedestal import console
 from pedestal_common.geometry import orbit, passes
+from pedestal_common.geometry.geodesy import STATION_NAMES
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_results.report.subject import place
 from tracking_receiver_sim import elements
 
 if typing.TYPE_CHECKING:
     from pedestal_bringup.scenario.scenario import Draft
-
-STATION_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height')
 
 
 def tle_changes(path: str | pathlib.Path, name: str, when: datetime.datetime) -> tuple[list[str], str]:
@@ -26,16 +25,17 @@ def tle_changes(path: str | pathlib.Path, name: str, when: datetime.datetime) ->
             for key, text in chosen.values.items()], chosen.remark
 
 
-def station_changes(text: str) -> list[str]:
-    """Return texts 'node.key=value' for a station 'LATITUDE,LONGITUDE,HEIGHT' [deg, deg, m]. Raises ValueError."""
+def station_values(text: str) -> dict[str, float]:
+    """Return {parameter of the receiver: value} of a station 'LATITUDE,LONGITUDE,HEIGHT' [deg, deg, m]. Raises
+    ValueError."""
     try:
         numbers = [float(part) for part in text.split(',')]
     except ValueError:
         numbers = []
-    if len(numbers) != len(STATION_PARAMETERS):
+    if len(numbers) != len(STATION_NAMES):
         raise ValueError(f'--station {text!r}: must be LATITUDE,LONGITUDE,HEIGHT in degrees and metres, for example '
                          '47.4,8.5,500')
-    return [f'tracking_receiver.target.station.{name}={number!r}' for name, number in zip(STATION_PARAMETERS, numbers)]
+    return {f'target.station.{name}': number for name, number in zip(STATION_NAMES, numbers)}
 
 
 class PassSelection:

@@ -12,33 +12,48 @@ from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from tracking_receiver_sim import target
 
+PLACE = 'antenna at 47.40 N 8.50 E, 500 m: the default'
 
-def lines(name, duration):
-    return Plan(scenario.load(name, duration=duration)).announced()
+
+def lines(name, duration, *changes):
+    return Plan(scenario.load(name, changes, duration=duration)).announced()
 
 
 def test_a_run_as_long_as_its_scenario_says_when_the_satellite_is_highest():
-    [line] = lines('leo_pass', None)
+    place, line = lines('leo_pass', None)
+    assert place == PLACE
     assert re.fullmatch(r'0 s is \S+ \S+ UTC; the satellite is highest in this run, 69\.\d deg, after [\d.]+ s, '
                         r'at \S+ UTC', line)
 
 
 def test_a_run_that_is_longer_than_the_pass_says_when_it_rises_and_sets():
-    _, rises, sets = lines('leo_pass', 900.0)
+    _, _, rises, sets = lines('leo_pass', 900.0)
     up, down = (float(re.search(r'after ([\d.]+) s', line)[1]) for line in (rises, sets))
     assert rises.startswith('the satellite rises') and sets.startswith('the satellite sets')
     assert 0.0 < up < 450.0 < down < 900.0
     assert up == pytest.approx(900.0 - down, abs=10.0)              # a pass is the same to both sides of its highest
 
 
+@pytest.mark.parametrize(('latitude', 'longitude', 'place'), (
+    (47.4, 8.5, PLACE), (-33.9, -18.4, 'antenna at 33.90 S 18.40 W, 500 m'),
+    (-33.9, 341.6, 'antenna at 33.90 S 18.40 W, 500 m')))
+def test_a_run_first_names_the_position_of_its_antenna(latitude, longitude, place):
+    changes = [f'tracking_receiver.target.station.{name}_deg={value}'
+               for name, value in (('latitude', latitude), ('longitude', longitude))]
+    assert lines('uav_flyby', None, *changes) == [place]
+    assert lines('phased_array_four', None, *changes)[0] == place
+    other = lines('uav_flyby', None, *changes, 'acu.prediction.station.height=7')       # a control unit that errs
+    assert other == [place.replace('500 m', '7 m').removesuffix(': the default')]
+
+
 def test_a_target_without_a_date_says_nothing_of_a_sky():
-    assert lines('uav_flyby', None) == []
+    assert lines('uav_flyby', None) == [PLACE]
 
 
 def test_a_track_that_rises_and_sets_within_the_run_says_so(tmp_path):
     path = tmp_path / 'a.csv'
     path.write_text('t,az,el\n' + ''.join(f'{k},{120 + k},{5 - abs(k - 10)}\n' for k in range(21)))
-    summary, highest, rises, sets = Plan(scenario.load('track_file', [
+    _, summary, highest, rises, sets = Plan(scenario.load('track_file', [
         f'tracking_receiver.target.track_file.path={path}'])).announced()
     assert 'highest 5.0 deg after 10 s' in highest and summary.startswith('a.csv')
     assert rises.startswith('the target rises after 5.') and sets.startswith('the target sets after 15.0')
@@ -68,8 +83,8 @@ def test_a_run_that_is_longer_than_a_track_states_its_end(tmp_path):
 def test_the_narrower_limit_of_control_unit_and_drive_holds(given, held, line):
     chosen = scenario.load('uav_flyby', given)
     assert held.items() <= parameters.as_dict(chosen.node_parameters('acu')).items()
-    assert Plan(chosen).announced() == ([line] if line else [])
-    assert Plan(scenario.parse('uav_flyby', chosen.as_yaml())).announced() == []
+    assert Plan(chosen).announced() == [PLACE, *filter(None, (line,))]
+    assert Plan(scenario.parse('uav_flyby', chosen.as_yaml())).announced() == [PLACE]
 
 
 def test_the_default_limits_of_the_control_unit_are_those_of_the_drive():

@@ -119,7 +119,7 @@ def test_the_lines_of_a_launch_are_those_of_a_run(tmp_path, monkeypatch):
         'ship_motion: {ros__parameters: {ship: {motion: recorded, recorded.path: ship.csv}}}\n'
         'tracking_receiver: {ros__parameters: {target: {kind: track_file, track_file.path: a.csv}}}\n')
     asked = given(scenario='ship_pass', params_file='mine.yaml', duration='5')
-    limit, ship, target, *_ = launch_arguments.prepare(asked, launch_arguments.load_scenario(asked))[0]
+    _, limit, ship, target, *_ = launch_arguments.prepare(asked, launch_arguments.load_scenario(asked))[0]
     assert limit.startswith('acu.azimuth.limits.high = 6.2832 rad is wider than the travel of the drive')
     assert ship == ('ship.csv: columns time [s] in s, Roll_deg in deg, pitch [rad] in rad, heading_deg in deg: '
                     '21 rows, passed over 21 x row that repeats the row before')
@@ -132,7 +132,7 @@ def test_what_the_nodes_start_with_lies_beside_the_bag(tmp_path, monkeypatch):
     asked = given(scenario='uav_flyby', seed='7', bag='mine')
     chosen = launch_arguments.load_scenario(asked)
     lines, file, whole = launch_arguments.prepare(asked, chosen)
-    assert lines == [] == program.Plan(chosen).announced()
+    assert lines == ['antenna at 47.40 N 8.50 E, 500 m: the default'] == program.Plan(chosen).announced()
     assert plain_yaml.read(file)['/**/recorder']['ros__parameters']['bag'] == 'mine'
     assert launch_arguments.load_scenario(given(scenario=str(whole))) == chosen
     (tmp_path / 'mine').mkdir()

@@ -19,6 +19,11 @@ RELATIONS = {'below': operator.lt, 'above': operator.gt, 'at most': operator.le,
 """{words of an error: comparison of a field with another field}."""
 
 
+NOT_GIVEN = math.nan
+"""Default of a number for which no default is right, such as the position of an antenna. Only a field with this
+default may have this value."""
+
+
 class ParameterError(ValueError):
     """Unknown parameter, or value outside its range; the message gives its name, its value and the allowed range."""
 
@@ -114,6 +119,16 @@ def without_ros(values: 'Mapping[str, Value]') -> 'dict[str, Value]':
     return {name: value for name, value in values.items() if name not in own and not name.startswith(_ROS_PREFIX)}
 
 
+def is_absent(value: object) -> bool:
+    """Return True for NOT_GIVEN."""
+    return isinstance(value, float) and math.isnan(value)
+
+
+def value_text(value: object) -> str:
+    """Return the text of a value or default for people."""
+    return 'not given' if is_absent(value) else f'{value:g}' if isinstance(value, float) else str(value)
+
+
 def number_text(value: float) -> str:
     """Return the text of a number for an error: all digits of an integer, six digits of a float."""
     return str(value) if isinstance(value, int) else f'{value:g}'
@@ -126,7 +141,8 @@ def _check_field(field: Field, name: str, value: object) -> None:
             raise ParameterError(f'{name} = {value!r}: must be a number')
         if field.type is int and not isinstance(value, int):
             raise ParameterError(f'{name} = {value!r}: must be a whole number')
-        if not (math.isfinite(value) and meta['low'] <= value <= meta['high']):
+        absent = is_absent(value) and is_absent(field.default)
+        if not absent and not (math.isfinite(value) and meta['low'] <= value <= meta['high']):
             given, low, high = (number_text(number) for number in (value, meta['low'], meta['high']))
             unit = f' {meta["unit"]}'.rstrip()
             raise ParameterError(f'{name} = {given}{unit}: must be {low} to {high}')

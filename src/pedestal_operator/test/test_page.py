@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pedestal_common.geometry import line_of_sight
+from pedestal_common.geometry.geodesy import STATION_NAMES
 from pedestal_common.wire import messages
 from pedestal_common.wire.commands import Command, Reply
 from pedestal_operator.page import page_log, page_passes, page_security, page_server, page_sky, page_state
@@ -219,7 +220,7 @@ class Station:
     LINES = {'line_1': '1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991',
              'line_2': '2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482'}
     DIAGNOSTICS = {'acu': LINES, 'tracking_receiver': {}}
-    PLACE = dict(zip((f'prediction.station.{name}' for name in page_state.STATION_PARAMETERS), (47.4, 8.5, 500.0)))
+    PLACE = dict(zip((f'prediction.station.{name}' for name in STATION_NAMES), (47.4, 8.5, 500.0)))
 
     def __init__(self, now, diagnostics=DIAGNOSTICS, **configuration):
         self.now, self._diagnostics, self.configuration = now, diagnostics, {**self.PLACE, **configuration}
@@ -254,6 +255,19 @@ def test_the_next_passes_are_those_of_skyfield_in_the_time_of_the_graph():
         times = [each[name] for each in found[:2] for name in ('aos', 'los')]
         assert times == pytest.approx([t + ahead for t in SKYFIELD], abs=0.5)
         assert len(found) == page_passes.MAX_PASSES and all(each['highest'] >= 10.0 for each in found)
+
+
+@pytest.mark.parametrize(('changes', 'text'), (
+    ({}, '47.40 N 8.50 E, 500 m: the default'),
+    ({'prediction.station.latitude_deg': -33.9}, '33.90 S 8.50 E, 500 m'),
+    ({'prediction.station.height': math.nan}, 'not given')))
+def test_the_sky_names_the_position_of_the_antenna(changes, text):
+    antenna = Station(1575909000.0, {'acu': {}}, **changes)
+    antenna.present, antenna.path, antenna.pointing_model = lambda topic: False, None, None
+    assert page_state.sky(antenna, ())['station'] == text
+    assert (page_passes.pass_query(Station(1575909000.0, **changes)) is None) == (text == 'not given')
+    antenna.configuration.clear()       # the control unit has not yet answered
+    assert page_state.sky(antenna, ())['station'] == ''
 
 
 def test_without_elements_station_or_utc_no_pass_is_looked_for():

@@ -10,6 +10,7 @@ import pytest
 from drive_law import drive_state
 from pedestal_bringup.loop import closed_loop, memory_recording
 from pedestal_bringup.scenario import files, scenario
+from pedestal_common.geometry.geodesy import STATION_NAMES
 from pedestal_common.parameters import ParameterError, as_dict
 from pedestal_results import results
 from pedestal_results.recorded_run import RecordedRun
@@ -224,6 +225,17 @@ def test_a_start_in_strong_wind_trips_no_drive(pedestal, tmp_path, share):
                                seed=seed, duration=duration)
         run = closed_loop.Loop(chosen).run()
         assert {drive_state.state_text(int(code)) for code in run['adu/state']} == {'enabled'}
+
+
+@pytest.mark.parametrize(('given', 'place'), (
+    ((), '47.40 N 8.50 E, 500 m: the default'), (('--station', '-33.912345,18.4,10'), '33.91 S 18.40 E, 10 m')))
+def test_the_file_states_the_position(pedestal, tmp_path, given, place):
+    code, output, _ = pedestal('new', 'my.yaml', '--like', 'uav_flyby', *given)
+    assert code == 0 and (f'no --station: the antenna stands at {place}' in output) == (not given)
+    text = (tmp_path / 'my.yaml').read_text()
+    assert all(f'    target.station.{name}: ' in text for name in STATION_NAMES)
+    station = scenario.load(tmp_path / 'my.yaml').node_parameters('acu').prediction.station
+    assert station.text == place and station.latitude_deg == (-33.912345 if given else 47.4)
 
 
 def test_no_file_is_overwritten(pedestal, tmp_path):

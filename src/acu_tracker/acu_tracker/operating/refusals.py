@@ -36,6 +36,8 @@ def now(unit: 'Acu') -> dict[str, str]:
     words = {code: modes.REASONS[code] for code in set(why) - {Reason.NONE}}
     if Reason.DRIVE_NOT_READY in words:
         words[Reason.DRIVE_NOT_READY] += f': {unit.drive_status}'
+    if Reason.NO_POSITION in words:
+        words[Reason.NO_POSITION] = of_mode(unit, Mode.SUN, Reason.NO_POSITION)
     for reason, name in INPUTS_OF_REASONS.items():
         if reason in words and (text := missing(unit, name)):
             words[reason] += f', {text}'

@@ -21,7 +21,7 @@ from acu_tracker.program.air import Air, RefractionParameters
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack
 from pedestal_common.geometry import bodies, earth_orientation, orbit
 from pedestal_common.geometry.earth_orientation import MJD_ZERO_JULIAN_DATE, EarthOrientationParameters
-from pedestal_common.geometry.geodesy import StationParameters
+from pedestal_common.geometry.geodesy import GivenStation
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph import topics
 from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY
@@ -48,7 +48,7 @@ class PredictionParameters(Parameters):
     light_time: bool = flag(False, 'travel time of the wave: the satellite is seen where it was when the wave left '
                             'it; the sun always is')
     earth_orientation: EarthOrientationParameters = group(EarthOrientationParameters)
-    station: StationParameters = group(StationParameters)
+    station: GivenStation = group(GivenStation)
 
     def check(self) -> None:
         """Raise ParameterError for invalid elements or an invalid time."""
@@ -102,10 +102,19 @@ class Predictor:
         """True if the UTC of the stamps is known. In lockstep only the parameter start_time gives it."""
         return self.parameters.start_time != '' or self.epoch > 0
 
+    @property
+    def _obstacle(self) -> int:
+        """Reason.NONE, or why no direction can be predicted."""
+        if self.parameters.station.absent:
+            return Reason.NO_POSITION
+        return Reason.NONE if self._utc_known else Reason.NO_UTC
+
     def satellite(self, stamp: Seconds) -> Predicted:
         """Return the Predicted of the satellite for a stamp."""
-        if self._satellite is None or not self._utc_known:
-            return Predicted(NO_TRACK, Reason.NO_ELEMENTS if self._utc_known else Reason.NO_UTC)
+        if self._obstacle != Reason.NONE:
+            return Predicted(NO_TRACK, self._obstacle)
+        if self._satellite is None:
+            return Predicted(NO_TRACK, Reason.NO_ELEMENTS)
         interval = max(round(2.0 * math.pi * 60.0 / self._satellite.no_kozai / ROWS_PER_ORBIT, 1), 1.0)
         if abs(self._age(stamp)) > self.parameters.oldest:
             return Predicted(NO_TRACK, Reason.TOO_OLD, stamp, stamp + TABLE_ROW_COUNT * interval)
@@ -113,14 +122,14 @@ class Predictor:
 
     def sun(self, stamp: Seconds) -> Predicted:
         """Return the Predicted of the sun for a stamp."""
-        if not self._utc_known:
-            return Predicted(NO_TRACK, Reason.NO_UTC)
+        if self._obstacle != Reason.NONE:
+            return Predicted(NO_TRACK, self._obstacle)
         return self._table(self._sun_angles, stamp, SUN_ROW_INTERVAL_S)
 
     def diagnostic_values(self, stamp: Seconds) -> list[tuple[str, str]]:
-        """Return [(key, text)] for the diagnostics: azimuth and elevation of the sun, if UTC is known, values of the
-        earth's orientation, and the elements of the satellite, if any."""
-        sun_now = np.degrees(self.sun_angles(np.array([stamp]))[0]) if self._utc_known else ()
+        """Return [(key, text)] for the diagnostics: azimuth and elevation of the sun, if UTC and position are known,
+        values of the earth's orientation, and the elements of the satellite, if any."""
+        sun_now = np.degrees(self.sun_angles(np.array([stamp]))[0]) if self._obstacle == Reason.NONE else ()
         lines = () if self._satellite is None else ('omm',) if self.parameters.omm else ('line_1', 'line_2')
         return [*((f'sun_{axis}_deg', f'{angle:.2f}') for axis, angle in zip(topics.AXES, sun_now)),
                 *self._orientation_values(stamp), *((line, getattr(self.parameters, line)) for line in lines)]
@@ -145,6 +154,8 @@ class Predictor:
 
     def refusal_details(self, mode: int, reason: int, stamp: Seconds) -> str:
         """Return details of the reason for which a mode is refused at a stamp; '' if there are none."""
+        if reason == Reason.NO_POSITION:
+            return f'set {", ".join(f"`prediction.station.{name}`" for name in self.parameters.station.absent)}'
         if reason == Reason.NO_UTC:
             return 'set `prediction.start_time`'
         if reason == Reason.TOO_OLD:

@@ -70,6 +70,12 @@ def add_param(parser: argparse.ArgumentParser, example: str = 'acu.azimuth.feedf
                         help=f'parameter and its new value, for example {example}; may be repeated')
 
 
+def add_station(parser: argparse.ArgumentParser) -> None:
+    """Add --station LAT,LON,H."""
+    parser.add_argument('--station', metavar='LAT,LON,H', help='position of the antenna: latitude [deg], longitude '
+                        '[deg], height [m]; default: that of the scenario')
+
+
 def add_beam(parser: argparse.ArgumentParser) -> None:
     """Add --beam NAME for a recording of several beams."""
     parser.add_argument('--beam', default='', metavar='NAME', help='beam to read from a recording of several beams, '

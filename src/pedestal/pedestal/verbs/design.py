@@ -68,6 +68,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
     """
     from pedestal_workbench.tuning.data_sheet import DataSheet
     parser.add_argument('file', type=pathlib.Path, metavar='FILE.yaml', help='new scenario file')
+    arguments.add_station(parser)
     for name, field in parameters.flatten(DataSheet):
         unit = field.metadata.get('unit')
         allowed = ', '.join(field.metadata.get('options', ()))
@@ -89,7 +90,9 @@ def _new(options: argparse.Namespace) -> int:
     except parameters.ParameterError as error:
         name, equals, rest = str(error).partition(' = ')
         raise ValueError(f'{option_of(name)}{equals}{rest}') from None
-    content, remarks = antenna_from_data_sheet.new(sheet, options.file.stem, options.command)
+    from pedestal import satellite
+    station = None if options.station is None else satellite.station_values(options.station)
+    content, remarks = antenna_from_data_sheet.new(sheet, options.file.stem, options.command, station)
     options.file.write_text(content)
     print(*remarks, sep='\n', end='\n' if remarks else '')
     following = shlex.join(('pedestal', 'tune', str(options.file), '--loops'))
@@ -119,7 +122,7 @@ def _columns(meta: 'Mapping[str, Json]', value: object) -> tuple[str, str, str]:
     """Return default, range or options, and meaning with unit of a parameter, as texts."""
     allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ' | '.join(meta.get('options', ()))
     unit = f' [{meta["unit"]}]' if meta.get('unit') else ''
-    return f'{value:g}' if isinstance(value, float) else str(value), allowed, f'{meta["doc"]}{unit}'
+    return parameters.value_text(value), allowed, f'{meta["doc"]}{unit}'
 
 
 def _add_study(parser: argparse.ArgumentParser) -> None:

@@ -40,8 +40,7 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
     console.add_explain(parser)
     arguments.add_param(parser)
     arguments.add_elements(parser)
-    parser.add_argument('--station', metavar='LAT,LON,H', help='place of the antenna: latitude [deg], longitude '
-                        '[deg], height [m]')
+    arguments.add_station(parser)
     parser.add_argument('--pass', dest='which', metavar='WHICH', help='pass to track from rise to set. next: the next '
                         'pass; N: number N of the list; a UTC such as 2019-12-10T12:35: the first pass at or after '
                         'it; list: only print the passes; default with --tle: next')
@@ -188,7 +187,8 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     if options.which is not None and started:
         raise ValueError(f'--pass {options.which}: sets {START_TIME_PARAMETER}, which is also given; leave out one')
     if options.station is not None:
-        changes = satellite.station_changes(options.station) + changes
+        changes = [f'tracking_receiver.{name}={value!r}'
+                   for name, value in satellite.station_values(options.station).items()] + changes
     if options.tle:
         by_utc = options.which is not None and not (options.which in ('list', 'next') or options.which.isdecimal())
         when = (orbit.instant('--pass', options.which) if by_utc else

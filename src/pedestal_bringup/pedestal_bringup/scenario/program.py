@@ -82,10 +82,12 @@ class Plan:
         return motion.summary(self.scenario.node_parameters('ship_motion').ship, self.scenario.header.duration)
 
     def announced(self) -> list[str]:
-        """Return the lines that a user reads before the run: the notes of the scenario, the file of the ship motion,
-        and the targets (a recorded flight, when it is highest, rises and sets). Equal lines of several beams appear
-        once. Raises csv_table.TableError for a file that cannot be used."""
-        lines = [*self.scenario.notes, *self.ship_summary]
+        """Return the lines that a user reads before the run. They state the position of the antenna, the notes of the
+        scenario, the file of the ship motion, and the targets (a recorded flight, when it is highest, rises and sets).
+        Equal lines of several beams appear once. Raises csv_table.TableError for a file that cannot be used."""
+        stations = [self.scenario.node_parameters(f'{prefix}acu').prediction.station
+                    for prefix in self.scenario.prefixes]
+        lines = [*(f'antenna at {station.text}' for station in stations), *self.scenario.notes, *self.ship_summary]
         for prefix, built in self.targets.items():
             lines += [*built.summary, *_sky(built, self._parameters(prefix).kind, self.scenario.header.duration)]
         return list(dict.fromkeys(lines))

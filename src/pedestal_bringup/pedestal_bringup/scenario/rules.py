@@ -17,6 +17,7 @@ from pedestal_bringup.scenario.sections import (
     values_of,
 )
 from pedestal_common import parameters
+from pedestal_common.geometry.geodesy import STATION_NAMES
 from pedestal_common.graph import nodes, topics
 from pedestal_common.quantities import Seconds, Value
 
@@ -38,7 +39,7 @@ SHARED_PARAMETERS = (
     ('tracking_receiver', 'blockage', 'acu', 'blockage'),
     ('tracking_receiver', 'target.leo_pass.start_time', 'acu', 'prediction.start_time'),
     *(('tracking_receiver', f'target.station.{name}', 'acu', f'prediction.station.{name}')
-      for name in ('latitude_deg', 'longitude_deg', 'height')),
+      for name in STATION_NAMES),
 )
 """(node, parameter, second node, parameter): the second takes the value of the first where the scenario does not set
 it."""
@@ -191,8 +192,9 @@ def share(name: str, sections: Sections, header: ScenarioParameters, seed: int |
     if header.servo:
         rules.share_servo()
     for owner, key, node, known_as in SHARED_PARAMETERS:
-        if key in sections[owner]:
-            sections[node].setdefault(known_as, sections[owner][key])
+        # A control unit has no default position. Because a scenario simulates the antenna, its default place will do.
+        if key in sections[owner] or known_as.startswith('prediction.station.'):
+            sections[node].setdefault(known_as, rules.value_of(owner, key))
     if header.beam:
         rules.share_age()
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from pedestal_common.parameters import Parameters, parameter
+from pedestal_common.parameters import NOT_GIVEN, Parameters, as_dict, is_absent, parameter
 from pedestal_common.quantities import Degrees, Floats, Matrix3, Meters, Radians, Vector3
 from pedestal_common.reproducible import cos, sin
 
@@ -28,6 +28,31 @@ class StationParameters(Parameters):
     latitude_deg: float = parameter(47.4, -90.0, 90.0, 'deg', 'geodetic latitude')
     longitude_deg: float = parameter(8.5, -180.0, 360.0, 'deg', 'longitude, east positive')
     height: float = parameter(500.0, -500.0, 9000.0, 'm', 'height above the ellipsoid')
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Names of the parameters that are not given."""
+        return tuple(name for name, value in as_dict(self).items() if is_absent(value))
+
+    @property
+    def text(self) -> str:
+        """Position for people, with a remark where it is the default or not given."""
+        if self.absent:
+            return 'not given'
+        east = (self.longitude_deg + 180.0) % 360.0 - 180.0
+        return (f'{abs(self.latitude_deg):.2f} {"NS"[self.latitude_deg < 0.0]} {abs(east):.2f} {"EW"[east < 0.0]}, '
+                f'{self.height:.0f} m{": the default" if as_dict(self) == as_dict(StationParameters()) else ""}')
+
+
+@dataclasses.dataclass(frozen=True)
+class GivenStation(StationParameters):
+    """Place of an antenna that has no default, because an antenna points past every satellite at a default place."""
+    latitude_deg: float = parameter(NOT_GIVEN, -90.0, 90.0, 'deg', 'geodetic latitude')
+    longitude_deg: float = parameter(NOT_GIVEN, -180.0, 360.0, 'deg', 'longitude, east positive')
+    height: float = parameter(NOT_GIVEN, -500.0, 9000.0, 'm', 'height above the ellipsoid')
+
+
+STATION_NAMES = tuple(field.name for field in dataclasses.fields(StationParameters))  # names of the parameters
 
 
 def geocentric(latitude: Radians | Floats, longitude: Radians | Floats, height: Meters | Floats) -> Floats:

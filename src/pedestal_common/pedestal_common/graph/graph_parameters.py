@@ -38,6 +38,9 @@ class GraphParameters(parameters.Parameters):
     priority: int = parameters.parameter(0, 0, 98, '', 'realtime: priority (SCHED_RR) of the nodes with a unit, where '
                                          'the system allows it, one more for the drive; 0: the default scheduling')
 
+    simulated: bool = parameters.flag(False, 'simulated antenna, as in `pedestal run`; false: in realtime each node '
+                                      'names at its start the values for an antenna that are not given')
+
     def check(self) -> None:
         """Raise ParameterError for a name in `nodes` that is no node."""
         known = (*nodes.NODE_NAMES, *nodes.SIMULATED_PARTS)

@@ -42,10 +42,12 @@ MODE_ROWS = (
         'where rows are missing',
         needs='program', ends='program', follows=True, handover='autotrack', table=True),
     Row('tle', 'follow a satellite, predicted from its elements',
-        'elements not older than `prediction.oldest`; the satellite is above the horizon and inside the limits',
+        '`prediction.station` is given; elements not older than `prediction.oldest`; the satellite is above the '
+        'horizon and inside the limits',
         'to `autotrack` after `lock_count` accepted receiver errors; to `standby` when the satellite has set',
         needs='tle', ends='tle', follows=True, handover='autotrack', table=True, predicted='satellite'),
-    Row('sun', 'follow the sun, to calibrate the pointing', 'the sun is above the horizon and inside the limits',
+    Row('sun', 'follow the sun, to calibrate the pointing',
+        '`prediction.station` is given; the sun is above the horizon and inside the limits',
         'to `standby` when the sun has set', needs='sun', ends='sun', follows=True, table=True, predicted='sun'),
     Row('autotrack', 'follow the filtered receiver error; while the signal is lost for a short time, follow the '
         'prediction of the filter',

@@ -1,6 +1,7 @@
 """Shell: base class of every ROS node of the project, and `main`, which runs the process of a node."""
 import array
 import contextlib
+import ctypes
 import gc
 import inspect
 import json
@@ -31,7 +32,7 @@ from rclpy.timer import Timer
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from pedestal_common import ignored_stop, parameters
-from pedestal_common.graph import nodes
+from pedestal_common.graph import antenna_values, nodes
 from pedestal_common.graph.graph_parameters import GraphParameters
 from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY, GraphError
 from pedestal_common.node import middleware
@@ -50,6 +51,7 @@ START_DEADLINE_S = 300.0
 """Longest time that a node waits for its graph, whose other nodes may compile their laws for the first time [s]."""
 
 ACKNOWLEDGE_TIMEOUT_S = 1.0  # longest time that a node waits at its end for the acknowledgement of its messages [s]
+TIMEX_BYTES, TIME_ERROR = 256, 5  # at least the size of struct timex; result of adjtimex for an unsynchronised clock
 EXIT_DELAY_S = 0.1  # time for which a process stays after its publishers and subscribers have left the graph [s]
 
 
@@ -101,6 +103,11 @@ def readings() -> tuple[Nanoseconds, Nanoseconds]:
     return steady, system
 
 
+def is_clock_synchronised() -> bool:
+    """Return False if the kernel counts the clock of this host as not synchronised by NTP or PTP (adjtimex(2))."""
+    return ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(TIMEX_BYTES)) != TIME_ERROR
+
+
 def node_of(info: TopicEndpointInfo, root: str = '/') -> str:
     """Return the name in the graph of the node that owns a publisher or subscriber, 'beam_2/acu' for example. root:
     namespace of the graph, with a '/' at its end."""
@@ -113,6 +120,8 @@ def _descriptor(field: parameters.Field, read_only: bool) -> ParameterDescriptor
     descriptor = ParameterDescriptor(description=meta['doc'] + unit, read_only=read_only)
     if 'options' in meta:
         descriptor.additional_constraints = 'one of ' + ', '.join(meta['options'])
+    elif parameters.is_absent(field.default):     # no range of ROS contains .nan
+        descriptor.additional_constraints = f'{meta["low"]:g} to {meta["high"]:g}, or .nan: not given'
     elif 'low' in meta and field.type is int:
         descriptor.integer_range = [IntegerRange(from_value=int(meta['low']), to_value=int(meta['high']), step=0)]
     elif 'low' in meta:
@@ -177,6 +186,10 @@ class Shell(Node):
             name = self.get_name()
             self.get_logger().warning(f'no parameter of {self.get_fully_qualified_name()} is in the parameter file: a '
                                       f'section /**/{name} is for {name} in any namespace, {name} for one without')
+        if not (self.graph.lockstep or self.graph.simulated):
+            for line in antenna_values.lines(self.get_name(), self.parameters, given, self.graph.members,
+                                             is_clock_synchronised()):
+                self.get_logger().warning(line)
         if live:
             self.add_pre_set_parameters_callback(self._typed)
             self.add_on_set_parameters_callback(self._on_set)

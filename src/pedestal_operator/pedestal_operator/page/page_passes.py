@@ -7,7 +7,7 @@ from typing import NamedTuple
 from pedestal_common.geometry import orbit, passes
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.graph.steps import SECONDS_PER_DAY
-from pedestal_common.quantities import Json, Seconds
+from pedestal_common.quantities import Seconds
 from pedestal_operator.page import page_state
 
 MAX_PASSES = 4  # largest number of passes shown
@@ -34,8 +34,8 @@ def pass_query(antenna: page_state.PageAntenna) -> PassQuery | None:
     simulated = [target.get(f'target.leo_pass.{name}', '') for name in page_state.ELEMENT_PARAMETERS]
     lines = [acu.get(name, '') for name in page_state.ELEMENT_PARAMETERS]
     lines = lines if any(lines) else simulated
-    station: list[Json] = [p.get(f'prediction.station.{name}') for name in page_state.STATION_PARAMETERS]
-    if not any(lines) or None in station:
+    station = page_state.station(antenna)
+    if not any(lines) or station.absent:
         return None
     start = p.get('prediction.start_time')
     if not start and lines == simulated:
@@ -43,7 +43,7 @@ def pass_query(antenna: page_state.PageAntenna) -> PassQuery | None:
     ahead = _seconds(orbit.instant('start_time', start)) - page_state.epoch(antenna) if start else 0.0
     utc = antenna.now + ahead
     line_1, line_2, omm = lines
-    return PassQuery(line_1, line_2, omm, StationParameters(*station), ahead,
+    return PassQuery(line_1, line_2, omm, station, ahead,
                      int(utc / SECONDS_PER_DAY / SEARCH_VALIDITY_DAYS)) if utc > MIN_UTC_S else None
 
 

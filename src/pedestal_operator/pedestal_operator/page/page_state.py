@@ -4,7 +4,9 @@ import math
 from collections.abc import Iterable, Mapping
 
 from pedestal_common.geometry import pointing_report
+from pedestal_common.geometry.geodesy import STATION_NAMES, GivenStation
 from pedestal_common.graph import topics
+from pedestal_common.parameters import NOT_GIVEN
 from pedestal_common.quantities import Degrees, Json, Seconds
 from pedestal_operator import state
 from pedestal_operator.antenna import Antenna
@@ -16,11 +18,10 @@ EXTRA_NUMBER_TOPICS = (MOTOR_STATES_TOPIC, ATTITUDE_TOPIC)
 
 TEXT_TOPIC_BY_NAME = {'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}  # {name on the page: topic of the text}
 
-STATION_PARAMETERS, ELEMENT_PARAMETERS = ('latitude_deg', 'longitude_deg', 'height'), (
-    'line_1', 'line_2', 'omm')
+ELEMENT_PARAMETERS = 'line_1', 'line_2', 'omm'
 
 SHOWN_PARAMETERS = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blockage', 'floor', 'prediction.start_time',
-                            *(f'prediction.station.{name}' for name in STATION_PARAMETERS),
+                            *(f'prediction.station.{name}' for name in STATION_NAMES),
                             *(f'{axis}.limits.{end}' for axis in topics.AXES for end in ('low', 'high')),
                             *(f'{axis}.stow' for axis in topics.AXES)),
                     'tracking_receiver': ('receiver.acquire_level_dbhz', 'receiver.lose_level_dbhz', 'target.kind',
@@ -108,6 +109,12 @@ def epoch(antenna: PageAntenna) -> Seconds:
     return antenna.configuration.get('graph.start', 0) * 1e-9 or antenna.now // 86400.0 * 86400.0
 
 
+def station(antenna: PageAntenna) -> GivenStation:
+    """Return the position of an antenna, as far as it is known."""
+    return GivenStation(*(antenna.configuration.get(f'prediction.station.{name}', NOT_GIVEN)
+                          for name in STATION_NAMES))
+
+
 def fixed(antenna: PageAntenna) -> dict[str, Json]:
     """Return the constants of a run: beamwidth and limits [deg], thresholds of the level [dB-Hz], axes of charts."""
     p = antenna.configuration
@@ -125,8 +132,8 @@ def sky(antenna: PageAntenna, coming: Iterable[Mapping[str, float]]) -> dict[str
     """Return the content of the sky plot in earth angles [deg]: path, hidden sectors, lines, sun and passes.
 
     `floor`, `top`: lines of the lowest and highest elevation in reach; `hole`: time of the keyhole, UTC [s];
-    `residuals`: of the pointing model, azimuth and elevation on the deck, cross-elevation, elevation [deg]. coming:
-    passes after the track.
+    `station`: position of the antenna, '' while it is unknown; `residuals`: of the pointing model, azimuth and
+    elevation on the deck, cross-elevation, elevation [deg]. coming: passes after the track.
     """
     deck, p, acu = _deck(antenna), antenna.configuration, antenna.diagnostics_of('acu')
     begin = epoch(antenna)
@@ -135,7 +142,9 @@ def sky(antenna: PageAntenna, coming: Iterable[Mapping[str, float]]) -> dict[str
     low, high = (math.degrees(p.get(f'elevation.limits.{end}', math.nan)) for end in ('low', 'high'))
     sun = [float(acu[key]) for axis in topics.AXES if (key := f'sun_{axis}_deg') in acu]
     last = antenna.path.times[-1] if antenna.path else -math.inf
-    return {'path': page_sky.thinned(antenna.path), 'hole': hole, 'sun': sun,
+    known = f'prediction.station.{STATION_NAMES[0]}' in p
+    return {'station': station(antenna).text if known else '',
+            'path': page_sky.thinned(antenna.path), 'hole': hole, 'sun': sun,
             'coming': [each for each in coming if each['aos'] > last],
             'passes': page_sky.passage(antenna.path, acu.get('keyhole_loss_s', '')),
             'sectors': [deck.sector(*row) for row in page_sky.numbers(p.get('blockage', ''))],

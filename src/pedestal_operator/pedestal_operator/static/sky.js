@@ -114,11 +114,12 @@ const residualLine = (rows) =>
   `rms ${number(rms(rows), 4)}°, longest arrow ${number(largest(rows), 4)}°`;
 
 // Show the passes, and the predictions of the control unit.
-function showPasses({passes, coming}, {status, now}) {
+function showPasses({passes, coming, station}, {status, now}) {
   const lines = passes.map(passLine);
   if (!lines.length) lines.push(make('span', 'none', 'no program track'));
   lines.push(...coming.map((pass) => nextLine(pass, now ? now.t : 0)));
   for (const text of status ? [status.keyhole, status.blockage] : []) if (text) lines.push(make('div', 'note', text));
+  if (station) lines.push(words([['position', station]]));
   find('passes').replaceChildren(...lines);
 }
 

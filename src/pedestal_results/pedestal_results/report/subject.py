@@ -56,13 +56,13 @@ def changed_parameters(bag: Bag) -> list[list[str]]:
         defaults, units = parameters.defaults(kind), {key: field.metadata.get('unit', '')
                                                       for key, field in parameters.flatten(kind)}
         rows += [[f'{name}.{key}', _shown(value), _shown(defaults[key]), units[key]] for key, value in values.items()
-                 if key in defaults and value != defaults[key]]
+                 if key in defaults and value != defaults[key] and not parameters.is_absent(value)]
     return rows
 
 
 def _shown(value: object) -> str:
     """Return a parameter value as text, without the middle of a long text."""
-    text = f'{value:.6g}' if isinstance(value, float) else str(value)
+    text = parameters.value_text(value)
     half = MAX_VALUE_CHARACTERS // 2
     return text if len(text) <= MAX_VALUE_CHARACTERS else f'{text[:half]} ... {text[-half:]}'
 

@@ -167,8 +167,10 @@ def _assumed(sheet: DataSheet) -> list[str]:
     return lines
 
 
-def sections(sheet: DataSheet, title: str) -> dict[str, dict[str, Json]]:
-    """Return {node: {key: value}} of the scenario. Raises ValueError."""
+def sections(sheet: DataSheet, title: str,
+             station: Mapping[str, float] | None = None) -> dict[str, dict[str, Json]]:
+    """Return {node: {key: value}} of the scenario. station: {parameter of the receiver: value}, None for that of the
+    scenario of the data sheet. Raises ValueError."""
     from pedestal_workbench.tuning import loops
     _, content = files.text(sheet.like)
     found = files.by_node(parameter_file.parse(content))
@@ -188,6 +190,8 @@ def sections(sheet: DataSheet, title: str) -> dict[str, dict[str, Json]]:
         found['acu'] |= {f'{name}.{key}': value for key, value in gains.items()}
     rounded = {node: {key: float(f'{value:.4g}') if isinstance(value, float) else value for key, value in own.items()}
                for node, own in found.items()}
+    place = station or as_dict(_receiver(sheet.like).target.station, 'target.station.')
+    rounded['tracking_receiver'] = {**place, **rounded['tracking_receiver'], **place}
     if not rounded['scenario'].get('ship'):
         rounded['adu'] |= _at_the_target(sheet, rounded)
     return rounded
@@ -218,21 +222,24 @@ def text(found: Mapping[str, Mapping[str, Json]], head: Iterable[str]) -> str:
     return parameter_file.comment(head) + '\n'.join(lines) + '\n'
 
 
-def new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
+def new(sheet: DataSheet, name: str, command: str,
+        station: Mapping[str, float] | None = None) -> tuple[str, list[str]]:
     """Return (text of the scenario file, line about each changed or assumed value). command: the command line, for the
-    head of the file. Raises ValueError for values that contradict each other, which names the options of `pedestal
-    new` to change."""
+    head of the file; station: as in `sections`. Raises ValueError for values that contradict each other, which names
+    the options of `pedestal new` to change."""
     try:
-        return _new(sheet, name, command)
+        return _new(sheet, name, command, station)
     except ValueError as error:
-        raise data_sheet.refusal(sheet, error, lambda other: _new(other, name, command)) from None
+        raise data_sheet.refusal(sheet, error, lambda other: _new(other, name, command, station)) from None
 
 
-def _new(sheet: DataSheet, name: str, command: str) -> tuple[str, list[str]]:
+def _new(sheet: DataSheet, name: str, command: str, station: Mapping[str, float] | None) -> tuple[str, list[str]]:
     sheet, remarks = attainable(sheet)
     remarks += _assumed(sheet)
+    if station is None:
+        remarks.append(f'no --station: the antenna stands at {_receiver(sheet.like).target.station.text}')
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
-    found = sections(sheet, title)
+    found = sections(sheet, title, station)
     tune = shlex.join(('pedestal', 'tune', f'{name}.yaml', '--loops'))
     run = Variant(f'{name}.yaml', files=(f'{name}-loops.yaml',)).command()
     content = text(found, [*parameter_file.origin(command), 'Values that are not in the data sheet are scaled from '
