@@ -1,4 +1,5 @@
-"""Library of the tracking antenna without ROS: load a scenario, change its parameters, run it, read its numbers.
+"""Library of the tracking antenna without ROS: load a scenario, change its parameters, run it, read its numbers, and
+filter measured angles.
 
 >>> import pedestal
 >>> scenario = pedestal.load('leo_pass', duration=6.0)
@@ -18,14 +19,16 @@ import typing
 
 if typing.TYPE_CHECKING:
     from pedestal.ensemble import Trials, trials
+    from pedestal.estimate import Filtered, filter
     from pedestal.recording import Run, Table, read_bag, run
     from pedestal.scenario import Scenario, load, scenarios
 
-_MODULES = {'Trials': 'ensemble', 'trials': 'ensemble', 'Run': 'recording', 'Table': 'recording',
-            'read_bag': 'recording', 'run': 'recording', 'Scenario': 'scenario', 'load': 'scenario',
-            'scenarios': 'scenario'}
+_MODULES = {'Trials': 'ensemble', 'trials': 'ensemble', 'Filtered': 'estimate', 'filter': 'estimate',
+            'Run': 'recording', 'Table': 'recording', 'read_bag': 'recording', 'run': 'recording',
+            'Scenario': 'scenario', 'load': 'scenario', 'scenarios': 'scenario'}
 
-__all__ = ['Run', 'Scenario', 'Table', 'Trials', 'load', 'read_bag', 'run', 'scenarios', 'trials']
+__all__ = ['Filtered', 'Run', 'Scenario', 'Table', 'Trials', 'filter', 'load', 'read_bag', 'run', 'scenarios',
+           'trials']
 
 
 def __getattr__(name: str) -> object:
