@@ -2,7 +2,7 @@
 
 A reading states how we interpret the claim, and under which conditions we measure it. The measured numbers are in the
 rows of the studies. A verdict states in words whether the claim holds. tools/reference.py writes claims, numbers and
-verdicts side by side into docs/papers.md.
+verdicts side by side into docs/reference/papers.md.
 """
 import typing
 from collections.abc import Sequence

@@ -64,7 +64,7 @@ SCENARIO_RESULTS = (
     ('`uav_flyby` at 60 m (`pedestal study scenarios` prints its command): the same ratio, cross-elevation',
      'uav_flyby-60m', 'noise_reduction_cross_elevation'),
     ('`uav_flyby` at 60 m: the same ratio, elevation', 'uav_flyby-60m', 'noise_reduction_elevation'))
-"""(text, case, metric) of the results of the study scenarios in docs/measured.md."""
+"""(text, case, metric) of the results of the study scenarios in docs/reference/measured.md."""
 HEADLINE_RESULTS = (
     ('a satellite pass ashore: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
     ('the same pass: rms pointing error divided by the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
@@ -186,7 +186,7 @@ def manoeuvre_numbers(rows: Rows) -> Content:
 
 
 def feedforward_numbers(rows: Rows) -> Content:
-    """Return the table of paper 003's feed-forward: miss and rate noise for each source of rate and acceleration.
+    """Return the table of Lin 2020's feed-forward: miss and rate noise for each source of rate and acceleration.
 
     The miss is the pointing error, a term of the paper.
     """
@@ -206,7 +206,7 @@ def feedforward_numbers(rows: Rows) -> Content:
 
 
 def family_numbers(rows: Rows) -> Content:
-    """Return the table of the filters that paper 000 compares: geometric means of the errors over all motions."""
+    """Return the table of the filters that Ma 2023 compares: geometric means of the errors over all motions."""
     lines = []
     for name, meaning in filter_families.FILTER_MEANINGS.items():
         cells = [_spread(rows['filter-families', case, metric]) if ('filter-families', case, metric) in rows else ''
@@ -218,7 +218,7 @@ def family_numbers(rows: Rows) -> Content:
 
 
 def speed_numbers(rows: Rows) -> Content:
-    """Return the table of paper 003's feed-forward with differences, and with targets of 30 and 50 m/s."""
+    """Return the table of Lin 2020's feed-forward with differences, and with targets of 30 and 50 m/s."""
     lines = [(case, *(_spread(rows['feedforward-speed', case, metric]) for metric in (
         'miss_rms_deg', 'rate_noise_deg_s', 'rate_rms_deg_s', 'acceleration_rms_deg_s2')))
              for case in feedforward_speed.CASES]
@@ -239,7 +239,7 @@ def alignment_speed_numbers(rows: Rows) -> Content:
 
 
 def matrix_table(rows: Rows) -> Content:
-    """Return the table of the matrices of paper 004's proof of stability, in seconds, with rank and condition."""
+    """Return the table of the matrices of Li 2018's proof of stability, in seconds, with rank and condition."""
     lines = [(name, '; '.join(' '.join(f'{value:.4g}' for value in line) for line in matrix),
               *(number(rows['telemetry-flight', name, metric]['value'])
                 for metric in ('rank', 'condition', 'condition_in_seconds')))
@@ -305,7 +305,7 @@ CALIBRATION_RESULTS = (
     ('leave-one-out rms of the default terms alone', 'program track', 'leave_one_out_default_rms_deg'),
     ('share of the terms within three of their sigmas', 'terms', 'within_3_sigma'),
     ('number of terms, over all runs', 'terms', 'cases'))
-"""(text, case, metric) of the results of the study calibration in docs/measured.md."""
+"""(text, case, metric) of the results of the study calibration in docs/reference/measured.md."""
 
 
 def calibration_numbers(rows: Rows) -> Content:
@@ -320,7 +320,7 @@ ARRAY_LOOPS = ('paper', 'paper-delta', 'type-2', 'type-2-delta', 'tracked-10ms',
 
 
 def array_numbers(rows: Rows) -> Content:
-    """Return the table of the loops of paper 002's plant: true errors without noise, and jitter due to noise."""
+    """Return the table of the loops of Jia 2025's plant: true errors without noise, and jitter due to noise."""
     lines = []
     for case in (*(f'{loop}/{target}' for loop in ARRAY_LOOPS for target in ('ramp', 'sine', 'sway')
                    if target == 'sway' or not loop.endswith('-delta')),
@@ -379,7 +379,7 @@ TABLES = {'results over seeds': results_table(SCENARIO_RESULTS), 'headline resul
           **{f'claims of paper {paper}': claim_table(paper) for paper in claims.CLAIMS_BY_PAPER},
           'filters compared': filter_numbers, 'manoeuvre': manoeuvre_numbers, 'feed forward': feedforward_numbers,
           'pareto': pareto_numbers, 'flyby with a rate': flyby_numbers, 'alignment': alignment_numbers,
-          'filters of paper 000': family_numbers, 'feed forward by speed': speed_numbers,
+          'filters of Ma 2023': family_numbers, 'feed forward by speed': speed_numbers,
           'speed of alignment': alignment_speed_numbers, 'acquisition': acquisition_numbers,
           'array loops': array_numbers, 'calibration': calibration_numbers, 'matrices': matrix_table}
 """{name of a table: function that makes it}."""

@@ -5,8 +5,8 @@ function `run(progress)` returns a result.Result and may call progress(fraction 
 study of many runs the function is `run(progress, runs=DEFAULT_RUNS, pool=None)`, where pool is a monte_carlo.Pool.
 Without a pool the runs are made in this process.
 
-A folder p000 to p004 holds the studies of one paper of docs/papers.md and what only they use; `system` holds our own
-studies. The modules beside the folders are used by the studies of several papers.
+A folder p000 to p004 holds the studies of one paper (docs/understand/papers.md) and what only they use; `system` holds
+our own studies. The modules beside the folders are used by the studies of several papers.
 
 A case is one configuration that a study measures, such as a filter on a motion. If a case is a scenario with changed
 parameters, `pedestal run SCENARIO --param ...` runs it with separate nodes.

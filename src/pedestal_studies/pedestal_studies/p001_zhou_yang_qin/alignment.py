@@ -1,7 +1,7 @@
-"""Alignment of the INS: paper 001's figures 3 and 4 for five methods, over many seeds, beside the information limit.
+"""Alignment of the INS: Zhou 2011's figures 3 and 4 for five methods, over many seeds, beside the information limit.
 
 The INS measures the attitude of the deck. The alignment removes the error of its initial attitude (misalignment), here
-3, 3 and 180 deg. The IMU, the sway of the ship and a white velocity of 0.05 m/s per axis are those of paper 001
+3, 3 and 180 deg. The IMU, the sway of the ship and a white velocity of 0.05 m/s per axis are those of Zhou 2011
 (section 5 and table 1). The velocity has one value per 0.02 s. The paper does not state this period, and the results
 scale with it. CASE_MEANINGS describes the five methods.
 
@@ -77,15 +77,15 @@ RUN_DURATION_S, SHORT_RUN_DURATION_S = 600.0, 300.0  # duration of a run, and of
 ARCMIN_RAD = math.radians(1.0 / 60.0)
 HOUR_S = 3600.0
 GYRO_BIAS_RAD_S, GYRO_NOISE_DENSITY = math.radians(0.01) / HOUR_S, math.radians(0.005) / 60.0
-"""Bias [rad/s] and noise [rad/sqrt(s)] of the gyros, from paper 001, section 5."""
+"""Bias [rad/s] and noise [rad/sqrt(s)] of the gyros, from Zhou 2011, section 5."""
 G = 9.80665  # acceleration [m/s2] in whose unit the paper states errors of accelerometers
 ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_NOISE_DENSITY = 3e-5 * G, 6e-6 * G
-"""Bias [m/s2] and noise [m/s/sqrt(s)] of the accelerometers, from paper 001, section 5."""
+"""Bias [m/s2] and noise [m/s/sqrt(s)] of the accelerometers, from Zhou 2011, section 5."""
 
 SHIP_PARAMETERS = ShipParameters(motion='plain', speed=0.0, latitude_deg=34.0, plain=PlainParameters(
     roll_amplitude_deg=7.0, roll_period=1.0 / 0.3, pitch_amplitude_deg=5.0, pitch_period=1.0 / 0.5,
     yaw_amplitude_deg=9.0, yaw_period=1.0 / 0.2))
-"""Ship with the sway of paper 001, table 1. In the paper x points to starboard and y to the bow, so that a rotation
+"""Ship with the sway of Zhou 2011, table 1. In the paper x points to starboard and y to the bow, so that a rotation
 about x is our pitch."""
 
 MISALIGNMENT_RAD = np.radians((3.0, 3.0, 180.0))  # misalignment a_x, a_y, a_z about east, north, up [rad]
@@ -101,7 +101,7 @@ CASE_METHODS = {method.replace('_', '-'): method for method in METHODS}
 """{case: method}."""
 CASE_MEANINGS = {
     'classical': 'gyrocompass: the level error that a wrong azimuth causes corrects the azimuth',
-    'adrc': 'paper 001, corrected: active disturbance rejection control (ADRC) levels, its commands give the azimuth',
+    'adrc': 'Zhou 2011, corrected: active disturbance rejection control (ADRC) levels, its commands give the azimuth',
     'adrc-scheduled': 'ADRC whose observer begins with a high bandwidth, which then falls as 6/t',
     'riccati-eso': 'extended state observer (ESO) with the gains of a Kalman filter (Riccati equation)',
     'oba': 'optimisation-based alignment: the rotation that best maps the measured specific force onto gravity',

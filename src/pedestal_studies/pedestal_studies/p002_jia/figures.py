@@ -1,4 +1,4 @@
-"""Figures of the study phased-array: the figures of paper 002 for each smoothing, and figures of loops with a filter.
+"""Figures of the study phased-array: the figures of Jia 2025 for each smoothing, and figures of loops with a filter.
 
 S0, S1 and S2 are the kinds of smoothing in the receiver, see SMOOTHING_TITLES.
 """

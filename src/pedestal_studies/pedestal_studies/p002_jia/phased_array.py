@@ -1,4 +1,4 @@
-"""Paper 002's angle loop of a phased array: figures 3 to 7 and 9, limits of stability and of lock, a better loop.
+"""Jia 2025's angle loop of a phased array: figures 3 to 7 and 9, limits of stability and of lock, a better loop.
 
 The array steers its beam electronically. The loop moves the beam after the target by the error that the receiver
 measures. alpha is the gain of the loop from the error to the angle [-], T the time between two updates. Cases run the

@@ -1,4 +1,4 @@
-"""The position loop of paper 003 on one axis: measured miss, with rate and acceleration of the target fed forward.
+"""The position loop of Lin 2020 on one axis: measured miss, with rate and acceleration of the target fed forward.
 
 The studies imm-feedforward and pareto use this loop. The miss, a term of the paper, is the pointing error: angle of
 the target minus angle of the antenna. The target moves to and fro; in a reversal its rate is half a cosine. Every T =

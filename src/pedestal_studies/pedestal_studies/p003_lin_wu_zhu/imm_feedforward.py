@@ -1,4 +1,4 @@
-"""Feed-forward of estimated rate and acceleration (paper 003): a conventional Kalman filter beside the IMM.
+"""Feed-forward of estimated rate and acceleration (Lin 2020): a conventional Kalman filter beside the IMM.
 
 An IMM (interacting multiple model) filter mixes several Kalman filters by the probabilities of their models. The miss,
 a term of the paper, is the pointing error: the angle from the axis of the antenna to the target. The loop is that of

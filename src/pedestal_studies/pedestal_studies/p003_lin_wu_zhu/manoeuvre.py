@@ -1,4 +1,4 @@
-"""Rate and acceleration of filters through ever sharper reversals (paper 003, figures 3 and 4).
+"""Rate and acceleration of filters through ever sharper reversals (Lin 2020, figures 3 and 4).
 
 A target moves to and fro through 20 deg at 3.5 deg/s. In a reversal its rate is half a cosine. The reversals last 4,
 2, 1, 0.5 and 0.35 s, one after the other. The angle is measured at 100 Hz with a noise of 0.02 deg. Cases are
@@ -141,7 +141,7 @@ def remarks(values: Errors) -> list[str]:
 
 
 def moments_figure(sums_of: Mapping[str, Records], what: str, label: str) -> Figure:
-    """Draw truth and mean estimates above, mean errors +-1 sigma below (paper 003, figures 3 and 4).
+    """Draw truth and mean estimates above, mean errors +-1 sigma below (Lin 2020, figures 3 and 4).
 
     sums_of: {filter: Moments (n,) of the errors, estimate minus truth}; what: 'rate' or 'acceleration'.
     """
