@@ -10,6 +10,7 @@ import subprocess
 import sys
 
 import pytest
+from tools import pages
 
 import pedestal
 from pedestal import cli
@@ -89,7 +90,7 @@ def test_readme_runs_in_its_own_order(reserve_domain, tmp_path, capsys):
                 print(f'\nnot executed: {line} ({of_table(line, NOT_RUN)})', end='')
 
 
-PAGES = ['README.md', *(f'docs/{path.relative_to(ROOT / "docs")}' for path in sorted((ROOT / 'docs').rglob('*.md')))]
+PAGES = [page.path for page in pages.PAGES if page.path.endswith('.md') and (ROOT / page.path).is_file()]
 
 
 @pytest.mark.parametrize('page', PAGES)

@@ -1,52 +1,29 @@
 """Book: the folder of Markdown pages from which `make book` builds the documentation as a web site.
 
-`python -m tools.book FOLDER` copies docs/ into the folder. It adds three pages generated from the code, in reference/:
-the parameters of every node, the verbs, the laws. CONTRIBUTING.md, which is outside docs/, becomes contributing.md.
-Each notebook is executed and becomes a page with its output.
+`python -m tools.book FOLDER` copies the pages of the table pages.PAGES and all other files of docs/ into the folder. It
+adds two pages generated from the code, in reference/: the options of the verbs, and the laws. CONTRIBUTING.md and
+CHANGELOG.md, which are outside docs/, get names in lower case. Each notebook is executed and becomes a page with its
+output.
 """
 import argparse
 import ast
 import inspect
 import pathlib
-import re
 import shutil
 import sys
 
-from tools import notebooks
+from tools import notebooks, pages
 
 from pedestal import cli
-from pedestal_bringup.scenario.sections import parameters_of
-from pedestal_common import parameters
-from pedestal_common.graph import nodes
-from pedestal_common.graph.graph_parameters import GraphParameters
 
 LAW_PACKAGES = ('pedestal_common', 'receiver_law', 'drive_law', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
                 'ship_motion_sim')
 """Packages with laws, in the order of the page of laws."""
 
 
-def parameter_page():
-    """Return the lines of the page of parameters: default, range, unit and meaning of every parameter."""
-    lines = ['# Parameters', '', 'Every parameter of every node, as the node declares it. `pedestal parameters NODE` '
-             'prints the same. The units are SI units and radians. A name that ends in `_deg` or `_dbhz` has this '
-             'unit instead.']
-    kinds = {node: parameters_of(node) for node in
-             ('scenario', *(node.name for node in nodes.NODES if node.program), 'beam_steering')}
-    for node, kind in {**kinds, 'graph, of every node': GraphParameters}.items():
-        values = parameters.defaults(kind)
-        lines += ['', f'## {node}', '', '| parameter | default | range | unit | meaning |', '|---|---|---|---|---|']
-        for name, field in parameters.flatten(kind):
-            meta, value = field.metadata, values[name]
-            allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ()))
-            text = f'{value:g}' if isinstance(value, float) else str(value)
-            cells = (f'`{name}`', text, allowed, meta.get('unit', ''), meta['doc'])
-            lines.append('| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |')
-    return lines
-
-
 def verb_page():
     """Return the lines of the page of verbs: purpose and options of every verb, as its --help prints them."""
-    lines = ['# Verbs', '', 'The help texts that `pedestal VERB --help` prints.']
+    lines = ['# Options of every verb', '', 'The help texts that `pedestal VERB --help` prints.']
     for name, (_, summary) in cli.VERBS.items():
         verb = cli.found(name)
         parser = argparse.ArgumentParser(prog=f'pedestal {name}', add_help=False,
@@ -100,11 +77,9 @@ def _laws(module):
             for node in compiled if not node.name.startswith('_')] if compiled else None
 
 
-def contributing_page(root):
-    """Return the text of CONTRIBUTING.md for the book. Its links to docs/ fit the new place, and its links to other
-    files outside docs/ become plain text."""
-    text = (root / 'CONTRIBUTING.md').read_text().replace('](docs/', '](')
-    return re.sub(r'\[([^]]*)\]\([A-Z][^)]*\)', r'\1', text)
+BOOK_ONLY_LINKS = {'docs/reference/commands.md': '[Options of every verb](verbs.md) has the help texts of all verbs.',
+                   'docs/understand/architecture.md': '[Laws](../reference/laws.md) has the equations of every law.'}
+"""{page: sentence that the book adds at its end}, with the links to the pages that only the book has."""
 
 
 def main(folder, root='.', execute=True) -> int:
@@ -112,15 +87,20 @@ def main(folder, root='.', execute=True) -> int:
     code 0. execute: True to run the notebooks, whose pages otherwise have no output."""
     root, folder = pathlib.Path(root), pathlib.Path(folder)
     shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(root / 'docs', folder)
-    (folder / 'contributing.md').write_text(contributing_page(root))
-    for page in folder.glob('*.md'):
-        text = page.read_text().replace('](../CONTRIBUTING.md)', '](contributing.md)')
-        page.write_text(text.replace('.ipynb)', '.md)'))
-    for notebook in sorted(folder.glob('*.ipynb')):
-        notebooks.write_page(notebooks.read(notebook, execute), notebook)
-    (folder / 'reference').mkdir()
-    for name, lines in (('parameters', parameter_page()), ('verbs', verb_page()), ('laws', law_page(root))):
+    shutil.copytree(root / 'docs', folder, ignore=shutil.ignore_patterns('*.md', '__pycache__'))
+    present = [page.path for page in pages.PAGES if (root / page.path).is_file()]
+    files = {*present, *(str(path.relative_to(root)) for path in (root / 'docs').rglob('*')
+                         if path.is_file() and path.suffix != '.md')}
+    for path in present:
+        place = folder / (pages.book_path(path) or '')
+        if path.endswith('.ipynb'):
+            notebooks.write_page(notebooks.read(folder / place.with_suffix('.ipynb').name, execute),
+                                 place.with_suffix('.ipynb'))
+        elif place != folder:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            added = f'\n{BOOK_ONLY_LINKS[path]}\n' if path in BOOK_ONLY_LINKS else ''
+            place.write_text(pages.for_book((root / path).read_text(), path, files) + added)
+    for name, lines in (('verbs', verb_page()), ('laws', law_page(root))):
         (folder / 'reference' / f'{name}.md').write_text('\n'.join(lines) + '\n')
     return 0
 

@@ -1,12 +1,16 @@
 """Generated tables of README.md and docs/, which `make docs` (`python -m tools.reference`) writes again.
 
 A reference table comes from the tables of the code. A table of measured numbers comes from docs/rows.json. A table
-stands between <!-- table NAME --> and <!-- end --> in a file. A test compares the files with the code.
+stands between <!-- table NAME --> and <!-- end --> in a file, a number between <!-- number ... --> and <!-- end -->.
+Every file with such a mark is written (pages.marked). A test compares the files with the code.
 """
+import functools
 import pathlib
 import re
 import sys
+from collections.abc import Callable, Mapping
 
+from tools import pages
 from tools.numbers import published
 
 import pedestal_studies
@@ -14,21 +18,19 @@ from acu_tracker import modes
 from acu_tracker.alarms import table as alarms
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from drive_law import faults
-from pedestal import console
+from pedestal import cli, console
 from pedestal_bringup.scenario import shipped
 from pedestal_bringup.scenario.sections import parameters_of
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
+from pedestal_common.graph.graph_parameters import GraphParameters
 from pedestal_common.injection.table import INJECTED_FAULTS
 from pedestal_common.text_files.text_table import TextTable
 from pedestal_results import results
 from pedestal_studies.system.faults import FAULT_EXPECTATIONS
 from pedestal_workbench.again import what_if
-
-GENERATED_PAGES = ('README.md', *(f'docs/{name}.md' for name in (
-    'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools',
-    'troubleshooting')))
-"""Files with generated tables."""
+from tracking_receiver_sim.tracks import files as track_files
+from tracking_receiver_sim.tracks import tables as flight_tables
 
 TABLE_PARAMETERS = (
     'scenario.pacing', 'scenario.seed', 'adu.period', 'adu.transport_delay', 'adu.command_timeout',
@@ -44,7 +46,22 @@ TABLE_PARAMETERS = (
     'tracking_receiver.antenna.beamwidth', 'tracking_receiver.path.refractivity',
     'tracking_receiver.receiver.latency', 'ship_motion.ship.motion', 'ship_motion.ship.sea_state',
     'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
-"""The parameters in the table of docs/parameters.md."""
+"""The parameters in the first table of docs/reference/parameters.md."""
+
+PARAMETER_KINDS = {node: parameters_of(node) for node in (
+    'scenario', *(node.name for node in nodes.NODES if node.program), 'beam_steering')}
+"""{node: dataclass of its parameters} of the other tables of that page."""
+
+VERB_GROUPS = {
+    'see what exists': ('scenarios', 'samples', 'parameters'),
+    'run a scenario': ('run',),
+    'operate a running antenna': ('status', 'mode', 'ask', 'operate', 'program', 'live', 'simulate'),
+    'use a recording': ('verify', 'recover', 'rerun', 'report', 'replay', 'export'),
+    'compare settings': ('trials', 'recompute'),
+    'design an antenna': ('new', 'tune'),
+    'calibrate an antenna': ('calibrate',),
+    'measure the laws and this machine': ('study', 'bench')}
+"""{what a user wants: the verbs for it}, the sections of docs/reference/commands.md."""
 
 RATE_TEXTS = {'step': 'every step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
               'reply': 'after each request', 'command': 'on request', 'sample': 'at any time, in realtime only'}
@@ -87,6 +104,13 @@ def command_table():
     return TextTable(('topic', 'command', 'arguments', 'effect'), rows)
 
 
+def verb_table() -> TextTable:
+    """Return the table of the verbs of the command line."""
+    return TextTable(('you want to', 'verb', 'it does this'), [
+        ('' if i else f'[{group}](#{group.replace(" ", "-")})', f'`{verb}`', cli.VERBS[verb][1])
+        for group, verbs in VERB_GROUPS.items() for i, verb in enumerate(verbs)])
+
+
 def injection_table():
     """Return the table of the faults that can be injected into each simulated node."""
     rows = [(f'`{node}`', f'`{fault.name}`', ', '.join(map(_defaulted, fault.arguments[:-1])), fault.doc,
@@ -100,16 +124,17 @@ def _defaulted(argument):
     return f'`{text}` ({argument.range} {argument.unit}; {argument.doc})'.replace(' ;', ';')
 
 
-def expectation_table():
-    """Return the table of the expected reactions to each injected fault, by mode of the control unit. Modes with equal
-    expectations share a line."""
-    rows = []
+def expectation_table(node: str) -> TextTable:
+    """Return the table of the expected reactions to each fault that is injected into a node, by mode of the control
+    unit. Modes with equal expectations share a line."""
+    rows: list[tuple[str, ...]] = []
     for fault, of_modes in FAULT_EXPECTATIONS.items():
-        alike = {}
+        alike: dict[tuple[str, str, str], list[str]] = {}
         for mode, expected in of_modes.items():
             alike.setdefault(expected.texts(mode), []).append(mode)
-        rows += [(f'`{fault}`', ', '.join(modes), *texts) for texts, modes in alike.items()]
-    return TextTable(('fault', 'in', 'report', 'largest error', 'ends in'), rows)
+        if fault.startswith(f'{node}.'):
+            rows += [(f'`{fault}`', ', '.join(modes), *texts) for texts, modes in alike.items()]
+    return TextTable(('fault', 'in the modes', 'report', 'largest error', 'ends in'), rows)
 
 
 def _argument(argument):
@@ -161,18 +186,52 @@ def study_table():
                      [(f'`{name}`', line) for name, line in pedestal_studies.descriptions().items()])
 
 
-def parameter_table():
+def first_parameter_table() -> TextTable:
     """Return the table of TABLE_PARAMETERS: default, range, unit, meaning."""
     rows = []
     for name in TABLE_PARAMETERS:
         node, _, key = name.partition('.')
         kind = parameters_of(node)
-        field, value = dict(parameters.flatten(kind))[key], parameters.defaults(kind)[key]
-        meta = field.metadata
-        allowed = (f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ())))
-        text = f'{value:g}' if isinstance(value, float) else str(value)
-        rows.append((f'`{name}`', text, allowed, meta.get('unit', ''), meta['doc']))
-    return TextTable(('parameter', 'default', 'range', 'unit', 'meaning'), rows)
+        rows.append(_parameter_row(name, dict(parameters.flatten(kind))[key], parameters.defaults(kind)[key]))
+    return TextTable(PARAMETER_HEADS, rows)
+
+
+PARAMETER_HEADS = ('parameter', 'default', 'range', 'unit', 'meaning')
+
+
+def _parameter_row(name: str, field, value) -> tuple[str, ...]:
+    """Return the line of a parameter: a field of a dataclass, and its default."""
+    meta = field.metadata
+    allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ()))
+    text = f'{value:g}' if isinstance(value, float) else str(value)
+    return tuple(cell.replace('|', '\\|') for cell in (f'`{name}`', text, allowed, meta.get('unit', ''), meta['doc']))
+
+
+def parameter_table(kind: type) -> TextTable:
+    """Return the table of all parameters of a dataclass: default, range, unit, meaning."""
+    values = parameters.defaults(kind)
+    return TextTable(PARAMETER_HEADS, [_parameter_row(name, field, values[name])
+                                       for name, field in parameters.flatten(kind)])
+
+
+def track_format_table() -> TextTable:
+    """Return the table of the formats of track files."""
+    return TextTable(('format', 'content', 'a file of this format begins with', 'what is read'), [
+        (form.name, form.kind.doc, form.beginning, form.doc) for form in track_files.FILE_FORMATS])
+
+
+def flight_column_table() -> TextTable:
+    """Return the table of the columns by which a CSV file of a flight is known."""
+    def names(quantity) -> str:
+        return ', '.join(f'`{name}`' for name in quantity.names)
+    rows = []
+    for layout in flight_tables.CSV_LAYOUTS:
+        place = (names(layout.latitude) if layout.latitude == layout.longitude
+                 else f'{names(layout.latitude)}; {names(layout.longitude)}')
+        altitudes = '; '.join(f'{names(one)} in {"the unit of its name" if "" in one.names.values() else unit}'
+                              for one in layout.altitudes for unit in (next(iter(one.names.values())),))
+        rows.append((layout.name, names(layout.time), place, altitudes))
+    return TextTable(('kind', 'time', 'latitude; longitude', 'altitude, the best first'), rows)
 
 
 def result_table(table=results.RESULTS):
@@ -188,13 +247,19 @@ def exit_code_table():
     return TextTable(('exit code', 'meaning'), [(str(code), meaning) for code, meaning in console.EXIT_CODES.items()])
 
 
-REFERENCE_TABLES = {'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table, 'topics': topic_table,
-                    'services': service_table, 'modes': mode_table, 'commands': command_table,
-                    'faults that can be injected': injection_table, 'expected of faults': expectation_table,
-                    'filter kinds': filter_table, 'drive faults': fault_table, 'alarms': alarm_table,
-                    'results': result_table, 'exit codes': exit_code_table,
-                    'recomputed results': lambda: result_table(what_if.COMPARISON_RESULTS),
-                    'first parameters': parameter_table}
+Maker = Callable[[], TextTable]
+
+REFERENCE_TABLES: Mapping[str, Maker] = {
+    'verbs': verb_table, 'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table,
+    'topics': topic_table, 'services': service_table, 'modes': mode_table, 'commands': command_table,
+    'faults that can be injected': injection_table,
+    **{f'expected of faults of {node}': functools.partial(expectation_table, node) for node in INJECTED_FAULTS},
+    'filter kinds': filter_table, 'drive faults': fault_table, 'alarms': alarm_table, 'results': result_table,
+    'exit codes': exit_code_table, 'recomputed results': lambda: result_table(what_if.COMPARISON_RESULTS),
+    'first parameters': first_parameter_table,
+    **{f'parameters of {node}': functools.partial(parameter_table, kind) for node, kind in PARAMETER_KINDS.items()},
+    'parameters of every node': functools.partial(parameter_table, GraphParameters),
+    'formats of track files': track_format_table, 'columns of flights': flight_column_table}
 """{name of a table: function that returns it}."""
 
 
@@ -206,23 +271,21 @@ def with_tables(text, rows):
 
     rows: published.Rows, the measured numbers of docs/rows.json. Raises KeyError for an unknown table.
     """
-    def table(match):
+    def table(match: re.Match[str]) -> str:
         name = match[1]
         found = TextTable(*published.TABLES[name](rows)) if name in published.TABLES else REFERENCE_TABLES[name]()
         return '\n'.join((f'<!-- table {name} -->', *found.markdown(), '<!-- end -->'))
+
     def number(match: re.Match[str]) -> str:
-        study, case, metric, factor, form = match[1].split()
-        value = rows[study, case, metric]['value']
-        return f'<!-- number {match[1]} -->{float(factor) * value:{form}}<!-- end -->'
-    text = re.sub(r'<!-- number ([^>]+?) -->.*?<!-- end -->', number, text)
-    return re.sub(r'<!-- table ([\w ]+) -->\n.*?<!-- end -->', table, text, flags=re.DOTALL)
+        return f'<!-- number {match[1]} -->{published.number_of_prose(rows, match[1])}<!-- end -->'
+    return pages.TABLE_PATTERN.sub(table, pages.NUMBER_PATTERN.sub(number, text))
 
 
 def main(root='.') -> int:
     """Write the generated tables of a checkout (root) again, and print the names of the changed files. Return the exit
     code 0."""
     rows = published.read(root)
-    for name in GENERATED_PAGES:
+    for name in pages.marked(root):
         file = pathlib.Path(root, name)
         old = file.read_text()
         new = with_tables(old, rows)
