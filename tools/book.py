@@ -1,7 +1,7 @@
 """Book: the folder of Markdown pages from which `make book` builds the documentation as a web site.
 
-`python -m tools.book FOLDER` copies the pages of the table pages.PAGES and all other files of docs/ into the folder. It
-adds two pages generated from the code, in reference/: the options of the verbs, and the laws. CONTRIBUTING.md and
+`python -m tools.book FOLDER` copies the pages of the table pages.PAGES and all other files of docs/ into the folder.
+It adds two pages generated from the code, in reference/: the options of the verbs, and the laws. CONTRIBUTING.md and
 CHANGELOG.md, which are outside docs/, get names in lower case. Each notebook is executed and becomes a page with its
 output.
 """
@@ -82,6 +82,10 @@ BOOK_ONLY_LINKS = {'docs/reference/commands.md': '[Options of every verb](verbs.
 """{page: sentence that the book adds at its end}, with the links to the pages that only the book has."""
 
 
+LAST_IN_SEARCH = '---\nsearch:\n  boost: 0.3\n---\n\n'
+"""Head of a page to which the search of the book gives less weight than to the pages that explain."""
+
+
 def main(folder, root='.', execute=True) -> int:
     """Write all pages of the book of a checkout (root) into a folder, whose old content is deleted. Return the exit
     code 0. execute: True to run the notebooks, whose pages otherwise have no output."""
@@ -91,6 +95,7 @@ def main(folder, root='.', execute=True) -> int:
     present = [page.path for page in pages.PAGES if (root / page.path).is_file()]
     files = {*present, *(str(path.relative_to(root)) for path in (root / 'docs').rglob('*')
                          if path.is_file() and path.suffix != '.md')}
+    looked_up = [page.path for page in (*pages.SECTIONS['Develop'], *pages.SECTIONS['Reference'])]
     for path in present:
         place = folder / (pages.book_path(path) or '')
         if path.endswith('.ipynb'):
@@ -99,9 +104,11 @@ def main(folder, root='.', execute=True) -> int:
         elif place != folder:
             place.parent.mkdir(parents=True, exist_ok=True)
             added = f'\n{BOOK_ONLY_LINKS[path]}\n' if path in BOOK_ONLY_LINKS else ''
-            place.write_text(pages.for_book((root / path).read_text(), path, files) + added)
+            last = LAST_IN_SEARCH if path in looked_up else ''
+            place.write_text(last + pages.for_book((root / path).read_text(), path, files) + added)
+    (folder / 'reference').mkdir(exist_ok=True)
     for name, lines in (('verbs', verb_page()), ('laws', law_page(root))):
-        (folder / 'reference' / f'{name}.md').write_text('\n'.join(lines) + '\n')
+        (folder / 'reference' / f'{name}.md').write_text('\n'.join((LAST_IN_SEARCH, *lines)) + '\n')
     return 0
 
 

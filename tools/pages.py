@@ -43,11 +43,13 @@ SECTIONS = {
         Page('docs/size_a_drive.ipynb', 'Notebook: size a drive', None)),
     'Hardware': (
         Page('docs/hardware/index.md', 'Real equipment', 1000),
-        Page('docs/hardware/servo-drives.md', 'Servo drives', 1600),
+        Page('docs/hardware/servo-drives.md', 'Servo drives', 1600,
+             'the objects on the bus and ten steps of a power-up stand nowhere else'),
         Page('docs/hardware/your-drive.md', 'Your own drive', 600),
         Page('docs/hardware/receiver.md', 'Your receiver', 1000),
-        Page('docs/hardware/iq.md', 'I/Q samples', 1600),
-        Page('docs/hardware/ins.md', 'Your INS', 1100),
+        Page('docs/hardware/iq.md', 'I/Q samples', 1600,
+             'the calibration matrix and the equations of the errors stand nowhere else'),
+        Page('docs/hardware/ins.md', 'Your INS', 1100, 'three kinds of sources, each with its frames'),
         Page('docs/hardware/ship.md', 'On a ship', 900)),
     'Calibrate': (
         Page('docs/calibrate/pointing.md', 'The pointing', 1800),
@@ -65,14 +67,14 @@ SECTIONS = {
         Page('docs/operate/troubleshooting.md', 'Troubleshooting', 2400)),
     'Understand': (
         Page('docs/understand/architecture.md', 'Architecture', 1600),
-        Page('docs/understand/time.md', 'Time', 900),
+        Page('docs/understand/time.md', 'Time', 900, 'foreign publishers and several hosts are part of it'),
         Page('docs/understand/evidence.md', 'Evidence', 1300),
         Page('docs/understand/papers.md', 'The five papers', 1800),
         Page('docs/glossary.md', 'Glossary', 1200)),
     'Develop': (
-        Page('CONTRIBUTING.md', 'Contributing', 1100),
+        Page('CONTRIBUTING.md', 'Contributing', 1100, 'the rules of code and language in full'),
         Page('docs/develop/extending.md', 'Extend the system', 1000),
-        Page('docs/develop/decisions.md', 'Decisions', 1000),
+        Page('docs/develop/decisions.md', 'Decisions', 1000, 'eleven decisions, not nine'),
         Page('CHANGELOG.md', 'Changes', None)),
     'Reference': (
         Page('docs/reference/commands.md', 'Commands', None),
@@ -94,7 +96,7 @@ PAGES = tuple(page for pages in SECTIONS.values() for page in pages)
 BUILT_PAGES = ('docs/reference/verbs.md', 'docs/reference/laws.md')
 """Pages that only the book has, because tools/book.py makes them. No page of the checkout has a link to them."""
 MAX_WORDS = 45_000  # largest number of words of all pages with a limit
-BUDGET_MARGIN = 1.05  # factor of its limit up to which a page needs no reason
+BUDGET_MARGIN = 1.1  # factor of its limit up to which a page needs no reason
 
 
 def book_path(path: str) -> str | None:
