@@ -51,8 +51,12 @@ def test_what_is_random_is_never_of_one_seed():
 
 
 def test_a_number_that_no_paper_prints_is_in_no_paper_column():
-    printed = {(claim.study, claim.case, claim.metric)
+    """The number of the paper may stand beside another case, such as our own controller, and beside both readings of
+    the sine of figure 6 of Ma 2023."""
+    def measured(study, metric):
+        return study, metric.replace('sine_0p4rads', 'sine_0p4hz')
+    printed = {measured(claim.study, claim.metric)
                for of in claims.CLAIMS_BY_PAPER.values() for claim in of if '(no number)' not in claim.claim}
-    for key, row in published.read(ROOT).items():
+    for (study, case, metric), row in published.read(ROOT).items():
         if row['paper'] is not None:
-            assert key in printed, key
+            assert measured(study, metric) in printed, (study, case, metric)

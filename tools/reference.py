@@ -266,8 +266,10 @@ REFERENCE_TABLES: Mapping[str, Maker] = {
 def with_tables(text, rows):
     """Return the text of a file in which every generated table and number is replaced by its present content.
 
-    A number of prose stands between <!-- number STUDY CASE METRIC FACTOR FORMAT --> and <!-- end -->: the value of
-    that row times the factor, as in <!-- number scenarios leo_pass pointing_rms_deg 1000 .2f -->2.38<!-- end -->.
+    A number of prose is the value of a row times a factor, in a format. Its mark has study, case, metric, factor and
+    format:
+
+        <!-- number scenarios leo_pass pointing_rms_deg 1000 .2f -->2.38<!-- end -->
 
     rows: published.Rows, the measured numbers of docs/rows.json. Raises KeyError for an unknown table.
     """

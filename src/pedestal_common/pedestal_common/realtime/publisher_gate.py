@@ -9,7 +9,7 @@ accepted message is valid and newer than the last one; all others are dropped an
 
 The sequence numbers of a restarted publisher begin again. A publisher is a different node if it overlapped with the
 active publisher (both sent at the same time), or if its numbers are too high for a restart in this silence.
-docs/develop/decisions.md gives the reasons.
+The reasons are in docs/develop/decisions.md.
 """
 from collections.abc import Callable
 from typing import Generic, TypeVar
