@@ -47,8 +47,8 @@ class BeamParameters(Parameters):
 
     form: str = choice('tracked', LOOP_FORMS,
                        'form of the loop. tracked: the beam goes to the estimate of the target, predicted to the '
-                       'middle of the time for which the command acts; type_1: the loop of Jia 2025; type_2: that loop '
-                       'with the beam at its prediction')
+                       'middle of the time for which the command acts; type_1: the loop of Jia 2025; type_2: that '
+                       'loop with the beam at its prediction')
     alpha: float = parameter(0.1, 1e-3, 1.0, '', 'gain of the angle; beta by Benedict and Bordner')
     rate_compensation: float = parameter(0.0, 0.0, 2.0, '', "share delta of the deck's rate that is fed forward")
 
