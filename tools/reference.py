@@ -266,10 +266,11 @@ REFERENCE_TABLES: Mapping[str, Maker] = {
 def with_tables(text, rows):
     """Return the text of a file in which every generated table and number is replaced by its present content.
 
-    A number of prose is the value of a row times a factor, in a format. Its mark has study, case, metric, factor and
-    format:
+    A number of prose is the value of a row times a factor. It stands between two marks:
 
         <!-- number scenarios leo_pass pointing_rms_deg 1000 .2f -->2.38<!-- end -->
+
+    The words are study, case, metric, factor and format.
 
     rows: published.Rows, the measured numbers of docs/rows.json. Raises KeyError for an unknown table.
     """
