@@ -1,5 +1,5 @@
 # make demo    set up, run the main scenario as separate nodes, record it, check the recording, write the report
-# make quick   set up, lint, check types, run the tests of all laws: a minute and a half
+# make quick   set up, lint, check types, run the tests of all laws and of the pages: a minute and a half
 # make test    set up, lint, show that each part of the product works: five minutes
 # make test-all   make test, then make test-rest: every test
 # make test-rest  the tests that are marked thorough
@@ -56,7 +56,7 @@ demo: .venv/installed
 
 quick: install
 	$(LINT)
-	$(LIMITED) 900 $(PYTEST_IN_TURN) -m 'not thorough' --numprocesses 2 $(LAWS)
+	$(LIMITED) 900 $(PYTEST_IN_TURN) -m 'not thorough' --numprocesses 2 $(LAWS) test/test_pages.py
 
 test: install
 	$(LINT)
@@ -79,7 +79,7 @@ docs: install
 # the book from the disk, searches it, and looks for clipped tables and code.
 book: install .venv/mkdocs
 	.venv/bin/python -m tools.book build/book/pages
-	NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 .venv/bin/python -m mkdocs build --strict
 	! grep --recursive --include='*.html' --extended-regexp --files-with-matches \
 	    '<(script|img|iframe|link)[^>]*(src|href)="?(https?:)?//' build/book/site
 	BOOK=build/book/site .venv/bin/python -m pytest $(PYTEST) test/test_built_book.py

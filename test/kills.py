@@ -3,7 +3,7 @@
     python test/kills.py realtime [--kills 200]     in runs of `leo_pass`; each kill is waited out
     python test/kills.py lockstep [--kills 200]     a run for each kill, which ends it by name
 
-Prints the numbers that docs/reliability.md quotes. Give it a ROS_DOMAIN_ID of its own.
+Prints the numbers of docs/understand/evidence.md. Give it a ROS_DOMAIN_ID of its own.
 """
 import argparse
 import collections

@@ -1,11 +1,11 @@
-"""The pages that are made of the code hold all of it, and every page of docs/ has a place in the book."""
+"""The pages that are made of the code hold all of it, and every page of the table has a place in the book."""
 import pathlib
-import re
 import xml.etree.ElementTree
 
 import pytest
 import yaml
-from tools import book
+from tools import book, book_hooks
+from tools import pages as table
 
 from pedestal import cli
 from pedestal_bringup.scenario.sections import parameters_of
@@ -39,14 +39,22 @@ def test_every_parameter_verb_and_law_is_there(pages):
         assert '```text' in section and f'`{test}`' in section
 
 
-def test_every_page_is_in_the_table_of_contents(pages):
-    def names(entries):
+def test_the_navigation_of_mkdocs_is_that_of_the_table(pages):
+    """Every page in the folder of the book is in it, and no other page is."""
+    class Config:
+        docs_dir = str(pages)
+        nav = None
+
+    def listed(entries):
         for entry in entries:
             for value in entry.values():
-                yield from [value] if isinstance(value, str) else names(value)
-
-    there = {str(path.relative_to(pages)) for path in pages.rglob('*.md')}
-    assert set(names(yaml.safe_load((ROOT / 'mkdocs.yml').read_text())['nav'])) == there
+                yield from [value] if isinstance(value, str) else listed(value)
+    settings = yaml.safe_load((ROOT / 'mkdocs.yml').read_text())
+    assert 'nav' not in settings and settings['hooks'] == [str(pathlib.Path('tools', 'book_hooks.py'))]
+    nav = list(listed(book_hooks.on_config(Config()).nav))
+    places = [place for page in table.PAGES if (place := table.book_path(page.path))]
+    assert nav == [place for place in places if (pages / place).is_file()]
+    assert {*nav} == {str(path.relative_to(pages)) for path in pages.rglob('*.md')}
 
 
 def test_every_law_has_a_sentence(pages):
@@ -69,8 +77,3 @@ def test_the_drawing_of_the_chain_has_the_nodes_and_topics_of_the_tables():
     assert arrows >= {(link.name, writer, reader) for link in links.values() if not link.flag
                       for writer in link.writers for reader in link.readers
                       if link.name != 'diagnostics' and writer not in not_drawn}
-
-
-def test_every_verb_has_one_place_in_the_groups_of_commands():
-    groups = (ROOT / 'docs' / 'tools.md').read_text().partition('| you want to |')[2].partition('\n\n')[0]
-    assert sorted(re.findall(r'`([a-z]+)`', groups)) == sorted(cli.VERBS)

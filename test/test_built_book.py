@@ -12,7 +12,7 @@ if 'BOOK' not in os.environ:
 BOOK = pathlib.Path(os.environ['BOOK']).resolve()
 PAGES = sorted(path for path in BOOK.rglob('*.html') if path.name != '404.html')
 CHROMIUM = shutil.which('chromium') or shutil.which('google-chrome')
-DESK, TELEPHONE = 1280, 390
+DESK, LAPTOP, TELEPHONE = 1280, 1024, 390
 """Widths of a page [px]."""
 TOO_WIDE = """() => {
     const clipped = element => {
@@ -64,9 +64,32 @@ def test_the_search_works_from_the_disk(browser):
     assert [url for url in page.requests if not url.startswith(('file:', 'data:', 'about:', 'blob:'))] == []
 
 
-@pytest.mark.parametrize('width', [DESK, TELEPHONE])
+QUESTIONS = {
+    'my satellite tonight': 'start/tonight', 'rotator does not move': 'start/dish',
+    'what does acquire mean': 'operate/acquisition', 'which filter should I use': 'design/filters',
+    'receiver never locks': 'operate/troubleshooting', 'exit code 3': 'reference/results',
+    'calibrate the pointing': 'calibrate/pointing', 'which drive can I buy': 'start/buy',
+    'inject a fault': 'operate/faults', 'recording with pandas': 'operate/recordings'}
+"""{question as a user types it: the page that answers it}."""
+FIRST_RESULTS = 5  # number of pages on the first screen of results
+
+
+@pytest.mark.parametrize('question', QUESTIONS)
+def test_the_search_answers_a_question_on_its_first_screen(browser, question):
+    page = opened(browser, DESK)
+    page.goto((BOOK / 'index.html').as_uri())
+    page.locator('.md-search__input').fill(question)
+    found = page.locator('.md-search-result__item > .md-search-result__link:first-child')
+    found.first.wait_for()
+    first = [href.partition('.html')[0] for href in found.evaluate_all(
+        'links => links.map(link => link.href)')[:FIRST_RESULTS]]
+    assert (BOOK / QUESTIONS[question]).as_uri() in first
+    page.close()
+
+
+@pytest.mark.parametrize('width', [DESK, LAPTOP, TELEPHONE])
 def test_no_page_hides_a_table_or_code(browser, width):
-    """On a desk tables and code fit; on a telephone a box scrolls what does not fit."""
+    """On a desk tables and code fit; on a narrower screen a box scrolls what does not fit."""
     page, faults = opened(browser, width), {}
     for path in PAGES:
         page.goto(path.as_uri())

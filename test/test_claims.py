@@ -33,7 +33,7 @@ def test_the_spread_of_the_motors():
     spread = [100.0 * (1.0 - getattr(axis.motor_2, name) / getattr(axis.motor_1, name))
               for name in ('resistance', 'inductance')]
     assert all(0.0 < value < 0.5 for value in spread)
-    assert '{:.2f} % in resistance, {:.2f} % in inductance'.format(*spread) in reading('000', 'the motors differ')
+    assert '{:.2f} % in resistance, {:.2f} % in inductance'.format(*spread) in reading('Ma 2023', 'the motors differ')
 
 
 def stiffness(**changed):
@@ -51,7 +51,7 @@ def test_two_motors_stiffen_the_drive():
     both, slack = stiffness(), stiffness(**backlash.bias('off'))
     one = AduParameters().azimuth.gear_train.stiffness
     assert both / one == pytest.approx(2.0, rel=0.01) and slack < 0.2 * one
-    text = reading('000', 'two motors stiffen')
+    text = reading('Ma 2023', 'two motors stiffen')
     assert f'{both:.2e} Nm/rad with' in text and f'{one:.0e} Nm/rad of' in text and f'{slack:.1e} Nm/rad' in text
 
 
@@ -61,7 +61,7 @@ def test_the_output_has_the_period_of_the_input(name, sine, shown):
     run = closed_loop.Loop(servo.sine_case(name, sine).load()).run()
     period = servo.sine_metrics(run, sine)[f'sine_{sine}_period_s']
     assert period == pytest.approx(2.0 * math.pi / servo.SINE_FREQUENCIES_RAD_S[sine], rel=1e-5)
-    assert f'{period:{shown}} s of' in reading('000', 'figure 6: the output')
+    assert f'{period:{shown}} s of' in reading('Ma 2023', 'figure 6: the output')
 
 
 def test_longitude_and_height_of_the_alignment():
@@ -69,7 +69,7 @@ def test_longitude_and_height_of_the_alignment():
     gravity = earth.gravity(LATITUDE)
     lessened = gravity * 2.0 * 450.0 / 6.371e6
     assert (f'{gravity:.4f} m/s2, and 450 m lessen it by {lessened:.4f} m/s2, or {100.0 * lessened / gravity:.3f} %'
-            in reading('001', 'longitude'))
+            in reading('Zhou, Yang, Qin 2011', 'longitude'))
 
 
 def test_without_noise_an_alignment_reaches_the_limits_of_the_paper(monkeypatch):
@@ -90,10 +90,10 @@ def test_without_noise_an_alignment_reaches_the_limits_of_the_paper(monkeypatch)
     azimuth = aligned_runs.GYRO_BIAS_RAD_S / earth.rate(LATITUDE)[1] / ARCMIN_RAD
     for east, north, up in found.values():
         assert (east, north) == pytest.approx((level, level), rel=0.06) and up == pytest.approx(azimuth, rel=0.05)
-    text = reading('001', 'limit of the level')
+    text = reading('Zhou, Yang, Qin 2011', 'limit of the level')
     assert f': {level:.3f} arcmin;' in text and all(f' {error[0]:.3f} arcmin, classical method and ADRC' in text
                                                     for error in found.values())
-    text = reading('001', 'limit of the azimuth')
+    text = reading('Zhou, Yang, Qin 2011', 'limit of the azimuth')
     assert f': {azimuth:.3f} arcmin;' in text and f'{found["classical"][2]:.2f} arcmin, classical method' in text
     assert f'{found["adrc"][2]:.2f} arcmin, ADRC' in text
 
@@ -111,7 +111,7 @@ def test_constant_rate_and_acceleration_leave_no_error(rate, acceleration, late,
                  loop.rate_loop_step(*loop.RATE_LOOP_CONSTANTS), np.zeros((1, len(t))), out)
     miss = math.degrees(out['miss'][0, -1])
     assert miss == pytest.approx(acceleration * late / loop.K_P, rel=1e-4, abs=1e-7)
-    assert shown.format(miss) in reading('003', '(17)')
+    assert shown.format(miss) in reading('Lin, Wu, Zhu 2020', '(17)')
 
 
 VERDICTS = 'reproduced', 'not reproduced', 'holds', 'without effect', 'our IMM'

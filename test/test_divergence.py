@@ -72,7 +72,7 @@ def test_a_reset_while_the_slope_is_still_wrong_is_followed_by_the_same_verdict(
 
 @pytest.mark.parametrize('name', list(imm_feedforward.DRIVE_CASES))
 def test_a_target_that_reverses_is_no_reversed_slope(name):
-    """Paper 003 through the product: 3.5 deg/s to and fro."""
+    """Lin 2020 through the product: 3.5 deg/s to and fro."""
     for seed in (1, 2):
         done = closed_loop.Loop(imm_feedforward.DRIVE_CASES[name].variant.with_(seed=seed).load()).run()
         state = done.units['acu'].parts['state']

@@ -15,7 +15,7 @@ NEEDS_FILE = {'track_file'}
 OTHER = {'NPY_DISABLE_CPU_FEATURES': 'X86_V3 X86_V4', 'OPENBLAS_CORETYPE': 'Prescott',
          'GLIBC_TUNABLES': 'glibc.cpu.hwcaps=-AVX512F,-AVX512VL,-AVX512DQ,-AVX512BW'}
 """An old processor, whose instructions every one has; and the C library without AVX-512. AVX2 and FMA select its
-functions: see docs/decisions/reproducible-bytes.md."""
+functions: see docs/develop/decisions.md."""
 
 
 def numbers(memory):

@@ -11,6 +11,7 @@ import sys
 
 import pytest
 import yaml
+from tools import pages
 
 import pedestal
 from pedestal import cli
@@ -88,7 +89,8 @@ def test_readme_runs_in_its_own_order(reserve_domain, tmp_path, capsys):
                 print(f'\nnot executed: {line} ({of_table(line, NOT_RUN)})', end='')
 
 
-PAGES = ['README.md', *(f'docs/{path.relative_to(ROOT / "docs")}' for path in sorted((ROOT / 'docs').rglob('*.md')))]
+PAGES = [page.path for page in pages.PAGES if page.path.endswith('.md') and page.path.startswith(('README', 'docs/'))
+         and (ROOT / page.path).is_file()]
 
 
 @pytest.mark.parametrize('page', PAGES)

@@ -1,4 +1,4 @@
-"""The step and the sine of paper 000 through the graph of nodes equal the study's: there is one implementation."""
+"""The step and the sine of Ma 2023 through the graph of nodes equal the study's: there is one implementation."""
 import json
 
 import numpy as np

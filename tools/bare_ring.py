@@ -1,6 +1,6 @@
 """Ring of bare rclpy nodes that pass the messages of the graph and compute nothing.
 
-The time of its lap is the lower bound of the lap time in `pedestal bench graph` (docs/decisions/lockstep.md). A lap is
+The time of its lap is the lower bound of the lap time in `pedestal bench graph` (docs/develop/decisions.md). A lap is
 one step of the lockstep: a message of the drive leads to messages of the receiver and the control unit, and returns to
 the drive. `python -m tools.bare_ring` compares the two times. `python -m tools.bare_ring ROLE STEPS` runs one node;
 ROLE is its name in RING_NODES. The role `adu` prints the lap time. Topics, types, QoS and executor are those of the

@@ -1,52 +1,29 @@
 """Book: the folder of Markdown pages from which `make book` builds the documentation as a web site.
 
-`python -m tools.book FOLDER` copies docs/ into the folder. It adds three pages generated from the code, in reference/:
-the parameters of every node, the verbs, the laws. CONTRIBUTING.md, which is outside docs/, becomes contributing.md.
-Each notebook is executed and becomes a page with its output.
+`python -m tools.book FOLDER` copies the pages of the table pages.PAGES and all other files of docs/ into the folder.
+It adds two pages generated from the code, in reference/: the options of the verbs, and the laws. CONTRIBUTING.md and
+CHANGELOG.md, which are outside docs/, get names in lower case. Each notebook is executed and becomes a page with its
+output.
 """
 import argparse
 import ast
 import inspect
 import pathlib
-import re
 import shutil
 import sys
-from collections.abc import Iterator
 
-from tools import notebooks
+from tools import notebooks, pages
 
 from pedestal import cli
-from pedestal_bringup.scenario.sections import parameters_of
-from pedestal_common import parameters
-from pedestal_common.graph import nodes
-from pedestal_common.graph.graph_parameters import GraphParameters
 
 LAW_PACKAGES = ('pedestal_common', 'receiver_law', 'drive_law', 'tracking_receiver_sim', 'acu_tracker', 'adu_drive',
                 'ship_motion_sim')
 """Packages with laws, in the order of the page of laws."""
 
 
-def parameter_page() -> list[str]:
-    """Return the lines of the page of parameters."""
-    lines = ['# Parameters', '', 'Every parameter of every node, as the node declares it. `pedestal parameters NODE` '
-             'prints the same. The units are SI units and radians. A name that ends in `_deg` or `_dbhz` has this '
-             'unit instead.']
-    kinds = {node: parameters_of(node) for node in
-             ('scenario', *(node.name for node in nodes.NODES if node.program), 'beam_steering')}
-    for node, kind in {**kinds, 'graph, of every node': GraphParameters}.items():
-        values = parameters.defaults(kind)
-        lines += ['', f'## {node}', '', '| parameter | default | range | unit | meaning |', '|---|---|---|---|---|']
-        for name, field in parameters.flatten(kind):
-            meta, value = field.metadata, values[name]
-            allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ()))
-            cells = (f'`{name}`', parameters.value_text(value), allowed, meta.get('unit', ''), meta['doc'])
-            lines.append('| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |')
-    return lines
-
-
-def verb_page() -> list[str]:
-    """Return the lines of the page of verbs, as their --help prints them."""
-    lines = ['# Verbs', '', 'The help texts that `pedestal VERB --help` prints.']
+def verb_page():
+    """Return the lines of the page of verbs: purpose and options of every verb, as its --help prints them."""
+    lines = ['# Options of every verb', '', 'The help texts that `pedestal VERB --help` prints.']
     for name, (_, summary) in cli.VERBS.items():
         verb = cli.found(name)
         parser = argparse.ArgumentParser(prog=f'pedestal {name}', add_help=False,
@@ -58,8 +35,9 @@ def verb_page() -> list[str]:
     return lines
 
 
-def law_page(root: pathlib.Path) -> list[str]:
-    """Return the lines of the page of laws: docstring, compiled functions and tests of every module with laws."""
+def law_page(root):
+    """Return the lines of the page of laws: docstring, compiled functions and tests of every module with laws. root:
+    folder of the checkout."""
     lines = ['# Laws', '', 'Every control law, filter, motor and wave is a compiled function in a small module. This '
              'page is a copy of the docstrings of these modules: equations, symbols, sources.']
     for package in LAW_PACKAGES:
@@ -77,19 +55,21 @@ def law_page(root: pathlib.Path) -> list[str]:
     return lines
 
 
-def _docstring(module: pathlib.Path) -> str:
+def _docstring(module):
+    """Return the docstring of a module. module: path of its file."""
     return ast.get_docstring(ast.parse(module.read_text())) or ''
 
 
-def _imported(test: pathlib.Path) -> Iterator[str]:
-    """Yield the dotted names that a test module imports with `from`."""
+def _imported(test):
+    """Yield the dotted names that a test module imports with `from`. test: path of its file."""
     for node in ast.walk(ast.parse(test.read_text())):
         if isinstance(node, ast.ImportFrom):
-            yield from (str(node.module), *(f'{node.module}.{alias.name}' for alias in node.names))
+            yield from (node.module, *(f'{node.module}.{alias.name}' for alias in node.names))
 
 
-def _laws(module: pathlib.Path) -> list[tuple[str, str]] | None:
-    """Return [(signature, first paragraph of the docstring)] of the public compiled functions of a module, or None."""
+def _laws(module):
+    """Return [(signature, first paragraph of the docstring)] of the public compiled functions of a module; None for a
+    module without compiled functions. module: path of its file."""
     compiled = [node for node in ast.parse(module.read_text()).body if isinstance(node, ast.FunctionDef) and any(
         ast.unparse(decorator) in ('compiled', 'inlined') for decorator in node.decorator_list)]
     return [(f'{node.name}({", ".join(argument.arg for argument in node.args.args)})',
@@ -97,29 +77,38 @@ def _laws(module: pathlib.Path) -> list[tuple[str, str]] | None:
             for node in compiled if not node.name.startswith('_')] if compiled else None
 
 
-def contributing_page(root: pathlib.Path) -> str:
-    """Return CONTRIBUTING.md for the book, whose links to files outside docs/ become plain text."""
-    text = (root / 'CONTRIBUTING.md').read_text().replace('](docs/', '](')
-    return re.sub(r'\[([^]]*)\]\([A-Z][^)]*\)', r'\1', text)
+BOOK_ONLY_LINKS = {'docs/reference/commands.md': '[Options of every verb](verbs.md) has the help texts of all verbs.',
+                   'docs/understand/architecture.md': '[Laws](../reference/laws.md) has the equations of every law.'}
+"""{page: sentence that the book adds at its end}, with the links to the pages that only the book has."""
 
 
-def main(folder: str | pathlib.Path, root: str | pathlib.Path = '.', *, execute: bool = True) -> int:
-    """Write all pages of the book of a checkout into a folder, whose old content is deleted. Return exit code 0.
+LAST_IN_SEARCH = '---\nsearch:\n  boost: 0.3\n---\n\n'
+"""Head of a page to which the search of the book gives less weight than to the pages that explain."""
 
-    execute: True to run the notebooks, whose pages otherwise have no output.
-    """
+
+def main(folder, root='.', execute=True) -> int:
+    """Write all pages of the book of a checkout (root) into a folder, whose old content is deleted. Return the exit
+    code 0. execute: True to run the notebooks, whose pages otherwise have no output."""
     root, folder = pathlib.Path(root), pathlib.Path(folder)
     shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(root / 'docs', folder)
-    (folder / 'contributing.md').write_text(contributing_page(root))
-    for page in folder.glob('*.md'):
-        text = page.read_text().replace('](../CONTRIBUTING.md)', '](contributing.md)')
-        page.write_text(text.replace('.ipynb)', '.md)'))
-    for notebook in sorted(folder.glob('*.ipynb')):
-        notebooks.write_page(notebooks.read(notebook, execute), notebook)
-    (folder / 'reference').mkdir()
-    for name, lines in (('parameters', parameter_page()), ('verbs', verb_page()), ('laws', law_page(root))):
-        (folder / 'reference' / f'{name}.md').write_text('\n'.join(lines) + '\n')
+    shutil.copytree(root / 'docs', folder, ignore=shutil.ignore_patterns('*.md', '__pycache__'))
+    present = [page.path for page in pages.PAGES if (root / page.path).is_file()]
+    files = {*present, *(str(path.relative_to(root)) for path in (root / 'docs').rglob('*')
+                         if path.is_file() and path.suffix != '.md')}
+    looked_up = [page.path for page in (*pages.SECTIONS['Develop'], *pages.SECTIONS['Reference'])]
+    for path in present:
+        place = folder / (pages.book_path(path) or '')
+        if path.endswith('.ipynb'):
+            notebooks.write_page(notebooks.read(folder / place.with_suffix('.ipynb').name, execute),
+                                 place.with_suffix('.ipynb'))
+        elif place != folder:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            added = f'\n{BOOK_ONLY_LINKS[path]}\n' if path in BOOK_ONLY_LINKS else ''
+            last = LAST_IN_SEARCH if path in looked_up else ''
+            place.write_text(last + pages.for_book((root / path).read_text(), path, files) + added)
+    (folder / 'reference').mkdir(exist_ok=True)
+    for name, lines in (('verbs', verb_page()), ('laws', law_page(root))):
+        (folder / 'reference' / f'{name}.md').write_text('\n'.join((LAST_IN_SEARCH, *lines)) + '\n')
     return 0
 
 

@@ -1,5 +1,13 @@
-"""Hooks of mkdocs (mkdocs.yml): changes of the HTML of a page of the book."""
+"""Hooks of mkdocs (mkdocs.yml): the navigation of the book, and changes of the HTML of a page."""
 import re
+
+from tools import pages
+
+
+def on_config(config):
+    """Return the configuration with the navigation of the table of the pages."""
+    config.nav = pages.nav(config.docs_dir)
+    return config
 
 
 def on_page_content(html: str, **_context: object) -> str:

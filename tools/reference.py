@@ -1,13 +1,16 @@
 """Generated tables of README.md and docs/, which `make docs` (`python -m tools.reference`) writes again.
 
-A table stands between <!-- table NAME --> and <!-- end --> in a file. It comes from a table of the code or from
-docs/rows.json. A test compares the files with the code.
+A reference table comes from the tables of the code. A table of measured numbers comes from docs/rows.json. A table
+stands between <!-- table NAME --> and <!-- end --> in a file, a number between <!-- number ... --> and <!-- end -->.
+Every file with such a mark is written (pages.marked). A test compares the files with the code.
 """
+import functools
 import pathlib
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 
+from tools import pages
 from tools.numbers import published
 
 import pedestal_studies
@@ -15,23 +18,21 @@ from acu_tracker import modes
 from acu_tracker.alarms import table as alarms
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from drive_law import faults
-from pedestal import console
+from pedestal import cli, console
 from pedestal_bringup.scenario import shipped
 from pedestal_bringup.scenario.sections import parameters_of
 from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
+from pedestal_common.graph.graph_parameters import GraphParameters
 from pedestal_common.injection.table import INJECTED_FAULTS
 from pedestal_common.text_files.text_table import TextTable
-from pedestal_common.wire.commands import Argument
 from pedestal_results import results
 from pedestal_studies.system.faults import FAULT_EXPECTATIONS
 from pedestal_workbench.again import what_if
+from tracking_receiver_sim.tracks import files as track_files
+from tracking_receiver_sim.tracks import tables as flight_tables
 
-GENERATED_PAGES = ('README.md', *(f'docs/{name}.md' for name in (  # files with generated tables
-    'acquisition', 'budget', 'faults', 'graph', 'measured', 'operating', 'papers', 'parameters', 'studies', 'tools',
-    'troubleshooting')))
-
-TABLE_PARAMETERS = (  # the parameters in the table of docs/parameters.md
+TABLE_PARAMETERS = (
     'scenario.pacing', 'scenario.seed', 'adu.period', 'adu.transport_delay', 'adu.command_timeout',
     'adu.azimuth.speed_loop.proportional', 'adu.azimuth.bias.schedule',
     'adu.azimuth.speed_loop.disturbance_observer', 'adu.azimuth.structure.inertia_share', 'adu.wind.gust.kind',
@@ -45,6 +46,22 @@ TABLE_PARAMETERS = (  # the parameters in the table of docs/parameters.md
     'tracking_receiver.antenna.beamwidth', 'tracking_receiver.path.refractivity',
     'tracking_receiver.receiver.latency', 'ship_motion.ship.motion', 'ship_motion.ship.sea_state',
     'ship_motion.ship.spectrum', 'ship_motion.nmea.port', 'ins.method', 'ins.latency')
+"""The parameters in the first table of docs/reference/parameters.md."""
+
+PARAMETER_KINDS = {node: parameters_of(node) for node in (
+    'scenario', *(node.name for node in nodes.NODES if node.program), 'beam_steering')}
+"""{node: dataclass of its parameters} of the other tables of that page."""
+
+VERB_GROUPS = {
+    'see what exists': ('scenarios', 'samples', 'parameters'),
+    'run a scenario': ('run',),
+    'operate a running antenna': ('status', 'mode', 'ask', 'operate', 'program', 'live', 'simulate'),
+    'use a recording': ('verify', 'recover', 'rerun', 'report', 'replay', 'export'),
+    'compare settings': ('trials', 'recompute'),
+    'design an antenna': ('new', 'tune'),
+    'calibrate an antenna': ('calibrate',),
+    'measure the laws and this machine': ('study', 'bench')}
+"""{what a user wants: the verbs for it}, the sections of docs/reference/commands.md."""
 
 RATE_TEXTS = {'step': 'every step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
               'reply': 'after each request', 'command': 'on request', 'sample': 'at any time, in realtime only'}
@@ -52,14 +69,15 @@ RATE_TEXTS = {'step': 'every step', 'once': 'once, latched or not', 'second': '1
 
 
 def node_table() -> TextTable:
-    """Return the table of the nodes and of the real equipment that they stand for."""
+    """Return the table of the nodes: executable, function, and the equipment of a real antenna that the node stands
+    for."""
     rows = [(f'`{node.name}`', f'`{node.executable}` ({node.package})' if node.program else '', node.doc,
              node.stands_for) for node in (*nodes.NODES, *nodes.HARDWARE_ROWS)]
     return TextTable(('node', 'executable (package)', 'function', 'stands for'), rows)
 
 
 def topic_table() -> TextTable:
-    """Return the table of the topics."""
+    """Return the table of the topics: type, publishers, subscribers, rate, content."""
     links = nodes.links()
     rows = []
     for topic in topics.TOPICS:
@@ -78,11 +96,19 @@ def service_table() -> TextTable:
 
 
 def command_table() -> TextTable:
-    """Return the table of the commands of each node, except injected faults, which have a table of their own."""
+    """Return the table of the commands of each node on its topic of commands. Injected faults have a table of their
+    own."""
     rows = [(f'`{node.obeys}`', f'`{verb.name}`', ', '.join(map(_argument, verb.arguments)), verb.doc)
             for node in nodes.UNIT_NODES if node.obeys and node.name not in INJECTED_FAULTS
             for verb in node.unit_type().VERBS]
     return TextTable(('topic', 'command', 'arguments', 'effect'), rows)
+
+
+def verb_table() -> TextTable:
+    """Return the table of the verbs of the command line."""
+    return TextTable(('you want to', 'verb', 'it does this'), [
+        ('' if i else f'[{group}](#{group.replace(" ", "-")})', f'`{verb}`', cli.VERBS[verb][1])
+        for group, verbs in VERB_GROUPS.items() for i, verb in enumerate(verbs)])
 
 
 def injection_table() -> TextTable:
@@ -92,23 +118,27 @@ def injection_table() -> TextTable:
     return TextTable(('node', 'fault', 'arguments', 'effect', 'in lockstep'), rows)
 
 
-def _defaulted(argument: Argument) -> str:
+def _defaulted(argument):
+    """Return the text of an argument of a fault: its name, default, range, unit and meaning."""
     text = f'{argument.name} = {argument.default}' if argument.options else f'{argument.name} = {argument.default:g}'
     return f'`{text}` ({argument.range} {argument.unit}; {argument.doc})'.replace(' ;', ';')
 
 
-def expectation_table() -> TextTable:
-    """Return the table of the expected reactions to each injected fault. Modes with equal reactions share a line."""
-    rows = []
+def expectation_table(node: str) -> TextTable:
+    """Return the table of the expected reactions to each fault that is injected into a node, by mode of the control
+    unit. Modes with equal expectations share a line."""
+    rows: list[tuple[str, ...]] = []
     for fault, of_modes in FAULT_EXPECTATIONS.items():
         alike: dict[tuple[str, str, str], list[str]] = {}
         for mode, expected in of_modes.items():
             alike.setdefault(expected.texts(mode), []).append(mode)
-        rows += [(f'`{fault}`', ', '.join(modes), *texts) for texts, modes in alike.items()]
-    return TextTable(('fault', 'in', 'report', 'largest error', 'ends in'), rows)
+        if fault.startswith(f'{node}.'):
+            rows += [(f'`{fault}`', ', '.join(modes), *texts) for texts, modes in alike.items()]
+    return TextTable(('fault', 'in the modes', 'report', 'largest error', 'ends in'), rows)
 
 
-def _argument(argument: Argument) -> str:
+def _argument(argument):
+    """Return the text of an argument of a command with its range and unit, in brackets if it is optional."""
     text = f'{argument.name} = {argument.range} {argument.unit}'.rstrip()
     return f'`{text}`' if argument.default is None else f'[`{text}`]'
 
@@ -132,8 +162,9 @@ def fault_table() -> TextTable:
 
 
 def alarm_table() -> TextTable:
-    """Return the table of the alarms. An alarm that each axis has takes one line, with AXIS as its name."""
-    def both(text: str) -> str:
+    """Return the table of the alarms of the control unit. An alarm that each axis has takes one line, with AXIS as the
+    name of the axis."""
+    def both(text):
         return text.replace(f'{topics.AXES[0]} ', 'AXIS ')
     return TextTable(('alarm', 'priority', 'delay on, off [s]', 'latched', 'consequence of', 'meaning',
                       'action of the operator'),
@@ -155,22 +186,56 @@ def study_table() -> TextTable:
                      [(f'`{name}`', line) for name, line in pedestal_studies.descriptions().items()])
 
 
-def parameter_table() -> TextTable:
-    """Return the table of TABLE_PARAMETERS."""
+def first_parameter_table() -> TextTable:
+    """Return the table of TABLE_PARAMETERS: default, range, unit, meaning."""
     rows = []
     for name in TABLE_PARAMETERS:
         node, _, key = name.partition('.')
         kind = parameters_of(node)
-        field, value = dict(parameters.flatten(kind))[key], parameters.defaults(kind)[key]
-        meta = field.metadata
-        allowed = (f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ())))
-        text = f'{value:g}' if isinstance(value, float) else str(value)
-        rows.append((f'`{name}`', text, allowed, meta.get('unit', ''), meta['doc']))
-    return TextTable(('parameter', 'default', 'range', 'unit', 'meaning'), rows)
+        rows.append(_parameter_row(name, dict(parameters.flatten(kind))[key], parameters.defaults(kind)[key]))
+    return TextTable(PARAMETER_HEADS, rows)
 
 
-def result_table(table: Sequence[results.Result] = results.RESULTS) -> TextTable:
-    """Return a table of results; table: by default that of a run."""
+PARAMETER_HEADS = ('parameter', 'default', 'range', 'unit', 'meaning')
+
+
+def _parameter_row(name: str, field, value) -> tuple[str, ...]:
+    """Return the line of a parameter: a field of a dataclass, and its default."""
+    meta = field.metadata
+    allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ()))
+    return tuple(cell.replace('|', '\\|') for cell in (f'`{name}`', parameters.value_text(value), allowed, meta.get('unit', ''), meta['doc']))
+
+
+def parameter_table(kind: type) -> TextTable:
+    """Return the table of all parameters of a dataclass: default, range, unit, meaning."""
+    values = parameters.defaults(kind)
+    return TextTable(PARAMETER_HEADS, [_parameter_row(name, field, values[name])
+                                       for name, field in parameters.flatten(kind)])
+
+
+def track_format_table() -> TextTable:
+    """Return the table of the formats of track files."""
+    return TextTable(('format', 'content', 'a file of this format begins with', 'what is read'), [
+        (form.name, form.kind.doc, form.beginning, form.doc) for form in track_files.FILE_FORMATS])
+
+
+def flight_column_table() -> TextTable:
+    """Return the table of the columns by which a CSV file of a flight is known."""
+    def names(quantity) -> str:
+        return ', '.join(f'`{name}`' for name in quantity.names)
+    rows = []
+    for layout in flight_tables.CSV_LAYOUTS:
+        place = (names(layout.latitude) if layout.latitude == layout.longitude
+                 else f'{names(layout.latitude)}; {names(layout.longitude)}')
+        altitudes = '; '.join(f'{names(one)} in {"the unit of its name" if "" in one.names.values() else unit}'
+                              for one in layout.altitudes for unit in (next(iter(one.names.values())),))
+        rows.append((layout.name, names(layout.time), place, altitudes))
+    return TextTable(('kind', 'time', 'latitude; longitude', 'altitude, the best first'), rows)
+
+
+def result_table(table=results.RESULTS):
+    """Return the table of results: name, unit, meaning, target. table: rows of results.RESULTS, by default those of a
+    run."""
     return TextTable(('result', 'unit', 'meaning', 'target'),
                      [(f'`{name}`', unit, sentence, target) for name, unit, sentence, target in
                       results.documented(table)])
@@ -181,18 +246,24 @@ def exit_code_table() -> TextTable:
     return TextTable(('exit code', 'meaning'), [(str(code), meaning) for code, meaning in console.EXIT_CODES.items()])
 
 
-REFERENCE_TABLES: dict[str, Callable[[], TextTable]] = {
-    'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table, 'topics': topic_table,
-    'services': service_table, 'modes': mode_table, 'commands': command_table,
-    'faults that can be injected': injection_table, 'expected of faults': expectation_table,
+Maker = Callable[[], TextTable]
+
+REFERENCE_TABLES: Mapping[str, Maker] = {
+    'verbs': verb_table, 'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table,
+    'topics': topic_table, 'services': service_table, 'modes': mode_table, 'commands': command_table,
+    'faults that can be injected': injection_table,
+    **{f'expected of faults of {node}': functools.partial(expectation_table, node) for node in INJECTED_FAULTS},
     'filter kinds': filter_table, 'drive faults': fault_table, 'alarms': alarm_table, 'results': result_table,
     'exit codes': exit_code_table, 'recomputed results': lambda: result_table(what_if.COMPARISON_RESULTS),
-    'first parameters': parameter_table}
+    'first parameters': first_parameter_table,
+    **{f'parameters of {node}': functools.partial(parameter_table, kind) for node, kind in PARAMETER_KINDS.items()},
+    'parameters of every node': functools.partial(parameter_table, GraphParameters),
+    'formats of track files': track_format_table, 'columns of flights': flight_column_table}
 """{name of a table: function that returns it}."""
 
 
-def with_tables(text: str, rows: published.Rows) -> str:
-    """Return a text with the present content of every generated table and number.
+def with_tables(text, rows):
+    """Return the text of a file in which every generated table and number is replaced by its present content.
 
     A number of prose is the value of a row times a factor. It stands between two marks:
 
@@ -200,7 +271,7 @@ def with_tables(text: str, rows: published.Rows) -> str:
 
     The words are study, case, metric, factor and format.
 
-    Raises KeyError for an unknown table.
+    rows: published.Rows, the measured numbers of docs/rows.json. Raises KeyError for an unknown table.
     """
     def table(match: re.Match[str]) -> str:
         name = match[1]
@@ -208,18 +279,15 @@ def with_tables(text: str, rows: published.Rows) -> str:
         return '\n'.join((f'<!-- table {name} -->', *found.markdown(), '<!-- end -->'))
 
     def number(match: re.Match[str]) -> str:
-        study, case, metric, factor, form = match[1].split()
-        value = rows[study, case, metric]['value']
-        return f'<!-- number {match[1]} -->{float(factor) * value:{form}}<!-- end -->'
-
-    text = re.sub(r'<!-- number ([^>]+?) -->.*?<!-- end -->', number, text)
-    return re.sub(r'<!-- table ([\w ]+) -->\n.*?<!-- end -->', table, text, flags=re.DOTALL)
+        return f'<!-- number {match[1]} -->{published.number_of_prose(rows, match[1])}<!-- end -->'
+    return pages.TABLE_PATTERN.sub(table, pages.NUMBER_PATTERN.sub(number, text))
 
 
-def main(root: str | pathlib.Path = '.') -> int:
-    """Write the generated tables of a checkout again and print the names of the changed files. Return exit code 0."""
+def main(root='.') -> int:
+    """Write the generated tables of a checkout (root) again, and print the names of the changed files. Return the exit
+    code 0."""
     rows = published.read(root)
-    for name in GENERATED_PAGES:
+    for name in pages.marked(root):
         file = pathlib.Path(root, name)
         old = file.read_text()
         new = with_tables(old, rows)

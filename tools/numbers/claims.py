@@ -2,7 +2,7 @@
 
 A reading states how we interpret the claim, and under which conditions we measure it. The measured numbers are in the
 rows of the studies. A verdict states in words whether the claim holds. tools/reference.py writes claims, numbers and
-verdicts side by side into docs/papers.md.
+verdicts side by side into docs/reference/papers.md.
 """
 import typing
 from collections.abc import Sequence
@@ -30,9 +30,9 @@ def _of(study: str, *claims: Sequence[str]) -> tuple[Claim, ...]:
     return tuple(Claim(claim, reading, study, *where) for claim, reading, *where in claims)
 
 
-PAPER_000_CLAIMS = (
+MA_CLAIMS = (
     Claim('figures 1 to 4: block diagrams, gear train, simulation model',
-          'implemented: graph.md, section The chain; package adu_drive'),
+          'implemented: the chain of the nodes; package adu_drive'),
     Claim('table 1: 30 Nm, 1500 rpm, 4.7 kW; 1.736 and 1.731 ohm, 20.199 and 20.149 mH between the terminals',
           'a phase has half of each: defaults of `adu`'),
     Claim('the motors differ by less than 0.5 %',
@@ -105,7 +105,7 @@ PAPER_000_CLAIMS = (
          ('one speed loop keeps the motors in step (no number)', 'opposing torque at rest, a speed loop for each '
           'motor', 'independent-loops', 'fight_torque_rms_nm')))
 
-PAPER_001_CLAIMS = (
+ZHOU_YANG_QIN_CLAIMS = (
     Claim('figures 1, 2: block diagrams', 'implemented: p001_zhou_yang_qin/adrc.py'),
     Claim('latitude 34 deg north; misalignment 3, 3 and 180 deg', 'as printed'),
     Claim('longitude 108 deg, height 450 m', 'no law of an alignment contains the longitude; gravity is that of the '
@@ -151,7 +151,7 @@ PAPER_001_CLAIMS = (
         for speed in ('1', '4'))))
 
 _STEP, _RAMP = 'step/alpha=0.1/T=10ms/{}', 'ramp/{}deg_s/T={}ms'
-PAPER_002_CLAIMS = (
+JIA_CLAIMS = (
     Claim('figures 1, 2, 8: block diagrams', 'implemented: pedestal_studies/p002_jia/angle_loop.py'),
     Claim('(2): bandwidth 8.4 Hz for n = 20, T = 1 ms',
           '1/((n - 1) T) is 8.38 Hz; the recursion has its -3 dB at 8.17 Hz', verdict='reproduced'),
@@ -210,7 +210,7 @@ PAPER_002_CLAIMS = (
           'largest rate at which the loop keeps the target', 'loss/half-beamwidth/type-1', 'linear_lag_beamwidths',
           'holds')))
 
-PAPER_003_CLAIMS = (
+LIN_WU_ZHU_CLAIMS = (
     Claim('figures 1, 2, 5 to 7: block diagrams, test stand',
           'implemented: pedestal_studies/p003_lin_wu_zhu/feedforward_loop.py'),
     Claim('20 deg to and fro at 3.50 deg/s, which represents 30 m/s at 500 m',
@@ -272,7 +272,7 @@ PAPER_003_CLAIMS = (
          ('more than 3 x better', 'the same ratio through receiver, control unit and motors, elevation',
           'elevation/drive-imm', 'miss_ratio_to_kalman_cv', 'not reproduced: 2.96 x')))
 
-PAPER_004_CLAIMS = (
+LI_CHEN_WANG_CLAIMS = (
     Claim('T = 0.01 s; the filter begins with the measured angle and rate',
           'as printed; the noises and the flight are ours'),
     *_of('telemetry-flight',
@@ -301,6 +301,6 @@ PAPER_004_CLAIMS = (
          ('the filter is uniformly asymptotically stable (no number)', 'largest eigenvalue', 'position-rate',
           'largest_eigenvalue', 'holds')))
 
-CLAIMS_BY_PAPER = {'000': PAPER_000_CLAIMS, '001': PAPER_001_CLAIMS, '002': PAPER_002_CLAIMS, '003': PAPER_003_CLAIMS,
-                   '004': PAPER_004_CLAIMS}
-"""{number of a paper: its Claims}."""
+CLAIMS_BY_PAPER = {'Ma 2023': MA_CLAIMS, 'Zhou, Yang, Qin 2011': ZHOU_YANG_QIN_CLAIMS, 'Jia 2025': JIA_CLAIMS,
+                   'Lin, Wu, Zhu 2020': LIN_WU_ZHU_CLAIMS, 'Li, Chen, Wang 2018': LI_CHEN_WANG_CLAIMS}
+"""{authors and year of a paper: its Claims}."""

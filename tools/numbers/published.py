@@ -1,7 +1,7 @@
 """The numbers of the documentation: rows of the studies, kept in docs/rows.json, and the tables made from these rows.
 
 `python -m tools.numbers.published [STUDY ...]` (`make numbers`) runs all published studies, or the named studies only,
-and writes the rows that the tables use. `make docs` writes the tables from these rows.
+and writes the rows that the tables and the numbers of prose use. `make docs` writes both from these rows.
 """
 import dataclasses
 import inspect
@@ -13,6 +13,7 @@ import typing
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
+from tools import pages
 from tools.numbers import claims
 
 import pedestal_studies
@@ -35,7 +36,7 @@ Maker: TypeAlias = Callable[['Rows'], Content]   # of a table
 
 ROWS_FILE = 'docs/rows.json'  # file of the rows in a checkout
 
-SCENARIO_RESULTS = (  # (text, case, metric) of the results of the study scenarios in docs/measured.md
+SCENARIO_RESULTS = (  # (text, case, metric) of the results of the study scenarios in docs/reference/measured.md
     ('`leo_pass`: pointing error against truth, per axis, rms', 'leo_pass', 'pointing_rms_deg'),
     ('`leo_pass`: largest pointing error', 'leo_pass', 'pointing_max_deg'),
     ('`leo_pass`: rms pointing error divided by the noise of a receiver sample', 'leo_pass', 'pointing_to_noise'),
@@ -97,15 +98,29 @@ def read(root: str | pathlib.Path = '.') -> Rows:
 
 
 def write(rows: Rows, root: str | pathlib.Path = '.') -> None:
-    """Write the rows that the tables use into ROWS_FILE."""
-    # The tables are made only to note the rows that they read in rows.used.
-    for table in TABLES.values():
-        table(rows)
+    """Write the rows that the tables and the numbers of prose use into ROWS_FILE."""
+    note_used(rows, root)
     lines: dict[str, list[str]] = {}
     for (study, *_), row in sorted(rows.used.items()):
         lines.setdefault(study, []).append('  ' + json.dumps(row))
     content = ',\n'.join(f' "{study}": [\n' + ',\n'.join(of) + ']' for study, of in lines.items())
     pathlib.Path(root, ROWS_FILE).write_text('{\n' + content + '\n}\n')
+
+
+def note_used(rows: Rows, root: str | pathlib.Path = '.') -> None:
+    """Note in rows.used the rows of all tables, and of the numbers in the prose of the pages of a checkout."""
+    for table in TABLES.values():
+        table(rows)
+    for name in pages.marked(root):
+        for mark in pages.NUMBER_PATTERN.findall(pathlib.Path(root, name).read_text()):
+            number_of_prose(rows, mark)
+
+
+def number_of_prose(rows: Rows, mark: str) -> str:
+    """Return the text of a number of prose; mark: 'STUDY CASE METRIC FACTOR FORMAT', separated by blanks. The last two
+    words are FACTOR and FORMAT, and the one before them METRIC; the words between it and STUDY are the case."""
+    study, *case, metric, factor, form = mark.split()
+    return f'{float(factor) * rows[study, " ".join(case), metric]["value"]:{form}}'
 
 
 def _cells(row: Row) -> tuple[str, str, str]:
@@ -278,7 +293,7 @@ ARRAY_NUMBERS = Numbers(
 
 
 def matrix_table(rows: Rows) -> Content:
-    """Return the table of the matrices of paper 004's proof of stability, in seconds, with rank and condition."""
+    """Return the table of the matrices of Li 2018's proof of stability, in seconds, with rank and condition."""
     lines = [(name, '; '.join(' '.join(f'{value:.4g}' for value in line) for line in matrix),
               *(number(rows['telemetry-flight', name, metric]['value'])
                 for metric in ('rank', 'condition', 'condition_in_seconds')))
@@ -304,7 +319,7 @@ def acquisition_table(rows: Rows) -> Content:
         ('`steptrack_geo`: largest error after 90 s', *_cells(off), '', '', '')]
 
 
-CALIBRATION_RESULTS = (  # (text, case, metric) of the results of the study calibration in docs/measured.md
+CALIBRATION_RESULTS = (  # (text, case, metric) of the results of the study calibration in docs/reference/measured.md
     ('program track of the test pass without a model, rms', 'program track', 'raw_rms_deg'),
     ('program track of the test pass with the model, rms', 'program track', 'calibrated_rms_deg'),
     ('residuals of the fit, rms', 'program track', 'residual_rms_deg'),
@@ -312,6 +327,87 @@ CALIBRATION_RESULTS = (  # (text, case, metric) of the results of the study cali
     ('leave-one-out rms of the default terms alone', 'program track', 'leave_one_out_default_rms_deg'),
     ('share of the terms within three of their sigmas', 'terms', 'within_3_sigma'),
     ('number of terms, over all runs', 'terms', 'cases'))
+
+CONTROLLERS = {
+    'best': 'our controller', 'best-inertia-plus': 'the same, load inertia +20 %',
+    'best-inertia-minus': 'the same, load inertia -20 %',
+    'best-full-torque': 'our controller without torque in reserve for a heavier load',
+    'adrc': 'the controller `adrc`', 'paper-r1': "the paper's controller with the gains R1"}
+"""{case of the study servo: its meaning} of the table of controllers."""
+CONTROLLER_COLUMNS = (
+    ('step: overshoot, %', 'step_overshoot_percent', 1.0), ('settling within 2 %, s', 'step_settling_2percent_s', 1.0),
+    ('sine of 0.4 rad/s: largest error, urad', 'sine_0p4rads_max_error_rad', 1e6),
+    ('rms, urad', 'sine_0p4rads_rms_error_rad', 1e6),
+    ('sine of 0.4 Hz: largest error, urad', 'sine_0p4hz_max_error_rad', 1e6),
+    ('rms, urad', 'sine_0p4hz_rms_error_rad', 1e6),
+    ('gust of 1000 Nm: largest error, urad', 'gust_1000nm_peak_rad', 1e6))
+"""(head, metric, factor) of the columns of that table."""
+
+
+def _scaled(rows: Rows, key: Key, factor: float) -> str:
+    """Return the value of a row times a factor, to three digits; '' if there is no such row or no value."""
+    if key not in rows or rows[key]['value'] is None:
+        return ''
+    value = factor * rows[key]['value']
+    return f'{value:.3g}' if abs(value) < 1e3 else f'{value:.0f}'
+
+
+def controller_numbers(rows: Rows) -> Content:
+    """Return the table of our controllers on the plant of Ma 2023, with the targets of `best`."""
+    lines = [(case, meaning, *(_scaled(rows, ('servo', case, metric), factor)
+                               for _, metric, factor in CONTROLLER_COLUMNS)) for case, meaning in CONTROLLERS.items()]
+    targets = [rows['servo', 'best', metric]['target'] for _, metric, _ in CONTROLLER_COLUMNS]
+    return ('case', 'meaning', *(head for head, *_ in CONTROLLER_COLUMNS)), [
+        *lines, ('target', 'of best', *(f'{float(target.split()[-1]) * factor:.3g}' if target else ''
+                                        for target, (*_, factor) in zip(targets, CONTROLLER_COLUMNS)))]
+
+
+BIAS_SCHEDULES = {
+    'schedule-off': 'none', 'schedule-constant-5': '5 Nm, constant', 'schedule-constant-12': '12 Nm, constant',
+    'schedule-fade-5': '5 Nm, falls from the beginning, zero at 30 Nm',
+    'schedule-fade-12': '12 Nm, falls from the beginning, zero at 30 Nm',
+    'hold-fade': '12 Nm, full up to 14 Nm, then falls, zero at 45 Nm: the schedule of the product'}
+"""{case of the study backlash: its bias torque as the torque demand of a motor grows}."""
+
+
+def bias_numbers(rows: Rows) -> Content:
+    """Return the table of the schedules of the bias torque."""
+    return ('case', 'bias torque as the torque demand of a motor grows', 'remaining error of a sine of 0.4 Hz, urad',
+            'overshoot of a step at 40 rad/s2, %'), [
+        (case, meaning, _scaled(rows, ('backlash', case, 'sine_residual_rad'), 1e6),
+         _scaled(rows, ('backlash', case, 'step_overshoot_percent'), 1.0)) for case, meaning in BIAS_SCHEDULES.items()]
+
+
+MEASURED_LOOPS = {
+    'current/motor_1': 'current loop of motor 1', 'speed/azimuth': 'speed loop, azimuth',
+    'speed/elevation': 'speed loop, elevation', 'position/azimuth/feedforward': 'position loop, default (T = 5 ms)',
+    'position/azimuth/adrc': 'position loop `adrc`', 'position/azimuth/paper-r1': 'position loop, paper-r1 (T = 2 ms)',
+    'position/azimuth/best': 'position loop, best (T = 2 ms)',
+    'position/azimuth/structure': 'position loop of 40 rad/s, half of the load on a spring of 8 Hz',
+    'position/azimuth/structure-notch': 'the same with the notch at 7.5 Hz'}
+"""{case of the study bode: its meaning}."""
+
+
+def loop_numbers(rows: Rows) -> Content:
+    """Return the table of the measured loops; T is the period of the drive."""
+    return ('case', 'meaning', 'bandwidth, Hz', 'crossover, Hz', 'gain margin, dB', 'phase margin, deg'), [
+        (case, meaning, *(_scaled(rows, ('bode', case, metric), 1.0) or 'none' for metric in (
+            'bandwidth_hz', 'crossover_hz', 'gain_margin_db', 'phase_margin_deg')))
+        for case, meaning in MEASURED_LOOPS.items()]
+
+
+def bandwidth_numbers(rows: Rows) -> Content:
+    """Return the table of the filter of Li 2018 with constant gains: bandwidth, dynamic error, stability."""
+    lines = []
+    for sigma_a in rate_measurement.ACCELERATION_SIGMAS_DEG_S2:
+        of_sigma = '' if sigma_a == rate_measurement.MAIN_SIGMA_DEG_S2 else f'/sigma_a-{sigma_a:g}'
+        lines += [(f'{sigma_a:g}', rate, *(_scaled(rows, ('rate-measurement', case + of_sigma, metric), 1.0)
+                                           for metric in ('rate_bandwidth_hz', 'dynamic_error_0p2hz')),
+                   f'{rows["rate-measurement", case + of_sigma, "largest_eigenvalue"]["value"]:.4f}')
+                  for case, rate in (('position', 'none'), ('position-rate', '0.1'), ('position-rate-0.02', '0.02'))]
+    return ('sigma_a, deg/s2', 'rate measured to, deg/s', 'bandwidth of the rate, Hz',
+            'dynamic error of the angle at 0.2 Hz', 'largest eigenvalue'), lines
+
 
 MDEG_PER_DEG = 1e3
 
@@ -358,16 +454,17 @@ TABLES: dict[str, Maker] = {  # {name of a table: function that makes it}
     'headline results': Results('scenarios', 'seeds', HEADLINE_RESULTS),
     **{f'budget of {mode}': budget_table(mode) for mode in budget.MODE_OVERRIDES},
     **{f'directions of {mode}': direction_table(mode) for mode in budget.MODE_OVERRIDES},
-    **{f'claims of paper {paper}': claim_table(paper) for paper in claims.CLAIMS_BY_PAPER},
+    **{f'claims of {paper}': claim_table(paper) for paper in claims.CLAIMS_BY_PAPER},
     'filters compared': FILTER_NUMBERS, 'manoeuvre': MANOEUVRE_NUMBERS, 'feed forward': FEEDFORWARD_NUMBERS,
     'pareto': PARETO_NUMBERS, 'flyby with a rate': FLYBY_NUMBERS, 'alignment': ALIGNMENT_NUMBERS,
-    'filters of paper 000': FAMILY_NUMBERS, 'feed forward by speed': SPEED_NUMBERS,
+    'filters of Ma 2023': FAMILY_NUMBERS, 'feed forward by speed': SPEED_NUMBERS,
     'speed of alignment': ALIGNMENT_SPEED_NUMBERS, 'acquisition': acquisition_table, 'array loops': ARRAY_NUMBERS,
+    'controllers': controller_numbers, 'bias schedules': bias_numbers, 'measured loops': loop_numbers, 'bandwidth with a rate': bandwidth_numbers,
     'calibration': Results('calibration', 'runs', CALIBRATION_RESULTS), 'matrices': matrix_table}
 
 PUBLISHED_STUDIES = tuple(dict.fromkeys((  # names of the studies whose rows are in the tables
     *(claim.study for of_paper in claims.CLAIMS_BY_PAPER.values() for claim in of_paper if claim.study),
-    'filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration')))
+    'bode', 'filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration')))
 
 
 def main(names: Sequence[str] = (), root: str | pathlib.Path = '.') -> int:

@@ -1,7 +1,7 @@
 """The law of the antenna control unit: `step` runs once per drive step and computes the rate command of both axes.
 
-docs/architecture.md explains the order of a step. Each part of the state is written by its own module; this module
-connects the parts. `unit` calls `step`, and between two steps `request`, `refusals` and `reset`.
+docs/understand/architecture.md explains the order of a step. Each part of the state is written by its own module;
+this module connects the parts. `unit` calls `step`, and between two steps `request`, `refusals` and `reset`.
 """
 import math
 from typing import Annotated

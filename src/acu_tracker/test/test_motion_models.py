@@ -67,7 +67,7 @@ def test_noise_stays_definite_for_small_alpha_t(alpha, T):
 
 @pytest.mark.parametrize('alpha, T', CASES)
 def test_prediction_of_current_statistical_is_phi_x_plus_u_abar(alpha, T):
-    """Phi1 X for Phi X + U abar, abar the estimated acceleration (paper 000, eq. 2, 6)."""
+    """Phi1 X for Phi X + U abar, abar the estimated acceleration (Ma 2023, eq. 2, 6)."""
     X = np.array([0.3, -0.2, 0.15])
     f13, f23, f33 = motion_models.fading(alpha, T)
     Phi = np.array([[1, T, f13], [0, 1, f23], [0, 0, f33]])

@@ -11,7 +11,7 @@ from drive_law.params import AduParameters
 
 P = AduParameters(initial_elevation=0.7)
 STEP, K_p = 0.174, 54.85
-"""Of the move [rad], of the position loop around it [1/s]: paper 000's step, which takes all the torque there is."""
+"""Of the move [rad], of the position loop around it [1/s]: Ma 2023's step, which takes all the torque there is."""
 
 
 def right_hand_side(t, x, p, v):
@@ -45,7 +45,7 @@ def state_vector(s):
 
 @numba.njit
 def move(state, constants, volts, path):
-    """The step of paper 000: phase voltages (n, 4) every 100 us and the load angle (n,) after them."""
+    """The step of Ma 2023: phase voltages (n, 4) every 100 us and the load angle (n,) after them."""
     s, c = state[0].azimuth, constants[0].azimuth
     m1, m2, rate = s.motor_1, s.motor_2, 0.0
     axis.begin_period(s, c, False)        # brakes off, windings cold

@@ -214,7 +214,7 @@ def test_thermal_load_is_the_first_order_lag_of_the_torque_squared(drive):
 
 
 def test_defaults_do_not_trip_in_the_hardest_moves(drive):
-    """Paper 000's raw step, the largest steps of the rate command, and a gust of 3000 Nm."""
+    """Ma 2023's raw step, the largest steps of the rate command, and a gust of 3000 Nm."""
     d = made(drive, period=2e-3, azimuth__bias__torque=5.0, azimuth__bias__schedule='fade',
              azimuth__speed_loop__proportional=3.57, azimuth__speed_loop__integral=244.0)
     for _ in range(300):

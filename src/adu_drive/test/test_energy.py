@@ -15,7 +15,7 @@ from drive_law.params import AduParameters
 from pedestal_common.parameters import build
 
 STEP, K_p = 0.174, 54.85
-"""Of the move [rad], of the position loop around it [1/s]: paper 000's step, which takes all the torque there is."""
+"""Of the move [rad], of the position loop around it [1/s]: Ma 2023's step, which takes all the torque there is."""
 
 COPPER, MOTOR_FRICTION, BEARING, VISCOUS, MESH = range(5)
 """Places of the losses."""

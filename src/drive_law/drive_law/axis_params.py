@@ -1,6 +1,6 @@
 """Parameters of an axis: motors, gears, load and control loops.
 
-The motor data are those of paper 000, table 1, whose line values are halved to phase values. The other defaults are
+The motor data are those of Ma 2023, table 1, whose line values are halved to phase values. The other defaults are
 assumptions of this project for a pedestal with these motors.
 """
 import dataclasses

@@ -2,13 +2,13 @@
 
 Travel: close to an end of travel, a limit of the rate command stops the axis in time.
 
-Speed control of two motors on one load: one PI controls the mean of both speeds (paper 000 section 1.3, figure 3). For
+Speed control of two motors on one load: one PI controls the mean of both speeds (Ma 2023 section 1.3, figure 3). For
 comparison, each motor may have its own PI on its own speed, which is the other structure in that paper. Two loops act
 as the loop on the mean and a second loop, with half its gains, on the difference omega_1 - omega_2. The integral of
 the second loop acts as a spring between the motors. It opposes every lasting difference of their torques: that of an
 offset of a current sensor, and also the wanted bias torque.
 
-Bias torque against backlash: opposite on the two motors, zero at a high torque demand. Paper 000 section 1.3 leaves
+Bias torque against backlash: opposite on the two motors, zero at a high torque demand. Ma 2023 section 1.3 leaves
 the schedule of the bias over the torque demand open. The schedules are those of BiasParameters.schedule: `off`;
 `constant`; `fade`, a straight line from the full bias at demand 0 to zero at `out`; `hold_fade`, full up to the demand
 `hold` and then a straight line to zero at `out`. A pinion would lose contact without the bias at a low demand. A bias

@@ -1,4 +1,4 @@
-"""Han's time-optimal function, the core of a tracking differentiator and of paper 001's control law."""
+"""Han's time-optimal function, the core of a tracking differentiator and of Zhou 2011's control law."""
 import math
 
 from pedestal_common.compiled import compiled

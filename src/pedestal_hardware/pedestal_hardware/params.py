@@ -9,7 +9,7 @@ from pedestal_hardware import pdo
 CONTROLS = ('velocity', 'drive', 'torque')  # divisions of the control between drive_node and the drives
 
 MAX_TORQUE_PERIOD_S = 1e-3
-"""Longest period with control `torque` [s]. With a longer period the axis would oscillate (docs/hardware.md)."""
+"""Longest period with control `torque` [s]. With a longer one the axis oscillates (docs/hardware/servo-drives.md)."""
 
 MAX_CAN_BITRATE = 1_000_000  # largest bit rate of a CAN bus [bit/s]
 MAX_OBJECT_VALUE = 0xFFFF  # largest value of the objects 60F9:1 and :2

@@ -270,7 +270,7 @@ def xsens_north(deck, w):
 DRIVERS = {
     sbg: ('enu', 'flu', 'flu'), vectornav_enu: ('enu', 'rfu', 'rfu'), vectornav_ned: ('ned', 'frd', 'frd'),
     novatel_default: ('nwu', 'flu', 'rfu'), xsens_north: ('nwu', 'flu', 'flu')}
-"""{arithmetic of a driver: parameters imu.earth, imu.body, imu.rate_body of docs/how-to/ins.md}."""
+"""{arithmetic of a driver: parameters imu.earth, imu.body, imu.rate_body of docs/hardware/ins.md}."""
 
 
 def given_to(unit, driver, seconds=15.0):

@@ -2,7 +2,7 @@
 
 `flyby-500m` and `flyby-60m` pass the antenna on a straight line at 15 m/s and are nearest in the middle of the record.
 `s-turn-500m` is an S of turns at 3 m/s2 across the line of sight, 500 m away, between two straight legs. `s-20deg` is
-paper 003's S motion of 20 deg at 3.5 deg/s.
+Lin 2020's S motion of 20 deg at 3.5 deg/s.
 """
 import math
 from typing import NamedTuple
@@ -26,7 +26,7 @@ The requirement for this motion states the acceleration and the distance. The ti
 """
 
 S_MOTION_STROKE_RAD, S_MOTION_RATE_RAD_S, S_MOTION_REVERSAL_S = math.radians(20.0), math.radians(3.5), 1.0
-"""Paper 003's S motion: stroke from end to end [rad], rate between the ends [rad/s], and duration of a reversal,
+"""Lin 2020's S motion: stroke from end to end [rad], rate between the ends [rad/s], and duration of a reversal,
 which is ours [s]."""
 
 

@@ -1,4 +1,4 @@
-"""The methods of alignment of paper 001 piece by piece, against Monte Carlo, scipy and closed forms."""
+"""The methods of alignment of Zhou 2011 piece by piece, against Monte Carlo, scipy and closed forms."""
 import itertools
 import math
 

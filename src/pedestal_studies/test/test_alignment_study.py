@@ -37,7 +37,7 @@ def test_the_stated_sigma_is_honest_on_swell_without_log_or_gnss(on_swell, metho
 
 @pytest.mark.thorough
 def test_higher_bandwidths_level_faster_and_less_precisely(pedestal, tmp_path):
-    """Paper 001, section 6. White noise of the velocity: the noise of the tilt grows with the bandwidth^1.5."""
+    """Zhou 2011, section 6. White noise of the velocity: the noise of the tilt grows with the bandwidth^1.5."""
     code, _, errors = pedestal('study', 'alignment-speed', '--runs', 4, '--workers', 1, '--json', 'rows.json')
     assert (code, errors) == (0, '')
     values = {(row['case'], row['metric']): row['value']

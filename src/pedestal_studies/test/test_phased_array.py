@@ -1,4 +1,4 @@
-"""The study of paper 002: its kernels against closed forms and steady states, its rows against their targets."""
+"""The study of Jia 2025: its kernels against closed forms and steady states, its rows against their targets."""
 import dataclasses
 import math
 

@@ -20,11 +20,11 @@ def test_every_fault_has_an_expectation_in_every_mode_of_the_study():
 
 @pytest.mark.parametrize(('expected', 'mode', 'sentence'), (
     (Expectation(None, (), 0.1), 'stow', 'report not required, error at most 0.1 deg, ends in the same mode'),
-    (Expectation(4, ('standby',), 0.5), 'standby', 'report within 4 steps, error at most 0.5 deg, ends in standby'),
+    (Expectation(4, ('standby',), 0.5), 'standby', 'report within 0.02 s, error at most 0.5 deg, ends in standby'),
     (Expectation(60, ('standby', 'slave'), None), 'slave',
-     'report within 60 steps, error not limited, ends in the same mode or standby'),
+     'report within 0.3 s, error not limited, ends in the same mode or standby'),
     (Expectation(200, ('program',), 0.5), 'autotrack',
-     'report within 200 steps, error at most 0.5 deg, ends in program')))
+     'report within 1 s, error at most 0.5 deg, ends in program')))
 def test_an_expectation_in_words(expected, mode, sentence):
     assert expected.sentence(mode) == sentence
 

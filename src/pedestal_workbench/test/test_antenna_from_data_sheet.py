@@ -21,7 +21,7 @@ SHIPPED = ('uav_tracker_3m', 'leo_station_7m', 'ship_terminal_1m2')
 
 
 def test_the_data_sheet_of_the_known_antenna_gives_it_back():
-    """Paper 000's motor and the plant around it, but for what the scaling rounds: 3 % of inductance and resistance."""
+    """Ma 2023's motor and the plant around it, but for what the scaling rounds: 3 % of inductance and resistance."""
     found = antenna_from_data_sheet.sections(DataSheet(mode_share=0.0), 'known')
     chosen = scenario.parse('known', antenna_from_data_sheet.text(found, ['known']))
     for axis in loops.AXES:

@@ -35,7 +35,7 @@ def test_second_order_loop():
 
 
 def test_loop_with_a_zero():
-    """k_v = a1 / b0, k_a = a2 / b0 - a1 b1 / b0^2 (paper 003, corrected): here the printed c2 would be wrong."""
+    """k_v = a1 / b0, k_a = a2 / b0 - a1 b1 / b0^2 (Lin 2020, corrected): here the printed c2 would be wrong."""
     b0, b1, a1, a2, a3 = 4.0, 0.02, 3.0, 0.05, 2e-4
     s = 1j * W
     f = identification.series(W, (b0 + b1 * s) / (a1 + a2 * s + a3 * s * s), terms=6)

@@ -1,4 +1,4 @@
-"""Smoothing of the angle errors of the receiver, in the interpretations of eq. (1) of paper 002.
+"""Smoothing of the angle errors of the receiver, in the interpretations of eq. (1) of Jia 2025.
 
     none            the mean of the samples of one step
     recursion       eq. (1) as printed: a first-order low-pass, x = (n - 1) / n x + 1 / n y. Its bandwidth (eq. 2) is

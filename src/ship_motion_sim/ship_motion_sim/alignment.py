@@ -1,11 +1,11 @@
 """Alignment of an INS: level and north from its gyros and accelerometers, by an observer with Kalman gains.
 
 Both level channels have a linear extended state observer, and its estimates give the commands that level the frame n'
-of the INS and the azimuth of n'. The study of paper 001 (Zhou, Yang, Qin 2011) compares five methods; this is
+of the INS and the azimuth of n'. The study of Zhou 2011 compares five methods; this is
 `riccati_eso`. Its covariance is the information limit: the least covariance of z if x1 is measured with white noise r
 and x2 walks at random by q.
 
-    dx1/dt = x2, dx2/dt = x3 + b0 u, dx3/dt = 0, y = x1        paper 001 equation (9)
+    dx1/dt = x2, dx2/dt = x3 + b0 u, dx3/dt = 0, y = x1        Zhou 2011 equation (9)
 
     x1, x2, x3  of the north and of the east channel: velocity error [m/s], its rate [m/s2], the rate of x2 without
                 command [m/s3]; z1, z2, z3: their estimates; v1, v2: references of x1 and x2
@@ -16,7 +16,7 @@ and x2 walks at random by q.
     r, q        variance of the measured velocity per step [m2/s2]; growth of the variance of x2, the random walk of
                 the gyros times g [(m/s2)2/s]; w_N: north part of the rate of the earth
 
-The level commands are those of paper 001, equations (7), (8), (11). The correct form of (11) is u = (u0 - z3) / b0,
+The level commands are those of Zhou 2011, equations (7), (8), (11). The correct form of (11) is u = (u0 - z3) / b0,
 but the paper prints u0 - z3 / b0. With the printed form the east channel (b0 < 0) has positive feedback and ends at
 180 deg of level, and the gain of the north channel is g times too high.
 """
@@ -266,7 +266,7 @@ def step(state: State, conditions: Conditions, v_east: MetersPerSecond, v_north:
     does not affect the estimate, because the observer receives its exact commands."""
     observer = state.observer
     # The wanted velocity error is zero, so v1 and v2 start at zero and stay there. The differentiator is part of the
-    # ADRC of paper 001.
+    # ADRC of Zhou 2011.
     for i in range(2):
         state.v1[i], state.v2[i] = differentiated(state.v1[i], state.v2[i], 0.0, h)
     predict(observer, h)

@@ -86,7 +86,7 @@ class LeoPassParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class TrackFileParameters(Parameters):
     """A track from a file: a recorded flight (CSV, ADS-B, GPX, NMEA), a predicted orbit (CCSDS OEM, STK) or a table of
-    azimuth and elevation (CSV, program.txt), see docs/tracks.md."""
+    azimuth and elevation (CSV, program.txt), see docs/reference/tracks.md."""
     path: str = text('', 'file: CSV, ADS-B as CSV, GPX, NMEA, OEM, STK .e, program.txt')
     aircraft: str = text('', 'name of the target if the file holds several: icao24, callsign, name of a GPX track, '
                          'object of an OEM')
@@ -104,7 +104,7 @@ class TrackFileParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class FlybyParameters(Parameters):
-    """A straight, level pass at constant speed, with growing azimuth. The defaults are the UAV of paper 000."""
+    """A straight, level pass at constant speed, with growing azimuth. The defaults are the UAV of Ma 2023."""
     closest_distance: float = parameter(500.0, 0.0, 1e6, 'm', 'closest distance over ground')
     height: float = parameter(100.0, -1000.0, 1e6, 'm', 'height above the station')
     speed: float = parameter(15.0, 0.0, 8000.0, 'm/s', 'ground speed')
@@ -196,7 +196,7 @@ class ReceiverParameters(Parameters):
     beam: str = choice('moving', BEAM_MOTIONS, 'motion of the beam between two steps; held: an electronic beam, which '
                        'jumps at the steps')
     smoothing: str = choice('none', SMOOTHING_KINDS, 'smoothing of the errors; none: mean over a step; recursion: '
-                            'low-pass of paper 002 over the samples')
+                            'low-pass of Jia 2025 over the samples')
     smoothing_samples: int = parameter(20, 1, 10000, '1', 'number of samples n of recursion and moving average')
     full_scale: float = parameter(0.7, 0.1, 100.0, 'beamwidths', 'largest error that the detector puts out')
     agc_time_constant: float = parameter(0.05, 1e-3, 10.0, 's', 'time constant of the sum power that normalises the '

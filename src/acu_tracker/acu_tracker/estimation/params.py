@@ -47,7 +47,7 @@ class SingerParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class CurrentStatisticalParameters(Parameters):
-    """Model of an acceleration of limited duration about its present estimate (paper 000)."""
+    """Model of an acceleration of limited duration about its present estimate (Ma 2023)."""
 
     alpha: float = parameter(0.1, 1e-4, 100.0, *_ALPHA, grid=(0.03, 3.0, 3))
     a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', 'largest acceleration: 1.2 to 1.7 x the peak of the target',
@@ -86,7 +86,7 @@ class FilterParameters(Parameters):
     """Filter of an axis: its kind, and the parameters of every kind. All of them can be changed at run time."""
 
     kind: str = choice('imm', FILTER_KINDS, 'kind of the filter; can be changed while it runs')
-    rate_measurement: bool = flag(False, 'use of the measured rate of the target, if there is one (paper 004); '
+    rate_measurement: bool = flag(False, 'use of the measured rate of the target, if there is one (Li 2018); '
                                   'with imm_ukf in the filters of the axes only')
     alpha_beta: AlphaBetaParameters = group(AlphaBetaParameters)
     alpha_beta_gamma: AlphaBetaParameters = group(AlphaBetaParameters)

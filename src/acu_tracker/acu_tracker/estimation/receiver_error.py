@@ -76,7 +76,7 @@ def _error_at(encoders: history.Encoders, receiver: ReceiverModelParameters, inp
 
     The receiver error is a weighted mean of samples; each sample is target minus beam. The mean of the target belongs
     to the instant receiver.age before the stamp of the error, that of the beam to receiver.beam_age before this stamp.
-    The two ages may differ, because an electronic beam jumps from step to step (docs/graph.md, Age of the error). The
+    The two ages may differ, because an electronic beam jumps from step to step (docs/understand/architecture.md). The
     pointing between two steps is interpolated linearly. For an axis of constant rate this is exact, whatever the
     weights are.
     """

@@ -6,7 +6,7 @@ filter.
     I, D    integral and filtered derivative of the error [rad/s]
     t_m     middle of the interval in which the command is in force
 
-pid: a PID on the raw (unshaped) target, as in paper 000, without feed-forward:
+pid: a PID on the raw (unshaped) target, as in Ma 2023, without feed-forward:
 
     u = K_p e + I + K_d D,    dI/dt = K_i e,    D = de/dt through a lag of derivative_time
 
@@ -22,11 +22,12 @@ because t_m already contains the delay:
     W = (b0 + b1 s + ...) / (a1 + a2 s + ...)    k_v = a1 / b0,    k_a = a2 / b0 - a1 b1 / b0^2
     W of second order, damping zeta              k_v = 1,          k_a = 2 zeta / w_s
 
-Source: paper 003, eq. 14 to 18. The c2 of the paper holds for b0 = 1, and the captions of its eq. 17 and 18 are
+Source: Lin 2020, eq. 14 to 18. The c2 of the paper holds for b0 = 1, and the captions of its eq. 17 and 18 are
 swapped.
 
 adrc: active disturbance rejection control for a drive with a rate loop. An observer estimates the disturbance of the
-axis, and the control law cancels it. The laws follow paper 001, equations (7) to (11); docs/papers.md names the paper.
+axis, and the control law cancels it. The laws follow equations (7) to (11) of Zhou 2011
+(docs/understand/papers.md).
 
     v1, v2, v3     angle, rate, acceleration of the shaped reference [rad, rad/s, rad/s2]
     z1, z2, z3     observed angle [rad], rate [rad/s], disturbance [rad/s2]; y: encoder angle [rad]
@@ -50,7 +51,7 @@ NLC (11)    u0 = v3 + w_c^2 (v1 - z1) + 2 w_c (v2 - z2). This is fhan with h1 = 
 
 beam: the angle loop of an electronically steered beam, from the receiver's error to the angle R [rad] and the rate v
 of the beam of the next interval; R(k/k-1) is R at step k, predicted from step k - 1. The form `type_1` of LOOP_FORMS
-is the loop of paper 002, eq. 3. Its eq. 6 compensates the share delta of the rate V at which the motion of the ship
+is the loop of Jia 2025, eq. 3. Its eq. 6 compensates the share delta of the rate V at which the motion of the ship
 moves a fixed target:
 
     R(k/k-1) = R(k-1/k-1) + v(k-1) T

@@ -9,7 +9,7 @@ from pedestal_common.quantities import RadiansPerSecond2
 
 @dataclasses.dataclass(frozen=True)
 class PidParameters(Parameters):
-    """PID on the raw (unshaped) target, as in paper 000. K_p = bandwidth, K_i = integral K_p^2, K_d = derivative."""
+    """PID on the raw (unshaped) target, as in Ma 2023. K_p = bandwidth, K_i = integral K_p^2, K_d = derivative."""
 
     bandwidth: float = parameter(20.0, 0.0, 500.0, 'rad/s', 'bandwidth of the position loop: K_p')
     integral: float = parameter(0.05, 0.0, 10.0, '', 'K_i / K_p^2; 0.25: both poles of the loop at K_p / 2')
@@ -33,7 +33,7 @@ class FeedforwardParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class AdrcParameters(Parameters):
-    """State feedback and disturbance observer (paper 001); torque and friction fed forward as in `feedforward`."""
+    """State feedback and disturbance observer (Zhou 2011); torque and friction fed forward as in `feedforward`."""
 
     bandwidth: float = parameter(60.0, 0.1, 500.0, 'rad/s', 'poles w_c of the state feedback')
     observer_bandwidth: float = parameter(100.0, 0.1, 1000.0, 'rad/s', 'poles w_o of the observer; below w_s / 3 they '
@@ -43,11 +43,12 @@ class AdrcParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class BeamParameters(Parameters):
-    """Loop of the beam of a phased array (paper 002); alpha and rate_compensation act in type_1 and type_2 only."""
+    """Loop of the beam of a phased array (Jia 2025); alpha and rate_compensation act in type_1 and type_2 only."""
 
     form: str = choice('tracked', LOOP_FORMS,
-                       "form of the loop. tracked: the target's filter predicted to t_m; type_1: the paper's loop; "
-                       'type_2: that loop with the beam at its prediction')
+                       'form of the loop. tracked: the beam goes to the estimate of the target, predicted to the '
+                       'middle of the time for which the command acts; type_1: the loop of Jia 2025; type_2: that '
+                       'loop with the beam at its prediction')
     alpha: float = parameter(0.1, 1e-3, 1.0, '', 'gain of the angle; beta by Benedict and Bordner')
     rate_compensation: float = parameter(0.0, 0.0, 2.0, '', "share delta of the deck's rate that is fed forward")
 

@@ -1,7 +1,7 @@
 """Electronically steered beam of a phased array: no motors, a commanded angle is reached after a pure delay and held.
 
 A command stamped t_k is active from the first step at or after t_k + transport delay, until the next command becomes
-active. This models the delays of the beam steering computer and the array of paper 002 (section 2, figure 2). The hold
+active. This models the delays of the beam steering computer and the array of Jia 2025 (section 2, figure 2). The hold
 models the closed-loop period of that paper.
 """
 from typing import Annotated

@@ -66,7 +66,7 @@ def _add_mode(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--el',
                         type=float, metavar='DEG', help='elevation [deg]; in mode rate: elevation rate [deg/s]')
     parser.add_argument('given', nargs='*', metavar='NAME=VALUE', help='other arguments of the mode (radians, SI '
-                        'units; see docs/operating.md, Commands); or two numbers, as --az and --el')
+                        'units; see docs/reference/nodes.md, Commands); or two numbers, as --az and --el')
     parser.add_argument('--hold', type=float, metavar='S', help='time for which mode rate is repeated before the axes '
                         'stop [s]; default: the command is sent once and lasts 0.5 s')
     arguments.add_elements(parser)
@@ -116,7 +116,7 @@ def _add_ask(parser: argparse.ArgumentParser) -> None:
                         'names')
     parser.add_argument('given',
                         nargs='*', metavar='NAME=VALUE', help='arguments of the command (radians, SI units); see '
-                        'docs/operating.md, Commands')
+                        'docs/reference/nodes.md, Commands')
     parser.add_argument('--node', default='acu', metavar='NODE', help='node that receives the command; default: acu')
     parser.add_argument('--params-file', metavar='FILE', help='parameter file with the arguments of the command '
                         '`pointing`: the parameters pointing.* of the node acu')

@@ -153,7 +153,7 @@ def _add_recompute(parser: argparse.ArgumentParser) -> None:
                         help='pacing of the run, which determines the inputs of each step; default: pacing in the '
                         'bag, else realtime')
     parser.add_argument('--absolute', type=float, metavar='X', help='absolute tolerance of every field, in its unit; '
-                        'default: tolerance of the field (docs/graph.md, Recomputing)')
+                        'default: tolerance of the field (docs/operate/recordings.md)')
     parser.add_argument('--relative', type=float, metavar='X', help='additional tolerance relative to the recorded '
                         'value; default: 1e-9')
     parser.add_argument('--ignore', action='append', default=[], metavar='PATTERN',

@@ -162,7 +162,7 @@ def _cure(priority: int) -> str:
     load, cores = os.getloadavg()[0], len(os.sched_getaffinity(0))
     text = f'load {load:.1f} on {cores} cores; end other programs or use a machine with more cores'
     return text if priority else (f'{text}, or give the nodes a realtime priority: --param scenario.priority=10 '
-                                  '(docs/station.md)')
+                                  '(docs/operate/station.md)')
 
 
 def _some(values: dict[str, tuple[float, str]], names: Collection[str]) -> dict[str, tuple[float, str]]:

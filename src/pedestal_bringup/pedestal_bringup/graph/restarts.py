@@ -45,7 +45,7 @@ class Losses:
     """Count of the steps that the drive lost outside the recovery time after a death."""
     RECOVERY_TIME_S = 5.0
     """Time after a death in which lost steps count as an effect of the death [s]. A graph recovers within 2.3 s
-    (docs/reliability.md)."""
+    (docs/understand/time.md)."""
 
     def __init__(self) -> None:
         self.count = 0

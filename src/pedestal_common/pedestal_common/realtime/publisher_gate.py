@@ -8,8 +8,8 @@ accepted message is valid and newer than the last one; all others are dropped an
     unclear publishers   never: a message may be of several of them, so the motion that the topic commands stops
 
 The sequence numbers of a restarted publisher begin again. A publisher is a different node if it overlapped with the
-active publisher (both sent at the same time), or if its numbers are too high for a restart in this silence. The
-measurements are in docs/reliability.md.
+active publisher (both sent at the same time), or if its numbers are too high for a restart in this silence.
+The reasons are in docs/develop/decisions.md.
 """
 from collections.abc import Callable
 from typing import Generic, TypeVar

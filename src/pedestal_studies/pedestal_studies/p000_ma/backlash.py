@@ -4,7 +4,7 @@ The bias torque closes the lash, which is the free play between pinion and bull 
 reversals and fast moves with each schedule of the bias torque. The study also compares one speed loop for both motors
 with a speed loop for each motor.
 
-Three cases have the controller of paper 000, as in the scenarios. The sine and the fast step run with the controller
+Three cases have the controller of Ma 2023, as in the scenarios. The sine and the fast step run with the controller
 `best` of the study servo and with every schedule. `pedestal run servo_step|servo_sine --param ...` runs every case
 too.
 """

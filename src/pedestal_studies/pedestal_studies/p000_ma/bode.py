@@ -146,7 +146,7 @@ def drawings(responses: Mapping[str, Response], drive: AduParameters) -> Drawing
                             {'rigid': ('position/azimuth/rigid', fig.RAW_COLOUR),
                              'flexible': ('position/azimuth/structure', fig.TRUTH_COLOUR),
                              'flexible, notch': ('position/azimuth/structure-notch', fig.FILTERED_COLOUR)}),
-        'paper': chosen('position loop, azimuth, of paper 000 and ours',
+        'paper': chosen('position loop, azimuth, of Ma 2023 and ours',
                         {'paper': ('position/azimuth/paper-r1', fig.RAW_COLOUR),
                          'best': ('position/azimuth/best', fig.FILTERED_COLOUR)})}
 

@@ -1,4 +1,4 @@
-"""Paper 000's choice of a filter: least squares, alpha-beta, alpha-beta-gamma, Wiener and Kalman filter compared.
+"""Ma 2023's choice of a filter: least squares, alpha-beta, alpha-beta-gamma, Wiener and Kalman filter compared.
 
 The paper (introduction) names these five filters for the angle of a target and states that the Kalman filter has the
 better effect. It prints no number. Its Kalman filter is that of the 'current' statistical model.

@@ -1,4 +1,4 @@
-"""Paper 000's step and sine (figures 5, 6), then a better controller on the same plant.
+"""Ma 2023's step and sine (figures 5, 6), then a better controller on the same plant.
 
 The plant is the azimuth axis with two motors, gears and load. The paper prints a sine of "0.4 rad/s", which is read in
 two ways: 0.4 Hz (paper-r1) and 0.4 rad/s (paper-r2). The case paper-all has the controller of the paper with gains for

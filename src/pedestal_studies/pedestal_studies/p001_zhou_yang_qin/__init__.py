@@ -1,1 +1,1 @@
-"""Paper 001: alignment of an INS by ADRC. The papers are in docs/papers.md."""
+"""Zhou 2011: alignment of an INS by ADRC. The papers are in docs/understand/papers.md."""

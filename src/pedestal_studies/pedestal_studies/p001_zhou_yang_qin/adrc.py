@@ -1,4 +1,4 @@
-"""Alignment methods of paper 001: level by ADRC, azimuth from the commands that keep the INS level.
+"""Alignment methods of Zhou 2011: level by ADRC, azimuth from the commands that keep the INS level.
 
 The ADRC consists of tracking differentiator, extended state observer and nonlinear combination (ship_motion_sim
 alignment, with a correction of equation (11) of the paper). The observer of the paper is linear too, because its delta
@@ -35,7 +35,7 @@ MAX_OBSERVER_BANDWIDTH_RAD_S, MIN_CONTROL_BANDWIDTH_RAD_S = 1.0, 0.1  # of adrc_
 
 @dataclasses.dataclass(frozen=True)
 class AdrcParameters(Parameters):
-    """Method adrc; the defaults reproduce figure 4 of paper 001."""
+    """Method adrc; the defaults reproduce figure 4 of Zhou 2011."""
     observer: float = parameter(0.3, 0.01, 20.0, 'rad/s', 'bandwidth of the extended state observer')
     control: float = parameter(1.0, 0.01, 20.0, 'rad/s', 'bandwidth of the level control')
     start: float = parameter(60.0, 1.0, 3600.0, 's', 'time from power-up after which the azimuth uses the level '

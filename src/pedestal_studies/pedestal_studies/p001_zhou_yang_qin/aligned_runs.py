@@ -1,6 +1,6 @@
-"""Runs of an alignment: the IMU of a swaying ship of paper 001, a navigator over its samples, sums of its errors.
+"""Runs of an alignment: the IMU of a swaying ship of Zhou 2011, a navigator over its samples, sums of its errors.
 
-The IMU, the sway of the ship and a white velocity of 0.05 m/s per axis are those of paper 001 (section 5 and table 1).
+The IMU, the sway of the ship and a white velocity of 0.05 m/s per axis are those of Zhou 2011 (section 5 and table 1).
 The velocity has one value per 0.02 s. The paper does not state this period, and the results scale with it.
 """
 import dataclasses
@@ -60,7 +60,7 @@ ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_NOISE_DENSITY = 3e-5 * G, 6e-6 * G  # [m/
 SHIP_PARAMETERS = ShipParameters(motion='plain', speed=0.0, latitude_deg=34.0, plain=PlainParameters(
     roll_amplitude_deg=7.0, roll_period=1.0 / 0.3, pitch_amplitude_deg=5.0, pitch_period=1.0 / 0.5,
     yaw_amplitude_deg=9.0, yaw_period=1.0 / 0.2))
-"""Ship with the sway of paper 001, table 1. In the paper x points to starboard and y to the bow, so that a rotation
+"""Ship with the sway of Zhou 2011, table 1. In the paper x points to starboard and y to the bow, so that a rotation
 about x is our pitch."""
 
 MISALIGNMENT_RAD = np.radians((3.0, 3.0, 180.0))  # misalignment a_x, a_y, a_z about east, north, up [rad]

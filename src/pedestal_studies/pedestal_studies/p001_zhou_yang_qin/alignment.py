@@ -1,4 +1,4 @@
-"""Alignment of the INS: paper 001's figures 3 and 4 for five methods, over many seeds, beside the information limit.
+"""Alignment of the INS: Zhou 2011's figures 3 and 4 for five methods, over many seeds, beside the information limit.
 
 The alignment removes the error of the initial attitude (misalignment), here 3, 3 and 180 deg. Cases <method> have the
 conditions of the paper. Cases <method>/swell have an additional velocity of 0.5 m/s at 0.1 Hz on every axis. Cases
@@ -52,7 +52,7 @@ DEFAULT_RUNS = 400  # of the cases without a suffix and of swell; each quadrant 
 CASE_METHODS = {method.replace('_', '-'): method for method in METHODS}  # {case: method}
 CASE_MEANINGS = {  # {case: description} of the methods and of the limit, for the table of the documentation
     'classical': 'gyrocompass: the level error that a wrong azimuth causes corrects the azimuth',
-    'adrc': 'paper 001, corrected: active disturbance rejection control (ADRC) levels, its commands give the azimuth',
+    'adrc': 'Zhou 2011, corrected: active disturbance rejection control (ADRC) levels, its commands give the azimuth',
     'adrc-scheduled': 'ADRC whose observer begins with a high bandwidth, which then falls as 6/t',
     'riccati-eso': 'extended state observer (ESO) with the gains of a Kalman filter (Riccati equation)',
     'oba': 'optimisation-based alignment: the rotation that best maps the measured specific force onto gravity',

@@ -1,4 +1,4 @@
-"""Paper 001's trade: an ADRC alignment with higher bandwidths is faster and less precise.
+"""Zhou 2011's trade: an ADRC alignment with higher bandwidths is faster and less precise.
 
 The paper (section 6) states that other parameters of the ADRC make the level converge faster and so shorten the
 alignment of the azimuth, and that a faster convergence lowers the precision. It prints no number.

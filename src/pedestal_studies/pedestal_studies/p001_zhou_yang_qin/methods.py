@@ -1,4 +1,4 @@
-"""A strapdown INS at rest that aligns by one of the five methods which the study of paper 001 compares.
+"""A strapdown INS at rest that aligns by one of the five methods which the study of Zhou 2011 compares.
 
 The commands of the method rotate n', the frame that the INS computes for ENU. The method oba commands no rotation. Its
 strapdown integrates in inertial space: earth rate, command and gravity are zero. riccati_eso is the method of the
@@ -114,7 +114,7 @@ def reject_reversed_azimuth(state: State, constants: Constants, h: Seconds) -> N
     """Declare the azimuth of the gyrocompass unknown if the level command shows an azimuth az above 60 deg.
 
     The loop has a second equilibrium at 180 deg of azimuth. There the north command w_cN is minus twice the north
-    component w_N of the earth rate, by equation (19) of paper 001: cos az = 1 + w_cN / w_N.
+    component w_N of the earth rate, by equation (19) of Zhou 2011: cos az = 1 + w_cN / w_N.
     """
     # s0: bandwidth of the gyrocompass [rad/s], here of the low-pass.
     state.north_command_smoothed += constants.classical.s0 * h * (state.command[1] - state.north_command_smoothed)

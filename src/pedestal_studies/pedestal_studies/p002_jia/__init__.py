@@ -1,1 +1,1 @@
-"""Paper 002: angle loop of a phased array. The papers are in docs/papers.md."""
+"""Jia 2025: angle loop of a phased array. The papers are in docs/understand/papers.md."""

@@ -1,6 +1,6 @@
-"""The angle loop of a phased array on one axis, on a grid of 1 ms: paper 002's loop, and a loop with a target filter.
+"""The angle loop of a phased array on one axis, on a grid of 1 ms: Jia 2025's loop, and a loop with a target filter.
 
-Each loop is one compiled function of the laws that the nodes run. Symbols of paper 002: R, v: angle [rad] and rate
+Each loop is one compiled function of the laws that the nodes run. Symbols of Jia 2025: R, v: angle [rad] and rate
 [rad/s] that the loop predicts; T: time between two updates [s]; alpha, beta: gains from the error to R and to v T [-].
 beta follows from alpha (Benedict and Bordner). The grid, with h = GRID_STEP_S:
 
@@ -34,7 +34,7 @@ GRID_STEP_NS = round(GRID_STEP_S * 1e9)
 
 SMOOTHING_CODES = {'S0': smoothing.SMOOTHING_NONE, 'S1': smoothing.SMOOTHING_RECURSION,
                    'S2': smoothing.SMOOTHING_MOVING_AVERAGE}
-"""{smoothing of the receiver: its code}. S0: no smoothing, the last sample; S1: the recursion of paper 002, eq. (1);
+"""{smoothing of the receiver: its code}. S0: no smoothing, the last sample; S1: the recursion of Jia 2025, eq. (1);
 S2: the moving average. The paper calls eq. (1) a moving average, so S1 and S2 are two readings of it."""
 
 SMOOTHING_SAMPLES = 20  # number n of samples in the smoothing S1 and S2, as in the paper's example
@@ -91,7 +91,7 @@ class FilterLoopConstants(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class PaperLoop:
-    """Loop of paper 002."""
+    """Loop of Jia 2025."""
     alpha: float = 0.1      # gain from the error to the angle [-]
     period: int = 10        # time between two updates of the loop, in samples of the grid
     delay: int = 0          # time from a command to its effect, in samples

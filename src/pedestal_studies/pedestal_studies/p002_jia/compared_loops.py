@@ -1,4 +1,4 @@
-"""The moving targets of paper 002's figures, and the loops that the study compares on them.
+"""The moving targets of Jia 2025's figures, and the loops that the study compares on them.
 
 A record has a value in the middle of each millisecond.
 """

@@ -1,4 +1,4 @@
-"""Figures of the study phased-array: those of paper 002 for each smoothing, and figures of loops with a filter."""
+"""Figures of the study phased-array: those of Jia 2025 for each smoothing, and figures of loops with a filter."""
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 

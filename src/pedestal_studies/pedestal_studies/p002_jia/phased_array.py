@@ -1,4 +1,4 @@
-"""Paper 002's angle loop of a phased array: figures 3 to 7 and 9, limits of stability and of lock, a better loop.
+"""Jia 2025's angle loop of a phased array: figures 3 to 7 and 9, limits of stability and of lock, a better loop.
 
 Cases run the loops of angle_loop.py; cases graph/... run the scenario phased_array_sway in the closed loop. Symbols
 are alpha, the gain [-] from the error to the angle, and T, the time between two updates. S0, S1 and S2 are the kinds

@@ -1,4 +1,4 @@
-"""The position loop of paper 003 on one axis: measured miss, with rate and acceleration of the target fed forward.
+"""The position loop of Lin 2020 on one axis: measured miss, with rate and acceleration of the target fed forward.
 
 The miss, a term of the paper, is the pointing error: angle of the target minus angle of the antenna. Every T = 10 ms
 the tracker measures the miss, with noise and the delay d. The encoder angle of that instant plus the miss is the angle

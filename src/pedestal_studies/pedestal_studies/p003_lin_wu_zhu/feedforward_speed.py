@@ -1,4 +1,4 @@
-"""Feed-forward of paper 003 with differenced angles, and with targets of 30 and 50 m/s.
+"""Feed-forward of Lin 2020 with differenced angles, and with targets of 30 and 50 m/s.
 
 The paper (introduction and section 1) states that targets fly at 30 to 50 m/s, and that an IMM estimates rate and
 acceleration better than differences and than a conventional Kalman filter. Its test stand shows 30 m/s only. Loop,

@@ -1,4 +1,4 @@
-"""Feed-forward of estimated rate and acceleration (paper 003): a conventional Kalman filter beside the IMM.
+"""Feed-forward of estimated rate and acceleration (Lin 2020): a conventional Kalman filter beside the IMM.
 
 An IMM (interacting multiple model) filter mixes several Kalman filters by the probabilities of their models. The loop
 is that of feedforward_loop.py. Cases are AXIS/SOURCE; SOURCE_MEANINGS describes the sources of the rate and

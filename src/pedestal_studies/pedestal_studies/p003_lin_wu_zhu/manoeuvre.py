@@ -1,4 +1,4 @@
-"""Rate and acceleration of filters through ever sharper reversals (paper 003, figures 3 and 4).
+"""Rate and acceleration of filters through ever sharper reversals (Lin 2020, figures 3 and 4).
 
 A target moves to and fro through 20 deg at 3.5 deg/s. In a reversal its rate is half a cosine. Cases are
 reversal-<seconds>/<filter>; their metrics are the rms errors of rate and acceleration inside the reversal. `imm-a` and

@@ -1,4 +1,4 @@
-"""Miss over rate noise for all tunings of every filter: a fair comparison of paper 003's feed-forward.
+"""Miss over rate noise for all tunings of every filter: a fair comparison of Lin 2020's feed-forward.
 
 The loop is that of the study imm-feedforward, azimuth, with prediction over the delay for all filters. The rate noise
 is the rms error of the rate that is fed forward while the rate of the target is constant. Any filter has a small miss
@@ -51,7 +51,7 @@ FILTER_TUNINGS = {  # {filter: (name of the tuned parameter, its values, functio
             lambda q: feedforward_loop.imm(q_ca=q, predicted=True))}
 
 FILTER_MEANINGS = {'cv': 'Kalman filter of constant rate', 'ca': 'Kalman filter of constant acceleration',
-                   'current_statistical': "'current' statistical model of paper 000",
+                   'current_statistical': "'current' statistical model of Ma 2023",
                    'imm': 'IMM of cv, ca and current_statistical, with other noises of its ca'}
 
 FILTER_COLOURS = {'cv': fig.TRUTH_COLOUR, 'ca': fig.RAW_COLOUR, 'current_statistical': fig.MOTOR_2_COLOUR,

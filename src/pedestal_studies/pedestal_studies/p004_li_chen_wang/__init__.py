@@ -1,1 +1,1 @@
-"""Paper 004: measured rate in the filter of a telemetry servo. The papers are in docs/papers.md."""
+"""Li 2018: measured rate in the filter of a telemetry servo. The papers are in docs/understand/papers.md."""

@@ -1,4 +1,4 @@
-"""Effect of an independent measurement of the rate on the filter (paper 004): bandwidth and dynamic error.
+"""Effect of an independent measurement of the rate on the filter (Li 2018): bandwidth and dynamic error.
 
 With constant sigma_a and noises, the 'current' statistical filter settles to constant gains: X+ = A X + B (y, y'). X
 is the estimate of angle, rate and acceleration; sigma_a is the acceleration of the target that the filter assumes. A
@@ -237,7 +237,7 @@ def remarks(measured: Mapping[str, Metrics], errors: Mapping[str, Pairs]) -> lis
     one, twenty, without = (errors[name][:, 0].mean() for name in (*DIFFERENCED_RATES, 'position'))
     largest, slowest = max((measured[name]['largest_eigenvalue'][0], name) for name in measured)
     return [
-        f'Paper 004 prints neither its noises nor its sigma_a. Ours are {math.degrees(ANGLE_SIGMA_RAD):g} deg for the '
+        f'Li 2018 prints neither its noises nor its sigma_a. Ours are {math.degrees(ANGLE_SIGMA_RAD):g} deg for the '
         'angle, 0.1 and 0.02 deg/s for the rate, and sigma_a '
         f'{", ".join(f"{sigma_a:g}" for sigma_a in ACCELERATION_SIGMAS_DEG_S2)} deg/s2. Rows without sigma_a in their '
         f'name have {MAIN_SIGMA_DEG_S2:g} deg/s2. The paper claims a wider band and a smaller dynamic error, without '

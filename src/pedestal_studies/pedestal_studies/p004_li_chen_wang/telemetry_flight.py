@@ -1,4 +1,4 @@
-"""Paper 004's filter on a flight of the same kind (figures 1 to 8), and the matrices of its proof of stability.
+"""Li 2018's filter on a flight of the same kind (figures 1 to 8), and the matrices of its proof of stability.
 
 The paper prints T = 0.01 s and the windows of its figures, and that the filter begins with the first measured angle
 and rate. The flight, the noises and the parameters of the filter are ours. A target flies straight past the antenna.
@@ -87,7 +87,7 @@ def flight_errors(axis: str, run: int) -> Floats:
 
 
 def model(T: Seconds) -> tuple[Matrix3, Vector3]:
-    """Return (Phi, U) of the 'current' statistical model over T (paper 004, equations 5 and 6)."""
+    """Return (Phi, U) of the 'current' statistical model over T (Li 2018, equations 5 and 6)."""
     angle, rate, kept = motion_models.fading(ALPHA, T)
     return (np.array([[1.0, T, angle], [0.0, 1.0, rate], [0.0, 0.0, kept]]),
             np.array([0.5 * T * T - angle, T - rate, 1.0 - kept]))

@@ -52,6 +52,8 @@ HALF_PITCH_DEG = 1.32
 """Half of a tooth pitch on the axis [deg], the play at a missing tooth of a pinion with 17 teeth and gear ratio 8:
 pi / (17 * 8) rad."""
 
+STEP_S = 0.005  # period of the drive in the study [s]
+
 SAME_MODE: tuple[str, ...] = ()     # values of `Expectation.end`: the mode at the onset; standby
 STANDBY_MODE: tuple[str, ...] = ('standby',)
 
@@ -66,7 +68,7 @@ class Expectation(typing.NamedTuple):
         """Return (report, error, permitted modes at the end) in words, for a mode at the onset."""
         kept = not self.end or mode in self.end and self.end != STANDBY_MODE
         ends = ['the same mode'] * kept + [name for name in dict.fromkeys(self.end) if not (kept and name == mode)]
-        return ('not required' if self.report_steps is None else f'within {self.report_steps} steps',
+        return ('not required' if self.report_steps is None else f'within {self.report_steps * STEP_S:g} s',
                 'not limited' if self.error is None else f'at most {self.error:g} deg',
                 ' or '.join(filter(None, (', '.join(ends[:-1]), ends[-1]))))
 

@@ -136,7 +136,7 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) 
 
 
 def flyby_figure() -> Figure:
-    """Draw paper 000's figures 7 to 11 for uav_flyby: error and angle before and after the filter, and the azimuth."""
+    """Draw Ma 2023's figures 7 to 11 for uav_flyby: error and angle before and after the filter, and the azimuth."""
     figure, axes = fig.new_panels(3, height=7.2, y=('error [deg]', 'elevation [deg]', 'azimuth [deg]'))
     flown = tracking.read(memory_recording.record(CASES['uav_flyby'].with_(seed=FIRST_SEED).load()))
     middle = np.abs(flown.t - 0.5 * flown.t[-1]) <= 0.5

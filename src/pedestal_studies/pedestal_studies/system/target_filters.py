@@ -2,7 +2,7 @@
 
 Cases are <target>/<filter>. The filter `tuned` has one motion model, whose process noise gives the smallest pointing
 error at this target. `manoeuvre` is an IMM that expects a manoeuvre at any time. `current-statistical` is the filter
-of paper 000 with its default a_max. A ratio divides the pointing error of a case by that of `tuned` under the same
+of Ma 2023 with its default a_max. A ratio divides the pointing error of a case by that of `tuned` under the same
 seed. A target whose name ends in -ship is seen from the deck of the scenario ship_pass.
 """
 import functools
@@ -42,7 +42,7 @@ def _integrated(t: Times, rate: Floats, start: float) -> Floats:
 
 
 def s_motion(t: Times) -> tuple[Floats, Floats]:
-    """Return the S motion of paper 003: 20 deg to and fro at 3.5 deg/s, reversals of 1 s (11 deg/s2)."""
+    """Return the S motion of Lin 2020: 20 deg to and fro at 3.5 deg/s, reversals of 1 s (11 deg/s2)."""
     azimuth = profiles.s_motion(t, math.radians(20.0), math.radians(3.5), 1.0)[0]
     return azimuth, np.full(t.size, math.radians(30.0))
 

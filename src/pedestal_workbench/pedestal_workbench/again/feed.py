@@ -1,7 +1,7 @@
 """Recorded messages of a bag as inputs of the steps of a node, for its unit in memory or its process.
 
 pedestal_common.graph.steps, the code of the nodes themselves, matches inputs to steps: in lockstep by stamps, in
-realtime by the order of publication. docs/graph.md (Recomputing) states the accuracy.
+realtime by the order of publication. docs/operate/recordings.md states the accuracy.
 """
 import dataclasses
 import itertools

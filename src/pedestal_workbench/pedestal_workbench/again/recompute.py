@@ -1,6 +1,6 @@
 """`pedestal recompute`: feed the recorded inputs of a node to its unit, and compare new outputs with recorded outputs.
 
-docs/graph.md (Recomputing) states the repeated commands, and the inputs that no recording holds.
+docs/operate/recordings.md states the repeated commands, and the inputs that no recording holds.
 """
 import dataclasses
 import pathlib

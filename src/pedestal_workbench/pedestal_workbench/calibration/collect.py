@@ -4,7 +4,7 @@ The offset of a point is the mean over WINDOW_S, in cross-elevation and elevatio
 
     encoder angles + receiver error - predicted direction (predicted.py)
 
-The errors of the prediction and, on a ship, of the INS are a part of the offset (docs/how-to/calibrate.md).
+The errors of the prediction and, on a ship, of the INS are a part of the offset (docs/calibrate/pointing.md).
 """
 import math
 from collections.abc import Iterable, Sequence

@@ -1,6 +1,6 @@
 """Files of measured pointing offsets: a CSV file, a file of katpoint's reduction scripts, or a TPOINT file.
 
-The content of a file shows its format (docs/how-to/calibrate.md). In a CSV file, the names az, el, d_xel, d_el and
+The content of a file shows its format (docs/calibrate/pointing.md). In a CSV file, the names az, el, d_xel, d_el and
 sigma without a unit are degrees. A file of katpoint states offsets of the azimuth axis, and its standard deviations.
 """
 import csv

@@ -1,7 +1,7 @@
 """`pedestal new`: make a scenario of your own antenna from the numbers of its data sheet.
 
 Values that a data sheet does not state are scaled from the default antenna of this software. This antenna has the
-motors of paper 000 and a load of 210 kg m2. The scaling keeps the resonance frequencies of gears and motors:
+motors of Ma 2023 and a load of 210 kg m2. The scaling keeps the resonance frequencies of gears and motors:
 
     motor       flux: from the voltage at rated speed. Resistance and inductance: from their shares of the voltage at
                 rated torque. Inertia: proportional to the rated torque to the power 5/3. Friction and brake:

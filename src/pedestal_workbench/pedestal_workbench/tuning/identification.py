@@ -9,7 +9,7 @@ holds each command for one period. The prediction of the ACU covers it. Least sq
     1 / W(jw) = f_1 + f_2 jw + f_3 (jw)^2 + f_4 (jw)^3.
 
 The feed-forward adds k_v v + k_a a to the rate command, from rate v [rad/s] and acceleration a [rad/s2] of the
-reference. It needs k_v = f_1 [-] and k_a = f_2 [s]. Source: paper 003, eq. 14 to 18, as corrected in
+reference. It needs k_v = f_1 [-] and k_a = f_2 [s]. Source: Lin 2020, eq. 14 to 18, as corrected in
 acu_tracker.servo.controllers.
 """
 import dataclasses

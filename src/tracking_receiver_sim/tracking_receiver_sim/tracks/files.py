@@ -19,21 +19,25 @@ Data: TypeAlias = Any   # of a reader: fixes.Fixes, states.Ephemeris or Directio
 
 class FileKind(NamedTuple):
     """Kind of track, with two functions of the data that a reader returns."""
+    doc: str        # what its files hold
     lay_out: Callable[[Data, TargetParameters, Seconds, Seconds], flight.Flight]    # of a duration and a margin
     # {parameter: value} for a scenario that does not set them, from the names of the parameters that it sets.
     run_parameters: Callable[[Data, TargetParameters, Collection[str]], dict[str, float]]
 
 
-LOG_KIND = FileKind(lambda log, target, _duration, _margin: flight.lay_out(log, target.track_file, target.station),
+LOG_KIND = FileKind('recorded flight',
+                    lambda log, target, _duration, _margin: flight.lay_out(log, target.track_file, target.station),
                     flight.run_parameters)
-ORBIT_KIND = FileKind(course.flight_of_orbit, course.run_parameters_of_orbit)
-DIRECTIONS_KIND = FileKind(course.flight_of_directions, course.run_parameters_of_directions)
+ORBIT_KIND = FileKind('predicted orbit', course.flight_of_orbit, course.run_parameters_of_orbit)
+DIRECTIONS_KIND = FileKind('directions', course.flight_of_directions, course.run_parameters_of_directions)
 
 
 class FileFormat(NamedTuple):
     """Format of a file."""
     name: str
     kind: FileKind
+    beginning: str                      # of its files, in words
+    doc: str                            # what is read
     matches: Callable[[str], object]    # a true value if a file with this beginning has this format
     read: Callable[[TrackFileParameters], Data]
 
@@ -47,15 +51,28 @@ def _read_object(read: Callable[[str, str], Data]) -> Callable[[TrackFileParamet
 
 
 FILE_FORMATS = (
-    FileFormat('CCSDS OEM', ORBIT_KIND, lambda beginning: lines.begins_with(beginning, oem.FILE_SIGNATURE),
-               _read_object(oem.read)),
-    FileFormat('STK ephemeris', ORBIT_KIND, stk.FILE_SIGNATURE_PATTERN.match, _read_object(stk.read)),
-    FileFormat('GPX', LOG_KIND, lambda beginning: beginning.startswith('<'), _read_log(gpx.rows)),
-    FileFormat('NMEA', LOG_KIND, nmea.is_log, _read_log(nmea.rows)),
-    FileFormat('sat-nms program', DIRECTIONS_KIND, directions.is_program, _read_object(directions.read_program)),
-    FileFormat('table of azimuth and elevation', DIRECTIONS_KIND, directions.is_table,
-               _read_object(directions.read_table)),
-    FileFormat('CSV', LOG_KIND, lambda beginning: True, _read_log(tables.rows)))
+    FileFormat('CCSDS OEM', ORBIT_KIND, '`CCSDS_OEM_VERS`',
+               'all segments of one object and their usable times, 502.0-B versions 1 to 3, keyword = value; '
+               'covariances are ignored',
+               lambda beginning: lines.begins_with(beginning, oem.FILE_SIGNATURE), _read_object(oem.read)),
+    FileFormat('STK ephemeris', ORBIT_KIND, '`stk.v`',
+               '`EphemerisTimePosVel`, `EphemerisTimePosVelAcc`, `EphemerisTimePos`; two states at one time separate '
+               'two segments', stk.FILE_SIGNATURE_PATTERN.match, _read_object(stk.read)),
+    FileFormat('GPX', LOG_KIND, '`<`',
+               'every `trkpt` of a `trk`, altitude `ele` + `geoidheight` in metres, times in UTC',
+               lambda beginning: beginning.startswith('<'), _read_log(gpx.rows)),
+    FileFormat('NMEA', LOG_KIND, '`$` or `!`, or a sentence such as `$GPGGA,` after other text',
+               'GGA and RMC of NMEA 0183, altitude + geoidal separation in metres; UTC, without a valid RMC seconds '
+               'since midnight', nmea.is_log, _read_log(nmea.rows)),
+    FileFormat('sat-nms program', DIRECTIONS_KIND, 'a Julian date',
+               'Julian date (UTC), azimuth, elevation [deg]; other words and `#` comments are ignored',
+               directions.is_program, _read_object(directions.read_program)),
+    FileFormat('table of azimuth and elevation', DIRECTIONS_KIND,
+               'names of columns with an azimuth, or three columns of numbers',
+               'CSV of time, azimuth and elevation; without names, these three columns in this order',
+               directions.is_table, _read_object(directions.read_table)),
+    FileFormat('CSV', LOG_KIND, 'anything else', 'CSV of time, latitude, longitude and altitude',
+               lambda beginning: True, _read_log(tables.rows)))
 
 FOREIGN_FORMATS = (
     (re.compile(r'A[A-Z0-9]{3}[^\n]*\n(?:[^\n]*\n){0,200}?(?:HFDTE|B\d{13}[NS]\d{8}[EW][AV])'),

@@ -1,4 +1,4 @@
-"""Reader of flights as CSV. The names of the columns select a row of CSV_LAYOUTS (docs/tracks.md).
+"""Reader of flights as CSV. The names of the columns select a row of CSV_LAYOUTS (docs/reference/tracks.md).
 
 The geometric altitude of ADS-B is above the ellipsoid. If a file has only the barometric altitude, it is taken
 instead, with a remark in the log. Rows of ADS-B logs without a position are passed over and counted.

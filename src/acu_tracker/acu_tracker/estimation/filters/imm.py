@@ -4,7 +4,7 @@ Each filter of the bank has another motion model. Before a prediction the estima
 measurement the likelihood of the measurement changes the probability mu of each model. The estimate of the bank is the
 mean of all filters, weighted with these probabilities.
 
-The equations are those of paper 003, eq. 5 to 11, with two corrections. The paper omits the mixing before the
+The equations are those of Lin 2020, eq. 5 to 11, with two corrections. The paper omits the mixing before the
 prediction. In its eq. 11 the second factor has a reversed sign, which would subtract the spread of the models. Here
 the weights in eq. 11 are the probabilities, and the spread is added. The likelihoods are kept as logarithms, so that
 even a measurement far from all models ranks the models.

@@ -59,7 +59,7 @@ def predicted_mean(x: AxisMotion, F: Transition, T: Seconds) -> AxisMotion:
 
 @compiled
 def predicted_covariance(P: Symmetric, F: Transition, Q: Symmetric, T: Seconds) -> Symmetric:
-    """Return F P F' + Q, the covariance T after P (paper 000, eq. 7)."""
+    """Return F P F' + Q, the covariance T after P (Ma 2023, eq. 7)."""
     a11 = P.p11 + T * P.p12 + F.f13 * P.p13
     a12 = P.p12 + T * P.p22 + F.f13 * P.p23
     a13 = P.p13 + T * P.p23 + F.f13 * P.p33
@@ -85,7 +85,7 @@ def _corrected(x: AxisMotion, k1: float, k2: float, k3: float, nu: float) -> Axi
 @compiled
 def update(gaussian: Gaussian, nu: Radians, R: Radians2) -> Gaussian:
     """Return the Gaussian after a measured angle of variance R with the innovation nu. H = [1 0 0], K = P H' / S
-    (paper 000, eq. 8, 9, 10). The first row of the new P is p1j - k1 p1j. The equal form kj R is used, because it
+    (Ma 2023, eq. 8, 9, 10). The first row of the new P is p1j - k1 p1j. The equal form kj R is used, because it
     loses no digits in a difference."""
     P, S = gaussian.P, gaussian.P.p11 + R
     k1, k2, k3 = P.p11 / S, P.p12 / S, P.p13 / S
@@ -110,7 +110,7 @@ def update_correlated(gaussian: Gaussian, previous: PreviousAngle, rho: float, n
 
 @compiled
 def update_rate(gaussian: Gaussian, nu: RadiansPerSecond, R: float) -> Gaussian:
-    """Return the Gaussian after a measured rate of variance R [rad2/s2]: H = [0 1 0] (paper 004, eq. 34)."""
+    """Return the Gaussian after a measured rate of variance R [rad2/s2]: H = [0 1 0] (Li 2018, eq. 34)."""
     P, S = gaussian.P, gaussian.P.p22 + R
     k1, k2, k3 = P.p12 / S, P.p22 / S, P.p23 / S
     return Gaussian(_corrected(gaussian.x, k1, k2, k3, nu),

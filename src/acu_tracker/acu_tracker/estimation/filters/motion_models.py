@@ -2,11 +2,11 @@
 
 Each model gives the matrices F (transition over T) and Q (process noise) of the Kalman filter. The reciprocal of the
 duration of an acceleration is alpha [1/s], and x = alpha T. The mean of the acceleration is abar, its standard
-deviation sigma_a [rad/s2]. In the model cv the acceleration stays 0. The model current_statistical is that of paper
-000, eq. 2, 4, 5. Several models ca with growing noise form a ladder; each of these models is a rung. docs/extending.md
-lists what another model needs.
+deviation sigma_a [rad/s2]. In the model cv the acceleration stays 0. The model current_statistical is that of Ma
+2023, eq. 2, 4, 5. Several models ca with growing noise form a ladder; each of these models is a rung.
+docs/develop/extending.md lists what another model needs.
 
-The print of paper 000 has two errors, which are corrected here. Its factor of q22 is 1/(2 alpha^2); correct is 1/(2
+The print of Ma 2023 has two errors, which are corrected here. Its factor of q22 is 1/(2 alpha^2); correct is 1/(2
 alpha^3). Its sigma_a^2 (eq. 5) contains a_max - abar; correct is the square (a_max - abar)^2.
 
 The models with an acceleration of limited duration have Q = 2 alpha sigma_a^2 q. For small x the closed forms of q
@@ -55,7 +55,7 @@ MODEL_ROWS = (
                 lambda params: params.noise * math.sqrt(WHITE_JERK_TIME_S)),
     MotionModel('singer', 'an acceleration of mean 0 that lasts 1 / alpha (Singer 1970)', 3,
                 lambda params: params.sigma),
-    MotionModel('current_statistical', 'an acceleration that lasts 1 / alpha about its estimated mean (paper 000)', 3,
+    MotionModel('current_statistical', 'an acceleration that lasts 1 / alpha about its estimated mean (Ma 2023)', 3,
                 lambda params: params.a_max))
 MODEL_NAMES = tuple(row.name for row in MODEL_ROWS)
 MODEL_CV, MODEL_CA, MODEL_SINGER, MODEL_CURRENT_STATISTICAL = range(len(MODEL_NAMES))
@@ -141,7 +141,7 @@ def _series(coefficients: tuple[float, ...], x: float) -> float:
 
 @inlined
 def fading(alpha: float, T: Seconds) -> Transition:
-    """Return the Transition of an acceleration that fades with e^(-alpha T), alpha [1/s] (paper 000, eq. 2)."""
+    """Return the Transition of an acceleration that fades with e^(-alpha T), alpha [1/s] (Ma 2023, eq. 2)."""
     if T == 0.0:
         return Transition(0.0, 0.0, 1.0)
     x = alpha * T
@@ -153,7 +153,7 @@ def fading(alpha: float, T: Seconds) -> Transition:
 
 @inlined
 def fading_noise(alpha: float, T: Seconds) -> Symmetric:
-    """Return q in Q = 2 alpha sigma_a^2 q over T, alpha [1/s] (paper 000, eq. 4)."""
+    """Return q in Q = 2 alpha sigma_a^2 q over T, alpha [1/s] (Ma 2023, eq. 4)."""
     if T == 0.0:
         return Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     x = alpha * T
@@ -172,7 +172,7 @@ def fading_noise(alpha: float, T: Seconds) -> Symmetric:
 
 @compiled
 def acceleration_variance(abar: RadiansPerSecond2, a_max: RadiansPerSecond2, floor: float) -> float:
-    """Return sigma_a^2 [rad2/s4] for a mean acceleration abar (paper 000, eq. 5, with the square): the variance of the
+    """Return sigma_a^2 [rad2/s4] for a mean acceleration abar (Ma 2023, eq. 5, with the square): the variance of the
     modified Rayleigh density. At abar = a_max this variance is zero, and the filter would ignore its measurements.
     Therefore sigma_a is at least floor a_max."""
     return max((4.0 - math.pi) / math.pi * max(a_max - abs(abar), 0.0)**2, (floor * a_max)**2)
@@ -221,7 +221,7 @@ def singer(model: MotionModelRecord, T: Seconds) -> Discrete:
 def current_statistical(model: MotionModelRecord, abar: RadiansPerSecond2, T: Seconds) -> Discrete:
     """Return the Discrete of the model current_statistical over T; abar: estimated acceleration.
 
-    Paper 000 predicts the mean by Phi X + U abar (eq. 6). Phi is the F of `fading`, U abar the effect of the mean
+    Ma 2023 predicts the mean by Phi X + U abar (eq. 6). Phi is the F of `fading`, U abar the effect of the mean
     acceleration. Because abar is the estimated acceleration (eq. 11), this sum equals F X with the F of constant
     acceleration. The covariance is predicted with Phi.
     """

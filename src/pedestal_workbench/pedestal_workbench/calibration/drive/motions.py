@@ -1,7 +1,7 @@
 """Plan of safe motions that show the properties of a drive: a schedule of `preset` commands for the control unit.
 
 Each axis moves alone about the middle of its travel: constant rates, reversals, pulses, and a turn both ways if the
-travel allows a turn. docs/how-to/calibrate.md states the purpose and the limits of each motion.
+travel allows a turn. docs/calibrate/receiver-drive-gt.md states the purpose and the limits of each motion.
 """
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""Levels at offsets about a source, from a CSV file or from a recording (docs/how-to/calibrate.md).
+"""Levels at offsets about a source, from a CSV file or from a recording (docs/calibrate/receiver-drive-gt.md).
 
 The level of a file is the total power, of source and system noise, in dB. The level of a recording is a C/N0 in dB-Hz:
 the power of the source alone over the noise power in 1 Hz.
