@@ -113,9 +113,8 @@ def filter(t: ArrayLike, az: ArrayLike, el: ArrayLike, kind: str = 'imm', *, sig
     azimuth = _numbers('az', az, -36_000.0, 36_000.0, 'deg', times)
     elevation = _numbers('el', el, -90.0, 90.0, 'deg', times)
     spread = _numbers('sigma', np.full(len(times), sigma) if np.ndim(sigma) == 0 else sigma, 1e-6, 5.0, 'deg', times)
-    bridged = max(MIN_BRIDGED_TIME_S, BRIDGED_STEPS * float(np.median(steps))) if gap is None else gap
-    if not bridged > 0.0:
-        raise ValueError(f'gap = {gap}: must be above 0 s')
+    longest = max(MIN_BRIDGED_TIME_S, BRIDGED_STEPS * float(np.median(steps))) if gap is None else gap
+    bridged = float(_numbers('gap', [longest], 1e-9, 1e12, 's', None)[0])
     chosen = build(FilterParameters, {**(changes or {}), 'kind': kind})
     params = AcuParameters(azimuth=AxisParameters(filter=chosen), elevation=ElevationParameters(filter=chosen),
                            tracker=TrackerParameters(receiver=UNIT_RECEIVER))
@@ -139,7 +138,8 @@ def _numbers(name: str, values: ArrayLike, low: float, high: float, unit: str, l
     try:
         array = np.array(values, float)
     except (TypeError, ValueError):
-        raise ValueError(f'{name} = {values!r:.60}: must be numbers, {low:g} to {high:g} {unit}') from None
+        given = ' '.join(f'{values!r}'.split())[:60]
+        raise ValueError(f'{name} = {given}: must be numbers, {low:g} to {high:g} {unit}') from None
     if array.ndim != 1 or (like is not None and array.shape != like.shape):
         raise ValueError(f'{name} has the shape {array.shape}: must be {"(n,)" if like is None else like.shape}')
     wrong = np.flatnonzero(~((low <= array) & (array <= high)))

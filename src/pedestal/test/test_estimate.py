@@ -114,7 +114,8 @@ def test_long_gaps_outliers_and_a_wrong_sigma_are_reported():
     ('az', [1.0, 2.0], r'az has the shape \(2,\): must be \(4,\)'),
     ('el', [1.0, 1.0, 91.0, 1.0], r'el\[2\] = 91: must be -90 to 90 deg'),
     ('sigma', 0.0, r'sigma\[0\] = 0: must be 1e-06 to 5 deg'), ('sigma', [0.1, -1.0, 0.1, 0.1], r'sigma\[1\] = -1'),
-    ('sigma', [0.1, 0.1], 'sigma has the shape'), ('gap', 0.0, 'gap = 0.0: must be above 0 s'),
+    ('sigma', [0.1, 0.1], 'sigma has the shape'), ('gap', 0.0, r'gap\[0\] = 0: must be 1e-09 to 1e\+12 s'),
+    ('gap', 'long', 'gap = .*long.*must be numbers'),
     ('kind', 'inm', "kind = 'inm': did you mean 'imm'[?] must be one of alpha_beta, "),
     ('changes', {'imm.dwel': 1.0}, "did you mean 'imm.dwell'"), ('changes', {'imm.dwell': -1.0}, 'dwell = -1')])
 def test_wrong_arguments_are_named(name, wrong, said):
