@@ -203,7 +203,8 @@ def _parameter_row(name: str, field, value) -> tuple[str, ...]:
     """Return the line of a parameter: a field of a dataclass, and its default."""
     meta = field.metadata
     allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ()))
-    return tuple(cell.replace('|', '\\|') for cell in (f'`{name}`', parameters.value_text(value), allowed, meta.get('unit', ''), meta['doc']))
+    cells = f'`{name}`', parameters.value_text(value), allowed, meta.get('unit', ''), meta['doc']
+    return tuple(cell.replace('|', '\\|') for cell in cells)
 
 
 def parameter_table(kind: type) -> TextTable:

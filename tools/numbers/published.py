@@ -459,7 +459,8 @@ TABLES: dict[str, Maker] = {  # {name of a table: function that makes it}
     'pareto': PARETO_NUMBERS, 'flyby with a rate': FLYBY_NUMBERS, 'alignment': ALIGNMENT_NUMBERS,
     'filters of Ma 2023': FAMILY_NUMBERS, 'feed forward by speed': SPEED_NUMBERS,
     'speed of alignment': ALIGNMENT_SPEED_NUMBERS, 'acquisition': acquisition_table, 'array loops': ARRAY_NUMBERS,
-    'controllers': controller_numbers, 'bias schedules': bias_numbers, 'measured loops': loop_numbers, 'bandwidth with a rate': bandwidth_numbers,
+    'controllers': controller_numbers, 'bias schedules': bias_numbers, 'measured loops': loop_numbers,
+    'bandwidth with a rate': bandwidth_numbers,
     'calibration': Results('calibration', 'runs', CALIBRATION_RESULTS), 'matrices': matrix_table}
 
 PUBLISHED_STUDIES = tuple(dict.fromkeys((  # names of the studies whose rows are in the tables
