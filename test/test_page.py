@@ -345,11 +345,13 @@ def test_the_scale_of_a_chart(lone, browser):
     slewed = page.evaluate("""async () => {
         const t = Array.from({length: 200}, (_, i) => 0.5 * i);
         const rates = t.map((at) => at < 2 ? -130 : 0.2), missing = t.map(() => null);
+        const pass = t.map((at) => at < 12 ? -10 : 0.2 + Math.exp(-(((at - 60) / 5) ** 2)));
         const {shownRange} = await import('./charts.js');
         return [shownRange(t, [rates, missing]), shownRange(t.slice(0, 20), [rates.slice(0, 20)]),
-                shownRange(t, [missing])];
+                shownRange(t, [missing]), shownRange(t, [pass, t.map((at) => (60 - at) / 60)])];
     }""")
-    assert slewed == [[0.2, 0.2], [-130, 0.2], [None, None]]
+    assert slewed[:3] == [[0.2, 0.2], [-130, 0.2], [None, None]]
+    assert slewed[3] == pytest.approx([-0.66, 1.2], abs=0.01)               # a pass with its culmination stays on it
     ranges = [[-0.035, 0.028], [-4e-4, 3e-4], [-130, 10], [40.13, 40.24], [-1, 1], [0, 1e-5], [9, 41]]
     texts = page.evaluate("""async (ranges) => {
         const {ticks, tickTexts} = await import('./charts.js');

@@ -37,7 +37,8 @@ MAX_PICTURE_BYTES = 200_000
 MAX_COLOURS = 256
 """Largest size and largest number of colours of a picture."""
 
-PASS = ('leo_pass', '--pacing', 'realtime', '--duration', '360', '--page', str(PORT), '--param', 'scenario.priority=10')
+PASS = ('leo_pass', '--pacing', 'realtime', '--duration', '360', '--page', str(PORT),
+        '--param', 'scenario.priority=10')
 PASS_MOMENT_S = 100.0
 """Arguments of the run, which has a real-time priority against alarms about time; time of its picture after its start
 [s]."""
