@@ -1,5 +1,6 @@
 """The pages that are made of the code hold all of it, and every page of the table has a place in the book."""
 import pathlib
+import re
 import xml.etree.ElementTree
 
 import pytest
@@ -63,7 +64,7 @@ def test_every_law_has_a_sentence(pages):
 
 
 def test_the_drawing_of_the_chain_has_the_nodes_and_topics_of_the_tables():
-    drawing = xml.etree.ElementTree.parse(ROOT / 'docs' / 'chain.svg').getroot()
+    drawing = xml.etree.ElementTree.parse(ROOT / 'docs' / 'pictures' / 'chain.svg').getroot()
     drawn = {element.get('data-node') for element in drawing.iter() if element.get('data-node')}
     arrows = {(element.text, element.get('data-from'), element.get('data-to')) for element in drawing.iter()
               if element.get('data-from')}
@@ -77,3 +78,11 @@ def test_the_drawing_of_the_chain_has_the_nodes_and_topics_of_the_tables():
     assert arrows >= {(link.name, writer, reader) for link in links.values() if not link.flag
                       for writer in link.writers for reader in link.readers
                       if link.name != 'diagnostics' and writer not in not_drawn}
+
+
+def test_every_picture_is_on_a_page_and_small():
+    shown = {(page.parent / name).resolve() for page in (ROOT / 'README.md', *(ROOT / 'docs').rglob('*.md'))
+             for name in re.findall(r'!\[[^]]*\]\(([^)]*)\)', page.read_text())}
+    pictures = {file for kind in ('png', 'svg', 'jpg', 'gif') for file in (ROOT / 'docs').rglob(f'*.{kind}')}
+    assert shown == pictures
+    assert max(file.stat().st_size for file in pictures) <= 200_000

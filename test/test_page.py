@@ -312,23 +312,55 @@ def test_a_recording_on_the_page(browser, start_process):
     reads(page, '#link', 'recording')
     assert page.locator('#stop').is_disabled()
     reads(page, '#play', 'play')
-    slewed = page.evaluate("""async () => {
-        const t = Array.from({length: 200}, (_, i) => 0.5 * i);
-        const rates = t.map((at) => at < 2 ? -130 : 0.2), missing = t.map(() => null);
-        const {shownRates} = await import('./charts.js');
-        return [shownRates(t, [rates, missing]), shownRates(t.slice(0, 20), [rates.slice(0, 20)]),
-                shownRates(t, [missing])];
+    page.evaluate("""() => {
+        window.texts = {};
+        const write = CanvasRenderingContext2D.prototype.fillText;
+        CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
+            (texts[this.canvas.closest('[id^=chart-]').id] ??= new Set()).add(text);
+            write.call(this, text, ...place);
+        };
     }""")
-    assert slewed == [[0.2, 0.2], [-130, 0.2], [None, None]]     # a slew leaves the scale, and at first it is on it
     for moment in (3.0, 1.0):
         page.locator('#slider').fill(f'{moment:g}')
         row = int((joints['t'] - joints['t'][0] > moment + 1e-9).argmax()) - 1
         reads(page, '#az-actual', f'{math.degrees(joints["azimuth.position"][row]):.3f}')
         reads(page, '#position', f'{moment:.1f} of')
+    written = "Object.entries(texts).map(([chart, texts]) => [chart, [...texts].filter((text) => text !== '')])"
+    holds(page, f'() => {written}.length === 4')
+    for chart, texts in page.evaluate(written):
+        scale = {text for text in texts if not text.endswith(' s')}
+        assert len(scale) >= 2 and {float(text) for text in scale} != {0.0}, (chart, texts)
+        assert (scale != set(texts)) == (chart == 'chart-level')               # only the lowest chart has the times
     assert page.errors == []
     page.context.close()
     player.send_signal(signal.SIGINT)
     assert player.wait(PATIENCE) == 0
+
+
+@pytest.mark.thorough
+@needs_chromium
+def test_the_scale_of_a_chart(lone, browser):
+    """A slew leaves the scale, and at first it is on it. A scale has two or three different numbers."""
+    page = opened(browser[1], lone[1].urls['monitor'])
+    slewed = page.evaluate("""async () => {
+        const t = Array.from({length: 200}, (_, i) => 0.5 * i);
+        const rates = t.map((at) => at < 2 ? -130 : 0.2), missing = t.map(() => null);
+        const pass = t.map((at) => at < 12 ? -10 : 0.2 + Math.exp(-(((at - 60) / 5) ** 2)));
+        const {shownRange} = await import('./charts.js');
+        return [shownRange(t, [rates, missing]), shownRange(t.slice(0, 20), [rates.slice(0, 20)]),
+                shownRange(t, [missing]), shownRange(t, [pass, t.map((at) => (60 - at) / 60)])];
+    }""")
+    assert slewed[:3] == [[0.2, 0.2], [-130, 0.2], [None, None]]
+    assert slewed[3] == pytest.approx([-0.66, 1.2], abs=0.01)               # a pass with its culmination stays on it
+    ranges = [[-0.035, 0.028], [-4e-4, 3e-4], [-130, 10], [40.13, 40.24], [-1, 1], [0, 1e-5], [9, 41]]
+    texts = page.evaluate("""async (ranges) => {
+        const {ticks, tickTexts} = await import('./charts.js');
+        return ranges.map((range) => tickTexts(ticks(...range)));
+    }""", ranges)
+    assert texts[0] == ['-0.02', '0.00', '0.02'] and texts[-1] == ['20', '40']
+    for (low, high), numbers in zip(ranges, texts):
+        assert 2 <= len(set(numbers)) == len(numbers) <= 3 and all(low <= float(number) <= high for number in numbers)
+    page.context.close()
 
 
 @pytest.mark.thorough

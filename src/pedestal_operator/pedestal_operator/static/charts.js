@@ -6,8 +6,10 @@ import {find, make, number, time} from './text.js';
 const POINT_PERIOD_S = 0.5;  // some hundred pixels show about a thousand points
 const DRAW_PERIOD_MS = 1000;  // the lines move by less than a pixel
 const MAX_GAP_S = 15;  // after a longer gap (hidden page, lost link) the page requests the history
-const RECENT_S = 20;  // every rate of this time is on the scale
-const MAX_OFF_SCALE = 0.05;  // share of the earlier rates that may be off the scale, at either end
+const RECENT_S = 20;  // every value of this time is on the scale
+const MAX_OFF_SCALE = 0.15;  // share of the earlier values that may be off the scale, at either end
+const MAX_TICKS = 3;  // a chart is as high as three or four lines of text
+const TICK_STEPS = [1, 2, 3, 5, 10, 20];  // times a power of ten
 const COLOURS = ['--first', '--second', '--third', '--fourth'];
 const STYLES = ['first', 'second', 'third', 'fourth'];
 const TITLES = {error: 'receiver error [deg]', rate: 'axis rates [deg/s]', torque: 'motor torques [Nm]',
@@ -19,6 +21,8 @@ const CHARTS = {
            ['el 2', 'elevation_motor_2']],
   level: [['C/N0', 'level']],
 };
+const SLEWED = ['error', 'rate'];  // charts in which a slew would hide the tracking
+const TIMED = 'level';  // the lowest chart, which has the times of all
 
 function colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
 
@@ -34,7 +38,8 @@ function marks(plot, beamwidth) {
   if (!beamwidth) return;
   const {ctx, bbox} = plot;
   ctx.save();
-  ctx.strokeStyle = colour('--edge');
+  ctx.strokeStyle = colour('--dim');
+  ctx.setLineDash([2, 4]);
   ctx.beginPath();
   for (const share of [-0.1, -0.05, 0.05, 0.1]) {
     const y = plot.valToPos(share * beamwidth, 'y', true);
@@ -46,16 +51,33 @@ function marks(plot, beamwidth) {
   ctx.restore();
 }
 
-// Return the lowest and the highest of the rates to show: lines over the times t, null for a missing value. A slew of
-// some seconds leaves the scale after RECENT_S, so that it does not hide the rates of tracking.
-export function shownRates(t, lines) {
+// Return the lowest and the highest value to show of lines over the times t, null for a missing value. A slew leaves the
+// scale after RECENT_S, so that it does not hide the tracking: earlier values are on the scale only if they are near
+// most of them.
+export function shownRange(t, lines) {
   const known = lines.flatMap((line) => line.map((value, i) => [value, t[i]])).filter(([value]) => value !== null);
   if (!known.length) return [null, null];
   const sorted = known.map(([value]) => value).sort((a, b) => a - b);
   const cut = Math.floor(MAX_OFF_SCALE * sorted.length);
-  const kept = known.filter(([, at]) => at > t.at(-1) - RECENT_S).map(([value]) => value);
-  kept.push(sorted[cut], sorted[sorted.length - 1 - cut]);
-  return [Math.min(...kept), Math.max(...kept)];
+  const [low, high] = [sorted[cut], sorted[sorted.length - 1 - cut]];
+  const kept = known.filter(([value, at]) => at > t.at(-1) - RECENT_S
+                                             || (value >= 2 * low - high && value <= 2 * high - low));
+  return [Math.min(...kept.map(([value]) => value)), Math.max(...kept.map(([value]) => value))];
+}
+
+// Return two or three round numbers between two others: an axis with one label has no scale.
+export function ticks(low, high) {
+  const unit = 10 ** Math.floor(Math.log10((high - low) / (MAX_TICKS + 1)));
+  const ends = (step) => [Math.ceil(low / step / unit), Math.floor(high / step / unit)];
+  const step = TICK_STEPS.find((each) => ends(each)[1] - ends(each)[0] < MAX_TICKS);
+  const [first, last] = ends(step);
+  return Array.from({length: last - first + 1}, (_, i) => (first + i) * step * unit);
+}
+
+// Return the texts of ticks, with as many decimals as their step has.
+export function tickTexts(values) {
+  const digits = Math.max(0, -Math.floor(Math.log10(values[1] - values[0]) + 1e-6));
+  return values.map((value) => number(value, digits));
 }
 
 class Chart {
@@ -68,9 +90,11 @@ class Chart {
     this.plot = new uPlot({
       ...this.size(), cursor: {show: false}, legend: {show: false}, padding: [8, 22, 0, 0],
       scales: {x: {time: false}, y: {range: (plot, low, high) => Chart.range(
-        ...(name === 'rate' ? shownRates(plot.data[0], plot.data.slice(1)) : [low, high]))}},
-      axes: [{...axis, size: 19, gap: 1, space: 72, values: (plot, values) => values.map((value) => time(value))},
-             {...axis, size: 50, gap: 3, space: 24}],
+        ...(SLEWED.includes(name) ? shownRange(plot.data[0], plot.data.slice(1)) : [low, high]))}},
+      axes: [{...axis, size: name === TIMED ? 19 : 5, gap: 1, space: 72,
+              values: (plot, values) => values.map((value) => (name === TIMED ? time(value) : ''))},
+             {...axis, size: 50, gap: 3, space: 1, splits: (plot, side, low, high) => ticks(low, high),
+              values: (plot, values) => tickTexts(values)}],
       series: [{}, ...series.map((_, i) => ({stroke: colour(COLOURS[i]), width: 1.2, points: {show: false}}))],
       hooks: name === 'error' ? {drawAxes: [(plot) => marks(plot, beamwidth())]} : {},
     }, [[], ...series.map(() => [])], this.place);
