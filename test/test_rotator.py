@@ -75,7 +75,8 @@ def test_a_control_unit_names_at_its_start_what_the_file_does_not_state(start_pr
     said = ''
     while 'ready, waits for' not in said and (line := process.stderr.readline()):
         said += line
-    for text in ('acu.prediction.station.*: not given; set them to the position of the antenna; ', 'acu.tracker.receiver.beamwidth = 0.0175 rad: the default; set it to that of'):
+    for text in ('acu.prediction.station.*: not given; set them to the position of the antenna; ',
+                 'acu.tracker.receiver.beamwidth = 0.0175 rad: the default; set it to that of'):
         assert (text in said) != simulated, said
     assert 'ready, waits for' in said and 'acu.azimuth.limits' not in said      # the file states the travel
 
