@@ -68,6 +68,19 @@ def station(device, start_process, connect, reserve_domain):
     return client, rotator, {'gs232': 1.0}.get(protocol, 0.1)
 
 
+@pytest.mark.parametrize('simulated', (False, True))
+def test_a_control_unit_names_at_its_start_what_the_file_does_not_state(start_process, reserve_domain, simulated):
+    process = start_process([*NODE, 'acu_node', '--ros-args', '--params-file', PARAMETERS, '-p',
+                             f'graph.simulated:={str(simulated).lower()}'], ROS_DOMAIN_ID=str(reserve_domain()))
+    said = ''
+    while 'ready, waits for' not in said and (line := process.stderr.readline()):
+        said += line
+    for text in ('acu.prediction.station.*: not given; set them to the position of the antenna; ',
+                 'acu.tracker.receiver.beamwidth = 0.0175 rad: the default; set it to that of'):
+        assert (text in said) != simulated, said
+    assert 'ready, waits for' in said and 'acu.azimuth.limits' not in said      # the file states the travel
+
+
 def ask(client, verb, **arguments):
     """Command the control unit, and wait until it grants the command."""
     assert (reply := asked(client, verb, **arguments)).granted, reply

@@ -38,7 +38,8 @@ def _drives(options: argparse.Namespace) -> int:
     chosen = scenario.load(options.scenario or 'leo_pass', changes, pacing='realtime')
     row = nodes.SIMULATED_DRIVES
     with tempfile.NamedTemporaryFile('w', suffix='.yaml') as file:
-        file.write(parameter_file.text({row.name: {**chosen.given(row.name), 'graph.nodes': row.name}}))
+        file.write(parameter_file.text({row.name: {**chosen.given(row.name), 'graph.nodes': row.name,
+                                                   'graph.simulated': True}}))
         file.flush()
         return run.run(row.executable, ['--ros-args', '--params-file', file.name])
 

@@ -186,14 +186,17 @@ class Shell(Node):
             name = self.get_name()
             self.get_logger().warning(f'no parameter of {self.get_fully_qualified_name()} is in the parameter file: a '
                                       f'section /**/{name} is for {name} in any namespace, {name} for one without')
-        if not (self.graph.lockstep or self.graph.simulated):
-            for line in antenna_values.lines(self.get_name(), self.parameters, given, self.graph.members,
-                                             is_clock_synchronised()):
-                self.get_logger().warning(line)
         if live:
             self.add_pre_set_parameters_callback(self._typed)
             self.add_on_set_parameters_callback(self._on_set)
             self.add_post_set_parameters_callback(self._post_set)
+
+    def antenna_lines(self) -> Iterable[str]:
+        """Return the lines on the values for an antenna that are not given; none in a simulated graph."""
+        if self.graph.lockstep or self.graph.simulated:
+            return ()
+        return antenna_values.lines(self.get_name(), self.parameters, self._parameter_overrides, self.graph.members,
+                                    is_clock_synchronised())
 
     def _declare_all(self, values: Mapping[str, Value], fields: Iterable[tuple[str, parameters.Field]],
                      live: Sequence[str]) -> None:
@@ -454,7 +457,8 @@ def main(make_node: Callable[[], Shell], args: Sequence[str] | None = None) -> i
         executor.add_node(node)
         # This avoids that a garbage collection in the middle of a step visits all imported modules.
         gc.freeze()
-        node.get_logger().info(f'ready, waits for {node.awaits}')
+        for line in (*node.antenna_lines(), f'ready, waits for {node.awaits}'):
+            node.get_logger().info(line)
         while not (_stop or node.finished) or node.draining():
             node.spin(executor)
         node.close()
