@@ -42,7 +42,8 @@ SECTIONS = {
         Page('docs/choose_a_filter.ipynb', 'Notebook: choose a filter', None),
         Page('docs/size_a_drive.ipynb', 'Notebook: size a drive', None)),
     'Hardware': (
-        Page('docs/hardware/index.md', 'Real equipment', 1000),
+        Page('docs/hardware/index.md', 'Real equipment', 1000,
+             'the table of the values that only the owner of an antenna knows'),
         Page('docs/hardware/servo-drives.md', 'Servo drives', 1600,
              'the objects on the bus and ten steps of a power-up stand nowhere else'),
         Page('docs/hardware/your-drive.md', 'Your own drive', 600),
