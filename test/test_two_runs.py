@@ -26,8 +26,9 @@ def test_two_runs_get_two_domains_and_commands_reach_both(default_domain_taken, 
         process = start_process([*PEDESTAL, 'run', 'uav_flyby', '--pacing', 'realtime', '--duration', '600', '--bag',
                                  tmp_path / name, '--param', 'adu.period=0.02', '--param', 'acu.period=0.02'],
                                 ROS_DOMAIN_ID=None)
-        said = begins_with(process, 1)
-        found = re.fullmatch(r'this run has ROS_DOMAIN_ID (\d+), because another run has 0; commands to it: '
+        said = begins_with(process, 2)
+        found = re.fullmatch(r'antenna at .*\n'
+                             r'this run has ROS_DOMAIN_ID (\d+), because another run has 0; commands to it: '
                              r'ROS_DOMAIN_ID=\1 pedestal status\n', said)
         assert found, said or process.communicate()
         runs[found[1]] = process

@@ -43,8 +43,8 @@ def _filled(topic: nodes.Link) -> Message:
 
 class Ring(Node):
     """Node of the ring: it publishes its messages when a message arrives on its trigger, and drops all others."""
-    # shell.main uses the attributes `awaits` and `spin` and the methods `draining` and `close` of a node. The Ring
-    # takes `spin` from the shell, so that both have the same executor loop.
+    # shell.main uses the attributes `awaits` and `spin` and the methods `antenna_lines`, `draining` and `close` of a
+    # node. The Ring takes `spin` from the shell, so that both have the same executor loop.
     awaits = 'its trigger'
     spin = shell.Shell.spin
 
@@ -76,6 +76,10 @@ class Ring(Node):
 
     def ignore(self, _message: Message) -> None:
         """Drop a message."""
+
+    def antenna_lines(self) -> tuple[str, ...]:
+        """Return no lines: the node has no values of an antenna."""
+        return ()
 
     def draining(self) -> bool:
         """Return False: the node waits for nothing at the end."""
