@@ -11,6 +11,7 @@ import inspect
 import pathlib
 import shutil
 import sys
+from collections.abc import Iterator
 
 from tools import notebooks, pages
 
@@ -21,7 +22,7 @@ LAW_PACKAGES = ('pedestal_common', 'receiver_law', 'drive_law', 'tracking_receiv
 """Packages with laws, in the order of the page of laws."""
 
 
-def verb_page():
+def verb_page() -> list[str]:
     """Return the lines of the page of verbs: purpose and options of every verb, as its --help prints them."""
     lines = ['# Options of every verb', '', 'The help texts that `pedestal VERB --help` prints.']
     for name, (_, summary) in cli.VERBS.items():
@@ -35,9 +36,8 @@ def verb_page():
     return lines
 
 
-def law_page(root):
-    """Return the lines of the page of laws: docstring, compiled functions and tests of every module with laws. root:
-    folder of the checkout."""
+def law_page(root: pathlib.Path) -> list[str]:
+    """Return the lines of the page of laws: docstring, compiled functions and tests of every module with laws."""
     lines = ['# Laws', '', 'Every control law, filter, motor and wave is a compiled function in a small module. This '
              'page is a copy of the docstrings of these modules: equations, symbols, sources.']
     for package in LAW_PACKAGES:
@@ -55,21 +55,19 @@ def law_page(root):
     return lines
 
 
-def _docstring(module):
-    """Return the docstring of a module. module: path of its file."""
+def _docstring(module: pathlib.Path) -> str:
     return ast.get_docstring(ast.parse(module.read_text())) or ''
 
 
-def _imported(test):
-    """Yield the dotted names that a test module imports with `from`. test: path of its file."""
+def _imported(test: pathlib.Path) -> Iterator[str]:
+    """Yield the dotted names that a test module imports with `from`."""
     for node in ast.walk(ast.parse(test.read_text())):
         if isinstance(node, ast.ImportFrom):
-            yield from (node.module, *(f'{node.module}.{alias.name}' for alias in node.names))
+            yield from (str(node.module), *(f'{node.module}.{alias.name}' for alias in node.names))
 
 
-def _laws(module):
-    """Return [(signature, first paragraph of the docstring)] of the public compiled functions of a module; None for a
-    module without compiled functions. module: path of its file."""
+def _laws(module: pathlib.Path) -> list[tuple[str, str]] | None:
+    """Return [(signature, first paragraph of the docstring)] of the public compiled functions of a module, or None."""
     compiled = [node for node in ast.parse(module.read_text()).body if isinstance(node, ast.FunctionDef) and any(
         ast.unparse(decorator) in ('compiled', 'inlined') for decorator in node.decorator_list)]
     return [(f'{node.name}({", ".join(argument.arg for argument in node.args.args)})',
@@ -86,7 +84,7 @@ LAST_IN_SEARCH = '---\nsearch:\n  boost: 0.3\n---\n\n'
 """Head of a page to which the search of the book gives less weight than to the pages that explain."""
 
 
-def main(folder, root='.', execute=True) -> int:
+def main(folder: str | pathlib.Path, root: str | pathlib.Path = '.', execute: bool = True) -> int:
     """Write all pages of the book of a checkout (root) into a folder, whose old content is deleted. Return the exit
     code 0. execute: True to run the notebooks, whose pages otherwise have no output."""
     root, folder = pathlib.Path(root), pathlib.Path(folder)

@@ -14,6 +14,8 @@ import tokenize
 from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 
+from tools import pages
+
 Text: TypeAlias = tuple[int, str, bool]     # line number, text, True if it consists of sentences
 Fault: TypeAlias = tuple[int, str, str]     # line number, broken rule, text
 
@@ -50,7 +52,7 @@ def markdown_texts(text: str) -> Iterator[Text]:
     def blank(match: re.Match[str]) -> str:     # keeps line numbers
         return '\n' * match[0].count('\n')
 
-    text = re.sub(r'(?ms)^ *(```|~~~).*?^ *\1[^\n]*$', blank, text)
+    text = pages.CODE_PATTERN.sub(blank, text)
     text = re.sub(r'(?s)<!--.*?-->', blank, text)
     paragraph: list[str] = []
     start, after_blank = 0, True

@@ -13,6 +13,8 @@ TABLE_PATTERN = re.compile(r'(?s)<!-- table ([\w ,]+) -->\n.*?<!-- end -->')
 """A generated table: its name, then the table."""
 NUMBER_PATTERN = re.compile(r'(?s)<!-- number ([^>]+?) -->.*?<!-- end -->')
 """A generated number of prose: study, case, metric, factor and format, then the number."""
+CODE_PATTERN = re.compile(r'(?ms)^ *(```|~~~).*?^ *\1[^\n]*$')
+"""A block of code between fences."""
 
 
 class Page(NamedTuple):
@@ -129,7 +131,7 @@ def marked(root: str | pathlib.Path = '.') -> list[str]:
 def prose(text: str) -> str:
     """Return a Markdown text without its blocks of code, generated tables and comments."""
     text = re.sub(r'<!--.*?-->', '', TABLE_PATTERN.sub('', text), flags=re.DOTALL)
-    text = re.sub(r'(?ms)^ *(```|~~~).*?^ *\1[^\n]*$', '', text)
+    text = CODE_PATTERN.sub('', text)
     lines, after_blank = [], True
     for line in text.splitlines():
         code = line.startswith('    ') and after_blank and not re.match(r'\s*([-*+]|\d+\.)\s', line)
@@ -149,7 +151,7 @@ def anchors(text: str) -> set[str]:
     """Return the anchors of the headings of a Markdown text, as GitHub and as mkdocs name them. A second heading of
     the same text has none."""
     found = set()
-    for heading in re.findall(r'(?m)^#+ +(.*?)\s*#*$', re.sub(r'(?ms)^ *(```|~~~).*?^ *\1[^\n]*$', '', text)):
+    for heading in re.findall(r'(?m)^#+ +(.*?)\s*#*$', CODE_PATTERN.sub('', text)):
         plain = re.sub(r'[^\w\s-]', '', re.sub(r'\[([^]]*)\]\([^)]*\)', r'\1', heading)).strip().lower()
         found |= {re.sub(r'\s', '-', plain)} & {re.sub(r'[-\s]+', '-', plain)}
     return found
@@ -157,7 +159,7 @@ def anchors(text: str) -> set[str]:
 
 def links(text: str) -> Iterator[str]:
     """Yield the target of each link and picture of a Markdown text, except those in code and those to web sites."""
-    text = re.sub(r'`[^`\n]*`', '', re.sub(r'(?ms)^ *(```|~~~).*?^ *\1[^\n]*$', '', text))
+    text = re.sub(r'`[^`\n]*`', '', CODE_PATTERN.sub('', text))
     for target in re.findall(r'\]\(([^)\s]+)[^)]*\)', text):
         if not re.match(r'\w+:', target):
             yield target

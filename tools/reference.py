@@ -8,7 +8,7 @@ import functools
 import pathlib
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from tools import pages
 from tools.numbers import published
@@ -25,7 +25,9 @@ from pedestal_common import parameters
 from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.graph_parameters import GraphParameters
 from pedestal_common.injection.table import INJECTED_FAULTS
+from pedestal_common.quantities import Value
 from pedestal_common.text_files.text_table import TextTable
+from pedestal_common.wire.commands import Argument
 from pedestal_results import results
 from pedestal_studies.system.faults import FAULT_EXPECTATIONS
 from pedestal_workbench.again import what_if
@@ -118,7 +120,7 @@ def injection_table() -> TextTable:
     return TextTable(('node', 'fault', 'arguments', 'effect', 'in lockstep'), rows)
 
 
-def _defaulted(argument):
+def _defaulted(argument: Argument) -> str:
     """Return the text of an argument of a fault: its name, default, range, unit and meaning."""
     text = f'{argument.name} = {argument.default}' if argument.options else f'{argument.name} = {argument.default:g}'
     return f'`{text}` ({argument.range} {argument.unit}; {argument.doc})'.replace(' ;', ';')
@@ -137,7 +139,7 @@ def expectation_table(node: str) -> TextTable:
     return TextTable(('fault', 'in the modes', 'report', 'largest error', 'ends in'), rows)
 
 
-def _argument(argument):
+def _argument(argument: Argument) -> str:
     """Return the text of an argument of a command with its range and unit, in brackets if it is optional."""
     text = f'{argument.name} = {argument.range} {argument.unit}'.rstrip()
     return f'`{text}`' if argument.default is None else f'[`{text}`]'
@@ -199,7 +201,7 @@ def first_parameter_table() -> TextTable:
 PARAMETER_HEADS = ('parameter', 'default', 'range', 'unit', 'meaning')
 
 
-def _parameter_row(name: str, field, value) -> tuple[str, ...]:
+def _parameter_row(name: str, field: parameters.Field, value: Value) -> tuple[str, ...]:
     """Return the line of a parameter: a field of a dataclass, and its default."""
     meta = field.metadata
     allowed = f'{meta["low"]:g} to {meta["high"]:g}' if 'low' in meta else ', '.join(meta.get('options', ()))
@@ -234,7 +236,7 @@ def flight_column_table() -> TextTable:
     return TextTable(('kind', 'time', 'latitude; longitude', 'altitude, the best first'), rows)
 
 
-def result_table(table=results.RESULTS):
+def result_table(table: Sequence[results.Result] = results.RESULTS) -> TextTable:
     """Return the table of results: name, unit, meaning, target. table: rows of results.RESULTS, by default those of a
     run."""
     return TextTable(('result', 'unit', 'meaning', 'target'),
@@ -263,7 +265,7 @@ REFERENCE_TABLES: Mapping[str, Maker] = {
 """{name of a table: function that returns it}."""
 
 
-def with_tables(text, rows):
+def with_tables(text: str, rows: published.Rows) -> str:
     """Return the text of a file in which every generated table and number is replaced by its present content.
 
     A number of prose is the value of a row times a factor. It stands between two marks:
@@ -272,7 +274,7 @@ def with_tables(text, rows):
 
     The words are study, case, metric, factor and format.
 
-    rows: published.Rows, the measured numbers of docs/rows.json. Raises KeyError for an unknown table.
+    rows: the measured numbers of docs/rows.json. Raises KeyError for an unknown table.
     """
     def table(match: re.Match[str]) -> str:
         name = match[1]
@@ -284,7 +286,7 @@ def with_tables(text, rows):
     return pages.TABLE_PATTERN.sub(table, pages.NUMBER_PATTERN.sub(number, text))
 
 
-def main(root='.') -> int:
+def main(root: str | pathlib.Path = '.') -> int:
     """Write the generated tables of a checkout (root) again, and print the names of the changed files. Return the exit
     code 0."""
     rows = published.read(root)
