@@ -5,6 +5,7 @@
 Every period the drive sends 'AZIMUTH_RATE ELEVATION_RATE' [rad/s] to the port of the amplifiers. They answer with
 'AZIMUTH ELEVATION AZIMUTH_RATE ELEVATION_RATE' [rad, rad/s] of their encoders.
 """
+import argparse
 import socket
 import sys
 import time
@@ -88,8 +89,12 @@ class Drive(Node):
 
 def main(drive):
     """Run a class of drive on the port of the command line."""
+    parser = argparse.ArgumentParser(description=sys.modules[drive.__module__].__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('port', type=int, help='UDP port of the amplifiers on 127.0.0.1, 1 to 65535')
+    options = parser.parse_args()
     middleware.initialise()
-    rclpy.spin(drive(int(sys.argv[1])))
+    rclpy.spin(drive(options.port))
 
 
 if __name__ == '__main__':

@@ -4,9 +4,8 @@
 
 A datagram is 'CROSS_ELEVATION ELEVATION CN0' in rad, rad, dB-Hz; 'nan nan 20' states that the receiver is not locked.
 """
-import math
+import argparse
 import socket
-import sys
 
 import rclpy
 from geometry_msgs.msg import Vector3Stamped
@@ -17,7 +16,7 @@ from pedestal_common.node import middleware
 
 
 class Receiver(Node):
-    """Publisher of the newest error for each message on joint_states, with the stamp of that message."""
+    """Publisher of the newest error, at most one for each message on joint_states, with the stamp of that message."""
 
     def __init__(self, port):
         super().__init__('tracking_receiver')
@@ -28,25 +27,34 @@ class Receiver(Node):
         self.create_subscription(JointState, 'joint_states', self.step, middleware.qos('step'))
 
     def step(self, joints):
-        error = Vector3Stamped(header=joints.header)
-        error.header.frame_id = 'beam'
-        error.vector.x, error.vector.y, error.vector.z = self.newest()
-        self.publisher.publish(error)
+        if text := self.newest():
+            error = Vector3Stamped(header=joints.header)
+            error.header.frame_id = 'beam'
+            try:
+                error.vector.x, error.vector.y, error.vector.z = map(float, text.split())
+            except ValueError:
+                self.get_logger().warning(f'{text!r}: must be three numbers', throttle_duration_sec=10.0)
+                return
+            self.publisher.publish(error)
 
     def newest(self):
-        """Return the newest datagram as three numbers; no lock if none has come since the last step."""
-        text = b'nan nan 0'
+        """Return the newest datagram since the last step; without one, nothing is published: no measurement."""
+        text = b''
         try:
             while True:
                 text = self.socket.recv(100)
         except BlockingIOError:
-            pass
-        try:
-            cross_elevation, elevation, cn0 = map(float, text.split())
-        except ValueError:          # another datagram
-            return math.nan, math.nan, 0.0
-        return cross_elevation, elevation, cn0
+            return text
 
 
-middleware.initialise()
-rclpy.spin(Receiver(int(sys.argv[1])))
+def main():
+    """Run the receiver on the port of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('port', type=int, help='UDP port on 127.0.0.1, 1 to 65535')
+    options = parser.parse_args()
+    middleware.initialise()
+    rclpy.spin(Receiver(options.port))
+
+
+if __name__ == '__main__':
+    main()

@@ -7,6 +7,7 @@
     python -m docs.pictures.make budget       the error budget, from docs/rows.json
     python -m docs.pictures.make loops        the position loops of an antenna from a data sheet
 """
+import argparse
 import contextlib
 import pathlib
 import re
@@ -219,11 +220,16 @@ PICTURES = {'page': make_page, 'ship': make_ship, 'sky': make_sky, 'demo': make_
             'loops': make_loops, 'filter': make_filter}
 
 
-def main(names):
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('names', nargs='*', metavar='NAME', help=', '.join(PICTURES))
+    names = parser.parse_args().names
+    if unknown := [name for name in names if name not in PICTURES]:
+        parser.error(f'{", ".join(unknown)}: must be of {", ".join(PICTURES)}')
     matplotlib.use('agg')
     with tempfile.TemporaryDirectory() as folder:
         return 0 if all([PICTURES[name](pathlib.Path(folder)) for name in names or PICTURES]) else 1
 
 
 if __name__ == '__main__':
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

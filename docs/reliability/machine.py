@@ -1,10 +1,10 @@
-"""What the machine itself takes from a realtime graph: how late a loop comes that does nothing but wait.
+"""Delays of the machine itself, which no realtime graph can avoid: a loop that only waits.
 
     python docs/reliability/machine.py [SECONDS]
 
 A loop on each core wakes every millisecond for SECONDS (default 60), with the priority of `scenario.priority` 10 where
-the user may set it. Prints for each core how often it woke so many milliseconds late: what is above 3.5 ms would have
-cost a step of 5 ms, whatever the program.
+the user may set it. The program prints for each core how often the loop woke later than 1, 2, 3.5, 5 and 10 ms. A
+delay above 3.5 ms costs a step of 5 ms in every program.
 """
 import argparse
 import multiprocessing

@@ -1,12 +1,14 @@
-"""Strangers beside a station ashore: one that stops reading, a slow one, two that flood: steps that the drive loses.
+"""Foreign nodes beside a station ashore: a suspended reader, a slow reader, two writers that flood a topic.
 
     python docs/reliability/strangers.py [SECONDS [PRIORITY]]
 
 Each case lasts SECONDS (default 60); the nodes have graph.priority PRIORITY (default 0). Drive, control unit, receiver
-and recorder run in standby; prints a row per case from the diagnostics of the drive. A step is missed when the drive
-does not make it, lost when it is missed or when the command for it has not come. ms is what a step costs the drive of
-a core, which says on a busy machine, too, whether a stranger burdens it.
+and recorder run in standby. The program prints a row for each case, from the diagnostics of the drive. A step is
+missed if the drive does not make it. A step is lost if it is missed, or if the drive makes it without the command for
+it. The column ms is the time of a core that the drive needs for a step. It shows also on a busy machine whether the
+foreign node burdens the drive.
 """
+import argparse
 import multiprocessing
 import os
 import pathlib
@@ -92,12 +94,24 @@ def measured(watcher, drive, case, seconds, stranger=None, stop=False, count=Non
           + f' {1e3 * used / (after["step"] - before["step"]):6.2f} {moved:10.1e}  {said[:60]}', flush=True)
 
 
-def main(seconds=60.0, priority=0.0):
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('seconds', nargs='?', type=float, default=60.0)
+    parser.add_argument('priority', nargs='?', type=int, default=0)
+    options = parser.parse_args()
+    if not options.seconds > 0.0:
+        parser.error(f'SECONDS = {options.seconds:g}: must be above 0')
+    measure(options.seconds, options.priority)
+    return 0
+
+
+def measure(seconds, priority):
+    """Print the row of each case."""
     process, number = multiprocessing.get_context('spawn').Process, multiprocessing.get_context('spawn').Value
     with tempfile.TemporaryDirectory() as folder:
         domain_id = int(os.environ.get('ROS_DOMAIN_ID', '77'))
         station = Station(folder, domain_id, changes=(
-            'acu.initial_mode=standby', 'scenario.duration=36000', f'scenario.priority={priority:.0f}'))
+            'acu.initial_mode=standby', 'scenario.duration=36000', f'scenario.priority={priority}'))
         watcher = Stranger(domain_id)
         try:
             station.start(*station.nodes, 'recorder')
@@ -118,8 +132,7 @@ def main(seconds=60.0, priority=0.0):
         finally:
             watcher.close()
             station.close()
-    return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main(*map(float, sys.argv[1:])))
+    sys.exit(main())

@@ -1,12 +1,13 @@
-"""Wind and brakes in standby: how near the antenna comes to the alarm of uncommanded motion.
+"""Wind and brakes in standby: the distance of the antenna from the alarm `uncommanded motion`.
 
     python docs/reliability/wind.py [SEEDS] [SECONDS]
 
 The closed loop of an antenna in standby, ashore and on a ship in sea state 6, SECONDS (default 180) for each of SEEDS
-(default 20) gusts. The drive is disabled and enabled again every 20 s, so that the brakes fall in and are released in
-the wind. The mean torque is that of both axes, its gusts have the spectrum of Davenport at 20 m/s. Prints for each
-wind in how many runs it tripped the drive, how often the alarm was raised in these and in the others, and of these
-others the largest rate that stayed for as long as the alarm takes (MIN_EXCESS_TIME_S) while it was watching.
+(default 20) gusts. The drive is disabled and enabled again every 20 s, so that the brakes engage and release in the
+wind. The mean torque acts on both axes; its gusts have the spectrum of Davenport at 20 m/s. For each wind the program
+prints the number of runs in which the drive tripped and of alarms in them, then the number of the other runs and of
+alarms in them. The last columns hold the largest rate of the other runs that lasted for the time of the alarm
+(MIN_EXCESS_TIME_S), and this rate divided by the threshold of the alarm.
 """
 import argparse
 import sys

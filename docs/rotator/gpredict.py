@@ -4,9 +4,11 @@
     python docs/rotator/gpredict.py [PORT] [SECONDS]
 
 Debian's gpredict runs on a screen of its own (Xvfb) with settings of its own: one satellite, one rotator with
-threshold 0.1 deg and cycle 100 ms. Keys and clicks (xdotool) open its antenna control, choose Track and Engage. Prints
-every 5 s where the satellite is, by sgp4, and what the server tells of the antenna.
+threshold 0.1 deg and cycle 100 ms. Keys and clicks (xdotool) open its antenna control, choose Track and Engage. Every
+5 s this program prints the direction of the satellite by sgp4, and the direction of the antenna from the server, for
+SECONDS (default 60). PORT (default 4533) is that of the server.
 """
+import argparse
 import datetime
 import math
 import os
@@ -165,15 +167,19 @@ class Gpredict:
             screen.wait(START_TIME_S)
 
 
-def main(port='4533', seconds='60'):
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('port', nargs='?', type=int, default=4533)
+    parser.add_argument('seconds', nargs='?', type=float, default=60.0)
+    options = parser.parse_args()
     if MISSING:
         print(f'not installed: {", ".join(MISSING)}', file=sys.stderr)
         return 1
     with tempfile.TemporaryDirectory() as home:
-        gpredict = Gpredict(home, int(port))
+        gpredict = Gpredict(home, options.port)
         try:
-            with socket.create_connection(('127.0.0.1', int(port)), 5.0) as server:
-                for _ in range(round(float(seconds) / 5.0)):
+            with socket.create_connection(('127.0.0.1', options.port), 5.0) as server:
+                for _ in range(round(options.seconds / 5.0)):
                     time.sleep(5.0)
                     server.sendall(b'p\n')
                     told = server.recv(100).split()
@@ -185,4 +191,4 @@ def main(port='4533', seconds='60'):
 
 
 if __name__ == '__main__':
-    sys.exit(main(*sys.argv[1:]))
+    sys.exit(main())

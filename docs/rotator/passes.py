@@ -216,7 +216,7 @@ def measured(name, highest, setting, seconds):
 
 
 def main(arguments=None):
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--scenario', default='leo_pass')
     parser.add_argument('--seconds', type=float, default=math.inf)
     options = parser.parse_args(arguments)

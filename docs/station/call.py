@@ -4,6 +4,7 @@
 
 Prints the reply. Exit code 1: the node refused the request, or no reply arrived within 20 s.
 """
+import argparse
 import sys
 
 import rclpy
@@ -15,8 +16,11 @@ TIMEOUT_S = 20.0
 """Longest wait for the node, and for its reply [s]."""
 
 
-def main(name):
-    """Call the service of this name; return the exit code."""
+def main():
+    """Call the service that the command line names; return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('name', help='name of the service, for example adu/enable')
+    name = parser.parse_args().name
     middleware.initialise()
     node = rclpy.create_node('service_call')
     client = node.create_client(Trigger, name)
@@ -31,4 +35,4 @@ def main(name):
 
 
 if __name__ == '__main__':
-    sys.exit(main(sys.argv[1]))
+    sys.exit(main())

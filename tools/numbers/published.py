@@ -332,7 +332,7 @@ CONTROLLERS = {
     'best': 'our controller', 'best-inertia-plus': 'the same, load inertia +20 %',
     'best-inertia-minus': 'the same, load inertia -20 %',
     'best-full-torque': 'our controller without torque in reserve for a heavier load',
-    'adrc': 'the controller `adrc`', 'paper-r1': "the paper's controller with the gains R1"}
+    'adrc': 'the controller `adrc`', 'paper-r1': "the paper's controller with gains for a sine of 0.4 Hz"}
 """{case of the study servo: its meaning} of the table of controllers."""
 CONTROLLER_COLUMNS = (
     ('step: overshoot, %', 'step_overshoot_percent', 1.0), ('settling within 2 %, s', 'step_settling_2percent_s', 1.0),

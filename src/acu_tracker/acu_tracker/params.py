@@ -80,15 +80,18 @@ class ElevationParameters(AxisParameters):
 class SharedParameters(topic_flags(nodes.row('acu').reads)):  # type: ignore[misc]  # a field per flag of the topics
     """Parameters that both axes share."""
 
-    period: float = parameter(0.005, 1e-4, 1.0, 's', 'drive step T')
-    step_gap: float = parameter(0.05, 1e-3, 10.0, 's', 'gap between drive steps after which targets := actual')
+    period: float = parameter(0.005, 1e-4, 1.0, 's', 'period T of the steps of the drive')
+    step_gap: float = parameter(0.05, 1e-3, 10.0, 's', 'longest time between two steps of the drive; after a longer '
+                                'time the axes restart from their actual angles')
     resume_time: float = parameter(10.0, 0.0, 3600.0, 's', 'longest silence of the drive or of the control unit '
                                    'through which a mode is kept; 0: no mode is kept')
     unasked_rate: float = parameter(0.05, 1e-4, 10.0, 'rad/s', 'excess over the recently commanded rates that counts '
                                     'as uncommanded motion')
-    command_delay: float = parameter(0.0, 0.0, 1.0, 's', 'known delay from t_k until the command is in force')
-    receiver_latency: float = parameter(0.0, 0.0, 0.5, 's', "known latency of the receiver's errors")
-    attitude_latency: float = parameter(0.005, 0.0, 0.5, 's', 'latency of the attitude in lockstep')
+    command_delay: float = parameter(0.0, 0.0, 1.0, 's', 'time from the stamp of a command to its effect on the axes')
+    receiver_latency: float = parameter(0.0, 0.0, 0.5, 's', 'age of the errors of the receiver when the control unit '
+                                        'uses them')
+    attitude_latency: float = parameter(0.005, 0.0, 0.5, 's', 'lockstep: age of the attitude when the control unit '
+                                        'uses it')
     initial_mode: str = choice('standby', MODES, 'mode after the start, entered as soon as its conditions hold')
     stow_window: float = parameter(1.75e-3, 1e-5, 0.1, 'rad', 'largest distance of an axis from its stow angle at '
                                    'which the pins are commanded in')
@@ -101,7 +104,8 @@ class SharedParameters(topic_flags(nodes.row('acu').reads)):  # type: ignore[mis
     points: str = text('', POINTS_DOC)
     commands: str = text('', SCHEDULE_DOC)
     attitude_timeout: float = parameter(0.2, 1e-3, 10.0, 's', 'age of the ship attitude at which it counts as lost')
-    attitude_smoothing: float = parameter(0.05, 0.0, 10.0, 's', 'time constant of the deck angular acceleration')
+    attitude_smoothing: float = parameter(0.05, 0.0, 10.0, 's', 'time constant of the lag that smooths the angular '
+                                          'acceleration of the deck')
     antenna: str = text('', 'name of this antenna; a pointing model of another antenna is refused')
     pointing: PointingParameters = group(PointingParameters)
     lever_arm: LeverArm = group(LeverArm)

@@ -182,12 +182,12 @@ class Acu(Unit):
         """Return the text that a code on a text topic stands for; for acu/alarms return the message."""
         lookahead = self.parts['state']['guidance']['lookahead']
         if topic == KEYHOLE_TOPIC:
-            return announcement.keyhole(lookahead, self.parameters)
+            return announcement.keyhole(lookahead, self.parameters, self.epoch)
         if topic == ALARMS_TOPIC:
             tripped = dict.fromkeys((DRIVE_FAULT_ALARM, *MOTOR_LOST_ALARMS), self.drive_state)
             return report.message(self.alarms, tripped, self.desk.reasons)
         if topic == BLOCKAGE_TOPIC:
-            return announcement.hidden(lookahead)
+            return announcement.hidden(lookahead, self.epoch)
         if topic == POINTING_TOPIC:
             return self.model.reports[code].text
         return modes.MODES[code] if topic == MODE_TOPIC else super().encode(topic, code)

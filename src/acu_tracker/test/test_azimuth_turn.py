@@ -125,12 +125,13 @@ def test_an_error_belongs_to_a_turn_by_its_own_time(turn):
     assert [azimuth_wrap.turn_covers(turn, t) for t in (12.5, 13.0, 13.01)] == [True, True, False]
 
 
-@pytest.mark.parametrize(('limits', 'said'), (
-    ({}, 'at 1.8 s the azimuth turns back by 360 deg at the end of its travel, for about 2.8 s off the target'),
-    ({'azimuth.limits.low': -1.0},
-     'at 1.8 s the azimuth stops at the end of its travel until the target is inside the travel again')))
-def test_the_announcement_says_what_the_azimuth_will_do(limits, said):
+@pytest.mark.parametrize(('limits', 'epoch', 'said'), (
+    ({}, 0, 'at 1.8 s the azimuth turns back by 360 deg at the end of its travel, for about 2.8 s off the target'),
+    ({'azimuth.limits.low': -1.0}, 1_795_723_278_100_000_000,       # 2026-11-26T20:01:18.1 UTC
+     'at 20:01:19.9 UTC the azimuth stops at the end of its travel until the target is inside the travel again')))
+def test_the_announcement_says_what_the_azimuth_will_do(limits, epoch, said):
     unit = Acu(build(AcuParameters, {**limits}), ())
+    unit.epoch = epoch
     times = np.arange(20.0)
     unit.followed.append(unit.parts, times, np.column_stack((4.0 + 0.4 * times, np.full(20, 0.7))))
     unit.inputs['joint_states']['position'][0] = 4.0, 0.7

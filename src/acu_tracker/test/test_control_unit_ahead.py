@@ -167,7 +167,10 @@ def test_a_mast_hides_the_target(Rig):
     pointing_errors(rig, 3.5)
     begin, end = rig.state['guidance']['lookahead']['hidden'][0]
     assert (begin, end) == (pytest.approx(4.0, abs=0.2), pytest.approx(32.0 / 3.0, abs=0.2))
-    assert announcement.hidden(rig.state[0]['guidance']['lookahead']).startswith('target hidden from')
+    lookahead = rig.state[0]['guidance']['lookahead']
+    assert announcement.hidden(lookahead) == f'target hidden from {begin:.1f} s to {end:.1f} s'
+    day = 1_795_651_200_000_000_000             # 2026-11-26T00:00:00 UTC
+    assert announcement.hidden(lookahead, day).startswith(f'target hidden from 00:00:0{begin:.1f} UTC to 00:00:1')
     rig.run(0.1)
     for _ in range(2):
         errors = pointing_errors(rig, 3.4, lambda deck: not sector[0] <= deck[0] <= sector[1])

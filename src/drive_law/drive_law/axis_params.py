@@ -37,13 +37,14 @@ class MotorParameters(Parameters):
     inductance: float = parameter(10.0995e-3, 1e-4, 1.0, 'H', 'phase inductance, d = q')
     flux_linkage: float = parameter(0.4219, 1e-3, 10.0, 'Wb', 'flux linkage of the magnets')
     pole_pairs: int = parameter(4, 1, 50, '', 'number of pole pairs')
-    voltage: float = parameter(310.0, 10.0, 2000.0, 'V', 'largest phase voltage, peak; 380 V line')
+    voltage: float = parameter(310.0, 10.0, 2000.0, 'V', 'largest phase voltage, peak; 310: of a 380 V line')
     torque_limit: float = parameter(90.0, 0.1, 10000.0, 'Nm', 'short-time torque limit, 3 times rated torque')
-    inertia: float = parameter(0.0085, 1e-5, 10.0, 'kg m2', 'rotor, reducer and pinion, on the motor shaft')
+    inertia: float = parameter(0.0085, 1e-5, 10.0, 'kg m2', 'inertia of rotor, reducer and pinion, on the motor shaft')
     friction: float = parameter(0.4, 0.0, 100.0, 'Nm', 'Coulomb friction')
     friction_speed: float = parameter(0.5, 0.1, 100.0, 'rad/s', 'speed v in Coulomb friction T_c tanh(omega / v)')
     viscous: float = parameter(0.003, 0.0, 10.0, 'Nms/rad', 'viscous friction')
-    cogging: float = parameter(0.0, 0.0, 100.0, 'Nm', 'amplitude; common motors: 1 to 3 % of rated torque')
+    cogging: float = parameter(0.0, 0.0, 100.0, 'Nm', 'amplitude of the cogging torque; common motors: 1 to 3 % of '
+                               'rated torque')
     cogging_per_turn: int = parameter(24, 1, 1000, '', 'periods of the cogging in a turn: least common '
                                      'multiple of slots and poles')
     brake: float = parameter(45.0, 0.0, 1e4, 'Nm', 'holding torque of the brake on the motor shaft')
@@ -69,11 +70,12 @@ class CurrentLoopParameters(Parameters):
 class SpeedLoopParameters(Parameters):
     """Speed loop of an axis: PI and disturbance observer."""
     structure: str = choice('mean', ('mean', 'independent'), 'one loop on the mean speed, or a loop for each motor')
-    proportional: float = parameter(6.0, 0.0, 1000.0, 'Nms/rad', 'gain per motor, on its shaft')
-    integral: float = parameter(200.0, 0.0, 1e5, 'Nm/rad', 'gain per motor, on its shaft')
+    proportional: float = parameter(6.0, 0.0, 1000.0, 'Nms/rad', 'proportional gain per motor, on its shaft')
+    integral: float = parameter(200.0, 0.0, 1e5, 'Nm/rad', 'integral gain per motor, on its shaft')
     differential_damping: float = parameter(0.0, 0.0, 10.0, 'Nms/rad', 'gain on the speed difference of the motors')
-    disturbance_observer: float = parameter(0.0, 0.0, 2000.0, 'rad/s', 'bandwidth; adds to the integral; 0: off')
-    load_inertia: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'load inertia in the disturbance observer')
+    disturbance_observer: float = parameter(0.0, 0.0, 2000.0, 'rad/s', 'bandwidth of the disturbance observer, whose '
+                                            'torque is added to that of the integral; 0: off')
+    load_inertia: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'load inertia that the disturbance observer assumes')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,18 +132,20 @@ class StructureParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class FrictionParameters(Parameters):
     """LuGre friction of the load bearing."""
-    coulomb: float = parameter(60.0, 0.01, 1e5, 'Nm', 'sliding friction')
+    coulomb: float = parameter(60.0, 0.01, 1e5, 'Nm', 'sliding (Coulomb) friction')
     breakaway: float = parameter(80.0, 0.01, 1e5, 'Nm', 'static friction', must_be='at least coulomb')
-    stribeck_rate: float = parameter(2e-3, 1e-5, 1.0, 'rad/s', 'rate at which the static part has fallen to 1 / e')
-    stiffness: float = parameter(2e5, 1.0, 1e9, 'Nm/rad', 'stiffness of the bristles')
-    damping: float = parameter(400.0, 0.0, 1e6, 'Nms/rad', 'damping of the bristles')
+    stribeck_rate: float = parameter(2e-3, 1e-5, 1.0, 'rad/s', 'rate at which the excess of static over sliding '
+                                     'friction has fallen to 1 / e')
+    stiffness: float = parameter(2e5, 1.0, 1e9, 'Nm/rad', 'stiffness of the bristles of the LuGre model')
+    damping: float = parameter(400.0, 0.0, 1e6, 'Nms/rad', 'damping of the bristles of the LuGre model')
 
 
 @dataclasses.dataclass(frozen=True)
 class LimitParameters(Parameters):
     """Rates and travel of an axis, and the buffers at its ends."""
     rate: float = parameter(2.45, 0.01, 20.0, 'rad/s', 'largest rate command')
-    deceleration: float = parameter(20.0, 0.01, 500.0, 'rad/s2', 'for the controlled stop and at the end of travel')
+    deceleration: float = parameter(20.0, 0.01, 500.0, 'rad/s2', 'deceleration of the controlled stop and before the '
+                                    'end of travel')
     lower: float = parameter(math.radians(-270.0), -20.0, 20.0, 'rad', 'lower end of the commanded travel')
     upper: float = parameter(math.radians(270.0), -20.0, 20.0, 'rad', 'upper end of the commanded travel',
                              must_be='above lower')
@@ -190,13 +194,15 @@ class ThermalParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class FaultParameters(Parameters):
     """Trip levels of an axis."""
-    overcurrent: float = parameter(46.0, 0.01, 10000.0, 'A', 'peak phase current; 1.3 times that at torque_limit')
-    overspeed: float = parameter(3.0, 1e-4, 50.0, 'rad/s', 'motor speed divided by the gear ratio')
-    encoder_disagreement: float = parameter(5e-3, 1e-6, 1.0, 'rad', 'load encoder minus motor encoders; must be above '
-                                            'lash, wind-up and bending of the gears')
-    following_error: float = parameter(0.05, 1e-4, 50.0, 'rad/s', 'commanded minus measured rate')
-    following_time: float = parameter(0.5, 1e-3, 100.0, 's', 'time beyond `following_error` until the trip')
-    overtemperature: float = parameter(1.1, 0.01, 100.0, '', 'thermal load; 1: steady state at rated torque')
+    overcurrent: float = parameter(46.0, 0.01, 10000.0, 'A', 'largest peak phase current; default: 1.3 times that at '
+                                   'torque_limit')
+    overspeed: float = parameter(3.0, 1e-4, 50.0, 'rad/s', 'largest motor speed, divided by the gear ratio')
+    encoder_disagreement: float = parameter(5e-3, 1e-6, 1.0, 'rad', 'largest difference between load encoder and '
+                                            'motor encoders; must be above lash, wind-up and bending of the gears')
+    following_error: float = parameter(0.05, 1e-4, 50.0, 'rad/s', 'largest difference between commanded and measured '
+                                       'rate')
+    following_time: float = parameter(0.5, 1e-3, 100.0, 's', 'time above `following_error` until the trip')
+    overtemperature: float = parameter(1.1, 0.01, 100.0, '', 'largest thermal load; 1: steady state at rated torque')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -208,7 +214,8 @@ class EncoderErrorParameters(Parameters):
     """
     zero: float = parameter(0.0, -0.1, 0.1, 'rad', "zero of the encoder minus zero of the axis; katpoint's P1, P7")
     eccentricity_sin: float = parameter(0.0, -0.01, 0.01, 'rad', 'factor of the sine in the eccentricity error')
-    eccentricity_cos: float = parameter(0.0, -0.01, 0.01, 'rad', 'factor of the cosine; offset divided by disc radius')
+    eccentricity_cos: float = parameter(0.0, -0.01, 0.01, 'rad', 'factor of the cosine in the eccentricity error; '
+                                        'offset of the disc divided by its radius')
     interpolation: float = parameter(0.0, 0.0, 1e-3, 'rad', 'amplitude of the interpolation error, once per line')
     lines: int = parameter(16384, 1, 1_000_000, '', 'lines of the disc per turn')
 

@@ -44,8 +44,9 @@ class BrakeParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class StowPinParameters(Parameters):
     """Stow pins of both axes: place of the holes, conditions and times of the motion."""
-    azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'azimuth of the deck at which its pin meets the hole')
-    elevation: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'elevation at which its pin meets the hole')
+    azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'encoder angle at which the pin of the azimuth meets its hole')
+    elevation: float = parameter(0.5 * math.pi, -20.0, 20.0, 'rad', 'encoder angle at which the pin of the elevation '
+                                 'meets its hole')
     window: float = parameter(1.75e-3, 1e-5, 0.1, 'rad', 'largest distance from the hole for moving a pin in')
     travel_time: float = parameter(3.0, 0.0, 600.0, 's', 'time of a pin from out to in')
     timeout: float = parameter(10.0, 0.01, 600.0, 's', 'longest time for the motion of a pin; then the pin has failed')
@@ -117,8 +118,8 @@ class MountParameters(Parameters):
 class ElevatingParameters(Parameters):
     """Inertia of the elevating part in its own frame, x along the beam, y to port, z up; see gimbal.py. The inertia
     about y is elevation.load.inertia; azimuth.load.inertia holds at elevation 0."""
-    about_beam: float = parameter(0.0, 0.0, 1e7, 'kg m2', 'inertia about x; 0: azimuth inertia is constant, axes do '
-                                  'not interact')
+    about_beam: float = parameter(0.0, 0.0, 1e7, 'kg m2', 'inertia about x; 0: the inertia of the azimuth is '
+                                  'constant, and the axes do not interact')
     about_lift: float = parameter(0.0, 0.0, 1e7, 'kg m2', 'inertia about z')
     product_xy: float = parameter(0.0, -1e7, 1e7, 'kg m2', 'integral of x y over the mass')
     product_xz: float = parameter(0.0, -1e7, 1e7, 'kg m2', 'integral of x z over the mass')
@@ -128,10 +129,11 @@ class ElevatingParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class AduParameters(Parameters):
     """Parameters of the antenna drive unit."""
-    period: float = parameter(5e-3, 1e-3, 0.02, 's', 'control period T, with one command')
-    transport_delay: float = parameter(0.0, 0.0, MAX_TRANSPORT_DELAY_S, 's', 'delay of the effect of a command')
-    initial_azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'azimuth at t = 0')
-    initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'elevation at t = 0')
+    period: float = parameter(5e-3, 1e-3, 0.02, 's', 'period T of the steps, each with one command')
+    transport_delay: float = parameter(0.0, 0.0, MAX_TRANSPORT_DELAY_S, 's', 'time from the stamp of a command to its '
+                                       'effect')
+    initial_azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'azimuth of the axis at time 0')
+    initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'elevation of the axis at time 0')
     initially_enabled: bool = flag(True, 'true: enabled at t = 0; false: brakes on until adu/enable')
     brakes: BrakeParameters = group(BrakeParameters)
     stow_pins: bool = flag(False, 'true: each axis has a stow pin')

@@ -60,8 +60,8 @@ def yaw_rate(truth: AnyRecord) -> RadiansPerSecond:
 
 
 def sentences(kind: str, truth: AnyRecord, stamp: Nanoseconds) -> bytes:
-    """Return the bytes of one sample: a sentence behind HDT and ROT. kind: of pedestal_hardware.ins.sentences.KINDS;
-    truth: a motion.Truth; stamp: UTC."""
+    """Return the bytes of one sample: a sentence behind HDT and ROT. kind: one of
+    pedestal_hardware.ins.sentences.KINDS; truth: a motion.Truth; stamp: UTC."""
     roll, pitch, yaw = float(truth['roll']), float(truth['pitch']), float(truth['yaw'])
     turn = nmea.turn(yaw_rate(truth))
     heading_and_attitude = nmea.attitude(stamp, roll, pitch, yaw, float(truth['position'][2]))

@@ -21,7 +21,7 @@ class RotatorParameters(RunParameters):
     """Parameters of rotator_node."""
     REALTIME_ONLY = ', because the rotator has its own time'
 
-    period: float = parameter(0.2, 0.05, 1.0, 's', 'step T: time between two measurements and two set-points')
+    period: float = parameter(0.2, 0.05, 1.0, 's', 'period T of the steps, each with a measurement and a set-point')
     protocol: str = choice('rotctld', tuple(PROTOCOLS), 'protocol of the rotator')
     url: str = text('socket://127.0.0.1:4533', 'connection: socket://HOST:PORT, or the path of a serial device')
     baud_rate: int = parameter(0, 0, 1_000_000, 'Bd', 'speed of a serial device; 0: the usual speed of the protocol')

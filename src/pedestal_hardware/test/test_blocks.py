@@ -37,6 +37,15 @@ def test_a_time_of_the_samples_off_the_clock_is_a_fault(deviation, text):
     assert comparison.fault == ''
 
 
+def test_a_fault_that_continues_with_other_numbers_is_logged_once():
+    log, logged = blocks.FaultLog(), []
+    for k in range(400):                            # a wrong rate with noise, and lost samples, every 5 ms
+        for text in (f'sample rate {80_000 + k % 7} S/s: must be 100000 S/s', f'{k % 3 + 1} samples are missing'):
+            logged += [(k, text)] if log.due(text, 0.005 * k) else []
+    assert logged == [(0, 'sample rate 80000 S/s: must be 100000 S/s'), (0, '1 samples are missing')]
+    assert not log.due('2 samples are missing', 3.9) and log.due('2 samples are missing', 6.0)
+
+
 def test_a_stall_of_the_machine_is_no_deviation_of_the_clock():
     comparison = blocks.ClockComparison()
     for k in range(100):                            # 0.5 s of blocks, taken after a stall of 0.4 s

@@ -223,7 +223,7 @@ def brief(columns: Iterable[Values], count: int = BRIEF_COUNT) -> list[str]:
 
 
 def remarks(noted: Mapping[str, str], values: Values) -> list[str]:
-    """Return a line for each note on the filter; noted: of `marks`, values: of `measured`."""
+    """Return a line for each note on the filter; noted: result of `marks`; values: result of `measured`."""
     found: dict[str, list[str]] = {}
     for name, note in noted.items():
         found.setdefault(note, []).append(f'{name} {values[name][0]:.3g}')

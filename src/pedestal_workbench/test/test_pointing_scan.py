@@ -67,7 +67,7 @@ def test_a_scan_beside_the_sun_is_refused():
                       f'elevation={0.002 * (k // 3) - 0.007:g};'
                       for k in range(9))
     record = recorded(f'acu.commands={beside.rstrip(";")}', 'scenario.duration=24.0')
-    with pytest.raises(CalibrationError, match='no autotrack; scan at 8.0 s: the highest level is not inside'):
+    with pytest.raises(CalibrationError, match='holds no autotrack; scan at 8.0 s: the highest level is not inside'):
         collect.every_point(record)
 
 

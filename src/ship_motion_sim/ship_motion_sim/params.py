@@ -188,7 +188,7 @@ class InsParameters(Parameters):
     tilt_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of roll and pitch, per sample')
     heading_noise: float = parameter(3e-5, 0.0, 0.1, 'rad', 'rms white noise of heading, per sample')
     rate_noise: float = parameter(1.7e-4, 0.0, 0.1, 'rad/s', 'rms white noise of the deck rate, per axis and sample')
-    latency: float = parameter(0.005, 0.0, 0.25, 's', 'time from measurement to release')
+    latency: float = parameter(0.005, 0.0, 0.25, 's', 'time from a measurement to its publication')
     imu_tolerance: float = parameter(0.005, 1e-6, 1.0, 'rad/s', 'largest difference between the rate of the IMU and '
                                      'that of the `ship` parameters of the INS')
     error_told: bool = flag(True, 'publication of ins/error, the noise and random walk of the attitude error')

@@ -159,8 +159,10 @@ class AntennaParameters(Parameters):
     beamwidth: float = parameter(0.0175, 1e-4, 0.5, 'rad', 'half-power beamwidth theta3 of the sum pattern')
     slope: float = parameter(1.6, 0.5, 1.867, '1', 'slope k_m: difference over sum per beamwidth; lossless: 1.867')
     slope_factor: float = parameter(1.0, 0.1, 5.0, '1', 'true slope over the slope that the receiver assumes')
-    cross_coupling: float = parameter(0.0, -math.pi, math.pi, 'rad', 'rotation beta of the error axes')
-    phase_error: float = parameter(0.0, -math.pi, math.pi, 'rad', 'post-comparator phase error phi')
+    cross_coupling: float = parameter(0.0, -math.pi, math.pi, 'rad', 'rotation beta of the axes of the error to the '
+                                      'axes of the antenna')
+    phase_error: float = parameter(0.0, -math.pi, math.pi, 'rad', 'phase error phi of the differences to the sum, '
+                                   'after the comparator')
     boresight_cross_elevation: float = parameter(0.0, -0.1, 0.1, 'rad', 'null of the difference channels off the '
                                                  'beam, in cross-elevation')
     boresight_elevation: float = parameter(0.0, -0.1, 0.1, 'rad', 'null of the difference channels off the beam, in '
@@ -206,9 +208,9 @@ class ReceiverParameters(Parameters):
                                           'acquire_time')
     lose_level_dbhz: float = parameter(36.0, 0.0, 120.0, 'dB-Hz', 'C/N0 below which the receiver loses lock after '
                                        'lose_time')
-    acquire_time: float = parameter(0.1, 0.0, 10.0, 's', 'time above the upper level before lock')
-    lose_time: float = parameter(0.05, 0.0, 10.0, 's', 'time below the lower level before loss of lock')
-    latency: float = parameter(0.0, 0.0, 0.5, 's', 'time from measurement to output')
+    acquire_time: float = parameter(0.1, 0.0, 10.0, 's', 'time above acquire_level_dbhz until the receiver locks')
+    lose_time: float = parameter(0.05, 0.0, 10.0, 's', 'time below lose_level_dbhz until the receiver loses lock')
+    latency: float = parameter(0.0, 0.0, 0.5, 's', 'time from a measurement to its publication')
     rate: RateParameters = group(RateParameters)
     ranging: RangingParameters = group(RangingParameters)
 
@@ -241,7 +243,7 @@ class TrackingReceiverParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class TrackingReceiverNodeParameters(TrackingReceiverParameters):
     """Parameters of tracking_receiver_node: the receiver, and the step and length of the run."""
-    period: float = parameter(5e-3, 1e-4, 1.0, 's', 'drive step T')
+    period: float = parameter(5e-3, 1e-4, 1.0, 's', 'period T of the steps of the drive')
     duration: float = parameter(3600.0, 0.1, 86400.0, 's', 'duration of the run, covered by the target motion')
     inject: str = text('', table.INJECT_DOC)
 

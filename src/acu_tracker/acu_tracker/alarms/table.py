@@ -51,14 +51,16 @@ ALARM_ROWS = (
     Alarm('INS jump', 'medium', 0.0, 1.0, False, ('drive silent', 'time jump', 'INS lost'),
           'the attitude differs by more than 3 mrad from the attitude that the deck rates predict; the ACU applies '
           'the difference at 1 mrad/s',
-          'compare with another heading; autotrack follows the receiver, other modes follow the attitude'),
+          'compare the attitude with another heading; use autotrack, which follows the receiver, because all other '
+          'modes follow the attitude'),
     Alarm('receiver noisy', 'medium', 0.1, 1.0, False, ('receiver silent', 'INS lost', 'INS jump'),
           'successive receiver errors differ by five times their noise; the ACU does not use them',
           'check for interference, and check the receiver; choose a mode that needs no receiver', 'following'),
     Alarm('drive frozen', 'high', 0.0, 0.0, True, ('drive silent',),
           'a motion of more than 3 mrad was commanded, and the drive repeats the same angles, rates and torques. The '
           'ACU enters standby',
-          'make sure that the antenna is at rest; inspect the encoders, their interface and the drive; then reset'),
+          'make sure that the antenna is at rest; inspect the encoders, their interface and the drive; then reset '
+          'the alarm'),
     Alarm('* motor lost', 'medium', 0.0, 1.0, False, (),
           'one motor of the pair makes no torque; the remaining motor drives the axis with half the torque and '
           'without bias torque',
@@ -68,20 +70,20 @@ ALARM_ROWS = (
           'keep clear; inspect pin, hole and switches; `adu/reset_faults` retries the motion of the pin', 'motors'),
     Alarm('* encoder jump', 'high', 0.0, 1.0, True, ('time jump',),
           'the load encoder moved 3 mrad in one step without the motors',
-          'compare with the motor encoders; inspect encoder, coupling and cable; then reset', 'motors'),
+          'compare with the motor encoders; inspect encoder, coupling and cable; then reset the alarm', 'motors'),
     Alarm('* encoder stuck', 'high', 0.0, 1.0, True, (),
           'the load encoder stands still while the motors turn by 3 mrad',
-          'stop the antenna: its true angle may differ from the display; check encoder and coupling, then reset',
-          'motors'),
+          'stop the antenna, because its true angle may differ from the display; check encoder and coupling; then '
+          'reset the alarm', 'motors'),
     Alarm('* encoder disagreement', 'high', 0.0, 1.0, True,
           ('time jump', '* encoder jump', '* encoder stuck'),
-          'load encoder and motors have moved by angles that differ by 10 mrad; a difference decays with a time '
-          'constant of 2 s',
-          'compare the encoders; inspect gear, couplings and cables; then reset', 'motors'),
+          'load encoder and motor encoders have moved by angles that differ by 10 mrad; the ACU lets this difference '
+          'decay with a time constant of 2 s',
+          'compare the encoders; inspect gear, couplings and cables; then reset the alarm', 'motors'),
     Alarm('* brake not released', 'high', 0.3, 1.0, False, (),
-          'the mean of the absolute torque is above 50 times the Coulomb friction (`feedforward.friction`), and '
-          'for half a second the axis has stood in spite of its command, or has moved at 80 times the friction. '
-          'A gust that pushes the axis back does not count',
+          'the motors push against a brake or an obstacle: their mean torque is above 50 times the Coulomb friction '
+          '(`feedforward.friction`). For half a second the axis has stood in spite of its command, or has moved only '
+          'with 80 times the friction. Torque against a gust does not count',
           'go to standby; inspect the brakes; check for an obstacle that blocks the axis', 'moving'),
     Alarm('* immobile', 'high', 0.3, 1.0, False,
           ('drive silent', 'drive frozen', '* brake not released', '* motor lost'),
@@ -93,13 +95,13 @@ ALARM_ROWS = (
     Alarm('* runaway', 'critical', 0.005, 1.0, True,
           ('* brake not gripping', '* encoder stuck', '* motor lost'),
           'the axis turns opposite to its rate command',
-          'keep the antenna stopped; inspect the wiring of motors and encoders; then reset', 'motors'),
+          'keep the antenna stopped; inspect the wiring of motors and encoders; then reset the alarm', 'motors'),
     Alarm('uncommanded motion', 'critical', 0.0, 1.0, True,
           ('drive frozen', '* runaway', '* brake not gripping', '* encoder stuck', '* motor lost'),
-          'for 14 ms the rate of an axis has been outside the range of 0 and its recent rate commands, by more than '
-          '`unasked_rate` plus a quarter of this range; also active in standby. The ACU enters standby and calls '
-          '`adu/emergency_stop`',
-          'keep the antenna stopped until the cause is known; then reset'),
+          'an axis moves faster than commanded, or without a command, also in standby. For 14 ms its rate has been '
+          'outside the range of 0 and its recent rate commands, by more than `unasked_rate` plus a quarter of this '
+          'range. The ACU enters standby and calls `adu/emergency_stop`',
+          'keep the antenna stopped until the cause is known; then reset the alarm'),
     Alarm('* oscillation', 'medium', 0.0, 5.0, False, ('* motor lost', '* encoder stuck'),
           'the following error oscillates faster than 1 Hz, with half waves of more than 0.1 mrad s (1 mrad at 3 '
           'Hz)',
@@ -123,17 +125,18 @@ ALARM_ROWS = (
     Alarm('diverged', 'medium', 0.0, 1.0, True,
           ('INS lost', '* encoder jump', '* encoder stuck', '* encoder disagreement', '* immobile',
            '* following error'),
-          'in autotrack the mean of the last 100 squared innovations, divided by their variance, exceeds 7 (2 at a '
-          'loss of signal), or the receiver error of an axis moves with the beam as with a reversed slope. The ACU '
-          'enters `program`, or `standby` without a program, and refuses autotrack until a reset',
-          "check slope, phase and sign of the receiver's error signals; then reset"),
+          'the estimate departs from the target. In autotrack the mean of the last 100 squared innovations, divided '
+          'by their variance, exceeds 7 (2 at a loss of signal), or the receiver error of an axis moves with the '
+          'beam as with a reversed slope. The ACU enters `program`, or `standby` without a program, and refuses '
+          'autotrack until a reset of the alarm',
+          "check slope, phase and sign of the receiver's error signals; then reset the alarm"),
     Alarm('signal lost', 'medium', 0.5, 1.0, False,
           ('emergency stop', 'drive silent', 'time jump', 'receiver silent', 'INS lost', 'INS jump', 'receiver noisy',
            'drive frozen', '* motor lost', '* encoder jump', '* encoder stuck', '* brake not released', '* immobile',
            '* runaway', '* oscillation', '* following error', '* at limit', 'uncommanded motion', 'drive fault',
            'diverged'),
           'autotrack coasts or has ended without a signal, and no predicted blockage or keyhole explains the loss',
-          'compare with the prediction; search, or choose another target'),
+          'compare the direction of the antenna with the prediction; command `search`, or choose another target'),
     Alarm('program too early', 'low', 0.0, 1.0, False, (),
           'mode `program` was commanded before the first row of the program track',
           'wait for its first row, or shift it by `offset`'),

@@ -52,7 +52,8 @@ class CurrentStatisticalParameters(Parameters):
     alpha: float = parameter(0.1, 1e-4, 100.0, *_ALPHA, grid=(0.03, 3.0, 3))
     a_max: float = parameter(0.02, 1e-7, 100.0, 'rad/s2', 'largest acceleration: 1.2 to 1.7 x the peak of the target',
                              grid=(1e-4, 1.0, 5))
-    floor: float = parameter(0.3, 0.0, 1.0, '', 'least sigma_a over a_max; with 0 the filter may ignore measurements')
+    floor: float = parameter(0.3, 0.0, 1.0, '', 'least standard deviation of the acceleration over a_max; with 0 the '
+                             'filter may ignore measurements')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,7 +106,7 @@ class UkfParameters(Parameters):
                                 'that flies straight')
     ca_noise: float = parameter(3.0, 1e-6, 1e5, 'm/s3/sqrt(Hz)', 'root density of the white jerk of a target that '
                                 'turns')
-    dwell: float = parameter(5.0, 1e-3, 1e4, 's', 'mean time for which one of the two is valid')
+    dwell: float = parameter(5.0, 1e-3, 1e4, 's', 'mean time for which one of the two models is valid')
     initial_speed: float = parameter(100.0, 1e-3, 1e5, 'm/s', 'standard deviation of the radial speed at the start')
     initial_acceleration: float = parameter(5.0, 1e-6, 1e4, 'm/s2', 'standard deviation of the acceleration at '
                                             'the start')
@@ -123,10 +124,11 @@ class ReceiverModelParameters(Parameters):
     sigma_floor: float = parameter(2e-6, 1e-9, 0.1, 'rad', 'error that does not depend on C/N0 (encoder, phase)')
     noise_bandwidth: float = parameter(0.0, 0.0, 1000.0, 'Hz', 'bandwidth of the first-order lag that filtered the '
                                        'noise; 0: white noise')
-    age: float = parameter(0.0, 0.0, 0.5, 's', 'age of an error at its stamp; of a beam that is held between steps, '
-                           'the mean age of the samples')
-    beam_age: float = parameter(0.0, 0.0, 0.5, 's', 'age, at the stamp of an error, of the encoder angles that belong '
-                                'to it; of a beam that is held between steps, their mean age in the samples')
+    age: float = parameter(0.0, 0.0, 0.5, 's', 'time from the measurement of an error to its stamp; with a beam that '
+                           'is held between steps, the mean of this time over the samples')
+    beam_age: float = parameter(0.0, 0.0, 0.5, 's', 'time from the encoder angles to which an error refers to the '
+                                'stamp of the error; with a beam that is held between steps, the mean of this time '
+                                'over the samples')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -163,8 +165,9 @@ class AttitudeModelParameters(Parameters):
 class TrackerParameters(Parameters):
     """Target filter, its gates and the conditions of its lock."""
 
-    gate: float = parameter(25.0, 1.0, 1e6, '', "largest accepted nu' S^-1 nu of the two angles; the gate of a rate "
-                            'or a range is exceeded as rarely')
+    gate: float = parameter(25.0, 1.0, 1e6, '', 'largest accepted square of the innovation of both angles over its '
+                            'variance; the filter ignores an error above it; rates and ranges have gates of the same '
+                            'probability')
     gate_restart: int = parameter(20, 1, 100000, '', 'number of consecutive gated errors at which the filter restarts')
     restart_gap: float = parameter(1.0, 1e-3, 1000.0, 's', 'gap between errors after which the filter restarts')
     initial_rate: float = parameter(0.1, 1e-6, 100.0, 'rad/s', 'standard deviation of the rate at the start')

@@ -1,4 +1,8 @@
-"""Texts and numbers for the operator on keyholes, hidden sectors and the end of the azimuth's travel."""
+"""Texts and numbers for the operator on keyholes, hidden sectors and the end of the azimuth's travel.
+
+A text states a time as UTC in realtime (epoch: UTC of stamp 0), and in lockstep as seconds of the run (epoch 0).
+"""
+import datetime
 import math
 from typing import TYPE_CHECKING
 
@@ -7,14 +11,22 @@ import numpy as np
 from acu_tracker import modes
 from acu_tracker.lookahead import planner
 from acu_tracker.program import program_track
-from pedestal_common.quantities import AnyRecord, Degrees, Radians
+from pedestal_common.quantities import AnyRecord, Degrees, Nanoseconds, Radians, Seconds
 
 if TYPE_CHECKING:
     from acu_tracker.params import AcuParameters, AxisParameters
     from acu_tracker.unit import Acu
 
 
-def keyhole(lookahead: AnyRecord, parameters: 'AcuParameters') -> str:
+def instant(t: Seconds, epoch: Nanoseconds) -> str:
+    """Return the text of a time."""
+    if not epoch:
+        return f'{t:.1f} s'
+    utc = datetime.datetime(1970, 1, 1) + datetime.timedelta(microseconds=round(epoch / 1000 + t * 1e6, -5))
+    return f'{utc:%H:%M:%S}.{utc.microsecond // 100_000} UTC'
+
+
+def keyhole(lookahead: AnyRecord, parameters: 'AcuParameters', epoch: Nanoseconds = 0) -> str:
     """Return the text of acu/keyhole: the announced slew, its cancellation, or that no azimuth wrap holds the pass."""
     beamwidth = parameters.tracker.receiver.beamwidth
     if lookahead['announced_forecast'] == planner.FORECAST_NO_WRAP:
@@ -27,10 +39,10 @@ def keyhole(lookahead: AnyRecord, parameters: 'AcuParameters') -> str:
         other = 'limits forbid the opposite direction'
     else:
         other = f'the opposite direction would lose {slew["other_cost"] - slew["cost"]:.1f} s more'
-    text = (f'keyhole at {slew["culmination"]:.1f} s, elevation {_deg(slew["highest"]):.1f} deg: azimuth leaves the '
-            f'target at {slew["t1"]:.1f} s, slews {abs(_deg(slew["azimuth2"] - slew["azimuth1"])):.0f} deg {way} and '
-            f'meets the target at {slew["t2"]:.1f} s; expected loss {slew["loss"]:.1f} s, largest pointing '
-            f'offset {_deg(slew["worst"]):.2f} deg; {other}')
+    top, leaves, meets = (instant(slew[name], epoch) for name in ('culmination', 't1', 't2'))
+    text = (f'keyhole at {top}, elevation {_deg(slew["highest"]):.1f} deg: azimuth leaves the target at {leaves}, '
+            f'slews {abs(_deg(slew["azimuth2"] - slew["azimuth1"])):.0f} deg {way} and meets the target at {meets}; '
+            f'expected loss {slew["loss"]:.1f} s, largest pointing offset {_deg(slew["worst"]):.2f} deg; {other}')
     if lookahead['deck_motion'] > 0.25 * beamwidth:
         text += f'; approximate, because the deck moves by {_deg(lookahead["deck_motion"]):.2f} deg rms'
     return text
@@ -61,7 +73,7 @@ def overtravel(unit: 'Acu') -> str:
             row, times = beyond[0], np.concatenate(([now], track.times[ahead]))
             end = limits.low if azimuth[row] < limits.low else limits.high
             rows = row - 1 + np.argsort(azimuth[row - 1:row + 1])   # np.interp needs increasing azimuths
-            when = f'at {np.interp(end, azimuth[rows], times[rows]):.1f} s '
+            when = f'at {instant(float(np.interp(end, azimuth[rows], times[rows])), unit.epoch)} '
     return f'no azimuth wrap holds the whole program track: {_at_the_end(unit.parameters.azimuth, when)}'
 
 
@@ -88,10 +100,10 @@ def turn(unit: 'Acu') -> str:
     return f'the azimuth goes round by {_deg(guidance["azimuth"] - reference["angle"]):+.0f} deg to the target'
 
 
-def hidden(lookahead: AnyRecord) -> str:
-    """Return the text of acu/blockage: begin and end [s] of the time in which the target will be hidden."""
-    begin, end = lookahead['hidden']
-    return f'target hidden from {begin:.1f} s to {end:.1f} s'
+def hidden(lookahead: AnyRecord, epoch: Nanoseconds = 0) -> str:
+    """Return the text of acu/blockage: begin and end of the time in which the target will be hidden."""
+    begin, end = (instant(t, epoch) for t in lookahead['hidden'])
+    return f'target hidden from {begin} to {end}'
 
 
 def numbers(lookahead: AnyRecord) -> list[tuple[str, str]]:

@@ -87,7 +87,10 @@ def _values(unit: 'Acu', invalid: tuple[str, ...]) -> list[tuple[str, str]]:
                for i, axis in enumerate(topics.AXES)]
     for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
         values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
-    if title := unit.model.title(state['tracking']['pointing']):
+    pointing = state['tracking']['pointing']
+    if title := unit.model.title(pointing):
+        if pointing['changing']:
+            title += f'; in force from {announcement.instant(pointing["ends"], unit.epoch)} on'
         values.append(('pointing_model', title))
     return [*values, ('blocked', str(int(outputs['blocked']))), *announcement.numbers(state['guidance']['lookahead']),
             *unit.followed.predictor.diagnostic_values(unit.now * 1e-9),

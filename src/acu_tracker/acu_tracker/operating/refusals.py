@@ -58,7 +58,7 @@ def of_mode(unit: 'Acu', mode: int, reason: int) -> str:
 def missing(unit: 'Acu', name: str) -> str:
     """Return the text that names the numbers which the last message of an input lacks; '' if it lacks none.
 
-    name: in NEEDED_FIELDS. A decoded number is NaN if the message does not contain it or marks it as no data.
+    name: key of NEEDED_FIELDS. A decoded number is NaN if the message does not contain it or marks it as no data.
     """
     topic, needed = NEEDED_FIELDS.get(name, ('', ()))
     if topic not in unit.reads and topic != unit.trigger:

@@ -59,5 +59,4 @@ class ModelInForce:
         """Return the model in force, in words; '' without a model."""
         if record['report'] == topics.NO_TEXT_CODE:
             return ''
-        title = self.reports[int(record['report'])].title
-        return f'{title}; in force from {record["ends"]:.1f} s on' if record['changing'] else title
+        return self.reports[int(record['report'])].title

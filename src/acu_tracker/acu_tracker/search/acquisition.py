@@ -42,13 +42,15 @@ class SearchParameters(Parameters):
     """Mode search: rounds of the small and the full area, after a wait at the last place."""
 
     pattern: str = choice('spiral', SEARCH_PATTERNS, 'search path; square and raster lie along the track')
-    wait: float = parameter(2.5, 0.0, 600.0, 's', 'time at the last place, in which the noise is learnt')
+    wait: float = parameter(2.5, 0.0, 600.0, 's', 'time at the last place before the first round, in which the noise '
+                            'is learnt')
     small: float = parameter(1.5, 0.1, 50.0, 'beamwidths', 'radius of the small area', must_be='at most full')
     full: float = parameter(5.0, 0.1, 200.0, 'beamwidths', 'radius of the full area')
-    across: float = parameter(0.3, 0.0, 1.0, '', 'raster and sector: half width of the area over half its length')
+    across: float = parameter(0.3, 0.0, 1.0, '', 'raster, sector: width of the area across the track over its length')
     pitch: float = parameter(0.7, 0.1, 1.0, 'beamwidths', 'distance between neighbouring lines')
     speed: float = parameter(1.0, 0.01, 1.0, '', 'speed of the beam, in beamwidths per 4 time constants of the level')
-    rounds: int = parameter(3, 1, 1000, '', 'number of rounds of both areas before the fallback mode')
+    rounds: int = parameter(3, 1, 1000, '', 'number of rounds after which the search ends without a signal; a round '
+                            'covers the small area once, then the full area once')
 
 
 

@@ -109,7 +109,7 @@ def floor_at(text: str, A: Radians) -> Radians:
 
 
 def floor_table(text: str) -> Records:
-    """Return the Floor (1,) of a text: in each cell the highest of its ends and of the points inside it."""
+    """Return the Floor (1,) of the parameter `floor`. The value of a cell is the highest floor in it."""
     A, f = floor_points(text)
     floor = Floor.zeros()
     if A:

@@ -18,8 +18,8 @@ def check_delay(period: Seconds, transport_delay: Seconds) -> None:
 @dataclasses.dataclass(frozen=True)
 class BeamParameters(RunParameters):
     """Parameters of beam_steering_node: array and run."""
-    period: float = parameter(5e-3, 1e-4, 0.1, 's', 'step T, in which the beam is constant')
-    transport_delay: float = parameter(0.0, 0.0, 0.5, 's', 'delay of the effect of a command')
+    period: float = parameter(5e-3, 1e-4, 0.1, 's', 'period T of the steps; the beam is constant in a step')
+    transport_delay: float = parameter(0.0, 0.0, 0.5, 's', 'time from the stamp of a command to its effect')
     initial_azimuth: float = parameter(0.0, -20.0, 20.0, 'rad', 'azimuth of every beam at t = 0')
     initial_elevation: float = parameter(0.0, -20.0, 20.0, 'rad', 'elevation of every beam at t = 0')
 

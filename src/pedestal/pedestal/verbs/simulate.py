@@ -77,7 +77,7 @@ def _receiver(options: argparse.Namespace) -> int:
 
 
 def _add_rotator(parser: argparse.ArgumentParser) -> None:
-    """rotator_node, or another program, opens this path as a serial line."""
+    """Prints the path of the pseudo terminal. rotator_node, or another program, opens this path as a serial line."""
     parser.add_argument('--protocol', choices=ROTATOR_PROTOCOLS, default='gs232', help='protocol on the line; '
                         'default: gs232')
     parser.add_argument('--rate', type=float, default=6.0, metavar='RATE', help='rate of both axes, at most '
@@ -97,16 +97,17 @@ def _rotator(options: argparse.Namespace) -> int:
 
 
 def _add_ins(parser: argparse.ArgumentParser) -> None:
-    """It sends until Ctrl-C; ins_input_node receives the sentences."""
+    """Sends NMEA sentences until Ctrl-C. ins_input_node receives the sentences."""
     parser.add_argument('--scenario', default='ship_pass', metavar='NAME', help='scenario whose section ship_motion '
                         'describes the ship: name or .yaml file; default: ship_pass')
     line = parser.add_mutually_exclusive_group()
     line.add_argument('--port', type=int, default=DEFAULT_INS_PORT, metavar='PORT', help='UDP port on 127.0.0.1 that '
                       f'receives the sentences; default: {DEFAULT_INS_PORT}')
-    line.add_argument('--serial', action='store_true', help='sentences on a pseudo terminal, whose path is printed')
-    parser.add_argument('--sentence', choices=KINDS, default='pashr', help='sentence beside HDT and ROT; default: '
-                        'pashr')
-    parser.add_argument('--rate', type=float, default=50.0, metavar='HZ', help='samples per second, '
+    line.add_argument('--serial', action='store_true', help='pseudo terminal (virtual serial port) for the sentences, '
+                      'in place of UDP; the verb prints its path')
+    parser.add_argument('--sentence', choices=KINDS, default='pashr', help='NMEA sentence with the attitude, beside '
+                        'HDT and ROT; default: pashr')
+    parser.add_argument('--rate', type=float, default=50.0, metavar='HZ', help='rate of the samples [Hz], '
                         f'{MIN_RATE_HZ:g} to {MAX_RATE_HZ:g}; default: 50')
     parser.add_argument('--start', type=int, metavar='NS', help='UTC at which the time of the ship is 0 [ns], the '
                         'graph.start of its graph; default: beginning of the day')
@@ -135,7 +136,7 @@ EQUIPMENT = {
     'drives': ('four CiA 402 servo drives with the simulated mechanics, on a socketcand server of this machine, until '
                'Ctrl-C', Verb(_add_drives, _drives)),
     'receiver': ('I/Q samples of the channels of a tracking antenna', Verb(_add_receiver, _receiver)),
-    'rotator': ('a rotator with its own position loop on a pseudo terminal, whose path is printed, until Ctrl-C',
+    'rotator': ('a rotator with its own position loop on a pseudo terminal (virtual serial port), until Ctrl-C',
                 Verb(_add_rotator, _rotator)),
     'ins': ('the INS of the ship of a scenario, which sends NMEA sentences in real time by UDP or on a pseudo '
             'terminal', Verb(_add_ins, _ins)),

@@ -64,18 +64,20 @@ def _add_trials(parser: argparse.ArgumentParser) -> None:
 
 def _add_questions(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--side', action='append', nargs='+', default=[], metavar=('NAME', 'NODE.KEY=VALUE'),
-                        help='side of a comparison: its name, then the parameters that it changes; may be repeated')
-    parser.add_argument('--against', metavar='SCENARIO', help='scenario of the second side of a comparison')
+                        help='setting to compare with the others (a side): its name, then the parameters that it '
+                        'changes; may be repeated')
+    parser.add_argument('--against', metavar='SCENARIO', help='scenario to compare with; default: the same scenario')
     parser.add_argument('--against-param', action='append', default=[], metavar='NODE.KEY=VALUE',
-                        help='parameter of the second side and its value; may be repeated')
+                        help='parameter that only the second of two compared settings has, and its value; may be '
+                        'repeated')
     parser.add_argument('--by', metavar='RESULT', help='result that ranks the trials and decides a comparison; '
                         'default: pointing_rms_deg')
     parser.add_argument('--require', action='append', default=[], metavar="'RESULT < LIMIT'", help="criterion for a "
                         "trial, with <, <=, > or >=, for example 'pointing_max_deg < 0.1'; may be repeated")
     parser.add_argument('--solve', metavar='NODE.KEY[=LOW:HIGH]', help='parameter whose value is searched, and the '
-                        'range of the search')
-    parser.add_argument('--until', metavar="'RESULT = LIMIT'", help="limit that the mean of a result reaches at the "
-                        "value of --solve, for example 'pointing_rms_deg = 0.02'")
+                        'range of the search; needs --until; default range: that of the parameter')
+    parser.add_argument('--until', metavar="'RESULT = LIMIT'", help="goal of the search by --solve: the mean of "
+                        "RESULT over the trials is LIMIT, for example 'pointing_rms_deg = 0.02'")
 
 
 def _trials(options: argparse.Namespace) -> int:

@@ -12,7 +12,8 @@ class ProgramParameters(parameters.Parameters):
     """Parameters of the program track that the operator sends to the control unit (ACU) before the run."""
     source: str = parameters.choice('target', ('target', 'none'), 'source of the program track; none: no track')
     interval: float = parameters.parameter(1.0, 0.002, 60.0, 's', 'time between two points')
-    time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'delay of the prediction')
+    time_offset: float = parameters.parameter(0.0, -60.0, 60.0, 's', 'time by which the prediction lags the target; '
+                                              'negative: it leads')
     azimuth_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'error of the predicted azimuth')
     elevation_offset: float = parameters.parameter(0.0, -0.2, 0.2, 'rad', 'error of the predicted elevation')
     refractivity: float = parameters.parameter(0.0, 0.0, 500.0, 'N', 'measured refractivity of the air, whose '

@@ -182,8 +182,8 @@ class _Rules:
 
 
 def share(name: str, sections: Sections, header: ScenarioParameters, seed: int | None) -> None:
-    """Give every node the parameters that several nodes share. seed: as of scenario.checked. Raises ScenarioError if
-    the section of a node has another value."""
+    """Give every node the parameters that several nodes share. seed: argument of scenario.checked. Raises
+    ScenarioError if the section of a node has another value."""
     rules = _Rules(name, sections, header, seed)
     rules.share_run()
     rules.share_flags()

@@ -139,8 +139,8 @@ class Steps:
             return bool(arrived) and arrived[0][0] >= due or self._next_stamp(topic) > due
         if arrived and arrived[0][0] != due:
             raise GraphError(f'{topic} is stamped {arrived[0][0] / NS_PER_SECOND:.6f} s where '
-                             f'{due / NS_PER_SECOND:.6f} s is due; is its latency the one of this node '
-                             f'({self._latency[topic] / NS_PER_SECOND:.6f} s)?')
+                             f'{due / NS_PER_SECOND:.6f} s is due; its latency must be that of this node, '
+                             f'{self._latency[topic] / NS_PER_SECOND:.6f} s')
         return bool(arrived)
 
     def _next_stamp(self, topic: str) -> Nanoseconds:

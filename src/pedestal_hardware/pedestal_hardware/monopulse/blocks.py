@@ -6,6 +6,8 @@ time of its samples.
 """
 import collections
 import contextlib
+import math
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
@@ -27,6 +29,7 @@ LATE_TOLERANCE_S = 0.004
 """Largest delay of the earliest arrivals of two intervals before samples count as lost [s]. A clock that drifts by
 200 ppm makes the arrivals as late in twice ARRIVAL_WINDOW_S."""
 
+FAULT_TIME_S = 2.0  # time for which a fault of the stream is reported after its last occurrence [s]
 RATE_WINDOW_S = 2.0  # time over which the sample rate of a source without times is measured [s]
 CAUSE_TOLERANCE = 0.05  # largest relative deviation of a wrong sample rate from that of a possible cause
 RATE_TOLERANCE, STALL_TIME_S = 0.01, 0.1  # of the measured sample rate, and delay of one arrival that is none [s]
@@ -124,6 +127,20 @@ class Blocks:
             self.recorder, self.recorder_fault = None, str(error)
             with contextlib.suppress(StreamError):      # a full disk takes the rest of the samples neither
                 recorder.close()
+
+
+class FaultLog:
+    """Choice of the faults that a node logs. A fault that continues, perhaps with other numbers, is logged once."""
+
+    def __init__(self) -> None:
+        self.last: dict[str, Seconds] = {}      # {text without its numbers: time of the last occurrence}
+
+    def due(self, text: str, now: Seconds) -> bool:
+        """Take a fault at a time of the monotonic clock; return True if it is new, or was absent for FAULT_TIME_S."""
+        words = re.sub(r'\d+', '', text)
+        absent = now - self.last.get(words, -math.inf)
+        self.last[words] = now
+        return absent > FAULT_TIME_S
 
 
 class ClockComparison:

@@ -17,7 +17,6 @@ from pedestal_hardware.start import StartsWithEquipment
 
 READ_TIMEOUT_S = 0.1  # longest wait for samples before the node looks whether it ends [s]
 MAX_SATURATED_SHARE = 0.01  # largest share of the samples of a block at full scale [-]
-FAULT_TIME_S = 2.0  # time for which a fault of the stream is reported after its last occurrence [s]
 
 
 class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
@@ -31,7 +30,8 @@ class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
         self.blocks: blocks.Blocks | None = None
         self.ending = False
         self.heard: Seconds | None = None       # time of the monotonic clock of the last samples
-        self.fault = -FAULT_TIME_S, ''          # time and text of the last fault
+        self.fault = -blocks.FAULT_TIME_S, ''   # time and text of the last fault
+        self.fault_log = blocks.FaultLog()
         super().__init__(row)
 
     def begin(self) -> None:
@@ -77,9 +77,8 @@ class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
                 self._look_for_faults()
 
     def _note_fault(self, text: str) -> None:
-        at, last = self.fault
         now = time.monotonic()
-        if text != last or now - at > FAULT_TIME_S:
+        if self.fault_log.due(text, now):
             self.get_logger().warning(text)
         self.fault = now, text
         self._look_for_faults()
@@ -89,7 +88,7 @@ class MonopulseReceiverNode(StartsWithEquipment, unit_node.UnitNode):
         assert self.source is not None and self.blocks is not None
         now, (at, text) = time.monotonic(), self.fault
         silent = now - (self.begun if self.heard is None else self.heard)
-        if now - at > FAULT_TIME_S:
+        if now - at > blocks.FAULT_TIME_S:
             text = ''
         if silent > self.parameters.source.silence:
             text = text or (f'no samples for {silent:.0f} s' if self.heard is not None else 'no samples so far')

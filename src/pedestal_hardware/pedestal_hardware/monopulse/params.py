@@ -132,16 +132,16 @@ class CalibrationParameters(Parameters):
     """
     x_from_x_gain: float = parameter(1.0, 0.0, 1e3, '1', 'gain from the received cross-elevation difference to the '
                                      'cross-elevation difference')
-    x_from_x_phase: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'its phase')
+    x_from_x_phase: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'phase of x_from_x_gain')
     x_from_e_gain: float = parameter(0.0, 0.0, 1e3, '1', 'gain from the received elevation difference to the '
                                      'cross-elevation difference')
-    x_from_e_phase: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'its phase')
+    x_from_e_phase: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'phase of x_from_e_gain')
     e_from_x_gain: float = parameter(0.0, 0.0, 1e3, '1', 'gain from the received cross-elevation difference to the '
                                      'elevation difference')
-    e_from_x_phase: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'its phase')
+    e_from_x_phase: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'phase of e_from_x_gain')
     e_from_e_gain: float = parameter(1.0, 0.0, 1e3, '1', 'gain from the received elevation difference to the '
                                      'elevation difference')
-    e_from_e_phase: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'its phase')
+    e_from_e_phase: float = parameter(0.0, -2 * math.pi, 2 * math.pi, 'rad', 'phase of e_from_e_gain')
 
     @property
     def matrix(self) -> list[list[complex]]:

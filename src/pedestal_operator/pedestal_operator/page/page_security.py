@@ -135,7 +135,7 @@ def _bracketed(name: str) -> str:
 
 
 def headers(host: str) -> list[tuple[str, str]]:
-    """Return the headers of every answer: own content only, a checked cache, no frames. host: of the request."""
+    """Return the headers of every answer: own content only, a checked cache, no frames. host: Host of the request."""
     return [('content-security-policy',
              "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
              f"connect-src 'self' ws://{host} wss://{host}; "

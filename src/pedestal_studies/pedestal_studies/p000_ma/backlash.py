@@ -71,7 +71,8 @@ METRIC_TARGETS = {  # {(case, metric): target}
 
 
 def reversal_case(kind: str, name: str) -> Variant:
-    """Return the variant of three periods of a sine; kind: of REVERSAL_FREQUENCIES_RAD_S; name: of PAPER_CASES."""
+    """Return the variant of three periods of a sine. kind: key of REVERSAL_FREQUENCIES_RAD_S; name: key of
+    PAPER_CASES."""
     return servo.of_sine(Variant('servo_sine').with_({
         **PAPER_CASES[name], 'tracking_receiver.target.angle.azimuth_amplitude': REVERSAL_AMPLITUDE_RAD}),
         REVERSAL_FREQUENCIES_RAD_S[kind], 3)

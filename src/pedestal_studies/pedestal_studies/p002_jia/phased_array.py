@@ -185,7 +185,8 @@ def limit_rows(delays: Mapping[PaperLoop, tuple[int, int]]) -> list[Line]:
 
 def lag_rows(case: str, loop: PaperLoop, target: Floats,
              rate: Floats | None = None) -> list[tuple[str, str, float, str]]:
-    """Return the rows of lag_deg of a loop, and of true_lag_deg with each smoothing; arguments as of PaperLoop.run."""
+    """Return the rows of lag_deg of a loop, and of true_lag_deg with each smoothing. target, rate: arguments
+    of PaperLoop.run."""
     rows = [(case, 'lag_deg', math.degrees(peak(settled(loop.run(target, rate)[1]))), 'deg')]
     for S in SMOOTHING_CODES:
         beam, _ = dataclasses.replace(loop, smoothing=S).run(target, rate)
@@ -255,7 +256,7 @@ half-beamwidth: half of the power, at half a beamwidth. pattern: the level at wh
 
 
 def signal_loss_loop(kind: str, form: str) -> PaperLoop:
-    """Return the loop with a receiver that loses the signal; kind: of RECEIVER_LOSS_POWERS; form: of the loop."""
+    """Return the loop with a receiver that loses the signal; kind: key of RECEIVER_LOSS_POWERS."""
     return PaperLoop(delay=LOOP_DELAY_MS, form=form, beamwidth=BEAMWIDTH_RAD,
                      lost_power_ratio=RECEIVER_LOSS_POWERS[kind])
 
@@ -346,7 +347,7 @@ def graph_rows(jitters: Mapping[str, list[Degrees]]) -> list[Line]:
 
 
 def readings(loops: Mapping[str, PaperLoop], target: Floats, rate: Floats | None = None) -> dict[str, Readings]:
-    """Return {label: readings [rad]} of loops; target, rate: as of PaperLoop.run."""
+    """Return {label: readings [rad]} of loops; target, rate: arguments of PaperLoop.run."""
     errors: dict[str, Readings] = {}
     for label, loop in loops.items():
         errors[label] = {}

@@ -363,7 +363,7 @@ def baseline_reports(mode: str) -> Baseline:
 
 
 def fault_outcome(mode: str, inject: str, baseline: Baseline) -> FaultOutcome:
-    """Return the outcome of a fault in a mode; inject: as of `run_of`."""
+    """Return the outcome of a fault in a mode; inject: argument of `run_of`."""
     run, reports = run_of(mode, inject)
     onset = int(np.searchsorted(run.t, FAULT_ONSET_S - 1e-9))
     new = [one for one in reports if one.step >= onset and (one.source, one.level, one.text) not in baseline]

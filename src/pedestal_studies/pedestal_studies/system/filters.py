@@ -94,7 +94,7 @@ def times() -> Times:
 
 
 def noise_of(noise: str, name: str) -> Noise:
-    """Return the noise for a filter; noise: name of NOISE_CASES; name: of FILTERS."""
+    """Return the noise for a filter; noise: key of NOISE_CASES; name: key of FILTERS."""
     return dataclasses.replace(NOISE_CASES[noise], rate_sigma=RATE_SIGMAS_RAD_S.get(name),
                                expected=name in NOISE_AWARE_FILTERS)
 

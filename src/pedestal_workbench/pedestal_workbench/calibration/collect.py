@@ -46,14 +46,15 @@ def points(bag: Recording, tracks: Sequence[ProgramTrack], count: int = DEFAULT_
     errors = recordings.of_equipment(bag, t, 'tracking_receiver/angle_error', ('x', 'y'))
     errors = errors @ tracking.error_matrix(bag).T
     if not (modes == 'autotrack').any():
-        raise CalibrationError('no autotrack')
+        raise CalibrationError('the recording holds no autotrack')
     directions = predicted.on_deck(bag, t, tracks, modes)
     settled = tracking.settled(modes == 'autotrack', t)
     usable = np.isfinite(errors).all(1) & np.isfinite(directions).all(1) & settled
     places = np.flatnonzero(usable)
     half = 0.5 * WINDOW_S
     if not places.size or t[places[-1]] - t[places[0]] < WINDOW_S:
-        raise CalibrationError(f'no autotrack of {WINDOW_S:g} s with a predicted direction')
+        raise CalibrationError(f'the recording holds no autotrack of {WINDOW_S:g} s with a predicted direction, that '
+                               'of a program track, tle or sun')
     found = []
     beamwidth = recordings.beamwidth(bag)
     # Because the windows of two points must not overlap, a short recording gives fewer points.
@@ -72,7 +73,8 @@ def points(bag: Recording, tracks: Sequence[ProgramTrack], count: int = DEFAULT_
         at = scan.mean_direction(directions[window])
         found.append((middle, *np.degrees((at[0], at[1], xel + mean_error[0], el + mean_error[1]))))
     if not found:
-        raise CalibrationError('no part in autotrack has small receiver errors for long enough')
+        raise CalibrationError(f'no part of {WINDOW_S:g} s in autotrack has a mean receiver error of at most '
+                               f'{MAX_MEAN_ERROR_BEAMWIDTHS:g} beamwidths')
     table = np.array(found)
     return table[:, 0], table[:, 1:3], table[:, 3:5]
 

@@ -116,7 +116,8 @@ def points(bag: Recording, tracks: Sequence[ProgramTrack]) -> tuple[Times, Pairs
     modes = recordings.modes(bag, t)
     found_scans = [one for one in scans(bag, t, modes) if len(one) >= MIN_LEVELS]
     if not found_scans:
-        raise CalibrationError(f'no scan of {MIN_LEVELS} commands `offset` in a mode that follows a table')
+        raise CalibrationError(f'the recording holds no scan of {MIN_LEVELS} commands `offset` in the mode program, '
+                               'tle or sun')
     directions = predicted.on_deck(bag, t, tracks, modes)
     level = 10.0**(0.1 * recordings.of_equipment(bag, t, 'tracking_receiver/angle_error', ('z',))[:, 0])
     azimuth = np.array([wrap(angle) for angle in joints['azimuth.position'] - directions[:, 0]])

@@ -69,8 +69,9 @@ def read(bag: Recording) -> Points:
     found = [_point(t[first:last], offsets[first:last] / beamwidth, errors[first:last], beamwidth)
              for first, last in _still(t, offsets, beamwidth)]
     if not found:
-        raise CalibrationError(f'no part in the modes preset or program with a still beam of {MIN_POINT_S:g} s; '
-                               'program hands over to autotrack unless acu.tracker.handover = false')
+        raise CalibrationError('the recording holds no part in the mode preset or program in which the beam stands '
+                               f'still for {MIN_POINT_S:g} s; wait longer at each offset, and set '
+                               'acu.tracker.handover=false, so that program does not change to autotrack')
     spans, means, errors, sigma, level = map(np.array, zip(*found))
     if plain:
         # The middle of the points is the beacon: most points of a cross have the offset 0 on one of the axes.
@@ -94,7 +95,8 @@ def _from_beacon(bag: Recording, t: Times, beam: Pairs) -> tuple[Pairs, bool]:
     else:
         tracks = predicted.programs(bag)
         if not tracks:
-            raise CalibrationError('the recording holds no program track, which predicts the directions')
+            raise CalibrationError('the recording holds no program track, which predicts the directions; send one '
+                                   'before the mode program')
         beacon[usable] = predicted.of_programs(tracks, t)[usable]
     offsets = np.empty_like(beam)
     mode_pointing.fill_offsets(np.ascontiguousarray(beam), beacon, offsets)

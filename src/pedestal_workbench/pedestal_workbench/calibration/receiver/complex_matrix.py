@@ -41,7 +41,10 @@ def half_of_inverse(slopes: matrix.ComplexSlopes) -> Floats:
 
 
 def phase_half(values: Complexes, half: Floats) -> Floats:
-    """Return half of the interval of the phases of values [rad], pi if a phase is unknown; half: of their parts."""
+    """Return half of the confidence interval of the phase of each value [rad], pi where the phase is unknown.
+
+    half: half of the confidence interval of the real part and of the imaginary part.
+    """
     share = half / np.maximum(np.abs(values), np.finfo(float).tiny)
     return np.where(share < 1.0, np.arcsin(np.minimum(share, 1.0)), math.pi)
 

@@ -71,7 +71,7 @@ def disk(diameter: Degrees) -> Pairs:
 
 
 def pattern(offsets: Pairs, place: Pair, width: Pair, points: Pairs) -> Floats:
-    """Return the power (n,) of the disk at offsets [deg], with A = 1; points: of `disk`."""
+    """Return the power (n,) of the disk at offsets [deg], with A = 1; points: result of `disk`."""
     r = (offsets - place)[:, np.newaxis] - points
     return np.exp(-4.0 * math.log(2.0) * (r**2 / np.asarray(width)**2).sum(-1)).mean(1)
 
@@ -86,7 +86,7 @@ def fit(levels: Levels, diameter: Degrees) -> Beam:
     width = max(found.width)
     off = np.hypot(*(offsets - found.place).T) > OFF_BEAMWIDTHS * width + 0.5 * diameter
     if not off.any():
-        raise CalibrationError('no level off the source, must be at least 1 further than '
+        raise CalibrationError('no level off the source; measure at least one further than '
                                f'{OFF_BEAMWIDTHS * width + 0.5 * diameter:.3g} deg from it')
     return _fit(offsets, levels.power, float(levels.power[off].mean()), points)
 

@@ -90,8 +90,8 @@ def of_recording(bag: Recording, source: str) -> Levels:
         power = np.nanmean(10.0**(0.1 * measured[part, 2]))
         found.append((*np.degrees(off), power, *np.degrees(error)))
     if not found:
-        raise CalibrationError('no command `offset` in a mode that follows a table, with '
-                               f'{scan.MIN_DWELL_S:g} s at rest after it')
+        raise CalibrationError('the recording holds no command `offset` in the mode program, tle or sun, after which '
+                               f'the antenna is at rest for {scan.MIN_DWELL_S:g} s')
     rows = np.array(found)
     receiver = recordings.parameters(bag, 'tracking_receiver')
     # The level of a carrier has no noise bandwidth.
