@@ -50,7 +50,8 @@ def _add_pointing(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--scenario', metavar='SCENARIO', help='scenario (name or .yaml file) whose travel limits the '
                         'directions of --plan; default: azimuth -270 to 270 deg')
     parser.add_argument('--terms', metavar='P1,P3,...', help='terms to fit; default: P1,P3,P4,P5,P6,P7,P8')
-    parser.add_argument('--keep-all', action='store_true', help='no drop of terms whose sigma exceeds their value')
+    parser.add_argument('--keep-all', action='store_true', help='all terms in the model; default: a term whose sigma '
+                        'exceeds its value is dropped')
     parser.add_argument('--form', choices=('linear', 'exact'), help='form of the model: first order in the terms, as '
                         'in katpoint, or the exact law of the control unit; default: linear, unless the exact form '
                         'predicts left-out offsets better by 5 %%')
@@ -93,8 +94,9 @@ def _add_receiver(parser: argparse.ArgumentParser) -> None:
                         'beacon')
     source.add_argument('--scenario', metavar='SCENARIO', help='scenario (name or .yaml file) to run in memory, for '
                         'example receiver_phasing')
-    parser.add_argument('--iq', type=pathlib.Path, metavar='FILE', help='.sigmf-meta file of the I/Q samples of this '
-                        'run (tracking_receiver.source.record), for the complex calibration matrix')
+    parser.add_argument('--iq', type=pathlib.Path, metavar='FILE', help='.sigmf-meta file of the I/Q samples of the '
+                        'run of --bag or --scenario (tracking_receiver.source.record), for the complex calibration '
+                        'matrix')
     arguments.add_param(parser, 'tracking_receiver.antenna.cross_coupling=0.3')
     arguments.add_params_file(parser)
     arguments.add_result_files(parser, 'new parameter file with the matrix', 'new HTML page with errors and circle')

@@ -162,8 +162,9 @@ def _add_recompute(parser: argparse.ArgumentParser) -> None:
                         '(never locked, never in autotrack, never moved)')
     console.add_json(parser)
     console.add_explain(parser)
-    parser.add_argument('--iq', type=pathlib.Path, metavar='FILE', help='.sigmf-meta file of the I/Q samples of this '
-                        'run: compare the angle errors that the monopulse receiver makes of them, byte by byte')
+    parser.add_argument('--iq', type=pathlib.Path, metavar='FILE', help='.sigmf-meta file of the I/Q samples of the '
+                        'recorded run; the angle errors that the monopulse receiver computes from these samples are '
+                        'compared byte by byte')
     parser.add_argument('--output', type=pathlib.Path, metavar='BAG',
                         help='new bag: the recording with recomputed outputs in place of the recorded outputs')
 
@@ -194,7 +195,7 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bag', type=pathlib.Path, help='recording: a folder or an .mcap file')
     into = parser.add_mutually_exclusive_group()
     into.add_argument('--node', nargs='+', action='extend', default=[], metavar='NAME',
-                      help='nodes, for example acu; only their inputs are published; default: every topic')
+                      help='nodes whose inputs are published, for example acu; default: every topic is published')
     into.add_argument('--topics', nargs='+', action='extend', default=[], metavar='NAME', help='topics to '
                       'publish')
     pace = parser.add_mutually_exclusive_group()

@@ -53,10 +53,12 @@ def _add_receiver(parser: argparse.ArgumentParser) -> None:
     sink = parser.add_mutually_exclusive_group(required=True)
     sink.add_argument('--output', metavar='FILE', help='new .sigmf-meta file; the samples are written to the '
                       '.sigmf-data file beside it')
-    sink.add_argument('--stream', choices=('vita49', 'zmq_sub', 'zmq_pull'), help='kind of the source that receives '
-                      'the samples; zmq_sub: this verb binds a PUB socket; zmq_pull: a PUSH socket')
-    parser.add_argument('--address', metavar='ADDRESS', help='address of a stream, udp://HOST:PORT or '
-                        'tcp://HOST:PORT; default: udp://127.0.0.1:4991, with ZMQ tcp://127.0.0.1:5555')
+    sink.add_argument('--stream', choices=('vita49', 'zmq_sub', 'zmq_pull'), help='value of source.kind in the '
+                      'receiver of the samples; zmq_sub: the verb binds a PUB socket; zmq_pull: the verb binds a PUSH '
+                      'socket')
+    parser.add_argument('--address', metavar='ADDRESS', help='vita49: address to which the verb sends, '
+                        'udp://HOST:PORT; default: udp://127.0.0.1:4991. zmq: address that the verb binds, '
+                        'tcp://HOST:PORT; default: tcp://127.0.0.1:5555')
     arguments.add_duration(parser, 'the samples')
     arguments.add_param(parser, 'tracking_receiver.source.rate=2.5e5')
     arguments.add_params_file(parser)

@@ -142,7 +142,8 @@ class Graph:
                 if code is not None:
                     raise RuntimeError(f'--{name}: {self.result(name).get("error", exit_description(code))}')
                 if time.monotonic() > deadline:
-                    raise RuntimeError(f'--{name}: no announcement within {SERVER_START_TIMEOUT_S:g} s')
+                    raise RuntimeError(f'--{name}: the server has not started within {SERVER_START_TIMEOUT_S:g} s; '
+                                       f'its log is {self._log_of(name)}')
 
     def announce(self) -> None:
         """Print the announcements of the servers that have announced themselves since the last call."""

@@ -85,7 +85,7 @@ class Topic(typing.NamedTuple):
 
 
 TOPICS = (
-    Topic('clock', 'rosgraph_msgs/msg/Clock', 'step', "the drive's time t_k"),
+    Topic('clock', 'rosgraph_msgs/msg/Clock', 'step', 'time of the drive: the stamp of its step'),
     Topic('joint_states', 'sensor_msgs/msg/JointState', 'step',
           '`azimuth`, `elevation`: encoder angle [rad], rate [rad/s], torque on the load [Nm]', frame='base_link',
           inputs={'position': 'position', 'velocity': 'velocity', 'effort': 'torque'}),
@@ -154,10 +154,10 @@ TOPICS = (
     Topic('acu/rate_command', 'sensor_msgs/msg/JointState', 'step',
           'velocity [rad/s], effort = feed-forward load torque [Nm]', frame='base_link'),
     Topic('acu/estimate', 'trajectory_msgs/msg/JointTrajectory', 'step',
-          'one point: filter estimate of the target, earth angles at t_k; NaN without an estimate',
+          'one point: filter estimate of the target, earth angles at the stamp; NaN without an estimate',
           frame='earth'),
     Topic('acu/reference', 'trajectory_msgs/msg/JointTrajectory', 'step',
-          'one point: reference of the position loop, encoder angles at t_k', frame='base_link'),
+          'one point: reference of the position loop, encoder angles at the stamp', frame='base_link'),
     Topic('acu/filter', 'sensor_msgs/msg/JointState', 'step',
           'numbers of the filter of each axis, all in `position`: innovation, NIS, 1-sigma, correlation of angle and '
           'rate, and the probability of each motion model; NaN for a number without a value in this step: '

@@ -147,7 +147,7 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) 
 
 
 def figures(accuracy: Mapping[str, Mapping[str, Accuracy]], bound: InformationLimit) -> Drawings:
-    """Return the figures; arguments as of `rows`."""
+    """Return the figures; arguments: those of `rows`."""
     return {'azimuth': lambda: azimuth_figure(accuracy[''], bound), 'level': lambda: level_figure(accuracy[''], bound),
             'swell': lambda: swell_figure(accuracy['swell'], bound)}
 

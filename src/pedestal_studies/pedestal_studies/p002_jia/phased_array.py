@@ -359,7 +359,7 @@ def readings(loops: Mapping[str, PaperLoop], target: Floats, rate: Floats | None
 
 def drawings(done: Mapping[PaperLoop, Floats], limit: Mapping[PaperLoop, tuple[int, int]],
              errors: Mapping[str, Floats]) -> Drawings:
-    """Return the figures; arguments as of `steps`, `limits` and `compared_errors`."""
+    """Return the figures; arguments: those of `steps`, `limits` and `compared_errors`."""
     def of(**fixed: float) -> dict[PaperLoop, Floats]:
         return {loop: y for loop, y in done.items() if loop.slope == 1.0
                 and all(getattr(loop, field) == value for field, value in fixed.items())}

@@ -147,7 +147,7 @@ def bandwidth(G: Complexes) -> Hertz:
 
 
 def measures(sigma_a: float, rate_sigma: float) -> Metrics:
-    """Return the metrics of the filter with constant gains; arguments as of `steady_state_matrices`."""
+    """Return the metrics of the filter with constant gains; arguments: those of `steady_state_matrices`."""
     A, B = steady_state_matrices(sigma_a, rate_sigma)
     angle, rate = responses(A, B, RESPONSE_FREQUENCIES_HZ)
     (angle_at_frequency,), _ = responses(A, B, np.array([DYNAMIC_ERROR_FREQUENCY_HZ]))
@@ -233,7 +233,7 @@ def rows(measured: Mapping[str, Metrics], errors: Mapping[str, Pairs]) -> list[R
 
 
 def remarks(measured: Mapping[str, Metrics], errors: Mapping[str, Pairs]) -> list[str]:
-    """Return the sentences that explain the rows; arguments as of `rows`."""
+    """Return the sentences that explain the rows; arguments: those of `rows`."""
     one, twenty, without = (errors[name][:, 0].mean() for name in (*DIFFERENCED_RATES, 'position'))
     largest, slowest = max((measured[name]['largest_eigenvalue'][0], name) for name in measured)
     return [

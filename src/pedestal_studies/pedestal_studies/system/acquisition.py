@@ -148,7 +148,7 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) 
 
 
 def time_figure(values: Mapping[str, Pairs]) -> Figure:
-    """Draw tracked_after_s of every run that found its target; values as of `rows`."""
+    """Draw tracked_after_s of every run that found its target; values: argument of `rows`."""
     figure, axes = fig.new_panels(1, height=3.8, x='time until the target is tracked [s]')
     for name, of_runs in values.items():
         if name != 'steptrack_geo':

@@ -132,7 +132,7 @@ class Pass:
 
 
 def _run(mode: str, on: str, seed: int, duration: Seconds | None) -> Run:
-    """Return the run of a mode, with a step every EVALUATION_PERIOD_S from EVALUATION_START_S on; on: as of
+    """Return the run of a mode, with a step every EVALUATION_PERIOD_S from EVALUATION_START_S on; on: argument of
     `overrides`; duration: None for that of the scenario."""
     chosen = scenario.load(SCENARIO_NAME, [*overrides(mode, on), f'adu.wind.field.seed={seed}'], seed=seed,
                            duration=duration)
@@ -142,14 +142,14 @@ def _run(mode: str, on: str, seed: int, duration: Seconds | None) -> Run:
 
 
 def pass_angles(duration: Seconds | None) -> Pass:
-    """Return the direction along the pass of the scenario; duration as of `_run`."""
+    """Return the direction along the pass of the scenario; duration: argument of `_run`."""
     run = _run('program', NO_TERMS, FIRST_SEED, duration)
     azimuth, elevation = np.degrees(run['joint_states']['position'].T)
     return Pass(run.t, azimuth, elevation)
 
 
 def errors(case: tuple[str, str], run: int, duration: Seconds | None = None) -> Pairs:
-    """Return the errors [deg], cross-elevation and elevation, of one run of a case (mode, on)."""
+    """Return the errors [deg], cross-elevation and elevation, of one run; case: arguments of `overrides`."""
     return np.degrees(_run(*case, FIRST_SEED + run, duration).truth['error'])
 
 

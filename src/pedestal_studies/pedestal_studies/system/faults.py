@@ -394,7 +394,7 @@ def rows(case: str, found: FaultOutcome, mode: str, expected: Expectation) -> li
 
 
 def line(case: str, found: FaultOutcome, mode: str, expected: Expectation, case_rows: Sequence[Row]) -> str:
-    """Return a case in one line: outcome and expectation; arguments as of `rows`, and the rows of the case."""
+    """Return a case in one line: outcome and expectation; arguments: those of `rows`, and the rows of the case."""
     report_text = 'no report' if found.report_steps is None else (
         f'report after {found.report_steps} steps "{found.text}"')
     if found.alarms:

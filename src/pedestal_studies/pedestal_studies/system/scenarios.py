@@ -158,7 +158,7 @@ def flyby_figure() -> Figure:
 
 
 def pointing_figure(values: Mapping[str, Floats]) -> Figure:
-    """Draw the pointing error of every seed, rms to the left and largest to the right; values as of `rows`."""
+    """Draw the pointing error of every seed, rms to the left and largest to the right; values: argument of `rows`."""
     figure, axes = fig.new_panels(1, 2, height=3.8, x=('pointing error, rms [deg]', 'pointing error, largest [deg]'),
                                   sharey=True)
     for panel, metric in zip(axes[0], ('pointing_rms_deg', 'pointing_max_deg')):

@@ -212,7 +212,7 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) 
 
 
 def figure(values: Mapping[str, Floats]) -> Figure:
-    """Draw the pointing error of every seed, divided by the mean of the tuned filter; values as of `rows`."""
+    """Draw the pointing error of every seed, divided by the mean of the tuned filter; values: argument of `rows`."""
     drawn, axes = fig.new_panels(1, height=5.4, x='pointing error over that of the tuned filter')
     for name, of_runs in values.items():
         relative = of_runs / values[f'{name.partition("/")[0]}/tuned'].mean()
