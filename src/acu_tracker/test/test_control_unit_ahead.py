@@ -1,5 +1,6 @@
 """The whole unit through the zenith, past the superstructure, at the end of a long arm, with an INS that aligns."""
 import math
+import re
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph.modes import MODES
 
 BEAMWIDTH = 0.0175
+DAY_NS = 1_795_651_200_000_000_000      # 2026-11-26T00:00:00 UTC
 SLOW = {'azimuth.shaper.rate': 0.1745, 'azimuth.limits.rate': 0.2, 'azimuth.shaper.acceleration': 0.35}
 """10 deg/s."""
 
@@ -115,15 +117,18 @@ def test_a_cancelled_slew_is_announced(Rig):
     rig = Rig(overhead(math.radians(84.6)), at=overhead(math.radians(84.6))(0.0), initial_mode='program', sigma=2e-5,
               **SLOW, **{'tracker.receiver.sigma_floor': 2e-5, 'tracker.lock_count': 20})
     rig.program(start=-2.0, rows=90, target=overhead(math.radians(85.1)))
-    texts = []
+    texts, first = [], ''
     for k in range(round(36.0 / rig.T)):
         rig.receiver_on = k * rig.T > 12.0
         rig.step()
         h = rig.state[0]['guidance']['lookahead']
         if h['forecasts'] > len(texts):
             texts.append(announcement.keyhole(h, rig.params))
-    print(texts)
+            first = first or announcement.keyhole(h, rig.params, DAY_NS)
+    print(texts, first)
     assert rig.mode == 'autotrack' and 'expected loss' in texts[0] and 'cancelled' in texts[-1]
+    times, *_ = texts[0].partition('; expected')
+    assert first.startswith(re.sub(r'\b(\d+\.\d) s\b', lambda t: f'00:00:{float(t[1]):04.1f} UTC', times))
 
 
 def slewing(Rig, **parameters):
@@ -169,8 +174,7 @@ def test_a_mast_hides_the_target(Rig):
     assert (begin, end) == (pytest.approx(4.0, abs=0.2), pytest.approx(32.0 / 3.0, abs=0.2))
     lookahead = rig.state[0]['guidance']['lookahead']
     assert announcement.hidden(lookahead) == f'target hidden from {begin:.1f} s to {end:.1f} s'
-    day = 1_795_651_200_000_000_000             # 2026-11-26T00:00:00 UTC
-    assert announcement.hidden(lookahead, day).startswith(f'target hidden from 00:00:0{begin:.1f} UTC to 00:00:1')
+    assert announcement.hidden(lookahead, DAY_NS).startswith(f'target hidden from 00:00:0{begin:.1f} UTC to 00:00:1')
     rig.run(0.1)
     for _ in range(2):
         errors = pointing_errors(rig, 3.4, lambda deck: not sector[0] <= deck[0] <= sector[1])
