@@ -5,6 +5,7 @@
 Every period the drive sends 'AZIMUTH_RATE ELEVATION_RATE' [rad/s] to the port of the amplifiers. They answer with
 'AZIMUTH ELEVATION AZIMUTH_RATE ELEVATION_RATE' [rad, rad/s] of their encoders.
 """
+import signal
 import socket
 import sys
 import time
@@ -89,6 +90,7 @@ class Drive(Node):
 def main(drive):
     """Run a class of drive on the port of the command line."""
     middleware.initialise()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)      # Ctrl-C ends the program
     rclpy.spin(drive(int(sys.argv[1])))
 
 

@@ -5,6 +5,7 @@
 A datagram is 'CROSS_ELEVATION ELEVATION CN0' in rad, rad, dB-Hz; 'nan nan 20' states that the receiver is not locked.
 """
 import math
+import signal
 import socket
 import sys
 
@@ -49,4 +50,5 @@ class Receiver(Node):
 
 
 middleware.initialise()
+signal.signal(signal.SIGINT, signal.SIG_DFL)      # Ctrl-C also ends a node that waits for a message
 rclpy.spin(Receiver(int(sys.argv[1])))
