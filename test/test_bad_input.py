@@ -47,6 +47,7 @@ COMMAND_LINES = {
     'latitude': (['leo_pass', '--station', '95,8.5,0'], ['target.station.latitude_deg = 95 deg: must be -90 to 90']),
     'pass of a UAV': (['uav_flyby', '--pass', '1'], ['the target of uav_flyby is a flyby, must be a satellite']),
     'pass of an array': (['phased_array_four', '--pass', '1'], ['phased_array_four has 4 beams']),
+    'a file that is no scenario': ([__file__], ['is no scenario, whose file ends in .yaml; a track: pedestal run ']),
     'no file': (['/nowhere/run.yaml'], ['/nowhere/run.yaml: No such file']),
 }
 

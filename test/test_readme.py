@@ -2,6 +2,7 @@
 reason why not; the command lines of docs/ are at least understood."""
 import ast
 import doctest
+import importlib.util
 import os
 import pathlib
 import re
@@ -20,6 +21,7 @@ from pedestal.verbs import design
 from pedestal_bringup.scenario import files, scenario
 from pedestal_common import parameters
 from pedestal_common.geometry.geodesy import StationParameters
+from pedestal_common.graph import nodes
 from pedestal_workbench.trials import plan as trial_plans
 from tracking_receiver_sim.params import LeoPassParameters
 
@@ -100,6 +102,20 @@ def test_the_commands_of_every_page_are_understood(page):
     for line in command_lines((ROOT / page).read_text()):
         if line.startswith('pedestal '):
             parser.parse_args(shlex.split(line.removesuffix(' &'))[1:])
+
+
+@pytest.mark.parametrize('page', PAGES)
+def test_the_programs_of_every_page_exist(page):
+    """A module without a main would do nothing, with exit code 0."""
+    for line in command_lines((ROOT / page).read_text()):
+        program, *arguments = line.split()
+        if program == 'python' and arguments[0] == '-m':
+            found = importlib.util.find_spec(arguments[1])
+            assert found and "__name__ == '__main__'" in pathlib.Path(found.origin).read_text(), line
+        elif program == 'python' and arguments[0].endswith('.py'):
+            assert (ROOT / arguments[0]).is_file(), line
+        elif program.endswith('_node') or arguments[:1] == ['--ros-args']:
+            assert program in nodes.EXECUTABLES, line
 
 
 def documented_changes(text):

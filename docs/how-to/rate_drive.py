@@ -6,6 +6,7 @@ Every period the drive sends 'AZIMUTH_RATE ELEVATION_RATE' [rad/s] to the port o
 'AZIMUTH ELEVATION AZIMUTH_RATE ELEVATION_RATE' [rad, rad/s] of their encoders.
 """
 import argparse
+import signal
 import socket
 import sys
 import time
@@ -94,6 +95,7 @@ def main(drive):
     parser.add_argument('port', type=int, help='UDP port of the amplifiers on 127.0.0.1, 1 to 65535')
     options = parser.parse_args()
     middleware.initialise()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)      # Ctrl-C also ends a node that waits for a message
     rclpy.spin(drive(options.port))
 
 

@@ -5,6 +5,7 @@
 A datagram is 'CROSS_ELEVATION ELEVATION CN0' in rad, rad, dB-Hz; 'nan nan 20' states that the receiver is not locked.
 """
 import argparse
+import signal
 import socket
 
 import rclpy
@@ -53,6 +54,7 @@ def main():
     parser.add_argument('port', type=int, help='UDP port on 127.0.0.1, 1 to 65535')
     options = parser.parse_args()
     middleware.initialise()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)      # Ctrl-C also ends a node that waits for a message
     rclpy.spin(Receiver(options.port))
 
 

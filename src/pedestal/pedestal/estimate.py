@@ -1,6 +1,7 @@
 """The target filter of the control unit on angles of the caller: `pedestal.filter` returns a Filtered."""
 from __future__ import annotations
 
+import datetime
 import math
 import typing
 from collections.abc import Mapping
@@ -84,7 +85,7 @@ def filter(t: ArrayLike, az: ArrayLike, el: ArrayLike, kind: str = 'imm', *, sig
            gap: Seconds | None = None, changes: Mapping[str, Value] | None = None) -> Filtered:
     """Filter measured angles by the compiled laws of the control unit, ashore.
 
-    t         times [s], increasing
+    t         times [s], increasing; dates and durations count from the first one on
     az, el    measured azimuth (clockwise, with or without wraps) and elevation [deg]
     kind      kind of the filter, a row of FILTER_KINDS
     sigma     standard deviation of a measured direction across the line of sight [deg], a number or one per row; that
@@ -105,7 +106,7 @@ def filter(t: ArrayLike, az: ArrayLike, el: ArrayLike, kind: str = 'imm', *, sig
     if kind not in FILTER_KINDS:
         hint = did_you_mean(str(kind), FILTER_KINDS)
         raise ValueError(f'kind = {kind!r}:{hint} must be one of {", ".join(FILTER_KINDS)}')
-    times = _numbers('t', t, -1e11, 1e11, 's', None)
+    times = _numbers('t', _seconds(t), -1e11, 1e11, 's', None)
     steps = np.diff(times)
     if len(times) < 2 or steps.min() <= 0.0:
         k = int(np.argmin(steps)) if len(steps) else 0
@@ -131,6 +132,16 @@ def filter(t: ArrayLike, az: ArrayLike, el: ArrayLike, kind: str = 'imm', *, sig
                      **{f'{axis}.measured': measured[:, i] for i, axis in enumerate(AXES)},
                      **{f'{axis}.{column}': estimates[:, i, j] for i, axis in enumerate(AXES)
                         for j, column in enumerate(COLUMNS)}}, UNITS)
+
+
+def _seconds(t: ArrayLike) -> ArrayLike:
+    """Return the times; dates and durations, of numpy, pandas or datetime, as seconds from the first one on."""
+    dates = np.asarray(t)
+    if dates.dtype.kind in 'mM':
+        return (dates - dates[:1]) / np.timedelta64(1, 's')
+    if dates.dtype.kind == 'O' and dates.ndim == 1 and all(isinstance(date, datetime.datetime) for date in dates):
+        return [(date - dates[0]).total_seconds() for date in dates]
+    return t
 
 
 def _numbers(name: str, values: ArrayLike, low: float, high: float, unit: str, like: Floats | None) -> Floats:

@@ -84,7 +84,8 @@ class PassSelection:
                     f'{_azimuth(p.set_azimuth)}{", under way now" if p.under_way and p.begin == self.now else ""}')
             # Whole seconds from the start to the set, rounded up: the negative of the floor of the negative.
             duration = duration or -((start - (p.set or start)) // datetime.timedelta(seconds=1))
-        return [f'tracking_receiver.target.leo_pass.start_time="{start.isoformat()}Z"'], duration, line
+        return [f'tracking_receiver.target.leo_pass.start_time="{start.isoformat()}Z"',
+                f'scenario.title="a pass of satellite {self.satellite.number}"'], duration, line
 
 
 def _azimuth(degrees: float) -> str:

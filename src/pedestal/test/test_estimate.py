@@ -1,4 +1,5 @@
 """`pedestal.filter`: filterpy's filter, the bits of the control unit, wraps, gaps, rejected rows, wrong arguments."""
+import datetime
 import math
 
 import numpy as np
@@ -103,6 +104,18 @@ def test_long_gaps_outliers_and_a_wrong_sigma_are_reported():
         assert f'azimuth {mean[0]:.2f}, elevation {mean[1]:.2f}, expected 1 +- 0.1' in made.verdict
     panels = made.plot().axes
     assert len(panels) == 6 and all(axes.lines for axes in panels)
+
+
+@pytest.mark.parametrize('of', [
+    lambda t: np.datetime64('2026-11-29T10:00', 'ms') + np.round(1000.0 * t).astype('timedelta64[ms]'),
+    lambda t: np.round(1000.0 * t).astype('timedelta64[ms]'),
+    lambda t: [datetime.datetime(2026, 11, 29, 10, tzinfo=datetime.timezone.utc) + datetime.timedelta(seconds=second)
+               for second in t]], ids=['dates', 'durations', 'datetimes with a zone'])
+def test_dates_count_in_seconds_from_the_first(of):
+    t, A, E = measured()
+    made, of_dates = (pedestal.filter(times, A, E, sigma=SIGMA) for times in (t, of(t)))
+    assert of_dates['t'] == pytest.approx(t - t[0], abs=1e-9)
+    assert of_dates['azimuth.rate'] == pytest.approx(made['azimuth.rate'], abs=1e-9)
 
 
 @pytest.mark.every_case

@@ -50,8 +50,8 @@ class Report:
     made: str   # origin of the bag, one line
     end: Nanoseconds    # time of the last step
     planned_end: Nanoseconds | None     # time of the planned last step, None if unknown
-    # number of lost steps and number of all steps in the last diagnostics of the drive, None if unknown
-    lost: tuple[int, int] | None
+    # in the last diagnostics of the drive, '' without any; 'of N' if its N steps are not more than `steps`
+    lost_steps: str
     foreign: list[str]  # lines about the foreign messages, which the check leaves out
     cut: Seconds | None     # time at which a recording of only a part of its run begins; None for a whole run
 
@@ -79,11 +79,6 @@ class Report:
             return (f'part of a run: {self.cut:.6f} s to {self.end / 1e9:.6f} s; planned end '
                     f'{self.planned_end / 1e9:.6f} s')
         return f'aborted: ends at {self.end / 1e9:.6f} s, planned end {self.planned_end / 1e9:.6f} s'
-
-    @property
-    def lost_steps(self) -> str:
-        """Lost steps of the drive as text, '' without any."""
-        return '{} of {}'.format(*self.lost) if self.lost and self.lost[0] else ''
 
     @property
     def loss(self) -> str:
@@ -167,7 +162,7 @@ def verify(bag: Bag) -> Report:
     planned = planned - bag.start if of_steps and planned is not None else None
     return Report(str(bag.path), checks, bag.breaks + problems, grid.steps,
                   grid.period / 1e9 if grid.period else np.nan, configuration.line(bag), grid.last, planned,
-                  None if lost is None or of_all is None else (lost, of_all), bag.foreign,
+                  f'{lost}{f" of {of_all}" if of_all <= grid.steps else ""}' if lost and of_all else '', bag.foreign,
                   grid.first / 1e9 if before else None)
 
 

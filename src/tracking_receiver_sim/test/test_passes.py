@@ -70,6 +70,7 @@ def test_a_pass_is_named_by_number_by_utc_or_as_next():
     ('0', 0, '--pass 0: there are 2. passes above 10 deg within 5 days of 2019-12-09T16:38:29Z'),
     ('99', 0, '--pass 99: there are'),
     ('soon', 0, "--pass = 'soon': must be UTC as ISO 8601"),
+    ('tonight', 0, '; or next, list, or a number of the list'),
     ('2026-01-01', 0, '--pass 2026-01-01: 2214.3 days from the TLE epoch')])
 def test_a_pass_that_is_not_there(which, days, message):
     with pytest.raises(orbit.TargetError, match=message):

@@ -241,7 +241,7 @@ def test_broken_track_files(tmp_path):
         assert '\n' not in str(raised.value)
         return str(raised.value)
 
-    assert 'track_file.path is empty' in message('')
+    assert 'track_file.path is empty: give --param tracking_receiver.target.track_file.path=FILE' in message('')
     assert 'No such file' in message(tmp_path / 'none.csv')
     assert 'not a regular file' in message(tmp_path)
     assert "column 'altitude_m' is missing" in message(

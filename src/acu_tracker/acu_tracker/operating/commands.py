@@ -127,8 +127,10 @@ def reset(unit: 'Acu') -> Reply:
         unit.reset_stamp = float(unit.parts['state']['stamp'])
     if cause != annunciator.NO_ALARM:
         return Reply(False, f'refused: the cause of {table.ALARM_NAMES[cause]} is still there')
-    drive = f'; the drive reports {unit.drive_state}'
-    return Reply(True, 'cleared' + (drive if unit.drive_state.startswith(('fault', 'emergency stop')) else ''))
+    if unit.drive_state.startswith('fault'):
+        return Reply(True, f'cleared; requests the reset of the drive, which reported {unit.drive_state}')
+    stopped = unit.drive_state.startswith('emergency stop')
+    return Reply(True, 'cleared' + ('; the drive reports emergency stop: only adu/reset_faults ends it' * stopped))
 
 
 def _rates(arguments: Arguments) -> list[RadiansPerSecond]:

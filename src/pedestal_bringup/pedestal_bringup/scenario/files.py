@@ -32,6 +32,10 @@ def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
     name = str(name_or_path)
     entry = shipped.folder() / f'{name}.yaml'
     if not entry.is_file():
+        if path.is_file():
+            raise ScenarioError(f'{name!r} is no scenario, whose file ends in .yaml; a track: pedestal run track_file '
+                                f'--param tracking_receiver.target.track_file.path={name}; elements: pedestal run '
+                                f'leo_pass --tle {name}')
         names = list(shipped.available())
         raise ScenarioError(f'unknown scenario {name!r};{parameters.did_you_mean(name, names)} there are '
                             f'{", ".join(names)} (or give a path that ends in .yaml)')

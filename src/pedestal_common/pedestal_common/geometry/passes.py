@@ -149,7 +149,10 @@ def chosen_pass(satrec: Satellite, station: StationParameters, which: str, now: 
             raise TargetError(f'--pass {which}: there are {len(found)} passes above {MIN_CULMINATION_DEG:g} deg '
                               f'within {SEARCH_DAYS:g} days of {begin:%Y-%m-%dT%H:%M:%SZ}')
         return found[number - 1]
-    when = orbit.instant('--pass', which)
+    try:
+        when = orbit.instant('--pass', which)
+    except TargetError as error:
+        raise TargetError(f'{error}; or next, list, or a number of the list') from None
     epoch = orbit.calendar(satrec.jdsatepoch, satrec.jdsatepochF)
     age = (when - epoch).total_seconds() / SECONDS_PER_DAY
     if abs(age) > orbit.MAX_TLE_AGE_DAYS:

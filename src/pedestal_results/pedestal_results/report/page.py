@@ -250,7 +250,8 @@ def _provenance_table(bag: bags.Bag, run: RecordedRun, author: str) -> str:
     duration = (stamps.max() - stamps.min()) / 1e9 if stamps.size else 0.0
     versions = ', '.join(f'{key.removeprefix("version.")} {value}' for key, value in bag.metadata.items()
                          if key.startswith('version.'))
-    rows = [[key, value] for key, value in bag.metadata.items() if not key.startswith(('version.', 'beamwidth'))]
+    rows = [[key, value] for key, value in bag.metadata.items()
+            if not key.startswith(('version.', 'beamwidth', 'planned_end'))]
     rows = [*([['author', author]] if author else []), ['date of the run', subject.date(bag)],
             *subject.rows(bag, run), *rows, ['duration', f'{duration:g} s'],
             ['software versions', versions or 'not in the bag'],

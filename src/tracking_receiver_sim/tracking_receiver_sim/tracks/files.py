@@ -88,7 +88,8 @@ DERIVED_PARAMETERS = (*flight.STATION_FIELDS, 'receiver.reference_range', 'durat
 def read(track: TrackFileParameters) -> tuple[FileKind, Data]:
     """Return (kind, data) of a track file. Raises csv_table.TableError."""
     if not track.path:
-        raise csv_table.TableError('track_file.path is empty: must name a file of one of the formats '
+        raise csv_table.TableError('track_file.path is empty: give --param '
+                                   'tracking_receiver.target.track_file.path=FILE, a file of one of the formats '
                                    + ', '.join(form.name for form in FILE_FORMATS))
     with csv_table.stream(track.path) as stream:
         beginning = files.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
