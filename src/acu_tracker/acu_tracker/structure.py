@@ -25,6 +25,7 @@ A bank weighs its models, so the gain of the loop may also be smaller. The margi
 k L from -1 on the imaginary axis for any k from 0 to 1. A loop with a margin above 0 is stable for each such k.
 """
 import dataclasses
+import itertools
 import math
 from typing import TYPE_CHECKING
 
@@ -115,34 +116,38 @@ def bandwidths(filter_params: 'FilterParameters', receiver: 'ReceiverModelParame
     return [(imm.ca.noise * imm.rung_ratio**rung / density)**(1.0 / 3.0) for rung in range(imm.rungs)]
 
 
-def usable_rungs(params: 'AcuParameters', name: str) -> int:
-    """Return the number of models ca of the ladder that an axis can use: those up to the last one with MIN_MARGIN, and
-    at least one."""
+def rungs_with_margin(params: 'AcuParameters', name: str) -> int:
+    """Return the number of models ca of an axis up to the last one with MIN_MARGIN; all of them on a rigid axis."""
     axis = getattr(params, name)
     if axis.structure.inertia_share == 0.0 or axis.controller == 'beam' or not FILTER_KINDS[axis.filter.kind].ladder:
         return axis.filter.imm.rungs
-    rungs = 0
-    for bandwidth in bandwidths(axis.filter, params.tracker.receiver):
-        if margin(params, name, bandwidth) < MIN_MARGIN:
-            break
-        rungs += 1
-    return max(rungs, 1)
+    return sum(1 for _ in itertools.takewhile(lambda bandwidth: margin(params, name, bandwidth) >= MIN_MARGIN,
+                                              bandwidths(axis.filter, params.tracker.receiver)))
 
 
 def filters(params: 'AcuParameters') -> 'list[FilterParameters]':
-    """Return the filters of both axes, with their usable models."""
-    given = [(getattr(params, name).filter, usable_rungs(params, name)) for name in AXES]
-    return [dataclasses.replace(own, imm=dataclasses.replace(own.imm, rungs=rungs)) for own, rungs in given]
+    """Return the filters of both axes with the models ca that have the margin, and at least one model ca."""
+    made = []
+    for name in AXES:
+        own = getattr(params, name).filter
+        rungs = max(1, rungs_with_margin(params, name))
+        made.append(dataclasses.replace(own, imm=dataclasses.replace(own.imm, rungs=rungs)))
+    return made
 
 
 def remarks(params: 'AcuParameters') -> list[str]:
     """Return a line on the axes whose filter cannot use all its models; no line if there is none."""
-    limited = []
+    limited: list[str] = []
+    none: list[str] = []
     for name in AXES:
-        axis, rungs = getattr(params, name), usable_rungs(params, name)
+        axis, rungs = getattr(params, name), rungs_with_margin(params, name)
         if rungs < axis.filter.imm.rungs:
-            limited.append(f'{name} {rungs} of {axis.filter.imm.rungs} ({axis.structure.frequency:g} Hz)')
+            limited.append(f'{name} {max(1, rungs)} of {axis.filter.imm.rungs} (structure of '
+                           f'{axis.structure.frequency:g} Hz)')
+        if rungs == 0:
+            none.append(name)
     if not limited:
         return []
-    return [f'models ca of the filter in use: {", ".join(limited)}; the loop through a faster one would swing the '
-            'structure; `pedestal tune --loops` finds loops for it']
+    why = (f'{" and ".join(none)} may swing with any of them; run `pedestal tune --loops`' if none else
+           'a faster model would swing the structure')
+    return [f'models ca of the filter in use: {", ".join(limited)}; {why}']
