@@ -22,7 +22,9 @@ G                acceleration that the loops of the axis make of an error of 1 r
 X                1, or under `adrc` the part of a disturbance that the observer leaves, 1 - w_o^3 / (s + w_o)^3
 
 A bank weighs its models, so the gain of the loop may also be smaller. The margin is therefore the smallest distance of
-k L from -1 on the imaginary axis for any k from 0 to 1. A loop with a margin above 0 is stable for each such k.
+k L from -1 on the imaginary axis for any k from 0 to 1. A loop with a margin above 0 is stable for each such k. A
+model is usable with MIN_MARGIN, if its bandwidth also stays below the structure by MIN_FREQUENCY_RATIO: a faster model
+amplifies gusts below the resonance.
 """
 import dataclasses
 import itertools
@@ -42,8 +44,9 @@ if TYPE_CHECKING:
     from acu_tracker.estimation.params import FilterParameters, ReceiverModelParameters
     from acu_tracker.params import AcuParameters, AxisParameters
 
-MIN_MARGIN = 0.6
-"""Smallest margin of a usable model [-]. A loop at this distance from -1 amplifies a disturbance by 1.7 at most."""
+MIN_MARGIN, MIN_FREQUENCY_RATIO = 0.53, 8.0
+"""Smallest margin of a usable model [-], with which the loop amplifies a disturbance by 1.9 at most; smallest ratio of
+the frequency of the structure to the bandwidth of a usable model [-]."""
 
 SPEED_INTEGRAL_RATIO = 5.0  # ratio of the gains K_p w_s and K_i of the drive's speed loop (tuning.loops) [-]
 
@@ -117,11 +120,12 @@ def bandwidths(filter_params: 'FilterParameters', receiver: 'ReceiverModelParame
 
 
 def rungs_with_margin(params: 'AcuParameters', name: str) -> int:
-    """Return the number of models ca of an axis up to the last one with MIN_MARGIN; all of them on a rigid axis."""
+    """Return the number of models ca of an axis up to the last usable one; all of them on a rigid axis."""
     axis = getattr(params, name)
     if axis.structure.inertia_share == 0.0 or axis.controller == 'beam' or not FILTER_KINDS[axis.filter.kind].ladder:
         return axis.filter.imm.rungs
-    return sum(1 for _ in itertools.takewhile(lambda bandwidth: margin(params, name, bandwidth) >= MIN_MARGIN,
+    highest = 2.0 * math.pi * axis.structure.frequency / MIN_FREQUENCY_RATIO
+    return sum(1 for _ in itertools.takewhile(lambda b: b <= highest and margin(params, name, b) >= MIN_MARGIN,
                                               bandwidths(axis.filter, params.tracker.receiver)))
 
 

@@ -53,7 +53,7 @@ MAX_POINTING_RATIO = 1.05  # of the default filter over the one before
 
 
 def tracked(name: str, number: int) -> tuple[float, float]:
-    """Return (time in autotrack after its begin [%], settled pointing error, rms [deg]) of one run of one of CASES. The
+    """Return (time in autotrack after its begin [%], settled rms pointing error [deg]) of a run of one of CASES. The
     error is NaN if autotrack ended."""
     seed = FIRST_SEED + number
     run = closed_loop.Loop(CASES[name].with_({'adu.wind.gust.seed': seed}, seed=seed).load()).run()

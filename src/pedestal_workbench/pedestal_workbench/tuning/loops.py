@@ -23,7 +23,8 @@ The feed-forward takes J_A and the friction of the load. A required crossover of
 w_s / 8.
 
 A declared structure swings with the frequency f on locked motors. The receiver sees this swing as a motion of the
-target, and the shaper must not excite it. docs/develop/decisions.md states the design for f and its reasons. Of both
+target, and the shaper must not excite it. docs/develop/decisions.md states the design for f and its reasons. The
+control unit gets f, and limits the models of its filter by it (acu_tracker.structure). Of both
 designs the smaller value counts, of h0 the larger. The margins are then measured with the structure in the plant, and
 again in all PLANT_CORNERS, within the ranges of these parameters. The smallest margins count.
 """
