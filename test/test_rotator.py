@@ -81,6 +81,7 @@ def test_a_control_unit_names_at_its_start_what_the_file_does_not_state(start_pr
     assert 'ready, waits for' in said and 'acu.azimuth.limits' not in said      # the file states the travel
 
 
+@pytest.mark.thorough
 def test_a_control_unit_of_a_real_drive_names_the_models_that_its_structure_does_not_allow(start_process,
                                                                                             reserve_domain):
     structure = ('azimuth.structure.inertia_share:=0.5', 'azimuth.structure.frequency:=8.0')
