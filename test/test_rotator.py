@@ -81,6 +81,21 @@ def test_a_control_unit_names_at_its_start_what_the_file_does_not_state(start_pr
     assert 'ready, waits for' in said and 'acu.azimuth.limits' not in said      # the file states the travel
 
 
+@pytest.mark.thorough
+def test_a_control_unit_of_a_real_drive_names_the_models_that_its_structure_does_not_allow(start_process,
+                                                                                            reserve_domain):
+    structure = ('azimuth.structure.inertia_share:=0.5', 'azimuth.structure.frequency:=8.0')
+    process = start_process([*NODE, 'acu_node', '--ros-args',
+                             *(part for text in ('graph.nodes:=acu,adu', *structure) for part in ('-p', text))],
+                            ROS_DOMAIN_ID=str(reserve_domain()))
+    said = ''
+    while 'ready, waits for' not in said and (line := process.stderr.readline()):
+        said += line
+    assert ('models ca of the filter in use: azimuth 4 of 6 (structure of 8 Hz); a faster model would swing the '
+            'structure' in said), said
+    assert 'acu.azimuth.structure' not in said and 'acu.elevation.structure.*: the defaults; set them to' in said
+
+
 def ask(client, verb, **arguments):
     """Command the control unit, and wait until it grants the command."""
     assert (reply := asked(client, verb, **arguments)).granted, reply

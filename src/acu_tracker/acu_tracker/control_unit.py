@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from acu_tracker import modes, signals, tracking
+from acu_tracker import modes, signals, structure, tracking
 from acu_tracker.alarms import annunciator, conditions
 from acu_tracker.estimation import monitors, receiver_error, target
 from acu_tracker.estimation.filters import target_filter
@@ -82,7 +82,7 @@ def constants(params: AcuParameters) -> Records:
     made['axis'] = np.concatenate([axis_constants(position_loop.slowed(axis, params.command_delay), params.period,
                                                   params.reaction) for axis in axes])
     made['floor'] = travel.floor_table(params.floor)
-    made['target'] = target.constants(params.tracker, [axis.filter for axis in axes])
+    made['target'] = target.constants(params.tracker, structure.filters(params))
     made['lookahead'] = planner.constants(params)
     return made
 

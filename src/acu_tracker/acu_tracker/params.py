@@ -32,6 +32,7 @@ from pedestal_common.graph.graph_parameters import topic_flags
 from pedestal_common.graph.modes import MODES
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter, text
 from pedestal_common.quantities import Seconds
+from pedestal_common.structure import StructureParameters
 from pedestal_common.wire.commands import SCHEDULE_DOC, schedule
 
 
@@ -41,6 +42,7 @@ class AxisParameters(Parameters):
 
     stow: float = parameter(0.0, -20.0, 20.0, 'rad', 'encoder angle in mode stow')
     preset: float = parameter(0.0, -20.0, 20.0, 'rad', 'deck angle on the sky in mode preset before the first command')
+    structure: StructureParameters = group(StructureParameters)
     filter: FilterParameters = group(FilterParameters)
     controller: str = choice('feedforward', CONTROLLERS, 'law of the position loop, changeable at run time; '
                              'beam is for an electronic array, and an array allows no other')
@@ -146,6 +148,14 @@ class AcuParameters(SharedParameters):
         dx/dt = -f(x(t - tau)). With f <= x / (e tau) the axis does not overshoot.
         """
         return math.e * (self.command_delay + 2.0 * self.period)
+
+    def remarks(self) -> list[str]:
+        """Return the line on the models that the filters cannot use on a flexible structure."""
+        if self.azimuth.structure.inertia_share == self.elevation.structure.inertia_share == 0.0:
+            return []
+        # Imported late, because its laws take half a second to import.
+        from acu_tracker import structure
+        return structure.remarks(self)
 
     def _check_travel(self) -> None:
         for name in ('azimuth', 'elevation'):

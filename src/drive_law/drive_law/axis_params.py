@@ -8,6 +8,7 @@ import math
 
 from pedestal_common.parameters import ParameterError, Parameters, choice, group, parameter
 from pedestal_common.quantities import KilogramMeters2, Radians, RadiansPerSecond
+from pedestal_common.structure import StructureParameters
 
 SPEED_LOOP_PERIOD_S = 0.5e-3  # period of the speed loop, five periods of the current loop [s]
 PLANT_PERIOD_S = 50e-6  # step of the simulated plant, half a period of the current loop [s]
@@ -118,15 +119,6 @@ class LoadParameters(Parameters):
     inertia: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'inertia about the axis')
     viscous: float = parameter(20.0, 0.0, 1e6, 'Nms/rad', 'viscous friction')
     unbalance: float = parameter(0.0, -1e5, 1e5, 'Nm', 'gravity torque at angle 0; positive: towards negative angles')
-
-
-@dataclasses.dataclass(frozen=True)
-class StructureParameters(Parameters):
-    """Flexible structure: the dish swings on the rest of the load, to which gear and encoder are attached."""
-    inertia_share: float = parameter(0.0, 0.0, 0.9, '', 'share of the dish in the load inertia; 0: rigid; if above 0, '
-                                   '`pedestal tune --loops` finds loops and filter')
-    frequency: float = parameter(12.0, 1.0, 200.0, 'Hz', 'frequency of the dish on a locked base')
-    damping: float = parameter(0.01, 0.0, 1.0, '', 'damping ratio of the dish on a locked base')
 
 
 @dataclasses.dataclass(frozen=True)

@@ -90,6 +90,11 @@ class Parameters:
         if lockstep and self.REALTIME_ONLY:
             raise ParameterError(f'graph.pacing = lockstep: must be realtime{self.REALTIME_ONLY}')
 
+    def remarks(self) -> list[str]:
+        """Return the lines that a user reads at the start on parameters without their full effect; overridden where
+        there are such parameters."""
+        return []
+
 
 AnyParameters: typing.TypeAlias = typing.Any    # instance of a parameter class that the node determines
 _P = typing.TypeVar('_P', bound=Parameters)

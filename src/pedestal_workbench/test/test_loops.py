@@ -1,11 +1,9 @@
 """`pedestal tune --loops`: the design against the drive as it comes, margins measured on the plant, refusals."""
-import dataclasses
 import math
 import re
 
 import pytest
 
-from acu_tracker.estimation.params import FilterParameters
 from pedestal_bringup.loop import memory_recording
 from pedestal_bringup.scenario import files, scenario
 from pedestal_bringup.scenario.variant import Variant
@@ -138,29 +136,19 @@ def test_the_shaper_of_a_flexible_dish_leaves_no_swing():
         assert max(map(abs, after)) < swing * a / w**2
 
 
-def test_a_flexible_dish_gets_the_models_that_do_not_follow_its_swing():
-    """Noise 1 deg / (1.6 sqrt(2 C/N0)); the bandwidth (q / r)^(1/3) of the last model is below 2 pi f / 7, that of the
-    next above it. A rigid dish keeps all models."""
-    noise = loops.receiver_noise(math.radians(1.0), 1.6, 46.4)
-    assert math.degrees(noise) == pytest.approx(1.0 / (1.6 * math.sqrt(2.0 * 10**4.64)))
-    axis, bank = loops.Loops(Variant('leo_pass')).plants['azimuth'].axis, FilterParameters().imm
-    assert loops.filter_gains(loops.Plant('azimuth', axis, noise=noise)) == {}
-    for frequency in (2.0, 4.0, 8.0):
-        structure = dataclasses.replace(axis.structure, inertia_share=0.4, frequency=frequency)
-        flexible = loops.Plant('azimuth', dataclasses.replace(axis, structure=structure), noise=noise)
-        rungs = loops.filter_gains(flexible)['filter.imm.rungs']
-        last, following = ((bank.ca.noise * bank.rung_ratio**k / noise)**(1.0 / 3.0) for k in (rungs - 1, rungs))
-        assert last <= 2.0 * math.pi * frequency / 7.0 < following and 1 < rungs < bank.rungs
-
-
-def test_the_models_of_a_scenario_count_with_its_own_white_jerk():
-    """A first model with 5.2 times the default white jerk leaves room for one model fewer."""
-    structure = [f'adu.azimuth.structure.{key}' for key in ('inertia_share=0.4', 'frequency=4.0')]
-    count = lambda *more: loops.filter_gains(loops.Loops(Variant('leo_pass', (*structure, *more))).plants[  # noqa: E731
-        'azimuth'])['filter.imm.rungs']
-    noise = FilterParameters().imm.ca.noise
-    assert count(f'acu.azimuth.filter.imm.ca.noise={5.2 * noise}') == count() - 1
-    assert count('acu.azimuth.filter.imm.rungs=1') == count()
+def test_the_control_unit_gets_the_structure_and_the_speed_loop_of_the_design():
+    """By these it decides which models its filter may use. A speed loop of the gear's inertia alone is slower with the
+    whole axis. A rigid dish has no structure to state."""
+    plant = loops.Loops(Variant('leo_pass').with_({'adu.azimuth.structure.inertia_share': 0.4,
+                                                   'adu.azimuth.structure.frequency': 4.0})).plants['azimuth']
+    gains = loops.control_gains(plant, 100.0, 10.0)
+    assert {key: value for key, value in gains.items() if key.startswith('structure.')} == {
+        'structure.inertia_share': 0.4, 'structure.frequency': 4.0, 'structure.damping': 0.01}
+    K_p = loops.drive_gains(plant, 100.0)['speed_loop.proportional']
+    assert gains['adrc.rate_bandwidth'] == pytest.approx(K_p / plant.inertia)
+    rigid = loops.control_gains(loops.Loops(Variant('leo_pass')).plants['azimuth'], 100.0, 10.0)
+    assert not any('structure' in key or 'filter' in key for key in rigid)
+    assert rigid['adrc.rate_bandwidth'] == pytest.approx(100.0)
 
 
 def test_the_design_is_that_of_a_rigid_drive():

@@ -121,6 +121,8 @@ class ReceiverModelParameters(Parameters):
     beamwidth: float = parameter(0.0175, 1e-5, 1.0, 'rad', '3 dB beamwidth theta3 of the sum pattern')
     slope: float = parameter(1.6, 0.1, 10.0, '', 'monopulse slope k_m: difference over sum per beamwidth')
     integration: float = parameter(0.005, 1e-6, 10.0, 's', 'integration time tau of one measured error')
+    cn0_dbhz: float = parameter(46.4, 0.0, 120.0, 'dB-Hz', 'largest C/N0, with which the filter is fastest; has an '
+                                'effect with a flexible structure only')
     sigma_floor: float = parameter(2e-6, 1e-9, 0.1, 'rad', 'error that does not depend on C/N0 (encoder, phase)')
     noise_bandwidth: float = parameter(0.0, 0.0, 1000.0, 'Hz', 'bandwidth of the first-order lag that filtered the '
                                        'noise; 0: white noise')

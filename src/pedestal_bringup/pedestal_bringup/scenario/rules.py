@@ -20,6 +20,7 @@ from pedestal_common import parameters
 from pedestal_common.geometry.geodesy import STATION_NAMES
 from pedestal_common.graph import nodes, topics
 from pedestal_common.quantities import Seconds, Value
+from pedestal_common.structure import StructureParameters
 
 if typing.TYPE_CHECKING:
     from pedestal_hardware.monopulse.params import MonopulseParameters
@@ -32,9 +33,12 @@ SHARED_PARAMETERS = (
     ('tracking_receiver', 'antenna.beamwidth', 'acu', 'tracker.receiver.beamwidth'),
     ('tracking_receiver', 'antenna.slope', 'acu', 'tracker.receiver.slope'),
     ('tracking_receiver', 'antenna.beamwidth', 'recorder', 'beamwidth'),
+    ('tracking_receiver', 'receiver.cn0_dbhz', 'acu', 'tracker.receiver.cn0_dbhz'),
     ('tracking_receiver', 'receiver.cn0_time_constant', 'acu', 'acquisition.time_constant'),
     ('ins', 'latency', 'acu', 'attitude_latency'),
     ('ship_motion', 'imu.output', 'ins', 'imu_output'),
+    *(('adu', key, 'acu', key) for axis in topics.AXES for field in dataclasses.fields(StructureParameters)
+      for key in (f'{axis}.structure.{field.name}',)),
     *(('tracking_receiver', f'lever_arm.{axis}', 'acu', f'lever_arm.{axis}') for axis in 'xyz'),
     ('tracking_receiver', 'blockage', 'acu', 'blockage'),
     ('tracking_receiver', 'target.leo_pass.start_time', 'acu', 'prediction.start_time'),

@@ -180,6 +180,7 @@ def checked(new_draft: Draft, seed: int | None = None, duration: Seconds | None 
             raise ScenarioError('; '.join((str(error), *notes))) from None
         with errors_named(f'scenario {name}, {node}'):
             node_parameters.check_graph(header.graph_beams, header.pacing == 'lockstep')
+        notes += tuple(f'{node}: {line}' for line in node_parameters.remarks())
         typed = parameters.as_dict(node_parameters)
         sections[node] = {key: typed.get(key, value) for key, value in values.items()}
     return Scenario(name, header, sections, notes)

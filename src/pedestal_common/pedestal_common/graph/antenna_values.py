@@ -21,6 +21,8 @@ ANTENNA_VALUES: Mapping[str, Mapping[str, str]] = {
         **{f'{axis}.{name}': value for axis in AXES for name, value in (
             ('limits.low', 'the travel that the cables allow'), ('limits.high', 'the travel that the cables allow'),
             ('limits.rate', 'the largest rate of the drive'), ('stow', 'the angle at which the antenna is stowed'))},
+        **{f'{axis}.structure.*': 'the slowest swing of the dish on locked motors; without it the axis counts as rigid'
+           for axis in AXES},
         'floor': 'the horizon mask, the lowest elevation over the azimuth',
         'blockage': 'the sectors that are hidden from the antenna',
         'command_delay': 'the time from a command to its effect',

@@ -192,11 +192,12 @@ class Shell(Node):
             self.add_post_set_parameters_callback(self._post_set)
 
     def antenna_lines(self) -> Iterable[str]:
-        """Return the lines on the values for an antenna that are not given; none in a simulated graph."""
+        """Return the lines on the values for an antenna that are not given, and the remarks on the parameters; none in
+        a simulated graph."""
         if self.graph.lockstep or self.graph.simulated:
             return ()
-        return antenna_values.lines(self.get_name(), self.parameters, self._parameter_overrides, self.graph.members,
-                                    is_clock_synchronised())
+        return (*antenna_values.lines(self.get_name(), self.parameters, self._parameter_overrides, self.graph.members,
+                                      is_clock_synchronised()), *self.parameters.remarks())
 
     def _declare_all(self, values: Mapping[str, Value], fields: Iterable[tuple[str, parameters.Field]],
                      live: Sequence[str]) -> None:

@@ -101,8 +101,7 @@ def _plant(sheet: DataSheet, name: str, values: Mapping[str, float]) -> 'Plant':
     from pedestal_workbench.tuning import loops
     known = getattr(AduParameters(), name)
     try:
-        return loops.Plant(name, build(type(known), {**as_dict(known), **values}), beamwidth=sheet.theta,
-                           noise=loops.receiver_noise(sheet.theta, _receiver(sheet.like).antenna.slope, cn0(sheet)))
+        return loops.Plant(name, build(type(known), {**as_dict(known), **values}), beamwidth=sheet.theta)
     except ParameterError as error:
         raise ParameterError(f'adu.{name}: {error}') from None
 
@@ -242,8 +241,8 @@ def _new(sheet: DataSheet, name: str, command: str, station: Mapping[str, float]
     found = sections(sheet, title, station)
     tune = shlex.join(('pedestal', 'tune', f'{name}.yaml', '--loops'))
     run = Variant(f'{name}.yaml', files=(f'{name}-loops.yaml',)).command()
+    remarks += scenario.parse(name, parameter_file.text(found)).notes
     content = text(found, [*parameter_file.origin(command), 'Values that are not in the data sheet are scaled from '
                            'the antenna of the product: replace them by known values.',
                            f'Next: {tune}, then {run}', *remarks])
-    scenario.parse(name, content)
     return content, remarks

@@ -23,7 +23,8 @@ The feed-forward takes J_A and the friction of the load. A required crossover of
 w_s / 8.
 
 A declared structure swings with the frequency f on locked motors. The receiver sees this swing as a motion of the
-target, and the shaper must not excite it. docs/develop/decisions.md states the design for f and its reasons. Of both
+target, and the shaper must not excite it. docs/develop/decisions.md states the design for f and its reasons. The
+control unit gets f, and limits the models of its filter by it (acu_tracker.structure). Of both
 designs the smaller value counts, of h0 the larger. The margins are then measured with the structure in the plant, and
 again in all PLANT_CORNERS, within the ranges of these parameters. The smallest margins count.
 """
@@ -35,13 +36,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acu_tracker.estimation.params import FilterParameters, ImmParameters
 from drive_law.axis_params import SPEED_LOOP_PERIOD_S, AxisParameters
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common import parameters
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import (
-    DecibelHertz,
     Decibels,
     Degrees,
     Hertz,
@@ -72,9 +71,9 @@ CLOSED_TEETH_SHARE = 0.5
 """Share of the torque limit that the shaper uses on a flexible structure [-]. Above this torque (`bias.out`) no bias
 torque keeps the teeth in contact."""
 
-MODE_H0, MODE_RATIO, FILTER_RATIO = 0.8, 3.0, 7.0
-"""h0 of the shaper times the frequency of the structure; smallest ratios of this frequency to the crossover of the
-position loop and to the bandwidth of the target filter [-]."""
+MODE_H0, MODE_RATIO = 0.8, 3.0
+"""h0 of the shaper times the frequency of the structure; smallest ratio of this frequency to the crossover of the
+position loop [-]."""
 
 PLANT_CORNERS = tuple((inertia, mode) for inertia in (0.7, 1.3) for mode in (0.8, 1.2))
 """Factors (of the load inertia, of the frequency of the structure) with which the loops must also have their margins
@@ -116,8 +115,6 @@ class Plant:
     axis: AxisParameters
     wind: NewtonMeters = 0.0        # mean wind torque at the load
     beamwidth: Radians = math.inf   # half-power beamwidth of the antenna
-    noise: float = math.inf         # root density of the receiver's noise on the beam axis [rad/sqrt(Hz)]
-    bank: ImmParameters = FilterParameters().imm    # of the axis's filter
 
     def __post_init__(self) -> None:
         if self.acceleration <= 0.0:
@@ -164,20 +161,9 @@ class Plant:
                 ) / self.whole_inertia
 
 
-def receiver_noise(beamwidth: Radians, slope: float, cn0_dbhz: DecibelHertz) -> float:
-    """Return the root density of the noise of a receiver's error on the beam axis [rad/sqrt(Hz)]. slope: monopulse
-    slope."""
-    return beamwidth / (slope * math.sqrt(2.0 * 10.0**(0.1 * cn0_dbhz)))
-
-
-def filter_gains(plant: Plant) -> dict[str, int]:
-    """Return {key of acu.AXIS: value} of the target filter: the number of models that do not follow the structure."""
-    if not plant.mode:
-        return {}
-    fastest = plant.noise * (2.0 * math.pi * plant.mode / FILTER_RATIO)**3
-    # Because an earlier design may have lowered the number of the scenario, the default number is the largest.
-    noises = plant.bank.ca.noise * plant.bank.rung_ratio**np.arange(ImmParameters().rungs)
-    return {'filter.imm.rungs': max(1, int(np.sum(noises <= fastest)))}
+def structure(plant: Plant) -> dict[str, float]:
+    """Return {key of acu.AXIS: value} of the structure, by which the control unit limits the models of its filter."""
+    return parameters.as_dict(plant.axis.structure, 'structure.') if plant.mode else {}
 
 
 def rate_slope(plant: Plant) -> RadiansPerSecond2:
@@ -215,7 +201,8 @@ def control_gains(plant: Plant, w_s: RadiansPerSecond, w_p: RadiansPerSecond) ->
     shaper = {f'shaper.{key}': value for key, value in shaper_gains(plant, w_s).items()}
     return {'controller': 'feedforward', 'feedforward.bandwidth': w_p, 'feedforward.inertia': plant.whole_inertia,
             'feedforward.friction': plant.axis.friction.coulomb,
-            'shaper.rate': SHAPER_RATE_SHARE * plant.axis.limits.rate, **shaper, **filter_gains(plant),
+            'shaper.rate': SHAPER_RATE_SHARE * plant.axis.limits.rate, **shaper, **structure(plant),
+            'adrc.rate_bandwidth': w_s * plant.gear_inertia / plant.inertia,
             'limits.rate': plant.axis.limits.rate, 'limits.acceleration': rate_slope(plant)}
 
 
@@ -260,10 +247,8 @@ class Loops:
         self.variant, self.name = variant, chosen.name
         drive = chosen.node_parameters('adu')
         known = chosen.node_parameters('tracking_receiver')
-        noise = receiver_noise(known.antenna.beamwidth, known.antenna.slope, known.receiver.cn0_dbhz)
-        control = chosen.node_parameters('acu')
-        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), known.antenna.beamwidth,
-                                   noise, getattr(control, name).filter.imm) for name in AXES}
+        self.plants = {name: Plant(name, getattr(drive, name), getattr(drive.wind, name), known.antenna.beamwidth)
+                       for name in AXES}
         self.gains: dict[str, Json] = {}
 
     def set(self, node: str, name: str, gains: Mapping[str, Json]) -> None:
@@ -445,8 +430,8 @@ def main(options: LoopOptions, required: LoopRequirements, progress: Callable[[f
         raise ValueError(f'--output {file}: must be a new file in a directory that exists')
     rows = design(loops, axes, required, progress)
     loops.gains = {key: value for key, value in loops.gains.items() if key.split('.')[1] in axes}
-    loops.variant.with_(loops.gains).load()     # raises ScenarioError for a gain outside its range
-    lines = [*table(rows, required), *remarks(loops, rows)]
+    tuned = loops.variant.with_(loops.gains).load()     # raises ScenarioError for a gain outside its range
+    lines = [*table(rows, required), *remarks(loops, rows), *tuned.notes]
     made = parameter_file.origin(options.command, configuration.git_revision() or 'unknown')
     sections = {node: {key.removeprefix(f'{node}.'): value for key, value in loops.gains.items()
                        if key.startswith(f'{node}.')} for node in ('adu', 'acu')}

@@ -31,6 +31,7 @@ class Kind(NamedTuple):
     doc: str                    # meaning of the kind
     bank: 'Callable[[FilterParameters], Bank]'  # returns the bank of an axis
     cartesian: bool = False     # True if the Cartesian filter is used as well
+    ladder: bool = False        # True if its models ca form a ladder of `imm.rungs`
 
 
 def _bank_of_alpha_beta(params: 'FilterParameters') -> Bank:
@@ -61,9 +62,9 @@ FILTER_KINDS = {
     'alpha_beta_gamma': Kind('constant gains on the model ca', _bank_of_alpha_beta_gamma),
     **{model.name: Kind(f'Kalman filter: {model.doc}', functools.partial(_bank_of_one, model.name))
        for model in MODEL_ROWS},
-    'imm': Kind('interacting models, those of `imm.models`', _bank_of_several),
+    'imm': Kind('interacting models, those of `imm.models`', _bank_of_several, ladder=True),
     'imm_ukf': Kind('interacting unscented filters of the position where the range is measured, otherwise `imm`',
-                    _bank_of_several, cartesian=True)}
+                    _bank_of_several, cartesian=True, ladder=True)}
 """{name of a kind: its Kind}."""
 
 

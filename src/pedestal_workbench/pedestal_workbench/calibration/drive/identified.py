@@ -129,7 +129,7 @@ class Identified(Calibration):
         return missing
 
     def parameters(self) -> dict[str, dict[str, Json]]:
-        """Return the changes of the simulated drive, and inertia and friction for the control unit.
+        """Return the changes of the simulated drive, and inertia, friction and structure for the control unit.
 
         The inertia is that of load and motors, the friction that of the load. The friction of the motors rises over a
         wider range of rates than the feed-forward knows. With it, the following error of a slow pass doubled, so the
@@ -144,6 +144,7 @@ class Identified(Calibration):
                     self.changes[f'{name}.load.inertia'] + extra[name]
                     + ratio**2 * sum(motor.inertia for motor in motors))
             values[f'{name}.feedforward.friction'] = self.changes[f'{name}.friction.coulomb']
+        values |= {key: value for key, value in self.changes.items() if '.structure.' in key}
         return {'acu': values, 'adu': self.changes}
 
     def friction_plot(self) -> Figure:

@@ -1,0 +1,106 @@
+"""The default target filter on a flexible structure with untuned loops, beside the filter before its ladder of models.
+
+Cases are <scenario>/<frequency>Hz-<share>-<air>/<filter>. Share is the part of the load inertia that swings, on both
+axes. The air is calm or has Davenport gusts about a mean torque of 300 Nm. The loops are those of the scenario, not of
+`pedestal tune --loops`. `default` uses the models that the margins of the loop allow (acu_tracker.structure).
+`all-models` is a control unit that takes the axes for rigid, and uses the whole ladder. `before` has the models of the
+filter that the ladder replaced. A ratio divides the pointing error by that of `before` under the same seed.
+"""
+import functools
+import itertools
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from acu_tracker.modes import Mode
+from pedestal_bringup.loop import closed_loop
+from pedestal_bringup.scenario.variant import Variant
+from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Floats, Json, Row
+from pedestal_results.intervals import row
+from pedestal_results.report import figures as fig
+from pedestal_results.tracking import HANDOVER_SETTLING_S
+from pedestal_studies.result import FIRST_SEED, Result, of_cases, seeds
+from pedestal_workbench.trials.monte_carlo import Pool, Progress
+
+DEFAULT_RUNS = 5  # runs of each case
+DURATION_S = 25.0
+
+SCENARIOS = ('leo_pass', 'uav_flyby', 'ship_pass')
+FREQUENCIES_HZ, SHARES = (6.0, 8.0, 10.0, 12.0, 20.0), (0.1, 0.5)
+AIR_PARAMETERS: dict[str, dict[str, Json]] = {'calm': {}, 'gusts': {
+    'adu.wind.azimuth': 300.0, 'adu.wind.elevation': 300.0, 'adu.wind.gust.kind': 'davenport'}}
+
+
+def _both(node: str, changes: Mapping[str, Json]) -> dict[str, Json]:
+    return {f'{node}.{axis}.{key}': value for axis in AXES for key, value in changes.items()}
+
+
+FILTER_PARAMETERS: dict[str, dict[str, Json]] = {
+    'default': {}, 'all-models': _both('acu', {'structure.inertia_share': 0.0}),
+    'before': _both('acu', {'filter.imm.models': 'cv ca singer current_statistical', 'filter.imm.rungs': 1,
+                            'filter.imm.dwell': 3000.0, 'filter.imm.ca.noise': math.radians(2.5e-3)})}
+
+CASES = {  # {case: Variant}
+    f'{name}/{frequency:g}Hz-{share:g}-{air}/{filter_name}': Variant(name, duration=DURATION_S).with_({
+        **_both('adu', {'structure.frequency': frequency, 'structure.inertia_share': share}), **wind, **own})
+    for name, frequency, share, (air, wind), (filter_name, own) in itertools.product(
+        SCENARIOS, FREQUENCIES_HZ, SHARES, AIR_PARAMETERS.items(), FILTER_PARAMETERS.items())}
+
+MAX_POINTING_RATIO = 1.05  # of the default filter over the one before
+
+
+def tracked(name: str, number: int) -> tuple[float, float]:
+    """Return (time in autotrack after its begin [%], settled rms pointing error [deg]) of a run of one of CASES. The
+    error is NaN if autotrack ended."""
+    seed = FIRST_SEED + number
+    run = closed_loop.Loop(CASES[name].with_({'adu.wind.gust.seed': seed}, seed=seed).load()).run()
+    on = run['acu/mode'] == Mode.AUTOTRACK
+    if not on.any():
+        return 0.0, math.nan
+    begin = run.t[on][0]
+    settled = run.truth['error'][run.t >= begin + HANDOVER_SETTLING_S]
+    rms = math.degrees(math.sqrt(np.mean(np.sum(settled**2, axis=1))))
+    share = float(np.mean(on[run.t >= begin]))
+    return 100.0 * share, rms if share == 1.0 else math.nan
+
+
+def rows(values: Mapping[str, Floats]) -> list[Row]:
+    """Return the rows of the study; values: {case: (runs, 2) of `tracked`}."""
+    table = []
+    for name, of_runs in values.items():
+        place, _, filter_name = name.rpartition('/')
+        before, judged = values[f'{place}/before'], filter_name == 'default'
+        held = bool(np.all(before[:, 0] == 100.0))
+        table.append(row(name, 'tracked_percent', of_runs[:, 0], '%', target='>= 100' if judged and held else None))
+        if np.isfinite(of_runs[:, 1]).all():
+            table.append(row(name, 'pointing_rms_deg', of_runs[:, 1], 'deg'))
+            if held and filter_name != 'before':
+                table.append(row(name, 'pointing_to_before', of_runs[:, 1] / before[:, 1], '',
+                                 target=f'<= {MAX_POINTING_RATIO:g}' if judged else None))
+    return table
+
+
+def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) -> Result:
+    """Run every case `runs` times."""
+    values = of_cases(tracked, CASES, runs, pool, progress)
+    table = rows(values)
+    return Result(table, {'tracked': functools.partial(figure, values)},
+                  [f'{seeds(runs)} A case in which a run ended autotrack has no pointing error.'],
+                  [line for line in table if line['case'].endswith('/default')])
+
+
+def figure(values: Mapping[str, Floats]) -> Figure:
+    """Draw the time in autotrack of every run over the frequency of the structure, a panel for each filter."""
+    drawn, axes = fig.new_panels(len(FILTER_PARAMETERS), height=6.0, x='frequency of the structure [Hz]',
+                                 y='in autotrack [%]', sharex=True)
+    for panel, filter_name in zip(axes[:, 0], FILTER_PARAMETERS):
+        for name, of_runs in values.items():
+            _, cell, own = name.split('/')
+            if own == filter_name:
+                colour = fig.TRUTH_COLOUR if cell.endswith('gusts') else fig.FILTERED_COLOUR
+                panel.plot(np.full(len(of_runs), float(cell.partition('Hz')[0])), of_runs[:, 0], '_', color=colour)
+        panel.set_title(filter_name)
+    return drawn
