@@ -19,7 +19,7 @@ from pedestal_common.parameters import NOT_GIVEN, is_absent, parameter
 if typing.TYPE_CHECKING:    # numpy is slow to import, and `pedestal scenarios` needs none
     from pedestal_common.quantities import DecibelHertz, Decibels, Meters, Radians, Value
 
-DEFAULT_DIAMETER_M, DEFAULT_FREQUENCY_GHZ = 3.0, 6.984
+DEFAULT_DIAMETER_M, DEFAULT_FREQUENCY_GHZ = 3.0, 6.976
 """Diameter of the dish for which the defaults of beamwidth and C/N0 hold [m], and the frequency that they imply."""
 BEAM_FACTOR_RAD = math.radians(70.0)  # half-power beamwidth times diameter divided by wavelength [rad]
 SPEED_OF_LIGHT_M_GHZ = 0.299792458  # speed of light [m GHz]
@@ -32,7 +32,7 @@ class DishParameters(parameters.Parameters):
     """The dish, one for all nodes."""
     diameter: float = parameter(NOT_GIVEN, 0.1, 100.0, 'm', 'diameter of the dish, from which beamwidth, C/N0 and '
                                 'torque of the wind follow; not given: the nodes keep their values, of a dish of 3 m')
-    frequency: float = parameter(NOT_GIVEN, 0.1, 300.0, 'GHz', 'frequency of the signal; not given: 6.984')
+    frequency: float = parameter(NOT_GIVEN, 0.1, 300.0, 'GHz', 'frequency of the signal; not given: 6.976')
 
     @property
     def stated(self) -> bool:

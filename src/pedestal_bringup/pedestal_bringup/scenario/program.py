@@ -134,20 +134,21 @@ def _sky(built: target.Target, kind: str, duration: Seconds) -> tuple[str, ...]:
 
 
 def _link(built: target.Target, parameters: AnyParameters, duration: Seconds) -> tuple[str, ...]:
-    """Return a line on the C/N0 over the ranges of a run; () for a source of noise, or without a simulated level."""
+    """Return a line on the C/N0 over the ranges of a run; () for a C/N0 that does not depend on the range."""
     receiver: AnyParameters = getattr(parameters, 'receiver', None)
-    if parameters.target.of_noise or not hasattr(receiver, 'cn0_dbhz'):
+    if parameters.target.of_noise or not getattr(receiver, 'range_exponent', 0.0):
         return ()
     _, elevation, distance = target.look_angles(built, np.linspace(0.0, duration, 1 + int(min(1e4, duration))))
     seen = distance[elevation > receiver.horizon_mask]
-    text = f'link: C/N0 {receiver.cn0_dbhz:.4g} dB-Hz at {1e-3 * receiver.reference_range:g} km'
-    if not seen.size or not receiver.range_exponent:
-        return (f'{text}; lock at {receiver.acquire_level_dbhz:g} dB-Hz',)
+    if not seen.size:
+        return ()
     near, far = float(seen.min()), float(seen.max())
     best, worst = (receiver.cn0_dbhz - 10.0 * receiver.range_exponent * math.log10(distance / receiver.reference_range)
                    for distance in (near, far))
-    text += (f'; in this run {best:.1f} to {worst:.1f} dB-Hz at {_km(near)} to {_km(far)} km; lock at '
-             f'{receiver.acquire_level_dbhz:g} dB-Hz')
+    levels, ranges = ((one, other) if one != other else (one,) for one, other in (
+        (f'{best:.1f}', f'{worst:.1f}'), (_km(near), _km(far))))
+    text = (f'link: C/N0 {receiver.cn0_dbhz:.4g} dB-Hz at {1e-3 * receiver.reference_range:g} km; in this run '
+            f'{" to ".join(levels)} dB-Hz at {" to ".join(ranges)} km; lock at {receiver.acquire_level_dbhz:g} dB-Hz')
     if best < receiver.acquire_level_dbhz:
         text += (': the receiver cannot lock; state the target by scenario.link.eirp, or by '
                  'tracking_receiver.receiver.cn0_dbhz at reference_range')
