@@ -207,8 +207,8 @@ def _never_tracked(bag: Recording, run: Tracking, distance: Floats, near: Bools,
 
 
 def _link(run: Tracking, near: Bools, receiver: Mapping[str, Json]) -> str:
-    """Return the range up to which the signal of a run would lock, and the parameter that would make it lock; '' if
-    the signal on the axis is strong enough. near: True with the target within half a beamwidth."""
+    """Return the range up to which the signal would lock, and the parameters that would do it; '' for a sufficient
+    signal on the axis. near: True with the target within half a beamwidth."""
     level, needed, exponent = (receiver.get(f'receiver.{key}', math.nan) for key in (
         'cn0_dbhz', 'acquire_level_dbhz', 'range_exponent'))
     distance, reference = run.range[near], receiver.get('receiver.reference_range', math.nan)
