@@ -20,6 +20,7 @@ CASES = {
     'a command': ('uav_flyby', 4.0, ('acu.commands=1 preset azimuth=5.5',), 'refused',
                   'preset at 1 s refused: outside limits, azimuth 315.13 deg: must be -270.00 to 270.00 deg; tracked'),
     'an injection': ('uav_flyby', 4.0, ('acu.commands=1 sun',), 'refused', 'sun at 1 s refused: '),
+    'geostationary': ('ship_geo', 3.0, (), 'tracked', 'first lock at 0.1'),
     'too far': ('leo_pass', 6.0, ('tracking_receiver.receiver.reference_range=10e3',), 'never locked',
                 'dB too weak, and locks up to 23.4'),
     'no level': ('leo_pass', 6.0, (LOW_LEVEL,), 'never locked', 'dB-Hz, lock at 39'),
