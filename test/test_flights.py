@@ -41,7 +41,7 @@ def test_two_options_are_enough(adsb):
 
 
 def test_the_flight_is_told_where_the_run_begins(adsb):
-    _, log, path = Plan(scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH])).announced()
+    _, log, path, _ = Plan(scenario.load('track_file', [f'{PATH}={adsb}', SMOOTH])).announced()
     assert log.startswith('flight.csv: ADS-B of 4b1812 RGA3, columns timestamp in UTC, latitude in deg, longitude in '
                           'deg, geoaltitude in ft: 57 of 60 fixes, 3 held positions dropped, times in whole')
     assert 'altitudes in steps of 100 ft, smoothed: off the fixes by ' in log
@@ -108,7 +108,7 @@ def test_an_orbit_from_a_file_is_tracked(oem):
     error = run.truth['error'][run.t > 10.0]
     half_beam = 0.5 * chosen.node_parameters('tracking_receiver').antenna.beamwidth
     assert np.isfinite(error).all() and np.abs(error).max() < 0.5 * half_beam
-    _, log, path = Plan(chosen).announced()
+    _, log, path, _ = Plan(chosen).announced()
     assert log == 'pass.oem: CCSDS OEM of SAT (2026-001A): 17 states in ITRF, HERMITE of degree 7'
     assert path.startswith('20 s from 2026-11-22T05:03:20.000Z, highest ')
     assert Plan(chosen).begins() == 1_795_323_800 * 10**9

@@ -109,7 +109,7 @@ def test_the_diagnosis_says_by_which_elements_it_predicts():
     ({}, 'elements: must be line_1 and line_2, or omm'),
     ({'line_1': LINES[0], 'line_2': LINES[1], 'omm': OMM}, 'elements: must be line_1 and line_2, or omm'),
     ({'line_1': LINES[0]}, 'TLE line 2: 0 characters, must be 69 of ASCII'),
-    ({'omm': '{}'}, 'omm: MEAN_MOTION = None: must be a number')])
+    ({'omm': '{}'}, 'omm: MEAN_MOTION is missing')])
 def test_elements_that_are_refused(arguments, text):
     unit = Acu(AcuParameters(), ())
     granted, reason = unit.command(Command('elements', arguments=arguments))

@@ -9,7 +9,7 @@ from adu_drive.plant import wind
 from drive_law.params import AduParameters, WindFieldParameters
 from pedestal_common.parameters import build
 
-STEADY = WindFieldParameters(speed=12.0, from_azimuth=2.0, intensity=0.0)
+STEADY = WindFieldParameters(speed=12.0, from_azimuth=2.0, intensity=0.0, diameter=7.0)
 FULL = 0.5 * 1.225 * 12.0 ** 2 * math.pi * 3.5 ** 2 * 7.0
 """q A D [Nm]."""
 
@@ -67,7 +67,7 @@ def test_both_axes_are_moved_by_one_wind():
 def test_a_drive_starts_in_balance_and_holds_against_it(drive, speed):
     """At 27 m/s each motor holds more than the torque above which there is no bias."""
     p = build(AduParameters, {'initial_elevation': 0.7, 'wind.field.speed': speed, 'wind.field.from_azimuth': 2.5,
-                              'wind.field.intensity': 0.0})
+                              'wind.field.intensity': 0.0, 'wind.field.diameter': 7.0})
     d = drive(p).run(0.5, azimuth=0.0, elevation=0.0)
     expected = torques(p.wind.field, 0.0, 0.0, 0.7)
     for axis, torque in zip(('azimuth', 'elevation'), expected):

@@ -117,19 +117,19 @@ class GearTrainParameters(Parameters):
 class LoadParameters(Parameters):
     """The load of an axis: dish, yoke and counterweight."""
     inertia: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'inertia about the axis')
-    viscous: float = parameter(20.0, 0.0, 1e6, 'Nms/rad', 'viscous friction')
-    unbalance: float = parameter(0.0, -1e5, 1e5, 'Nm', 'gravity torque at angle 0; positive: towards negative angles')
+    viscous: float = parameter(20.0, 0.0, 1e9, 'Nms/rad', 'viscous friction')
+    unbalance: float = parameter(0.0, -1e7, 1e7, 'Nm', 'gravity torque at angle 0; positive: towards negative angles')
 
 
 @dataclasses.dataclass(frozen=True)
 class FrictionParameters(Parameters):
     """LuGre friction of the load bearing."""
-    coulomb: float = parameter(60.0, 0.01, 1e5, 'Nm', 'sliding (Coulomb) friction')
-    breakaway: float = parameter(80.0, 0.01, 1e5, 'Nm', 'static friction', must_be='at least coulomb')
+    coulomb: float = parameter(60.0, 0.01, 1e7, 'Nm', 'sliding (Coulomb) friction')
+    breakaway: float = parameter(80.0, 0.01, 1e7, 'Nm', 'static friction', must_be='at least coulomb')
     stribeck_rate: float = parameter(2e-3, 1e-5, 1.0, 'rad/s', 'rate at which the excess of static over sliding '
                                      'friction has fallen to 1 / e')
-    stiffness: float = parameter(2e5, 1.0, 1e9, 'Nm/rad', 'stiffness of the bristles of the LuGre model')
-    damping: float = parameter(400.0, 0.0, 1e6, 'Nms/rad', 'damping of the bristles of the LuGre model')
+    stiffness: float = parameter(2e5, 1.0, 1e12, 'Nm/rad', 'stiffness of the bristles of the LuGre model')
+    damping: float = parameter(400.0, 0.0, 1e9, 'Nms/rad', 'damping of the bristles of the LuGre model')
 
 
 @dataclasses.dataclass(frozen=True)

@@ -81,7 +81,7 @@ class WindFieldParameters(Parameters):
     from_azimuth: float = parameter(0.0, -2.0 * math.pi, 2.0 * math.pi, 'rad', 'deck azimuth of the wind source')
     intensity: float = parameter(0.2, 0.0, 0.5, '', 'turbulence intensity sigma_u / V along the wind')
     length: float = parameter(100.0, 10.0, 2000.0, 'm', 'length scale of the turbulence')
-    diameter: float = parameter(7.0, 0.1, 100.0, 'm', 'diameter D of the dish')
+    diameter: float = parameter(3.0, 0.1, 100.0, 'm', 'diameter D of the dish; of a scenario: scenario.dish.diameter')
     density: float = parameter(1.225, 0.1, 2.0, 'kg/m3', 'density of the air')
     c_1: float = parameter(0.055, -1.0, 1.0, '', 'torque coefficient of sin alpha')
     c_2: float = parameter(-0.08, -1.0, 1.0, '', 'torque coefficient of sin 2 alpha')

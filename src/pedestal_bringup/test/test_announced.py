@@ -20,14 +20,16 @@ def lines(name, duration, *changes):
 
 
 def test_a_run_as_long_as_its_scenario_says_when_the_satellite_is_highest():
-    place, line = lines('leo_pass', None)
+    place, line, link = lines('leo_pass', None)
     assert place == PLACE
+    assert re.fullmatch(r'link: C/N0 46\.4 dB-Hz at 500 km; in this run 4\d\.\d to 4\d\.\d dB-Hz at 4\d\d to \d+ km; '
+                        'lock at 39 dB-Hz', link)
     assert re.fullmatch(r'0 s is \S+ \S+ UTC; the satellite is highest in this run, 69\.\d deg, after [\d.]+ s, '
                         r'at \S+ UTC', line)
 
 
 def test_a_run_that_is_longer_than_the_pass_says_when_it_rises_and_sets():
-    _, _, rises, sets = lines('leo_pass', 900.0)
+    _, _, rises, sets, _ = lines('leo_pass', 900.0)
     up, down = (float(re.search(r'after ([\d.]+) s', line)[1]) for line in (rises, sets))
     assert rises.startswith('the satellite rises') and sets.startswith('the satellite sets')
     assert 0.0 < up < 450.0 < down < 900.0
@@ -53,7 +55,7 @@ def test_a_target_without_a_date_says_nothing_of_a_sky():
 def test_a_track_that_rises_and_sets_within_the_run_says_so(tmp_path):
     path = tmp_path / 'a.csv'
     path.write_text('t,az,el\n' + ''.join(f'{k},{120 + k},{5 - abs(k - 10)}\n' for k in range(21)))
-    _, summary, highest, rises, sets = Plan(scenario.load('track_file', [
+    _, summary, highest, rises, sets, _ = Plan(scenario.load('track_file', [
         f'tracking_receiver.target.track_file.path={path}'])).announced()
     assert 'highest 5.0 deg after 10 s' in highest and summary.startswith('a.csv')
     assert rises.startswith('the target rises after 5.') and sets.startswith('the target sets after 15.0')
@@ -63,7 +65,7 @@ def test_a_run_that_is_longer_than_a_track_states_its_end(tmp_path):
     path = tmp_path / 'a.csv'
     path.write_text('t,az,el\n' + ''.join(f'{k},{120 + k},{20 + k}\n' for k in range(21)))
     changes = [f'tracking_receiver.target.track_file.path={path}']
-    *_, ends = Plan(scenario.load('track_file', changes, duration=30.0)).announced()
+    *_, ends, _ = Plan(scenario.load('track_file', changes, duration=30.0)).announced()
     assert ends == 'the track of the target ends after 20.0 s: nothing can be tracked after'
     assert not any('ends' in line for line in Plan(scenario.load('track_file', changes)).announced())
 
@@ -118,3 +120,37 @@ def test_a_program_with_light_time_leads_to_where_the_wave_left():
     inside = times - delay > 1.0
     assert seen[inside, 1] == pytest.approx(elevation[inside], abs=1e-12)
     assert np.abs(seen - plain)[inside].max() > 1e-6
+
+
+GEO = [f'tracking_receiver.target.leo_pass.{key}={value}' for key, value in scenario.load('geo_station').given(
+    'tracking_receiver').items() for key in key.split('target.leo_pass.')[1:]]
+
+
+def test_the_link_of_a_run_follows_the_range():
+    """A geostationary satellite from the ship of ship_pass; an EIRP gives its C/N0 by the link budget."""
+    *_, link = lines('ship_pass', 4.0, *GEO)
+    assert link == ('link: C/N0 46.4 dB-Hz at 500 km; in this run 8.7 dB-Hz at 38195 km; lock at 39 dB-Hz: the '
+                    'receiver cannot lock; state the target by scenario.link.eirp, or by '
+                    'tracking_receiver.receiver.cn0_dbhz at reference_range')
+    *_, replaced, _, link = lines('ship_pass', 4.0, *GEO, 'scenario.link.eirp=8', 'scenario.link.g_over_t=20',
+                                  'scenario.dish.frequency=2.3', 'tracking_receiver.receiver.cn0_dbhz=40')
+    loss = 20.0 * math.log10(4.0 * math.pi * 38.194e6 / (0.299792458 / 2.3))
+    assert float(re.search(r'this run ([\d.]+) dB-Hz', link)[1]) == pytest.approx(8.0 + 20.0 - loss + 228.6, abs=0.1)
+    assert replaced.startswith('scenario.link.eirp = 8 dBW: ')
+    assert replaced.endswith(' in place of tracking_receiver.receiver.cn0_dbhz = 40')
+
+
+def test_the_diameter_of_the_dish_is_one_parameter():
+    """Twice the diameter: half the beam, 6 dB, and the wind acts on it. What overrides it is said."""
+    chosen = scenario.load('leo_pass', ('scenario.dish.diameter=6', 'adu.wind.field.speed=15'))
+    known = scenario.load('leo_pass')
+    receiver, before = (each.node_parameters('tracking_receiver') for each in (chosen, known))
+    assert receiver.antenna.beamwidth == pytest.approx(0.5 * before.antenna.beamwidth, rel=1e-3)
+    assert chosen.node_parameters('acu').tracker.receiver.beamwidth == receiver.antenna.beamwidth
+    assert receiver.receiver.cn0_dbhz == pytest.approx(before.receiver.cn0_dbhz + 6.02, abs=0.01)
+    assert chosen.node_parameters('adu').wind.field.diameter == 6.0 and not chosen.notes
+    assert known.node_parameters('adu').wind.field.diameter == 3.0
+    assert Plan(chosen).announced()[-1] == 'wind: 15 m/s on a dish of 6 m'
+    assert Plan(scenario.parse('leo_pass', chosen.as_yaml())).announced() == Plan(chosen).announced()
+    other = scenario.load('leo_pass', ('scenario.dish.diameter=6', 'adu.wind.field.diameter=7'))
+    assert other.notes == ('adu.wind.field.diameter = 7 overrides 6 of the dish of 6 m',)

@@ -143,7 +143,8 @@ def _check_field(field: Field, name: str, value: object) -> None:
     meta = field.metadata
     if 'low' in meta:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ParameterError(f'{name} = {value!r}: must be a number')
+            unit = f', in {meta["unit"]}' if meta['unit'] else ''
+            raise ParameterError(f'{name} = {value!r}: must be a number{unit}')
         if field.type is int and not isinstance(value, int):
             raise ParameterError(f'{name} = {value!r}: must be a whole number')
         absent = is_absent(value) and is_absent(field.default)

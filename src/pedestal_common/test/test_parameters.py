@@ -51,6 +51,7 @@ def test_build_changes_what_is_named_and_keeps_the_rest():
     ({'azimuth.Kp': 101.0}, ['azimuth.Kp = 101', '0 to 100']),
     ({'azimuth.Kp': math.nan}, ['azimuth.Kp = nan', '0 to 100']),
     ({'azimuth.Kp': 'six'}, ["azimuth.Kp = 'six'", 'number']),
+    ({'azimuth.Kp': '6 Nm s/deg'}, ["azimuth.Kp = '6 Nm s/deg': must be a number, in Nm s/rad"]),
     ({'azimuth.order': 1.5}, ['azimuth.order = 1.5', 'whole number']),
     ({'azimuth.seed': 2**31}, ['azimuth.seed = 2147483648: must be 0 to 2147483647']),
     ({'azimuth.Kp': 1e7}, ['azimuth.Kp = 1e+07 Nm s/rad: must be 0 to 100']),

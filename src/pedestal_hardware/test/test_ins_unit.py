@@ -164,6 +164,28 @@ def test_prdid_takes_its_heading_from_hdt():
     assert angles(sample.q) == pytest.approx((40.0, 3.0, 2.0))
 
 
+@pytest.mark.parametrize('every, turn, bound', [(1, False, 0.1), (5, False, 0.2), (20, False, 0.6), (20, True, 0.1)])
+def test_a_slow_hdt_makes_no_steps_in_the_rates(every, turn, bound):
+    """PRDID with 50 Hz; HDT with 50, 10 and 2.5 Hz; a deck that rolls, and turns with up to 3.1 deg/s. The steps of
+    the heading would make errors of 6 deg/s at 2.5 Hz. bound: of the error of each rate [deg/s]."""
+    unit, step, worst = unit_of(nmea__sentence='prdid'), 20_000_000, 0.0
+    for k in range(1500):
+        t = 0.02 * k
+        heading, rate = 358.0 + 5.0 * math.sin(2 * math.pi * t / 10.0), math.pi * math.cos(2 * math.pi * t / 10.0)
+        roll, roll_rate = 4.0 * math.sin(2 * math.pi * t / 8.0), math.pi * math.cos(2 * math.pi * t / 8.0)
+        if turn:
+            unit.take_line(nmea.sentence(f'TIROT,{60.0 * rate:.1f},A'), NOON + k * step - 2)
+        if k % every == 0:
+            unit.take_line(nmea.sentence(f'HEHDT,{heading % 360.0:.2f},T'), NOON + k * step - 1)
+        sample = unit.take_line(nmea.sentence(f'PRDID,0.0,{roll:.3f},'), NOON + k * step)
+        if t > 5.0:
+            up = np.array((0.0, math.sin(math.radians(roll)), math.cos(math.radians(roll))))
+            true = np.array((roll_rate, 0.0, 0.0)) - rate * up
+            worst = max(worst, np.abs(np.degrees(sample.w) - true).max())
+            assert abs(math.remainder(angles(sample.q)[0] - heading, 360.0)) < 0.15
+    assert worst < bound
+
+
 @pytest.mark.parametrize('sign', [1, -1])
 def test_hdt_alone_and_the_sign_of_its_rate_of_turn(sign):
     """A deck that is taken as level; the heading turns by sines, ROT in deg/min is positive to starboard."""

@@ -307,6 +307,7 @@ def test_integers_of_other_recorders_are_read(tmp_path):
     (lambda m: m['global'].update({'core:num_channels': 2}), 'core:num_channels = 2: must be 3'),
     (lambda m: m['global'].pop('core:num_channels'), 'core:num_channels = 1: must be 3'),
     (lambda m: m['global'].update({'core:sample_rate': 48000}), r'core:sample_rate = 48000 S/s: must be 100000 S/s'),
+    (lambda m: m['global'].update({'core:sample_rate': '100 kHz'}), "core:sample_rate = '100 kHz': must be a number"),
     (lambda m: m['global'].update({'core:sample_rate': '1e5'}), "core:sample_rate = '1e5': must be a number"),
     (lambda m: m['global'].update({'core:dataset': 'other.bin'}), "core:dataset = 'other.bin': must be "),
     (lambda m: m['captures'][0].update({'core:header_bytes': 16}), 'core:header_bytes = 16: must be 0'),

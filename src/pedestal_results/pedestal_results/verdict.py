@@ -196,7 +196,7 @@ def _never_tracked(bag: Recording, run: Tracking, distance: Floats, near: Bools,
     if not (run.target_earth[:, 1] > receiver.get('receiver.horizon_mask', 0.0)).any():
         return NOT_LOCKED, f'{best}: the target was below the horizon'
     if np.sum(near) * run.period >= allowance:
-        return NOT_LOCKED, best
+        return NOT_LOCKED, best + _link(run, near, receiver)
     away = f'{distance[-1] * DEG_PER_RAD:.3g} deg away'
     if left < allowance or near[-1] or _approaches(run, distance):
         return ON_THE_WAY, f'ended on the way to the target, {away}, before the receiver could lock'
@@ -204,6 +204,24 @@ def _never_tracked(bag: Recording, run: Tracking, distance: Floats, near: Bools,
     if due:
         return ON_THE_WAY, f'ended before the command {due}, the target {away}'
     return NOT_LOCKED, f'{best}; the beam came within {np.nanmin(distance) * DEG_PER_RAD:.3g} deg of the target'
+
+
+def _link(run: Tracking, near: Bools, receiver: Mapping[str, Json]) -> str:
+    """Return the range up to which the signal would lock, and the parameters that would do it; '' for a sufficient
+    signal on the axis. near: True with the target within half a beamwidth."""
+    level, needed, exponent = (receiver.get(f'receiver.{key}', math.nan) for key in (
+        'cn0_dbhz', 'acquire_level_dbhz', 'range_exponent'))
+    distance, reference = run.range[near], receiver.get('receiver.reference_range', math.nan)
+    if not (exponent and np.isfinite(distance).any() and math.isfinite(level + reference)):
+        return ''
+    nearest = float(np.nanmin(distance))
+    missing = needed - level + 10.0 * exponent * math.log10(nearest / reference)
+    if missing <= 0.0:
+        return ''
+    up_to = nearest * 10.0**(-missing / (10.0 * exponent))
+    return (f'; at {1e-3 * nearest:.5g} km the signal is {missing:.3g} dB too weak, and locks up to '
+            f'{1e-3 * up_to:.5g} km: receiver.cn0_dbhz of {level + missing:.3g} at {1e-3 * reference:g} km, or '
+            'scenario.link.eirp of the target, would do it')
 
 
 def _next_command(acu: Mapping[str, Json], end: Seconds) -> str:

@@ -92,8 +92,9 @@ def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name
     *(pytest.param(*case, marks=pytest.mark.thorough) for case in (
         (('--ratio-azimuth', '20000'), '--ratio-azimuth 20000: must be 8 to 7990, with the other values'),
         (('--motor-torque', '1', '--inertia-azimuth', '40000'), '(adu.azimuth: the motors cannot move the axis'),
-        (('--mirror', '18', '--inertia-azimuth', '200000', '--inertia-elevation', '150000'),
-         '--inertia-azimuth 200000 kg m2: must be 0.1 to 92800, or --ratio-azimuth 64: must be 93.9 to 7990, or '),
+        (('--mirror', '18', '--inertia-azimuth', '200000', '--inertia-elevation', '150000', '--motor-torque', '30',
+          '--ratio-azimuth', '64', '--ratio-elevation', '90', '--rate-azimuth', '140', '--rate-elevation', '97'),
+         '--inertia-azimuth 200000 kg m2: must be 0.211 to 92800, or --ratio-azimuth 64: must be 93.9 to 7990, or '),
         (('--beamwidth', '0.001'), '--beamwidth 0.001 deg: must be 0.00573 to 20, with the other values'),
         (('--mirror', '0.1'), '--mirror 0.1 m: must be 0.319 to 40, or --frequency 2.3 GHz: must be 7.33 to 100'),
     ))])
@@ -167,7 +168,7 @@ def test_a_large_antenna_is_studied(pedestal, tmp_path):
     (('--inertia-azimuth', '40000'), 'azimuth',
      '--rate-azimuth 140: the motors can stop the axis within half of its travel from 63.5 deg/s; '),
     (('--mirror', '13', '--inertia-azimuth', '140000', '--ratio-azimuth', '1500', '--motor-torque', '45'), 'azimuth',
-     '--rate-azimuth 140: the motors reach 6.92 deg/s at ratio 1500; '),
+     '--rate-azimuth 7.456: the motors reach 6.92 deg/s at ratio 1500; '),
 ])
 def test_a_rate_out_of_reach_becomes_nine_tenths_of_what_is_reached(pedestal, tmp_path, arguments, axis, expected):
     """The verb says so, and the file says it too."""
@@ -191,14 +192,65 @@ def test_an_assumed_structure_is_announced(pedestal, tmp_path):
 
 def test_signal_and_wind_follow_from_the_mirror(pedestal, tmp_path):
     """A mirror of twice the diameter collects four times the power, 6.02 dB; --cn0 takes precedence."""
-    for name, options, level in (('double', ('--mirror', '4.8'), 52.42), ('given', ('--mirror', '4.8', '--cn0', '48'),
-                                                                          48.0)):
+    for name, options, level in (('double', ('--mirror', '6'), 52.42), ('given', ('--mirror', '6', '--cn0', '48'),
+                                                                        48.0)):
         code, output, _ = pedestal('new', f'{name}.yaml', *options)
         made = scenario.load(tmp_path / f'{name}.yaml')
-        assert code == 0 and made.node_parameters('adu').wind.field.diameter == 4.8
+        assert code == 0 and made.node_parameters('adu').wind.field.diameter == 6.0
         assert made.node_parameters('tracking_receiver').receiver.cn0_dbhz == level
         assumed = 'no --cn0: 52.4 dB-Hz at 500 km, that of leo_pass for the area of the mirror, is taken'
         assert (assumed in output) == (name == 'double')
+
+
+def shown(output, label):
+    """Return (True if it is marked, value) of a scaled value that `pedestal new` prints."""
+    [found] = re.findall(rf'(?m)^([* ]) {re.escape(label)} +([\d.e+]+)', output)
+    return found[0] == '*', float(found[1])
+
+
+def test_a_value_that_the_data_sheet_lacks_is_scaled_and_printed_with_its_rule(pedestal, tmp_path):
+    """Twice the diameter: inertia 32, friction 16 (inertia / diameter), torque of the motors on the axis 8 times."""
+    code, output, _ = pedestal('new', 'my.yaml', '--mirror', '6')
+    drive, head = scenario.load(tmp_path / 'my.yaml').node_parameters('adu'), (tmp_path / 'my.yaml').read_text()
+    known = scenario.load('leo_pass').node_parameters('adu')
+    assert code == 0 and 'scaled from the antenna of 3 m by the rule behind each value' in output
+    for name in loops.AXES:
+        own, other = getattr(drive, name), getattr(known, name)
+        assert own.load.inertia == pytest.approx(32.0 * other.load.inertia, rel=1e-3)
+        assert own.friction.coulomb == pytest.approx(16.0 * other.friction.coulomb, rel=1e-3)
+        assert own.thermal.rated_torque * own.gear_train.ratio == pytest.approx(
+            8.0 * other.thermal.rated_torque * other.gear_train.ratio, rel=1e-3)
+        assert shown(output, f'--inertia-{name}') == (True, own.load.inertia)
+        assert f'# * --inertia-{name}' in head
+    assert shown(output, 'friction') == (True, drive.azimuth.friction.coulomb)
+    assert shown(output, 'friction of a motor') == (False, pytest.approx(drive.azimuth.motor_1.friction))
+    wind = 0.12 * 0.5 * 1.225 * 15.0**2 * math.pi / 4.0 * 6.0**3
+    assert shown(output, 'wind of 15 m/s')[1] == pytest.approx(wind, rel=0.01)
+    _, given, _ = pedestal('new', 'given.yaml', '--mirror', '6', '--inertia-azimuth', '7000')
+    assert '--inertia-azimuth' not in given and shown(given, '--inertia-elevation')[1] == 4800.0
+
+
+def test_power_and_speed_of_a_motor_give_its_torque(pedestal, tmp_path):
+    """P = T omega: 5 kW at 3000 rpm, 314.16 rad/s, are 15.92 Nm."""
+    code, output, _ = pedestal('new', 'my.yaml', '--motor-power', '5', '--motor-speed', '3000')
+    assert code == 0 and '--motor-power 5 kW at 3000 rpm: 15.92 Nm' in output and '--motor-torque' not in output
+    assert scenario.load(tmp_path / 'my.yaml').node_parameters('adu').azimuth.thermal.rated_torque == 15.92
+    assert '--motor-power = 5 kW: must be without motor_torque' in pedestal(
+        'new', 'no.yaml', '--motor-power', '5', '--motor-torque', '15')[2]
+
+
+@pytest.mark.parametrize('rate, said', [
+    ('1', ': more than the 0.94 and 91.2 deg/s of the antenna for '), ('10', '; the antenna has 9.4 and 91.2 deg/s')])
+def test_the_rates_are_compared_with_the_pass(pedestal, tmp_path, rate, said):
+    _, output, _ = pedestal('new', 'my.yaml', '--rate-azimuth', rate)
+    [line] = (line for line in output.splitlines() if line.startswith('the target of this run needs up to '))
+    wanted = float(line.split()[8])
+    assert said in line and f'# {line}' in (tmp_path / 'my.yaml').read_text()
+    if rate == '1':
+        raised = re.search(r'; --rate-azimuth ([\d.]+) would follow', line)[1]
+        assert float(raised) == pytest.approx(1.1 * wanted / 0.94, rel=0.01)
+        _, output, _ = pedestal('new', 'faster.yaml', '--rate-azimuth', raised)
+        assert 'falls behind' not in output
 
 
 STATION = ('--mirror', '4.5', '--frequency', '8.2', '--inertia-azimuth', '900', '--inertia-elevation', '700',
@@ -218,11 +270,14 @@ def test_an_antenna_tracks_the_target_of_each_scenario(pedestal, tmp_path, like)
 
 @pytest.mark.parametrize('share', ('0', '0.5'))
 def test_a_start_in_strong_wind_trips_no_drive(pedestal, tmp_path, share):
-    """Rigid and flexible, the first second in up to 55 m/s, and a minute at 25 m/s."""
+    """Rigid and flexible, the first second in up to 60 m/s, and a minute at 25 m/s. The wind on 7 m is stronger than
+    the rated torque of the motors; with 3/4 of their peak torque, the drive tripped in the first three of these."""
     assert pedestal('new', 'my.yaml', '--mode-share', share, *STATION)[0] == 0
-    for speed, seed, duration in ((51, 1, 1.0), (53, 2, 1.0), (55, 3, 1.0), (25, 2, 60.0)):
-        chosen = scenario.load(tmp_path / 'my.yaml', [f'adu.wind.field.speed={speed}', f'adu.wind.field.seed={seed}'],
-                               seed=seed, duration=duration)
+    for diameter, speed, seed, duration in ((7, 38, 1, 0.5), (7, 45.3, 1, 0.5), (7, 45.3, 3, 0.5), (7, 52.7, 6, 0.5),
+                                            (7, 60, 5, 0.5), (4.5, 55, 3, 1.0), (4.5, 25, 2, 60.0)):
+        chosen = scenario.load(tmp_path / 'my.yaml', [
+            f'adu.wind.field.speed={speed}', f'adu.wind.field.seed={seed}', f'adu.wind.field.diameter={diameter}'],
+            seed=seed, duration=duration)
         run = closed_loop.Loop(chosen).run()
         assert {drive_state.state_text(int(code)) for code in run['adu/state']} == {'enabled'}
 

@@ -1,4 +1,5 @@
 """`pedestal tune --loops`: the design against the drive as it comes, margins measured on the plant, refusals."""
+import dataclasses
 import math
 import re
 
@@ -160,7 +161,10 @@ def test_the_design_is_that_of_a_rigid_drive():
     assert abs(gains['speed_loop.proportional'] / (1j * 100.0 * half)) == pytest.approx(1.0)
     torque = plant.acceleration * plant.whole_inertia + 60.0
     assert torque == pytest.approx(2.0 * 90.0 * 64.0)
-    assert math.isclose(loops.control_gains(plant, 100.0, 10.0)['shaper.acceleration'], 0.75 * plant.acceleration)
+    assert math.isclose(loops.shaper_gains(plant, 100.0)['acceleration'], 0.5 * plant.acceleration)
+    gears = dataclasses.replace(plant.axis.gear_train, lash=0.0)
+    without = dataclasses.replace(plant, axis=dataclasses.replace(plant.axis, gear_train=gears))
+    assert math.isclose(loops.shaper_gains(without, 100.0)['acceleration'], 0.75 * plant.acceleration)
 
 
 @pytest.mark.parametrize('arguments, expected', [

@@ -170,6 +170,7 @@ def test_a_date_in_the_future_is_no_date_of_the_measurement(tmp_path):
     (TPOINT.replace('ALTAZ', 'EQUAT'), 'must have the option `: ALTAZ`, .*; options found: EQUAT'),
     (TPOINT.replace('30.0 60.0 30.06 59.99 12.0', '30.0 60.0 30.06'), 'line 6: 3 numbers, must be at least 4'),
     (TPOINT.replace('59.99', '71.0'), 'line 6: elevation of the mount minus that on the sky = 11 deg: must be -5 to'),
+    (TPOINT.replace('59.99 12.0', '59.99 rad'), "line 6: 'rad': must be a number; all angles are in deg"),
     (TPOINT.replace('60.0', 'nan'), 'line 6: elevation = nan: must be -5 to 90'),
     (TPOINT.replace('30.06', 'east'), "line 6: azimuth of the mount = 'east': must be a number"),
     ('! only a comment\n: ALTAZ\n', '0 offsets, must be at least 1')])

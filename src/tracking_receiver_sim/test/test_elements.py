@@ -9,6 +9,7 @@ import pytest
 from sgp4 import omm
 from sgp4.api import WGS72, Satrec
 from sgp4.exporter import export_omm
+from sgp4.io import compute_checksum
 
 from pedestal_common.geometry import omm as omm_elements
 from pedestal_common.geometry import orbit
@@ -138,7 +139,7 @@ def test_a_julian_date_is_right_beyond_the_year_2100(when, julian):
 
 @pytest.mark.parametrize('text, message', [
     ('{"EPOCH": ', 'omm: not valid JSON'), ('[]', 'omm: must be an object'),
-    ('{}', 'omm: MEAN_MOTION = None: must be a number'),
+    ('{}', 'omm: MEAN_MOTION is missing'),
     (json.dumps({**ISS, 'EPOCH': 'today'}), "omm: EPOCH = 'today': must be UTC as ISO 8601"),
     (json.dumps({**ISS, 'MEAN_MOTION': '99'}), 'omm: MEAN_MOTION = 99: must be 0.05 to 18'),
     (json.dumps({**ISS, 'EPHEMERIS_TYPE': 4}), 'omm: ephemeris type 4: must be 0 or 2')])
@@ -167,7 +168,67 @@ def test_an_omm_of_sgp4_may_omit_bstar_and_begin_with_a_comment(tmp_path):
     assert chosen.remark == 'a.omm: line 2: BSTAR is missing: taken as 0, without drag'
 
 
+def xml_with_units(fields, unit):
+    return re.sub(r'<([A-Z_]+)>', lambda m: f'<{m[1]} units="{unit(m[1])}">' if unit(m[1]) else m[0], xml([fields]))
+
+
+WITH_UNITS = {      # {form: the text of fields with the unit(keyword) of each number, as this form states it}
+    'kvn': lambda fields, unit: kvn([{key: f'{value} [{unit(key)}]' if unit(key) else value
+                                      for key, value in fields.items()}]),
+    'xml': xml_with_units,
+    'csv': lambda fields, unit: table([fields]).replace('\r', '').replace(','.join(fields), ','.join(
+        f'{key} [{unit(key)}]' if unit(key) else key for key in fields)),
+    'json': lambda fields, unit: json.dumps([{key: f'{value} [{unit(key)}]' if unit(key) else value
+                                              for key, value in fields.items()}])}
+
+
+@pytest.mark.parametrize('spelled', [str, str.upper, lambda unit: unit.replace('**', '^').replace('deg', 'degrees')])
+@pytest.mark.parametrize('form', WITH_UNITS)
+def test_the_unit_of_the_standard_is_accepted_in_any_spelling(form, spelled, tmp_path):
+    path = tmp_path / f'a.{form}'
+    path.write_text(WITH_UNITS[form](ISS, lambda keyword: spelled(omm_elements.STANDARD_UNITS.get(keyword, ''))))
+    assert_same(elements.read(path), 'ISS (ZARYA)', '25544', TLE)
+
+
+@pytest.mark.parametrize('keyword, unit', [('INCLINATION', 'rad'), ('MEAN_MOTION', 'rad/min'), ('BSTAR', '1/m'),
+                                           ('MEAN_MOTION_DOT', 'rev/day'), ('ECCENTRICITY', 'deg')])
+@pytest.mark.parametrize('form', WITH_UNITS)
+def test_another_unit_is_refused_by_its_keyword(form, keyword, unit, tmp_path):
+    path = tmp_path / f'a.{form}'
+    path.write_text(WITH_UNITS[form](ISS, lambda key: unit if key == keyword else ''))
+    standard = omm_elements.STANDARD_UNITS[keyword]
+    with pytest.raises(orbit.TargetError, match=re.escape(
+            f'{keyword}: unit [{unit}]: must be {f"[{standard}]" if standard else "absent"}')):
+        elements.read(path)
+
+
+@pytest.mark.parametrize('form', FORMS)
+def test_an_empty_optional_value_counts_as_missing(form, tmp_path):
+    path = tmp_path / f'a.{form}'
+    empty = dict.fromkeys(('MEAN_MOTION_DOT', 'MEAN_MOTION_DDOT', 'BSTAR', 'CENTER_NAME', 'EPHEMERIS_TYPE'), '')
+    fields = {**ISS, **empty}
+    path.write_text(table([fields]) if form == 'csv' else WITH_UNITS[form.rpartition('.')[2]](fields, lambda _: ''))
+    chosen = elements.read(path)
+    satrec = orbit.satellite(LeoPassParameters(**chosen.values))
+    assert (satrec.bstar, satrec.ndot, satrec.inclo) == (0.0, 0.0, TLE.inclo) and 'BSTAR is missing' in chosen.remark
+
+
+@pytest.mark.parametrize('year, day, message', [
+    ('19', '366.50000000', 'line 1: epoch day 366.50000000: must be 1 to below 366 in 2019'), ('20', '366.5', ''),
+    ('19', '000.5', 'line 1: epoch day 000.5'), ('00', '366.9', ''), ('57', '366.0', 'below 366 in 1957')])
+def test_the_day_of_an_epoch_is_one_of_its_year(year, day, message, tmp_path):
+    path, line = tmp_path / 'a.tle', f'{LINES[0][:18]}{year}{day:<012}{LINES[0][32:68]}'
+    path.write_text(f'{line}{compute_checksum(line)}\n{LINES[1]}\n')
+    if message:
+        with pytest.raises(orbit.TargetError, match=message):
+            elements.read(path)
+    else:
+        assert elements.read(path).values['line_1'].startswith(line)
+
+
 REFUSED = {
+    'day 366': (lambda: kvn([{**ISS, 'EPOCH': '2019-366T00:00:00'}]), '', "EPOCH = '2019-366T00:00:00': must be a ti"),
+    'unit of a time': (lambda: kvn([{**ISS, 'EPOCH': ISS['EPOCH'] + ' [TAI]'}]), '', r"EPOCH = '.* \[TAI\]': must be"),
     'no drag term': (lambda: kvn([{key: value for key, value in ISS.items()
                                    if key not in ('BSTAR', 'MEAN_ELEMENT_THEORY')}]), '',
                      'line 1: BSTAR is missing: only an OMM with MEAN_ELEMENT_THEORY = SGP4 may omit it'),
@@ -178,7 +239,7 @@ REFUSED = {
     'frame': (lambda: table([{**ISS, 'REF_FRAME': 'EME2000'}]), '', "line 2: REF_FRAME = 'EME2000': must be TEME"),
     'nan': (lambda: xml([ISS, {**NEW, 'ECCENTRICITY': 'nan'}]), 'new one', 'line 4: ECCENTRICITY = nan: must'),
     'missing': (lambda: kvn([{key: value for key, value in ISS.items() if key != 'INCLINATION'}]), '',
-                'line 1: INCLINATION = None: must be a number'),
+                'line 1: INCLINATION is missing'),
     'epoch': (lambda: json.dumps([{**ISS, 'EPOCH': 'today'}]), '', "EPOCH = 'today': must be a time such as"),
     'number': (lambda: json.dumps({**ISS, 'NORAD_CAT_ID': 10**9}), '',
                "NORAD_CAT_ID = '1000000000': must be 0 to 999999999"),

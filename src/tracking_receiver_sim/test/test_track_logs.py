@@ -61,10 +61,10 @@ def angle(value, width):
     return f'{int(value):0{width}}{60.0 * (value % 1.0):011.8f}'
 
 
-def gga(k, time=None, altitude=None, quality='1', latitude=None):
+def gga(k, time=None, altitude=None, quality='1', latitude=None, talker='GP', unit='M', dilution='0.9'):
     data = (time or f'1000{k:02}.00', latitude or angle(LATITUDE[k], 2), 'N', angle(LONGITUDE[k], 3), 'E', quality,
-            '08', '0.9', altitude or f'{ALTITUDE[k] - 47.5:.4f}', 'M', '47.5', 'M', '', '')
-    return str(pynmea2.GGA('GP', 'GGA', data))
+            '08', dilution, altitude or f'{ALTITUDE[k] - 47.5:.4f}', unit, '47.5', 'M', '', '')
+    return str(pynmea2.GGA(talker, 'GGA', data))
 
 
 def incomplete(k, empty):
@@ -74,8 +74,8 @@ def incomplete(k, empty):
     return str(pynmea2.GGA('GP', 'GGA', tuple(data)))
 
 
-def nmea(sentences=None):
-    rmc = pynmea2.RMC('GP', 'RMC', ('100000.00', 'A', '4721.99', 'N', '00830.04', 'E', '0', '0', '230718', '', ''))
+def nmea(sentences=None, date='230718'):
+    rmc = pynmea2.RMC('GP', 'RMC', ('100000.00', 'A', '4721.99', 'N', '00830.04', 'E', '0', '0', date, '', ''))
     return '\n'.join(['$GPGSV,1,1,00*79', *(sentences or [gga(k) for k in range(N)]), str(rmc), ''])
 
 
@@ -170,6 +170,28 @@ def test_a_log_of_nmea_as_it_comes(tmp_path):
     assert np.diff(got.time).tolist() == [0.5] * 4
     assert 'passed over 1 x GGA without a fix' in got.description
     assert 'passed over 2 x damaged sentence' in got.description
+
+
+def test_two_talkers_in_one_log(tmp_path):
+    """The better one is taken, or the chosen one; the description names both."""
+    both = nmea([text for k in range(N) for text in (gga(k, dilution='1.4'), gga(k, altitude='9.0', talker='GN'))])
+    got = read(tmp_path, both)
+    assert got.altitude == pytest.approx(np.full(N, 56.5))
+    assert got.description.startswith('flight.log: NMEA of GN (8 fixes, mean HDOP 0.9), not of GP (8 fixes, mean '
+                                      'HDOP 1.4): aircraft names the talker to take')
+    assert read(tmp_path, both, aircraft='gp').altitude == pytest.approx(ALTITUDE, abs=1e-3)
+    assert "aircraft = 'GL': must name one of the 2 in the file: GP, GN" in refused(tmp_path, both, aircraft='GL')
+    rare = nmea([*SENTENCES, gga(0, time='100008.00', talker='GN', dilution='0.5')])
+    assert ' of GP (8 fixes' in read(tmp_path, rare).description
+
+
+def test_qualities_and_old_dates_are_named(tmp_path):
+    """A receiver whose week counter has overflowed dates a log of 2026 in 2006; 7168 days are 1,024 weeks."""
+    made_up = nmea([gga(k, quality='8' if k < 5 else '6') for k in range(N)], date='221106')
+    assert read(tmp_path, made_up).description.endswith(
+        'NMEA of GP, 3 fixes of quality 6 (estimated), 5 fixes of quality 8 (simulated), dated 2006-11-22: if the '
+        'week counter of its receiver has overflowed (1,024 weeks), the log is of 2026-07-08')
+    assert 'dated' not in read(tmp_path, nmea()).description
 
 
 SENTENCES = [gga(k) for k in range(N)]
@@ -278,6 +300,7 @@ BOMB = ('<?xml version="1.0"?>\n<!DOCTYPE gpx [<!ENTITY a "aaaaaaaaaa">' + ''.jo
      'an IGC log of a glider: convert it to GPX, for example with gpsbabel -i igc'),
     (BOMB, 'line 2: a document type declaration: GPX has none'),
     ('<gpx>' + '<a>' * 200, 'line 1: must be at most 100 nested elements'),
+    (nmea([gga(k, unit='f' if k == 2 else 'M') for k in range(N)]), "line 4: unit of altitude = 'f': must be M"),
     (nmea([gga(k, altitude='high' if k == 2 else None) for k in range(N)]), "line 4: altitude = 'high': must be a"),
     (nmea([gga(k, latitude='4799.0' if k == 2 else None) for k in range(N)]), 'must be degrees and minutes below 60'),
     (nmea([gga(k, time='256000' if k == 2 else None) for k in range(N)]), "line 4: time = '256000': must be hhmmss"),

@@ -24,7 +24,6 @@ MAX_SATELLITES = 300_000  # largest number of satellites in a file, several time
 MAX_COMPARED_NAMES = 40_000  # with which an error compares a name: more than catalogued satellites
 MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200  # of nested elements; length to which a value is cut
 PARSE_CHUNK_BYTES = 1 << 20  # number of bytes of XML that are parsed at once
-FIRST_SATELLITE_YEAR = 57  # smallest two-digit year of a TLE in the 20th century: first satellite 1957
 TLE_EPOCH_COLUMNS = slice(18, 32)  # columns of the epoch in line 1 of a TLE
 
 
@@ -89,7 +88,7 @@ def read(path: FilePath, name: str = '', when: datetime.datetime | None = None) 
             remedy = f'{count}; name it by its number' if history else f'{count};{hint}'.removesuffix(';')
         raise TargetError(f'TLE file {path}: satellites: {len(names)} found, {listed}: {remedy}')
     satellite, remark = _nearest(path, history, when)
-    if not (satellite.lines or satellite.fields.get('BSTAR')):
+    if not (satellite.lines or satellite.fields.get('BSTAR', '').partition('[')[0].strip()):
         remark = '; '.join(filter(None, (remark, f'{pathlib.Path(path).name}: line {satellite.line}: BSTAR is '
                                          'missing: taken as 0, without drag')))
     line_1, line_2 = satellite.lines or ('', '')
@@ -118,9 +117,7 @@ def _epoch(path: FilePath, satellite: Satellite) -> datetime.datetime:
     if satellite.lines:
         text = satellite.lines[0][TLE_EPOCH_COLUMNS]
         try:
-            year, day = int(text[:2]), float(text[2:])
-            return (datetime.datetime(year + (1900 if year >= FIRST_SATELLITE_YEAR else 2000), 1, 1)
-                    + datetime.timedelta(days=day - 1.0))
+            return datetime.datetime(orbit.epoch_year(text[:2]), 1, 1) + datetime.timedelta(days=float(text[2:]) - 1.0)
         except (ValueError, OverflowError):
             raise TargetError(f'TLE file {path}: line {satellite.line}, column {TLE_EPOCH_COLUMNS.start + 1}: epoch = '
                               f'{text!r}: must be year and day, for example 19343.69339541') from None
@@ -168,7 +165,7 @@ def _number(text: str) -> str:
 
 def _designator(line: str) -> str:
     year, piece = line[9:11], line[11:17].strip()
-    return f'{"19" if year >= str(FIRST_SATELLITE_YEAR) else "20"}{year}-{piece}'
+    return f'{"19" if year >= str(orbit.FIRST_SATELLITE_YEAR) else "20"}{year}-{piece}'
 
 
 def _omm(line: int, fields: dict[str, str]) -> Satellite:
@@ -189,7 +186,9 @@ def _kvn(path: FilePath) -> Iterator[Satellite]:
                 yield _omm(begun, fields)
             fields, begun = {}, number
         elif equals and keyword in omm.KEYWORDS:
-            fields[keyword] = value.partition('[')[0].strip()[:MAX_VALUE_CHARS]
+            # The names of an object may have a remark in brackets.
+            value = value if keyword in omm.STANDARD_UNITS or keyword == 'EPOCH' else value.partition('[')[0]
+            fields[keyword] = value.strip()[:MAX_VALUE_CHARS]
         elif not equals and keyword.split(None, 1)[0] not in ('COMMENT', 'META_START', 'META_STOP'):
             raise lines.wrong(path, number, 1, f'{text.strip()!r:.60}: must be KEYWORD = value')
     if begun:
@@ -200,8 +199,11 @@ def _csv(path: FilePath) -> Iterator[Satellite]:
     with csv_table.opened(path) as reader:
         csv_table.require(reader, ('EPOCH', 'NORAD_CAT_ID'))
         for row in reader:
-            yield _omm(reader.line_num, {keyword: cell.strip()[:MAX_VALUE_CHARS] for keyword in omm.KEYWORDS
-                                         if (cell := row.get(keyword)) is not None})
+            # The name of a column may have a unit behind it, as in `INCLINATION [deg]`.
+            named = ((name.partition('['), cell.strip()[:MAX_VALUE_CHARS]) for name, cell in row.items() if cell)
+            yield _omm(reader.line_num, {keyword: f'{cell} {bracket}{unit}' if bracket else cell
+                                         for (column, bracket, unit), cell in named
+                                         if (keyword := column.strip()) in omm.KEYWORDS})
 
 
 def _json(path: FilePath) -> Iterator[Satellite]:
@@ -242,6 +244,7 @@ class _Segments:
         self._path, self._parser = path, parser
         self._open: list[str] = []      # names of the open elements
         self._texts: dict[str, str] = {}    # of the keywords in the open segment, which begins at _line
+        self._units: dict[str, str] = {}    # of the keywords that state one, in brackets
         self._line = 1
         parser.buffer_text = True
         parser.StartDoctypeDeclHandler, parser.CharacterDataHandler = self._doctype, self._text
@@ -251,14 +254,17 @@ class _Segments:
         raise lines.wrong(self._path, self._parser.CurrentLineNumber, self._parser.CurrentColumnNumber + 1,
                           'a document type declaration: an OMM has none')
 
-    def _start(self, name: str, _attributes: dict[str, str]) -> None:
+    def _start(self, name: str, attributes: dict[str, str]) -> None:
         if len(self._open) >= MAX_XML_DEPTH:
             raise csv_table.TableError(f'{self._path}: line {self._parser.CurrentLineNumber}: must be at most '
                                        f'{MAX_XML_DEPTH} nested elements')
         self._open.append(name.rpartition(':')[2][:MAX_VALUE_CHARS])
         if self._open[-1] == 'segment':
             self._texts.clear()
+            self._units.clear()
             self._line = self._parser.CurrentLineNumber
+        if 'units' in attributes and self._open[-1] in omm.KEYWORDS:
+            self._units[self._open[-1]] = f' [{attributes["units"][:MAX_VALUE_CHARS]}]'
 
     def _text(self, data: str) -> None:
         if self._open and self._open[-1] in omm.KEYWORDS:
@@ -266,7 +272,8 @@ class _Segments:
 
     def _end(self, _name: str) -> None:
         if self._open.pop() == 'segment':
-            self.satellites.append(_omm(self._line, {key: value.strip() for key, value in self._texts.items()}))
+            self.satellites.append(_omm(self._line, {key: value.strip() + self._units.get(key, '')
+                                                     for key, value in self._texts.items()}))
             self._line = 1
 
 

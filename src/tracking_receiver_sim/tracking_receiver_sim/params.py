@@ -89,7 +89,7 @@ class TrackFileParameters(Parameters):
     azimuth and elevation (CSV, program.txt), see docs/reference/tracks.md."""
     path: str = text('', 'file: CSV, ADS-B as CSV, GPX, NMEA, OEM, STK .e, program.txt')
     aircraft: str = text('', 'name of the target if the file holds several: icao24, callsign, name of a GPX track, '
-                         'object of an OEM')
+                         'object of an OEM; or talker of a log of NMEA')
     start: float = parameter(0.0, 0.0, 1e7, 's', 'time from the first fix, state or row to stamp 0')
     max_gap: float = parameter(10.0, 0.01, 600.0, 's', 'largest time between two fixes of a flight')
     max_speed: float = parameter(400.0, 1.0, 12e3, 'm/s', 'largest speed of a flight; a faster one is refused')
@@ -155,7 +155,7 @@ class TargetParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class AntennaParameters(Parameters):
-    """Sum and difference channels; the defaults are an X-band dish of 2.4 m."""
+    """Sum and difference channels; the defaults are a dish of 3 m at 7 GHz."""
     beamwidth: float = parameter(0.0175, 1e-4, 0.5, 'rad', 'half-power beamwidth theta3 of the sum pattern')
     slope: float = parameter(1.6, 0.5, 1.867, '1', 'slope k_m: difference over sum per beamwidth; lossless: 1.867')
     slope_factor: float = parameter(1.0, 0.1, 5.0, '1', 'true slope over the slope that the receiver assumes')

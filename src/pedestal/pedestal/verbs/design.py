@@ -63,16 +63,17 @@ def _samples(options: argparse.Namespace) -> int:
 
 
 def _add_new(parser: argparse.ArgumentParser) -> None:
-    """All other values of the antenna are scaled from the antenna of the scenario leo_pass. A comment in the file
-    explains each value. `pedestal tune FILE --loops` then tunes the loops and measures their margins.
+    """All other values are scaled from the antenna of the scenario leo_pass; the command prints each rule. Comments in
+    the file explain its values. `pedestal tune FILE --loops` then tunes the loops and measures their margins.
     """
-    from pedestal_workbench.tuning.data_sheet import DataSheet
+    from pedestal_workbench.tuning.data_sheet import SCALED_FIELDS, DataSheet
     parser.add_argument('file', type=pathlib.Path, metavar='FILE.yaml', help='new scenario file')
     arguments.add_station(parser)
     for name, field in parameters.flatten(DataSheet):
         unit = field.metadata.get('unit')
         allowed = ', '.join(field.metadata.get('options', ()))
-        described = f'{field.metadata["doc"]}{f": {allowed}" if allowed else ""}; default: {field.default}'
+        default = 'scaled by the diameter' if name in SCALED_FIELDS else parameters.value_text(field.default)
+        described = f'{field.metadata["doc"]}{f": {allowed}" if allowed else ""}; default: {default}'
         parser.add_argument(option_of(name), type=field.type, default=field.default,
                             metavar=unit.upper().replace(' ', '') if unit else 'SCENARIO' if allowed else 'RATIO',
                             help=described.replace('%', '%%'))

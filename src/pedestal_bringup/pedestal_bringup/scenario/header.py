@@ -1,6 +1,7 @@
 """Header of a scenario: its section `scenario`, the parameters that belong to no single node."""
 import dataclasses
 
+from pedestal_bringup.scenario.link import DishParameters, LinkParameters
 from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from pedestal_common.graph.graph_parameters import GraphParameters
@@ -64,6 +65,8 @@ class ScenarioParameters(parameters.Parameters):
     deadline: float = _of_graph('deadline')
     priority: int = _of_graph('priority')
     program: ProgramParameters = parameters.group(ProgramParameters)
+    dish: DishParameters = parameters.group(DishParameters)
+    link: LinkParameters = parameters.group(LinkParameters)
     restart: RestartParameters = parameters.group(RestartParameters)
 
     def check(self) -> None:

@@ -3,13 +3,15 @@ elevations, predicted for the target of a scenario."""
 import dataclasses
 import datetime
 import functools
+import math
 
 import numpy as np
 
 from pedestal_bringup.scenario.scenario import Scenario
+from pedestal_bringup.scenario.sections import AnyParameters
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
-from pedestal_common.quantities import Message, Nanoseconds, Pairs, Seconds, Times
+from pedestal_common.quantities import Message, Meters, Nanoseconds, Pairs, Seconds, Times
 from pedestal_common.wire import messages
 from ship_motion_sim import motion
 from tracking_receiver_sim import target, wave_path
@@ -89,7 +91,12 @@ class Plan:
                     for prefix in self.scenario.prefixes]
         lines = [*(f'antenna at {station.text}' for station in stations), *self.scenario.notes, *self.ship_summary]
         for prefix, built in self.targets.items():
-            lines += [*built.summary, *_sky(built, self._parameters(prefix).kind, self.scenario.header.duration)]
+            lines += [*built.summary, *_sky(built, self._parameters(prefix).kind, self.scenario.header.duration),
+                      *_link(built, self.scenario.node_parameters(f'{prefix}tracking_receiver'),
+                             self.scenario.header.duration)]
+        wind = getattr(self.scenario.node_parameters('adu'), 'wind', None)
+        if wind and wind.field.speed > 0.0:
+            lines.append(f'wind: {wind.field.speed:g} m/s on a dish of {wind.field.diameter:g} m')
         return list(dict.fromkeys(lines))
 
     def begins(self) -> Nanoseconds:
@@ -124,6 +131,32 @@ def _sky(built: target.Target, kind: str, duration: Seconds) -> tuple[str, ...]:
     ends = (f'the track of the {name} ends {when(known[-1])}: nothing can be tracked after',
             ) if not sets and known[-1] < times.size - 1 else ()
     return (*highest, *rises, *sets, *ends)
+
+
+def _link(built: target.Target, parameters: AnyParameters, duration: Seconds) -> tuple[str, ...]:
+    """Return a line on the C/N0 over the ranges of a run; () for a C/N0 that does not depend on the range."""
+    receiver: AnyParameters = getattr(parameters, 'receiver', None)
+    if parameters.target.of_noise or not getattr(receiver, 'range_exponent', 0.0):
+        return ()
+    _, elevation, distance = target.look_angles(built, np.linspace(0.0, duration, 1 + int(min(1e4, duration))))
+    seen = distance[elevation > receiver.horizon_mask]
+    if not seen.size:
+        return ()
+    near, far = float(seen.min()), float(seen.max())
+    best, worst = (receiver.cn0_dbhz - 10.0 * receiver.range_exponent * math.log10(distance / receiver.reference_range)
+                   for distance in (near, far))
+    levels, ranges = ((one, other) if one != other else (one,) for one, other in (
+        (f'{best:.1f}', f'{worst:.1f}'), (_km(near), _km(far))))
+    text = (f'link: C/N0 {receiver.cn0_dbhz:.4g} dB-Hz at {1e-3 * receiver.reference_range:g} km; in this run '
+            f'{" to ".join(levels)} dB-Hz at {" to ".join(ranges)} km; lock at {receiver.acquire_level_dbhz:g} dB-Hz')
+    if best < receiver.acquire_level_dbhz:
+        text += (': the receiver cannot lock; state the target by scenario.link.eirp, or by '
+                 'tracking_receiver.receiver.cn0_dbhz at reference_range')
+    return (text,)
+
+
+def _km(distance: Meters) -> str:
+    return f'{1e-3 * distance:.0f}' if distance >= 100e3 else f'{1e-3 * distance:.3g}'
 
 
 def program_message(times: Times, angles: Pairs) -> Message:

@@ -10,7 +10,7 @@ import pathlib
 import typing
 from collections.abc import Iterable
 
-from pedestal_bringup.scenario import files, rules
+from pedestal_bringup.scenario import files, link, rules
 from pedestal_bringup.scenario.header import ScenarioParameters
 from pedestal_bringup.scenario.sections import (
     BEAM_NODES,
@@ -84,7 +84,9 @@ class Scenario:
 
     def as_yaml(self) -> str:
         """Return the scenario as a ROS 2 parameter file."""
-        sections = {'scenario': parameters.as_dict(self.header), **self.values}
+        header = {key: value for key, value in parameters.as_dict(self.header).items()
+                  if not parameters.is_absent(value)}
+        sections = {'scenario': header, **self.values}
         return plain_yaml.dump({node: {'ros__parameters': values} for node, values in sections.items()})
 
 
@@ -168,10 +170,12 @@ def checked(new_draft: Draft, seed: int | None = None, duration: Seconds | None 
     for node in (*SECTION_NODES, *of_beams, *header.simulated_parts):
         sections.setdefault(node, {})
         checked_section(name, node, row_of(node, header).parameters_type(), values_of(sections, node))
+    types = {node: row_of(node, header).parameters_type() for node in ('adu', 'tracking_receiver')}
+    of_link = link.derive(sections, header.dish, header.link, types)
     rules.share(name, sections, header, seed)
     for node in of_beams:
         rules.share_with_beam(name, node, sections, header, seed)
-    notes = rules.narrow(sections, header)
+    notes = (*of_link, *rules.narrow(sections, header))
     for node, values in sections.items():
         try:
             node_parameters = checked_section(name, node, row_of(node, header).parameters_type(),

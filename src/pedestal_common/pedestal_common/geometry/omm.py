@@ -9,13 +9,19 @@ from sgp4 import omm
 from sgp4.alpha5 import from_alpha5
 from sgp4.api import Satrec
 
+from pedestal_common.text_files import units
+
 NUMBER_LIMITS = {'MEAN_MOTION': (0.05, 18.0), 'ECCENTRICITY': (0.0, 0.9999999), 'INCLINATION': (0.0, 180.0),
                  'RA_OF_ASC_NODE': (-360.0, 360.0), 'ARG_OF_PERICENTER': (-360.0, 360.0),
                  'MEAN_ANOMALY': (-360.0, 360.0), 'BSTAR': (-1e3, 1e3),
                  'MEAN_MOTION_DOT': (-1e3, 1e3), 'MEAN_MOTION_DDOT': (-1e3, 1e3)}
-"""{keyword: (lowest, highest)}. Angles are in deg, BSTAR in 1/earth radii, MEAN_MOTION in rev/day; MEAN_MOTION_DOT is
-half of its derivative [rev/day^2], MEAN_MOTION_DDOT a sixth of its second derivative [rev/day^3]."""
+"""{keyword: (lowest, highest)}. MEAN_MOTION_DOT is half of the derivative of MEAN_MOTION, MEAN_MOTION_DDOT a sixth of
+its second derivative."""
 ANGLE_KEYWORDS = ('RA_OF_ASC_NODE', 'ARG_OF_PERICENTER', 'MEAN_ANOMALY')
+STANDARD_UNITS = {'MEAN_MOTION': 'rev/day', 'ECCENTRICITY': '', 'INCLINATION': 'deg',
+                  **dict.fromkeys(ANGLE_KEYWORDS, 'deg'), 'BSTAR': '1/ER', 'MEAN_MOTION_DOT': 'rev/day**2',
+                  'MEAN_MOTION_DDOT': 'rev/day**3', 'BTERM': 'm**2/kg', 'AGOM': 'm**2/kg'}
+"""{keyword of a number: its only unit}, table 4-3 of CCSDS 502.0-B-3; ER: earth radii."""
 MAX_CATALOGUE_NUMBER = 999_999_999  # largest catalogue number
 DEFAULT_FIELDS = {'MEAN_MOTION_DOT': '0', 'MEAN_MOTION_DDOT': '0'}  # {keyword that an OMM may omit: default value}
 ALLOWED_VALUES = {'CENTER_NAME': ('EARTH',), 'REF_FRAME': ('TEME',), 'TIME_SYSTEM': ('UTC',),
@@ -55,8 +61,11 @@ def catalogue_number(text: str) -> str:
 
 def checked(fields: Mapping[str, object]) -> dict[str, str]:
     """Return {keyword: text} of valid elements, with every number that SGP4 needs, from the fields of an OMM. Raises
-    ValueError, which names keyword, value and range."""
-    given = {**DEFAULT_FIELDS, **{key: str(value).strip() for key, value in fields.items() if key in KEYWORDS}}
+    ValueError, which names keyword, value and range. A number may have its unit behind it; an empty text counts as
+    missing."""
+    texts = {key: units.bare(key, str(value), STANDARD_UNITS[key]) if key in STANDARD_UNITS else str(value).strip()
+             for key, value in fields.items() if key in KEYWORDS}
+    given = {**DEFAULT_FIELDS, **{key: text for key, text in texts.items() if text}}
     for keyword, allowed in ALLOWED_VALUES.items():
         if given.get(keyword, allowed[0]).upper() not in allowed:
             raise ValueError(f'{keyword} = {given[keyword]!r:.60}: must be {" or ".join(allowed)}')
@@ -68,10 +77,12 @@ def checked(fields: Mapping[str, object]) -> dict[str, str]:
     if without_drag:
         given['BSTAR'] = '0'
     for keyword, (low, high) in NUMBER_LIMITS.items():
+        if keyword not in given:
+            raise ValueError(f'{keyword} is missing')
         try:
-            value = float(given.get(keyword, '').replace('_', ' '))  # float() alone would accept _ between digits
+            value = float(given[keyword].replace('_', ' '))  # float() alone would accept _ between digits
         except ValueError:
-            raise ValueError(f'{keyword} = {given.get(keyword)!r:.60}: must be a number') from None
+            raise ValueError(f'{keyword} = {given[keyword]!r:.60}: must be a number') from None
         if not low <= value <= high:
             raise ValueError(f'{keyword} = {value:g}: must be {low:g} to {high:g}')
     if without_drag and given.get('MEAN_ELEMENT_THEORY', '').upper() not in BSTAR_OPTIONAL_THEORIES:

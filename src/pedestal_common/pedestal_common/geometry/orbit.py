@@ -28,6 +28,7 @@ TLE_NUMBER_COLUMNS = (
      'mean anomaly': (43, 51), 'mean motion': (52, 63)})
 """For each TLE line, {number: (its first column, the column behind it)}, counted from 0."""
 
+FIRST_SATELLITE_YEAR = 57  # smallest two-digit year of a TLE in the 20th century: first satellite 1957
 TLE_TYPE_COLUMN = 62  # column of the ephemeris type in line 1, counted from 0
 
 ORDINAL_ZERO_JULIAN_DATE = 1721424.5
@@ -89,6 +90,7 @@ def satellite(leo_pass: Elements) -> Satellite:
         for field, (first, end) in TLE_NUMBER_COLUMNS[number - 1].items():
             if not line[first:end].replace('.', '', 1).strip().isdigit():
                 raise TargetError(f'{name}: {field} {line[first:end]!r} is not a number')
+    _require_day(lines[0])
     try:
         omm.require_sgp4(lines[0][TLE_TYPE_COLUMN])
     except ValueError as error:
@@ -100,6 +102,19 @@ def satellite(leo_pass: Elements) -> Satellite:
     if satrec.error:
         raise TargetError(f'TLE of satellite {lines[0][2:7]}: {SGP4_ERRORS[satrec.error]}')
     return satrec
+
+
+def epoch_year(text: str) -> int:
+    """Return the year of two digits in a TLE. Raises ValueError."""
+    return int(text) + (1900 if int(text) >= FIRST_SATELLITE_YEAR else 2000)
+
+
+def _require_day(line: str) -> None:
+    """Raise TargetError if the year of the epoch in line 1 does not have its day."""
+    year, day = (line[slice(*columns)] for columns in TLE_NUMBER_COLUMNS[0].values())
+    days = datetime.date(epoch_year(year), 12, 31).timetuple().tm_yday
+    if not 1.0 <= float(day) < days + 1:
+        raise TargetError(f'TLE line 1: epoch day {day.strip()}: must be 1 to below {days + 1} in {epoch_year(year)}')
 
 
 def earth_fixed(julian: float, fractions: Floats, ut1_offset: Seconds | Times = 0.0,

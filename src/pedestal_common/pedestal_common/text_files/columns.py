@@ -4,42 +4,12 @@ The name of a column has a quantity and behind it a unit, as in time_s, `az [deg
 candidate for a quantity if its name consists of this quantity and a known unit; `az_rate` or `time_local` is none. Two
 candidates are refused. Without a candidate, the error names a column that begins with the quantity.
 """
-import math
 import re
 import typing
 from collections.abc import Iterable, Mapping, Sequence
 
-from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.text_files.units import UNIT_NAMES, UNIT_SIZES, UTC
 
-METRES_PER_FOOT = 0.3048  # length of the international foot [m]
-
-UTC, JULIAN_DATE, MODIFIED_JULIAN_DATE = 'UTC', 'JD', 'MJD'
-"""Units of a time with a date: a calendar date (or seconds since 1970), a Julian date, a modified Julian date."""
-
-_UNIT_NAMES: dict[str, dict[str, tuple[str, ...]]] = {
-    # {unit of the reader, in lower case: {unit: its names in a file}}
-    's': {'s': ('s', 'sec', 'secs', 'second', 'seconds'),
-          'ms': ('ms', 'msec', 'millis', 'millisecond', 'milliseconds'),
-          'us': ('us', 'µs', 'μs', 'usec', 'micros', 'microsecond', 'microseconds'),
-          'ns': ('ns', 'nsec', 'nanos', 'nanosecond', 'nanoseconds'),
-          'min': ('min', 'mins', 'minute', 'minutes'), 'h': ('h', 'hr', 'hrs', 'hour', 'hours'),
-          'd': ('d', 'day', 'days'), JULIAN_DATE: ('jd', 'jdut', 'jdutc', 'juliandate', 'juliandateutc'),
-          MODIFIED_JULIAN_DATE: ('mjd', 'mjdut', 'mjdutc')},
-    'deg': {'deg': ('deg', 'degs', 'degree', 'degrees', '°', 'º', 'true', 'degtrue'),
-            'rad': ('rad', 'rads', 'radian', 'radians'), 'mrad': ('mrad', 'mrads', 'milliradians')},
-    'm': {'m': ('m', 'meter', 'meters', 'metre', 'metres'), 'km': ('km', 'kilometer', 'kilometers', 'kilometre',
-                                                                   'kilometres'),
-          'cm': ('cm',), 'mm': ('mm',), 'ft': ('ft', 'foot', 'feet')},
-    'db': {'db': ('db', 'decibel', 'decibels')},
-    'hz': {'hz': ('hz',), 'rad/s': ('rad/s', 'radpers')},
-    'm2_per_hz': {'m2/Hz': ('m2/hz', 'm^2/hz', 'm2perhz', 'm²/hz', 'm**2/hz'),
-                  'm2 s/rad': ('m2s/rad', 'm^2s/rad', 'm²s/rad', 'm2/rad/s', 'm^2/rad/s', 'm²/rad/s')}}
-_UNIT_SIZES = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0, 'h': 3600.0, 'd': SECONDS_PER_DAY,
-               'deg': 1.0, 'rad': math.degrees(1.0), 'mrad': math.degrees(1e-3),
-               'm': 1.0, 'km': 1000.0, 'cm': 0.01, 'mm': 1e-3, 'ft': METRES_PER_FOOT,
-               'db': 1.0, 'hz': 1.0, 'rad/s': 0.5 / math.pi, 'm2/Hz': 1.0, 'm2 s/rad': 2.0 * math.pi,
-               UTC: 1.0, JULIAN_DATE: SECONDS_PER_DAY, MODIFIED_JULIAN_DATE: SECONDS_PER_DAY}
-"""Size of each unit, in the first unit of its row in _UNIT_NAMES: s, deg, m, dB, Hz or m2/Hz."""
 _UTC_PATTERN = re.compile(r'(ut|utc|utcg|gmt|z|zulu|utciso8601|iso8601|iso)?(hrmn(ss|sc)?(fff)?)?')
 """Words behind the name of a time in UTC; HR:MN:SS.fff is of JPL Horizons, UTCG of STK."""
 _APPARENT_NAMES = ('aapp', 'aappr', 'rapp')  # words that JPL Horizons writes behind an apparent angle in degrees
@@ -90,14 +60,14 @@ def find(names: Iterable[str], wanted: Quantity, required: bool = True) -> Colum
     for name in names:
         unit = unit_of(name, wanted)
         if unit:
-            found.append(Column(name, unit, _UNIT_SIZES[unit]))
+            found.append(Column(name, unit, UNIT_SIZES[unit]))
         elif unit == '' and (required or not _rest(name, wanted).startswith(_DERIVED_WORDS)):
             others.append(name)
     if len(found) > 1:
         raise ColumnError(f'columns {found[0].name!r:.60} and {found[1].name!r:.60}: only one of them may be '
                           f'the {wanted.label}: rename or remove the other')
     if others and not found:
-        units = [*_UNIT_NAMES[wanted.unit], *([UTC] if wanted.unit == 's' else [])]
+        units = [*UNIT_NAMES[wanted.unit], *([UTC] if wanted.unit == 's' else [])]
         raise ColumnError(f'column {others[0]!r:.60}: must end with a known unit to be taken as {wanted.label}: '
                           f'{", ".join(units[:-1])} or {units[-1]}')
     return found[0] if found else None
@@ -105,7 +75,7 @@ def find(names: Iterable[str], wanted: Quantity, required: bool = True) -> Colum
 
 def is_time(unit: str) -> bool:
     """Return True for a unit of time, with or without a date."""
-    return unit == UTC or unit in _UNIT_NAMES['s']
+    return unit == UTC or unit in UNIT_NAMES['s']
 
 
 def named(names: Iterable[str], wanted: Quantity) -> bool:
@@ -152,4 +122,4 @@ def unit_of(name: str, wanted: Quantity) -> str | None:
         return UTC
     if wanted.unit == 'deg' and rest in _APPARENT_NAMES:
         return 'deg'
-    return next((unit for unit, texts in _UNIT_NAMES[wanted.unit].items() if rest in texts), '')
+    return next((unit for unit, texts in UNIT_NAMES[wanted.unit].items() if rest in texts), '')

@@ -85,7 +85,7 @@ def on_deck(frame: Frame, v: Vector3) -> Xyz:
 
 
 @compiled
-def rotation_vector(a: Quaternion | Xyzw, b: Quaternion) -> Xyz:
+def rotation_vector(a: Quaternion | Xyzw, b: Quaternion | Xyzw) -> Xyz:
     """Return the rotation vector in the frame of the body by which it turned from the quaternion a to b."""
     x, y, z, w = product((-a[0], -a[1], -a[2], a[3]), b)
     if w < 0.0:

@@ -10,7 +10,7 @@ A constant acceleration causes no error. Source: Morrison, Introduction to Seque
 import math
 
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Bit, Nanoseconds, Quaternion, RadiansPerSecond, Vector3, Xyz
+from pedestal_common.quantities import Bit, Nanoseconds, Quaternion, RadiansPerSecond, Vector3, Xyz, Xyzw
 from pedestal_common.record import Record
 from pedestal_hardware.ins.frames import rotation_vector, turned
 
@@ -40,7 +40,7 @@ def restart(estimator: Estimator) -> None:
 
 
 @compiled
-def take(state: Estimator, stamp: Nanoseconds, q: Quaternion,
+def take(state: Estimator, stamp: Nanoseconds, q: Quaternion | Xyzw,
          bandwidth: RadiansPerSecond) -> tuple[bool, Xyz, bool]:
     """Take a quaternion with a newer stamp. Return (True if the rate is settled, its components, True for a sample
     that jumps and is not used)."""

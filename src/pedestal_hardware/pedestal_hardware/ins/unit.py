@@ -58,14 +58,18 @@ class InsInputUnit:
         constants = self.record['constants'][0]
         constants['frame'] = frames.constants(*frame, p.mounting.radians, math.radians(p.heading_zero))[0]
         constants['bandwidth'], constants['max_gap_ns'] = p.rate_bandwidth, round(p.max_gap * 1e9)
+        constants['oldest_ns'] = round(p.oldest * 1e9)
         constants['checked'] = p.frame_check
         self.published, self.drops, self.other_sentences = 0, Drops(DROP_KINDS), 0
         self.state, self._blocking = 'aligning', ''
-        self._heading, self._turn, self._age_ns = (math.nan, 0), (0.0, 0), 0
+        self._turn, self._age_ns = (0.0, 0), 0
 
     def prepare(self) -> None:
         """Compile the law, without a change of the unit."""
         before = self.record.copy()
+        self.record['inputs']['yaw_rate'] = math.nan
+        input_law.take_heading(self.record, 0, 0.0)
+        input_law.predict_yaw(self.record, 0, math.nan)
         input_law.step(self.record)
         self.record['inputs']['q'], self.record['inputs']['axes'] = (0.0, 0.0, 0.0, 1.0), frame_check.ALL_AXES
         input_law.step(self.record)
@@ -82,21 +86,24 @@ class InsInputUnit:
             self._turn = -math.radians(found.rate) / 60.0, arrival
             return None
         if found is not None and found.kind == 'hdt':
-            self._heading = found.heading, arrival
+            input_law.take_heading(self.record, arrival, -math.radians(found.heading))
         if found is None or found.kind != p.nmea.sentence:
             self.other_sentences += 1
             return None
-        heading = found.heading
-        if math.isnan(heading):
-            heading, at = self._heading
-            if math.isnan(heading) or arrival - at > round(p.oldest * 1e9):
-                return self._drop('no_heading', f'{found.kind} without heading, and no HDT in the last {p.oldest:g} s',
-                                  arrival)
         device = None if found.time_of_day is None else sentences.stamp_at(found.time_of_day, arrival)
         u = self.record['inputs'][0]
-        u['q'] = frames.of_angles(math.radians(heading), *self._level_angles(found))
         rate, at = self._turn
         turns = at and arrival - at <= TURN_AGE_NS
+        yaw, u['yaw_rate'] = -math.radians(found.heading), math.nan
+        if math.isnan(yaw):     # The heading of HDT goes on until this sentence, so that a slow HDT makes no steps.
+            course = self.record['state'][0]['course']
+            if not course['runs'] or arrival - course['last'] > round(p.oldest * 1e9):
+                return self._drop('no_heading', f'{found.kind} without heading, and no HDT in the last {p.oldest:g} s',
+                                  arrival)
+            yaw, u['yaw_rate'], settled = input_law.predict_yaw(self.record, arrival, rate if turns else math.nan)
+            if not settled:
+                return self._drop('settling', OUTCOME_TEXTS[Outcome.SETTLING], arrival)
+        u['q'], u['yaw'] = frames.of_angles(-yaw, *self._level_angles(found)), yaw
         u['w'], u['axes'] = (0.0, 0.0, rate), frame_check.TURN_AXIS if turns else 0
         u['force'] = math.nan
         aligned = not found.sigmas[2] > p.aligned_sigma and (
@@ -121,6 +128,7 @@ class InsInputUnit:
                               'orientation (REP 145)', arrival)
         q, w, f = message.orientation, message.angular_velocity, message.linear_acceleration
         has_rates = message.angular_velocity_covariance[0] >= 0.0 or p.imu.undeclared_rates
+        u['yaw_rate'] = math.nan
         u['q'], u['w'], u['force'] = (q.x, q.y, q.z, q.w), (w.x, w.y, w.z), (f.x, f.y, f.z)
         u['axes'] = frame_check.ALL_AXES if has_rates else 0
         if message.linear_acceleration_covariance[0] < 0.0 or not np.isfinite(u['force']).all():

@@ -109,6 +109,10 @@ def rows(path: str | pathlib.Path, text: str) -> list[OffsetRow]:
         if len(words) < 4:
             raise TableError(f'{path}: line {line}: {len(words)} numbers, must be at least 4: azimuth and elevation '
                              'on the sky, azimuth and elevation of the mount')
+        no_numbers = [word for word in words[4:] if not _NUMBERS_PATTERN.match(word)]
+        if no_numbers:
+            raise TableError(f'{path}: line {line}: {no_numbers[0]!r:.40}: must be a number; all angles are in deg, '
+                             'and a unit is not allowed here')
         named = zip(('azimuth', 'elevation', 'azimuth of the mount', 'elevation of the mount'), words,
                     (AXIS_RANGE_DEG, (-5.0, 90.0), AXIS_RANGE_DEG, MOUNT_ELEVATION_RANGE_DEG))
         az, el, mount_az, mount_el = (csv_table.number(path, line, name, word, *limits)

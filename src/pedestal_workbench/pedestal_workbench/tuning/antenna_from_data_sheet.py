@@ -1,16 +1,14 @@
 """`pedestal new`: make a scenario of your own antenna from the numbers of its data sheet.
 
-Values that a data sheet does not state are scaled from the default antenna of this software. This antenna has the
-motors of Ma 2023 and a load of 210 kg m2. The scaling keeps the resonance frequencies of gears and motors:
+Values that a data sheet does not state are scaled from the default antenna of this software. This antenna has a mirror
+of 3 m, the motors of Ma 2023 and a load of 210 kg m2. SCALED_FIELDS (data_sheet) and RULES state the laws; the command
+prints them with their values. The others:
 
     motor       flux: from the voltage at rated speed. Resistance and inductance: from their shares of the voltage at
-                rated torque. Inertia: proportional to the rated torque to the power 5/3. Friction and brake:
-                proportional to the rated torque.
-    gear, load  Stiffness, damping and viscous friction: proportional to the inertia of the load. Other friction and
-                unbalance: proportional to the inertia of the load to the power 2/3.
+                rated torque.
     receiver    C/N0 of the scenario for the area of the mirror. The power of the satellite and the noise of the
                 receiver stay the same.
-    wind        the diameter of the mirror
+    wind        the diameter of the mirror (scenario.dish)
     structure   the lowest frequency of the data sheet, or the average of antennas of this diameter (data_sheet)
     loops       the design of tuning/loops.py. `pedestal tune --loops` then measures the loops.
 
@@ -21,18 +19,20 @@ import functools
 import math
 import shlex
 import typing
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+
+import numpy as np
 
 from acu_tracker.servo import travel
-from drive_law.axis_params import PLANT_PERIOD_S, MotorParameters, mesh_inertia
-from drive_law.params import AduParameters
+from drive_law.axis_params import PLANT_PERIOD_S, AxisParameters, MotorParameters, mesh_inertia
+from drive_law.params import AduParameters, WindFieldParameters
 from pedestal_bringup.scenario import files, scenario
 from pedestal_bringup.scenario.header import PROGRAM_ERRORS
 from pedestal_bringup.scenario.program import Plan
 from pedestal_bringup.scenario.sections import parameters_of
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph.topics import AXES
-from pedestal_common.parameters import ParameterError, as_dict, build, flatten
+from pedestal_common.parameters import ParameterError, as_dict, build, flatten, is_absent, option_of
 from pedestal_common.quantities import DecibelHertz, Json, Radians
 from pedestal_common.text_files import parameter_file
 from pedestal_workbench.tuning import data_sheet
@@ -46,28 +46,53 @@ BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033
 """Shares of the phase voltage of a motor [-]: back-EMF at rated speed, voltages over resistance and inductance at
 rated torque."""
 
-KNOWN_MIRROR_M = 2.4  # diameter of the mirror for which the C/N0 of the scenarios holds [m] (AntennaParameters)
+DRAG_PEAK, WIND_M_S = 0.12, 15.0  # largest torque coefficient of a dish (adu_drive.plant.wind); printed wind [m/s]
 RATE_SHARE = 0.9  # share of the rate that an axis reaches, which replaces an unreachable rate of the data sheet [-]
 
 
+class Rule(typing.NamedTuple):
+    """Rule by which values of an axis follow from those of the default antenna."""
+    label: str
+    keys: tuple[str, ...]       # of an axis; the first one is printed
+    text: str
+    share: Callable[[float, float, float], float]   # from the ratios of load inertia, diameter and motor torque
+    for_loops: bool             # True if the loops depend on the values most
+
+
+def _of_motors(*keys: str) -> tuple[str, ...]:
+    return tuple(f'motor_{number}.{key}' for key in keys for number in (1, 2))
+
+
+RULES = (
+    Rule('stiffness of a gear mesh', ('gear_train.stiffness', 'gear_train.damping', 'load.viscous'),
+         'inertia: the gears resonate at an equal frequency', lambda inertia, _d, _torque: inertia, True),
+    Rule('friction', ('friction.coulomb', 'friction.breakaway', 'friction.stiffness', 'friction.damping'),
+         'weight on the bearing times its radius: inertia / diameter', lambda inertia, d, _torque: inertia / d, True),
+    Rule('unbalance', ('load.unbalance',), 'weight times arm: inertia / diameter',
+         lambda inertia, d, _torque: inertia / d, False),
+    Rule('inertia of a motor', _of_motors('inertia'), 'motor torque^(5/3)',
+         lambda _inertia, _d, torque: torque**(5.0 / 3.0), True),
+    Rule('friction of a motor', _of_motors('friction', 'viscous', 'brake'), 'motor torque',
+         lambda _inertia, _d, torque: torque, False))
+
+
 def motor(sheet: DataSheet, known: Mapping[str, float]) -> dict[str, float]:
-    """Return {key: value} of a motor, scaled from the parameters {key: value} of the default motor."""
-    share, pairs, voltage = sheet.motor_torque / 30.0, known['pole_pairs'], known['voltage']
+    """Return {key: value} of the electrical part of a motor. known: {key: value} of the default motor."""
+    pairs, voltage = known['pole_pairs'], known['voltage']
     electrical = pairs * sheet.motor_speed * math.pi / 30.0
     flux = BACK_EMF_SHARE * voltage / electrical
     current = sheet.motor_torque / (1.5 * pairs * flux)
     return {'flux_linkage': flux, 'resistance': RESISTANCE_VOLTAGE_SHARE * voltage / current,
             'inductance': INDUCTANCE_VOLTAGE_SHARE * voltage / (electrical * current),
-            'torque_limit': 3.0 * sheet.motor_torque, 'inertia': known['inertia'] * share**(5.0 / 3.0),
-            'friction': known['friction'] * share,
-            'viscous': known['viscous'] * share, 'brake': known['brake'] * share}
+            'torque_limit': 3.0 * sheet.motor_torque}
 
 
 def axis(sheet: DataSheet, name: str) -> dict[str, float]:
     """Return {key: value} of an axis of the drive, without the gains of its loops; name: the axis."""
     known = as_dict(getattr(AduParameters(), name))
     inertia, ratio, rate = (getattr(sheet, f'{what}_{name}') for what in ('inertia', 'ratio', 'rate'))
-    share = inertia / known['load.inertia']
+    ratios = (inertia / known['load.inertia'], sheet.mirror / data_sheet.KNOWN_MIRROR_M,
+              sheet.motor_torque / known['thermal.rated_torque'])
     values = {'load.inertia': inertia, 'gear_train.reducer_ratio': ratio / known['gear_train.pinion_ratio'],
               'gear_train.lash': 1e-3 * sheet.lash, 'limits.rate': math.radians(rate),
               'encoder.load_bits': sheet.encoder_bits, 'faults.overspeed': 1.22 * math.radians(rate),
@@ -77,10 +102,7 @@ def axis(sheet: DataSheet, name: str) -> dict[str, float]:
         values |= {f'motor_{number}.{key}': value for key, value in motor(sheet, own).items()}
     constant = 1.5 * known['motor_1.pole_pairs'] * values['motor_1.flux_linkage']
     values['faults.overcurrent'] = 1.3 * values['motor_1.torque_limit'] / constant
-    values |= {key: known[key] * share for key in ('gear_train.stiffness', 'gear_train.damping', 'load.viscous')}
-    values |= {f'friction.{key}': known[f'friction.{key}'] * share**(2.0 / 3.0)
-               for key in ('coulomb', 'breakaway', 'stiffness', 'damping')}
-    values['load.unbalance'] = known['load.unbalance'] * share**(2.0 / 3.0)
+    values |= {key: known[key] * rule.share(*ratios) for rule in RULES for key in rule.keys}
     if sheet.mode_share:
         values |= {'structure.inertia_share': sheet.mode_share,
                    'structure.frequency': float(f'{sheet.structural_frequency:.3g}')}
@@ -145,12 +167,50 @@ def _motors(name: str, values: Mapping[str, float]) -> Iterator[MotorParameters]
 def cn0(sheet: DataSheet) -> DecibelHertz:
     """Return the C/N0 on the beam axis at the reference range: of the data sheet, else by the area of the mirror."""
     known = _receiver(sheet.like).receiver.cn0_dbhz
-    return sheet.cn0 or float(f'{known + 20.0 * math.log10(sheet.mirror / KNOWN_MIRROR_M):.4g}')
+    return sheet.cn0 or float(f'{known + 20.0 * math.log10(sheet.mirror / data_sheet.KNOWN_MIRROR_M):.4g}')
 
 
 @functools.cache
 def _receiver(name: str) -> TrackingReceiverParameters:
     return scenario.load(name).node_parameters('tracking_receiver')
+
+
+def _scaled(given: DataSheet, sheet: DataSheet) -> list[str]:
+    """Return a line for each value that the data sheet `given` lacks and `sheet` has, with its rule."""
+    meta = {name: field.metadata for name, field in flatten(DataSheet)}
+    rows = [(law.for_loops, option_of(name), f'{getattr(sheet, name):.4g} {meta[name]["unit"]}'.rstrip(), law.text)
+            for name, (_, law) in data_sheet.SCALED_FIELDS.items()
+            if is_absent(getattr(given, name)) and (name != 'motor_torque' or is_absent(given.motor_power))]
+    axes, fields = [axis(sheet, name) for name in AXES], dict(flatten(AxisParameters))
+    rows += [(rule.for_loops, rule.label, ', '.join(f'{values[rule.keys[0]]:.4g}' for values in axes)
+              + f' {fields[rule.keys[0]].metadata["unit"]}', rule.text) for rule in RULES]
+    wind = DRAG_PEAK * 0.5 * WindFieldParameters().density * WIND_M_S**2 * 0.25 * math.pi * sheet.mirror**3
+    holds = ', '.join(f'{2.0 * sheet.motor_torque * getattr(sheet, f"ratio_{name}"):.3g}' for name in AXES)
+    rows.append((False, f'wind of {WIND_M_S:g} m/s', f'{wind:.3g} Nm', f'diameter^3; the motors hold {holds} Nm'))
+    widths = [max(map(len, column)) for column in list(zip(*rows))[1:3]]
+    return [f'scaled from the antenna of {data_sheet.KNOWN_MIRROR_M:g} m by the rule behind each value (azimuth, '
+            'elevation); * matters most for the loops:',
+            *(f'{"*" if starred else " "} {label:{widths[0]}}  {value:{widths[1]}}  {law}'
+              for starred, label, value, law in rows)]
+
+
+def _rates(plan: Plan, found: Mapping[str, Mapping[str, Json]]) -> str:
+    """Return a line that compares the largest rates of the target with those of the shapers."""
+    from pedestal_workbench.tuning import loops
+    times, angles = next(iter(plan.tables.values()))
+    rates = np.abs(np.degrees(np.diff(angles, axis=0))) / np.diff(times)[:, np.newaxis]
+    there = np.degrees([found['acu'][f'{name}.shaper.rate'] for name in AXES])
+    wanted = rates.max(axis=0)
+    needs = f'the target of this run needs up to {wanted[0]:.3g} deg/s in azimuth and {wanted[1]:.3g} in elevation'
+    if plan.scenario.header.ship:
+        needs += ', without the motion of the ship'
+    if (wanted <= there).all():
+        return f'{needs}; the antenna has {there[0]:.3g} and {there[1]:.3g} deg/s'
+    short = float(np.diff(times)[(rates > there).any(axis=1)].sum())
+    options = ', '.join(f'--rate-{name} {1.1 * rate / loops.SHAPER_RATE_SHARE:.3g}'
+                        for name, rate, own in zip(AXES, wanted, there) if rate > own)
+    return (f'{needs}: more than the {there[0]:.3g} and {there[1]:.3g} deg/s of the antenna for {short:.3g} s, in '
+            f'which the beam falls behind; {options} would follow')
 
 
 def _assumed(sheet: DataSheet) -> list[str]:
@@ -171,6 +231,7 @@ def sections(sheet: DataSheet, title: str,
     """Return {node: {key: value}} of the scenario. station: {parameter of the receiver: value}, None for that of the
     scenario of the data sheet. Raises ValueError."""
     from pedestal_workbench.tuning import loops
+    sheet = sheet.completed()
     _, content = files.text(sheet.like)
     found = files.by_node(parameter_file.parse(content))
     found['scenario']['title'] = title
@@ -178,7 +239,7 @@ def sections(sheet: DataSheet, title: str,
     for key in PROGRAM_ERRORS.keys() & set(found['scenario']):
         found['scenario'][key] *= min(1.0, sheet.theta / 0.0175)
     found['tracking_receiver'] |= {'antenna.beamwidth': sheet.theta, 'receiver.cn0_dbhz': cn0(sheet)}
-    found['adu']['wind.field.diameter'] = sheet.mirror
+    found['scenario'] |= {'dish.diameter': sheet.mirror, 'dish.frequency': sheet.frequency}
     w_s = 2.0 * math.pi * loops.DEFAULT_SPEED_CROSSOVER_HZ
     for name in AXES:
         values = axis(sheet, name)
@@ -233,16 +294,21 @@ def new(sheet: DataSheet, name: str, command: str,
 
 
 def _new(sheet: DataSheet, name: str, command: str, station: Mapping[str, float] | None) -> tuple[str, list[str]]:
-    sheet, remarks = attainable(sheet)
-    remarks += _assumed(sheet)
+    whole = sheet.completed()
+    remarks = _scaled(sheet, whole)
+    if not is_absent(sheet.motor_power):
+        remarks.append(f'--motor-power {sheet.motor_power:g} kW at {whole.motor_speed:g} rpm: '
+                       f'{whole.motor_torque:g} Nm')
+    sheet, changed = attainable(whole)
+    remarks += [*changed, *_assumed(sheet)]
     if station is None:
         remarks.append(f'no --station: the antenna stands at {_receiver(sheet.like).target.station.text}')
     title = f'{sheet.mirror:g} m antenna, beam {math.degrees(sheet.theta):.3g} deg, on the mission of {sheet.like}'
     found = sections(sheet, title, station)
     tune = shlex.join(('pedestal', 'tune', f'{name}.yaml', '--loops'))
     run = Variant(f'{name}.yaml', files=(f'{name}-loops.yaml',)).command()
-    remarks += scenario.parse(name, parameter_file.text(found)).notes
-    content = text(found, [*parameter_file.origin(command), 'Values that are not in the data sheet are scaled from '
-                           'the antenna of the product: replace them by known values.',
+    parsed = scenario.parse(name, text(found, []))
+    remarks += [_rates(Plan(parsed), found), *parsed.notes]
+    content = text(found, [*parameter_file.origin(command), 'Replace scaled and assumed values by known values.',
                            f'Next: {tune}, then {run}', *remarks])
     return content, remarks

@@ -8,17 +8,49 @@ own range. The edges between refused and accepted values are bisected.
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
+from pedestal_bringup.scenario.link import DEFAULT_DIAMETER_M, DishParameters
 from pedestal_common.graph.topics import AXES
-from pedestal_common.parameters import ParameterError, Parameters, choice, flatten, option_of, parameter
+from pedestal_common.parameters import (
+    NOT_GIVEN,
+    ParameterError,
+    Parameters,
+    choice,
+    flatten,
+    is_absent,
+    option_of,
+    parameter,
+)
 from pedestal_common.quantities import Hertz, Json, Radians
 
-LIGHT_SPEED_M_GHZ = 0.299792458  # speed of light [m GHz]
 MIN_MODE_HZ, MAX_MODE_HZ = 1.0, 200.0  # smallest and largest structural frequency that the simulated plant allows [Hz]
 
 TEMPLATE_SCENARIOS = ('leo_pass', 'geo_station', 'uav_flyby', 'ship_pass', 'ship_uav')
+
+KNOWN_MIRROR_M = DEFAULT_DIAMETER_M  # diameter of the mirror of the default antenna, from which others are scaled
+
+
+class Law(NamedTuple):
+    """Law by which a value follows from that of the default antenna."""
+    text: str
+    share: Callable[[float], float]     # factor, from the ratio of the diameters
+    for_loops: bool                     # True if the loops depend on the value most
+
+
+_INERTIA = Law('diameter^5: equal shape and material', lambda d: d**5, True)
+_RATIO = Law('diameter^2 to 30 m: with the motor the wind torque, diameter^3',
+             lambda d: min(max(d**2, 0.15), 100.0), True)
+_RATE = Law('diameter^-2 above 3 m, with the gear ratio', lambda d: min(1.0, d**-2), False)
+_TORQUE = Law('diameter: with the gear ratio the wind torque, diameter^3', lambda d: max(d, 0.1), True)
+
+SCALED_FIELDS: dict[str, tuple[float, Law]] = {
+    'inertia_azimuth': (210.0, _INERTIA), 'inertia_elevation': (150.0, _INERTIA), 'ratio_azimuth': (64.0, _RATIO),
+    'ratio_elevation': (90.0, _RATIO), 'motor_torque': (30.0, _TORQUE), 'rate_azimuth': (140.0, _RATE),
+    'rate_elevation': (97.0, _RATE)}
+"""{field that a data sheet may lack: (value of the default antenna, law)}."""
 
 GRID_COUNT, BISECTIONS, MAX_OPTIONS = 8, 10, 3
 """Number of tried values on each side of the refused value; number of bisections of an edge; largest number of options
@@ -36,16 +68,18 @@ class DataSheet(Parameters):
                            '0: computed from that of the scenario for the area of the mirror')
     beamwidth: float = parameter(0.0, 0.0, 20.0, 'deg',
                                  'half-power beamwidth; 0: computed as 70 deg times wavelength divided by diameter')
-    inertia_azimuth: float = parameter(210.0, 0.1, 1e7, 'kg m2', 'inertia of the load about the azimuth axis')
-    inertia_elevation: float = parameter(150.0, 0.1, 1e7, 'kg m2', 'inertia of the load about the elevation axis')
-    ratio_azimuth: float = parameter(64.0, 8.0, 1e5, '', 'gear ratio from motor to azimuth axis')
-    ratio_elevation: float = parameter(90.0, 8.0, 1e5, '', 'gear ratio from motor to elevation axis')
-    motor_torque: float = parameter(30.0, 0.1, 1000.0, 'Nm',
+    inertia_azimuth: float = parameter(NOT_GIVEN, 0.1, 1e7, 'kg m2', 'inertia of the load about the azimuth axis')
+    inertia_elevation: float = parameter(NOT_GIVEN, 0.1, 1e7, 'kg m2', 'inertia of the load about the elevation axis')
+    ratio_azimuth: float = parameter(NOT_GIVEN, 8.0, 1e5, '', 'gear ratio from motor to azimuth axis')
+    ratio_elevation: float = parameter(NOT_GIVEN, 8.0, 1e5, '', 'gear ratio from motor to elevation axis')
+    motor_torque: float = parameter(NOT_GIVEN, 0.1, 1000.0, 'Nm',
                                     'rated torque of one motor; the peak torque is set to three times this torque')
+    motor_power: float = parameter(NOT_GIVEN, 1e-3, 1000.0, 'kW', 'rated power of one motor, which gives its rated '
+                                   'torque at motor_speed')
     motor_speed: float = parameter(1500.0, 100.0, 10000.0, 'rpm', 'rated speed of a motor')
     lash: float = parameter(1.0, 0.0, 50.0, 'mrad', 'lash of one gear mesh, referred to the load axis')
-    rate_azimuth: float = parameter(140.0, 0.6, 1000.0, 'deg/s', 'largest rate of azimuth')
-    rate_elevation: float = parameter(97.0, 0.6, 1000.0, 'deg/s', 'largest rate of elevation')
+    rate_azimuth: float = parameter(NOT_GIVEN, 0.6, 1000.0, 'deg/s', 'largest rate of azimuth')
+    rate_elevation: float = parameter(NOT_GIVEN, 0.6, 1000.0, 'deg/s', 'largest rate of elevation')
     mode: float = parameter(0.0, 0.0, MAX_MODE_HZ, 'Hz', 'lowest structural frequency with locked motors, 1 to 200; '
                             '0: computed as 20 Hz times the diameter in m to the power -0.7')
     mode_share: float = parameter(0.5, 0.0, 0.9, '', 'share of the load inertia that swings with the lowest '
@@ -57,7 +91,23 @@ class DataSheet(Parameters):
         if self.mode != 0.0 and not MIN_MODE_HZ <= self.mode <= MAX_MODE_HZ:
             raise ParameterError(f'mode = {self.mode:g} Hz: must be {MIN_MODE_HZ:g} to {MAX_MODE_HZ:g}, or 0 for the '
                                  'average of antennas of this diameter')
+        if not (is_absent(self.motor_power) or is_absent(self.motor_torque)):
+            raise ParameterError(f'motor_power = {self.motor_power:g} kW: must be without motor_torque, because power '
+                                 f'and motor_speed = {self.motor_speed:g} rpm give the torque')
         super().__post_init__()
+
+    def completed(self) -> 'DataSheet':
+        """Return the data sheet with a torque for its power, and with scaled values for those that it lacks."""
+        sheet = self
+        if not is_absent(self.motor_power):
+            torque = 1e3 * self.motor_power / (self.motor_speed * math.pi / 30.0)
+            sheet = dataclasses.replace(self, motor_power=NOT_GIVEN, motor_torque=float(f'{torque:.4g}'))
+        limits = {name: field.metadata for name, field in flatten(DataSheet) if name in SCALED_FIELDS}
+        values: dict[str, Json] = {
+            name: min(max(float(f'{known * law.share(self.mirror / KNOWN_MIRROR_M):.4g}'), limits[name]['low']),
+                      limits[name]['high'])
+            for name, (known, law) in SCALED_FIELDS.items() if is_absent(getattr(sheet, name))}
+        return dataclasses.replace(sheet, **values)
 
     @property
     def structural_frequency(self) -> Hertz:
@@ -70,12 +120,12 @@ class DataSheet(Parameters):
     @property
     def theta(self) -> Radians:
         """Half-power beamwidth."""
-        return math.radians(self.beamwidth or 70.0 * LIGHT_SPEED_M_GHZ / self.frequency / self.mirror)
+        return math.radians(self.beamwidth) or DishParameters(self.mirror, self.frequency).beamwidth
 
 
 def refusal(sheet: DataSheet, error: ValueError, make: Callable[[DataSheet], object]) -> ValueError:
     """Return the error with options for the error of a data sheet. make(sheet) raises ValueError for a refused one."""
-    axis = _axis(error)
+    axis, whole = _axis(error), sheet.completed()
 
     def is_made(name: str, value: float) -> bool:
         """Return True if the data sheet with another value is made, or refused for another axis."""
@@ -83,20 +133,22 @@ def refusal(sheet: DataSheet, error: ValueError, make: Callable[[DataSheet], obj
             changes: dict[str, Json] = {name: value}
             make(dataclasses.replace(sheet, **changes))
         except ValueError as found:
-            return bool(axis and _axis(found) and _axis(found) != axis)
+            # An option of one axis cannot mend the other axis.
+            return bool(name.endswith(axis or ' ') and _axis(found) not in ('', axis))
         return True
 
     fields = [(name, field) for name, field in flatten(type(sheet)) if 'low' in field.metadata
-              and name not in NO_CAUSE and getattr(sheet, name) > 0.0
+              and name not in NO_CAUSE and getattr(whole, name) > 0.0
               and not (axis and name.rpartition('_')[2] in AXES and not name.endswith(axis))]
     found: list[str] = []
     # The options that differ from the default come first, because the user gave them.
-    for name, field in sorted(fields, key=lambda item: getattr(sheet, item[0]) == item[1].default):
+    for name, field in sorted(fields, key=lambda item: is_absent(getattr(sheet, item[0]))
+                              or getattr(sheet, item[0]) == item[1].default):
         if len(found) == MAX_OPTIONS:
             break
-        edges = _edges(name, getattr(sheet, name), field.metadata, is_made)
+        edges = _edges(name, getattr(whole, name), field.metadata, is_made)
         if edges:
-            value = f'{getattr(sheet, name):g} {field.metadata["unit"]}'.rstrip()
+            value = f'{getattr(whole, name):g} {field.metadata["unit"]}'.rstrip()
             found.append(f'{option_of(name)} {value}: must be {edges[0]:g} to {edges[1]:g}')
     if not found:
         return ValueError(f'the values of the data sheet contradict each other: {error}')

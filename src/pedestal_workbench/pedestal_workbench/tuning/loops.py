@@ -8,7 +8,7 @@ loops are then measured on the simulated plant, with its gears, lash, friction, 
     J_A = J_L + 2 J_m N^2                       inertia of the whole axis, at the load [kg m2]
     K_p = w_s J,  K_i = K_p w_s / 5             gains of the speed loop, per motor [Nms/rad], [Nm/rad]
     w_p = w_s / 8                               gain of the position loop (`feedforward.bandwidth`) [rad/s]
-    a = 3/4 (2 T_max N - T_load) / J_A          acceleration of the shaper [rad/s2]
+    a = 1/2 (2 T_max N - T_load) / J_A          acceleration of the shaper [rad/s2], 3/4 without lash
     j = 3/4 a w_s                               jerk of the shaper [rad/s3]
     h0 = 3.5 / w_s                              filter step of the shaper [s]
     T_b = 0.4 T_r                               bias torque of a motor [Nm]. It is full up to a motor torque of
@@ -16,7 +16,8 @@ loops are then measured on the simulated plant, with its gears, lash, friction, 
 
     J_m, J_L    inertia of one motor, of the load; N: gear ratio from motor to load
     w_s         crossover of the speed loop [rad/s]
-    T_max, T_r  torque limit and rated torque of a motor; a quarter of the torque is a reserve for a heavier load
+    T_max, T_r  torque limit and rated torque of a motor; up to half of the torque a bias keeps the teeth in contact,
+                and a quarter is a reserve for a heavier load
     T_load      sum of friction, unbalance and mean wind, at the load
 
 The feed-forward takes J_A and the friction of the load. A required crossover of the position loop takes the place of
@@ -62,14 +63,14 @@ DEFAULT_SPEED_CROSSOVER_HZ, CROSSOVER_RATIO = 28.0, 8.0
 """Default crossover of the speed loop [Hz]; ratio of the crossovers of the speed loop and the position loop [-]."""
 
 TORQUE_SHARE, SHAPER_RATE_SHARE = 0.75, 0.94
-"""Acceleration and rate of the shaper, as shares of the acceleration and rate that the axis can reach [-]."""
+"""Acceleration of the shaper without lash, and its rate, as shares of those that the axis can reach [-]."""
 
 MAX_BEND_RAD, BEND_SHARE = 0.8e-3, 0.1
 """Largest bend of a structure by the acceleration of the shaper [rad]; its largest ratio to the beamwidth [-]."""
 
 CLOSED_TEETH_SHARE = 0.5
-"""Share of the torque limit that the shaper uses on a flexible structure [-]. Above this torque (`bias.out`) no bias
-torque keeps the teeth in contact."""
+"""Share of the torque limit that the shaper uses with lash [-]. Above this torque (`bias.out`) no bias torque keeps
+the teeth in contact. They would part at the end of an acceleration in strong wind, and their impact would trip it."""
 
 MODE_H0, MODE_RATIO = 0.8, 3.0
 """h0 of the shaper times the frequency of the structure; smallest ratio of this frequency to the crossover of the
@@ -168,7 +169,7 @@ def structure(plant: Plant) -> dict[str, float]:
 
 def rate_slope(plant: Plant) -> RadiansPerSecond2:
     """Return the largest slope of the rate command (`limits.acceleration`): 1.3 times the acceleration of the shaper
-    of a rigid axis."""
+    of a rigid axis without lash."""
     return 1.3 * TORQUE_SHARE * plant.acceleration
 
 
@@ -177,7 +178,8 @@ def drive_gains(plant: Plant, w_s: RadiansPerSecond) -> dict[str, float]:
     K_p, rated = w_s * plant.gear_inertia, plant.axis.thermal.rated_torque
     return {'speed_loop.proportional': K_p, 'speed_loop.integral': K_p * w_s / 5.0,
             'speed_loop.load_inertia': plant.axis.load.inertia, 'bias.torque': 0.4 * rated, 'bias.hold': 0.47 * rated,
-            'bias.out': 1.5 * rated, 'limits.deceleration': 0.5 * plant.acceleration}
+            'bias.out': 1.5 * rated,
+            'limits.deceleration': _allowed('limits.deceleration', 0.5 * plant.acceleration)}
 
 
 def position_crossover(plant: Plant, w_s: RadiansPerSecond) -> RadiansPerSecond:
@@ -188,11 +190,12 @@ def position_crossover(plant: Plant, w_s: RadiansPerSecond) -> RadiansPerSecond:
 
 def shaper_gains(plant: Plant, w_s: RadiansPerSecond) -> dict[str, float]:
     """Return {key of acu.AXIS.shaper: value} for a crossover w_s of the speed loop."""
-    a, f = TORQUE_SHARE * plant.acceleration, plant.mode
+    share = CLOSED_TEETH_SHARE if plant.axis.gear_train.lash else TORQUE_SHARE
+    a, f = share * plant.acceleration, plant.mode
     if not f:
         return {'acceleration': a, 'jerk': 0.75 * a * w_s, 'h0': 3.5 / w_s}
     bend = min(MAX_BEND_RAD, BEND_SHARE * plant.beamwidth)
-    a = min(a, CLOSED_TEETH_SHARE * plant.acceleration, bend * (2.0 * math.pi * f) ** 2)
+    a = min(a, bend * (2.0 * math.pi * f) ** 2)
     return {'acceleration': a, 'jerk': a * min(0.75 * w_s, f), 'h0': max(3.5 / w_s, MODE_H0 / f)}
 
 

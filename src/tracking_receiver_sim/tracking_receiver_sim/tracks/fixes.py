@@ -2,7 +2,7 @@
 import array
 import pathlib
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -42,9 +42,11 @@ class Log:
     remarks: list[str]              # sentences about the numbers
     passed_over: Counter[str]       # {kind of row or sentence: its number}
     nothing: str                    # reason why the file has no fix, '' if it has one
+    # {name: how good its fixes are}, the best first, for a format whose names are receivers of one aircraft.
+    receivers: dict[str, str]
 
     def __init__(self) -> None:
-        self.form, self.time_name, self.dated, self.nothing = '', '', False, ''
+        self.form, self.time_name, self.dated, self.nothing, self.receivers = '', '', False, '', {}
         self.remarks, self.passed_over = [], Counter()
 
 
@@ -73,7 +75,7 @@ def read(track: TrackFileParameters, rows: Callable[[str, Log], Iterator[Fix]]) 
         aircraft.names.update(identities)
         numbers.extend((line, aircraft.number, *fix))
     table = np.array(numbers).reshape(-1, len(FIX_COLUMNS))
-    label, number = _chosen_aircraft(track, aircraft_by_identity.values())
+    label, number = _chosen_aircraft(track, aircraft_by_identity.values(), log.receivers)
     aircraft_column = FIX_COLUMNS.index('aircraft')
     of_aircraft = np.delete(table[table[:, aircraft_column] == number], aircraft_column, axis=1)
     line, time, latitude, longitude, altitude = _without_repetitions(of_aircraft, log).T
@@ -96,13 +98,18 @@ def _without_repetitions(table: Floats, log: Log) -> Floats:
     return table[~repeated]
 
 
-def _chosen_aircraft(track: TrackFileParameters, all_aircraft: Collection[Aircraft]) -> tuple[str, int]:
-    """Return (' of' its names, its number) of the aircraft that `track` names, or of the only one."""
-    wanted = track.aircraft.strip().lower()
+def _chosen_aircraft(track: TrackFileParameters, all_aircraft: Collection[Aircraft],
+                     receivers: Mapping[str, str]) -> tuple[str, int]:
+    """Return (' of' its names, its number) of the aircraft that `track` names, or of the only one; of several
+    receivers of one aircraft, of the best."""
+    wanted = (track.aircraft.strip() or next(iter(receivers), '')).lower()
     matches = [aircraft for aircraft in all_aircraft
                if not wanted or wanted in {name.lower() for name in aircraft.names}]
     if len(matches) == 1:
         label = _label(matches[0])
+        others = [f'{name} ({fixes})' for name, fixes in receivers.items() if name != label]
+        if others:
+            label += f' ({receivers[label]}), not of {", ".join(others)}: aircraft names the talker to take'
         return f' of {label}' if label else '', matches[0].number
     if not all_aircraft:
         return '', 0

@@ -50,13 +50,14 @@ def read(path: FilePath) -> Iterator[tuple[int, str]]:
 
 
 def numbers(path: FilePath, line: int, text: str, limits: Limits) -> list[float]:
-    """Return the numbers in the text of a line, without further words. Raises TableError."""
+    """Return the numbers in the text of a line, without further numbers. Raises TableError, also for a further word
+    such as a unit."""
     if '_' not in text:
         with contextlib.suppress(ValueError):
-            values = [float(word) for word in text.split()[:len(limits)]]
-            if len(values) == len(limits) and all(
+            values = [float(word) for word in text.split()]
+            if len(values) >= len(limits) and all(
                     low <= value <= high for value, (low, high) in zip(values, limits.values())):
-                return values
+                return values[:len(limits)]
     values, words = [], WORD_PATTERN.finditer(text)  # word by word, so that the error names the wrong word
     for name, (low, high) in limits.items():
         word = next(words, None)
@@ -68,6 +69,8 @@ def numbers(path: FilePath, line: int, text: str, limits: Limits) -> list[float]
         if not low <= value <= high:
             raise wrong(path, line, word.start() + 1, f'{name} = {value:g}: must be {low:g} to {high:g}')
         values.append(value)
+    if other := next((word for word in words if not NUMBER_PATTERN.fullmatch(word[0])), None):
+        raise wrong(path, line, other.start() + 1, f'{other[0]!r:.60}: must be a number; a unit is not allowed here')
     return values
 
 

@@ -2,11 +2,12 @@
 
 The height above the ellipsoid is altitude + geoidal separation. Text before the $ of a line and behind the checksum is
 passed over, such as the time of a logger. Cut sentences, sentences with a wrong checksum, and GGA without fix, time or
-altitude (2D) are passed over and counted.
+altitude (2D) are passed over and counted. Each talker, the first two letters of a sentence, counts as a receiver.
 """
 import contextlib
 import datetime
 import io
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -16,22 +17,27 @@ import pynmea2
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Degrees, Seconds
 from pedestal_common.text_files import csv_table, files
-from tracking_receiver_sim.tracks import fixes, instant
+from tracking_receiver_sim.tracks import fixes, instant, lines
 
 SENTENCE_PATTERN = re.compile(r'\$[A-Z]{2}([A-Z]{3}),[^$*]*(\*[0-9A-Fa-f]{2})?', re.ASCII)
 CUT_SENTENCE_PATTERN = re.compile(r'[^$!]*,[^$!]*\*[0-9A-Fa-f]{2}', re.ASCII)
 TIME_PATTERN = re.compile(r'(\d\d)(\d\d)(\d\d(?:\.\d*)?)', re.ASCII)
 MIN_GGA_FIELDS = 11  # least number of fields of a GGA: up to the geoidal separation
 MAX_LISTED_TYPES = 8  # number of types of sentences that an error lists
+QUALITIES = {6: 'estimated', 7: 'manual input', 8: 'simulated'}  # {quality of a GGA that is no measured fix: name}
+MIN_FIX_SHARE = 0.9  # least share of the fixes of the most frequent talker that a better talker has
+COMBINED_TALKER = 'GN'  # talker of a solution from several constellations
+FIRST_RECENT_DATE = datetime.date(2017, 1, 1)  # a log from before is named, because its receiver may err
+ROLLOVER = datetime.timedelta(weeks=1024)  # time by which a receiver sets the date back if its week counter overflows
 MAX_LINE_CHARS = 1024  # largest number of characters of a line; the standard allows 82
 
 
 def rows(path: str, log: fixes.Log) -> Iterator[fixes.Fix]:
     """Yield the fixes of a log. Raises TableError. The time is an instant if an RMC has a date, otherwise it counts
-    from midnight. NMEA has no names of aircraft."""
+    from midnight. The names of the aircraft are the talkers."""
     first_day = _first_day(path)
     log.form, log.time_name, log.dated = 'NMEA', 'time', first_day is not None
-    clock, without_separation = _Clock(first_day), False
+    clock, without_separation, talkers, qualities = _Clock(first_day), False, _Talkers(), Counter[int]()
     for line, sentence in _sentences(path, log):
         if sentence.sentence_type == 'RMC':
             with contextlib.suppress(ValueError):
@@ -42,14 +48,54 @@ def rows(path: str, log: fixes.Log) -> Iterator[fixes.Fix]:
         except ValueError:
             raise csv_table.TableError(f'{path}: line {line}: time = {sentence.data[0]!r:.60}: must be hhmmss.ss, '
                                        '235960 only for a leap second') from None
+        for name, unit in (('altitude', sentence.data[9]), ('geoidal separation', ''.join(sentence.data[11:12]))):
+            if unit.strip().upper() not in ('M', ''):
+                raise csv_table.TableError(f'{path}: line {line}: unit of {name} = {unit!r:.20}: must be M')
+        talkers.take(sentence)
+        qualities[sentence.gps_qual] += 1
         without_separation = without_separation or not sentence.geo_sep
         separation = csv_table.number(path, line, 'geoidal separation', sentence.geo_sep or '0', -150.0, 150.0)
-        yield fixes.Fix(line, (), time,
+        yield fixes.Fix(line, (sentence.talker,), time,
                         _angle(path, line, 'latitude', sentence.lat, sentence.lat_dir, 'NS', 90.0),
                         _angle(path, line, 'longitude', sentence.lon, sentence.lon_dir, 'EW', 180.0),
                         separation + csv_table.number(path, line, 'altitude', sentence.altitude, -1000.0, 1e8))
     if without_separation:
         log.remarks.append('altitude without geoidal separation taken as height above the ellipsoid')
+    log.remarks += [f'{count} fixes of quality {quality} ({QUALITIES[quality]})'
+                    for quality, count in sorted(qualities.items()) if quality in QUALITIES]
+    log.receivers = talkers.described()
+    first = None if first_day is None else datetime.date(1970, 1, 1) + datetime.timedelta(days=first_day)
+    if first and first < FIRST_RECENT_DATE:
+        log.remarks.append(f'dated {first}: if the week counter of its receiver has overflowed (1,024 weeks), the log '
+                           f'is of {first + ROLLOVER}')
+
+
+class _Talkers:
+    """Numbers of fixes and horizontal dilutions of precision of the talkers."""
+
+    def __init__(self) -> None:
+        self._fixes: Counter[str] = Counter()
+        self._dilutions: dict[str, float] = {}      # sum of each talker
+
+    def take(self, gga: pynmea2.NMEASentence) -> None:
+        """Count a GGA with a fix."""
+        self._fixes[gga.talker] += 1
+        text = gga.horizontal_dil
+        # A talker without dilutions of precision is the last of its kind.
+        dilution = float(text) if lines.NUMBER_PATTERN.fullmatch(text) else math.inf
+        self._dilutions[gga.talker] = self._dilutions.get(gga.talker, 0.0) + dilution
+
+    def described(self) -> dict[str, str]:
+        """Return {talker: text about its fixes}, the best first: nearly as many fixes as the most frequent one, the
+        smallest dilution, the combined solution."""
+        most = max(self._fixes.values(), default=0)
+
+        def rank(name: str) -> tuple[bool, float, bool, str]:
+            few = self._fixes[name] < MIN_FIX_SHARE * most
+            return few, self._dilutions[name] / self._fixes[name], name != COMBINED_TALKER, name
+
+        return {name: f'{self._fixes[name]} fixes, mean HDOP {self._dilutions[name] / self._fixes[name]:.2g}'
+                for name in sorted(self._fixes, key=rank)}
 
 
 def is_log(beginning: str) -> bool:

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from pedestal_common.quantities import Meters
-from pedestal_common.text_files import columns, csv_table
+from pedestal_common.text_files import columns, csv_table, units
 from tracking_receiver_sim.tracks import times
 from tracking_receiver_sim.tracks.fixes import Fix, Log
 
-ALTITUDE_LIMITS_FT_IN_M = -3000.0 * columns.METRES_PER_FOOT, 500_000.0 * columns.METRES_PER_FOOT
+ALTITUDE_LIMITS_FT_IN_M = -3000.0 * units.METRES_PER_FOOT, 500_000.0 * units.METRES_PER_FOOT
 ALTITUDE_LIMITS_M = -1000.0, 150_000.0  # of ADS-B [m], in feet and in metres
 EMPTY_CELL_TEXTS = ('', 'nan', 'none', 'null')  # texts of a cell without a value, in lower case
 
@@ -41,7 +41,7 @@ class CsvLayout(NamedTuple):
         if not all(columns.named(names, wanted) for wanted in (self.time, self.latitude, self.longitude)):
             return False
         return (any(columns.named(names, altitude) for altitude in self.altitudes)
-                and not (self.adsb and table.column(self.time).unit not in ('s', columns.UTC)))
+                and not (self.adsb and table.column(self.time).unit not in ('s', units.UTC)))
 
 
 def _named(name: str, default: str, unit: str = '') -> columns.Quantity:
@@ -63,7 +63,7 @@ def rows(path: str, log: Log) -> Iterator[Fix]:
     """Yield the fixes of a CSV file; the names of an aircraft are icao24 and callsign. Raises TableError."""
     with csv_table.opened(path) as table:
         layout = _layout(table)
-        clock = times.Times(table, layout.time, columns.UTC if layout.adsb else '')
+        clock = times.Times(table, layout.time, units.UTC if layout.adsb else '')
         latitude, longitude = map(table.column, (layout.latitude, layout.longitude))
         altitudes = [table.column(altitude, required=False) for altitude in layout.altitudes]
         altitude = next(filter(None, altitudes), None) or table.column(layout.altitudes[0])

@@ -6,18 +6,18 @@ from collections.abc import Sequence
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Seconds
-from pedestal_common.text_files import columns, csv_table
+from pedestal_common.text_files import columns, csv_table, units
 from pedestal_common.text_files.files import FilePath
 from tracking_receiver_sim.tracks import instant
 
 TIME = columns.Quantity('time', {
     **dict.fromkeys(('time', 'epoch', 'timestamp', 't'), 's'),
     **dict.fromkeys(('utc', 'utc time', 'utc date', 'utcg', 'date', 'datetime', 'date time', 'date utc time'),
-                    columns.UTC),
-    **dict.fromkeys(('jd', 'jdut', 'jdutc', 'jd ut', 'jd utc', 'julian date', 'julian day'), columns.JULIAN_DATE),
-    **dict.fromkeys(('mjd', 'mjd ut', 'mjd utc'), columns.MODIFIED_JULIAN_DATE)}, 's')
-DATE = columns.Quantity('date', dict.fromkeys(('date', 'utc date'), columns.UTC), 's')
-TIME_OF_DAY = columns.Quantity('time of day', dict.fromkeys(('time', 'utc', 'utc time'), columns.UTC), 's')
+                    units.UTC),
+    **dict.fromkeys(('jd', 'jdut', 'jdutc', 'jd ut', 'jd utc', 'julian date', 'julian day'), units.JULIAN_DATE),
+    **dict.fromkeys(('mjd', 'mjd ut', 'mjd utc'), units.MODIFIED_JULIAN_DATE)}, 's')
+DATE = columns.Quantity('date', dict.fromkeys(('date', 'utc date'), units.UTC), 's')
+TIME_OF_DAY = columns.Quantity('time of day', dict.fromkeys(('time', 'utc', 'utc time'), units.UTC), 's')
 MODIFIED_JULIAN_DATE_ZERO = 2_400_000.5  # julian date of the modified Julian date 0
 JULIAN_DATE_LIMITS = 2_400_000.5, 2_536_000.0  # range of Julian dates: from 1858, the modified Julian date 0, to 2231
 FIRST_EXPECTED_JULIAN_DATE = 2_440_000.5
@@ -39,7 +39,7 @@ class Times:
     def __init__(self, table: csv_table.Table, wanted: columns.Quantity, unit: str = '') -> None:
         """Find the column. Raises TableError. unit: of its values; '': that which its name states."""
         self.table, self.date, self.dated = table, _date(table.fieldnames, wanted), None
-        unit = columns.UTC if self.date else unit
+        unit = units.UTC if self.date else unit
         column = table.column(wanted, without=self.date)
         self.column = column._replace(unit=unit) if unit else column
         self.first = self.last = None
@@ -59,10 +59,10 @@ class Times:
     def _seconds(self, cell: str) -> Seconds:
         table, column = self.table, self.column
         place = table.path, table.line_num, self.name
-        if column.unit in (columns.JULIAN_DATE, columns.MODIFIED_JULIAN_DATE):
+        if column.unit in (units.JULIAN_DATE, units.MODIFIED_JULIAN_DATE):
             self.dated = True
-            return julian(*place, table.point(column.name, cell), column.unit == columns.MODIFIED_JULIAN_DATE)
-        dated = column.unit == columns.UTC or column.unit == 's' and instant.is_dated(cell)
+            return julian(*place, table.point(column.name, cell), column.unit == units.MODIFIED_JULIAN_DATE)
+        dated = column.unit == units.UTC or column.unit == 's' and instant.is_dated(cell)
         if self.dated not in (None, dated):
             raise csv_table.TableError(f'{table.path}: line {table.line_num}: {column.name} = {cell!r:.60}: must be '
                                        f'{"UTC as ISO 8601" if self.dated else "a number"} as in the lines above')
@@ -82,7 +82,7 @@ class Times:
 
     def described(self) -> str:
         """Return the name of the column with the unit that was taken."""
-        return self.column._replace(name=self.name, unit=columns.UTC if self.dated else self.column.unit).described()
+        return self.column._replace(name=self.name, unit=units.UTC if self.dated else self.column.unit).described()
 
     def check(self) -> None:
         """Raise TableError after the last row if times taken as seconds look like days of a Julian date."""
@@ -102,7 +102,7 @@ def _date(names: Sequence[str], wanted: columns.Quantity) -> str:
     """Return the name of the column of dates if the table also has one of the time of day, else ''."""
     if not DATE.names.keys() <= wanted.names.keys():
         return ''
-    found, clocks = ([name for name in names if columns.unit_of(name, part) == columns.UTC]
+    found, clocks = ([name for name in names if columns.unit_of(name, part) == units.UTC]
                      for part in (DATE, TIME_OF_DAY))
     return found[0] if len(found) == len(clocks) == 1 else ''
 
