@@ -125,12 +125,16 @@ RESULTS = (
            'Time of the first lock of the receiver.', 'first lock', brief=True),
     Result('autotrack_time_s', 's', 'tracking', lambda run: run.autotrack_time,
            'Total time of the ACU in autotrack.', 'time in autotrack'),
+    Result('trackable_time_s', 's', 'tracking', lambda run: run.trackable_time,
+           'Total time in which the target could be tracked: above the horizon mask of the receiver, in no hidden '
+           'sector, above the floor and within the travel of the axes.', 'time in which the target could be tracked'),
     Result('tracked_percent', '%', 'tracking', lambda run: run.tracked_percent,
-           'Share of the run in autotrack.', brief=True),
+           'Share in autotrack of the time in which the target could be tracked (trackable_time_s).',
+           'share of this time in autotrack', brief=True),
     Result('loss_s', 's', 'tracking', lambda run: run.loss,
-           'Total time, in any mode, with the target further than half a beamwidth off the beam, counted from '
-           'the first step in settled autotrack.', 'time with the target further than half a beamwidth off',
-           brief=True),
+           'Total time, in any mode, in which the target could be tracked and was further than half a beamwidth off '
+           'the beam, counted from the first step in settled autotrack.',
+           'time with the target further than half a beamwidth off', brief=True),
     Result('evaluated_time_s', 's', 'tracking', lambda run: run.evaluated_time,
            f'Total time in settled autotrack: from {tracking.HANDOVER_SETTLING_S:g} s after the first hand-over to '
            'autotrack.', 'evaluated time'),
