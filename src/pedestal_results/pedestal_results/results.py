@@ -42,10 +42,6 @@ class Result(typing.NamedTuple):
 
 BRIEF_COUNT = 8  # number of results that a run prints by default
 
-MARK_MEANINGS = {'too sure': 'the errors are larger than it states',
-                 'too careful': 'the errors are smaller than it states'}
-"""{note of consistency.mark: its meaning for the filter}."""
-
 ENCODER_DEFINITION = 'This result includes all errors between dish and encoders, such as the bend.'
 """Sentence in the definitions of the results by the encoders."""
 
@@ -224,15 +220,6 @@ def brief(columns: Iterable[Values], count: int = BRIEF_COUNT) -> list[str]:
                     for name, (value, _) in values.items())]
     chosen = sorted(found, key=lambda result: not result.brief)[:count]
     return [result.name for result in found if result in chosen]
-
-
-def remarks(noted: Mapping[str, str], values: Values) -> list[str]:
-    """Return a line for each note on the filter; noted: of `marks`, values: of `measured`."""
-    found: dict[str, list[str]] = {}
-    for name, note in noted.items():
-        found.setdefault(note, []).append(f'{name} {values[name][0]:.3g}')
-    return [f'the filter is {note} ({MARK_MEANINGS.get(note, note)}): {", ".join(names)}'
-            for note, names in found.items()]
 
 
 def rows(case: str, values: Values) -> list[Row]:

@@ -103,7 +103,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _results(options: argparse.Namespace, chosen: 'Scenario', outcome: 'Outcome', recording: 'Bag') -> bool:
     """Print verdicts and results of a run and write --json. Return True if the verdict on a beam is a failure."""
-    from pedestal_results import results
+    from pedestal_results import consistency, results
     from pedestal_results.recorded_run import RecordedRun
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     views = [recording.view(beam) for beam in beams]
@@ -117,14 +117,13 @@ def _results(options: argparse.Namespace, chosen: 'Scenario', outcome: 'Outcome'
     for beam, found in zip(beams, verdicts):
         print(f'{beam}: {found.text}' if beam else found.text)
     shown = [*of_beams[0], *whole] if options.all else results.brief([*of_beams, whole])
-    noted = [results.marks(part) for part in parts]
     printed = {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else 'steps')}
     console.show_results(f'{chosen.name}: {chosen.header.title}', beams, [_some(values, shown) for values in of_beams],
-                         _some(printed, shown), noted if options.all else ())
+                         _some(printed, shown), map(results.marks, parts) if options.all else ())
+    for beam, run in zip(beams, runs):
+        for line in consistency.remarks(run.filter) if run.filter is not None else ():
+            print(f'{beam}: {line}' if beam else line)
     if not options.all:
-        for beam, notes, values in zip(beams, noted, of_beams):
-            for line in results.remarks(notes, values):
-                print(f'{beam}: {line}' if beam else line)
         print('--all prints all results, --explain their definitions')
     if options.explain:
         console.explain(results.RESULTS, shown)
