@@ -13,13 +13,14 @@ import typing
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 
-from pedestal_common.text_files.text_table import TextTable
+from pedestal_common.text_files.text_table import Cell, Column, TextTable
 
 if typing.TYPE_CHECKING:    # these imports are slow, and most verbs need none of them
     import argparse
     from types import ModuleType
 
     from rich import progress
+    from rich.table import Table as RichTable
 
     from pedestal_common.quantities import Row, Seconds
     from pedestal_results.results import Result, Values
@@ -153,8 +154,13 @@ def exit_codes() -> str:
 
 def _show(table: TextTable, title: str = '', width: int = 0, framed: bool = False) -> None:
     """Print a title and a table by rich, at least `width` characters wide. framed: with a frame and wrapped cells."""
-    from rich.box import HEAVY_HEAD, SIMPLE_HEAD
     from rich.console import Console
+    Console(width=max(Console().width, width) if width else None).print(_drawn(table, title, framed))
+
+
+def _drawn(table: TextTable, title: str = '', framed: bool = False) -> RichTable:
+    """Return a table for rich, see `_show`."""
+    from rich.box import HEAVY_HEAD, SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
     box, padding = (HEAVY_HEAD, (0, 1)) if framed else (SIMPLE_HEAD, (0, 1, 0, 0))
@@ -164,7 +170,27 @@ def _show(table: TextTable, title: str = '', width: int = 0, framed: bool = Fals
         shown.add_column(Text(head), justify='right' if right else 'left', no_wrap=not framed)
     for row in table.rows:
         shown.add_row(*map(Text, row))
-    Console(width=max(Console().width, width) if width else None).print(shown)
+    return shown
+
+
+def _show_fitted(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], optional: Sequence[str],
+                 title: str = '') -> list[str]:
+    """Print a table without those `optional` columns that are too many for the terminal, the last ones first. Return
+    the names of the columns that are left out. A row stays one line."""
+    from rich.console import Console
+    from rich.measure import Measurement
+    wide, left_out = Console(width=10 * MIN_TABLE_COLUMNS), list[str]()
+    while True:
+        kept = [i for i, column in enumerate(columns) if (column if isinstance(column, str) else column[0])
+                not in left_out]
+        drawn = _drawn(TextTable([columns[i] for i in kept], [[row[i] for i in kept] for row in rows]))
+        needed = Measurement.get(wide, wide.options, drawn).maximum
+        if needed <= Console().width or len(left_out) == len(optional):
+            break
+        left_out.append(optional[-1 - len(left_out)])
+    print(title, end='\n' if title else '')
+    Console(width=max(Console().width, needed)).print(drawn)
+    return left_out
 
 
 def show_results(title: str, columns: Sequence[str], results: Sequence[Values], whole: Values,
@@ -223,7 +249,7 @@ def show_study(title: str, rows: Iterable[Row], missed: Callable[[Row], bool]) -
 
 
 def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None = None) -> None:
-    """Print the statistics of results over trials as a table.
+    """Print the statistics of results over trials as a table, and the comparisons of sides as a second one.
 
     metrics: names of the printed results in their order, None for all rows. The rows of a comparison are printed for
     the first of these results only.
@@ -238,17 +264,40 @@ def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None =
             continue
         if key in ('mean', 'p05', 'p50', 'p95', 'max'):
             of_results.setdefault((row['case'], metric, row['unit']), {})[key] = row
-        elif key in ('rate', 'difference', 'gain', 'wins') and (metrics is None or metric == metrics[0]):
+        elif key in _COMPARISON_KEYS and (metrics is None or metric == metrics[0]):
             others.append(row)
     order = metrics or list(dict.fromkeys(metric for _, metric, _ in of_results))
     lines = [(metric, case, number(found['mean']['value']), interval_text(found['mean']),
               *(number(found[key]['value']) for key in ('p05', 'p50', 'p95', 'max')), coverage(found['mean']), unit)
              for (case, metric, unit), found in sorted(of_results.items(), key=lambda item: order.index(item[0][1]))]
-    lines += [(row['metric'], row['case'], number(row['value']), interval_text(row), '', '', '', '', coverage(row),
-               row['unit']) for row in others]
     numbers = ('mean', '95 % interval', '5 %', 'median', '95 %', 'largest', 'trials')
-    _show(TextTable(('result', 'case', *((name, '>') for name in numbers), 'unit'), lines), title,
-          MIN_TABLE_COLUMNS + max((len(row['case']) for row in rows), default=0))
+    optional = ['95 % interval', 'largest', 'median', '95 %', '5 %']
+    if len({line[1] for line in lines}) == 1:
+        optional.append('case')
+    left_out = _show_fitted(('result', 'case', *((name, '>') for name in numbers), 'unit'), lines, optional, title)
+    if others:
+        # With one result its name is the title, which leaves room for the interval.
+        common = metrics[0] + '/' if metrics else ''
+        left_out += _show_fitted(
+            ('', 'case', ('value', '>'), ('95 % interval', '>'), ('trials', '>'), 'unit'),
+            [(row['metric'].removeprefix(common), row['case'], number(row['value']), interval_text(row),
+              coverage(row), row['unit']) for row in _without_hidden_factors(others)], ('95 % interval', 'trials'),
+            common.rstrip('/'))
+    if left_out:
+        print(f'not shown for want of space: {", ".join(dict.fromkeys(left_out))}; a wider terminal '
+              f'(COLUMNS={MIN_TABLE_COLUMNS}) or --json has them')
+
+
+def _without_hidden_factors(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows of comparisons with the ratio of two means in place of their gain in percent if it is a factor
+    above 2 or below 1/2, else with the gain."""
+    factors = {(row['case'], row['metric'].removesuffix('/ratio')) for row in rows
+               if row['metric'].endswith('/ratio') and not 0.5 <= (row['value'] or 1.0) <= 2.0}
+    return [row for row in rows for metric, _, key in (row['metric'].rpartition('/'),)
+            if key not in ('gain', 'ratio') or (key == 'ratio') == ((row['case'], metric) in factors)]
+
+
+_COMPARISON_KEYS = 'rate', 'difference', 'gain', 'ratio', 'wins'    # of the rows that are no statistics of a result
 
 
 def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:
@@ -259,10 +308,9 @@ def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:
     for one in tried:
         cells = ('', '', '', '')
         if one.row:
-            share = one.row['tracked_percent']
+            lost = one.row['mean_loss_s']
             cells = (number(one.row['value']), interval_text(one.row), one.row['unit'],
-                     '' if share is None else f'{share:.3g} %')
+                     '' if lost is None else f'{lost:.3g} s')
         lines.append((f'{one.value:.6g}', *cells, reason(one)))
-    name = f'{key} [{unit}]' if unit else key
-    _show(TextTable(((name, '>'), ('mean', '>'), ('95 % interval', '>'), 'unit', ('tracked', '>'), 'trials'), lines),
-          width=MIN_TABLE_COLUMNS)
+    _show_fitted((('value', '>'), ('mean', '>'), ('95 % interval', '>'), 'unit', ('lost', '>'), 'trials'), lines, (),
+                 f'{key} [{unit}]' if unit else key)
