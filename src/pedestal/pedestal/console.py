@@ -7,6 +7,7 @@ import json
 import math
 import pathlib
 import shutil
+import string
 import sys
 import textwrap
 import typing
@@ -49,6 +50,7 @@ MAX_NAME_COLUMNS, MAX_CELL_COLUMNS, MIN_SENTENCE_COLUMNS = 44, 24, 40
 [characters]. A longer cell moves the rest of its row to the right. On a narrower terminal, the sentences are printed
 below the cells."""
 
+MAX_SIDE_COLUMNS = 10  # largest width of the name of a compared side in a table; a letter replaces a longer one
 MIN_TABLE_COLUMNS = 150
 """Smallest width of a table of results on any terminal, so that a row stays one line [characters]."""
 
@@ -248,14 +250,30 @@ def show_study(title: str, rows: Iterable[Row], missed: Callable[[Row], bool]) -
           title, MIN_TABLE_COLUMNS)
 
 
-def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None = None) -> None:
+def _lettered(rows: Sequence[Row], names: Sequence[str]) -> tuple[list[Row], str]:
+    """Return the rows with letters in place of the names of compared sides, and the legend; of short names the same
+    rows without a legend."""
+    if max(map(len, names), default=0) <= MAX_SIDE_COLUMNS or len(names) > len(string.ascii_uppercase):
+        return list(rows), ''
+    letters = dict(zip(names, string.ascii_uppercase))
+    cases = {f'{a} against {b}': f'{letters[a]} against {letters[b]}' for a in names for b in names} | letters
+    # The case of a beam is that of its side, '/' and the beam.
+    return ([{**row, 'case': next((text + row['case'][len(case):] for case, text in cases.items()
+                                   if f'{row["case"]}/'.startswith(f'{case}/')), row['case'])} for row in rows],
+            ''.join(f'\n{letter}: {name}' for name, letter in letters.items()))
+
+
+def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None = None,
+                names: Sequence[str] = ()) -> None:
     """Print the statistics of results over trials as a table, and the comparisons of sides as a second one.
 
-    metrics: names of the printed results in their order, None for all rows. The rows of a comparison are printed for
-    the first of these results only.
+    metrics     names of the printed results in their order, None for all rows. The rows of a comparison are printed
+                for the first of these results only.
+    names       of the compared sides; a letter takes the place of a long one
     """
     from pedestal_results.intervals import interval_text, number
     from pedestal_workbench.trials.statistics import coverage
+    rows, legend = _lettered(rows, names)
     of_results: dict[tuple[str, str, str], dict[str, Row]] = {}
     others: list[Row] = []
     for row in rows:
@@ -272,20 +290,32 @@ def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None =
              for (case, metric, unit), found in sorted(of_results.items(), key=lambda item: order.index(item[0][1]))]
     numbers = ('mean', '95 % interval', '5 %', 'median', '95 %', 'largest', 'trials')
     optional = ['95 % interval', 'largest', 'median', '95 %', '5 %']
-    if len({line[1] for line in lines}) == 1:
-        optional.append('case')
-    left_out = _show_fitted(('result', 'case', *((name, '>') for name in numbers), 'unit'), lines, optional, title)
+    # A case or a number of trials that is the same in each row, as the title states it, goes before the interval.
+    counts, cases = ({line[place] for line in lines} for place in (-2, 1))
+    optional[1:1] = ['trials'] * (len(counts) == 1 and counts.pop().isdecimal()) + ['case'] * (len(cases) == 1)
+    left_out = _show_fitted(('result', 'case', *((name, '>') for name in numbers), 'unit'), lines, optional,
+                            title + legend)
     if others:
-        # With one result its name is the title, which leaves room for the interval.
-        common = metrics[0] + '/' if metrics else ''
-        left_out += _show_fitted(
-            ('', 'case', ('value', '>'), ('95 % interval', '>'), ('trials', '>'), 'unit'),
-            [(row['metric'].removeprefix(common), row['case'], number(row['value']), interval_text(row),
-              coverage(row), row['unit']) for row in _without_hidden_factors(others)], ('95 % interval', 'trials'),
-            common.rstrip('/'))
+        left_out += _show_compared(others, metrics[0] if metrics else '')
     if left_out:
         print(f'not shown for want of space: {", ".join(dict.fromkeys(left_out))}; a wider terminal '
               f'(COLUMNS={MIN_TABLE_COLUMNS}) or --json has them')
+
+
+def _show_compared(rows: Sequence[Row], result: str) -> list[str]:
+    """Print the rows of comparisons as a table. Return the columns that are left out. result: of all rows, '' for
+    several; what is the same in all rows is in the title."""
+    from pedestal_results.intervals import interval_text, number
+    from pedestal_workbench.trials.statistics import coverage
+    cases = {row['case'] for row in rows}
+    lines = [[row['metric'].removeprefix(f'{result}/'), row['case'], number(row['value']), interval_text(row),
+              coverage(row), row['unit']] for row in _without_hidden_factors(rows)]
+    columns: list[Column] = ['', 'case', ('value', '>'), ('95 % interval', '>'), ('trials', '>'), 'unit']
+    if len(cases) == 1:
+        columns.pop(1)
+        lines = [[line[0], *line[2:]] for line in lines]
+    title = ': '.join(filter(None, (result, *(cases if len(cases) == 1 else ()))))
+    return _show_fitted(columns, lines, ('95 % interval', 'trials'), title)
 
 
 def _without_hidden_factors(rows: Sequence[Row]) -> list[Row]:

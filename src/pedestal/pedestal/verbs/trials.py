@@ -113,9 +113,8 @@ def _compare(options: argparse.Namespace) -> int:
         print(line)
     by = found.ranking.rpartition('/')[2]
     shown = [by, *(result.name for result in results.RESULTS if result.brief and result.name != by)]
-    title = f'{plan.runs} trials of {plan.name}'
-    console.show_trials(f'{title}: {" against ".join(found.names)}' if len(sides) > 1 else title, found.rows,
-                        None if options.all else shown)
+    console.show_trials(f'{plan.runs} trials of {" against ".join(dict.fromkeys(side.plan.name for side in sides))}',
+                        found.rows, None if options.all else shown, found.names if len(sides) > 1 else ())
     for line in (*found.sensitivities, *found.worst_lines):
         print(line)
     print(f'table {found.table.file}, page {page}' + ('' if options.all else '; --all prints all results'))
