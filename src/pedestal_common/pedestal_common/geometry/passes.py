@@ -54,8 +54,8 @@ class Pass(typing.NamedTuple):
 
 def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.datetime,
                  days: Days = SEARCH_DAYS, least: Degrees = 0.0) -> list[Pass]:
-    """Return the passes that are under way at `begin` (UTC) or rise within `days` after it, without those that
-    culminate below MIN_CULMINATION_DEG and are no longer than a run. least: elevation at which the satellite rises and
+    """Return the passes that are under way at `begin` (UTC) or rise within `days` after it. Of those below
+    MIN_CULMINATION_DEG, only one that is longer than a run counts. least: elevation at which the satellite rises and
     sets. Raises TargetError if the satellite does not rise, or if SGP4 ends."""
     julian, fraction = orbit.julian_date(begin)
 
