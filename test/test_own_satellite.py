@@ -106,10 +106,10 @@ def test_a_run_of_a_pass_begins_where_it_matters(which, duration, start, begin, 
 def test_the_horizon_mask_of_the_receiver_is_that_of_rise_and_set():
     mask = ['tracking_receiver.receiver.horizon_mask=0.349065850']
     selection = satellite.PassSelection(scenario.draft('leo_pass').changed(mask), NOW)
-    [start], duration, line = selection.choose('2019-12-10T12:00')
+    texts, duration, line = selection.choose('2019-12-10T12:00')
     run = pedestal.load('leo_pass', {'tracking_receiver.receiver.horizon_mask': np.radians(20.0)},
                         which='2019-12-10T12:00').checked
-    assert f'start_time="{run.node_parameters("tracking_receiver").target.leo_pass.start_time}"' in start
+    assert f'start_time="{run.node_parameters("tracking_receiver").target.leo_pass.start_time}"' in texts[0]
     assert duration == run.header.duration == 251.0 and ' in azimuth 56 deg (at 20 deg)' in line
     built = Plan(run)
     _, elevation, _ = target.look_angles(built.targets[''], [0.0, duration])
