@@ -7,19 +7,21 @@ import json
 import math
 import pathlib
 import shutil
+import string
 import sys
 import textwrap
 import typing
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 
-from pedestal_common.text_files.text_table import TextTable
+from pedestal_common.text_files.text_table import Cell, Column, TextTable
 
 if typing.TYPE_CHECKING:    # these imports are slow, and most verbs need none of them
     import argparse
     from types import ModuleType
 
     from rich import progress
+    from rich.table import Table as RichTable
 
     from pedestal_common.quantities import Row, Seconds
     from pedestal_results.results import Result, Values
@@ -48,6 +50,7 @@ MAX_NAME_COLUMNS, MAX_CELL_COLUMNS, MIN_SENTENCE_COLUMNS = 44, 24, 40
 [characters]. A longer cell moves the rest of its row to the right. On a narrower terminal, the sentences are printed
 below the cells."""
 
+MAX_SIDE_COLUMNS = 10  # largest width of the name of a compared side in a table; a letter replaces a longer one
 MIN_TABLE_COLUMNS = 150
 """Smallest width of a table of results on any terminal, so that a row stays one line [characters]."""
 
@@ -153,8 +156,13 @@ def exit_codes() -> str:
 
 def _show(table: TextTable, title: str = '', width: int = 0, framed: bool = False) -> None:
     """Print a title and a table by rich, at least `width` characters wide. framed: with a frame and wrapped cells."""
-    from rich.box import HEAVY_HEAD, SIMPLE_HEAD
     from rich.console import Console
+    Console(width=max(Console().width, width) if width else None).print(_drawn(table, title, framed))
+
+
+def _drawn(table: TextTable, title: str = '', framed: bool = False) -> RichTable:
+    """Return a table for rich, see `_show`."""
+    from rich.box import HEAVY_HEAD, SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
     box, padding = (HEAVY_HEAD, (0, 1)) if framed else (SIMPLE_HEAD, (0, 1, 0, 0))
@@ -164,7 +172,27 @@ def _show(table: TextTable, title: str = '', width: int = 0, framed: bool = Fals
         shown.add_column(Text(head), justify='right' if right else 'left', no_wrap=not framed)
     for row in table.rows:
         shown.add_row(*map(Text, row))
-    Console(width=max(Console().width, width) if width else None).print(shown)
+    return shown
+
+
+def _show_fitted(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], optional: Sequence[str],
+                 title: str = '') -> list[str]:
+    """Print a table without those `optional` columns that are too many for the terminal, the last ones first. Return
+    the names of the columns that are left out. A row stays one line."""
+    from rich.console import Console
+    from rich.measure import Measurement
+    wide, left_out = Console(width=10 * MIN_TABLE_COLUMNS), list[str]()
+    while True:
+        kept = [i for i, column in enumerate(columns) if (column if isinstance(column, str) else column[0])
+                not in left_out]
+        drawn = _drawn(TextTable([columns[i] for i in kept], [[row[i] for i in kept] for row in rows]))
+        needed = Measurement.get(wide, wide.options, drawn).maximum
+        if needed <= Console().width or len(left_out) == len(optional):
+            break
+        left_out.append(optional[-1 - len(left_out)])
+    print(title, end='\n' if title else '')
+    Console(width=max(Console().width, needed)).print(drawn)
+    return left_out
 
 
 def show_results(title: str, columns: Sequence[str], results: Sequence[Values], whole: Values,
@@ -222,14 +250,30 @@ def show_study(title: str, rows: Iterable[Row], missed: Callable[[Row], bool]) -
           title, MIN_TABLE_COLUMNS)
 
 
-def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None = None) -> None:
-    """Print the statistics of results over trials as a table.
+def _lettered(rows: Sequence[Row], names: Sequence[str]) -> tuple[list[Row], str]:
+    """Return the rows with letters in place of the names of compared sides, and the legend; of short names the same
+    rows without a legend."""
+    if max(map(len, names), default=0) <= MAX_SIDE_COLUMNS or len(names) > len(string.ascii_uppercase):
+        return list(rows), ''
+    letters = dict(zip(names, string.ascii_uppercase))
+    cases = {f'{a} against {b}': f'{letters[a]} against {letters[b]}' for a in names for b in names} | letters
+    # The case of a beam is that of its side, '/' and the beam.
+    return ([{**row, 'case': next((text + row['case'][len(case):] for case, text in cases.items()
+                                   if f'{row["case"]}/'.startswith(f'{case}/')), row['case'])} for row in rows],
+            ''.join(f'\n{letter}: {name}' for name, letter in letters.items()))
 
-    metrics: names of the printed results in their order, None for all rows. The rows of a comparison are printed for
-    the first of these results only.
+
+def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None = None,
+                names: Sequence[str] = ()) -> None:
+    """Print the statistics of results over trials as a table, and the comparisons of sides as a second one.
+
+    metrics     names of the printed results in their order, None for all rows. The rows of a comparison are printed
+                for the first of these results only.
+    names       of the compared sides; a letter takes the place of a long one
     """
     from pedestal_results.intervals import interval_text, number
     from pedestal_workbench.trials.statistics import coverage
+    rows, legend = _lettered(rows, names)
     of_results: dict[tuple[str, str, str], dict[str, Row]] = {}
     others: list[Row] = []
     for row in rows:
@@ -238,17 +282,52 @@ def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None =
             continue
         if key in ('mean', 'p05', 'p50', 'p95', 'max'):
             of_results.setdefault((row['case'], metric, row['unit']), {})[key] = row
-        elif key in ('rate', 'difference', 'gain', 'wins') and (metrics is None or metric == metrics[0]):
+        elif key in _COMPARISON_KEYS and (metrics is None or metric == metrics[0]):
             others.append(row)
     order = metrics or list(dict.fromkeys(metric for _, metric, _ in of_results))
     lines = [(metric, case, number(found['mean']['value']), interval_text(found['mean']),
               *(number(found[key]['value']) for key in ('p05', 'p50', 'p95', 'max')), coverage(found['mean']), unit)
              for (case, metric, unit), found in sorted(of_results.items(), key=lambda item: order.index(item[0][1]))]
-    lines += [(row['metric'], row['case'], number(row['value']), interval_text(row), '', '', '', '', coverage(row),
-               row['unit']) for row in others]
     numbers = ('mean', '95 % interval', '5 %', 'median', '95 %', 'largest', 'trials')
-    _show(TextTable(('result', 'case', *((name, '>') for name in numbers), 'unit'), lines), title,
-          MIN_TABLE_COLUMNS + max((len(row['case']) for row in rows), default=0))
+    optional = ['95 % interval', 'largest', 'median', '95 %', '5 %']
+    # A case or a number of trials that is the same in each row, as the title states it, goes before the interval.
+    counts, cases = ({line[place] for line in lines} for place in (-2, 1))
+    optional[1:1] = ['trials'] * (len(counts) == 1 and counts.pop().isdecimal()) + ['case'] * (len(cases) == 1)
+    left_out = _show_fitted(('result', 'case', *((name, '>') for name in numbers), 'unit'), lines, optional,
+                            title + legend)
+    if others:
+        left_out += _show_compared(others, metrics[0] if metrics else '')
+    if left_out:
+        print(f'not shown for want of space: {", ".join(dict.fromkeys(left_out))}; a wider terminal '
+              f'(COLUMNS={MIN_TABLE_COLUMNS}) or --json has them')
+
+
+def _show_compared(rows: Sequence[Row], result: str) -> list[str]:
+    """Print the rows of comparisons as a table. Return the columns that are left out. result: of all rows, '' for
+    several; what is the same in all rows is in the title."""
+    from pedestal_results.intervals import interval_text, number
+    from pedestal_workbench.trials.statistics import coverage
+    cases = {row['case'] for row in rows}
+    lines = [[row['metric'].removeprefix(f'{result}/'), row['case'], number(row['value']), interval_text(row),
+              coverage(row), row['unit']] for row in _without_hidden_factors(rows)]
+    columns: list[Column] = ['', 'case', ('value', '>'), ('95 % interval', '>'), ('trials', '>'), 'unit']
+    if len(cases) == 1:
+        columns.pop(1)
+        lines = [[line[0], *line[2:]] for line in lines]
+    title = ': '.join(filter(None, (result, *(cases if len(cases) == 1 else ()))))
+    return _show_fitted(columns, lines, ('95 % interval', 'trials'), title)
+
+
+def _without_hidden_factors(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows of comparisons with the ratio of two means in place of their gain in percent if it is a factor
+    above 2 or below 1/2, else with the gain."""
+    factors = {(row['case'], row['metric'].removesuffix('/ratio')) for row in rows
+               if row['metric'].endswith('/ratio') and not 0.5 <= (row['value'] or 1.0) <= 2.0}
+    return [row for row in rows for metric, _, key in (row['metric'].rpartition('/'),)
+            if key not in ('gain', 'ratio') or (key == 'ratio') == ((row['case'], metric) in factors)]
+
+
+_COMPARISON_KEYS = 'rate', 'difference', 'gain', 'ratio', 'wins'    # of the rows that are no statistics of a result
 
 
 def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:
@@ -259,10 +338,9 @@ def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:
     for one in tried:
         cells = ('', '', '', '')
         if one.row:
-            share = one.row['tracked_percent']
+            lost = one.row['mean_loss_s']
             cells = (number(one.row['value']), interval_text(one.row), one.row['unit'],
-                     '' if share is None else f'{share:.3g} %')
+                     '' if lost is None else f'{lost:.3g} s')
         lines.append((f'{one.value:.6g}', *cells, reason(one)))
-    name = f'{key} [{unit}]' if unit else key
-    _show(TextTable(((name, '>'), ('mean', '>'), ('95 % interval', '>'), 'unit', ('tracked', '>'), 'trials'), lines),
-          width=MIN_TABLE_COLUMNS)
+    _show_fitted((('value', '>'), ('mean', '>'), ('95 % interval', '>'), 'unit', ('lost', '>'), 'trials'), lines, (),
+                 f'{key} [{unit}]' if unit else key)

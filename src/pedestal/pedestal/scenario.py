@@ -2,14 +2,16 @@
 from __future__ import annotations
 
 import dataclasses
+import datetime
 import functools
 import pathlib
 from collections.abc import Mapping
 
 import numpy as np
 
+from pedestal.satellite import Choice, chosen
+from pedestal_bringup.scenario import files, shipped
 from pedestal_bringup.scenario import scenario as bringup
-from pedestal_bringup.scenario import shipped
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.parameters import Parameters, as_dict, flatten
 from pedestal_common.quantities import Seconds
@@ -27,11 +29,13 @@ def scenarios() -> dict[str, str]:
 
 
 def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None, *, duration: float | None = None,
-         seed: int | None = None) -> Scenario:
+         seed: int | None = None, tle: str | pathlib.Path | None = None, satellite: str = '',
+         station: str | None = None, which: str | None = None, start: str | None = None) -> Scenario:
     """Return the scenario of a name or of a .yaml file.
 
-    changes: {'node.key': value}. changes, duration [s] and seed replace values of the file.
-    Raises ValueError with one line for an unknown name or a value out of range.
+    changes: {'node.key': value}. changes, duration [s] and seed replace values of the file. tle, satellite, station,
+    which and start choose a satellite and its pass as --tle, --satellite, --station, --pass and --start of `pedestal
+    run`. Raises ValueError with one line for an unknown name or a value out of range.
 
     >>> pedestal.load('leo_pass', seed=3).seed
     3
@@ -39,8 +43,18 @@ def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None,
     Traceback (most recent call last):
         ...
     pedestal_bringup.scenario.sections.ScenarioError: unknown scenario 'leo_pas'; did you mean 'leo_pass'? ...
+    >>> pedestal.load('leo_pass', which='2019-12-10T12:00', duration=60.0)[
+    ...     'tracking_receiver.target.leo_pass.start_time']     # half a minute before the culmination
+    '2019-12-10T12:37:55Z'
     """
-    return Scenario(str(source), dict(changes or {}), duration, seed)
+    choice = Choice(tle, satellite, station, which, start)
+    if not choice.made:
+        return Scenario(str(source), dict(changes or {}), duration, seed)
+    texts = [files.override(name, value) for name, value in (changes or {}).items()]
+    now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
+    found = chosen(bringup.draft(source), texts, choice, duration, now)
+    parsed = {f'{node}.{key}': value for node, key, value in map(files.parse_override, found.changes)}
+    return Scenario(str(source), parsed, found.duration, seed)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -59,6 +59,22 @@ def test_a_track_that_rises_and_sets_within_the_run_says_so(tmp_path):
         f'tracking_receiver.target.track_file.path={path}'])).announced()
     assert 'highest 5.0 deg after 10 s' in highest and summary.startswith('a.csv')
     assert rises.startswith('the target rises after 5.') and sets.startswith('the target sets after 15.0')
+    masked = Plan(scenario.load('track_file', [f'tracking_receiver.target.track_file.path={path}',
+                                               'tracking_receiver.receiver.horizon_mask=0.04'])).announced()
+    assert masked[-2].startswith('the target rises above the horizon mask of 2.29 deg after 7.')
+    assert masked[-1].startswith('the target sets below the horizon mask of 2.29 deg after 12.')
+    never = Plan(scenario.load('track_file', [f'tracking_receiver.target.track_file.path={path}',
+                                              'tracking_receiver.receiver.horizon_mask=0.2'])).announced()
+    assert never[-1] == ('the target never rises above the horizon mask of 11.5 deg, highest 5.0 deg: nothing can be '
+                         'tracked')
+
+
+@pytest.mark.parametrize('before, said', [(0.8, False), (1.9, False), (2.5, True)])
+def test_a_rise_is_stated_only_if_it_takes_time_from_the_run(before, said, tmp_path):
+    path = tmp_path / 'a.csv'
+    path.write_text('t,az,el\n' + ''.join(f'{k},{120 + k},{k - before}\n' for k in range(21)))
+    found = Plan(scenario.load('track_file', [f'tracking_receiver.target.track_file.path={path}'])).announced()
+    assert any('rises' in line for line in found) == said
 
 
 def test_a_run_that_is_longer_than_a_track_states_its_end(tmp_path):

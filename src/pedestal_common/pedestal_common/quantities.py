@@ -84,6 +84,6 @@ class Row(SingleRow, Coverage, total=False):
     ci_low: float | None
     ci_high: float | None
     runs: int
-    tracked_percent: float | None   # mean share of the trials in autotrack
+    mean_loss_s: float | None   # mean of the result loss_s of the trials
     text: str       # of the value
     alarms: list[str]

@@ -39,6 +39,7 @@ from pedestal_common.quantities import (
     Quaternions,
     Radians,
     RadiansPerSecond,
+    Seconds,
     Times,
     Vectors3,
 )
@@ -55,6 +56,20 @@ NOTABLE_DEVIATION = 0.1
 The mean must also lie outside its band. Because the band of a run of minutes is narrower than the accuracy of any
 model, the band alone would mark every filter.
 """
+
+MIN_JUDGED_S = 10.0  # shortest evaluated part from which a mean NIS or NEES is judged [s]
+SEVERE_RATIO = 1.5
+"""Ratio of a mean to its expectation that `remarks` states [-]: the interval of the ratio must be beyond it, or below
+its inverse."""
+
+CURES = {
+    ('NIS', 'too sure'): 'raise acu.tracker.receiver.sigma_floor, or state the errors of an INS in '
+                         'acu.tracker.attitude',
+    ('NIS', 'too careful'): 'state acu.tracker.receiver.noise_bandwidth of a receiver that smooths its errors, or '
+                            'lower acu.tracker.receiver.sigma_floor',
+    ('NEES', 'too sure'): 'fit the process noise by `pedestal tune SCENARIO --filter KIND`, or state the errors of an '
+                          'INS in acu.tracker.attitude'}
+"""{(number, note): what a user can do}. With too large a stated sigma of the estimate nothing is to be done."""
 
 FILTER_NUMBERS = ('innovation', 'rate_innovation', 'nis', 'sigma', 'rate_sigma', 'correlation')
 """Numbers of the topic acu/filter that this module reads, for each axis; their units are in topics.FILTER_UNITS."""
@@ -193,6 +208,7 @@ class Axis:
     """Statistics of one axis i, 0 azimuth or 1 elevation, over the evaluated part of the run; NaN without
     measurements.
     """
+    seconds: Seconds    # duration of the evaluated part
     nis: float      # mean
     nis_expected: float     # expected mean NIS, the mean of its degrees of freedom
     nees: float     # mean
@@ -203,6 +219,7 @@ class Axis:
 
     def __init__(self, known: Consistency, i: int) -> None:
         on = known.tracking
+        self.seconds = float(np.sum(on) * np.median(np.diff(known.t))) if known.t.size > 1 else 0.0
         nis, freedoms, nees = known.nis[on, i], known.freedoms[on, i], known.nees[on, i]
         self._freedoms, self._nis = freedoms[np.isfinite(nis)], nis[np.isfinite(nis)]
         self._nees = nees[np.isfinite(nees)]
@@ -237,22 +254,54 @@ class Axis:
     @property
     def nis_mark(self) -> str:
         """The note on the mean NIS, see `mark`."""
-        return mark(self.nis, self.nis_expected, self.nis_band)
+        return mark(self.nis, self.nis_expected, self.nis_band) if self.judged else ''
 
     @property
     def nees_mark(self) -> str:
         """The note on the mean NEES, see `mark`."""
-        return mark(self.nees, NEES_FREEDOMS, self.nees_band)
+        return mark(self.nees, NEES_FREEDOMS, self.nees_band) if self.judged else ''
+
+    @property
+    def judged(self) -> bool:
+        """True if the evaluated part is long enough for a note on its means."""
+        return self.seconds >= MIN_JUDGED_S
+
+    @property
+    def severe(self) -> tuple[str, str, float]:
+        """(NIS or NEES, note, ratio of the rms errors to the stated ones) of a filter that is far off, else two empty
+        texts. With a severe NIS the NEES is not regarded, because both have one cause."""
+        for number, mean, expected, (low, high) in (('NIS', self.nis, self.nis_expected, self.nis_band),
+                                                    ('NEES', self.nees, float(NEES_FREEDOMS), self.nees_band)):
+            note = 'too sure' if mean / high > SEVERE_RATIO else 'too careful'
+            far = note == 'too sure' or mean / low < 1.0 / SEVERE_RATIO
+            if self.judged and far and (number, note) in CURES:
+                return number, note, math.sqrt(mean / expected)
+        return '', '', math.nan
 
     @property
     def verdict(self) -> str:
         """The sentence on the mean NEES: too sure, too careful or consistent."""
         if not math.isfinite(self.nees):
             return 'nothing was evaluated'
+        if not self.judged:
+            return (f'not judged: {self.seconds:.3g} s evaluated, {MIN_JUDGED_S:g} s are needed (mean NEES '
+                    f'{self.nees:.3g})')
         low, high = self.nees_band
         kind = 'too sure' if self.nees > high else 'too careful' if self.nees < low else 'consistent'
         return (f'{kind}: the errors are {math.sqrt(self.nees / NEES_FREEDOMS):.2g} times the stated sigma (mean NEES '
                 f'{self.nees:.3g}, {100.0 * BAND_PROBABILITY:g} % of consistent filters have {low:.3g} to {high:.3g})')
+
+
+def remarks(known: Consistency) -> list[str]:
+    """Return a line for each kind of severe inconsistency, with what can be done; [] for a filter without one."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for axis, name in zip(known.axes, topics.AXES):
+        number, note, ratio = axis.severe
+        if note:
+            found.setdefault((number, note), []).append(f'{name} {ratio:.2g}')
+    what = {'NIS': 'innovations', 'NEES': 'errors'}
+    return [f'the filter is {note}: its {what[number]} are {", ".join(ratios)} times what it states (rms); '
+            f'{CURES[number, note]}' for (number, note), ratios in found.items()]
 
 
 def mark(mean: float, expected: float, band: Band) -> str:

@@ -42,10 +42,6 @@ class Result(typing.NamedTuple):
 
 BRIEF_COUNT = 8  # number of results that a run prints by default
 
-MARK_MEANINGS = {'too sure': 'the errors are larger than it states',
-                 'too careful': 'the errors are smaller than it states'}
-"""{note of consistency.mark: its meaning for the filter}."""
-
 ENCODER_DEFINITION = 'This result includes all errors between dish and encoders, such as the bend.'
 """Sentence in the definitions of the results by the encoders."""
 
@@ -125,12 +121,16 @@ RESULTS = (
            'Time of the first lock of the receiver.', 'first lock', brief=True),
     Result('autotrack_time_s', 's', 'tracking', lambda run: run.autotrack_time,
            'Total time of the ACU in autotrack.', 'time in autotrack'),
+    Result('trackable_time_s', 's', 'tracking', lambda run: run.trackable_time,
+           'Total time in which the target could be tracked: above the horizon mask of the receiver, in no hidden '
+           'sector, above the floor and within the travel of the axes.', 'time in which the target could be tracked'),
     Result('tracked_percent', '%', 'tracking', lambda run: run.tracked_percent,
-           'Share of the run in autotrack.', brief=True),
+           'Share in autotrack of the time in which the target could be tracked (trackable_time_s).',
+           'share of this time in autotrack', brief=True),
     Result('loss_s', 's', 'tracking', lambda run: run.loss,
-           'Total time, in any mode, with the target further than half a beamwidth off the beam, counted from '
-           'the first step in settled autotrack.', 'time with the target further than half a beamwidth off',
-           brief=True),
+           'Total time, in any mode, in which the target could be tracked and was further than half a beamwidth off '
+           'the beam, counted from the first step in settled autotrack.',
+           'time with the target further than half a beamwidth off', brief=True),
     Result('evaluated_time_s', 's', 'tracking', lambda run: run.evaluated_time,
            f'Total time in settled autotrack: from {tracking.HANDOVER_SETTLING_S:g} s after the first hand-over to '
            'autotrack.', 'evaluated time'),
@@ -220,15 +220,6 @@ def brief(columns: Iterable[Values], count: int = BRIEF_COUNT) -> list[str]:
                     for name, (value, _) in values.items())]
     chosen = sorted(found, key=lambda result: not result.brief)[:count]
     return [result.name for result in found if result in chosen]
-
-
-def remarks(noted: Mapping[str, str], values: Values) -> list[str]:
-    """Return a line for each note on the filter; noted: result of `marks`; values: result of `measured`."""
-    found: dict[str, list[str]] = {}
-    for name, note in noted.items():
-        found.setdefault(note, []).append(f'{name} {values[name][0]:.3g}')
-    return [f'the filter is {note} ({MARK_MEANINGS.get(note, note)}): {", ".join(names)}'
-            for note, names in found.items()]
 
 
 def rows(case: str, values: Values) -> list[Row]:

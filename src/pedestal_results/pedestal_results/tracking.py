@@ -20,6 +20,7 @@ from pedestal_common.quantities import (
     Decibels,
     Degrees,
     Floats,
+    Ints,
     Matrix3,
     Pair,
     Pairs,
@@ -32,7 +33,7 @@ from pedestal_common.quantities import (
 )
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import directions, sensor_frame
+from pedestal_results import directions, sensor_frame, trackable
 from receiver_law.monopulse import sum_pattern
 from tracking_receiver_sim import wave_path
 from tracking_receiver_sim.params import PathParameters
@@ -164,6 +165,7 @@ class Tracking:
     mode: Texts     # mode of the ACU, '' if unknown
     tracking: Bools         # the evaluated part of the run, which is settled autotrack
     since: Bools    # all steps from the first evaluated step on, in any mode
+    obstacle: Ints  # reason why the target cannot be tracked, see the module trackable
     beamwidth: Radians      # half-power, NaN if the bag does not state it
     boresight: Pair         # boresight offset of the receiver
     # true pointing error of an electronic beam at the beginning of the interval that ends at the stamp, else NaN
@@ -287,19 +289,36 @@ class Tracking:
         """Duration of the evaluated part; NaN without a known mode."""
         return float(np.sum(self.tracking) * self.period) if self.known_mode.any() else math.nan
 
+    @functools.cached_property
+    def trackable(self) -> Bools:
+        """The steps in which the target could be tracked, see the module trackable."""
+        return self.obstacle == trackable.NONE
+
+    @property
+    def trackable_time(self) -> Seconds:
+        """Time in which the target could be tracked."""
+        return float(np.sum(self.trackable) * self.period)
+
+    def share(self, mode: str) -> float:
+        """Return the share in a mode of the steps with a known mode in which the target could be tracked [%]; NaN
+        without such a step."""
+        counted = self.mode[self.known_mode & self.trackable]
+        return 100.0 * float(np.mean(counted == mode)) if counted.size else math.nan
+
     @property
     def tracked_percent(self) -> float:
-        """Share in autotrack of the steps with a known mode [%]; NaN without a known mode."""
-        return 100.0 * float(np.mean(self.mode[self.known_mode] == 'autotrack')) if self.known_mode.any() else math.nan
+        """The share in autotrack [%], see `share`."""
+        return self.share('autotrack')
 
     @property
     def loss(self) -> Seconds:
-        """Time, in any mode from the first evaluated step on, with the target further than half a beamwidth off; else
-        NaN.
+        """Time, in any mode from the first evaluated step on, in which the target could be tracked and was further
+        than half a beamwidth off; else NaN.
         """
-        if not (self.since.any() and math.isfinite(self.beamwidth)):
+        counted = self.since & self.trackable
+        if not (counted.any() and math.isfinite(self.beamwidth)):
             return math.nan
-        return float(np.sum(self.distance[self.since] > 0.5 * self.beamwidth) * self.period)
+        return float(np.sum(self.distance[counted] > 0.5 * self.beamwidth) * self.period)
 
 
 def error_matrix(bag: Recording) -> Annotated[Floats, (2, 2)]:
@@ -348,8 +367,8 @@ def read(bag: Recording) -> Tracking:
     joints = bag.table('joint_states')
     t = joints['t']
     at_steps = functools.partial(recordings.at, bag, t)
-    encoders = np.column_stack((joints['azimuth.position'], joints['elevation.position']))
-    encoders = directions.on_sky(bag, t, encoders)
+    raw = np.column_stack((joints['azimuth.position'], joints['elevation.position']))
+    encoders = directions.on_sky(bag, t, raw)
     beam = at_steps('adu/truth', ('azimuth.position', 'elevation.position')) if 'adu/truth' in bag.topics else encoders
     target = at_steps('target/truth', ('position.x', 'position.y', 'position.z'))
     quaternion = ('orientation.x', 'orientation.y', 'orientation.z', 'orientation.w')
@@ -386,8 +405,9 @@ def read(bag: Recording) -> Tracking:
                     measured=measured[:, :2], cn0=measured[:, 2], estimate_error=estimate_error,
                     beam_earth=beam_earth, target_earth=target_earth, estimate_earth=estimate_earth,
                     sensor_truth=sensor_truth, range=np.linalg.norm(relative, axis=1), mode=mode,
-                    tracking=automatic & (t >= start), since=t >= start, beamwidth=recordings.beamwidth(bag),
-                    boresight=boresight,
+                    tracking=automatic & (t >= start), since=t >= start,
+                    obstacle=trackable.obstacles(bag, relative, attitude, raw - encoders),
+                    beamwidth=recordings.beamwidth(bag), boresight=boresight,
                     begun=interval_start_error(beam, error) if bag.beams else np.full_like(error, np.nan))
 
 

@@ -18,7 +18,8 @@ from pedestal_common.quantities import Bools, Floats, Json, Seconds
 from pedestal_common.wire import commands
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results.tracking import DEG_PER_RAD, Tracking
+from pedestal_results import trackable
+from pedestal_results.tracking import DEG_PER_RAD, Tracking, keyholes
 
 TRIPPED, REFUSED, NOT_LOCKED, NOT_TRACKED = 'tripped', 'refused', 'never locked', 'never tracked'
 TRACKED, ON_THE_WAY, NO_TARGET = 'tracked', 'ended on the way', 'no target'  # words of the verdicts
@@ -31,7 +32,7 @@ DRIVE_STATE_TOPIC, EMERGENCY_STOP = 'adu/state', 'emergency stop'
 REPLY_TOPICS = tuple(node.replies for node in nodes.NODES if node.replies)
 
 WAITING_REASONS = tuple(REASON_TEXTS[name] for name in ('DRIVE_NOT_READY', 'INS_ALIGNING', 'ATTITUDE_INVALID',
-                                                        'BEFORE_PROGRAM'))
+                                                        'BEFORE_PROGRAM', 'BELOW_HORIZON'))
 """Reasons of the control unit that only delay a mode: the mode begins when the reason has passed."""
 
 LOCK_ALLOWANCE_S = 1.0
@@ -47,8 +48,8 @@ MIN_SWING_RAD = math.radians(1.0)
 """Least decrease and increase of the distance by which a beam has come near the target and gone away again [rad]."""
 
 MIN_OFF_TARGET_S, MIN_REASON_SHARE = 0.5, 0.1
-"""Time more than a beamwidth off the target [s], and share of the run outside autotrack after its end, that a verdict
-on a tracked run states."""
+"""Time more than a beamwidth off the target [s], and share of the trackable time outside autotrack after its end, that
+a verdict on a tracked run states."""
 
 
 class Verdict(typing.NamedTuple):
@@ -125,12 +126,22 @@ def _tracking(bag: Recording, run: Tracking) -> tuple[str, str]:
     if 'autotrack' in shares:
         return _autotracked(bag, run, distance, near)
     if by_level.any() and (near[by_level].any() or not math.isfinite(run.beamwidth)):
-        return TRACKED, f'tracked by its level for {shares["steptrack"]:.3g} % of {run.t[-1] - run.t[0]:.4g} s'
+        whole, rest = _counted_time(bag, run)
+        return TRACKED, f'tracked by its level for {run.share("steptrack"):.3g} % of {whole}{rest}'
     if not any(_leads_to_tracking(mode, acu.get('tracker.handover', True)) for mode in wanted):
         return NO_TARGET, _without_target(shares, acu)
     if not any(modes.MODE_ROWS[modes.MODES.index(mode)].follows for mode in shares):
         return _never_began(bag, acu.get('initial_mode', 'standby'))
     return _never_tracked(bag, run, distance, near, acu)
+
+
+def _counted_time(bag: Recording, run: Tracking) -> tuple[str, str]:
+    """Return (the time of which a verdict states a share, what the rest of the run was)."""
+    duration, rest = f'{run.t[-1] - run.t[0]:.4g} s', trackable.rest(bag, run.obstacle, run.period)
+    if not rest:
+        return duration, ''
+    return (f'the {run.trackable_time:.4g} s in which the target could be tracked',
+            f'; in the run of {duration} the target was {rest}')
 
 
 def _autotracked(bag: Recording, run: Tracking, distance: Floats, near: Bools) -> tuple[str, str]:
@@ -139,21 +150,24 @@ def _autotracked(bag: Recording, run: Tracking, distance: Floats, near: Bools) -
     distance: angle from beam to target [rad]; near: True with the target within half a beamwidth.
     """
     auto = run.mode == 'autotrack'
-    off = auto & (distance > run.beamwidth)
+    off = auto & run.trackable & (distance > run.beamwidth)
     off_s, wide = np.sum(off) * run.period, np.max(distance[off], initial=0.0) * DEG_PER_RAD
     if off_s > MIN_OFF_TARGET_S and not near[auto].any():
         return NOT_TRACKED, (f'tracked 0 %: autotrack for {np.sum(auto) * run.period:.3g} s, always off the target by '
                              f'up to {wide:.3g} deg: a side lobe, or another signal')
-    text = f'tracked {run.tracked_percent:.3g} % of {run.t[-1] - run.t[0]:.4g} s'
+    whole, rest = _counted_time(bag, run)
+    text = f'tracked {run.tracked_percent:.3g} % of {whole}'
     if not math.isnan(run.lock_time):
         text += f', first lock at {run.lock_time:.4g} s'
     if off_s > MIN_OFF_TARGET_S:
         text += f'; {off_s:.3g} s of it more than a beamwidth off the target, by up to {wide:.3g} deg'
+        announced = sum(slew.loss for slew in keyholes(bag))
+        text += f' (announced for the keyhole: {announced:.3g} s)' if announced else ''
     ended = run.t[auto][-1]
     reason = bag.last_values(f'{bag.beam}acu').get('refused autotrack', '')
-    if reason and run.t[-1] - ended > MIN_REASON_SHARE * (run.t[-1] - run.t[0]):
+    if reason and np.sum(run.trackable & (run.t > ended)) > MIN_REASON_SHARE * np.sum(run.trackable):
         text += f'; no autotrack from {ended:.4g} s on: {reason}'
-    return TRACKED, text
+    return TRACKED, text + rest
 
 
 def _without_target(shares: Mapping[str, float], acu: Mapping[str, Json]) -> str:
@@ -193,9 +207,9 @@ def _never_tracked(bag: Recording, run: Tracking, distance: Floats, near: Bools,
     level, needed = run.cn0[np.isfinite(run.cn0)], receiver.get('receiver.acquire_level_dbhz', math.nan)
     best = (f'never locked: best level {level.max():.3g} dB-Hz, lock at {needed:.3g}'
             if level.size else 'never locked: no level was recorded')
-    if not (run.target_earth[:, 1] > receiver.get('receiver.horizon_mask', 0.0)).any():
-        return NOT_LOCKED, f'{best}: the target was below the horizon'
-    if np.sum(near) * run.period >= allowance:
+    if not run.trackable.any():
+        return NOT_LOCKED, f'{best}: the target was {trackable.rest(bag, run.obstacle, run.period)}'
+    if np.sum(near & run.trackable) * run.period >= allowance:
         return NOT_LOCKED, best + _link(run, near, receiver)
     away = f'{distance[-1] * DEG_PER_RAD:.3g} deg away'
     if left < allowance or near[-1] or _approaches(run, distance):

@@ -9,10 +9,13 @@ from scipy.spatial.transform import Rotation
 from acu_tracker.estimation.filters import motion_models
 from acu_tracker.estimation.filters.measurement import error_variance
 from acu_tracker.estimation.params import ReceiverModelParameters
+from pedestal_bringup.loop import memory_recording
+from pedestal_bringup.scenario import scenario
 from pedestal_common.geometry import line_of_sight
 from pedestal_common.graph import topics
 from pedestal_common.parameters import build, record
 from pedestal_results import consistency, results
+from pedestal_results.recorded_run import RecordedRun
 from tracking_receiver_sim import receiver, target
 from tracking_receiver_sim.params import SMOOTHING_KINDS, TrackingReceiverParameters
 
@@ -60,6 +63,39 @@ def test_a_filter_is_what_it_was_made(factor, words, freedoms):
     said = {1.0: None, 2.0: 'too sure', 0.5: 'too careful'}[factor]
     assert {results.marks({'filter': found}).get(f'{axis}_{name}_mean') for axis in ('azimuth', 'elevation')
             for name in ('nis', 'nees')} == {said}
+
+
+@pytest.mark.parametrize('factor, n, said', [
+    (1.0, 6000, []), (1.15, 6000, []), (0.85, 6000, []), (2.0, 6000, ['too sure', 'sigma_floor']), (2.0, 1900, []),
+    (0.5, 6000, ['too careful', 'noise_bandwidth'])])
+def test_a_line_on_the_filter_needs_much_data_and_has_a_cure(factor, n, said):
+    """Errors of 0.85 to 1.15 times the stated ones are a healthy run, and 9 s are too little data."""
+    found = made(np.random.default_rng(1), factor, n=n)
+    lines = consistency.remarks(found)
+    assert len(lines) == bool(said) and all(text in lines[0] for text in said)
+    if n < 2000:
+        assert found.axes[0].verdict.startswith('not judged: 8.99 s evaluated, 10 s are needed')
+        assert results.marks({'filter': found}) == {}
+
+
+@pytest.mark.parametrize('factor, said', [(2.0, ['too sure', 'pedestal tune SCENARIO --filter KIND']), (0.5, [])])
+def test_errors_without_such_innovations_are_those_of_the_motion_model(factor, said):
+    found = made(np.random.default_rng(1), factor)
+    found.nis = found.nis / factor**2
+    lines = consistency.remarks(found)
+    assert len(lines) == bool(said) and all(text in lines[0] for text in said)
+
+
+@pytest.mark.parametrize('name, changes, said', [
+    ('leo_pass', (), ''), ('uav_flyby', (), ''), ('ship_pass', (), ''),
+    ('ship_pass', ('ins.error_told=false', 'ins.tilt_noise=0.0005', 'ins.heading_noise=0.0005'), 'tracker.attitude'),
+    ('leo_pass', ('tracking_receiver.receiver.smoothing=recursion',), 'noise_bandwidth')])
+@pytest.mark.every_case
+def test_a_healthy_run_has_no_line_on_its_filter(name, changes, said):
+    run = RecordedRun(memory_recording.record(scenario.load(name, changes, duration=20.0)))
+    lines = consistency.remarks(run.filter)
+    assert len(lines) == bool(said) or name == 'ship_pass' and lines
+    assert all(said in line for line in lines) and bool(lines) == bool(said)
 
 
 def test_the_band_holds_95_percent_of_consistent_filters():

@@ -92,16 +92,6 @@ def test_the_eight_results_come_first_and_others_fill_their_places():
     assert 'lost_steps' in filled and 'pointing_rms_deg' not in filled
 
 
-def test_a_filter_that_is_off_is_told_in_a_plain_sentence():
-    values = {'azimuth_nees_mean': (3.456, '-'), 'elevation_nees_mean': (0.5, '-'), 'elevation_nis_mean': (1.5, '-')}
-    noted = {'azimuth_nees_mean': 'too sure', 'elevation_nees_mean': 'too careful', 'elevation_nis_mean': 'too sure'}
-    assert results.remarks(noted, values) == [
-        'the filter is too sure (the errors are larger than it states): azimuth_nees_mean 3.46, '
-        'elevation_nis_mean 1.5',
-        'the filter is too careful (the errors are smaller than it states): elevation_nees_mean 0.5']
-    assert results.remarks({}, values) == []
-
-
 def test_the_loss_at_half_a_beamwidth_is_half_of_the_power():
     run = tracking.read(bag.read(REFERENCES / 'leo_pass'))
     on = np.flatnonzero(run.tracking)

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -131,7 +132,6 @@ def test_refused_before_anything_runs(pedestal, tmp_path, case):
     (('--runs', 0), '--runs 0: must be at least 1'), (('--sobol',), '--sobol: needs at least one --vary'),
     (('--seed', 2**31 - 3, '--runs', 4), '--runs 4: must be at most 3, the number of seeds from 2147483645 on'),
     (('--against-param', 'acu.azimuth.filter.kind=cx'), "'cx': must be one of"),
-    (('--side', 'ca'), '--side ca: needs at least one NODE.KEY=VALUE'),
     (('--side', 'a/b', f'{BANDWIDTH}=20'), '--side a/b: must be a name of letters, digits'),
     (('--side', 'base', f'{BANDWIDTH}=20'), 'other than base'),
     (('--require', 'pointing_max_deg'), 'must be RESULT < LIMIT'),
@@ -363,9 +363,9 @@ def test_trials_that_never_track_say_so(tmp_path):
     with Table(tmp_path, 'never', {}, [], ['lock_time_s', 'pointing_rms_deg']) as table:
         table.append([[0, 0, 12.5, None]])
     with pytest.raises(ValueError, match='^no trial ever tracked .* a longer --duration, .* --by: lock_time_s$'):
-        statistics.ranked_by(table)
+        statistics.ranked_by([table])
     with pytest.raises(ValueError, match='^--by pointing_rms_deg: no trial has this result'):
-        statistics.ranked_by(table, 'pointing_rms_deg')
+        statistics.ranked_by([table], 'pointing_rms_deg')
 
 
 def test_a_filter_kind_as_a_choice(pedestal, tmp_path):
@@ -396,8 +396,9 @@ def test_a_gain_is_found_where_there_is_one(tmp_path):
     a = 0.88 * b * np.exp(0.05 * rng.standard_normal(60))
     found = sides(tmp_path, a, b)
     rows = {row['metric']: row for row in comparison.rows(found)}
-    assert set(rows) == {'pointing_rms_deg/difference', 'pointing_rms_deg/gain', 'pointing_rms_deg/wins',
+    assert set(rows) == {*(f'pointing_rms_deg/{key}' for key in ('difference', 'gain', 'ratio', 'wins')),
                          'isolation_db/difference', 'isolation_db/wins'}
+    assert rows['pointing_rms_deg/ratio']['value'] == pytest.approx(a.mean() / b.mean())
     gain = rows['pointing_rms_deg/gain']
     assert gain['ci_low'] < 12.0 < gain['ci_high'] and gain['runs'] == 60
     drawn = rng.integers(0, 60, (4000, 60))
@@ -406,6 +407,50 @@ def test_a_gain_is_found_where_there_is_one(tmp_path):
     assert rows['isolation_db/wins']['value'] == rows['pointing_rms_deg/wins']['value']
     assert comparison.sentence(found, 'pointing_rms_deg').startswith('A is better than B by 12 +- 1.')
     assert comparison.sentence(found, 'isolation_db').startswith('A is better than B by 0.001')
+
+
+@pytest.mark.parametrize('factor, said', [
+    (50.0, r'A is better than B by a factor of 5\d(\.\d)? \(4\d\.?\d? to 5\d\.?\d?\) \(pointing_rms_deg, 40 pairs'),
+    (2.5, r'A is better than B by a factor of 2\.[45]\d? \(2\.[34]'), (1.8, r'A is better than B by 4\d \+- \d')])
+def test_a_ratio_above_two_is_said_as_a_factor(tmp_path, factor, said):
+    """98 % hides a factor of 50; its interval agrees with a bootstrap over pairs."""
+    rng = np.random.default_rng(6)
+    a = 0.01 * np.exp(0.1 * rng.standard_normal(40))
+    b = factor * a * np.exp(0.05 * rng.standard_normal(40))
+    found = sides(tmp_path, a, b)
+    assert re.match(said, comparison.sentence(found, 'pointing_rms_deg'))
+    drawn = rng.integers(0, 40, (4000, 40))
+    bootstrap = np.percentile(a[drawn].mean(axis=1) / b[drawn].mean(axis=1), (2.5, 97.5))
+    assert comparison.ratio(a, b)[1:] == pytest.approx(bootstrap, rel=0.01)
+    nothing = comparison.sentence(sides(tmp_path / 'none', np.zeros(40), b), 'pointing_rms_deg')
+    assert nothing.startswith(f'A is better than B by {b.mean():.2g} +- ') and ' deg (' in nothing
+
+
+def test_sides_without_the_result_are_not_identical(tmp_path):
+    missing = np.full(4, math.nan)
+    assert comparison.sentence(sides(tmp_path, missing, missing), 'pointing_rms_deg') == (
+        'A against B: no trial of either side has pointing_rms_deg; choose a result that they have with --by.')
+
+
+KINDS = tuple(f'acu.{axis}.filter.kind' for axis in ('azimuth', 'elevation'))
+
+
+@pytest.mark.parametrize('changes, named', [
+    ([(), (f'{KINDS[0]}=ca',)], ('azimuth.filter.kind=imm', 'azimuth.filter.kind=ca')),
+    ([(), (f'{KINDS[0]}=ca', f'{KINDS[1]}=ca')], ('filter.kind=imm', 'filter.kind=ca')),
+    ([(), (f'{KINDS[0]}=ca', f'{KINDS[1]}=cv')], ('azimuth.filter.kind=imm elevation.filter.kind=imm',
+                                                  'azimuth.filter.kind=ca elevation.filter.kind=cv')),
+    ([('adu.wind.field.speed=2',), ('adu.wind.field.speed=2', 'adu.azimuth.load.inertia=200')],
+     ('azimuth.load.inertia=210', 'azimuth.load.inertia=200')),
+    ([(), ('adu.azimuth.limits.upper=4', 'adu.elevation.limits.upper=1.6')],
+     ('azimuth.limits.upper=4.712389 elevation.limits.upper=1.605703',
+      'azimuth.limits.upper=4 elevation.limits.upper=1.6')),
+    ([('acu.azimuth.limits.rate=2.4', 'adu.azimuth.limits.rate=2.5'),
+      ('acu.azimuth.limits.rate=2.35', 'adu.azimuth.limits.rate=2.6')],
+     ('acu.azimuth.limits.rate=2.4 adu.azimuth.limits.rate=2.5',
+      'acu.azimuth.limits.rate=2.35 adu.azimuth.limits.rate=2.6'))])
+def test_a_side_has_the_short_name_of_what_differs(changes, named):
+    assert comparison.names(*(plan(Variant('uav_flyby', texts), 1) for texts in changes)) == named
 
 
 def test_no_gain_is_said_where_there_is_none(tmp_path):
@@ -426,7 +471,7 @@ def test_a_table_of_a_ship_against_another_setting(pedestal, tmp_path):
                                     'ship_motion.ship.sea_state=choice(3, 6)', '--against-param',
                                     'tracking_receiver.receiver.cn0_dbhz=42', '--workers', 1, '--json', 'rows.json')
     assert (code, errors) == (0, '')
-    names = [f'tracking_receiver.receiver.cn0_dbhz={level}' for level in (46.4, 42)]
+    names = [f'receiver.cn0_dbhz={level}' for level in (46.4, 42)]
     assert output.startswith(f'{names[0]} is better than {names[1]} by ')
     folder = tmp_path / 'trials' / 'ship_pass'
     page = (folder / 'trials.html').read_text()
@@ -448,7 +493,7 @@ def test_every_beam_has_its_own_results(tmp_path):
     assert {name.partition('/')[0] for name in table.measured_results} == {f'beam_{i}' for i in range(1, 5)}
     cases = {row['case'] for row in statistics.of_results('four', table)}
     assert cases == {f'four/beam_{i}' for i in range(1, 5)}
-    assert statistics.ranked_by(table) == 'beam_1/pointing_rms_deg'
+    assert statistics.ranked_by([table]) == 'beam_1/pointing_rms_deg'
 
 
 def test_the_worst_is_the_one_that_was_not_measured(tmp_path):

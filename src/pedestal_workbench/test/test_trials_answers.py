@@ -23,7 +23,8 @@ def test_the_best_of_three_sides_comes_first(pedestal, tmp_path):
     rows = json.loads((tmp_path / 'r.json').read_text())['rows']
     means = {row['case']: row['value'] for row in rows if row['metric'] == 'pointing_rms_deg/mean'}
     order = sorted(means, key=lambda case: means[case])
-    named = {'base': f'base ({KIND}=imm)', 'ca': f'ca ({KIND}=ca)', 'slow': f'slow ({KIND}=alpha_beta)'}
+    short = KIND.partition('.')[2]
+    named = {'base': f'base ({short}=imm)', 'ca': f'ca ({short}=ca)', 'slow': f'slow ({short}=alpha_beta)'}
     lines = said.splitlines()
     for line, other in zip(lines, order[1:]):
         assert line.startswith(f'{named[order[0]]} is ') and f' than {named[other]}' in line
@@ -32,6 +33,10 @@ def test_the_best_of_three_sides_comes_first(pedestal, tmp_path):
     table = [line.split()[:2] for line in lines if line.startswith((' pointing_rms_deg ', ' pointing_max_deg '))]
     assert table == [[metric, case] for metric in ('pointing_rms_deg', 'pointing_max_deg') for case in order]
     assert ' azimuth_nis_mean' not in said
+    assert all(len(line) <= 80 for line in lines if line.startswith(' ') and 'pedestal run' not in line)
+    worst = [line.split(' by ')[0] for line in lines if line.startswith('the worst trials')]
+    assert worst == [f'the worst trials of {side}' for side in order]
+    assert sum('pedestal run uav_flyby --seed' in line for line in lines) == 9
     assert {row['value'] for row in rows if row['metric'] == 'require(pointing_max_deg > 1)/rate'} == {0.0}
     assert {file.name for file in (tmp_path / 'trials' / 'uav_flyby').glob('*.csv')} == {
         'trials.csv', 'side_slow.csv', 'side_ca.csv'}
@@ -81,6 +86,36 @@ def test_sides_are_named_with_their_sensitivities_and_missing_results(pedestal):
                          'measured', said, re.MULTILINE), said
 
 
+def test_a_side_without_a_change_names_the_base(pedestal, tmp_path):
+    code, said, errors = pedestal('trials', 'uav_flyby', '--runs', 2, '--duration', 3, '--workers', 1, '--side',
+                                  'windy', 'adu.wind.field.speed=8', '--side', 'calm', '--json', 'r.json')
+    assert (code, errors) == (0, '')
+    assert re.match(r'(calm|windy) \(wind\.field\.speed=\d\) is ', said)
+    cases = {row['case'] for row in json.loads((tmp_path / 'r.json').read_text())['rows']}
+    assert cases == {'calm', 'windy', 'calm against windy'}
+    alone = pedestal('trials', 'uav_flyby', '--runs', 2, '--duration', 3, '--workers', 1, '--side', 'calm')
+    assert alone[0] == 0 and 'against' not in alone[1] and 'the worst trials by pointing_rms_deg:' in alone[1]
+
+
+@pytest.mark.parametrize('columns, shown', [('80', False), ('150', True)])
+def test_a_table_fits_the_terminal_and_says_what_it_leaves_out(pedestal, monkeypatch, columns, shown):
+    monkeypatch.setenv('COLUMNS', columns)
+    _, said, _ = pedestal('trials', 'uav_flyby', '--runs', 2, '--duration', 3, '--workers', 1, '--side', 'calm',
+                          '--side', 'windy', 'adu.wind.field.speed=8')
+    tables = [line for line in said.splitlines() if line.startswith(' ') and 'pedestal run' not in line]
+    assert max(map(len, tables)) <= int(columns) and any('95 % interval' in line for line in tables)
+    assert any(' median ' in line for line in tables) == shown
+    assert ('not shown for want of space: ' in said and 'COLUMNS=150' in said) != shown
+
+
+def test_a_program_track_is_ranked_by_its_own_pointing(pedestal):
+    _, said, _ = pedestal('trials', 'uav_flyby', '--runs', 2, '--duration', 5, '--workers', 1, '--param',
+                          'acu.tracker.handover=false', '--side', 'off', 'scenario.program.azimuth_offset=0.01')
+    assert said.startswith('base (program.azimuth_offset=0.003) is better than off (program.azimuth_offset=0.01) by a '
+                           'factor of 2.')
+    assert 'the worst trials of off by program_pointing_rms_deg:' in said
+
+
 def test_a_side_without_some_trials_is_compared_over_the_common_ones(tmp_path):
     tables = [Table(tmp_path, name, {}, [], ['pointing_rms_deg']) for name in 'ab']
     for table, values in zip(tables, ((0.1, 0.2, 0.3, 0.4), (0.05, 0.1, 0.2, None))):
@@ -96,9 +131,12 @@ def test_a_search_names_the_value_at_which_the_target_is_lost():
         return value if value < 5.5 else math.nan
 
     rig = Rig(law)
-    rig.tracked_percent = 93.1
-    assert re.fullmatch(r'.* trials; at [\d.]+ the target is tracked for 93.1 % of the time only; most trials have no '
+    rig.mean_loss = 3.14
+    assert re.fullmatch(r'.* trials; at [\d.]+ the target is lost for 3.14 s of a run; most trials have no '
                         r'pointing_rms_deg from 6 to 8', rig.run().sentence)
+    rig = Rig(law)
+    rig.mean_loss = 0.0     # a run begins without a lock, which is no loss
+    assert 'lost' not in rig.run().sentence
 
 
 class Rig(solve.Search):
@@ -107,11 +145,11 @@ class Rig(solve.Search):
     def __init__(self, law, low=0.0, high=8.0, limit=2.0, whole=False):
         wanted = solve.Range('adu.wind.field.speed', low, high, whole, 'm/s')
         super().__init__(None, wanted, solve.Goal('pointing_rms_deg', limit), None, None)
-        self.law, self.tracked_percent = law, None
+        self.law, self.mean_loss = law, None
 
     def _try(self, values):
         found = [solve.Tried(value, {'value': self.law(value), 'runs': 3, 'of': 3, 'left_out': {},
-                                     'tracked_percent': self.tracked_percent}, '', math.isfinite(self.law(value)))
+                                     'mean_loss_s': self.mean_loss}, '', math.isfinite(self.law(value)))
                  for value in values]
         self.tried = sorted((*self.tried, *found), key=lambda one: one.value)
         return found

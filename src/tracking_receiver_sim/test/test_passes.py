@@ -22,27 +22,31 @@ def summed(line):
     return line[:68] + str(orbit.compute_checksum(line))
 
 
-def skyfield_passes(station, days):
+def skyfield_passes(station, days, least):
     """[(rise, top, set as UTC datetime, elevation at the top [deg])] of whole passes, with UT1 = UTC as orbit.py."""
     scale = load.timescale(builtin=True)
     scale.delta_t_function = lambda tt: np.full(np.shape(tt), 32.184 + 37.0)
     sky = EarthSatellite(LINE_1, LINE_2, 'ISS', scale)
     place = wgs84.latlon(station.latitude_deg, station.longitude_deg, station.height)
-    times, kinds = sky.find_events(place, sky.epoch, sky.epoch + days, altitude_degrees=0.0)
+    times, kinds = sky.find_events(place, sky.epoch, sky.epoch + days, altitude_degrees=least)
     at = [(kind, time.utc_datetime().replace(tzinfo=None), (sky - place).at(time).altaz()[0].degrees)
           for time, kind in zip(times, kinds)]
     triples = [at[i:i + 3] for i in range(len(at) - 2)]
     return [(a[1], b[1], c[1], b[2]) for a, b, c in triples if (a[0], b[0], c[0]) == (0, 1, 2)]
 
 
-@pytest.mark.parametrize('station', [STATION, StationParameters(latitude_deg=-33.9, longitude_deg=18.4, height=10.0)])
-def test_passes_agree_with_skyfield(station):
+@pytest.mark.parametrize('station, least', [
+    (STATION, 0.0), (STATION, 15.0), (StationParameters(latitude_deg=-33.9, longitude_deg=18.4, height=10.0), 0.0)])
+def test_passes_agree_with_skyfield(station, least):
+    """Rise and set are at the stated elevation."""
     end = EPOCH + datetime.timedelta(days=3.0)
-    ours = [own for own in passes.passes_after(SATELLITE, station, EPOCH, 3.0) if not own.under_way and own.set < end]
-    theirs = [known for known in skyfield_passes(station, 3.0) if known[3] >= passes.MIN_CULMINATION_DEG]
+    ours = [own for own in passes.passes_after(SATELLITE, station, EPOCH, 3.0, least)
+            if not own.under_way and own.set < end]
+    theirs = [known for known in skyfield_passes(station, 3.0, least) if known[3] >= passes.MIN_CULMINATION_DEG]
     assert len(ours) == len(theirs) >= 8
     for own, (rise, top, down, elevation) in zip(ours, theirs):
-        assert abs((own.rise - rise).total_seconds()) < 0.2 and abs((own.set - down).total_seconds()) < 0.2
+        apart = 0.3 if least else 0.2       # the elevation changes more slowly high above the horizon
+        assert max(abs((own.rise - rise).total_seconds()), abs((own.set - down).total_seconds())) < apart
         assert abs((own.top - top).total_seconds()) < 1.0
         assert own.elevation == pytest.approx(elevation, abs=0.01)
 

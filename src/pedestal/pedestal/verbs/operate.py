@@ -1,5 +1,6 @@
 """Verbs for a running antenna: watch it, command it, send it a program track."""
 import argparse
+import dataclasses
 import datetime
 import math
 import pathlib
@@ -237,6 +238,7 @@ def _add_program(parser: argparse.ArgumentParser) -> None:
                         "2026-11-22T12:00:00; `now`; `file`: the start time given in the target's track file or TLE; "
                         "default: start of the running graph")
     arguments.add_param(parser)
+    arguments.add_station(parser)
     arguments.add_namespace(parser)
 
 
@@ -252,10 +254,20 @@ def _start(plan: 'Plan', text: str | None) -> int | None:
     return round(moment.timestamp() * 1e6) * 1000
 
 
+def program_plan(options: argparse.Namespace) -> 'Plan':
+    """Return the Plan of the program track of the options. Raises ValueError."""
+    from pedestal_bringup.scenario.program import Plan
+    variant = arguments.variant(options)
+    if options.station is not None:
+        from pedestal import satellite
+        variant = dataclasses.replace(variant, changes=(*satellite.station_changes(options.station),
+                                                        *variant.changes))
+    return Plan(variant.load())
+
+
 def _program(options: argparse.Namespace) -> int:
     from pedestal_bringup.graph import watch
-    from pedestal_bringup.scenario.program import Plan
-    plan = Plan(arguments.variant(options).load())
+    plan = program_plan(options)
     return watch.send_program(plan, _start(plan, options.start), arguments.ros_arguments(options))
 
 

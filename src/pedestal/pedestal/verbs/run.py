@@ -10,14 +10,12 @@ from collections.abc import Collection
 from pedestal import console, stop
 from pedestal.verbs import arguments
 from pedestal.verbs.arguments import Verb
-from pedestal_common import parameters
 
 if typing.TYPE_CHECKING:
     from pedestal_bringup.graph.start import Outcome
-    from pedestal_bringup.scenario.scenario import Draft, Scenario
+    from pedestal_bringup.scenario.scenario import Scenario
     from pedestal_recording.bag import Bag
 
-START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
 MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a realtime run, outside announced restarts
 
 
@@ -41,9 +39,12 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
     arguments.add_param(parser)
     arguments.add_elements(parser)
     arguments.add_station(parser)
-    parser.add_argument('--pass', dest='which', metavar='WHICH', help='pass to track from rise to set. next: the next '
-                        'pass; N: number N of the list; a UTC such as 2019-12-10T12:35: the first pass at or after '
-                        'it; list: only print the passes; default with --tle: next')
+    parser.add_argument('--pass', dest='which', metavar='WHICH', help='pass to track from rise to set, or about its '
+                        'culmination with a shorter --duration. next: the next pass; N: number N of the list; a UTC '
+                        'such as 2019-12-10T12:35: the pass at this UTC, from there on, or the first after it; list: '
+                        'only print the passes; default with --tle: next')
+    parser.add_argument('--start', metavar='START', help='begin of the run: a UTC, or +S for S seconds after the rise '
+                        'of the pass')
     arguments.add_params_file(parser)
     parser.add_argument('--drives', choices=('adu', 'simulated'), help='simulated: four simulated CiA 402 '
                         'servo drives on a CAN bus of this machine, and drive_node in place of the drive unit; needs '
@@ -102,7 +103,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _results(options: argparse.Namespace, chosen: 'Scenario', outcome: 'Outcome', recording: 'Bag') -> bool:
     """Print verdicts and results of a run and write --json. Return True if the verdict on a beam is a failure."""
-    from pedestal_results import results
+    from pedestal_results import consistency, results
     from pedestal_results.recorded_run import RecordedRun
     beams = [prefix[:-1] for prefix in chosen.prefixes]
     views = [recording.view(beam) for beam in beams]
@@ -116,14 +117,13 @@ def _results(options: argparse.Namespace, chosen: 'Scenario', outcome: 'Outcome'
     for beam, found in zip(beams, verdicts):
         print(f'{beam}: {found.text}' if beam else found.text)
     shown = [*of_beams[0], *whole] if options.all else results.brief([*of_beams, whole])
-    noted = [results.marks(part) for part in parts]
     printed = {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else 'steps')}
     console.show_results(f'{chosen.name}: {chosen.header.title}', beams, [_some(values, shown) for values in of_beams],
-                         _some(printed, shown), noted if options.all else ())
+                         _some(printed, shown), map(results.marks, parts) if options.all else ())
+    for beam, run in zip(beams, runs):
+        for line in consistency.remarks(run.filter) if run.filter is not None else ():
+            print(f'{beam}: {line}' if beam else line)
     if not options.all:
-        for beam, notes, values in zip(beams, noted, of_beams):
-            for line in results.remarks(notes, values):
-                print(f'{beam}: {line}' if beam else line)
         print('--all prints all results, --explain their definitions')
     if options.explain:
         console.explain(results.RESULTS, shown)
@@ -175,58 +175,24 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     equipment = [f'scenario.{name}={value}' for name in ('drives', 'receiver')
                  if (value := getattr(options, name)) is not None]
     changes = equipment + arguments.variant(options).overrides()
-    duration = options.duration
     arguments.check_elements(options)
-    if options.tle is options.station is options.which is None:
-        return scenario.load(options.scenario, changes, options.seed, duration, options.pacing)
+    if options.tle is options.station is options.which is options.start is None:
+        return scenario.load(options.scenario, changes, options.seed, options.duration, options.pacing)
     from pedestal import satellite
-    from pedestal_common.geometry import orbit
     now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
-    started = next((change.partition('=')[2].strip('"\'') for change in reversed(changes)
-                    if change.startswith(START_TIME_PARAMETER + '=')), '')
-    if options.which is not None and started:
-        raise ValueError(f'--pass {options.which}: sets {START_TIME_PARAMETER}, which is also given; leave out one')
-    if options.station is not None:
-        changes = [f'tracking_receiver.{name}={value!r}'
-                   for name, value in satellite.station_values(options.station).items()] + changes
-    if options.tle:
-        by_utc = options.which is not None and not (options.which in ('list', 'next') or options.which.isdecimal())
-        when = (orbit.instant('--pass', options.which) if by_utc else
-                orbit.instant('start_time', started) if started else now)
-        elements, remark = satellite.tle_changes(options.tle, options.satellite, when)
-        changes = elements + changes
-        if remark:
-            print(remark)
+    choice = satellite.Choice(options.tle, options.satellite, options.station, options.which, options.start)
     draft = scenario.draft(options.scenario)
-    if options.which is not None or options.tle and not started:
-        selection = satellite.PassSelection(draft.changed(changes), now)
-        if options.which == 'list':
-            from pedestal_bringup.graph import operator_servers
-            arguments.refuse_given(options, ('bag', 'json', 'all', 'explain', 'duration', 'seed', 'pacing', 'drives',
-                                             'receiver', *operator_servers.SERVERS),
-                                   'has no effect with --pass list, which runs nothing')
-            selection.print_passes()
-            return None
-        start, duration, line = selection.choose('next' if options.which is None else options.which, duration)
+    if options.which == 'list':
+        from pedestal_bringup.graph import operator_servers
+        arguments.refuse_given(options, ('bag', 'json', 'all', 'explain', 'duration', 'start', 'seed', 'pacing',
+                                         'drives', 'receiver', *operator_servers.SERVERS),
+                               'has no effect with --pass list, which runs nothing')
+        satellite.PassSelection(satellite.with_satellite(draft, changes, choice, now).draft, now).print_passes()
+        return None
+    found = satellite.chosen(draft, changes, choice, options.duration, now)
+    for line in found.lines:
         print(line)
-        changes = start + changes
-    if options.tle:
-        changes += _without_prediction_errors(draft, changes)
-    return scenario.checked(draft.changed(changes), options.seed, duration, options.pacing)
-
-
-def _without_prediction_errors(draft: 'Draft', changes: list[str]) -> list[str]:
-    """Return the changes that end the errors of the prediction in a scenario, which are of its own satellite, and
-    print them; an error in `changes` stays."""
-    from pedestal_bringup.scenario.header import PROGRAM_ERRORS
-    given, header = {change.partition('=')[0] for change in changes}, parameters.as_dict(draft.header)
-    found = []
-    for key, unit in PROGRAM_ERRORS.items():
-        if header[key] and f'scenario.{key}' not in given:
-            print(f'scenario.{key} = 0 {unit} in place of {header[key]:g} {unit}, which belongs to the satellite of '
-                  f'{draft.name}')
-            found.append(f'scenario.{key}=0')
-    return found
+    return scenario.checked(found.draft, options.seed, found.duration, options.pacing)
 
 
 VERBS = {'run': Verb(_add_run, _run)}

@@ -32,8 +32,8 @@ def _add_trials(parser: argparse.ArgumentParser) -> None:
     crash. The column `why` of the table holds the verdict on each trial that did not track.
 
     --side NAME NODE.KEY=VALUE ... adds a side to a comparison and may be repeated. A side is a variant of the scenario
-    with parameters of its own. --against and --against-param add one side. Trial i of all sides has the same seed and
-    drawn values. The side with the best result of --by is printed first.
+    with parameters of its own; a side without parameters names the base. --against and --against-param add one side.
+    Trial i of all sides has the same seed and drawn values. The side with the best result of --by is printed first.
 
     --require 'RESULT < LIMIT' prints the share of the trials that meet a criterion, with its 95 % interval. A trial
     without the result does not meet it.
@@ -65,7 +65,7 @@ def _add_trials(parser: argparse.ArgumentParser) -> None:
 def _add_questions(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--side', action='append', nargs='+', default=[], metavar=('NAME', 'NODE.KEY=VALUE'),
                         help='setting to compare with the others (a side): its name, then the parameters that it '
-                        'changes; may be repeated')
+                        'changes, if any; may be repeated')
     parser.add_argument('--against', metavar='SCENARIO', help='scenario to compare with; default: the same scenario')
     parser.add_argument('--against-param', action='append', default=[], metavar='NODE.KEY=VALUE',
                         help='parameter that only the second of two compared settings has, and its value; may be '
@@ -114,10 +114,9 @@ def _compare(options: argparse.Namespace) -> int:
         print(line)
     by = found.ranking.rpartition('/')[2]
     shown = [by, *(result.name for result in results.RESULTS if result.brief and result.name != by)]
-    title = f'{plan.runs} trials of {plan.name}'
-    console.show_trials(f'{title}: {" against ".join(found.names)}' if len(sides) > 1 else title, found.rows,
-                        None if options.all else shown)
-    for line in (*found.sensitivities, f'the worst trials by {found.ranking}:', *found.worst_lines):
+    console.show_trials(f'{plan.runs} trials of {" against ".join(dict.fromkeys(side.plan.name for side in sides))}',
+                        found.rows, None if options.all else shown, found.names if len(sides) > 1 else ())
+    for line in (*found.sensitivities, *found.worst_lines):
         print(line)
     print(f'table {found.table.file}, page {page}' + ('' if options.all else '; --all prints all results'))
     console.write_json(options.json, {'name': plan.name, 'rows': found.rows})
@@ -160,14 +159,16 @@ def _sides(options: argparse.Namespace) -> 'list[Side]':
 
     if options.against or options.against_param:
         add(options.against or options.scenario, options.against_param, '', 'against')
-    for name, *more in options.side:
+    # A side without a change is the base; it comes first, so that it may take the place of the label of the base.
+    for name, *more in sorted(options.side, key=lambda side: len(side) > 1):
         labels = [side.label for side in sides]
         if not re.fullmatch(r'[\w.-]+', name) or name in labels:
             raise ValueError(f'--side {name}: must be a name of letters, digits, -, _ and ., other than '
                              f'{", ".join(filter(None, labels))}')
-        if not more:
-            raise ValueError(f'--side {name}: needs at least one NODE.KEY=VALUE')
-        add(options.scenario, more, name, f'side_{name}')
+        if not more and sides[0].label == BASE_SIDE:
+            sides[0] = dataclasses.replace(sides[0], label=name)
+        else:
+            add(options.scenario, more, name, f'side_{name}')
     return sides
 
 

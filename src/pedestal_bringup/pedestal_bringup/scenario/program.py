@@ -11,11 +11,13 @@ from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_bringup.scenario.sections import AnyParameters
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import SPEED_OF_LIGHT_M_S
-from pedestal_common.quantities import Message, Meters, Nanoseconds, Pairs, Seconds, Times
+from pedestal_common.quantities import Message, Meters, Nanoseconds, Pairs, Radians, Seconds, Times
 from pedestal_common.wire import messages
 from ship_motion_sim import motion
 from tracking_receiver_sim import target, wave_path
 from tracking_receiver_sim.params import TargetParameters
+
+MIN_STATED_S = 2.0  # shortest part of a run without a target to be tracked that is announced [s]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,8 +34,10 @@ class Plan:
         return self.scenario.node_parameters(prefix + 'tracking_receiver').target
 
     def _built(self, prefix: str, parameters: TargetParameters) -> target.Target:
-        mask = self.scenario.node_parameters(prefix + 'tracking_receiver').receiver.horizon_mask
-        return target.build(parameters, self.scenario.header.duration, mask)
+        return target.build(parameters, self.scenario.header.duration, self._mask(prefix))
+
+    def _mask(self, prefix: str) -> Radians:
+        return self.scenario.node_parameters(prefix + 'tracking_receiver').receiver.horizon_mask
 
     def _nominal_target(self, prefix: str) -> target.Target:
         """Return the target of a beam as the operator predicts it: with the time UT1 of the earth's rotation equal to
@@ -91,7 +95,8 @@ class Plan:
                     for prefix in self.scenario.prefixes]
         lines = [*(f'antenna at {station.text}' for station in stations), *self.scenario.notes, *self.ship_summary]
         for prefix, built in self.targets.items():
-            lines += [*built.summary, *_sky(built, self._parameters(prefix).kind, self.scenario.header.duration),
+            lines += [*built.summary, *_sky(built, self._parameters(prefix).kind, self.scenario.header.duration,
+                                            self._mask(prefix)),
                       *_link(built, self.scenario.node_parameters(f'{prefix}tracking_receiver'),
                              self.scenario.header.duration)]
         wind = getattr(self.scenario.node_parameters('adu'), 'wind', None)
@@ -109,15 +114,19 @@ class Plan:
         return round(begin.timestamp() * 1e3) * 1_000_000
 
 
-def _sky(built: target.Target, kind: str, duration: Seconds) -> tuple[str, ...]:
-    """Return lines on a target: its rise and its set or end if they are within the run, and its highest place if it
-    has a date and no summary. (The summary of a recorded flight already states the highest place.)"""
+def _sky(built: target.Target, kind: str, duration: Seconds, mask: Radians) -> tuple[str, ...]:
+    """Return lines on a target: its rise and its set or end if they take more than MIN_STATED_S from the run, and its
+    highest place if it has a date and no summary. (The summary of a recorded flight already states the highest place.)
+    mask: elevation of rise and set."""
     name = 'satellite' if kind == 'leo_pass' else 'target'
     times = np.linspace(0.0, duration, 1 + int(min(1e5, 10.0 * duration)))
     elevation = np.degrees(target.look_angles(built, times)[1])
-    known, up = np.flatnonzero(np.isfinite(elevation)), np.flatnonzero(elevation > 0.0)
+    known, up = np.flatnonzero(np.isfinite(elevation)), np.flatnonzero(elevation > np.degrees(mask))
+    above, below = (f'{word} the horizon mask of {np.degrees(mask):.3g} deg' if mask else ''
+                    for word in (' above', ' below'))
     if not up.size:
-        return ()
+        return (f'the {name} never rises{above}, highest {np.nanmax(elevation):.1f} deg: nothing can be tracked',
+                ) if known.size else ()
     begin = orbit.instant('start', built.start_time) if built.start_time else None
 
     def when(row: int) -> str:
@@ -126,8 +135,10 @@ def _sky(built: target.Target, kind: str, duration: Seconds) -> tuple[str, ...]:
     top = int(np.nanargmax(elevation))
     highest = (f'0 s is {begin:%Y-%m-%d %H:%M:%S} UTC; the {name} is highest in this run, {elevation[top]:.1f} deg, '
                f'{when(top)}',) if begin and not built.summary else ()
-    rises = (f'the {name} rises {when(up[0])}: nothing can be tracked before',) if up[0] > known[0] else ()
-    sets = (f'the {name} sets {when(up[-1])}: nothing can be tracked after',) if up[-1] < known[-1] else ()
+    late, left = times[up[0]] - times[known[0]], times[known[-1]] - times[up[-1]]
+    rises = (f'the {name} rises{above} {when(up[0])}: nothing can be tracked before',) if late > MIN_STATED_S else ()
+    sets = (f'the {name} sets{below} {when(up[-1])}: nothing can be tracked after',
+            ) if left > MIN_STATED_S else ()
     ends = (f'the track of the {name} ends {when(known[-1])}: nothing can be tracked after',
             ) if not sets and known[-1] < times.size - 1 else ()
     return (*highest, *rises, *sets, *ends)

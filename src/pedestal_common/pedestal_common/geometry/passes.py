@@ -1,6 +1,7 @@
-"""Passes of a satellite over a station, by SGP4 every SEARCH_STEP_S seconds. Rise and set are exact to a millisecond,
-and the culmination is the highest instant between them. A shorter pass may be missed, which stays below 1 deg. A pass
-under way at the beginning or at the end of the search is followed to its rise and to its set."""
+"""Passes of a satellite over a station, by SGP4 every SEARCH_STEP_S seconds. A satellite rises and sets at a least
+elevation, such as that of a horizon mask. Rise and set are exact to a millisecond, and the culmination is the highest
+instant between them. A shorter pass may be missed, which stays below 1 deg above the least elevation. A pass under way
+at the beginning or at the end of the search is followed to its rise and to its set."""
 import datetime
 import math
 import typing
@@ -42,7 +43,7 @@ class Pass(typing.NamedTuple):
 
     @property
     def under_way(self) -> bool:
-        """True if the satellite is above the horizon at the beginning of the search."""
+        """True if the satellite is up at the beginning of the search."""
         return self.rise is None or self.rise < self.begin
 
     @property
@@ -52,16 +53,14 @@ class Pass(typing.NamedTuple):
 
 
 def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.datetime,
-                 days: Days = SEARCH_DAYS) -> list[Pass]:
-    """Return the passes that are under way at `begin` (UTC) or rise within `days` after it.
-
-    A pass below MIN_CULMINATION_DEG is left out, except one that is longer than a run. Raises TargetError if the
-    satellite does not rise, or if SGP4 ends.
-    """
+                 days: Days = SEARCH_DAYS, least: Degrees = 0.0) -> list[Pass]:
+    """Return the passes that are under way at `begin` (UTC) or rise within `days` after it. Of those below
+    MIN_CULMINATION_DEG, only one that is longer than a run counts. least: elevation at which the satellite rises and
+    sets. Raises TargetError if the satellite does not rise, or if SGP4 ends."""
     julian, fraction = orbit.julian_date(begin)
 
-    def elevation(t: Seconds | Times) -> Floats:
-        return orbit.elevations(satrec, station, julian, fraction, np.atleast_1d(t))
+    def elevation(t: Seconds | Times) -> Floats:    # above `least`
+        return orbit.elevations(satrec, station, julian, fraction, np.atleast_1d(t)) - least
 
     def azimuth(t: Seconds) -> Degrees:
         [[east, north, _]], _ = orbit.enu(satrec, station, julian, fraction, np.array([t]))
@@ -76,7 +75,8 @@ def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.
     times = np.arange(0.0, SECONDS_PER_DAY * days, SEARCH_STEP_S)
     heights = elevation(times)
     if not (heights > 0.0).any():
-        raise TargetError(f'satellite {satrec.number} does not rise within {days:g} days of '
+        mask = f'above {least:.3g} deg ' if least else ''
+        raise TargetError(f'satellite {satrec.number} does not rise {mask}within {days:g} days of '
                           f'{begin:%Y-%m-%dT%H:%M:%SZ} at latitude {station.latitude_deg:g}, longitude '
                           f'{station.longitude_deg:g} deg')
     if heights[0] > 0.0:
@@ -96,7 +96,7 @@ def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.
             min(times[j] if down is None else down, times[best] + SEARCH_STEP_S)), method='bounded',
             options={'xatol': 1e-3})
         each = Pass(None if rise is None else utc(rise), utc(top.x), None if down is None else utc(down),
-                    math.nan if rise is None else azimuth(rise), float(-top.fun),
+                    math.nan if rise is None else azimuth(rise), float(least - top.fun),
                     math.nan if down is None else azimuth(down), begin)
         if each.elevation >= MIN_CULMINATION_DEG or each.duration > MAX_RUN_S:
             found.append(each)
@@ -104,8 +104,8 @@ def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.
 
 
 def _until_below(elevation: Callable[[Times], Floats], start: Seconds, step: Seconds) -> tuple[Times, Floats]:
-    """Return (times, elevations [deg]) from `start` up to the first below the horizon, at most MAX_PASS_DAYS away, or
-    where SGP4 fails. A negative step goes back in time."""
+    """Return (times, elevations [deg]) from `start` up to the first elevation that is not above 0, at most
+    MAX_PASS_DAYS away, or where SGP4 fails. A negative step goes back in time."""
     times, heights = np.zeros(0), np.zeros(0)
     while len(times) * abs(step) < MAX_PASS_DAYS * SECONDS_PER_DAY:
         chunk = start + step * np.arange(len(times) + 1, len(times) + 1 + PASS_CHUNK_STEPS, dtype=np.float64)
@@ -131,8 +131,9 @@ def search_start(satrec: Satellite, now: datetime.datetime) -> tuple[datetime.da
                    f'{"old" if age > 0.0 else "ahead"}; SGP4 holds for {orbit.MAX_TLE_AGE_DAYS:g}')
 
 
-def chosen_pass(satrec: Satellite, station: StationParameters, which: str, now: datetime.datetime) -> Pass:
-    """Return the pass that `which` names. Raises TargetError.
+def chosen_pass(satrec: Satellite, station: StationParameters, which: str, now: datetime.datetime,
+                least: Degrees = 0.0) -> Pass:
+    """Return the pass that `which` names; least: as of passes_after. Raises TargetError.
 
     next    the pass under way, or the next pass
     N       a number: the Nth pass after `search_start`
@@ -144,7 +145,7 @@ def chosen_pass(satrec: Satellite, station: StationParameters, which: str, now: 
             raise TargetError(f'--pass next: {old}. Take a new {satrec.form}, or name a pass of that time by its '
                               'number or its UTC (--pass list)')
         number = 1 if which == 'next' else int(which)
-        found = passes_after(satrec, station, begin)
+        found = passes_after(satrec, station, begin, least=least)
         if not 1 <= number <= len(found):
             raise TargetError(f'--pass {which}: there are {len(found)} passes above {MIN_CULMINATION_DEG:g} deg '
                               f'within {SEARCH_DAYS:g} days of {begin:%Y-%m-%dT%H:%M:%SZ}')
@@ -158,7 +159,7 @@ def chosen_pass(satrec: Satellite, station: StationParameters, which: str, now: 
     if abs(age) > orbit.MAX_TLE_AGE_DAYS:
         raise TargetError(f'--pass {which}: {age:.1f} days from the {satrec.form} epoch '
                           f'{epoch:%Y-%m-%dT%H:%M:%SZ}, must be within {orbit.MAX_TLE_AGE_DAYS:g}')
-    found = passes_after(satrec, station, when)
+    found = passes_after(satrec, station, when, least=least)
     if not found:
         raise TargetError(f'--pass {which}: no pass above {MIN_CULMINATION_DEG:g} deg within {SEARCH_DAYS:g} days of '
                           'it')

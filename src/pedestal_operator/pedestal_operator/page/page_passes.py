@@ -1,13 +1,14 @@
 """Search for the next passes of the satellite that the antenna follows, in a thread of its own: the page does not
 wait."""
 import datetime
+import math
 from concurrent import futures
 from typing import NamedTuple
 
 from pedestal_common.geometry import orbit, passes
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.graph.steps import SECONDS_PER_DAY
-from pedestal_common.quantities import Seconds
+from pedestal_common.quantities import Degrees, Seconds
 from pedestal_operator.page import page_state
 
 MAX_PASSES = 4  # largest number of passes shown
@@ -23,6 +24,7 @@ class PassQuery(NamedTuple):
     station: StationParameters
     ahead: Seconds      # UTC for which the satellite is computed, minus the time of the graph; 0 except in a
                         # simulation of another day
+    least: Degrees      # elevation of rise and set: the horizon mask of a simulated receiver, else 0
     day: int            # number of the interval of SEARCH_VALIDITY_DAYS since 1970
 
 
@@ -43,7 +45,8 @@ def pass_query(antenna: page_state.PageAntenna) -> PassQuery | None:
     ahead = _seconds(orbit.instant('start_time', start)) - page_state.epoch(antenna) if start else 0.0
     utc = antenna.now + ahead
     line_1, line_2, omm = lines
-    return PassQuery(line_1, line_2, omm, station, ahead,
+    least = round(math.degrees(p.get('receiver.horizon_mask', 0.0)), 6)
+    return PassQuery(line_1, line_2, omm, station, ahead, least,
                      int(utc / SECONDS_PER_DAY / SEARCH_VALIDITY_DAYS)) if utc > MIN_UTC_S else None
 
 
@@ -54,7 +57,8 @@ def upcoming_passes(query: PassQuery) -> list[dict[str, float]]:
     try:
         satellite = orbit.satellite(query)
         _, too_old = passes.search_start(satellite, begin)
-        known = [] if too_old else passes.passes_after(satellite, query.station, begin, SEARCH_SPAN_DAYS)
+        known = [] if too_old else passes.passes_after(satellite, query.station, begin, SEARCH_SPAN_DAYS,
+                                                           query.least)
     except orbit.TargetError:
         known = []
     return [{'aos': _seconds(each.rise) - query.ahead, 'los': _seconds(each.set) - query.ahead,

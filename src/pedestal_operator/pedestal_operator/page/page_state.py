@@ -24,7 +24,8 @@ SHOWN_PARAMETERS = {'acu': ('graph.start', 'tracker.receiver.beamwidth', 'blocka
                             *(f'prediction.station.{name}' for name in STATION_NAMES),
                             *(f'{axis}.limits.{end}' for axis in topics.AXES for end in ('low', 'high')),
                             *(f'{axis}.stow' for axis in topics.AXES)),
-                    'tracking_receiver': ('receiver.acquire_level_dbhz', 'receiver.lose_level_dbhz', 'target.kind',
+                    'tracking_receiver': ('target.kind', *(f'receiver.{name}' for name in (
+                                              'acquire_level_dbhz', 'lose_level_dbhz', 'horizon_mask')),
                                           *(f'target.leo_pass.{name}' for name in ELEMENT_PARAMETERS))}
 
 CHART_SPAN_S, CHART_PERIOD_S = 600.0, 0.5  # time span of the strip charts, and time between two points [s]

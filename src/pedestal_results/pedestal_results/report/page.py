@@ -155,7 +155,8 @@ def _results(bag: bags.Bag, run: RecordedRun, check: Report) -> list[str]:
                      f'{tracking.HANDOVER_SETTLING_S:g} s after the first hand-over. "Both axes" pools the samples of '
                      'both axes.</p>')
         rows = _labelled(known, 'pointing_loss_mean_db', 'pointing_loss_max_db', 'single_sample_noise_deg',
-                         'lock_time_s', 'autotrack_time_s', 'evaluated_time_s', 'loss_s')
+                         'lock_time_s', 'autotrack_time_s', 'trackable_time_s', 'tracked_percent',
+                         'evaluated_time_s', 'loss_s')
     return [*parts, TextTable(('', ''), rows + _loop(bag, run, check)).html('n')]
 
 

@@ -157,7 +157,7 @@ class TruthComparison:
 COMPARISON_RESULTS = (
     Result('autotrack_from_s', 's', 'acu', lambda acu: acu.autotrack[0] if acu.autotrack.size else math.nan,
            'Time of the first step in autotrack.'),
-    Result('tracked_percent', '%', 'acu',
+    Result('autotrack_percent', '%', 'acu',
            lambda acu: 100.0 * acu.autotrack.size / acu.known if acu.known else math.nan,
            'Share of the steps in autotrack.'),
     Result('recorded_pointing_rms_deg', 'deg', 'truth', lambda acu: known_rms(acu.true) * DEG_PER_RAD,

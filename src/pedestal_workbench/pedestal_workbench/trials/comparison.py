@@ -6,15 +6,18 @@ difference  mean of a - b, with a 95 % interval by Student's t
 gain        improvement of the mean of a over the mean of b [%], 100 (1 - mean a / mean b), or, if larger values are
             better, 100 (mean a / mean b - 1), with a 95 % interval by the jackknife (Efron and Stein, Annals of
             Statistics 9 (1981) 586)
+ratio       mean of a over mean of b, with a 95 % interval by the jackknife of its logarithm
 wins        share of the pairs in which A is better [%], with a 95 % interval by Clopper and Pearson. Equal values are
             no win.
 """
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from pedestal_bringup.scenario.scenario import Scenario
+from pedestal_common.graph import topics
 from pedestal_common.quantities import Estimate, Floats, Row
 from pedestal_results.intervals import estimated, interval
 from pedestal_workbench.trials import plan as trial_plans
@@ -49,17 +52,34 @@ class Sides(NamedTuple):
         return both[0][known], both[1][known]
 
 
+MIN_FACTOR = 2.0  # smallest ratio of two means that a sentence states as a factor, not in percent [-]
+
+
 def names(*plans: Plan) -> tuple[str, ...]:
-    """Return a name for each of several plans: its scenario, if the scenarios differ, and the parameters of --param
-    that differ between the plans; without a difference the scenario."""
+    """Return a short name for each of several plans: its scenario, if the scenarios differ, and the parameters of
+    --param that differ between the plans; without a difference the scenario. A parameter has the name of its node only
+    if two of them are equal without, and that of its axis only if the axes differ."""
     first_scenarios = [plan.scenario(0) for plan in plans]
     keys = dict.fromkeys(change.partition('=')[0] for plan in plans for change in plan.overrides
                          if change.partition('=')[0] not in plan.varied)
     given = {key: [_value(chosen, key) for chosen in first_scenarios] for key in keys}
     different = {key: values for key, values in given.items() if len(set(values)) > 1}
     several = len({plan.name for plan in plans}) > 1
-    return tuple(' '.join([plan.name] * several + [f'{key}={values[i]}' for key, values in different.items()
+    shown = _short(different)
+    return tuple(' '.join([plan.name] * several + [f'{key}={values[i]}' for key, values in shown.items()
                                                    if values[i]]) or plan.name for i, plan in enumerate(plans))
+
+
+def _short(given: Mapping[str, Sequence[str]]) -> dict[str, Sequence[str]]:
+    """Return {name: values} of {node.key: values} with short names, see `names`."""
+    merged: dict[str, Sequence[str]] = {}
+    for key, values in given.items():
+        node, _, rest = key.partition('.')
+        axis, _, of_axis = rest.partition('.')
+        both = axis in topics.AXES and all(given.get(f'{node}.{other}.{of_axis}') == values for other in topics.AXES)
+        merged[f'{node}.{of_axis}' if both else key] = values
+    plain = [key.partition('.')[2] for key in merged]
+    return {rest if plain.count(rest) == 1 else key: values for rest, (key, values) in zip(plain, merged.items())}
 
 
 def unchanged(first: Plan, second: Plan) -> str:
@@ -107,6 +127,18 @@ def gain(a: Floats, b: Floats, larger: bool) -> Estimate:
     return whole, low, high
 
 
+def ratio(a: Floats, b: Floats) -> Estimate:
+    """Return the mean of a (n,) over that of b (n,), both above 0 without any one pair, with its 95 % interval."""
+    n, whole = len(a), math.log(a.sum() / b.sum())
+    _, low, high = interval(n * whole - (n - 1) * np.log((a.sum() - a) / (b.sum() - b)))
+    return math.exp(whole), math.exp(low), math.exp(high)
+
+
+def has_ratio(result: str, a: Floats, b: Floats) -> bool:
+    """Return True if there is a ratio of the means of a result: has_gain, and neither side is 0 but for one pair."""
+    return has_gain(result, a, b) and bool(np.sum(a > 0.0) > 1)
+
+
 def wins(a: Floats, b: Floats, larger: bool) -> Estimate:
     """Return the share [%] of the pairs in which a (n,) is better than b (n,), with its 95 % interval."""
     return statistics.rate(int(np.sum(a > b if larger else a < b)), len(a))
@@ -131,6 +163,8 @@ def rows(sides: Sides) -> list[Row]:
         found.append(estimated(case, f'{metric}/difference', interval(a - b), statistics.unit(name), len(a)))
         if has_gain(name, a, b):
             found.append(estimated(case, f'{metric}/gain', gain(a, b, larger), '%', len(a)))
+        if has_ratio(name, a, b):
+            found.append(estimated(case, f'{metric}/ratio', ratio(a, b), '', len(a)))
         found.append(estimated(case, f'{metric}/wins', wins(a, b, larger), '%', len(a)))
     return found
 
@@ -142,17 +176,25 @@ def sentence(sides: Sides, by: str) -> str:
     a, b = sides.pairs(by)
     total = len(sides.a.column(by))
     count = f'{len(a)} pairs' if len(a) == total else f'{len(a)} of {total} pairs'
+    if not any(np.isfinite(side.column(by)).any() for side in (sides.a, sides.b)):
+        return f'{sides.case}: no trial of either side has {by}; choose a result that they have with --by.'
     if np.array_equal(sides.a.column(by), sides.b.column(by), equal_nan=True):
         return f'Both sides have identical values of {by}: nothing that was changed has an effect on it.'
     if len(a) < 2:
         return f'{sides.case}: {by} was measured in {count}, which are too few for a comparison.'
     larger = statistics.larger_is_better(by)
-    if has_gain(by, a, b):
+    share, least, most = wins(a, b, larger)
+    what, wins_in = f'({by}, {count}, 95 % interval)', f'{share:.0f} % ({least:.0f} to {most:.0f} %) of the pairs'
+    if has_ratio(by, a, b):
+        factor, fewest, highest = ratio(a, b) if larger else ratio(b, a)
+        if factor > MIN_FACTOR and fewest > 1.0:
+            return (f'{sides.name_a} is better than {sides.name_b} by a factor of {factor:.3g} ({fewest:.3g} to '
+                    f'{highest:.3g}) {what}, and wins in {wins_in}.')
+    if has_gain(by, a, b) and a.sum() > 0.0:
         (value, low, high), unit = gain(a, b, larger), '%'
     else:
         (value, low, high), unit = interval(a - b if larger else b - a), statistics.unit(by)
-    half, (share, least, most) = 0.5 * (high - low), wins(a, b, larger)
-    what, wins_in = f'({by}, {count}, 95 % interval)', f'{share:.0f} % ({least:.0f} to {most:.0f} %) of the pairs'
+    half = 0.5 * (high - low)
     if low <= 0.0 <= high:
         return (f'{sides.name_a} is neither better nor worse than {sides.name_b}: by {value:.2g} +- {half:.2g} {unit} '
                 f'{what}; it wins in {wins_in}.')

@@ -17,12 +17,13 @@ from pedestal_workbench.trials.plan import Plan
 from pedestal_workbench.trials.statistics import Question
 from pedestal_workbench.trials.table import Table
 
-WORST_TRIAL_COUNT = 10  # number of the worst trials whose commands are stated
+WORST_TRIAL_COUNT, MIN_WORST_TRIAL_COUNT = 10, 3
+"""Number of the worst trials of all sides whose commands are stated, and smallest number of a side."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Side:
-    """A side of an experiment; the first side is that of the worst trials."""
+    """A side of an experiment; the page draws the worst trials of the first side."""
     plan: Plan
     label: str = ''         # by the user; '': the parameters in which the sides differ name the side
     table: str = 'trials'   # name of its table
@@ -83,34 +84,35 @@ class Found:
         """Name of each side: its label, else its difference."""
         return [side.label or text for side, text in zip(self.sides, self._differences)]
 
-    @property
-    def full_names(self) -> list[str]:
-        """Label and difference of each side."""
-        return [f'{side.label} ({text})' if side.label else text
-                for side, text in zip(self.sides, self._differences)]
-
     @functools.cached_property
     def ranking(self) -> str:
         """Column of the result that ranks the trials and the sides."""
-        return statistics.ranked_by(self.table, self.by)
+        return statistics.ranked_by(self.tables, self.by)
 
     @functools.cached_property
     def order(self) -> list[int]:
         """Numbers of the sides, the best side first."""
         return comparison.ranked(self.tables, self.ranking) if len(self.sides) > 1 else [0]
 
-    def _pair(self, first: int, second: int, names: Sequence[str]) -> Sides:
-        return Sides(names[first], names[second], self.tables[first], self.tables[second])
+    def _pair(self, first: int, second: int) -> Sides:
+        return Sides(self.names[first], self.names[second], self.tables[first], self.tables[second])
+
+    def _described_pair(self, first: int, second: int) -> Sides:
+        """Return two sides, whose names have the parameters in which these two differ behind their labels."""
+        sides = self.sides[first], self.sides[second]
+        name_a, name_b = (f'{side.label} ({text})' if side.label else text
+                          for side, text in zip(sides, comparison.names(*(side.plan for side in sides))))
+        return Sides(name_a, name_b, self.tables[first], self.tables[second])
 
     @property
     def best_two(self) -> Sides | None:
         """The two best sides; None for a single side."""
-        return self._pair(self.order[0], self.order[1], self.full_names) if len(self.sides) > 1 else None
+        return self._described_pair(*self.order[:2]) if len(self.sides) > 1 else None
 
     @functools.cached_property
     def rows(self) -> list[Row]:
         """Rows of --json."""
-        pairs = [self._pair(0, other, self.names) for other in range(1, len(self.sides))]
+        pairs = [self._pair(0, other) for other in range(1, len(self.sides))]
         found = [row for pair in pairs for row in comparison.rows(pair)]
         for place in self.order:
             found += statistics.of_all(self.names[place], self.tables[place], self.required)
@@ -122,7 +124,7 @@ class Found:
         best, *others = self.order
         plans = [side.plan for side in self.sides]
         return [*(comparison.unchanged(plans[best], plans[other])
-                  or comparison.sentence(self._pair(best, other, self.full_names), self.ranking) for other in others),
+                  or comparison.sentence(self._described_pair(best, other), self.ranking) for other in others),
                 *(_met(required, row) for required in self.required for row in self.rows
                   if row['metric'] == f'{required.name}/rate')]
 
@@ -146,22 +148,26 @@ class Found:
                 for row in sorted(found, key=lambda row: -abs(row['value'] or 0.0)**powers[
                     row['metric'].partition('(')[0]])]
 
-    @functools.cached_property
-    def places(self) -> list[int]:
-        """Numbers of the trials of the first side, the worst trial first."""
-        return statistics.ranking(self.ranking, self.table.column(self.ranking)).tolist()
+    def places(self, side: int = 0) -> list[int]:
+        """Return the numbers of the trials of a side, the worst trial first."""
+        return statistics.ranking(self.ranking, self.tables[side].column(self.ranking)).tolist()
 
-    @property
-    def worst(self) -> list[int]:
-        """Numbers of the worst trials of the first side."""
-        return self.places[:WORST_TRIAL_COUNT]
+    def worst(self, side: int = 0) -> list[int]:
+        """Return the numbers of the worst trials of a side."""
+        return self.places(side)[:max(WORST_TRIAL_COUNT // len(self.sides), MIN_WORST_TRIAL_COUNT)]
 
     @property
     def worst_lines(self) -> list[str]:
-        """A line for each of the worst trials: its result, its command and the verdict on it."""
-        values, whys = self.table.column(self.ranking), self.table.text(statistics.why_column(self.ranking))
-        return [f'{intervals.number(values[i] if math.isfinite(values[i]) else None):>10}  {self.plan.command(i)}'
-                + (f'  # {whys[i]}' if whys[i] else '') for i in self.worst]
+        """For each side a title and a line for each of its worst trials: result, command and verdict on it."""
+        lines = []
+        for side in self.order:
+            table, plan = self.tables[side], self.sides[side].plan
+            values, whys = table.column(self.ranking), table.text(statistics.why_column(self.ranking))
+            of_side = f' of {self.names[side]}' if len(self.sides) > 1 else ''
+            lines.append(f'the worst trials{of_side} by {self.ranking}:')
+            lines += [f'{intervals.number(values[i] if math.isfinite(values[i]) else None):>10}  {plan.command(i)}'
+                      + (f'  # {whys[i]}' if whys[i] else '') for i in self.worst(side)]
+        return lines
 
 
 def _met(required: Question, row: Row) -> str:

@@ -37,8 +37,9 @@ BRACKET_TOLERANCE = 0.01
 MAX_LINEAR_RATIO = 20.0
 """Largest ratio of the ends of a positive range whose values have equal differences; a wider range has equal ratios
 [-]."""
-TRACKED_RESULT, MIN_TRACKED_PERCENT = 'tracked_percent', 99.0
-"""Result that states the share of a run in autotrack; share below which the found value gets a warning [%]."""
+LOSS_RESULT, MAX_LOSS_S = 'loss_s', 0.1
+"""Result that states for how long the target was lost after the lock, and mean above which the found value gets a
+warning [s]."""
 MIN_MEASURED_SHARE = 0.5
 """Smallest share of the trials at a value that must have the result, so that the mean at this value counts [-]."""
 
@@ -60,7 +61,7 @@ class Range(NamedTuple):
 
 class Tried(NamedTuple):
     """Trials at one value of the parameter. The row is that of the mean (intervals.estimated), with the field
-    `tracked_percent`: mean share of the run in autotrack [%], None where it is not measured."""
+    `mean_loss_s`: mean time for which the target was lost [s], None where it is not measured."""
     value: float
     row: Row | None     # None if the scenario refused the value
     why: str            # text of the refusal, or ''
@@ -156,7 +157,7 @@ class Search:
         estimate = intervals.interval(values[known]) if known.any() else (math.nan,) * 3
         row: Row = {**intervals.estimated(f'{self._wanted.key}={value:.6g}', f'{nodes.plain(name)}/mean', estimate,
                                           statistics.unit(name), int(known.sum())),
-                    **statistics.coverage_fields(table, name, known), 'tracked_percent': _tracked(table, name)}
+                    **statistics.coverage_fields(table, name, known), 'mean_loss_s': _mean_loss(table, name)}
         return Tried(value, row, '', bool(known.mean() >= MIN_MEASURED_SHARE))
 
     def run(self) -> Solution:
@@ -246,17 +247,15 @@ class Search:
 
 
 def _losses(low: Tried, high: Tried) -> str:
-    """Return a warning if the trials at one of two values have lost the target for a part of the time, else ''."""
-    known = [(one.row['tracked_percent'], one.value) for one in (low, high) if one.row]
-    share, value = min(((share, value) for share, value in known if share is not None), default=(math.inf, math.nan))
-    return f'; at {value:.4g} the target is tracked for {share:.3g} % of the time only' if (
-        share < MIN_TRACKED_PERCENT) else ''
+    """Return a warning if the trials at one of two values have lost the target after the lock, else ''."""
+    known = [(one.row['mean_loss_s'], one.value) for one in (low, high) if one.row]
+    lost, value = max(((lost, value) for lost, value in known if lost is not None), default=(0.0, math.nan))
+    return f'; at {value:.4g} the target is lost for {lost:.3g} s of a run' if lost > MAX_LOSS_S else ''
 
 
-def _tracked(table: Table, name: str) -> float | None:
-    """Return the mean of tracked_percent [%] for the beam of the result `name`; None if the trials do not measure it.
-    """
-    column = f'{nodes.beam_of(name)}/{TRACKED_RESULT}'.lstrip('/')
+def _mean_loss(table: Table, name: str) -> float | None:
+    """Return the mean of loss_s for the beam of the result `name`; None if the trials do not measure it."""
+    column = f'{nodes.beam_of(name)}/{LOSS_RESULT}'.lstrip('/')
     values = table.column(column) if column in table.results else np.full(1, math.nan)
     return float(np.nanmean(values)) if np.isfinite(values).any() else None
 

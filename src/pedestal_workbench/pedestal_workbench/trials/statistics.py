@@ -15,7 +15,7 @@ sensitivity  Dependence of a result on a varied parameter. For a parameter with 
 import collections
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from scipy import optimize, stats
 from pedestal_common.graph import nodes
 from pedestal_common.parameters import did_you_mean
 from pedestal_common.quantities import Bools, Coverage, Estimate, Floats, Ints, Row
-from pedestal_results import intervals, results, verdict
+from pedestal_results import intervals, mode_pointing, results, verdict
 from pedestal_results.intervals import Target
 from pedestal_workbench.trials.table import Table
 
@@ -266,15 +266,22 @@ def ranking(name: str, values: Floats) -> Ints:
     return np.argsort(-np.where(np.isfinite(badness), badness, math.inf), kind='stable')
 
 
-def ranked_by(table: Table, result: str | None = None) -> str:
-    """Return the column of the result that ranks the trials: that of `result`, even if all its values are NaN. With
-    None it is the rms pointing error, or, if no trial has measured that, the rms following error in azimuth. Raises
-    ValueError if no trial has the result."""
-    for name in (result,) if result else ('pointing_rms_deg', 'azimuth_following_rms_deg'):
-        for column in table.measured_results:
-            if name in (column, nodes.plain(column)) and (result or np.isfinite(table.column(column)).any()):
+DEFAULT_RANKING = ('pointing_rms_deg', *(f'{mode}_pointing_rms_deg' for mode in mode_pointing.FOLLOWED_DIRECTIONS),
+                   'azimuth_following_rms_deg')
+"""Results that rank the trials without --by: the first one that every side has, else the first one of any side."""
+
+
+def ranked_by(tables: Sequence[Table], result: str | None = None) -> str:
+    """Return the column of the result that ranks the trials of several sides: that of `result`, even if all its values
+    are NaN, or None for one of DEFAULT_RANKING. Raises ValueError if no trial has the result."""
+    known = list(dict.fromkeys(column for table in tables for column in table.measured_results))
+    shares = [(column, sum(bool(np.isfinite(table.column(column)).any()) for table in tables))
+              for name in ((result,) if result else DEFAULT_RANKING) for column in known
+              if name in (column, nodes.plain(column))]
+    for least in (len(tables), 1, 0 if result else 1):
+        for column, sides in shares:
+            if sides >= least:
                 return column
-    known = table.measured_results
     if not result:
         raise ValueError('no trial ever tracked its target or followed a command: try a longer --duration, or choose '
                          f'a result with --by: {", ".join(known)}')

@@ -68,7 +68,7 @@ def scatter(found: Found) -> Figure:
     values = found.table.column(found.ranking)
     for axes, (name, given) in zip(panels.flat, varied):
         axes.plot(given, values, '.', color=RAW_COLOUR, markersize=3)
-        axes.plot(given[found.worst], values[found.worst], 'o', color=TRUTH_COLOUR, markersize=4)
+        axes.plot(given[found.worst()], values[found.worst()], 'o', color=TRUTH_COLOUR, markersize=4)
         axes.margins(0.03)
         if categories := found.table.categories(name):
             axes.set_xticks(range(len(categories)), categories)
@@ -83,10 +83,11 @@ def worst_and_median(found: Found) -> Figure:
     """Return the figure with the pointing errors of the worst and of the median trial; without a pointing error, the
     following errors. Both trials run again, because the table does not hold their signals."""
     # Trials without the result rank as the worst, so the median is that of the trials that have the result.
-    known = [i for i in found.places if math.isfinite(found.table.column(found.ranking)[i])] or found.places
+    places = found.places()
+    known = [i for i in places if math.isfinite(found.table.column(found.ranking)[i])] or places
     beam = nodes.beam_of(found.ranking)
     runs = [(f'{name}: trial {i}', tracking.read(memory_recording.record(found.plan.scenario(i), beam)))
-            for name, i in (('worst', found.places[0]), ('median', known[len(known) // 2]))]
+            for name, i in (('worst', places[0]), ('median', known[len(known) // 2]))]
     pointing = any(run.tracking.any() for _, run in runs)
     figure, panels = new_panels(2, 2, y='pointing error [deg]' if pointing else 'following error [deg]', sharex=True,
                                 sharey='row')
@@ -151,8 +152,9 @@ def page(found: Found, command: str) -> str:
     """Return the page as text; command: command line that makes it."""
     by, plan = found.ranking, found.plan
     title = f'{plan.runs} trials: {plan.name}'
-    values = found.table.column(by)
-    worst = [[f'trial {i}', elements.number(values[i], statistics.unit(by)), plan.command(i)] for i in found.worst]
+    worst = [[f'{found.names[side]}: ' * (len(found.sides) > 1) + f'trial {i}',
+              elements.number(found.tables[side].column(by)[i], statistics.unit(by)),
+              found.sides[side].plan.command(i)] for side in found.order for i in found.worst(side)]
     head = ['case', 'metric', 'value', '95 % interval', 'trials']
     parts = [f'<h1>{html.escape(title)}</h1>', TextTable(('', ''), [['made by', command]]).html('meta')]
     parts += [f'<p><b>{html.escape(line)}</b></p>' for line in found.sentences]
