@@ -175,6 +175,30 @@ def test_one_client_is_in_control_and_the_others_are_told_so(antenna):
         assert granted(second, 'P 12 40')
 
 
+def test_a_program_takes_no_pass_before_an_operator_has_allowed_it(antenna):
+    _, client, port = antenna
+    if 'acu/command_result' not in client.heard:
+        client.read('acu/command_result')
+
+    def hand(verb):
+        client.publish('acu/command', commands.message(commands.Command(verb, 'hand', f'{verb} {time.monotonic()}')))
+        client.spin(0.5)
+
+    def in_pass():
+        hand('program')
+        return client.heard['acu/mode'][-1].data in ('program', 'autotrack')
+    with connected(port) as gpredict:
+        client.until(in_pass, 60.0)
+        mode = client.heard['acu/mode'][-1].data
+        for _ in range(3):
+            assert ask(gpredict, 'P 12 40') == b'RPRT -9\n'
+        assert client.heard['acu/mode'][-1].data == mode and ask(gpredict, 'K') == b'RPRT -9\n'
+        hand('allow')
+        client.until(lambda: ask(gpredict, 'P 12 40') == b'RPRT 0\n', 60.0)
+        client.until(lambda: client.heard['acu/mode'][-1].data == 'preset', 60.0)
+        assert ask(gpredict, 'S') == b'RPRT 0\n'
+
+
 @pytest.fixture(params=('rotctld', 'easycomm'))
 def server(request, antenna, start_process):
     """(name of a server, its port, its number as a model of rotctl)."""

@@ -45,7 +45,7 @@ def test_refusals_of_the_control_unit_are_distinguished():
         outcomes_of['refused'] = control.do('a', 'program', 0.0).look(remote, 0.0)
         return 1000
     loop.run(watch=watch)
-    assert outcomes_of == {'other': pointing.OUTCOME_DONE, 'busy': pointing.OUTCOME_BUSY,
+    assert outcomes_of == {'other': pointing.OUTCOME_DONE, 'busy': pointing.OUTCOME_REFUSED,
                            'limits': pointing.OUTCOME_OUT_OF_REACH, 'range': pointing.OUTCOME_OUT_OF_REACH,
                            'refused': pointing.OUTCOME_REFUSED}
 

@@ -1,6 +1,6 @@
 """Rotators that count, answer and move differently: the protocol, the line and the law with each simulated device.
 
-The time of these tests is a number, and the device answers at once. test/test_rotator.py has nodes, clock and terminal.
+The time of these tests is a number, and the device answers at once. test/test_rotator.py has nodes and terminals.
 """
 import functools
 
@@ -97,7 +97,8 @@ READ = [
     ('gs232', {'azimuth': 400.0, 'high': 450.0}, WIDE, (440.0, 45.0)), ('gs232', {'line_end': 'cr'}, {}, (3.0, 45.0)),
     ('gs232', {'echo': True, 'prompt': True, 'line_end': 'lfcr'}, {}, (30.0, 45.0)),
     ('easycomm', {'decimal_comma': True}, {}, (30.1, 45.0)), ('easycomm', {'echo': True}, {}, (30.1, 45.0)),
-    ('easycomm', {'signs': True, 'elevation': -5.0}, {}, (30.1, 45.0)), ('easycomm', {'two_lines': True}, {}, (3.1, 45)),
+    ('easycomm', {'signs': True, 'elevation': -5.0}, {}, (30.1, 45.0)),
+    ('easycomm', {'two_lines': True}, {}, (3.1, 45)),
     ('easycomm', {'elevation': -5.0}, {'elevation.low': -10.0}, (30.1, -7.0)),
     ('easycomm', {'decimals': 3, 'line_end': 'lf'}, {}, (30.1, 170.0)),
     ('easycomm', {'azimuth': -170.0}, {'azimuth.low': -180.0, 'azimuth.high': 180.0}, (170.0, 20.0)),

@@ -68,7 +68,8 @@ def test_answers_arrive_whole_or_byte_by_byte(name, sent, expected):
 @pytest.mark.parametrize('name, sent', [
     ('rotctld', b'nan\n10.0\n'), ('rotctld', b'1e9\n10.0\n'), ('rotctld', b'hello\nworld\n'),
     ('gs232', b'AZ=1  EL=006\r\n'), ('gs232', b'AZ=12  EL=006\r\n'), ('gs232', b'AZ=012\r\n'),
-    ('easycomm', b'10 20\n'), ('rot2prog', b'W' + bytes(10) + b' '), ('easycomm', b'AZ1.2.3 EL4\n'), ('easycomm', b'ALlow battery\n'),
+    ('easycomm', b'10 20\n'), ('rot2prog', b'W' + bytes(10) + b' '), ('easycomm', b'AZ1.2.3 EL4\n'),
+    ('easycomm', b'ALlow battery\n'),
     ('rot2prog', b'W' + bytes(9) + b'\x0a!'), ('gs232', bytes(600)), ('rotctld', b'9' * 600),
 ])
 def test_bytes_that_are_no_answer_are_refused_and_the_next_answer_counts(name, sent):
