@@ -75,7 +75,7 @@ ACU_COMMANDS = (
     CommandDefinition('release', 'release control'),
     CommandDefinition('allow', 'allow a program, such as a client of rotctld, to take control in a pass and from '
                       'another client; a mode by another client ends this', (
-        Argument('client', 'program, without its TCP port; default: the one that asked last', default=''),)),
+        Argument('client', 'program, without its TCP port; default: the last that requested it', default=''),)),
     *_ALARM_COMMANDS,
 )
 

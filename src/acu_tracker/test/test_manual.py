@@ -157,8 +157,8 @@ def test_a_program_takes_the_antenna_from_a_pass_only_if_an_operator_has_allowed
     def take(who=program):
         return ask(Command('take', who, '', {'role': 'program'}))
 
-    def asks():
-        return dict(axes.unit.diagnose().values)['asks']
+    def requester():
+        return dict(axes.unit.diagnose().values)['requester']
     assert take().granted and ask(Command('preset', program)).granted and ask(Command('release', program)).granted
     assert ask(Command('sun', 'anna')).granted
     axes.run(0.1)
@@ -168,8 +168,8 @@ def test_a_program_takes_the_antenna_from_a_pass_only_if_an_operator_has_allowed
     assert not ask(Command('preset', again)).granted and not ask(Command('preset', program)).granted
     assert ask(Command('stop', program)).granted and ask(Command('sun', 'anna')).granted
     axes.run(0.1)
-    assert not take().granted and asks() == 'rotctld 4533 from 127.0.0.1'
-    assert ask(Command('allow', 'anna')).granted and asks() == '' and take().granted
+    assert not take().granted and requester() == 'rotctld 4533 from 127.0.0.1'
+    assert ask(Command('allow', 'anna')).granted and requester() == '' and take().granted
     assert ask(Command('preset', program)).granted and ask(Command('release', program)).granted
     assert ask(Command('sun', 'anna')).granted  # a pass begins: allowed no longer
     axes.run(0.1)

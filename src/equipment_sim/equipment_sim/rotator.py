@@ -193,8 +193,14 @@ class Device(NamedTuple):
         return (request + self.end if axes.habits.echo else b'') + self.answer(axes, request)
 
 
-DEVICES = {'gs232': Device(b'\r', gs232), 'easycomm': Device(b'\n', easycomm), 'rotctld': Device(b'\n', rotctld),
-           'rot1prog': Device(b' ', rot1prog), 'rot2prog': Device(b' ', rot2prog)}
+def gs232_azimuth(axes: Axes, request: bytes) -> bytes:
+    """Return the answer of a GS-232 that knows the requests of the azimuth alone."""
+    return b'?>\r\n' if request.strip()[:1] == b'W' or request.strip() == b'C2' else gs232(axes, request)
+
+
+DEVICES = {'gs232': Device(b'\r', gs232), 'gs232_azimuth': Device(b'\r', gs232_azimuth),
+           'easycomm': Device(b'\n', easycomm), 'rotctld': Device(b'\n', rotctld), 'rot1prog': Device(b' ', rot1prog),
+           'rot2prog': Device(b' ', rot2prog)}
 """{protocol: its device}. For rotctld Hamlib's `rotctld -m 1` is another one."""
 
 

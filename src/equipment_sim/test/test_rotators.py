@@ -114,7 +114,7 @@ CONFIGURED = [
     ('rotctld', {'circle': '0..360', 'low': -180.0, 'high': 180.0, 'azimuth': 10.0},
      {'azimuth.low': -180.0, 'azimuth.high': 180.0, 'azimuth_circle': '0..360'}, (-170.0, 45.0)),
     *((protocol, AZIMUTH_ONLY, {'fixed_elevation': 12.0}, (30.0, 12.0)) for protocol in (
-        'gs232', 'easycomm', 'rotctld', 'rot1prog')),
+        'gs232', 'gs232_azimuth', 'easycomm', 'rotctld', 'rot1prog')),
     ('gs232', {**AZIMUTH_ONLY, 'signs': True}, {'fixed_elevation': 12.0}, (30.0, 12.0)),
 ]
 

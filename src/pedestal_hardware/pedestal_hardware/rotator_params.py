@@ -82,9 +82,9 @@ class RotatorParameters(RunParameters):
         if self.resolution and self.resolution < finest:
             raise ParameterError(f'resolution = {self.resolution:g} deg: must be 0, or at least {finest:g} deg, the '
                                  f'resolution of {self.protocol}')
-        if self.protocol == 'rot1prog' and not self.azimuth_only:
-            raise ParameterError('fixed_elevation: must be given, because rot1prog is the protocol of a rotator of '
-                                 'the azimuth alone')
+        if PROTOCOLS[self.protocol].AZIMUTH_ONLY and not self.azimuth_only:
+            raise ParameterError(f'fixed_elevation: must be given, because {self.protocol} is for a rotator '
+                                 'of the azimuth alone')
         if self.circle is not None and self.azimuth.high - self.azimuth.low > 360.0:
             raise ParameterError(f"azimuth_circle = '{self.azimuth_circle}': must be travel with a travel above 360 "
                                  'deg, because the azimuth of the device has then two turns')

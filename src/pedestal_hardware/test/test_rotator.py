@@ -30,8 +30,8 @@ def test_a_set_point_in_bytes(name, azimuth, elevation, sent):
 
 def test_a_set_point_of_a_rotator_of_the_azimuth_alone():
     sent = [protocols.PROTOCOLS[name](azimuth_only=True).set_point(123.0, 45.0, None) for name in (
-        'rotctld', 'gs232', 'easycomm')]
-    assert sent == [b'P 123.00 0.00\n', b'M123\r', b'AZ123.0\n']
+        'rotctld', 'gs232', 'gs232_azimuth', 'easycomm')]
+    assert sent == [b'P 123.00 0.00\n', b'W123 000\r', b'M123\r', b'AZ123.0\n']
 
 
 ANSWERS = [

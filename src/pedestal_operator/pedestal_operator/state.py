@@ -172,8 +172,8 @@ def refusals(antenna: 'Antenna', holds_control: bool, may_take: bool = False) ->
         refused = {'take': 'you are in control'}
     else:
         refused = {'release': 'control is free'}
-    if not acu.get('asks'):
-        refused.setdefault('allow', 'no program has asked for control')
+    if not acu.get('requester'):
+        refused.setdefault('allow', 'no program has requested control')
     return {key.removeprefix(REFUSAL_PREFIX): text for key, text in acu.items()
             if key.startswith(REFUSAL_PREFIX)} | refused
 

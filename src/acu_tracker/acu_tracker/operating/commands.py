@@ -30,22 +30,22 @@ UNRESTRICTED_COMMANDS = ('standby', 'stop', 'acu/standby', 'acu/stop')
 # Modes of a pass. `slave` is not one of them: a program that moves the antenna of a ship leaves it in this mode.
 PASS_MODES = tuple(row.name for row in MODE_ROWS if row.follows and row.name != 'slave')
 
-ASK_TIME_NS = 60_000_000_000  # time for which the diagnostics name a program that has asked for control
+REQUEST_TIME_NS = 60_000_000_000  # time for which the diagnostics name a program that has requested control
 
 
 class Authority:
     """Control of the antenna: it belongs to at most one client.
 
     While a client holds control, the control unit refuses the commands of other clients, except those that stop the
-    antenna. While control is free, every client may send any command, except a program that has asked for control in a
-    pass, or while another client held it: an operator must allow this program.
+    antenna. While control is free, every client may send any command, except a program that has requested control
+    in a pass, or while another client held it. An operator must allow this program.
     """
     holder = ''     # name of the client that holds control; '' while control is free
 
     def __init__(self) -> None:
-        self._allowed = self._asks = ''     # programs: that may take control in a pass; that asked last
-        self._refused: set[str] = set()     # programs that asked, and were not allowed since
-        self._asked_at: Nanoseconds = 0
+        self._allowed = self._requester = ''    # programs: that may take control in a pass; of the last request
+        self._refused: set[str] = set()         # programs whose request was refused, and that were not allowed since
+        self._requested_at: Nanoseconds = 0
 
     def admit(self, command: Command) -> None:
         """Raise ValueError for a Command from a client that does not hold control. The command of a mode by another
@@ -67,28 +67,28 @@ class Authority:
         program, held = program_of(who), self.holder not in ('', who)
         if role == 'program' and program != self._allowed and (held or mode in PASS_MODES):
             self._refused.add(program)
-            self._asks, self._asked_at = program, now
+            self._requester, self._requested_at = program, now
             raise ValueError(f'{ASK_REFUSAL} {program}: ' + (f'{HELD_REFUSAL} {self.holder}' if held else
                                                              f'the antenna is in {mode}'))
         if held and role == 'operator':
             raise ValueError(f'{HELD_REFUSAL} {self.holder}')
         self._refused.discard(program)
-        if program == self._asks:
-            self._asks = ''
+        if program == self._requester:
+            self._requester = ''
         before, self.holder = self.holder, who
         return Reply(True, f'control is with {who}' + (f', taken from {before}' if before not in ('', who) else ''))
 
-    def asks(self, now: Nanoseconds) -> str:
-        """Return the name of the program that has asked for control within ASK_TIME_NS, '' for none."""
-        return self._asks if now - self._asked_at < ASK_TIME_NS else ''
+    def requester(self, now: Nanoseconds) -> str:
+        """Return the name of the program that has requested control within REQUEST_TIME_NS, '' for none."""
+        return self._requester if now - self._requested_at < REQUEST_TIME_NS else ''
 
     def allow(self, program: str) -> Reply:
-        """Allow a program to take control, in a pass and from another client; '': the one that asked last."""
-        program = program or self._asks
+        """Allow a program to take control, in a pass and from another client; '': the last that requested it."""
+        program = program or self._requester
         if not program:
-            raise ValueError('no program has asked for control; client must be its name, such as '
+            raise ValueError('no program has requested control; client must be its name, such as '
                              "'rotctld 4533 from 127.0.0.1'")
-        self._allowed, self._asks = program, ''
+        self._allowed, self._requester = program, ''
         self._refused.discard(program)
         return Reply(True, f'{program} may take control')
 

@@ -9,7 +9,7 @@ from pedestal.verbs.arguments import Verb
 from pedestal_hardware.ins.sentences import KINDS
 
 MAX_RATE_DEG_S, MAX_DELAY_S = 360.0, 10.0  # of a rotator
-ROTATOR_PROTOCOLS = 'gs232', 'easycomm', 'rot1prog', 'rot2prog', 'rotctld'
+ROTATOR_PROTOCOLS = 'gs232', 'gs232_azimuth', 'easycomm', 'rot1prog', 'rot2prog', 'rotctld'
 DEFAULT_INS_PORT = 5010
 MIN_RATE_HZ, MAX_RATE_HZ = 0.1, 200.0  # of the samples of an INS
 DAY_NS = 86_400_000_000_000

@@ -47,6 +47,7 @@ class RotatorProtocol:
     RESOLUTION: ClassVar[Degrees] = 0.01    # smallest step of a set-point
     RANGE: ClassVar[tuple[Degrees, Degrees]] = (-720.0, 720.0)   # of the set-points that its digits can hold
     READS_PULSES: ClassVar[bool] = False    # True if the device reports the pulses of its set-points
+    AZIMUTH_ONLY: ClassVar[bool] = False    # True for a protocol without elevation
 
     def __init__(self, azimuth_only: bool = False) -> None:
         self.azimuth_only = azimuth_only
@@ -156,15 +157,9 @@ class Gs232(LineProtocol):
                            rb'([-+]0\d{3}(?:[.,]\d+)?)\s*([-+]0\d{3}(?:[.,]\d+)?)?')
     _PROMPT = re.compile(rb'\s*\??>')
 
-    def __init__(self, azimuth_only: bool = False) -> None:
-        super().__init__(azimuth_only)
-        if azimuth_only:
-            self.ask = b'C\r'
-
     def set_point(self, azimuth: Degrees, elevation: Degrees, pulses: Pulses | None) -> bytes:
         """Return the request to move to these angles."""
-        return b'M%03d\r' % round(azimuth) if self.azimuth_only else b'W%03d %03d\r' % (round(azimuth),
-                                                                                       round(elevation))
+        return b'W%03d %03d\r' % (round(azimuth), 0 if self.azimuth_only else round(elevation))
 
     def answers(self, received: bytes) -> list[Answer]:
         """Return the complete answers in the received bytes. A prompt is complete without a line end."""
@@ -193,6 +188,15 @@ class Gs232(LineProtocol):
                 yield checked(azimuth, b'0' if self.azimuth_only else elevation)
         elif line and not self._is_echo(line):
             yield Refusal(f'answer {line.decode(errors="replace")!r}: must be AZ=aaa EL=eee, or +0aaa+0eee')
+
+
+class Gs232Azimuth(Gs232):
+    """Controller that knows the requests of the azimuth alone, such as a K3NG without elevation."""
+    ASK, AZIMUTH_ONLY = b'C\r', True
+
+    def set_point(self, azimuth: Degrees, elevation: Degrees, pulses: Pulses | None) -> bytes:
+        """Return the request to move to an azimuth."""
+        return b'M%03d\r' % round(azimuth)
 
 
 class Easycomm(LineProtocol):
@@ -265,7 +269,7 @@ class Spid(RotatorProtocol):
 
 class Rot1prog(Spid):
     """SPID Rot1Prog: azimuth alone, whole degrees, sent and received as 360 + azimuth."""
-    BAUD_RATE, RESOLUTION, RANGE = 1200, 1.0, (-360.0, 639.0)
+    BAUD_RATE, RESOLUTION, RANGE, AZIMUTH_ONLY = 1200, 1.0, (-360.0, 639.0), True
     FRAME_BYTES, FORM = 5, 'W, three digits, and a space'
 
     def set_point(self, azimuth: Degrees, elevation: Degrees, pulses: Pulses | None) -> bytes:
@@ -308,6 +312,7 @@ class Rot2prog(Spid):
 PROTOCOLS: dict[str, type[RotatorProtocol]] = {
     'rotctld': Rotctld,
     'gs232': Gs232,
+    'gs232_azimuth': Gs232Azimuth,
     'easycomm': Easycomm,
     'rot1prog': Rot1prog,
     'rot2prog': Rot2prog,

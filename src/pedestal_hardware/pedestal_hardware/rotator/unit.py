@@ -198,8 +198,8 @@ class Rotator(AngleDrive):
         return self.parameters.dead_band + 0.5 * self.step_deg
 
     def _angles(self, measurement: Measurement) -> Pair:
-        """Return the angles [rad] of a measurement: the azimuth on the turn next to the last one or, at first, to the
-        middle of the travel; the elevation that a rotator of the azimuth alone has."""
+        """Return the angles [rad] of a measurement. The azimuth is on the turn next to the last one or, at first, to
+        the middle of the travel."""
         p = self.parameters
         azimuth, elevation = measurement.azimuth, measurement.elevation
         if p.azimuth_only:

@@ -152,7 +152,7 @@ class Controller:
         return PendingRequest([*numbers, send()], now + CLIENT_REPLY_TIMEOUT_S, lose=lambda: self._lose(client))
 
     def _lose(self, client: str) -> None:
-        """Forget a client that is not in control; its next command asks for control again."""
+        """Forget a client that is not in control; its next command requests control again."""
         if client == self.holder:
             self.pointing.reset()
             self.holder, self._has_left, self._jog = '', False, None
