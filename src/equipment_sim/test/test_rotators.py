@@ -274,3 +274,51 @@ def test_one_garbled_answer_and_lawful_motions_trip_nothing():
         station.axes.angles[1] = station.axes.set_points[1] = 40.0 + k % 2
         station.step((300.0, 40.0))
     assert station.unit.condition == 'enabled', station.unit.diagnose()
+
+
+@pytest.mark.parametrize('sense', [1.0, -1.0])
+def test_an_axis_that_leaves_a_moving_target_is_stopped_within_two_seconds(sense):
+    """In a pass, 1 deg/s: ahead of the target, and back."""
+    station, target = Station('rot2prog', {'azimuth': 100.0, 'elevation': 30.0}, period=0.5), 100.0
+    for _ in range(40):
+        target += 0.5
+        station.step((target, 30.0))
+    begun, station.axes.go = station.now, lambda azimuth, elevation: None
+    station.axes.set_points[0] = 100.0 + sense * 250.0
+    while station.unit.condition == 'enabled' and station.now < begun + 10.0:
+        target += 0.5
+        station.step((target, 30.0))
+    assert station.unit.condition == 'fault: azimuth runs away' and station.now - begun <= AWAY_LIMIT_S + 0.5
+
+
+class SoftAxes(Axes):
+    """Axes that obey after half a second, and accelerate and brake with 4 deg/s2."""
+    velocity, goals = (0.0, 0.0), ()
+
+    def advance(self, now):
+        self.goals = [*self.goals, (now, list(self.set_points))]
+        while self.now < now - 1e-9:
+            self.now += 0.02
+            goal = [goals for at, goals in self.goals if at <= max(self.now - 0.5, self.goals[0][0])][-1]
+            wanted = np.subtract(goal, self.angles)
+            wanted = np.sign(wanted) * np.minimum(self.rate, 0.9 * np.sqrt(8.0 * np.abs(wanted)))
+            self.velocity += np.clip(wanted - self.velocity, -0.08, 0.08)
+            self.angles = list(self.angles + 0.02 * self.velocity)
+        self.goals = self.goals[-40:]
+
+
+@pytest.mark.parametrize('protocol', ['gs232', 'easycomm'])
+def test_reversals_and_stops_of_a_slow_and_soft_rotator_are_lawful(protocol):
+    """The reference moves as the control unit's does, at 5.7 deg/s towards targets that change in its motion."""
+    station, rng = Station(protocol, {'azimuth': 180.0, 'elevation': 45.0}), np.random.default_rng(1)
+    station.axes.__class__ = SoftAxes
+    reference = np.array((180.0, 45.0))
+    for _ in range(40):
+        target = rng.uniform(0.0, (360.0, 90.0))
+        for _ in range(int(rng.uniform(3, 75))):
+            reference += np.clip(target - reference, -1.14, 1.14)
+            station.step(reference)
+        if rng.uniform() < 0.3:
+            station.follow(reference, rng.uniform(0.2, 4.0), 'stop')
+            reference = np.array(station.measured)
+        assert station.unit.condition == 'enabled', station.unit.diagnose()

@@ -1,9 +1,9 @@
 """Detection of an axis that runs away: it moves away from its set-point, or further beyond its travel.
 
-An axis may be anywhere between the set-points of the last `reaction_ns`, because it may still obey an earlier one.
-After a stop it may run on for this time, and then stands. From HOLD_TIME_NS after a stop, and before the first
-set-point, a person may move it by hand within its travel. d is its distance from this interval. Each measurement adds
-the distance by which the axis went away:
+An axis may be anywhere between the set-points of the last `reaction_ns`, because it may still obey an earlier one. If
+a set-point passes an axis against its motion, it may go on for REACH_S, and so it may after a stop. From HOLD_TIME_NS
+after a stop, and before the first set-point, a person may move it by hand within its travel. d is its distance from
+this interval. Each measurement adds the distance by which the axis went away:
 
     w_k = max(0, w_k-1 + d(angle_k) - d(angle_k-1) - leak (t_k - t_k-1))
 
@@ -12,10 +12,12 @@ PERSISTENCE_NS. The second condition finds a slow axis; an axis that overshoots 
 measurements in a row, because a serial line without a checksum may garble one.
 """
 from pedestal_common.compiled import compiled
-from pedestal_common.quantities import Bit, BothAxes, Nanoseconds, Pair, Radians, Records
+from pedestal_common.quantities import Bit, BothAxes, Nanoseconds, Pair, Radians, RadiansPerSecond, Records
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
+REACH_S = 1.75  # time for which an axis goes on after a reversal: latency of 1 s, and brakes with 4 deg/s2 at 6 deg/s
+MIN_MOTION_SHARE = 0.05  # smallest share of its rate with which an axis is in motion [-]
 HOLD_TIME_NS = 5_000_000_000  # time after a stop for which an axis must stand
 PERSISTENCE_NS = 1_400_000_000  # shortest time for which a slow axis goes away
 MIN_EXCESS_COUNT = 2  # smallest number of measurements in a row with an excess
@@ -27,6 +29,7 @@ class Limits(Record):
     reaction_ns: Nanoseconds    # longest time until a set-point or a stop has an effect
     low: Pair                   # lower end of the travel [rad]
     high: Pair                  # upper end of the travel [rad]
+    rate: RadiansPerSecond      # of the axes
     most: Pair                  # largest w [rad]
     least: Pair                 # largest w of an axis that goes on [rad]
     leak: Pair                  # [rad/s]
@@ -35,11 +38,14 @@ class Limits(Record):
 class AxisWatch(Record):
     """State of one axis."""
     last: Radians           # angle of the measurement before
+    goal: Radians           # set-point, or the angle of a stop
     low: Radians            # ends of the interval
     high: Radians
     low_ns: Nanoseconds     # stamps of the last set-points that made them
     high_ns: Nanoseconds
-    rest: Radians           # angle at which the axis stands after a stop
+    middle: Radians         # angle about which the axis may move by
+    reach: Radians
+    reach_ns: Nanoseconds   # stamp from which it may
     away: Radians           # w
     since_ns: Nanoseconds   # last stamp at which w was 0
     count: int              # measurements in a row with an excess
@@ -55,6 +61,7 @@ class State(Record):
     last_ns: Nanoseconds    # stamp of the measurement before, NO_STAMP before the first and after a silence
     stopped_ns: Nanoseconds     # stamp of the last stop, NO_STAMP before the first set-point
     free: Bit               # 1 while a person may move the axes
+    moving: Bit             # 1 if a set-point was in force at the measurement before
     moves: Bit              # 1 if an angle has changed between the last two measurements
     again_ns: Nanoseconds   # stamp of the last stop in a fault
 
@@ -67,12 +74,23 @@ def initialise(record: Records) -> None:
 
 @compiled
 def _beyond(axis: AxisWatch, angle: Radians) -> Radians:
-    return max(axis.low - angle, angle - axis.high, 0.0)
+    low, high = min(axis.low, axis.middle - axis.reach), max(axis.high, axis.middle + axis.reach)
+    return max(low - angle, angle - high, 0.0)
 
 
 @compiled
-def _extend(axis: AxisWatch, goal: Radians, stamp: Nanoseconds, reaction_ns: Nanoseconds) -> None:
-    """Extend the interval to a goal; an end whose set-point is no longer obeyed becomes the goal."""
+def _aim(axis: AxisWatch, limits: Limits, angle: Radians, goal: Radians, stamp: Nanoseconds, dt_ns: Nanoseconds,
+         begins: bool, stops: bool) -> None:
+    """Extend the interval to a goal; an end whose set-point is no longer obeyed becomes the goal. begins: the goal is
+    the first after a stop; stops: it is a stop."""
+    reaction_ns, change, moved, dt = limits.reaction_ns, goal - axis.goal, angle - axis.last, dt_ns * 1e-9
+    passes = (axis.goal - axis.last) * (goal - angle) <= 0.0 and change * moved < 0.0
+    if stops or (begins or passes) and abs(moved) > MIN_MOTION_SHARE * limits.rate * dt:
+        reach = REACH_S * (min(abs(change) / dt, limits.rate) if passes and not begins else limits.rate)
+        axis.middle, axis.reach, axis.reach_ns = angle, reach, stamp
+    elif stamp - axis.reach_ns > reaction_ns:
+        axis.middle, axis.reach = goal, 0.0
+    axis.goal = goal
     if goal <= axis.low or stamp - axis.low_ns > reaction_ns:
         axis.low, axis.low_ns = goal, stamp
     if goal >= axis.high or stamp - axis.high_ns > reaction_ns:
@@ -82,6 +100,8 @@ def _extend(axis: AxisWatch, goal: Radians, stamp: Nanoseconds, reaction_ns: Nan
 @compiled
 def _begin_at(axis: AxisWatch, angle: Radians, stamp: Nanoseconds) -> None:
     axis.low, axis.high, axis.low_ns, axis.high_ns = angle, angle, stamp, stamp
+    axis.goal = axis.middle = angle
+    axis.reach = 0.0
 
 
 @compiled
@@ -103,6 +123,7 @@ def _take(axis: AxisWatch, i: int, limits: Limits, angle: Radians, stamp: Nanose
 def step(state: State, limits: Limits, stamp: Nanoseconds, angles: Pair, set_point: Pair, moving: Bit) -> None:
     """Take the angles of a measurement. moving: 1 while the set-point is in force."""
     first = state.last_ns == NO_STAMP
+    dt_ns = 1 if first else stamp - state.last_ns
     if moving == 1 or (first and state.free == 0):
         state.stopped_ns = stamp
     held = state.stopped_ns != NO_STAMP and stamp - state.stopped_ns <= HOLD_TIME_NS
@@ -112,20 +133,20 @@ def step(state: State, limits: Limits, stamp: Nanoseconds, angles: Pair, set_poi
         if state.free == 1 and held or first:
             _begin_at(axis, angles[i], stamp)
         if moving == 1:
-            _extend(axis, set_point[i], stamp, limits.reaction_ns)
+            _aim(axis, limits, angles[i], set_point[i], stamp, dt_ns, state.moving == 0, False)
         elif held:
-            if stamp - state.stopped_ns <= limits.reaction_ns:
-                axis.rest = angles[i]
-            _extend(axis, axis.rest, stamp, limits.reaction_ns)
+            stops = state.moving == 1
+            _aim(axis, limits, angles[i], angles[i] if stops else axis.goal, stamp, dt_ns, False, stops)
         else:
             axis.low, axis.high = limits.low[i], limits.high[i]
+            axis.middle, axis.reach = axis.low, 0.0
         if first:
             axis.since_ns = stamp
         else:
-            _take(axis, i, limits, angles[i], stamp, stamp - state.last_ns)
+            _take(axis, i, limits, angles[i], stamp, dt_ns)
             state.moves |= 1 if angles[i] != axis.last else 0
         axis.last = angles[i]
-    state.free, state.last_ns = 0 if held else 1, stamp
+    state.free, state.moving, state.last_ns = 0 if held else 1, moving, stamp
 
 
 @compiled

@@ -141,7 +141,8 @@ class Rotator(AngleDrive):
         super().__init__(parameters, reads)
         p = self.parameters
         constants, limits = set_point.Constants.zeros(), motion_watch.Limits.zeros()
-        constants['timeout_ns'], limits['reaction_ns'] = p.timeout_ns, round((1.0 + p.period) * 1e9)
+        constants['timeout_ns'], limits['reaction_ns'] = p.timeout_ns, round((2.0 + p.period) * 1e9)
+        limits['rate'] = math.radians(p.rate)
         constants['dead_band'] = math.radians(p.dead_band)
         for part in (constants, limits):
             part['low'], part['high'] = np.radians(p.travel).T
