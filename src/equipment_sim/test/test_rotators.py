@@ -145,6 +145,14 @@ def test_the_set_points_of_a_rot2prog_are_in_its_own_pulses_and_never_before_its
     assert ('pulses_per_degree', '2 and 2 pulses per degree') in station.unit.diagnose().values
 
 
+def test_a_rot2prog_whose_answers_differ_gets_no_set_point():
+    station = Station('rot2prog', {'pulses': 2})
+    for k in range(20):
+        station.axes.habits = build(Habits, {'pulses': 1 + k % 2})
+        station.step((30.0, 45.0))
+    assert station.line.counts['set_points'] == 0 and 'two equal answers' in station.unit.diagnose().message
+
+
 def test_other_pulses_of_a_device_trip_the_drive_and_its_reset_adopts_them():
     station = Station('rot2prog', {'pulses': 10})
     station.follow((30.0, 45.0), 2.0)

@@ -306,6 +306,8 @@ class Rotator(AngleDrive):
         if outputs['far']:
             return Diagnosis(LEVEL_WARN, 'mode rate would begin far from the measured angles: the rotator waits; '
                              'command a preset first', values)
+        if not switches['counts']:
+            return Diagnosis(LEVEL_WARN, 'waits for two equal answers with the pulses of a set-point', values)
         beyond = np.degrees(device['angle']) - np.clip(np.degrees(device['angle']), *np.transpose(p.travel))
         if np.abs(beyond).max() > self.accuracy_deg + self.step_deg:
             return Diagnosis(LEVEL_WARN, 'an axis is outside the travel of the parameters: it moves only towards it',
