@@ -1,9 +1,9 @@
 """Detection of an axis that runs away: it moves away from its set-point, or further beyond its travel.
 
 An axis may be anywhere between the set-points of the last `reaction_ns`, because it may still obey an earlier one. If
-a set-point passes an axis against its motion, it may go on for REACH_S, and so it may after a stop. From HOLD_TIME_NS
-after a stop, and before the first set-point, a person may move it by hand within its travel. d is its distance from
-this interval. Each measurement adds the distance by which the axis went away:
+a set-point passes an axis against its motion, the axis may go on for REACH_S within its travel. After a stop it may do
+so too. From HOLD_TIME_NS after a stop, and before the first set-point, a person may move it by hand within its travel.
+d is its distance from this interval. Each measurement adds the distance by which the axis went away:
 
     w_k = max(0, w_k-1 + d(angle_k) - d(angle_k-1) - leak (t_k - t_k-1))
 
@@ -16,7 +16,7 @@ from pedestal_common.quantities import Bit, BothAxes, Nanoseconds, Pair, Radians
 from pedestal_common.record import Record
 from pedestal_common.wire.records import NO_STAMP
 
-REACH_S = 1.75  # time for which an axis goes on after a reversal: latency of 1 s, and brakes with 4 deg/s2 at 6 deg/s
+REACH_S = 1.75  # time for which an axis goes on: it obeys after half a second, and brakes with 4 deg/s2 at 6 deg/s
 MIN_MOTION_SHARE = 0.05  # smallest share of its rate with which an axis is in motion [-]
 HOLD_TIME_NS = 5_000_000_000  # time after a stop for which an axis must stand
 PERSISTENCE_NS = 1_400_000_000  # shortest time for which a slow axis goes away
@@ -43,8 +43,8 @@ class AxisWatch(Record):
     high: Radians
     low_ns: Nanoseconds     # stamps of the last set-points that made them
     high_ns: Nanoseconds
-    middle: Radians         # angle about which the axis may move by
-    reach: Radians
+    reach_low: Radians      # ends of the interval in which the axis may go on
+    reach_high: Radians
     reach_ns: Nanoseconds   # stamp from which it may
     away: Radians           # w
     since_ns: Nanoseconds   # last stamp at which w was 0
@@ -74,22 +74,23 @@ def initialise(record: Records) -> None:
 
 @compiled
 def _beyond(axis: AxisWatch, angle: Radians) -> Radians:
-    low, high = min(axis.low, axis.middle - axis.reach), max(axis.high, axis.middle + axis.reach)
+    low, high = min(axis.low, axis.reach_low), max(axis.high, axis.reach_high)
     return max(low - angle, angle - high, 0.0)
 
 
 @compiled
-def _aim(axis: AxisWatch, limits: Limits, angle: Radians, goal: Radians, stamp: Nanoseconds, dt_ns: Nanoseconds,
-         begins: bool, stops: bool) -> None:
+def _aim(axis: AxisWatch, i: int, limits: Limits, angle: Radians, goal: Radians, stamp: Nanoseconds,
+         dt_ns: Nanoseconds, begins: bool, stops: bool) -> None:
     """Extend the interval to a goal; an end whose set-point is no longer obeyed becomes the goal. begins: the goal is
     the first after a stop; stops: it is a stop."""
     reaction_ns, change, moved, dt = limits.reaction_ns, goal - axis.goal, angle - axis.last, dt_ns * 1e-9
     passes = (axis.goal - axis.last) * (goal - angle) <= 0.0 and change * moved < 0.0
     if stops or (begins or passes) and abs(moved) > MIN_MOTION_SHARE * limits.rate * dt:
         reach = REACH_S * (min(abs(change) / dt, limits.rate) if passes and not begins else limits.rate)
-        axis.middle, axis.reach, axis.reach_ns = angle, reach, stamp
+        axis.reach_low = max(angle - reach, min(angle, limits.low[i]))
+        axis.reach_high, axis.reach_ns = min(angle + reach, max(angle, limits.high[i])), stamp
     elif stamp - axis.reach_ns > reaction_ns:
-        axis.middle, axis.reach = goal, 0.0
+        axis.reach_low = axis.reach_high = goal
     axis.goal = goal
     if goal <= axis.low or stamp - axis.low_ns > reaction_ns:
         axis.low, axis.low_ns = goal, stamp
@@ -100,8 +101,7 @@ def _aim(axis: AxisWatch, limits: Limits, angle: Radians, goal: Radians, stamp: 
 @compiled
 def _begin_at(axis: AxisWatch, angle: Radians, stamp: Nanoseconds) -> None:
     axis.low, axis.high, axis.low_ns, axis.high_ns = angle, angle, stamp, stamp
-    axis.goal = axis.middle = angle
-    axis.reach = 0.0
+    axis.goal = axis.reach_low = axis.reach_high = angle
 
 
 @compiled
@@ -133,13 +133,13 @@ def step(state: State, limits: Limits, stamp: Nanoseconds, angles: Pair, set_poi
         if state.free == 1 and held or first:
             _begin_at(axis, angles[i], stamp)
         if moving == 1:
-            _aim(axis, limits, angles[i], set_point[i], stamp, dt_ns, state.moving == 0, False)
+            _aim(axis, i, limits, angles[i], set_point[i], stamp, dt_ns, state.moving == 0, False)
         elif held:
             stops = state.moving == 1
-            _aim(axis, limits, angles[i], angles[i] if stops else axis.goal, stamp, dt_ns, False, stops)
+            _aim(axis, i, limits, angles[i], angles[i] if stops else axis.goal, stamp, dt_ns, False, stops)
         else:
             axis.low, axis.high = limits.low[i], limits.high[i]
-            axis.middle, axis.reach = axis.low, 0.0
+            axis.reach_low = axis.reach_high = axis.low
         if first:
             axis.since_ns = stamp
         else:
