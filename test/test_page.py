@@ -487,6 +487,30 @@ def test_an_operator_at_the_page(antenna, browser):
     page.context.close()
 
 
+@pytest.mark.thorough
+@needs_chromium
+def test_a_button_allows_a_program_at_rotctld_to_take_the_antenna(antenna, station, browser):
+    _, client, site = antenna
+    page = opened(browser[1], site.urls['operator'], [])
+    assert page.locator('#allow').is_hidden()
+    press(page, client, '#take', lambda: page.locator('#release').get_attribute('aria-disabled') == 'false')
+    with socket.create_connection(('127.0.0.1', station.ports['rotctld']), 5.0) as program:
+        program.settimeout(10.0)
+
+        def asked():
+            program.sendall(b'P 12 40\n')
+            return program.recv(100)
+        assert asked() == b'RPRT -9\n'
+        page.locator('#allow', has_text='from 127.0.0.1 to take control').wait_for()
+        press(page, client, '#allow', lambda: asked() == b'RPRT 0\n')
+        reads(page, '#control', 'rotctld')
+        assert page.locator('#allow').is_hidden()
+        program.sendall(b'S\nq\n')
+    reads(page, '#control', 'none')
+    assert page.errors == []
+    page.context.close()
+
+
 @pytest.mark.excused_by(None)
 @pytest.mark.thorough
 def test_ten_pages_that_never_read_cost_the_control_unit_no_step(antenna):

@@ -28,7 +28,7 @@ class Device:
 
 @pytest.fixture
 def device(request):
-    """A rotator of a protocol."""
+    """A rotator of a protocol, with its habits behind the name: 'rot2prog pulses=2'."""
     if request.param == 'rotctld':
         if ROTCTLD is None:
             pytest.skip('rotctld is not installed (libhamlib-utils)')
@@ -36,9 +36,11 @@ def device(request):
         process = subprocess.Popen([ROTCTLD, '-m', '1', '-T', '127.0.0.1', '-t', str(port)])
         yield request.param, Device(process, f'socket://127.0.0.1:{port}')
     else:
-        process = subprocess.Popen([*PEDESTAL, 'simulate', 'rotator', '--protocol', request.param],
+        protocol, *habits = request.param.split()
+        process = subprocess.Popen([*PEDESTAL, 'simulate', 'rotator', '--protocol', protocol,
+                                    *(word for habit in habits for word in ('--habit', habit))],
                                    stdout=subprocess.PIPE, text=True)
-        yield request.param, Device(process, process.stdout.readline().strip())
+        yield protocol, Device(process, process.stdout.readline().strip())
     process.send_signal(signal.SIGCONT)
     process.terminate()
     process.wait(10.0)
@@ -55,7 +57,7 @@ def station(device, start_process, connect, reserve_domain):
     # The control unit is there first, and reports a silent drive until the rotator is there.
     start('acu_node', STEP_TRACK)
     client = connect(domain, f'client_{domain}')
-    for name in ('acu/mode', 'acu/command_result', 'diagnostics'):
+    for name in ('acu/mode', 'acu/command_result', 'acu/alarms', 'diagnostics'):
         client.read(name)
     client.diagnosed('no joint_states', 60.0)
     start('rotator_node', (f'protocol:={protocol}', f'url:={rotator.url}'))
@@ -64,7 +66,7 @@ def station(device, start_process, connect, reserve_domain):
     client.write('acu/command', 'acu/program_track')
     client.until(lambda: client.heard['adu/state'] and client.heard['adu/state'][-1].data == 'enabled'
                  and client.heard['joint_states'] and client.heard['acu/mode'])
-    client.diagnosed('standby (', 60.0)      # the control unit has made a step, so it has the angles
+    client.diagnosed('standby', 60.0)      # the control unit has made a step, so it has the angles
     return client, rotator, {'gs232': 1.0}.get(protocol, 0.1)
 
 
@@ -114,20 +116,39 @@ def distance(client, azimuth, elevation):
     return float(np.max(np.abs(np.degrees(client.heard['joint_states'][-1].position) - (azimuth, elevation))))
 
 
-@pytest.mark.parametrize('device', ('gs232', *(pytest.param(protocol, marks=pytest.mark.thorough) for protocol in (
-    'rotctld', 'easycomm', 'rot2prog'))), indirect=True)
+@pytest.mark.parametrize('device', ('gs232', *(pytest.param(device, marks=pytest.mark.thorough) for device in (
+    'rotctld', 'easycomm', 'rot2prog', 'rot2prog pulses=2', 'gs232 elevation=-5', 'gs232 prompt=true'))),
+    indirect=True)
 def test_a_rotator_goes_where_a_preset_says(station):
-    """The mode stays, and no alarm takes the motion of a rotator for uncommanded motion."""
+    """The mode stays, and no alarm takes the motion of a rotator for uncommanded motion. The last three are the cases
+    N4_2, N4_5 and N4_6."""
     client, _, step = station
     ask(client, 'preset', azimuth=math.radians(20.0), elevation=math.radians(12.0))
     client.until(lambda: distance(client, 20.0, 12.0) <= step, told=lambda: str(client.heard['joint_states'][-1]))
     client.diagnosed('follows within')
+    raised = {status.name for array in client.heard['acu/alarms'][-1:] for status in array.status}
+    assert raised <= {'drive silent'}       # from the start, not acknowledged
     assert client.heard['acu/mode'][-1].data == 'preset'
     assert client.heard['adu/state'][-1].data == 'enabled'
     for mode in ('sun', 'tle'):     # the file of the how-to states no position
         reply = asked(client, mode)
         assert not reply.granted and reply.text.startswith(
             'refused: position of the antenna not given, set `prediction.station.latitude_deg`, ')
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize('device', ('easycomm turned=true azimuth=90 elevation=40',), indirect=True)
+def test_a_rotator_that_runs_away_is_stopped_alarmed_and_reset(station):
+    client, _, _ = station
+    ask(client, 'preset', azimuth=math.radians(80.0), elevation=math.radians(40.0))
+    client.until(lambda: client.heard['adu/state'][-1].data == 'fault: azimuth runs away')
+    client.until(lambda: 'drive fault' in {status.name for status in client.heard['acu/alarms'][-1].status})
+    client.diagnosed('azimuth went away from 90')
+    client.until(lambda: client.heard['acu/mode'][-1].data == 'standby')
+    assert 90.0 < math.degrees(client.heard['joint_states'][-1].position[0]) < 102.0
+    client.spin(2.0)
+    ask(client, 'reset')
+    client.until(lambda: client.heard['adu/state'][-1].data == 'enabled')
 
 
 @pytest.mark.thorough

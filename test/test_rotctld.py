@@ -88,7 +88,7 @@ def test_a_program_without_line_ends_is_answered(antenna):
 
 @pytest.mark.thorough
 def test_without_an_antenna_no_answer_is_a_position(start_process, complaints):
-    """One line in the log for each kind of refusal, however often it happens."""
+    """One line in the log for each kind of refusal of a program, however often it happens and connects."""
     nodes = {name: start_process([*NODE, f'{name}_node', '--ros-args', '-p',
                                   'port:=0']) for name in ('rotctld', 'easycomm')}
     ports = {name: int(begins_with(node, 1).removeprefix(f'{name}: 127.0.0.1:')) for name, node in nodes.items()}
@@ -106,7 +106,7 @@ def test_without_an_antenna_no_answer_is_a_position(start_process, complaints):
         for line in ('AZ EL', 'AZ', 'AZ10 EL20', 'EL20', 'AZ EL'):
             probe.sendall(line.encode() + b'\n')
             assert ask(probe, 'GS') == b'GS8\n', line
-    for name, kinds in (('rotctld', 5 + 3 * bool(ROTCTL)), ('easycomm', 2)):
+    for name, kinds in (('rotctld', 5), ('easycomm', 2)):
         nodes[name].send_signal(signal.SIGTERM)
         _, errors = nodes[name].communicate(timeout=60.0)
         said = complaints(errors).splitlines()
@@ -173,6 +173,30 @@ def test_one_client_is_in_control_and_the_others_are_told_so(antenna):
         first.recv(10)
         time.sleep(0.5)
         assert granted(second, 'P 12 40')
+
+
+def test_a_program_takes_no_pass_before_an_operator_has_allowed_it(antenna):
+    _, client, port = antenna
+    if 'acu/command' not in client.publishers:
+        client.write('acu/command')
+
+    def hand(verb):
+        client.publish('acu/command', commands.message(commands.Command(verb, 'hand', f'{verb} {time.monotonic()}')))
+        client.spin(0.5)
+
+    def in_pass():
+        hand('program')
+        return client.heard['acu/mode'][-1].data in ('program', 'autotrack')
+    with connected(port) as gpredict:
+        client.until(in_pass, 60.0)
+        mode = client.heard['acu/mode'][-1].data
+        for _ in range(3):
+            assert ask(gpredict, 'P 12 40') == b'RPRT -9\n'
+        assert client.heard['acu/mode'][-1].data == mode and ask(gpredict, 'K') == b'RPRT -9\n'
+        hand('allow')
+        client.until(lambda: ask(gpredict, 'P 12 40') == b'RPRT 0\n', 60.0)
+        client.until(lambda: client.heard['acu/mode'][-1].data == 'preset', 60.0)
+        assert ask(gpredict, 'S') == b'RPRT 0\n'
 
 
 @pytest.fixture(params=('rotctld', 'easycomm'))

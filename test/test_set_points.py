@@ -8,6 +8,7 @@ import pytest
 
 from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
+from pedestal_common.wire.commands import Command
 from pedestal_operator.rotator import pointing
 from pedestal_operator.rotator.controller import Controller
 
@@ -45,9 +46,31 @@ def test_refusals_of_the_control_unit_are_distinguished():
         outcomes_of['refused'] = control.do('a', 'program', 0.0).look(remote, 0.0)
         return 1000
     loop.run(watch=watch)
-    assert outcomes_of == {'other': pointing.OUTCOME_DONE, 'busy': pointing.OUTCOME_BUSY,
+    assert outcomes_of == {'other': pointing.OUTCOME_DONE, 'busy': pointing.OUTCOME_REFUSED,
                            'limits': pointing.OUTCOME_OUT_OF_REACH, 'range': pointing.OUTCOME_OUT_OF_REACH,
                            'refused': pointing.OUTCOME_REFUSED}
+
+
+def test_a_pass_is_taken_by_permission_or_by_the_parameter():
+    """A program that was refused sends its next set-point, which takes control once an operator has allowed it."""
+    loop = closed_loop.Loop(scenario.load('leo_pass', (), None, 2.0, 'lockstep'))
+    acu, outcomes = loop.units['acu'], []
+
+    def watch(step):
+        remote = passes.Remote(acu)
+        if remote.texts['acu/mode'] in ('program', 'autotrack') and not outcomes:
+            control, old = Controller(remote), Controller(remote, 'operator')
+            for _ in range(2):
+                outcomes.append(control.do('a 1 from h:5', 'preset', 0.0).look(remote, 0.0))
+            assert remote.texts['acu/mode'] != 'preset' and control.holder == ''
+            acu.command(Command('allow', 'anna'))
+            outcomes.append(control.do('a 1 from h:6', 'preset', 0.0).look(remote, 0.0))
+            control.release(0.0)
+            acu.command(Command('program', 'anna'))
+            outcomes.append(old.do('b', 'preset', 0.0).look(remote, 0.0))
+        return 50
+    loop.run(watch=watch)
+    assert outcomes == [pointing.OUTCOME_REFUSED] * 2 + [pointing.OUTCOME_DONE] * 2
 
 
 @pytest.mark.parametrize('connects_anew', (False, True))

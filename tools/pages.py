@@ -49,6 +49,7 @@ SECTIONS = {
         Page('docs/hardware/servo-drives.md', 'Servo drives', 1600,
              'the objects on the bus and ten steps of a power-up stand nowhere else'),
         Page('docs/hardware/your-drive.md', 'Your own drive', 600),
+        Page('docs/hardware/rotators.md', 'Rotators', 800),
         Page('docs/hardware/receiver.md', 'Your receiver', 1000),
         Page('docs/hardware/iq.md', 'I/Q samples', 1600,
              'the calibration matrix and the equations of the errors stand nowhere else'),

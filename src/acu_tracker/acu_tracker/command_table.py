@@ -15,7 +15,9 @@ from pedestal_common.wire.commands import Argument, CommandDefinition
 
 Arguments: TypeAlias = Mapping[str, Value]  # of a command, by name
 
-CONTROL_ROLES = ('operator', 'supervisor')  # roles of a client; a supervisor may take control from another client
+CONTROL_ROLES = ('operator', 'supervisor', 'program')
+"""Roles of a client. A supervisor may take control from another client; a program takes it only if it is free and the
+antenna is not in a pass, or if an operator has allowed this program."""
 
 
 def _of_axes(doc: str, low: float, high: float, unit: str, default: float | None = None,
@@ -68,9 +70,12 @@ ACU_COMMANDS = (
     CommandDefinition('pointing', 'take another pointing model, gradually; terms that are not given are 0',
                       _MODEL_ARGUMENTS),
     CommandDefinition('take', 'take control; other clients can then send only `stop` and `standby`', (
-        Argument('role', 'role of the client; a supervisor takes control from any holder', options=CONTROL_ROLES,
-                 default='operator'),)),
+        Argument('role', 'role of the client; a supervisor takes control from any holder; a program takes it from '
+                 'another client, or in a pass, only after `allow`', options=CONTROL_ROLES, default='operator'),)),
     CommandDefinition('release', 'release control'),
+    CommandDefinition('allow', 'allow a program, such as a client of rotctld, to take control in a pass and from '
+                      'another client; a mode by another client ends this', (
+        Argument('client', 'program, without its TCP port; default: the last that requested it', default=''),)),
     *_ALARM_COMMANDS,
 )
 

@@ -247,7 +247,8 @@ class Acu(Unit):
         """Values whose change is published at once in the diagnostics."""
         outputs, inputs = self.parts['outputs'], self.parts['inputs']
         return (control_unit.latched(self.parts['state']), outputs['mode'], outputs['reason'] == Reason.SILENCE,
-                outputs['locked'], inputs['drive'], inputs['pins'], inputs['aligning'])
+                outputs['locked'], inputs['drive'], inputs['pins'], inputs['aligning'],
+                self.authority.requester(self.now))
 
     @staticmethod
     def idle(numbers: Mapping[str, Message]) -> str:

@@ -149,9 +149,40 @@ def test_one_holder_at_a_time():
     assert ask(Command('release', 'carl')).granted and ask(Command('preset', 'bert')).granted
 
 
+def test_a_program_takes_the_antenna_from_a_pass_only_if_an_operator_has_allowed_it():
+    axes = Axes(**{'prediction.station.latitude_deg': 39.742476, 'prediction.station.longitude_deg': -105.1786,
+                   'prediction.station.height': 1830.0, 'prediction.start_time': '2003-10-17T19:30:30'}).run(0.1)
+    ask, program = axes.unit.command, 'rotctld 4533 from 127.0.0.1:40000'
+
+    def take(who=program):
+        return ask(Command('take', who, '', {'role': 'program'}))
+
+    def requester():
+        return dict(axes.unit.diagnose().values)['requester']
+    assert take().granted and ask(Command('preset', program)).granted and ask(Command('release', program)).granted
+    assert ask(Command('sun', 'anna')).granted
+    axes.run(0.1)
+    again = program[:-1] + '1'                  # the next connection of the program
+    reply = take(again)
+    assert reply.text == 'refused: an operator must allow rotctld 4533 from 127.0.0.1: the antenna is in sun'
+    assert not ask(Command('preset', again)).granted and not ask(Command('preset', program)).granted
+    assert ask(Command('stop', program)).granted and ask(Command('sun', 'anna')).granted
+    axes.run(0.1)
+    assert not take().granted and requester() == 'rotctld 4533 from 127.0.0.1'
+    assert ask(Command('allow', 'anna')).granted and requester() == '' and take().granted
+    assert ask(Command('preset', program)).granted and ask(Command('release', program)).granted
+    assert ask(Command('sun', 'anna')).granted  # a pass begins: allowed no longer
+    axes.run(0.1)
+    assert not take().granted and ask(Command('take', 'anna')).granted
+    assert 'control is held by anna' in take().text
+    assert not ask(Command('allow', program)).granted and not ask(Command('allow', 'bert')).granted
+    assert ask(Command('allow', 'anna', '', {'client': 'rotctld 4533 from 127.0.0.1'})).granted
+    assert take().text == f'control is with {program}, taken from anna'
+
+
 def test_nobody_without_a_name_takes_control():
     with pytest.raises(ValueError, match='must have a name'):
-        Authority().take('', 'operator')
+        Authority().take('', 'operator', 'standby', 0)
 
 
 def test_the_ramp_of_a_jog_keeps_the_shapers_acceleration():

@@ -1,8 +1,9 @@
-"""ROS node of a rotator: a drive that takes set-points, by rotctld, GS-232, EasyComm or Rot2Prog.
+"""ROS node of a rotator: a drive that takes set-points, by rotctld, GS-232, EasyComm, Rot1Prog or Rot2Prog.
 
 The node owns the time of its graph, which is a graph in realtime with the angles of an array (`graph.beams` 1). It
 runs the unit `rotator.unit.Rotator`; change the law in `rotator.set_point`.
 """
+import functools
 import time
 from collections.abc import Mapping
 
@@ -29,7 +30,8 @@ class RotatorNode(Timekeeper):
     def begin(self) -> None:
         """Connect to the device and begin the steps."""
         p = self.parameters
-        self.line = Line(p.url, PROTOCOLS[p.protocol], p.period, p.answer_timeout, p.baud_rate)
+        protocol = functools.partial(PROTOCOLS[p.protocol], p.azimuth_only)
+        self.line = Line(p.url, protocol, p.period, p.answer_timeout, p.baud_rate)
         self.line.start()
         super().begin()
 
@@ -40,10 +42,8 @@ class RotatorNode(Timekeeper):
         unit.counts, unit.fault = dict(line.counts), line.fault
         super()._make(stamp, values)
         decision = unit.decision
-        if isinstance(decision, str):
-            line.send_stop()
-        elif decision is not None:
-            line.send_set_point(*decision)
+        if decision is not None:
+            line.send(decision)
 
     def close(self) -> None:
         """Stop the device and end."""

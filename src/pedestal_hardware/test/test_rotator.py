@@ -10,7 +10,7 @@ import pytest
 
 from pedestal_common.parameters import ParameterError, build
 from pedestal_hardware.rotator import protocols, set_point
-from pedestal_hardware.rotator.line import Line, Measurement
+from pedestal_hardware.rotator.line import Line, Measurement, SetPoint
 from pedestal_hardware.rotator.protocols import Accepted, Position, Refusal
 from pedestal_hardware.rotator.unit import Rotator
 from pedestal_hardware.rotator_params import RotatorParameters
@@ -22,9 +22,16 @@ from pedestal_hardware.rotator_params import RotatorParameters
     ('easycomm', 10.04, -2.0, b'AZ10.0 EL-2.0\n'),
     # the manual of Rot2Prog: H = 10 (360 + angle) as ASCII, PH = 0x0A, K = 0x2F
     ('rot2prog', 123.5, 77.0, b'W4835\n4370\n/ '),
+    ('rot1prog', 123.4, 0.0, b'W4830\0\0\0\0\0\0/ '),
 ])
 def test_a_set_point_in_bytes(name, azimuth, elevation, sent):
-    assert protocols.PROTOCOLS[name]().set_point(azimuth, elevation) == sent
+    assert protocols.PROTOCOLS[name]().set_point(azimuth, elevation, (10, 10)) == sent
+
+
+def test_a_set_point_of_a_rotator_of_the_azimuth_alone():
+    sent = [protocols.PROTOCOLS[name](azimuth_only=True).set_point(123.0, 45.0, None) for name in (
+        'rotctld', 'gs232', 'gs232_azimuth', 'easycomm')]
+    assert sent == [b'P 123.00 0.00\n', b'W123 000\r', b'M123\r', b'AZ123.0\n']
 
 
 ANSWERS = [
@@ -35,7 +42,16 @@ ANSWERS = [
     ('gs232', b'+0123+0045\r\n', [Position(123.0, 45.0)]),
     ('easycomm', b'AZ10.0 EL20.0\n', [Position(10.0, 20.0)]),
     ('easycomm', b'AZ10.0\nEL-0.5\n', [Position(10.0, -0.5)]),
-    ('rot2prog', bytes([0x57, 3, 7, 2, 5, 2, 3, 9, 4, 0, 2, 0x20]), [Position(12.5, 34.0)]),
+    ('rot2prog', bytes([0x57, 3, 7, 2, 5, 2, 3, 9, 4, 0, 2, 0x20]), [Position(12.5, 34.0, (2, 2))]),
+    ('rot1prog', bytes([0x57, 3, 7, 2, 0x20]), [Position(12.0, 0.0)]),
+    ('gs232', b'AZ=020  EL=-05\r\n', [Position(20.0, -5.0)]), ('gs232', b'+0020-0005\r\n', [Position(20.0, -5.0)]),
+    ('gs232', b'AZ=0000EL=000\r', [Position(0.0, 0.0)]),      # Hamlib issue 251
+    ('gs232', b'\r\nAZ=400.5  EL=030.0\r\n?>', [Position(400.5, 30.0), Refusal("answer '?>'", True)]),
+    ('easycomm', b'AZ10,5 EL-0,5\n', [Position(10.5, -0.5)]),
+    ('easycomm', b'+10.5\n-0.5\n', [Position(10.5, -0.5)]),
+    ('easycomm', b'AZ+010.5,EL+20.0\n', [Position(10.5, 20.0)]),
+    ('rotctld', b'12,50\n-1,25\n', [Position(12.5, -1.25)]),
+    ('easycomm', b'AZ EL\r\nAZ10.0 EL20.0\r\n', [Position(10.0, 20.0)]),
 ]
 
 
@@ -45,12 +61,15 @@ def test_answers_arrive_whole_or_byte_by_byte(name, sent, expected):
     for found in (whole.answers(sent), [answer for byte in sent for answer in cut.answers(bytes([byte]))]):
         assert [type(answer) for answer in found] == [type(answer) for answer in expected]
         for answer, wanted in zip(found, expected):
-            assert answer == pytest.approx(wanted) if isinstance(answer, Position) else answer == wanted
+            assert answer[:2] == pytest.approx(wanted[:2]) and answer[2:] == wanted[2:] if isinstance(
+                answer, Position) else answer == wanted
 
 
 @pytest.mark.parametrize('name, sent', [
     ('rotctld', b'nan\n10.0\n'), ('rotctld', b'1e9\n10.0\n'), ('rotctld', b'hello\nworld\n'),
-    ('gs232', b'AZ=1  EL=006\r\n'), ('easycomm', b'AZ1.2.3 EL4\n'), ('easycomm', b'ALlow battery\n'),
+    ('gs232', b'AZ=1  EL=006\r\n'), ('gs232', b'AZ=12  EL=006\r\n'), ('gs232', b'AZ=012\r\n'),
+    ('easycomm', b'10 20\n'), ('rot2prog', b'W' + bytes(10) + b' '), ('easycomm', b'AZ1.2.3 EL4\n'),
+    ('easycomm', b'ALlow battery\n'),
     ('rot2prog', b'W' + bytes(9) + b'\x0a!'), ('gs232', bytes(600)), ('rotctld', b'9' * 600),
 ])
 def test_bytes_that_are_no_answer_are_refused_and_the_next_answer_counts(name, sent):
@@ -59,6 +78,17 @@ def test_bytes_that_are_no_answer_are_refused_and_the_next_answer_counts(name, s
     assert refusals and all(isinstance(answer, Refusal) and answer.reason for answer in refusals)
     good, expected = next((answer, wanted) for of, answer, wanted in ANSWERS if of == name)
     assert [type(answer) for answer in protocol.answers(good)][-1] is Position and expected
+
+
+@pytest.mark.parametrize('echoes', [True, False])
+def test_an_echoed_set_point_is_no_position_and_a_position_at_the_set_point_is_no_echo(echoes):
+    protocol = protocols.PROTOCOLS['easycomm']()
+    echo, answer = b'AZ EL \n' if echoes else b'', b'AZ10.0 EL20.0\n'
+    protocol.sent(protocol.ask)
+    assert len(protocol.answers(echo + answer)) == 1
+    protocol.sent(protocol.set_point(10.0, 20.0, None))
+    protocol.sent(protocol.ask)
+    assert protocol.answers((answer if echoes else b'') + echo + answer) == [Position(10.0, 20.0)]
 
 
 class Rotctld(threading.Thread):
@@ -104,7 +134,7 @@ def test_a_late_answer_exchanges_no_axes_and_a_refused_stop_is_sent_again():
                and connection.counts['positions'] > 8)
     wait_until(lambda: seen.add(connection.newest[:2]) is None and connection.counts['positions'] > 20)
     assert seen <= {None, (10.0, 45.0)} and connection.counts['missing_answers'] == 1
-    connection.send_stop()
+    connection.send('stop')
     wait_until(lambda: server.stops == 2 and not connection.refusal)
     connection.close()
 
@@ -115,7 +145,7 @@ def test_text_between_the_frames_of_a_rot2prog_loses_no_frame(text):
     frame = bytes([0x57, 3, 7, 2, 5, 2, 3, 9, 4, 0, 2, 0x20])
     found = [answer for answer in protocol.answers(text + frame + text + frame + bytes(12))
              if isinstance(answer, Position)]
-    assert found == [pytest.approx((12.5, 34.0))] * 2
+    assert [answer[:2] for answer in found] == [pytest.approx((12.5, 34.0))] * 2
 
 
 class Device:
@@ -145,9 +175,9 @@ class Device:
 
 def test_a_set_point_is_sent_when_the_target_leaves_the_dead_band():
     device = Device(dead_band=0.5)
-    assert device.step(10.0, 20.0) == pytest.approx((10.0, 20.0))
+    assert device.step(10.0, 20.0)[:2] == pytest.approx((10.0, 20.0))
     assert device.step(10.4, 20.0) is None
-    assert device.step(10.6, 20.0) == pytest.approx((10.6, 20.0))
+    assert device.step(10.6, 20.0)[:2] == pytest.approx((10.6, 20.0))
     assert [device.step(10.6, 20.0) for _ in range(20)] == [None] * 20
 
 
@@ -159,12 +189,12 @@ def test_a_ramp_stays_within_the_dead_band_and_half_a_step():
         target = 20.0 + 0.5 * k * device.period
         sent = device.step(target) or sent
         worst = max(worst, abs(sent[0] - target))
-    assert sent[0] == round(sent[0]) and worst <= device.unit.parameters.accuracy_deg + 0.5 * device.period
+    assert sent[0] == round(sent[0]) and worst <= device.unit.accuracy_deg + 0.5 * device.period
 
 
 def test_a_target_between_two_steps_of_the_device_is_sent_once():
     device = Device(protocol='gs232', dead_band=0.1)
-    assert device.step(30.4) == (pytest.approx(30.0), 0.0)
+    assert device.step(30.4)[:2] == (pytest.approx(30.0), 0.0)
     assert [device.step(30.4) for _ in range(20)] == [None] * 20
 
 
@@ -178,12 +208,12 @@ def test_a_mode_without_motion_stops_the_device_and_moves_it_never_again(mode):
         device.unit.request(name)
         assert [device.step(100.0, 30.0, mode=mode) for _ in range(3)] == [None] * 3
     assert device.step(100.0, 30.0, mode='rate') is None and 'preset first' in device.unit.diagnose().message
-    assert device.step(1.0, 1.0, mode='rate') == pytest.approx((1.0, 1.0))
+    assert device.step(1.0, 1.0, mode='rate')[:2] == pytest.approx((1.0, 1.0))
 
 
 def test_a_target_outside_the_travel_waits_at_the_end():
     device = Device()
-    assert device.step(400.0, -5.0) == pytest.approx((360.0, 0.0))
+    assert device.step(400.0, -5.0)[:2] == pytest.approx((360.0, 0.0))
     assert 'outside the travel' in device.unit.diagnose().message
 
 
@@ -200,7 +230,7 @@ def test_a_stale_reference_and_a_disabled_drive_stop_the_device_once():
     device.step(10.0)
     decisions = [device.step() for _ in range(10)]
     assert decisions.count('stop') == 1 and set(decisions) == {None, 'stop'}
-    assert device.step(10.0) == pytest.approx((10.0, 0.0))        # the same target is sent again after the stop
+    assert device.step(10.0)[:2] == pytest.approx((10.0, 0.0))        # the same target is sent again after the stop
     device.unit.request('adu/disable')
     assert [device.step(11.0), device.step(12.0)] == ['stop', None]
 
@@ -213,7 +243,7 @@ def test_a_silent_device_is_a_fault_without_angles_and_returns():
     joints = device.unit.outputs['joint_states']
     assert device.unit.condition == 'fault: rotator silent' and decision is None
     assert joints['stamp'][0] == np.iinfo(np.int64).min
-    assert device.step(10.0, measured=(3.0, 4.0)) == pytest.approx((10.0, 0.0))
+    assert device.step(10.0, measured=(3.0, 4.0))[:2] == pytest.approx((10.0, 0.0))
     assert device.unit.condition == 'enabled'
     assert np.degrees(joints['position'][0]) == pytest.approx((3.0, 4.0))
 
@@ -247,7 +277,7 @@ def test_a_refusal_without_an_answer_belongs_to_the_set_point():
     connection = Line(f'socket://127.0.0.1:{server.getsockname()[1]}', protocols.PROTOCOLS['gs232'], 0.02, 0.5)
     connection.start()
     wait_until(lambda: connection.newest is not None)
-    connection.send_set_point(120.0, 30.0)
+    connection.send(SetPoint(120.0, 30.0, None))
     wait_until(lambda: connection.counts['refusals'] == 1)
     positions = connection.counts['positions']
     wait_until(lambda: connection.counts['positions'] > positions + 3)

@@ -19,7 +19,7 @@ ANGLE_ERROR_TOPIC = 'tracking_receiver/angle_error'
 BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
 """Modes with a button or a key; `stop` has a separate button, `rate` is the jog, `slave` is for programs."""
 
-OPERATOR_COMMANDS = (*BUTTON_MODES, 'rate', 'take', 'release', 'reset', 'fallback', 'acknowledge', 'shelve',
+OPERATOR_COMMANDS = (*BUTTON_MODES, 'rate', 'take', 'release', 'allow', 'reset', 'fallback', 'acknowledge', 'shelve',
                      'unshelve')  # all except `stop`, which is never refused in advance
 
 FREE_COMMANDS = ('standby', 'take')  # accepted from a client without control
@@ -172,6 +172,8 @@ def refusals(antenna: 'Antenna', holds_control: bool, may_take: bool = False) ->
         refused = {'take': 'you are in control'}
     else:
         refused = {'release': 'control is free'}
+    if not acu.get('requester'):
+        refused.setdefault('allow', 'no program has requested control')
     return {key.removeprefix(REFUSAL_PREFIX): text for key, text in acu.items()
             if key.startswith(REFUSAL_PREFIX)} | refused
 

@@ -78,8 +78,10 @@ def test_a_silent_control_unit_has_no_mode_and_no_commands():
 
 
 @pytest.mark.parametrize('control, holds, may_take, expected', [
-    ('', True, False, {'release': 'control is free', 'tle': 'no elements'}),
-    ('anna', True, False, {'take': 'you are in control', 'tle': 'no elements'}),
+    ('', True, False, {'release': 'control is free', 'tle': 'no elements',
+                        'allow': 'no program has requested control'}),
+    ('anna', True, False, {'take': 'you are in control', 'tle': 'no elements',
+                            'allow': 'no program has requested control'}),
 ])
 def test_the_holder_is_refused_by_the_mode_only(control, holds, may_take, expected):
     assert state.refusals(Station({'control': control, 'refused tle': 'no elements'}), holds, may_take) == expected

@@ -14,11 +14,11 @@ from acu_tracker.geometry import direction
 from acu_tracker.guidance import manual
 from acu_tracker.operating import refusals
 from acu_tracker.unit_law import DRIVE_STATE_TOPIC
-from pedestal_common.graph.modes import MODES
+from pedestal_common.graph.modes import MODE_ROWS, MODES
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import did_you_mean
-from pedestal_common.quantities import AnyRecord, Radians, RadiansPerSecond, Seconds
-from pedestal_common.wire.commands import HELD_REFUSAL, Command, Reply
+from pedestal_common.quantities import AnyRecord, Nanoseconds, Radians, RadiansPerSecond, Seconds
+from pedestal_common.wire.commands import ASK_REFUSAL, HELD_REFUSAL, Command, Reply, program_of
 
 if TYPE_CHECKING:
     from acu_tracker.unit import Acu
@@ -27,27 +27,70 @@ if TYPE_CHECKING:
 UNRESTRICTED_COMMANDS = ('standby', 'stop', 'acu/standby', 'acu/stop')
 
 
+# Modes of a pass. `slave` is not one of them: a program that moves the antenna of a ship leaves it in this mode.
+PASS_MODES = tuple(row.name for row in MODE_ROWS if row.follows and row.name != 'slave')
+
+REQUEST_TIME_NS = 60_000_000_000  # time for which the diagnostics name a program that has requested control
+
+
 class Authority:
     """Control of the antenna: it belongs to at most one client.
 
     While a client holds control, the control unit refuses the commands of other clients, except those that stop the
-    antenna. While control is free, every client may send any command.
+    antenna. While control is free, every client may send any command, except a program that has requested control
+    in a pass, or while another client held it. An operator must allow this program.
     """
     holder = ''     # name of the client that holds control; '' while control is free
 
-    def admit(self, command: Command) -> None:
-        """Raise ValueError for a Command from a client that does not hold control."""
-        if self.holder and command.who != self.holder and command.verb not in (*UNRESTRICTED_COMMANDS, 'take'):
-            raise ValueError(f'{HELD_REFUSAL} {self.holder}')
+    def __init__(self) -> None:
+        self._allowed = self._requester = ''    # programs: that may take control in a pass; of the last request
+        self._refused: set[str] = set()         # programs whose request was refused, and that were not allowed since
+        self._requested_at: Nanoseconds = 0
 
-    def take(self, who: str, role: str) -> Reply:
-        """Give control to the client `who`; raise ValueError if another one holds it and `role` is not supervisor."""
+    def admit(self, command: Command) -> None:
+        """Raise ValueError for a Command from a client that does not hold control. The command of a mode by another
+        client ends what an operator has allowed a program."""
+        program = program_of(command.who)
+        if command.who != self.holder and command.verb not in (*UNRESTRICTED_COMMANDS, 'take'):
+            if self.holder:
+                raise ValueError(f'{HELD_REFUSAL} {self.holder}')
+            if program in self._refused:
+                raise ValueError(f'{ASK_REFUSAL} {program}')
+        if command.verb.removeprefix('acu/') in MODES and program != self._allowed:
+            self._allowed = ''
+
+    def take(self, who: str, role: str, mode: str, now: Nanoseconds) -> Reply:
+        """Give control to the client `who`; raise ValueError if another one holds it and `role` is not supervisor, or
+        if `role` is program and the antenna is not free for this program."""
         if not who:
             raise ValueError('a client that takes control must have a name')
-        if self.holder not in ('', who) and role != 'supervisor':
+        program, held = program_of(who), self.holder not in ('', who)
+        if role == 'program' and program != self._allowed and (held or mode in PASS_MODES):
+            self._refused.add(program)
+            self._requester, self._requested_at = program, now
+            raise ValueError(f'{ASK_REFUSAL} {program}: ' + (f'{HELD_REFUSAL} {self.holder}' if held else
+                                                             f'the antenna is in {mode}'))
+        if held and role == 'operator':
             raise ValueError(f'{HELD_REFUSAL} {self.holder}')
+        self._refused.discard(program)
+        if program == self._requester:
+            self._requester = ''
         before, self.holder = self.holder, who
         return Reply(True, f'control is with {who}' + (f', taken from {before}' if before not in ('', who) else ''))
+
+    def requester(self, now: Nanoseconds) -> str:
+        """Return the name of the program that has requested control within REQUEST_TIME_NS, '' for none."""
+        return self._requester if now - self._requested_at < REQUEST_TIME_NS else ''
+
+    def allow(self, program: str) -> Reply:
+        """Allow a program to take control, in a pass and from another client; '': the last that requested it."""
+        program = program or self._requester
+        if not program:
+            raise ValueError('no program has requested control; client must be its name, such as '
+                             "'rotctld 4533 from 127.0.0.1'")
+        self._allowed, self._requester = program, ''
+        self._refused.discard(program)
+        return Reply(True, f'{program} may take control')
 
     def release(self) -> Reply:
         """Release control."""
@@ -233,7 +276,9 @@ EXECUTORS: dict[str, Executor] = {      # by verb of command_table.ACU_COMMANDS
     'fallback': _choose_fallback,
     'offset': _shift_tables,
     'pointing': _replace_model,
-    'take': lambda unit, command, arguments: unit.authority.take(command.who, arguments['role']),
+    'take': lambda unit, command, arguments: unit.authority.take(
+        command.who, arguments['role'], MODES[unit.parts['outputs']['mode']], unit.now),
+    'allow': lambda unit, command, arguments: unit.authority.allow(arguments['client']),
     'release': lambda unit, command, arguments: unit.authority.release(),
     **dict.fromkeys(('acknowledge', 'shelve', 'unshelve'), _command_alarm),
     'reset': lambda unit, command, arguments: reset(unit),

@@ -72,6 +72,7 @@ def _values(unit: 'Acu', invalid: tuple[str, ...]) -> list[tuple[str, str]]:
     state, outputs = unit.parts['state'], unit.parts['outputs']
     values = [('mode', modes.MODES[outputs['mode']]), ('reason', modes.REASONS[outputs['reason']]),
               ('fallback', modes.FALLBACK_NAMES[int(state['mode']['fallback'])]), ('control', unit.authority.holder),
+              ('requester', unit.authority.requester(unit.now)),
               ('faults', ', '.join(unit.faults)), ('locked', str(int(outputs['locked']))),
               ('coasting', str(int(outputs['coasting']))), ('drive', unit.drive_status)]
     if unit.parameters.stow_pins:

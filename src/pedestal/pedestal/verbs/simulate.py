@@ -9,7 +9,7 @@ from pedestal.verbs.arguments import Verb
 from pedestal_hardware.ins.sentences import KINDS
 
 MAX_RATE_DEG_S, MAX_DELAY_S = 360.0, 10.0  # of a rotator
-ROTATOR_PROTOCOLS = 'gs232', 'easycomm', 'rot2prog'
+ROTATOR_PROTOCOLS = 'gs232', 'gs232_azimuth', 'easycomm', 'rot1prog', 'rot2prog', 'rotctld'
 DEFAULT_INS_PORT = 5010
 MIN_RATE_HZ, MAX_RATE_HZ = 0.1, 200.0  # of the samples of an INS
 DAY_NS = 86_400_000_000_000
@@ -86,15 +86,24 @@ def _add_rotator(parser: argparse.ArgumentParser) -> None:
                         f'{MAX_RATE_DEG_S:g}; default: 6 deg/s')
     parser.add_argument('--delay', type=float, default=0.05, metavar='DELAY', help='time until an answer, 0 to '
                         f'{MAX_DELAY_S:g}; default: 0.05 s')
+    parser.add_argument('--habit', action='append', default=[], metavar='NAME=VALUE', help='what this device does '
+                        'otherwise, for example pulses=2, prompt=true or turned=true; a wrong NAME lists them all')
 
 
 def _rotator(options: argparse.Namespace) -> int:
     from equipment_sim import rotator as simulator
+    from pedestal_common.parameters import build, defaults
+    from pedestal_common.text_files import plain_yaml
+    habits = dict(habit.partition('=')[::2] for habit in options.habit)
+    for name in habits:
+        if name not in (known := defaults(simulator.Habits)):
+            raise ValueError(f'--habit {name}: must be one of ' + ', '.join(known))
     if not 0.0 < options.rate <= MAX_RATE_DEG_S:
         raise ValueError(f'--rate {options.rate:g}: must be above 0 and at most {MAX_RATE_DEG_S:g} deg/s')
     if not (math.isfinite(options.delay) and 0.0 <= options.delay <= MAX_DELAY_S):
         raise ValueError(f'--delay {options.delay:g}: must be 0 to {MAX_DELAY_S:g} s')
-    simulator.serve(options.protocol, options.rate, options.delay)
+    simulator.serve(options.protocol, options.rate, options.delay,
+                    build(simulator.Habits, {name: plain_yaml.parse(text) for name, text in habits.items()}))
     return 0
 
 

@@ -22,6 +22,9 @@ HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL = 'control is held by', 'outside lim
 """Parts of the texts of refusals by which a program distinguishes them: another client has control; the angles are
 outside the limits; an argument is outside its range."""
 
+ASK_REFUSAL = 'an operator must allow'
+"""Part of the text of a refusal of `take`: the antenna is not free for this program."""
+
 MAX_TEXT_CHARACTERS = 1000
 """Largest length of a name or value [characters]. The largest known value, an OMM in JSON, has half of it."""
 
@@ -43,6 +46,11 @@ class Command(typing.NamedTuple):
 
     def __str__(self) -> str:
         return ' '.join((self.verb, *(f'{name}={text}' for name, text in self.arguments.items())))
+
+
+def program_of(client: str) -> str:
+    """Return the name of a client without its TCP port, which all connections of a program have in common."""
+    return client.rsplit(':', 1)[0]
 
 
 class Reply(typing.NamedTuple):

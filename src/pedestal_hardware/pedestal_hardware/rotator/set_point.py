@@ -23,9 +23,9 @@ After a stop the control unit still holds the reference of the mode before, to w
 class Constants(Record):
     """Constants of the device."""
     dead_band: Radians
-    resolution: Radians
+    resolution: Pair            # smallest step [rad]
     low: Pair                   # lower end of the range [rad]
-    high: Pair                  # upper end of the range [rad]
+    high: Pair                  # upper end of the range [rad], the lower one of an axis that the device has not
     timeout_ns: Nanoseconds     # age from which a reference is stale
 
 
@@ -92,7 +92,7 @@ def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) -
         return
     outputs.far = 0
     for i in range(2):
-        distance = abs(inputs.angle[i] - inputs.measured[i])
+        distance = abs(inputs.angle[i] - inputs.measured[i]) if constants.low[i] < constants.high[i] else 0.0
         outputs.far |= inputs.by_hand == 1 and state.moving == 0 and distance > MAX_START_DISTANCE_RAD
     if outputs.far == 1:
         return
@@ -100,8 +100,9 @@ def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) -
     for i in range(2):
         target = inputs.angle[i]
         if not constants.low[i] <= target <= constants.high[i]:
-            target, outputs.outside = min(max(target, constants.low[i]), constants.high[i]), 1
-        outputs.set_point[i] = constants.resolution * np.round(target / constants.resolution)
+            target = min(max(target, constants.low[i]), constants.high[i])
+            outputs.outside |= 1 if constants.low[i] < constants.high[i] else 0
+        outputs.set_point[i] = constants.resolution[i] * np.round(target / constants.resolution[i])
         # The second condition avoids that the same set-point is sent again, because of a step above the dead band.
         moved |= abs(target - state.set_point[i]) > constants.dead_band and outputs.set_point[i] != state.set_point[i]
     if moved:

@@ -80,7 +80,7 @@ def status_section(antenna: PageAntenna) -> dict[str, Json]:
     acu, header = antenna.diagnostics_of('acu'), state.header(antenna)
     texts = {name: antenna.texts.get(topic, '') if acu else '' for name, topic in TEXT_TOPIC_BY_NAME.items()}
     return {'present': bool(acu), **texts, 'mode': header['mode'].text if acu else '',
-            **{key: acu.get(key, '') for key in ('control', 'fallback', 'locked')},
+            **{key: acu.get(key, '') for key in ('control', 'requester', 'fallback', 'locked')},
             'header': {name: shown._asdict() for name, shown in header.items()},
             'axes': [shown._asdict() for shown in state.axis_states(antenna)],
             'model': antenna.pointing_model.title if antenna.pointing_model else '',

@@ -7,9 +7,8 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 
 from pedestal_common.quantities import Degrees, RadiansPerSecond, Seconds
-from pedestal_common.wire.commands import HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL
+from pedestal_common.wire.commands import ASK_REFUSAL, HELD_REFUSAL, LIMITS_REFUSAL, RANGE_REFUSAL, program_of
 from pedestal_operator.remote_node import JOG_REPEAT_PERIOD_S, Remote
-from pedestal_operator.rotator.line_server import address_of
 from pedestal_operator.rotator.pointing import (
     OUTCOME_BUSY,
     OUTCOME_DONE,
@@ -31,9 +30,11 @@ class PendingRequest:
     outcome: int | None     # one of the outcomes in `outcomes`, None before it is known
     reason: str             # of a refusal, one line
 
-    def __init__(self, numbers: Iterable[str], deadline: Seconds, outcome: int | None = None,
-                 reason: str = '') -> None:
+    def __init__(self, numbers: Iterable[str], deadline: Seconds, outcome: int | None = None, reason: str = '',
+                 lose: Callable[[], None] = lambda: None) -> None:
+        """Keep the numbers. lose: called after a refusal because the client is not in control."""
         self.numbers, self.deadline, self.outcome, self.reason = list(numbers), deadline, outcome, reason
+        self._lose = lose
 
     def look(self, remote: Remote, now: Seconds) -> int | None:
         """Take the replies at the time now. Return the outcome, None before it is known."""
@@ -42,6 +43,8 @@ class PendingRequest:
             if reply is not None:
                 self.numbers.remove(number)
                 self.reason = self.reason or ('' if reply.granted else reply.text)
+                if not reply.granted and (ASK_REFUSAL in reply.text or HELD_REFUSAL in reply.text):
+                    self._lose()
         if self.outcome is None and not self.numbers:
             self.outcome = _outcome(self.reason)
         elif self.outcome is None and now >= self.deadline:
@@ -53,6 +56,8 @@ class PendingRequest:
 def _outcome(refusal: str) -> int:
     if not refusal:
         return OUTCOME_DONE
+    if ASK_REFUSAL in refusal:
+        return OUTCOME_REFUSED
     if HELD_REFUSAL in refusal:
         return OUTCOME_BUSY
     return OUTCOME_OUT_OF_REACH if LIMITS_REFUSAL in refusal or RANGE_REFUSAL in refusal else OUTCOME_REFUSED
@@ -63,8 +68,9 @@ class Controller:
     holder: str                     # client in control, '' without one; one that has left controls its motion
     _jog: Sequence[float] | None    # rates (azimuth, elevation) [deg/s]
 
-    def __init__(self, remote: Remote) -> None:
-        self._remote = remote
+    def __init__(self, remote: Remote, role: str = 'program') -> None:
+        """Control by clients with this role (command_table.CONTROL_ROLES of the control unit)."""
+        self._remote, self._role = remote, role
         self.pointing = Pointing(remote)
         self.holder, self._has_left, self._last_command_time = '', False, 0.0
         self._jog, self._last_jog_time, self._was_jogging = None, 0.0, False
@@ -134,16 +140,22 @@ class Controller:
     def _request(self, client: str, now: Seconds, send: Callable[[], str], continues: bool = True) -> PendingRequest:
         """Return the pending request of send(); take control first if necessary. continues: False for a command that
         ends the motion of the set-points."""
-        if self._has_left and address_of(client) == address_of(self.holder):
+        if self._has_left and program_of(client) == program_of(self.holder):
             self._release()  # the same program on a new connection: its motion continues
         if self.holder not in ('', client):
             return PendingRequest([], now, OUTCOME_BUSY, f'{HELD_REFUSAL} {self.holder}')
         if not continues:
             self.pointing.reset()
         self._jog, self._remote.who = None, client
-        numbers = [] if self.holder else [self._remote.request('take')]
+        numbers = [] if self.holder else [self._remote.request('take', {'role': self._role})]
         self.holder, self._last_command_time = client, now
-        return PendingRequest([*numbers, send()], now + CLIENT_REPLY_TIMEOUT_S)
+        return PendingRequest([*numbers, send()], now + CLIENT_REPLY_TIMEOUT_S, lose=lambda: self._lose(client))
+
+    def _lose(self, client: str) -> None:
+        """Forget a client that is not in control; its next command requests control again."""
+        if client == self.holder:
+            self.pointing.reset()
+            self.holder, self._has_left, self._jog = '', False, None
 
 
 def _rates(rates: Sequence[float]) -> dict[str, RadiansPerSecond]:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Generic, TypeAlias, TypeVar
 
 from pedestal_common.stream import Overlong, Splitter, listen
+from pedestal_common.wire.commands import program_of
 
 MAX_UNREAD_BYTES = 65_536  # largest size of unread answers of a client [bytes]; further answers are dropped
 MAX_WAITING_LINES = 100  # largest number of waiting lines of a client; further input is left unread
@@ -22,11 +23,6 @@ READ_CHUNK_BYTES = 65_536  # largest size of one read [bytes]
 Stream: TypeAlias = socket.socket | io.FileIO   # connection to a program, or a serial device
 
 
-def address_of(name: str) -> str:
-    """Return the name of a client without its TCP port. All connections from one address have this name in common."""
-    return name.rsplit(':', 1)[0]
-
-
 class Client:
     """A connected program."""
     stream: Stream
@@ -34,7 +30,7 @@ class Client:
     lines: deque[str | None]    # unanswered lines; None: a line that was too long
     dropped: int                # number of answers dropped because they were not read
     gone: str | None            # reason of its end, None while it is connected
-    refusals: dict[str, str]    # {command: reason of its last logged refusal}
+    refusals: dict[str, str]    # {command: reason of its last logged refusal} of the program
 
     def __init__(self, stream: Stream, name: str, longest: int) -> None:
         self.stream, self.name = stream, name
@@ -104,6 +100,7 @@ class LineServer(Generic[AnyClient]):
                  make_client: Callable[[Stream, str, int], AnyClient]) -> None:
         self._most, self._longest, self._make = most, longest, make_client
         self._selector, self.clients, self.refused_count = selectors.DefaultSelector(), [], 0
+        self._refusals: dict[str, dict[str, str]] = {}     # of each program, also of one that connects for each line
         self._server, self._device_name = listen(address, port, most), f'{kind} {device}'
         self._server.setblocking(False)
         self._selector.register(self._server, selectors.EVENT_READ)
@@ -159,6 +156,7 @@ class LineServer(Generic[AnyClient]):
 
     def _add(self, stream: Stream, name: str) -> None:
         client = self._make(stream, name, self._longest)
+        client.refusals = self._refusals.setdefault(program_of(name), {})
         self.clients.append(client)
         self._selector.register(stream, selectors.EVENT_READ, client)
 

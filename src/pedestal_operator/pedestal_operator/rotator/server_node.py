@@ -24,6 +24,8 @@ class ServerParameters(parameters.Parameters):
     address: str = parameters.text('127.0.0.1', 'address of the server; programs that reach it can move the antenna')
     clients: int = parameters.parameter(8, 1, 64, '', 'largest number of connected clients')
     port: int = tcp_port(0)
+    permission: bool = parameters.flag(True, 'a program takes control only while it is free and the antenna is not in '
+                                       'a pass, or after the command `allow` of an operator; false: while it is free')
 
 
 class ServerNode(Remote, Generic[AnyClient]):
@@ -37,7 +39,7 @@ class ServerNode(Remote, Generic[AnyClient]):
                  make_client: Callable[[Stream, str, int], AnyClient]) -> None:
         super().__init__(name, name, parameters_type=parameters_type)
         p = self.parameters
-        self.controller = Controller(self)
+        self.controller = Controller(self, 'program' if p.permission else 'operator')
         self._checked_arrival = None
         self._server = LineServer(name, p.address, p.port, p.clients, longest, self.device, make_client)
         print(f'{name}: {p.address}:{self._server.port}' + (f' and {self.device}' if self.device else ''), flush=True)

@@ -67,6 +67,7 @@ export function begin() {
   press(find('preset').querySelector('button'), 'preset', requestPreset);
   press(find('take'), 'take', () => request('take', me.role === 'supervisor' ? {role: 'supervisor'} : {}));
   press(find('release'), 'release', () => request('release'));
+  press(find('allow'), 'allow', () => request('allow', {client: state.status.requester}));
   press(find('reset'), 'reset', () => request('reset'));
   for (const name of FALLBACKS) find('choose-fallback').appendChild(make('option', '', name));
   find('choose-fallback').onchange = (event) => request('fallback', {mode: event.target.value});
@@ -77,7 +78,9 @@ export function begin() {
       showModes(sections.fixed.modes);
     }
     if (sections.status) {
-      const {fallback, mode} = sections.status;
+      const {fallback, mode, requester} = sections.status;
+      find('allow').hidden = !requester;
+      find('allow').firstChild.data = `allow ${requester} to take control`;
       for (const button of find('modes').children) button.classList.toggle('on', button.dataset.verb === mode);
       if (document.activeElement !== find('choose-fallback')) find('choose-fallback').value = fallback;
     }
