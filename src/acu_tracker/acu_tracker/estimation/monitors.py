@@ -321,8 +321,8 @@ def score(state: WrongSlope, hypothesis: int) -> float:
 @compiled
 def take_slope(state: WrongSlope, t: Seconds, beam: Beam, error: tuple[Radians, Radians], variance: Radians2,
                gap: Seconds) -> bool:
-    """Take an error (cross-elevation, elevation) of a variance, measured at t with the beam; return True if the slope
-    is wrong. The test begins again after the time `gap` without errors."""
+    """Take an error (cross-elevation, elevation) of a variance, measured at t with the beam; return True if it ends a
+    block and the slope is wrong. The test begins again after the time `gap` without errors."""
     T = t - state.stamp
     if T <= 0.0:
         return False
@@ -336,7 +336,8 @@ def take_slope(state: WrongSlope, t: Seconds, beam: Beam, error: tuple[Radians, 
         state.sum[3 + i] += error[0] * x + error[1] * y
     state.variance += variance
     state.count += 1
-    if state.count == BLOCK_ERROR_COUNT:
-        _take_block(state, t, beam)
+    if state.count < BLOCK_ERROR_COUNT:
+        return False
+    _take_block(state, t, beam)
     return (state.n >= MIN_BLOCK_COUNT
             and max(score(state, 0), score(state, 1), score(state, 2)) > WRONG_SLOPE_MARGIN)
