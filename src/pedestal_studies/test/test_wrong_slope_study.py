@@ -42,6 +42,7 @@ def test_rows_of_every_slope():
     assert table['geo/phase-180', 'in_time_percent']['value'] == pytest.approx(100.0 / 3.0)
     assert table['geo/phase-180', 'known_in_time_percent']['value'] == pytest.approx(100.0 / 3.0)
     assert table['geo/phase-180', 'alarm_steps']['value'] == 200.0
+    assert len(study.figure(values).axes[0].lines) == len(study.GROSS_SLOPES) + 1
     assert table['all/right', 'largest_score']['value'] == 1.5 and table['all/right', 'alarm_percent']['runs'] == 6
     for slope in study.SLOPES:
         assert bool(table[f'all/{slope}', 'alarm_percent']['target']) == (slope not in study.GROSS_SLOPES)

@@ -208,7 +208,7 @@ bracket below 0 counts as 0. The noise alone makes J' about k.
 
 The ratio: with a right slope J is larger than J' for a while after the target has reversed its motion. In closed loops
 with square accelerations of 5 to 40 deg/s2 for 0.2 to 3 s, C/N0 up to 90 dB-Hz and bandwidths of 6 to 20 rad/s, J
-reached 7.2 J'. The margin: with the ratio, these loops and all targets of `pedestal study wrong-slope` reached 1.2.
+reached 7.2 J'. The margin: with the ratio, these loops and all targets of `pedestal study wrong-slope` reached 0.6.
 """
 
 
