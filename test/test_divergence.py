@@ -44,7 +44,7 @@ def test_errors_that_lead_away_are_recognised_and_left(name, wrong):
 
 
 @pytest.mark.parametrize('fault', ['wrong_slope', 'wrong_slope axis=cross_elevation', 'wrong_slope axis=elevation',
-                                   'phase_180'])
+                                   'phase_180', 'wrong_slope factor=1 turn=2.1'])
 @pytest.mark.parametrize('name', ['leo_pass', 'ship_pass', 'uav_flyby'])
 def test_a_slope_that_turns_over_in_autotrack_is_seen_before_the_target_leaves_the_beam(name, fault):
     for seed in range(1, 4):

@@ -32,7 +32,7 @@ class Tracking(Record):
     # monitors of the errors
     repetition: monitors.Repetition
     divergence: monitors.Divergence
-    slope_sign: monitors.SlopeSign
+    wrong_slope: monitors.WrongSlope
 
 
 def initialise(tracking: Records, pointing: PointingParameters) -> None:
@@ -106,7 +106,7 @@ def conditions(tracking: Tracking, constants: 'Constants', t: Seconds, gap: 'Out
 def restart(tracking: Tracking) -> None:
     """Restart the monitors of divergence and slope when a mode begins."""
     monitors.restart_divergence(tracking.divergence)
-    monitors.restart_slope(tracking.slope_sign)
+    monitors.restart_slope(tracking.wrong_slope)
 
 
 @compiled

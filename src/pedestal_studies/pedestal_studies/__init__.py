@@ -17,7 +17,7 @@ STUDIES = {  # {folder: its modules that are studies}; a name has hyphens for th
     'p003_lin_wu_zhu': ('feedforward_speed', 'imm_feedforward', 'manoeuvre', 'pareto'),
     'p004_li_chen_wang': ('rate_measurement', 'telemetry_flight'),
     'system': ('acquisition', 'budget', 'calibration', 'consistency', 'faults', 'filters', 'scenarios',
-               'structure', 'target_filters')}
+               'structure', 'target_filters', 'wrong_slope')}
 
 _STUDY_MODULES = {module.replace('_', '-'): f'{folder}.{module}'
                   for folder, modules in STUDIES.items() for module in modules}

@@ -57,6 +57,17 @@ def test_a_wrong_sign_points_away_from_the_target(fault, signs):
     assert measured[-100:].mean(0) == pytest.approx(np.multiply(OFF, signs), rel=0.05)
 
 
+@pytest.mark.parametrize(('fault', 'factor', 'turn'), (
+    ('wrong_slope factor=0.3', 0.3, 0.0), ('wrong_slope factor=1 turn=1.2', 1.0, 1.2),
+    ('wrong_slope factor=2 turn=-0.4', 2.0, -0.4)))
+def test_a_wrong_slope_multiplies_and_turns_the_errors(fault, factor, turn):
+    """The second error is that of the parameters of the antenna."""
+    injected = errors(run(f'0 {fault}'))[-100:].mean(0)
+    assert injected == pytest.approx(errors(run(antenna__cross_coupling=turn,
+                                                antenna__slope_factor=factor))[-100:].mean(0), rel=0.05)
+    assert complex(*injected) == pytest.approx(factor * complex(*OFF) * np.exp(1j * turn), rel=0.1)
+
+
 def test_a_phase_of_180_degrees_is_that_of_the_parameter():
     assert np.nanmax(np.abs(errors(run('0 phase_180')) - errors(run(antenna__phase_error=math.pi)))) < 1e-12
 

@@ -1,4 +1,5 @@
 """Injected faults of the receiver: their effects on the constants and the messages of its unit."""
+import math
 from typing import Protocol
 
 from pedestal_common.codes import codes
@@ -19,6 +20,8 @@ SLOPE_BOTH, SLOPE_CROSS_ELEVATION, SLOPE_ELEVATION = range(3)  # choices of the 
 class Injected(Record):
     """The faults in force, and the values of receiver.Constants without a fault."""
     power: float                # of receiver.Constants
+    cos_beta: float
+    sin_beta: float
     cos_phi: float
     sin_phi: float
     latency_ns: Nanoseconds
@@ -41,7 +44,7 @@ RANGE_TOPIC = 'tracking_receiver/range'
 def initial(constants: Records) -> Records:
     """Return the Injected (1,) without a fault, for receiver.Constants (1,)."""
     e = Injected.zeros()
-    for name in ('power', 'cos_phi', 'sin_phi', 'latency_ns'):
+    for name in ('power', 'cos_beta', 'sin_beta', 'cos_phi', 'sin_phi', 'latency_ns'):
         e[name] = constants[name]
     return e
 
@@ -49,6 +52,7 @@ def initial(constants: Records) -> Records:
 @compiled
 def _clear_faults(constants: receiver.Constants, injected: Injected) -> None:
     constants.power, constants.latency_ns = injected.power, injected.latency_ns
+    constants.cos_beta, constants.sin_beta = injected.cos_beta, injected.sin_beta
     constants.cos_phi, constants.sin_phi = injected.cos_phi, injected.sin_phi
     constants.sign[0] = constants.sign[1] = 1.0
     injected.clock_ns = 0
@@ -70,7 +74,10 @@ def _apply_fault(constants: receiver.Constants, injected: Injected, fault: int, 
     elif fault == Fault.WRONG_SLOPE:
         for i in range(2):
             if values[0] == SLOPE_BOTH or values[0] == SLOPE_CROSS_ELEVATION + i:
-                constants.sign[i] = -1.0
+                constants.sign[i] = values[1]
+        cos_turn, sin_turn = math.cos(values[2]), math.sin(values[2])
+        constants.cos_beta = injected.cos_beta * cos_turn - injected.sin_beta * sin_turn
+        constants.sin_beta = injected.sin_beta * cos_turn + injected.cos_beta * sin_turn
     elif fault == Fault.PHASE_180:
         constants.cos_phi, constants.sin_phi = -injected.cos_phi, -injected.sin_phi
     elif fault == Fault.CLOCK_STEP:

@@ -105,7 +105,7 @@ class Constants(Record):
     sin_beta: float
     cos_phi: float
     sin_phi: float
-    sign: Pair                  # 1 or -1, of each difference channel
+    sign: Pair                  # slope of each difference channel over its slope without an injected fault
     boresight: Pair             # null of the differences off the beam [rad]
     path: wave_path.Path
     multipath: wave_path.Multipath

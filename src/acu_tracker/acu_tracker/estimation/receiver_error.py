@@ -292,10 +292,10 @@ def _follow_with_frame(state: Target, constants: target.Constants) -> None:
 @compiled
 def _watch_slope(tracking: 'Tracking', params: TrackerParameters, inputs: Inputs, at: Pointing,
                  mat_ed: Rotation) -> None:
-    """Test the sign of the slope with an error and its beam; latch the divergence if the sign is reversed."""
+    """Test the slope with an error and its beam; latch the divergence if the slope is wrong."""
     error, beam = (inputs.cross_elevation, inputs.elevation), monitors.slope_beam(mat_ed, at.A, at.E)
     variance = error_variance(inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz, params.receiver)
-    if monitors.take_slope(tracking.slope_sign, inputs.error_stamp - params.receiver.age, beam, error, variance,
+    if monitors.take_slope(tracking.wrong_slope, inputs.error_stamp - params.receiver.age, beam, error, variance,
                            params.coast_after):
         monitors.latch_divergence(tracking.divergence)
 

@@ -82,8 +82,10 @@ INJECTED_FAULTS = {
         _fault('nan', 'the numbers of the measurements are NaN'),
         _fault('noise', 'white noise on the measured errors', *_noise(0.01, 1.0, 'rad')),
         _fault('fade', 'the carrier is weaker', _number('depth', 'loss of level', 30.0, 200.0, 'dB', low=0.0)),
-        _fault('wrong_slope', 'the chosen difference channels have the wrong sign',
-               _option('axis', 'channel', 'both', 'cross_elevation', 'elevation')),
+        _fault('wrong_slope', 'the chosen difference channels have the wrong sign or slope, or both are turned',
+               _option('axis', 'channel', 'both', 'cross_elevation', 'elevation'),
+               _number('factor', 'slope of the chosen channels over their slope without the fault', -1.0, 5.0),
+               _number('turn', 'angle by which the axes of the errors are turned', 0.0, 3.2, 'rad')),
         _fault('phase_180',
                'the phase of both difference channels against the sum channel is shifted by 180 deg, so both errors '
                'change their sign'),

@@ -172,16 +172,20 @@ def _folder() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix='pedestal-targets-')
 
 
-def loaded(case: str, seed: int | None = None) -> Scenario:
-    """Return the scenario of one of CASES; for a target of HARD_TARGETS its table is written first."""
+def placed(case: str, seed: int | None = None) -> Variant:
+    """Return the variant of one of CASES; for a target of HARD_TARGETS its table is written first."""
     name, variant = _ashore(case.partition('/')[0]).replace('-', '_'), CASES[case].with_(seed=seed)
     if name not in HARD_TARGETS:
-        return variant.load()
+        return variant
     path = pathlib.Path(_folder().name) / f'{name}.csv'
     if not path.exists():
         write(path, name, HARD_TARGET_DURATION_S)
-    return variant.with_({'tracking_receiver.target.track_file.path': str(path)},
-                         duration=HARD_TARGET_DURATION_S).load()
+    return variant.with_({'tracking_receiver.target.track_file.path': str(path)}, duration=HARD_TARGET_DURATION_S)
+
+
+def loaded(case: str, seed: int | None = None) -> Scenario:
+    """Return the scenario of one of CASES."""
+    return placed(case, seed).load()
 
 
 def pointing(name: str, run: int) -> Degrees:

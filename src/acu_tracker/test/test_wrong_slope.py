@@ -1,12 +1,14 @@
-"""Which of two directions moves smoothly: loops of a beam on a target, closed the right and the wrong way round."""
+"""Which of several directions moves smoothly: loops of a beam on a target, closed the right and the wrong way."""
 import math
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from acu_tracker import signals
 from acu_tracker.estimation import monitors
 from acu_tracker.geometry.vector import Vector, turn
+from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE as BOW_NORTH
 
 T, SIGMA, GAP = 0.005, 5e-4, 0.1
@@ -15,9 +17,19 @@ ASHORE = turn(*BOW_NORTH)
 
 @pytest.fixture
 def state():
-    record = monitors.SlopeSign.zeros()[0]
+    record = monitors.WrongSlope.zeros()[0]
     monitors.restart_slope(record)
     return record
+
+
+@compiled
+def alarms(state, beam, errors):
+    """True if the slope counts as wrong at one of the errors (n, 2) [rad] of a beam (n, 2) [rad] near the horizon."""
+    found = False
+    for k in range(len(beam)):
+        found |= monitors.take_slope(state, T * k, monitors.slope_beam(ASHORE, beam[k, 0], beam[k, 1]),
+                                     (errors[k, 0], errors[k, 1]), SIGMA**2, GAP)
+    return found
 
 
 def first(state, angles, errors, t=None, sigma=SIGMA):
@@ -28,7 +40,8 @@ def first(state, angles, errors, t=None, sigma=SIGMA):
         state, t[k], monitors.slope_beam(ASHORE, *at), tuple(e), sigma**2, GAP)), None)
 
 
-TURNED = 2 * monitors.MIN_ERROR_COUNT
+FIRST_VERDICT = monitors.MIN_BLOCK_COUNT * monitors.BLOCK_ERROR_COUNT
+TURNED = 2 * FIRST_VERDICT
 """Error from which on a slope is reversed."""
 
 
@@ -78,10 +91,10 @@ def test_a_reversed_slope_is_seen_while_the_beam_is_less_than_20_sigma_off(state
 
 
 def test_of_the_first_errors_nothing_is_said_and_of_those_off_the_straight_part_of_their_curve_or_none_at_all(state):
-    """Errors that lead away from the first on: what they are is seen, and said from FEWEST on."""
+    """Errors that lead away from the first on: what they are is seen, and said from FIRST_VERDICT on."""
     way = 0.01 * np.exp(0.05 * np.arange(200))
     angles, errors = np.column_stack((np.zeros(200), 0.5 - way)), np.column_stack((np.zeros(200), -way))
-    assert first(state, angles, errors) == monitors.MIN_ERROR_COUNT - 1
+    assert first(state, angles, errors) == FIRST_VERDICT - 1
     u = signals.Inputs.zeros()[0]
     for x, near in ((0.0, True), (0.4, True), (-0.6, False), (math.nan, False)):
         u['cross_elevation'] = 0.02 * x
@@ -94,7 +107,9 @@ def test_the_other_axis_says_nothing_of_it(state):
     angles, errors = loop(np.zeros(2000), -1.0, rng.normal(0.0, SIGMA, 2000))
     errors[:, 0] = rng.normal(0.0, SIGMA, len(errors))
     k = first(state, angles, errors)
-    assert k is not None and state['J'][0, 0] == pytest.approx(state['J'][0, 1], rel=1e-3)
+    assert k is not None
+    right, wrong = monitors.roughnesses(state, 0)
+    assert right == pytest.approx(wrong, rel=1e-3)
 
 
 def test_outliers_noise_and_a_beam_that_is_pushed(state):
@@ -108,25 +123,64 @@ def test_outliers_noise_and_a_beam_that_is_pushed(state):
                  errors - np.column_stack((0.0 * push, push))) is None
 
 
-def test_lines_are_least_squares_and_what_a_straight_line_does_is_none_of_it(state):
-    """The first errors alone make a line; one that all lie on leaves no innovation, whatever its rate."""
-    k = np.arange(300)
-    first(state, np.column_stack((np.zeros(300), np.full(300, 0.5))), np.column_stack((1e-5 * k, -2e-5 * k)))
-    assert np.abs(state['J']).max() < 1e-12
-    restarted = monitors.SlopeSign.zeros()[0]
-    monitors.restart_slope(restarted)
-    e = np.random.default_rng(1).normal(0.0, SIGMA, (100, 2))
-    first(restarted, np.zeros((100, 2)), e)
-    line = np.polyfit(T * np.arange(100), e[:, 1], 1)
-    assert restarted['line'][4] == pytest.approx([np.polyval(line, T * 99), line[0]], rel=1e-9)
+def innovations(y):
+    """Innovations (n, ...) of the means y (n, ...) of blocks. The parabola through all blocks before predicts each;
+    the first three are 0."""
+    k = np.arange(len(y))
+    return np.array([y[i] - sum(c * i**p for p, c in enumerate(np.polynomial.polynomial.polyfit(k[:i], y[:i], 2)))
+                     if i > 2 else np.zeros(y.shape[1]) for i in k])
+
+
+def means(x):
+    """Means (n, ...) of blocks of errors."""
+    return x.reshape(-1, monitors.BLOCK_ERROR_COUNT, *x.shape[1:]).mean(axis=1)
+
+
+def test_the_turn_with_the_smoothest_direction_is_found_as_by_a_search(state):
+    """A beam at rest in azimuth 0 and elevation 0 has fixed axes; the search tries 90 to 270 deg in steps of 0.01."""
+    rng, n = np.random.default_rng(5), 40 * monitors.BLOCK_ERROR_COUNT
+    assert n <= monitors.CURVE_BLOCK_COUNT * monitors.BLOCK_ERROR_COUNT
+    beam = np.cumsum(rng.normal(0.0, 0.04 * SIGMA, (n, 2)), axis=0) @ (1.0, 1.0j)
+    for beta in np.radians([20.0, 100.0, 180.0, -130.0]):
+        monitors.restart_slope(state)
+        error = -np.exp(1j * beta) * beam + rng.normal(0.0, 0.02 * SIGMA, (n, 2)) @ (1.0, 1.0j)
+        pairs = [np.column_stack((x.real, x.imag)) for x in (beam, error)]
+        alarms(state, *pairs)
+        a, b = (innovations(means(x)) @ (1.0, 1.0j) / SIGMA * monitors.BLOCK_ERROR_COUNT**0.5 for x in pairs)
+        share = 1.0 / monitors.SLOPE_BLOCK_COUNT
+        weights = share * (1.0 - share)**np.arange(len(a))[::-1]
+        turns = np.radians(np.arange(90.0, 270.0, 0.01))
+        searched = min((weights * np.abs(a + np.exp(-1j * turn) * b)**2).sum() for turn in turns)
+        right, wrong = monitors.roughnesses(state, 2)
+        assert right == pytest.approx((weights * np.abs(a + b)**2).sum(), rel=1e-4)
+        assert wrong == pytest.approx(searched, rel=1e-3)
+        for axis, (x, y) in enumerate(((a.real, b.real), (a.imag, b.imag))):
+            assert monitors.roughnesses(state, axis) == pytest.approx(
+                [(weights * (x + sign * y)**2).sum() for sign in (1.0, -1.0)], rel=1e-4)
+
+
+def test_what_a_parabola_does_is_none_of_it(state):
+    """One that all lie on leaves no innovation, whatever its rate and acceleration."""
+    k = np.arange(80 * monitors.BLOCK_ERROR_COUNT)
+    first(state, np.zeros((len(k), 2)), np.column_stack((1e-5 * k, 1e-7 * k**2)))
+    assert max(monitors.roughnesses(state, 2)) < 1e-12
+
+
+@pytest.mark.parametrize('jitter', [0.0, 0.3, 3.0])
+def test_noise_and_a_beam_that_shakes_are_no_wrong_slope_in_an_hour(state, jitter):
+    """Errors with the right slope of a target at rest. The rms of the beam is in units of the noise."""
+    rng = np.random.default_rng(6)
+    for _ in range(12):
+        beam = lfilter([0.1], [1.0, -0.9], rng.normal(0.0, 1.0, (60000, 2)), axis=0) / 0.23 * jitter * SIGMA
+        assert not alarms(state, beam, rng.normal(0.0, SIGMA, beam.shape) - beam)
 
 
 def test_it_begins_anew_after_a_gap_and_leaves_old_errors_alone(state):
     beam = monitors.Beam(Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0))
     for k in range(50):
-        monitors.take_slope(state, T * k, beam, (1e-3 * (-1)**k, 0.0), SIGMA**2, GAP)
-    J = state['J'].copy()
+        monitors.take_slope(state, T * k, beam, (1e-3 * (-1)**(k // 4), 0.0), SIGMA**2, GAP)
+    before = state.copy()
     monitors.take_slope(state, T * 49, beam, (1.0, 1.0), SIGMA**2, GAP)
-    assert state['n'] == 50 and (state['J'] == J).all() and J[0, 0] > 0.1
+    assert state == before and monitors.roughnesses(state, 0)[0] > 0.1
     monitors.take_slope(state, T * 49 + 1.01 * GAP, beam, (1.0, 1.0), SIGMA**2, GAP)
-    assert state['n'] == 1 and (state['J'] == 0.0).all()
+    assert (state['n'], state['count']) == (0, 1) and monitors.roughnesses(state, 2) == (0.0, 0.0)
