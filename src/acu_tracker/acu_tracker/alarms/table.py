@@ -127,8 +127,8 @@ ALARM_ROWS = (
            '* following error'),
           'the estimate departs from the target. In autotrack the mean of the last 100 squared innovations, divided '
           'by their variance, exceeds 7 (2 at a loss of signal), or the receiver errors move with the beam '
-          'as with a reversed sign or turned axes. The ACU enters `program`, or `standby` without a program, and refuses '
-          'autotrack until a reset of the alarm',
+          'as with a reversed sign or turned axes. The ACU enters `program`, or `standby` without a program, and '
+          'refuses autotrack until a reset of the alarm',
           "check slope, phase and sign of the receiver's error signals; then reset the alarm"),
     Alarm('signal lost', 'medium', 0.5, 1.0, False,
           ('emergency stop', 'drive silent', 'time jump', 'receiver silent', 'INS lost', 'INS jump', 'receiver noisy',
