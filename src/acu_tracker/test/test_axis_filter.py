@@ -253,7 +253,7 @@ def test_filter_is_honest_when_the_model_fits(with_rate):
 
 
 def test_the_inflation_keeps_the_nees_of_a_consistent_filter():
-    """The error of a Kalman filter is independent of the innovations, hence of the factor; its mean reciprocal is 1."""
+    """The error of a Kalman filter is independent of its innovations, so the mean reciprocal of the factor is 1."""
     mean = norm.expect(lambda z: 1.0 / (1.0 + 0.5 * max(z * z - 1.0, 0.0)), lb=-20.0, ub=20.0)
     assert axis_filter.CONSISTENT_INFLATION == pytest.approx(mean, abs=1e-3)
 
@@ -274,7 +274,7 @@ def test_a_lag_behind_a_smooth_motion_shows_in_the_stated_covariance(distance):
         assert out['inflation'].max() <= axis_filter.MAX_INFLATION
     of_seconds, of_bank_alone = (np.mean(nees, axis=0)[2000:4000].reshape(-1, 100).mean(axis=1)
                                  for nees in (stated, bank))
-    print(f'{distance:g} m: largest NEES of a second {of_seconds.max():.2f}, {of_bank_alone.max():.2f} of the bank alone')
+    print(f'{distance:g} m: largest NEES of a second {of_seconds.max():.2f}, of the bank {of_bank_alone.max():.2f}')
     assert of_seconds.max() < 0.75 * of_bank_alone.max() and of_seconds.mean() < 2.4
 
 

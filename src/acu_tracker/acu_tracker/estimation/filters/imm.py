@@ -29,8 +29,8 @@ def ending(T: Seconds, dwell: Seconds, count: int) -> float:
 
 @inlined
 def mix(mu: float, end: float, arrival: float) -> tuple[float, float]:
-    """Return (cbar, share) of a model of probability mu: its probability before the measurement, and the share in it
-    of models that have ended, which is the weight of the whole bank in `joined`. end: as `ending` returns."""
+    """Return (cbar, share) of a model of probability mu. cbar: its probability before the measurement. share: the weight
+    of the whole bank in `joined`, which is the part of cbar from models that have ended. end: see `ending`."""
     new = end * arrival
     cbar = (1.0 - end) * mu + new
     return cbar, new / cbar if cbar > 0.0 else 0.0
