@@ -29,8 +29,12 @@ def ending(T: Seconds, dwell: Seconds, count: int) -> float:
 
 @inlined
 def mix(mu: float, end: float, arrival: float) -> tuple[float, float]:
-    """Return (cbar, share) of a model of probability mu. cbar: its probability before the measurement. share: the weight
-    of the whole bank in `joined`, which is the part of cbar from models that have ended. end: see `ending`."""
+    """Return (cbar, share) of a model of probability mu.
+
+        cbar    its probability before the measurement
+        share   weight of the whole bank in `joined`: the part of cbar from models that have ended
+        end     probability that the present model has ended, from `ending`
+    """
     new = end * arrival
     cbar = (1.0 - end) * mu + new
     return cbar, new / cbar if cbar > 0.0 else 0.0
