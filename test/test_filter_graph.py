@@ -98,7 +98,7 @@ def test_what_the_filter_tells(told):
     assert np.nansum(probability, axis=2) == pytest.approx(1.0)
     assert [[name for name, there in zip(topics.MOTION_MODELS, np.isfinite(probability[:, i]).all(axis=0)) if there]
             for i in range(2)] == [
-                ['cv', 'ca', 'ca_2', 'ca_3', 'ca_4', 'ca_5', 'ca_6'], ['cv', 'ca']]
+                ['cv', 'ca', *(f'ca_{rung}' for rung in range(2, 9))], ['cv', 'ca']]
     assert np.all(np.abs(found.correlation[on]) <= 1.0) and np.all(found.sigma[on] > 0.0)
     header = list(export.table(bag, 'acu/filter'))
     assert 'azimuth_rate_sigma.position [rad/s]' in header and 'elevation_nis.position' in header

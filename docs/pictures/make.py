@@ -6,6 +6,7 @@
     python -m docs.pictures.make sky demo     the sky plot of a pass, and the overview of the demo
     python -m docs.pictures.make budget       the error budget, from docs/rows.json
     python -m docs.pictures.make loops        the position loops of an antenna from a data sheet
+    python -m docs.pictures.make targets      the default filter beside tuned filters, on hard targets
 """
 import argparse
 import contextlib
@@ -19,6 +20,7 @@ import tempfile
 import time
 
 import matplotlib
+import numpy as np
 from PIL import Image
 from playwright.sync_api import sync_playwright
 from tools.numbers import published
@@ -27,7 +29,7 @@ import pedestal
 from pedestal_bringup.loop import memory_recording
 from pedestal_results import recorded_run
 from pedestal_results.report import figures, run_figures
-from pedestal_studies.system import budget
+from pedestal_studies.system import budget, target_filters
 
 FOLDER = pathlib.Path(__file__).parent
 PORT = 8077
@@ -64,6 +66,9 @@ DATA_SHEET = ('--mirror 9 --inertia-azimuth 28000 --inertia-elevation 21000 --ra
 WHOLE_PASS_S = 345.0  # leo_pass from its rise until it sets
 MIN_BAR_MDEG = 0.2  # terms of the budget that are smaller in both modes have no bar
 MODES = {'program': ('program track', figures.RAW_COLOUR), 'autotrack': ('autotrack', figures.FILTERED_COLOUR)}
+
+
+SHOWN_TARGETS, TARGET_RUNS = ('geo', 'leo', 'uav-60m', 'helicopter', 'jet', 's-motion', 'square', 'chirp'), 4
 
 
 def start(*arguments):
@@ -205,6 +210,13 @@ def make_loops(folder):
     return made('loops')
 
 
+def make_targets(_folder):
+    """Pointing errors of the study target-filters, for targets that accelerate hard and for some that do not."""
+    cases = [f'{target}/{name}' for target in SHOWN_TARGETS for name in ('default', 'tuned', 'manoeuvre')]
+    values = {case: np.array([target_filters.pointing(case, run) for run in range(TARGET_RUNS)]) for case in cases}
+    return make_figure(figures.Spec('target_filters', '', '', (), target_filters.figure), values, 'target_filters')
+
+
 def make_filter(folder):
     """The programs of the page on the library: the file of angles, then its filter."""
     blocks = re.findall(r'```python\n(.*?)```', (FOLDER.parent / 'start' / 'library.md').read_text(), re.DOTALL)
@@ -217,7 +229,7 @@ def make_filter(folder):
 
 
 PICTURES = {'page': make_page, 'ship': make_ship, 'sky': make_sky, 'demo': make_demo, 'budget': make_budget,
-            'loops': make_loops, 'filter': make_filter}
+            'loops': make_loops, 'filter': make_filter, 'targets': make_targets}
 
 
 def main():

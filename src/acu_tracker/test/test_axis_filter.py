@@ -5,6 +5,7 @@ import pytest
 from oracles import van_loan
 from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 from scipy.signal import lfilter
+from scipy.stats import norm
 
 from acu_tracker.estimation.filters import axis_filter, kalman
 from acu_tracker.estimation.filters.kalman import Symmetric
@@ -39,7 +40,12 @@ def noisy(angle, seed=2):
 def variances(f, c, T):
     """(p11, p12, p22) T after the last measurement."""
     axis_filter.predict(f, c, T)
-    return axis_filter.variances(axis_filter.expected(f))
+    return axis_filter.variances(f, axis_filter.expected(f))
+
+
+def of_bank(row):
+    """Variance, covariance and rate variance of an Estimate without the inflation."""
+    return np.array([row['variance'], row['covariance'], row['rate_variance']]) / row['inflation']
 
 
 def rms(values):
@@ -116,8 +122,7 @@ def test_estimate_is_the_batch_posterior(kind, with_rate, bandwidth):
     gain = np.linalg.solve(C[np.ix_(rows, rows)] + noise - cross - cross.T, C_xY.T).T
     x, P = gain @ Y + [y[0], 0.0, 0.0], C[-3:, -3:] - gain @ C_xY.T
     np.testing.assert_allclose([got['angle'], got['rate'], got['acceleration']], x, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose([got['variance'], got['covariance'], got['rate_variance']], P[(0, 0, 1), (0, 1, 1)],
-                               rtol=1e-6)
+    np.testing.assert_allclose(of_bank(got), P[(0, 0, 1), (0, 1, 1)], rtol=1e-6)
 
 
 def bound(noise, bandwidth):
@@ -173,8 +178,7 @@ def test_steady_state_solves_the_riccati_equation(kind, with_rate):
     H, R = np.eye(n)[:2 if with_rate else 1], np.diag([SIGMA**2, RATE_SIGMA**2][:2 if with_rate else 1])
     P = solve_discrete_are(F.T, H.T, Q, R)
     P = P - P @ H.T @ np.linalg.solve(H @ P @ H.T + R, H @ P)
-    np.testing.assert_allclose([got['variance'], got['covariance'], got['rate_variance']], P[(0, 0, 1), (0, 1, 1)],
-                               rtol=1e-5)
+    np.testing.assert_allclose(of_bank(got), P[(0, 0, 1), (0, 1, 1)], rtol=1e-5)
 
 
 @pytest.mark.parametrize('kind', SOURCES)
@@ -206,8 +210,7 @@ def test_variance_of_constant_gains_is_that_of_lyapunov(kind, alpha):
     K = np.array(kalman.constant_gain(alpha, *gains, T))[:n, None]
     F, H = np.array([[1, T, T * T / 2], [0, 1, T], [0, 0, 1]])[:n, :n], np.eye(n)[:1]
     P = solve_discrete_lyapunov((np.eye(n) - K @ H) @ F, SIGMA**2 * K @ K.T)
-    np.testing.assert_allclose([out[-1][name] for name in ('variance', 'covariance', 'rate_variance')],
-                               P[(0, 0, 1), (0, 1, 1)], rtol=1e-6)
+    np.testing.assert_allclose(of_bank(out[-1]), P[(0, 0, 1), (0, 1, 1)], rtol=1e-6)
     S = (F @ P @ F.T)[0, 0] + SIGMA**2
     assert out[-1]['nis'] == pytest.approx(out[-1]['innovation']**2 / S, rel=1e-6)
     if n == 2:
@@ -247,6 +250,32 @@ def test_filter_is_honest_when_the_model_fits(with_rate):
     a, b, c = out['variance'], out['covariance'], out['rate_variance']
     nees = (c * e * e - 2 * b * e * de + a * de * de) / (a * c - b * b)
     assert np.mean(nees) == pytest.approx(2.0, abs=0.2)
+
+
+def test_the_inflation_keeps_the_nees_of_a_consistent_filter():
+    """The error of a Kalman filter is independent of its innovations, so the mean reciprocal of the factor is 1."""
+    mean = norm.expect(lambda z: 1.0 / (1.0 + 0.5 * max(z * z - 1.0, 0.0)), lb=-20.0, ub=20.0)
+    assert axis_filter.CONSISTENT_INFLATION == pytest.approx(mean, abs=1e-3)
+
+
+@pytest.mark.parametrize('distance', [60.0, 150.0])
+def test_a_lag_behind_a_smooth_motion_shows_in_the_stated_covariance(distance):
+    """Mean NEES of each second about the closest point of a flyby. The inflation lowers the largest."""
+    t, angle, _ = flyby(distance)
+    rate = np.gradient(angle, t)
+    stated, bank = [], []
+    for seed in range(12):
+        out = run(t, noisy(angle, seed), kind='imm')
+        e, de, a, b, c = (out['angle'] - angle, out['rate'] - rate, out['variance'], out['covariance'],
+                          out['rate_variance'])
+        stated.append((c * e * e - 2 * b * e * de + a * de * de) / (a * c - b * b))
+        bank.append(stated[-1] * out['inflation'])
+        assert (out['inflation'] >= axis_filter.CONSISTENT_INFLATION)[1:].all()
+        assert out['inflation'].max() <= axis_filter.MAX_INFLATION
+    of_seconds, of_bank_alone = (np.mean(nees, axis=0)[2000:4000].reshape(-1, 100).mean(axis=1)
+                                 for nees in (stated, bank))
+    print(f'{distance:g} m: largest NEES of a second {of_seconds.max():.2f}, of the bank {of_bank_alone.max():.2f}')
+    assert of_seconds.max() < 0.75 * of_bank_alone.max() and of_seconds.mean() < 2.4
 
 
 @pytest.mark.parametrize('kind', FILTER_KINDS)

@@ -55,8 +55,8 @@ def test_against_filterpy(with_rate):
         oracle.update(np.array([[y[k]], [y_rate[k]]]) if with_rate else np.array([[y[k]]]))
         np.testing.assert_allclose([out[k][name] for name in ('angle', 'rate', 'acceleration')], oracle.x[:, 0],
                                    rtol=1e-6, atol=1e-8)
-        np.testing.assert_allclose([out[k][name] for name in ('variance', 'covariance', 'rate_variance')],
-                                   oracle.P[(0, 0, 1), (0, 1, 1)], rtol=1e-6)
+        stated = np.array([out[k][name] for name in ('variance', 'covariance', 'rate_variance')])
+        np.testing.assert_allclose(stated / out[k]['inflation'], oracle.P[(0, 0, 1), (0, 1, 1)], rtol=1e-6)
         np.testing.assert_allclose(out[k]['mu'][:3], oracle.mu, rtol=1e-6, atol=1e-9)
     # The bank has used all its models on the way.
     assert (out['mu'][:, :3].max(axis=0) > 0.5).sum() >= 2 and np.isnan(out['mu'][:, 3:]).all()
@@ -65,10 +65,15 @@ def test_against_filterpy(with_rate):
 @pytest.mark.parametrize('T', [1e-4, 0.3, 20.0])
 @pytest.mark.parametrize('count', [2, 3, 4])
 def test_switching_is_the_chain_in_continuous_time(T, count):
-    dwell = 2.5
-    stay, switch = imm.switching(T, dwell, count)
-    generator = (np.full((count, count), 1.0 / (count - 1)) - np.eye(count) * count / (count - 1)) / dwell
-    np.testing.assert_allclose(np.where(np.eye(count), stay, switch), expm(generator * T), rtol=1e-12)
+    dwell, arrival = 2.5, np.arange(1.0, count + 1.0) / np.arange(1.0, count + 1.0).sum()
+    chain = expm(count / ((count - 1) * dwell) * (np.tile(arrival, (count, 1)) - np.eye(count)) * T)
+    held = np.linspace(0.1, 1.0, count) / np.linspace(0.1, 1.0, count).sum()
+    for j in range(count):
+        cbar, share = imm.mix(held[j], imm.ending(T, dwell, count), arrival[j])
+        assert cbar == pytest.approx(held @ chain[:, j], rel=1e-12)
+        # The share is spread over the bank by its probabilities; the rest is the model itself.
+        weights = share * held + np.where(np.arange(count) == j, 1.0 - share, 0.0)
+        np.testing.assert_allclose(weights, held * chain[:, j] / cbar, rtol=1e-10)
 
 
 @pytest.mark.parametrize('distance', [1e-2, 1.0, 100.0])

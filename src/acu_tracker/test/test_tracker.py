@@ -7,7 +7,7 @@ from scipy.stats import chi2
 
 from acu_tracker.estimation import receiver_error
 from acu_tracker.estimation import target as estimate
-from acu_tracker.estimation.filters import target_filter
+from acu_tracker.estimation.filters import axis_filter, target_filter
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import (
     AxisMeasurement,
@@ -225,6 +225,7 @@ def test_an_error_is_compared_with_what_was_told_in_the_coast(kind, gap):
         target.observe(k * T, 0.1 + 0.02 * k * T + 0.5 * 0.02 * max(k * T - 2.0, 0.0)**2)
     stamp = 299 * T + gap
     angle, variance = target.outlook(stamp)[0], target.variances(gap)[0]
+    variance /= axis_filter.inflation(target.state[0]['filter']['axis'][0])
     outcome, azimuth = target.observe(stamp, 0.3)
     assert outcome == receiver_error.OUTCOME_ACCEPTED and azimuth.nu == pytest.approx(0.3 - angle, abs=1e-12)
     assert azimuth.S == pytest.approx(variance + SIGMA**2, rel=1e-12)

@@ -195,8 +195,8 @@ def test_the_wiener_filter_is_the_steady_kalman_filter_of_its_model():
                           0.0 * t, 1.0, out)
     covariance = sigma**2 * window_filter.displacement(600, alpha) + noise**2 * np.eye(600)
     w = window_filter.wiener(600, alpha, sigma, noise)
-    assert w[0] @ covariance @ w[0] == pytest.approx(out['variance'][-1], rel=0.02)
-    assert w[1] @ covariance @ w[1] == pytest.approx(out['rate_variance'][-1], rel=0.02)
+    assert w[0] @ covariance @ w[0] == pytest.approx(out['variance'][-1] / out['inflation'][-1], rel=0.02)
+    assert w[1] @ covariance @ w[1] == pytest.approx(out['rate_variance'][-1] / out['inflation'][-1], rel=0.02)
 
 
 def test_window_estimates_follow_a_line_exactly():

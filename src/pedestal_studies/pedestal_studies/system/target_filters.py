@@ -84,8 +84,26 @@ def _turning(t: Times, speed: MetersPerSecond, turn: Radians, leg: Seconds, load
                  np.full(t.size, up))
 
 
+def _accelerating(t: Times, sign: Callable[[Times], Floats]) -> tuple[Floats, Floats]:
+    """Return a target at 30 deg of elevation, whose azimuth accelerates by 11 deg/s2 times the sign."""
+    rate = _integrated(t, math.radians(11.0) * sign(t), 0.0)
+    return _integrated(t, rate - 0.5 * (rate.max() + rate.min()), 0.0), np.full(t.size, math.radians(30.0))
+
+
+def _square(t: Times) -> Floats:
+    """Return +-1, which jumps every second."""
+    return 1.0 - 2.0 * (np.floor(t + 0.5) % 2)
+
+
+def _chirp(t: Times) -> Floats:
+    """Return +-1, which jumps every 3 s at the start and every 0.2 s after a minute."""
+    slow, fast = 1.0 / 6.0, 1.0 / 0.4
+    return np.sign(np.cos(2.0 * math.pi * (slow * t + (fast - slow) * t * t / 120.0)))
+
+
 HARD_TARGETS: dict[str, Callable[[Times], tuple[Floats, Floats]]] = {
-    's_motion': s_motion, 'quadcopter': quadcopter, 'launch_vehicle': launch_vehicle,
+    's_motion': s_motion, 'square': functools.partial(_accelerating, sign=_square),
+    'chirp': functools.partial(_accelerating, sign=_chirp), 'quadcopter': quadcopter, 'launch_vehicle': launch_vehicle,
     'jet': functools.partial(_turning, speed=250.0, turn=math.pi, leg=4.0, load=6.0, start=(-2000.0, 2500.0, 1200.0)),
     'stunt_plane': functools.partial(_turning, speed=60.0, turn=2.0 * math.pi, leg=2.0, load=3.0,
                                      start=(-250.0, 750.0, 250.0)),
@@ -136,10 +154,15 @@ def _singer(alpha: float, sigma_deg: float) -> dict[str, Json]:
     return _both(kind='singer', **{'singer.alpha': alpha, 'singer.sigma': math.radians(sigma_deg)})
 
 
+def _quiet_elevation(alpha: float, sigma_deg: float) -> dict[str, Json]:
+    return {**_singer(alpha, sigma_deg), 'elevation.filter.singer.sigma': math.radians(0.01 * sigma_deg)}
+
+
 TUNED_FILTERS = {
     'uav-60m': _one('ca', 5e-3, 1.5e-3), 'uav-150m': _one('ca', 1e-3, 1.8e-4), 'uav-500m': _one('ca', 5e-5, 1.5e-5),
     'leo': _one('ca', 1.2e-5, 1.2e-5), 'geo': _one('cv', 1e-9, 1e-9), 's-motion': _singer(1.0, 3.0),
-    'quadcopter': _singer(1.0, 1.0), 'launch-vehicle': _one('ca', math.radians(0.01), math.radians(0.01)),
+    'square': _quiet_elevation(2.0, 11.5), 'chirp': _quiet_elevation(2.0, 29.0), 'quadcopter': _singer(1.0, 1.0),
+    'launch-vehicle': _one('ca', math.radians(0.01), math.radians(0.01)),
     'jet': _singer(0.3, 1.0), 'stunt-plane': _singer(0.3, 1.0),
     'helicopter': _one('ca', math.radians(0.03), math.radians(0.03))}
 """{target: parameters of its filter of one model}. A target seen from a ship has the filter of the target ashore.

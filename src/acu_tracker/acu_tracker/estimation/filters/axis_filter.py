@@ -40,6 +40,14 @@ if TYPE_CHECKING:
 
 BANK_SIZE = len(COLUMN_NAMES)  # largest number of models in a bank
 
+TREND_MEMORY = 4.0
+"""Memory of the mean innovation over that of the filter [-]. A short one shows a lag soon, a long one a small lag."""
+
+MAX_INFLATION = 10.0  # largest factor of the stated variances [-]
+CONSISTENT_INFLATION = 0.891
+"""Factor of the stated variances without a lag [-]. A consistent filter sometimes shows a lag by chance. This factor
+keeps its mean NEES."""
+
 P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index('p33')  # columns in `p`
 
 
@@ -51,6 +59,7 @@ class Constants(Record):
     models: Annotated[Sequence[motion_models.MotionModelRecord], (BANK_SIZE,)]
     states: int     # largest number of states of a model: 2 or 3
     dwell: Seconds  # mean time for which one model holds
+    arrival: Annotated[Floats, (BANK_SIZE,)]    # probability of each model after the end of another
     alpha: float    # gain of a filter of constant gain [-]; 0 for a Kalman filter
     beta: float     # its second gain [-]
     gamma: float    # its third gain [-]
@@ -75,6 +84,8 @@ class Filter(Record):
     # x1, p11, c1, c2, c3 of the kalman.PreviousAngle of each model, for this prediction
     past: Annotated[Floats, (BANK_SIZE, 5)]
     weights: Annotated[Floats, (BANK_SIZE,)]    # scratch
+    trend: Radians          # mean of the last innovations of the angle
+    trend_variance: Radians2    # its variance in a consistent filter; 0: no innovation yet
     # variance per second [rad2/s] that each prediction adds to the variance of the angle, for the random walk of the
     # attitude error (estimation/receiver_error.py)
     drift_variance_rate: float
@@ -88,9 +99,10 @@ class Estimate(Record):
     angle: Radians
     rate: RadiansPerSecond
     acceleration: RadiansPerSecond2
-    variance: Radians2      # of the angle
-    covariance: float       # of angle and rate [rad2/s]
-    rate_variance: float    # [rad2/s2]
+    variance: Radians2      # of the angle, with the `inflation`
+    covariance: float       # of angle and rate, with the inflation [rad2/s]
+    rate_variance: float    # with the inflation [rad2/s2]
+    inflation: float        # factor in these three [-]
     innovation: Radians     # of the angle
     rate_innovation: RadiansPerSecond
     nis: float              # normalised innovation squared [-]
@@ -103,6 +115,7 @@ def constants(params: 'FilterParameters', noise_bandwidth: Hertz = 0.0) -> Recor
     c['count'] = len(bank.models)
     c['models'][0, :len(bank.models)] = bank.models
     c['bank'], c['states'] = np.sum(1 << bank.models['column']), bank.models['states'].max()
+    c['arrival'][0, :len(bank.models)] = bank.arrival
     c['dwell'], (c['alpha'], c['beta'], c['gamma']) = bank.dwell, bank.gains
     c['rate_measurement'], c['noise_bandwidth'] = params.rate_measurement, 2.0 * math.pi * noise_bandwidth
     return c
@@ -147,6 +160,7 @@ def start(state: Filter, constants: Constants, y: Radians, R: Radians2, rate_sig
                                      Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
     _reset_acceleration_variance(state, constants)
     state.last_angle, state.correlated = y, 1
+    state.trend = state.trend_variance = 0.0
 
 
 @compiled
@@ -197,13 +211,10 @@ def corrected(state: Filter) -> Gaussian:
 def predict(state: Filter, constants: Constants, T: Seconds) -> None:
     """Predict the bank to T >= 0 after its last measurement; only the prior fields change."""
     state.T = T
-    stay, switch = imm.switching(T, constants.dwell, constants.count)
+    end, bank = imm.ending(T, constants.dwell, constants.count), corrected(state)
     for j in range(constants.count):
-        if switch == 0.0:
-            state.mu_prior[j], g = state.mu[j], imm.alone(state.x, state.p, j)
-        else:
-            state.mu_prior[j] = imm.mix(state.mu, constants.count, stay, switch, j, state.weights)
-            g = imm.combine(state.weights, state.x, state.p, constants.count)
+        state.mu_prior[j], share = imm.mix(state.mu[j], end, constants.arrival[j])
+        g = imm.joined(_gaussian(state.x[j], state.p[j]), bank, share)
         model = motion_models.discretised(constants.models[j], g.x.acceleration, T)
         _put(state.x_prior, state.p_prior, j, Gaussian(kalman.predicted_mean(g.x, model.mean, T),
                                                        kalman.predicted_covariance(g.P, model.F, model.Q, T)))
@@ -225,9 +236,23 @@ def expected_motion(state: Filter) -> AxisMotion:
 
 
 @compiled
-def variances(gaussian: Gaussian) -> AxisVariances:
-    """Return the variances of angle and rate."""
-    return AxisVariances(gaussian.P.p11, gaussian.P.p12, gaussian.P.p22)
+def inflation(state: Filter) -> float:
+    """Return the factor of the stated variances over those of the bank.
+
+    The innovations of a consistent filter have mean 0. A filter that lags behind a motion has an error b, and its last
+    innovations have the mean b. The square of this mean over its variance in a consistent filter is 1 + k b^2 on
+    average; 2 / k is about the variance of the angle. The factor adds b^2 to this variance, within its limit."""
+    if state.trend_variance == 0.0:
+        return 1.0
+    excess = state.trend * state.trend / state.trend_variance - 1.0
+    return min(CONSISTENT_INFLATION * (1.0 + 0.5 * max(excess, 0.0)), MAX_INFLATION)
+
+
+@compiled
+def variances(state: Filter, gaussian: Gaussian) -> AxisVariances:
+    """Return the variances of angle and rate that the filter states with a Gaussian of the bank."""
+    factor, P = inflation(state), gaussian.P
+    return AxisVariances(factor * P.p11, factor * P.p12, factor * P.p22)
 
 
 @compiled
@@ -265,11 +290,15 @@ def correct(state: Filter, constants: Constants, measurement: AxisMeasurement) -
     rho = _correlation(state, constants)
     # own: variance of the part of the noise that is not correlated with the last angle.
     own = (1.0 - rho * rho) * measurement.variance
+    # nu_mean, nu_square: mean of the innovation, and of its expected square, over the models
+    nu_mean = nu_square = 0.0
     for j in range(constants.count):
         g, o = _gaussian(state.x_prior[j], state.p_prior[j]), _previous_angle(state.past[j])
         nu = measurement.angle - rho * state.last_angle - (g.x.angle - rho * o.x1)
         S = g.P.p11 - 2.0 * rho * o.c1 + rho * rho * o.p11 + own
         state.weights[j] = kalman.log_likelihood(nu, S)
+        nu_mean += state.mu_prior[j] * nu
+        nu_square += state.mu_prior[j] * (S + nu * nu)
         # A filter of constant gain uses alpha only where the Kalman gain p11 / S is below alpha. After a start or a
         # gap the Kalman gain is larger, and is used.
         if g.P.p11 < constants.alpha * S:
@@ -286,6 +315,16 @@ def correct(state: Filter, constants: Constants, measurement: AxisMeasurement) -
         _put(state.x, state.p, j, g)
     imm.weigh(state.mu_prior, state.weights, constants.count, state.mu)
     state.last_angle, state.correlated = measurement.angle, 1
+    _take_innovation(state, nu_mean, nu_square - nu_mean * nu_mean, own)
+
+
+@compiled
+def _take_innovation(state: Filter, nu: Radians, S: Radians2, own: Radians2) -> None:
+    """Add an innovation of the bank, of variance S, to the mean of the last ones; own: part of S by the measurement.
+    The memory of this mean is TREND_MEMORY times that of the filter."""
+    gain = (1.0 - own / S) / TREND_MEMORY
+    state.trend += gain * (nu - state.trend)
+    state.trend_variance = (1.0 - gain) * (1.0 - gain) * state.trend_variance + gain * gain * S
 
 
 @compiled
@@ -293,10 +332,13 @@ def outlook(state: Filter, constants: Constants, T: Seconds) -> AxisMotion:
     """Return the AxisMotion that `predict` would give for T >= 0 after the last measurement. The prior fields do not
     change. Because no covariance is computed, this is faster than `predict`."""
     angle = rate = acceleration = 0.0
-    stay, switch = imm.switching(T, constants.dwell, constants.count)
+    end = imm.ending(T, constants.dwell, constants.count)
+    bank = imm.mean(state.mu, state.x, constants.count)
     for j in range(constants.count):
-        mu = imm.mix(state.mu, constants.count, stay, switch, j, state.weights)
-        x = kalman.predicted_mean(imm.mean(state.weights, state.x, constants.count),
+        mu, share = imm.mix(state.mu[j], end, constants.arrival[j])
+        own, rest = state.x[j], 1.0 - share
+        x = kalman.predicted_mean(AxisMotion(rest * own[0] + share * bank.angle, rest * own[1] + share * bank.rate,
+                                             rest * own[2] + share * bank.acceleration),
                                   motion_models.mean_transition(constants.models[j], T), T)
         angle += mu * x.angle
         rate += mu * x.rate
@@ -347,5 +389,6 @@ def estimates(constants: Records, t: Times, y: Floats, R: Floats, y_rate: Floats
         predict(state, model, max(t[k] - last, 0.0))
         g = expected(state)
         o.angle, o.rate, o.acceleration = g.x
-        o.variance, o.covariance, o.rate_variance = variances(g)
+        o.variance, o.covariance, o.rate_variance = variances(state, g)
+        o.inflation = inflation(state)
         probabilities(state, model, o.mu)

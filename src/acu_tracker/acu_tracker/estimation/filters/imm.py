@@ -19,40 +19,40 @@ from pedestal_common.compiled import compiled, inlined
 from pedestal_common.quantities import Floats, Seconds
 
 
-@compiled
-def switching(T: Seconds, dwell: Seconds, count: int) -> tuple[float, float]:
-    """Return (probability that the same model holds after T, that of a given other model); dwell: mean time of one
-    model. The models form a Markov chain in continuous time. After one model each other model follows with equal
-    probability. The first probability is near exp(-T / dwell) for short T, and near 1 / count for long T."""
-    if count == 1:
-        return 1.0, 0.0
-    switch = -math.expm1(-T * count / ((count - 1) * dwell)) / count
-    return 1.0 - (count - 1) * switch, switch
+@inlined
+def ending(T: Seconds, dwell: Seconds, count: int) -> float:
+    """Return the probability that the present model ends within T; dwell: mean time of one of `count` equally probable
+    models. The models form a Markov chain in continuous time. A model that ends is followed by model j with the
+    probability arrival[j], whichever model it was; this may be the same model again."""
+    return -math.expm1(-T * count / ((count - 1) * dwell)) if count > 1 else 0.0
 
 
 @inlined
-def mix(mu: Floats, count: int, stay: float, switch: float, j: int, weights: Floats) -> float:
-    """Set weights[i] to the probability that model i held before, if model j holds now. Return cbar_j, the probability
-    of model j before the measurement. If cbar_j is 0, model j gets the weight 1 and so keeps its own state."""
-    total = 0.0
-    for i in range(count):
-        weights[i] = mu[i] * (stay if i == j else switch)
-        total += weights[i]
-    if total == 0.0:
-        weights[j] = 1.0
-        return 0.0
-    for i in range(count):
-        weights[i] /= total
-    return total
+def mix(mu: float, end: float, arrival: float) -> tuple[float, float]:
+    """Return (cbar, share) of a model of probability mu.
+
+        cbar    its probability before the measurement
+        share   weight of the whole bank in `joined`: the part of cbar from models that have ended
+        end     probability that the present model has ended, from `ending`
+    """
+    new = end * arrival
+    cbar = (1.0 - end) * mu + new
+    return cbar, new / cbar if cbar > 0.0 else 0.0
 
 
 @inlined
-def alone(x: Floats, p: Floats, j: int) -> Gaussian:
-    """Return the Gaussian of model j alone, equal to that of `combine` with the weight 1 for this model."""
-    # Adding 0.0 turns -0.0 into 0.0, as the sum in `combine` does.
-    return Gaussian(AxisMotion(0.0 + x[j, 0], 0.0 + x[j, 1], 0.0 + x[j, 2]),
-                    Symmetric(0.0 + p[j, 0], 0.0 + p[j, 1], 0.0 + p[j, 2], 0.0 + p[j, 3], 0.0 + p[j, 4],
-                              0.0 + p[j, 5]))
+def joined(own: Gaussian, bank: Gaussian, share: float) -> Gaussian:
+    """Return the mean and the covariance of a model mixed with a share of the whole bank (eq. 10, 11 for two parts).
+
+    Because every model that ends has the same successors, this equals the mixture of all models one by one, at a cost
+    that does not grow with their number."""
+    d1, d2, d3 = bank.x.angle - own.x.angle, bank.x.rate - own.x.rate, bank.x.acceleration - own.x.acceleration
+    rest, P, B = 1.0 - share, own.P, bank.P
+    k1, k2, k3 = rest * share * d1, rest * share * d2, rest * share * d3
+    return Gaussian(AxisMotion(own.x.angle + share * d1, own.x.rate + share * d2, own.x.acceleration + share * d3),
+                    Symmetric(rest * P.p11 + share * B.p11 + k1 * d1, rest * P.p12 + share * B.p12 + k1 * d2,
+                              rest * P.p13 + share * B.p13 + k1 * d3, rest * P.p22 + share * B.p22 + k2 * d2,
+                              rest * P.p23 + share * B.p23 + k2 * d3, rest * P.p33 + share * B.p33 + k3 * d3))
 
 
 @inlined

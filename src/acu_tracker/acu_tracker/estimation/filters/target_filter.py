@@ -172,7 +172,8 @@ def read(state: Filter) -> Estimate:
 def read_axes(state: Filter) -> Estimate:
     """Return the Estimate of the axis filters alone, at the instant of their last `predict`."""
     azimuth, elevation = axis_filter.expected(state.axis[0]), axis_filter.expected(state.axis[1])
-    return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(azimuth), axis_filter.variances(elevation)))
+    return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(state.axis[0], azimuth),
+                                                         axis_filter.variances(state.axis[1], elevation)))
 
 
 @compiled

@@ -191,9 +191,11 @@ def _moved(x: Floats, p: Floats, model: MotionModelRecord, T: Seconds) -> None:
 @compiled
 def predict(state: State, constants: Constants, T: Seconds) -> None:
     """Mix the modes and predict them by T into the prior fields; the estimate stays as it is."""
-    stay, switch = imm.switching(T, constants.dwell, 2)
+    end = imm.ending(T, constants.dwell, 2)
     for j in range(2):
-        state.mu_prior[j] = imm.mix(state.mu, 2, stay, switch, j, state.weights)
+        state.mu_prior[j], share = imm.mix(state.mu[j], end, 0.5)
+        for i in range(2):
+            state.weights[i] = share * state.mu[i] + (1.0 - share if i == j else 0.0)
         _mixed(state.x, state.p, state.weights, state.x_prior[j], state.p_prior[j])
         _moved(state.x_prior[j], state.p_prior[j], constants.models[j], T)
 
