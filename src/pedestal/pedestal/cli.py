@@ -26,6 +26,8 @@ VERBS = {
     'parameters': ('design', 'list the parameters of a node: default, range, unit, meaning'),
     'status': ('operate', 'print the state of a running antenna'),
     'mode': ('operate', 'set the mode of a running antenna control unit (ACU)'),
+    'stop': ('operate', 'stop both axes of a running antenna and hold them'),
+    'drive': ('operate', 'enable, disable, stop or reset the drive of a running antenna'),
     'ask': ('operate', 'send a command to a running node'),
     'operate': ('operate', 'operate a running antenna by hand on this terminal'),
     'live': ('operate', 'show a running graph in Foxglove or Lichtblick'),

@@ -176,7 +176,7 @@ class RecorderNode(shell.Shell):
                 if not checked or count(data, info):
                     put(data, info)
                 else:
-                    self._bag.write_foreign(index, self._stamp, info['source_timestamp'], data)
+                    self._bag.write_foreign(index, self._now(), info['source_timestamp'], data)
             except (BagError, OrderError) as error:
                 self._fail(str(error))
         return take
@@ -297,6 +297,10 @@ class RecorderNode(shell.Shell):
             self._without_stamp += 1
         return self._stamp
 
+    def _now(self) -> Nanoseconds:
+        """Return the time of the drive. Before its first message in realtime, UTC takes its place."""
+        return self._stamp or (0 if self.graph.lockstep else self.clock()[1])
+
     def _on_arrival(self, index: int, topic: nodes.Link) -> Take:
         """Return the function that writes a message of a topic at its arrival in realtime."""
         write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
@@ -310,7 +314,7 @@ class RecorderNode(shell.Shell):
             put(data, info)
 
         def put_unstamped(data: bytes, info: MessageInfo) -> None:
-            write(index, self._stamp, info['source_timestamp'], data)
+            write(index, self._now(), info['source_timestamp'], data)
 
         def put_diagnostics(data: bytes, info: MessageInfo) -> None:
             if self._sender(data) != self.name:

@@ -162,18 +162,34 @@ def verify(bag: Bag) -> Report:
     problems += _unrecorded_steps([rows[name] for name in of_steps], bag.start, grid)
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
-    drive = bag.last_values(nodes.DRIVE_NODE)
-    lost, of_all = count(drive.get('lost_steps', '')), count(drive.get('step', ''))
     planned = planned - bag.start if of_steps and planned is not None else None
     return Report(str(bag.path), checks, bag.breaks + problems, grid.steps,
                   grid.period / 1e9 if grid.period else np.nan, configuration.line(bag), grid.last, planned,
-                  None if lost is None or of_all is None else (lost, of_all), bag.foreign,
+                  _lost_steps(bag), bag.foreign,
                   grid.first / 1e9 if before else None)
 
 
 def count(text: str) -> int | None:
     """Return a text of the diagnostics as a whole number, None if the text is no whole number."""
     return int(text) if text.isdecimal() and len(text) < 20 else None
+
+
+def _lost_steps(bag: Bag) -> tuple[int, int] | None:
+    """Return (lost steps, all steps) by the diagnostics of the drive, None without them.
+
+    The drive counts since its start. In a graph that was started by hand, the recorder may start much later, and the
+    number of a step may count from midnight. The first diagnostics in its bag are then the begin of both counts.
+    """
+    last = _step_counts(bag.last_values(nodes.DRIVE_NODE))
+    if last is None or bag.configuration['scenario']:
+        return last
+    first = _step_counts(bag.last_values(nodes.DRIVE_NODE, first=True)) or (0, 0)
+    return (last[0] - first[0], last[1] - first[1]) if first[0] <= last[0] and first[1] <= last[1] else last
+
+
+def _step_counts(values: Mapping[str, str]) -> tuple[int, int] | None:
+    lost, steps = count(values.get('lost_steps', '')), count(values.get('step', ''))
+    return None if lost is None or steps is None else (lost, steps)
 
 
 def steps_before(bag: Bag) -> int:
@@ -198,7 +214,8 @@ def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut:
     rate = topic.rate if topic else ''
     if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
         # Missing steps of the graph, and messages of foreign publishers, are no fault of the recording.
-        return ([] if stamp.size else ['no message']) + _numbering(bag.recorded(name), cut)
+        absent = [] if stamp.size or _may_be_absent(bag, name) else ['no message']
+        return absent + _numbering(bag.recorded(name), cut)
     # A node outside the graph publishes samples. It may be restarted, and it may repeat a stamp.
     problems = _order(stamp) if topic and len(topic.writers) == 1 and rate != 'sample' else []
     if topic and rate == 'step':
@@ -206,7 +223,7 @@ def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut:
         if ours and not np.array_equal(rows.stamp, rows.log):
             problems.append(f'{np.sum(rows.stamp != rows.log)} messages with a log time that differs from their stamp')
     # The `once` topics are latched, so a restarted recorder receives their message again, in its own file.
-    elif rate == 'once' and not (not cut) <= stamp.size <= len(bag.files):
+    elif rate == 'once' and not (not (cut or _may_be_absent(bag, name))) <= stamp.size <= len(bag.files):
         problems.append(f'{stamp.size} messages, must be 1')
     elif rate == 'second' and bag.metadata.get('pacing') == 'lockstep' and grid.period:
         problems += _seconds(bag, name, stamp, grid)
@@ -215,6 +232,17 @@ def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut:
     if ours and rate != 'sample':
         problems += _numbering(bag.recorded(name), cut)
     return problems
+
+
+def _may_be_absent(bag: Bag, name: str) -> bool:
+    """Return True for a topic that needs no message in a realtime bag of a graph that was started by hand: the topic
+    of a node that does not run, or one that only simulated equipment publishes, such as adu/truth."""
+    if bag.configuration['scenario'] or bag.metadata.get('pacing') != 'realtime':
+        return False
+    graph = bag.graph
+    of_node = [other for other, topic in graph.items() if other in bag.topics and topic.rate == 'step'
+               and set(topic.writers) & set(graph[name].writers)]
+    return nodes.plain(name) in nodes.SIMULATED_TOPICS or not any(bag.rows(other).size for other in of_node)
 
 
 def _differences(claimed: Mapping[str, int], counts: Mapping[str, int]) -> str:

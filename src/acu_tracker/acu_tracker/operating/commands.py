@@ -127,8 +127,12 @@ def reset(unit: 'Acu') -> Reply:
         unit.reset_stamp = float(unit.parts['state']['stamp'])
     if cause != annunciator.NO_ALARM:
         return Reply(False, f'refused: the cause of {table.ALARM_NAMES[cause]} is still there')
-    drive = f'; the drive reports {unit.drive_state}'
-    return Reply(True, 'cleared' + (drive if unit.drive_state.startswith(('fault', 'emergency stop')) else ''))
+    if not unit.drive_state.startswith(('fault', 'emergency stop')):
+        return Reply(True, 'cleared')
+    tripped = unit.drive_state.startswith('fault')
+    return Reply(True, f'the ACU is reset, the drive is not yet: {unit.drive_state}; '
+                 + ('its reset is requested, `pedestal drive reset_faults` shows its reply' if tripped else
+                    'only `pedestal drive reset_faults` ends an emergency stop'))
 
 
 def _rates(arguments: Arguments) -> list[RadiansPerSecond]:
