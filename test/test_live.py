@@ -272,7 +272,7 @@ def test_the_recording_has_every_track_once(station):
     (['--pacing', 'realtime', '--foxglove'], "--foxglove needs foxglove: pip install 'pedestal_operator[live]'")))
 def test_what_cannot_be_is_refused_before_anything_runs(options, said, pedestal, monkeypatch):
     monkeypatch.setitem(sys.modules, 'foxglove', None)
-    assert pedestal('run', 'uav_flyby', *options) == (1, '', f'pedestal: error: {said}\n')
+    assert pedestal('run', 'uav_flyby', *options) == (2, '', f'pedestal: error: {said}\n')
 
 
 @pytest.mark.parametrize('server', ('rotctld', 'easycomm', 'page', 'foxglove'))
@@ -290,7 +290,7 @@ def test_the_files_for_viewers_are_written(pedestal, tmp_path):
     code, said, _ = pedestal('live', '--layouts', tmp_path / 'viewers')
     assert code == 0 and str(tmp_path / 'viewers' / 'tracking.json') in said.splitlines()
     assert (tmp_path / 'viewers' / 'pedestal.urdf').read_text() == frames.PEDESTAL_URDF
-    assert pedestal('live', '--layouts', tmp_path / 'viewers')[0] == 1
+    assert pedestal('live', '--layouts', tmp_path / 'viewers')[0] == 2
 
 
 @pytest.mark.parametrize('name', ['leo_pass', 'ship_pass'])

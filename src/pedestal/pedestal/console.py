@@ -164,7 +164,10 @@ def _show(table: TextTable, title: str = '', width: int = 0, framed: bool = Fals
         shown.add_column(Text(head), justify='right' if right else 'left', no_wrap=not framed)
     for row in table.rows:
         shown.add_row(*map(Text, row))
-    Console(width=max(Console().width, width) if width else None).print(shown)
+    console = Console(width=max(Console().width, width) if width else None)
+    with console.capture() as captured:     # because rich ends the process if the reader of a pipe has closed it
+        console.print(shown)
+    print(captured.get(), end='')
 
 
 def show_results(title: str, columns: Sequence[str], results: Sequence[Values], whole: Values,

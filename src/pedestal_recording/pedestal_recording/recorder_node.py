@@ -42,6 +42,7 @@ step. Such messages can come late: Fast DDS resends the messages that a subscrib
 next heartbeat, by default every 3 s.
 """
 
+SYNC_PERIOD_S = 5.0  # time between two synchronisations of the disk in realtime [s]
 LAST_OPENED_TOPIC = 'diagnostics'
 """Topic to which the recorder subscribes last, when the executor already serves all other topics.
 
@@ -145,6 +146,7 @@ class RecorderNode(shell.Shell):
         self._opening = self.every(0.0, self._record_last)
         if not self.graph.lockstep:
             self.every(1.0, lambda: self._write(self._bag.flush))
+            self.every(SYNC_PERIOD_S, self._bag.synchronise)
 
     def _record(self, index: int, topic: nodes.Link) -> None:
         """Subscribe to a topic. The queue keeps all messages in lockstep, and those of several seconds in realtime."""

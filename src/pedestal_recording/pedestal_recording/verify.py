@@ -53,6 +53,7 @@ class Report:
     # number of lost steps and number of all steps in the last diagnostics of the drive, None if unknown
     lost: tuple[int, int] | None
     foreign: list[str]  # lines about the foreign messages, which the check leaves out
+    damaged: bool   # True if the recording has no end, as after a killed recorder
     cut: Seconds | None     # time at which a recording of only a part of its run begins; None for a whole run
 
     @property
@@ -110,7 +111,8 @@ class Report:
         verdict = 'complete' if self.complete else f'NOT complete, {count} problem{"s" if count > 1 else ""}'
         if self.aborted:
             verdict = f'{"part of a run" if self.cut is not None else "aborted"}; up to its end {verdict}'
-        return [*lines, f'{self.path}: {verdict}: {total} messages, {len(self.topics)} topics, {steps}']
+        cure = [f'pedestal recover {self.path} makes a complete bag of the undamaged part'] if self.damaged else []
+        return [*lines, *cure, f'{self.path}: {verdict}: {total} messages, {len(self.topics)} topics, {steps}']
 
 
 _S = typing.TypeVar('_S', Nanoseconds, Stamps)
@@ -165,7 +167,7 @@ def verify(bag: Bag) -> Report:
     planned = planned - bag.start if of_steps and planned is not None else None
     return Report(str(bag.path), checks, bag.breaks + problems, grid.steps,
                   grid.period / 1e9 if grid.period else np.nan, configuration.line(bag), grid.last, planned,
-                  _lost_steps(bag), bag.foreign,
+                  _lost_steps(bag), bag.foreign, bool(bag.damage),
                   grid.first / 1e9 if before else None)
 
 

@@ -122,7 +122,7 @@ def test_refused_in_one_line(case, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr('sys.stdin', io.StringIO())
     write(tmp_path / 'bag', ROWS)
     options, text = REFUSED[case]
-    assert cli.main(['replay', str(tmp_path / 'bag'), *options]) == 1
+    assert cli.main(['replay', str(tmp_path / 'bag'), *options]) == 2
     error = capsys.readouterr().err
     assert text in error and error.count('\n') == 1
 

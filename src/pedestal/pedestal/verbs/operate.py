@@ -288,6 +288,9 @@ def _operate(options: argparse.Namespace) -> int:
 def _add_live(parser: argparse.ArgumentParser) -> None:
     """Serves every topic of the graph, its frames and the model of the pedestal on a WebSocket of this machine,
     read-only, until Ctrl-C. Needs the extra pedestal_operator[live].
+
+        pedestal live                        then open ws://127.0.0.1:8765 in Foxglove
+        pedestal live --layouts viewers      only write the files of the viewers
     """
     parser.add_argument('--port', type=int, metavar='PORT', help='TCP port on 127.0.0.1; default: 8765')
     parser.add_argument('--beams', type=int, metavar='N', help='number of beams of an electronic array; '

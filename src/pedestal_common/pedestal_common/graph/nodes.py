@@ -229,17 +229,25 @@ SIMULATED_PARTS = {SIMULATED_DRIVES.name: DRIVE_NODE, SIMULATED_IQ.name: MONOPUL
 """{name of a node that simulates a part of the equipment: node that commands or receives this part}."""
 
 SERVER_ROWS = (
-    Node('rotctld', 'pedestal_operator.rotctld_node', doc="serves the protocol of Hamlib's rotctld",
+    Node('rotctld', 'pedestal_operator.rotctld_node', 'pedestal_operator.rotctld_node:RotctldParameters',
+         doc="serves the protocol of Hamlib's rotctld",
          runs='pedestal_operator.rotctld_node:RotctldNode'),
-    Node('easycomm', 'pedestal_operator.easycomm_node', doc='serves EasyComm I, II and III',
+    Node('easycomm', 'pedestal_operator.easycomm_node', 'pedestal_operator.easycomm_node:EasycommParameters',
+         doc='serves EasyComm I, II and III',
          runs='pedestal_operator.easycomm_node:EasycommNode'),
-    Node('operator_page', 'pedestal_operator.operator_page', doc="serves the operator's page for a browser",
+    Node('operator_page', 'pedestal_operator.operator_page', 'pedestal_operator.page_node:PageParameters',
+         doc="serves the operator's page for a browser",
          runs='pedestal_operator.page_node:PageNode'),
-    Node('live', 'pedestal_operator.live_node', doc='serves every topic to Foxglove',
+    Node('live', 'pedestal_operator.live_node', 'pedestal_operator.live_node:LiveParameters',
+         doc='serves every topic to Foxglove',
          runs='pedestal_operator.live_node:LiveNode'),
     Node('frames', 'pedestal_operator.frames_node', doc='publishes robot_description and tf, for RViz',
          runs='pedestal_operator.frames_node:FramesNode'))
 """Rows of the servers, which connect other programs to a graph and belong to none. Each reads the topics it needs."""
+
+STANDALONE_NODES = {node.executable.removesuffix('_node').removeprefix('operator_'): node
+                    for node in (*HARDWARE_ROWS, *SERVER_ROWS) if node.parameters}
+"""{short name of an executable, such as rotator or page: its Node}, of the nodes that are no row of NODES."""
 
 EXECUTABLES = {node.executable: node for node in (*NODES, *HARDWARE_ROWS, *SERVER_ROWS) if node.program}
 """{name of an executable: its Node}."""
