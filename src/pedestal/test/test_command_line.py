@@ -30,6 +30,21 @@ def test_an_unknown_word_is_refused_with_the_usage_of_its_verb(words, usage, exp
     assert ended.value.code == 2 and said.startswith(f'usage: pedestal {usage} ') and expected in said
 
 
+@pytest.mark.parametrize(('change', 'expected'), (
+    ('azimuth.feedforward.bandwidth=12', 'acu.azimuth.feedforward.bandwidth, acu.elevation.feedforward.bandwidth'),
+    ('adu.azimuth.feedforward.bandwidth=12', 'acu.azimuth.feedforward.bandwidth'),
+    ('cn0_dbhz=50', 'tracking_receiver.receiver.cn0_dbhz'), ('acu.wind.gust=3', 'adu.wind.gust.seed')))
+def test_a_wrong_parameter_gets_the_nearest_names_over_all_sections(change, expected, pedestal):
+    code, _, errors = pedestal('run', 'uav_flyby', '--param', change)
+    assert code == 2 and f'; the nearest names are {expected}' in errors
+
+
+@pytest.mark.parametrize('node', ('acu', 'drive', 'rotator_node', 'page', 'operator_page', 'level_receiver', 'adu'))
+def test_the_parameters_of_every_node_are_listed(node, pedestal):
+    code, said, _ = pedestal('parameters', node)
+    assert code == 0 and 'graph.start' in said
+
+
 @pytest.mark.parametrize('words', (['run', 'no_such'], ['run', 'uav_flyby', '--param', 'acu.no_such=1'],
                                    ['mode', 'preset', '30'], ['parameters', 'no_such'], ['verify', '--x'],
                                    ['run', 'uav_flyby', '--params-file', 'no_such.yaml'],

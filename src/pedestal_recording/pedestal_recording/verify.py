@@ -237,8 +237,8 @@ def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut:
 
 
 def _may_be_absent(bag: Bag, name: str) -> bool:
-    """Return True for a topic that needs no message in a realtime bag of a graph that was started by hand: the topic
-    of a node that does not run, or one that only simulated equipment publishes, such as adu/truth."""
+    """Return True for a topic that needs no message in a realtime bag of a graph that was started by hand. It is the
+    topic of a node that does not run, or one that only simulated equipment publishes, such as adu/truth."""
     if bag.configuration['scenario'] or bag.metadata.get('pacing') != 'realtime':
         return False
     graph = bag.graph

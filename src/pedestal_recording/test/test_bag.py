@@ -1,6 +1,8 @@
 import hashlib
 import math
+import os
 import pathlib
+import threading
 
 import numpy as np
 import pytest
@@ -461,6 +463,27 @@ def test_verify_finds_swapped_messages(tmp_path, rows):
     report = verify(load(write(tmp_path / 'b', swapped)))
     problems = [problem for check in report.topics for problem in check.problems]
     assert problems == ['1 stamps go back, the first from 0.105000 to 0.100000 s']
+
+
+def test_the_disk_stores_a_recording_while_it_is_written(tmp_path, rows, monkeypatch):
+    """The flushed messages are in the file when its storing begins; storings do not queue."""
+    stored, begun = [], threading.Event()
+
+    def slow(descriptor):
+        stored.append((os.fstat(descriptor).st_ino, os.fstat(descriptor).st_size))
+        begun.wait(60.0)
+    monkeypatch.setattr(os, 'fdatasync', slow)
+    writer = Writer(tmp_path / 'b', RECORDED, METADATA)
+    for name, stamp, data in rows[:500]:
+        writer.write(NAMES.index(name), stamp, stamp, data)
+    writer.flush()
+    for _ in range(3):
+        writer.synchronise()
+    begun.set()
+    writer._storing.join()
+    file = (tmp_path / 'b' / 'b_0.mcap').stat()
+    assert stored == [(file.st_ino, file.st_size)] and file.st_size > 10_000
+    writer.close()
 
 
 def drive_counts(k, step, lost):

@@ -455,3 +455,10 @@ def test_the_worst_is_the_one_that_was_not_measured(tmp_path):
     values = np.array([0.2, math.nan, 0.1, 0.3])
     assert statistics.ranking('pointing_rms_deg', values).tolist() == [1, 3, 0, 2]
     assert statistics.ranking('isolation_db', values).tolist() == [1, 2, 0, 3]
+
+
+@pytest.mark.parametrize(('name', 'duration', 'size'), (
+    ('leo_pass', 28.0, 32), ('leo_pass', 100.0, 15), ('leo_pass', 600.0, 8), ('ship_pass', 20.0, 4),
+    ('ship_pass', 120.0, 1)))
+def test_a_batch_is_short_so_that_a_stop_keeps_the_rows_of_the_last_seconds(name, duration, size):
+    assert ensemble._batch_size(plan(Variant(name, duration=duration), 100)) == size

@@ -36,7 +36,9 @@ LOOP_REQUIREMENTS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'position
 
 
 def _add_scenarios(_parser: argparse.ArgumentParser) -> None:
-    """    pedestal scenarios
+    """The verbs that run something take the name of a scenario, or a file.
+
+        pedestal scenarios
         pedestal run uav_flyby               run one of them
     """
 
