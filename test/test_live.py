@@ -234,7 +234,7 @@ def test_the_verbs_of_a_terminal_are_served(graph, run_process, start_process, e
     assert rows['acu', 'mode'] == 'standby'
     assert verb('ask', 'take', '--who', 'hand').returncode == 0
     done = verb('mode', 'preset', '--az', '20', '--el', '35', '--who', 'hand')
-    assert (done.returncode, done.stdout) == (0, 'acu: mode is preset\n'), done.stderr
+    assert (done.returncode, done.stdout) == (0, 'acu: mode is preset, moving\n'), done.stderr
     client.until(lambda: client.heard['acu/mode'][-1].data == 'preset')
     table = start_process([*PEDESTAL, 'program', 'leo_pass'], ROS_DOMAIN_ID=str(run.domain_id))
     assert 'acu/program_track sent' in begins_with(table, 2)
@@ -281,7 +281,7 @@ def test_a_port_in_use_ends_a_run_before_anything_runs(server, pedestal, tmp_pat
         port = taken.getsockname()[1]
         told = pedestal('run', 'uav_flyby', '--pacing', 'realtime', '--bag', tmp_path / 'bag', f'--{server}', port)
         assert told == (
-            1, '', f'pedestal: error: --{server}: port {port} of 127.0.0.1 is in use: --{server} PORT selects another '
+            2, '', f'pedestal: error: --{server}: port {port} of 127.0.0.1 is in use: --{server} PORT selects another '
             'port\n')
     assert list(tmp_path.iterdir()) == []
 
