@@ -143,6 +143,12 @@ CASES = {
 """{maker of a bag: {verb: text of its error, None for success}}; '' stands for all other verbs."""
 
 
+def test_verify_of_a_recording_that_breaks_off_names_the_repair(tmp_path, capsys):
+    truncated(tmp_path / 'bag')
+    assert cli.main(['verify', str(tmp_path / 'bag')]) == 1
+    assert f"pedestal recover {tmp_path / 'bag'} makes a complete bag" in capsys.readouterr().out.splitlines()[-2]
+
+
 @pytest.mark.parametrize('make', CASES, ids=lambda make: make.__name__)
 def test_bad_bag(make, tmp_path, capsys, one_line):
     path = tmp_path / 'bag'

@@ -19,7 +19,7 @@ ROWS = [f'{t},{47.4 + 1e-3 * t:.6f},8.52,1500' for t in range(20)]
 
 def refused(capsys, one_line, *arguments):
     """The line with which `pedestal` refuses these arguments."""
-    assert cli.main([str(argument) for argument in arguments]) == 1
+    assert cli.main([str(argument) for argument in arguments]) == 2
     return one_line(capsys.readouterr().err)
 
 

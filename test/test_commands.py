@@ -89,4 +89,4 @@ def test_a_run_with_an_operator_is_made_again_to_the_byte(scheduled, start_proce
     ('2 preset azimuth=nan', 'preset: azimuth = nan rad: must be -20 to 20')))
 def test_a_wrong_schedule_is_refused_before_anything_runs(schedule, said, pedestal):
     code, _, errors = pedestal('run', 'uav_flyby', '--param', f'acu.commands={schedule}')
-    assert code == 1 and said in errors
+    assert code == 2 and said in errors

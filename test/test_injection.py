@@ -65,4 +65,4 @@ def test_a_node_with_faults_is_recomputed(injected, node, pedestal):
     ('adu.inject=2 gost', "inject = '2 gost': unknown command 'gost'; did you mean 'gust'?")))
 def test_a_fault_that_cannot_be_is_refused_before_anything_runs(inject, said, pedestal):
     code, _, errors = pedestal('run', 'ship_pass', '--param', inject)
-    assert code == 1 and said in errors
+    assert code == 2 and said in errors

@@ -131,4 +131,4 @@ def test_the_wrong_frame_of_a_driver_ends_its_attitude_within_10_s(start_process
     (('--scenario', 'leo_pass'), 'leo_pass: has no ship'), (('--scenario', 'ship_pas'), 'ship_pass')])
 def test_wrong_options_of_the_simulated_ins_are_named(given, reason, pedestal):
     code, _, errors = pedestal('simulate', 'ins', *given)
-    assert code == 1 and reason in errors
+    assert code == 2 and reason in errors

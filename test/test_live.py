@@ -234,7 +234,7 @@ def test_the_verbs_of_a_terminal_are_served(graph, run_process, start_process, e
     assert rows['acu', 'mode'] == 'standby'
     assert verb('ask', 'take', '--who', 'hand').returncode == 0
     done = verb('mode', 'preset', '--az', '20', '--el', '35', '--who', 'hand')
-    assert (done.returncode, done.stdout) == (0, 'acu: mode is preset\n'), done.stderr
+    assert (done.returncode, done.stdout) == (0, 'acu: mode is preset, moving\n'), done.stderr
     client.until(lambda: client.heard['acu/mode'][-1].data == 'preset')
     table = start_process([*PEDESTAL, 'program', 'leo_pass'], ROS_DOMAIN_ID=str(run.domain_id))
     assert 'acu/program_track sent' in begins_with(table, 2)
@@ -272,7 +272,7 @@ def test_the_recording_has_every_track_once(station):
     (['--pacing', 'realtime', '--foxglove'], "--foxglove needs foxglove: pip install 'pedestal_operator[live]'")))
 def test_what_cannot_be_is_refused_before_anything_runs(options, said, pedestal, monkeypatch):
     monkeypatch.setitem(sys.modules, 'foxglove', None)
-    assert pedestal('run', 'uav_flyby', *options) == (1, '', f'pedestal: error: {said}\n')
+    assert pedestal('run', 'uav_flyby', *options) == (2, '', f'pedestal: error: {said}\n')
 
 
 @pytest.mark.parametrize('server', ('rotctld', 'easycomm', 'page', 'foxglove'))
@@ -281,7 +281,7 @@ def test_a_port_in_use_ends_a_run_before_anything_runs(server, pedestal, tmp_pat
         port = taken.getsockname()[1]
         told = pedestal('run', 'uav_flyby', '--pacing', 'realtime', '--bag', tmp_path / 'bag', f'--{server}', port)
         assert told == (
-            1, '', f'pedestal: error: --{server}: port {port} of 127.0.0.1 is in use: --{server} PORT selects another '
+            2, '', f'pedestal: error: --{server}: port {port} of 127.0.0.1 is in use: --{server} PORT selects another '
             'port\n')
     assert list(tmp_path.iterdir()) == []
 
@@ -290,7 +290,7 @@ def test_the_files_for_viewers_are_written(pedestal, tmp_path):
     code, said, _ = pedestal('live', '--layouts', tmp_path / 'viewers')
     assert code == 0 and str(tmp_path / 'viewers' / 'tracking.json') in said.splitlines()
     assert (tmp_path / 'viewers' / 'pedestal.urdf').read_text() == frames.PEDESTAL_URDF
-    assert pedestal('live', '--layouts', tmp_path / 'viewers')[0] == 1
+    assert pedestal('live', '--layouts', tmp_path / 'viewers')[0] == 2
 
 
 @pytest.mark.parametrize('name', ['leo_pass', 'ship_pass'])

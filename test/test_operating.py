@@ -3,6 +3,7 @@ import json
 import math
 import os
 import pty
+import re
 import select
 import subprocess
 import time
@@ -58,9 +59,12 @@ def mode(client, name):
 
 
 def test_one_shot_verbs_ask_wait_and_say(running, terminal, tmp_path):
-    _, client = running
-    said = terminal('mode', 'preset', '--az', '20', '--el', '35')
-    assert (said.returncode, said.stdout) == (0, 'acu: mode is preset\n'), said.stderr
+    run, client = running
+    said = terminal('mode', 'preset', '--az', '20', '--el', '35', '--wait')
+    first, last = said.stdout.splitlines()
+    assert (said.returncode, first) == (0, 'acu: mode is preset, moving'), said.stderr
+    assert last.startswith('acu: preset, reached after ')
+    assert f'graph: domain {run.domain_id}, scenario ' in said.stderr
     mode(client, 'preset')
     refused = terminal('mode', 'preset', '--el', '1000')
     assert refused.returncode == 1
@@ -163,13 +167,31 @@ def test_the_antenna_is_stowed_with_its_pins_and_unstowed(running, terminal):
         client.until(lambda: client.heard['adu/stow_pins'] and client.heard['adu/stow_pins'][-1].data == (
             f'azimuth {where}, elevation {where}'))
     pins('out')
-    assert terminal('mode', 'stow').returncode == 0
+    stowed = terminal('mode', 'stow', '--wait')
+    assert stowed.returncode == 0 and 'acu: mode is stowing\nacu: stowed after ' in stowed.stdout
     pins('in')
     refused = terminal('mode', 'preset', '--az', '10')
     assert (refused.returncode, refused.stdout) == (1, 'acu: refused: stow pins not out; mode is stow\n')
     assert terminal('mode', 'unstow').returncode == 0
     pins('out')
     mode(client, 'standby')
+
+
+def test_the_drive_is_commanded_and_replies(running, terminal):
+    """An emergency stop is open to everyone. Only a reset of the drive ends it, once the axes stand."""
+    assert terminal('ask', 'take', '--who', 'anna').returncode == 0
+    refused = terminal('drive', 'disable', '--who', 'bert')
+    assert (refused.returncode, refused.stdout) == (1, 'adu: refused: control is held by anna\n')
+    assert terminal('drive', 'emergency_stop', '--who', 'bert').stdout == 'adu: drive is emergency stop\n'
+    assert terminal('ask', 'release', '--who', 'anna').returncode == 0
+    refused = terminal('drive', 'enable')
+    assert refused.returncode == 1 and 'an emergency stop is latched' in refused.stdout
+    assert 'only `pedestal drive reset_faults` ends an emergency stop' in terminal('ask', 'reset').stdout
+    assert re.search('^alarm +emergency stop: high, ', terminal('status').stdout, re.MULTILINE)
+    deadline = time.monotonic() + 60.0
+    while (reset := terminal('drive', 'reset_faults')).returncode != 0:
+        assert 'the axes still move' in reset.stdout and time.monotonic() < deadline
+    assert terminal('drive', 'disable').returncode == terminal('drive', 'enable').returncode == 0
 
 
 def test_every_request_of_a_burst_is_replied_to(running):
@@ -196,7 +218,7 @@ def test_without_a_graph_it_is_said_in_one_line(run_process, reserve_domain, one
         done = run_process([*PEDESTAL, *arguments, '--timeout', '1'], 60.0, ROS_DOMAIN_ID=str(reserve_domain()))
         assert done.returncode == 1 and 'is a graph running?' in one_line(done.stderr)
     done = run_process([*PEDESTAL, 'operate'], 60.0)
-    assert done.returncode == 1 and 'needs a terminal' in one_line(done.stderr)
+    assert done.returncode == 2 and 'needs a terminal' in one_line(done.stderr)
 
 
 def test_live_commands_are_answered_recorded_and_recomputed(start_run, connect, patient, pedestal):

@@ -229,6 +229,6 @@ def test_samples_are_never_overwritten(tmp_path, capsys, one_line):
     assert cli.main(['samples', str(tmp_path / 'new')]) == 0
     (tmp_path / 'new' / 'ship.csv').write_text('mine')
     (tmp_path / 'new' / 'flight.csv').unlink()
-    assert cli.main(['samples', str(tmp_path / 'new')]) == 1
+    assert cli.main(['samples', str(tmp_path / 'new')]) == 2
     assert 'ship.csv already exists' in one_line(capsys.readouterr().err)
     assert not (tmp_path / 'new' / 'flight.csv').exists()

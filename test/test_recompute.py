@@ -429,7 +429,7 @@ BAD = {
 def test_bad_input_is_one_line(case, runs, pedestal, one_line):
     arguments, text = BAD[case]
     code, _, errors = pedestal('nowhere' if case == 'no bag' else runs['leo'].bag, *arguments)
-    assert code == 1
+    assert code == 2
     assert text in one_line(errors)
 
 
@@ -440,7 +440,7 @@ def test_a_topic_of_another_type_is_refused(runs, pedestal, tmp_path, one_line):
         for connection in connections:
             writer.write(connection, 0, messages.serialize(messages.String(data='well')))
     code, _, errors = pedestal(tmp_path / 'other')
-    assert code == 1
+    assert code == 2
     assert 'joint_states is std_msgs/msg/String; must be sensor_msgs/msg/JointState' in one_line(errors)
 
 

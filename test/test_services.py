@@ -311,3 +311,22 @@ def test_stamps_that_go_back_are_named(plant):
     plant.client.publish(JOINTS, joints)
     status = plant.client.diagnosed('joint_states: 1 dropped: stale: ')
     assert status.level == 1
+
+
+def test_the_lost_steps_in_the_diagnostics_of_the_drive_are_an_alarm(plant):
+    """Only the drive counts the commands that came too late. Its step number counts from midnight."""
+    client = plant.client
+    client.write('diagnostics')
+    client.read('acu/alarms')
+    for i in range(12):
+        values = {'step': 8_000_000 + 200 * i, 'lost_steps': 20 * i}
+        client.publish('diagnostics', messages.DiagnosticArray(header=messages.header(''), status=[
+            messages.DiagnosticStatus(level=0, name='adu', message='enabled', hardware_id='pedestal', values=[
+                messages.KeyValue(key=key, value=str(value)) for key, value in values.items()])]))
+        plant.step()
+
+    def listed():
+        return [status for status in client.heard['acu/alarms'][-1].status if status.name == 'steps lost']
+    client.until(lambda: client.heard['acu/alarms'] and listed())
+    values = {pair.key: pair.value for pair in listed()[0].values}
+    assert values['detail'] == '100 of the last 1000 steps were lost, 10%' and 'scenario.priority' in values['action']

@@ -105,7 +105,7 @@ def test_scenario_and_the_file_in_a_run(pedestal, folder, one_line):
     assert chosen.node_parameters('acu').azimuth.filter.alpha_beta.alpha == values['azimuth.filter.alpha_beta.alpha']
     file.write_text(file.read_text().replace('alpha_beta.alpha', 'alpha_beta.alfa'))
     code, _, errors = pedestal('run', 'uav_flyby', '--bag', folder / 'no', '--params-file', file)
-    assert code == 1 and "did you mean 'azimuth.filter.alpha_beta.alpha'" in one_line(errors)
+    assert code == 2 and "did you mean 'azimuth.filter.alpha_beta.alpha'" in one_line(errors)
 
 
 @pytest.mark.thorough
@@ -186,12 +186,12 @@ def test_refused(pedestal, one_line, monkeypatch, tmp_path, case):
     monkeypatch.chdir(tmp_path)
     arguments, expected = REFUSED[case]
     code, output, errors = pedestal('tune', *arguments)
-    assert (code, output) == (1, '') and expected in one_line(errors)
+    assert (code, output) == (2, '') and expected in one_line(errors)
     assert not list(tmp_path.iterdir())
 
 
 def test_refuses_a_bag_without_errors_of_the_receiver_and_a_file_that_is_there(pedestal, one_line, silent, tuned_bag):
     code, _, errors = pedestal('tune', silent, '--filter', 'cv')
-    assert code == 1 and 'no tracking_receiver/angle_error in the bag' in one_line(errors)
+    assert code == 2 and 'no tracking_receiver/angle_error in the bag' in one_line(errors)
     code, _, errors = pedestal('tune', BAG, '--filter', 'cv', '--output', tuned_bag[0])
-    assert code == 1 and 'exists already; the file is not overwritten' in one_line(errors)
+    assert code == 2 and 'exists already; the file is not overwritten' in one_line(errors)

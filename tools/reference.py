@@ -57,7 +57,7 @@ PARAMETER_KINDS = {node: parameters_of(node) for node in (
 VERB_GROUPS = {
     'see what exists': ('scenarios', 'samples', 'parameters'),
     'run a scenario': ('run',),
-    'operate a running antenna': ('status', 'mode', 'ask', 'operate', 'program', 'live', 'simulate'),
+    'operate a running antenna': ('status', 'mode', 'stop', 'drive', 'ask', 'operate', 'program', 'live', 'simulate'),
     'use a recording': ('verify', 'recover', 'rerun', 'report', 'replay', 'export'),
     'compare settings': ('trials', 'recompute'),
     'design an antenna': ('new', 'tune'),

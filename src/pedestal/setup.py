@@ -11,7 +11,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         ('share/' + package_name, ['package.xml']),
     ],
-    install_requires=['numpy', 'matplotlib', 'rich'],
+    install_requires=['argcomplete', 'numpy', 'matplotlib', 'rich'],
     extras_require={'test': ['pytest', 'nbclient', 'ipykernel']},
     python_requires='>=3.10',
     zip_safe=False,

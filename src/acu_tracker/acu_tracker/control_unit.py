@@ -318,8 +318,8 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: p
 
 @compiled
 def _wait(state: State, constants: Constants, inputs: Inputs, outputs: Outputs) -> None:
-    if constants.p.stow_pins and stow.step(state.stow, constants, inputs, state.mode.now):
-        modes.mark_stowed(state.mode)
+    if constants.p.stow_pins:
+        modes.mark_stowed(state.mode, stow.step(state.stow, constants, inputs, state.mode.now))
     ended = state.mode.now == Mode.STANDBY and state.mode.reason == Reason.DRIVE_NOT_READY
     modes.set_pending(state.mode, interruptions.pending_mode(state.resumption, state.stamp, ended, outputs.locked,
                                                              state.mode.pending))
@@ -354,6 +354,8 @@ def _move(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, 
         beam = axes.BeamInputs(state.tracking.error, deck_rates, mode == Mode.AUTOTRACK)
         axes.follow(state.axis, constants, inputs, outputs, motion, now, beam)
         modes.mark_started(state.mode)
+        if mode != Mode.STOW or not constants.p.stow_pins:
+            modes.watch_arrival(state.mode, axes.distance(constants, inputs, motion, mode))
         limited = outputs.angle_limited[0] != 0 or outputs.angle_limited[1] != 0
         guidance.watch_beam(state.guidance, constants, mode, axes.now(state.axis), limited, now.t_m)
         if _note_outage_reason(state, constants) and mode == Mode.AUTOTRACK and not no_signal.coasting:
@@ -386,7 +388,7 @@ def _write_outputs(state: State, constants: Constants, inputs: Inputs, outputs: 
     for i in range(2):
         outputs.time_to_limit[i] = travel.time_to(inputs.position[i], inputs.velocity[i], of_axes[i])
     outputs.mode, outputs.reason, outputs.invalid_input = state.mode.now, state.mode.reason, flags
-    outputs.pins = state.stow.requested
+    outputs.pins, outputs.arrived = state.stow.requested, state.mode.arrived
     outputs.pins_wrong = stow.misplaced_pins(state.stow, constants, inputs) if constants.p.stow_pins else 0
     tracking.write_outputs(state.tracking, constants, state.stamp, outputs)
 

@@ -156,6 +156,7 @@ class ModeState(Record):
     reason: int     # why the mode was entered, a request was refused, or the receiver has no signal
     pending: int    # mode that is entered as soon as its conditions hold, or NO_REQUEST
     begins: Bit     # 1 until the mode sends its first command to the axes
+    arrived: Bit    # 1: the axes have reached the target of the mode
     table: int      # mode whose table was followed last: program, tle or sun
     fallback: int   # mode chosen for the loss of the track
 
@@ -183,7 +184,7 @@ def change(state: ModeState, now: Situation, request: int) -> int:
     if reason != Reason.NONE:
         state.reason = reason
     if mode != state.now:
-        state.now, state.begins = mode, 1
+        state.now, state.begins, state.arrived = mode, 1, 0
     return result
 
 
@@ -197,6 +198,13 @@ def restart(state: ModeState) -> None:
 def mark_started(state: ModeState) -> None:
     """Note that the mode has commanded the axes."""
     state.begins = 0
+
+
+@compiled
+def watch_arrival(state: ModeState, distance: float) -> None:
+    """Note whether the axes have reached the target of the mode. distance: from the target, 1 at the largest distance
+    that counts as reached. An axis that has arrived leaves its target at twice this distance."""
+    state.arrived = distance <= (2.0 if state.arrived else 1.0)
 
 
 @compiled
@@ -224,7 +232,10 @@ def set_outage_reason(state: ModeState, reason: int) -> None:
 
 
 @compiled
-def mark_stowed(state: ModeState) -> None:
-    """Replace the reason `requested` of the mode stow by `stow pins in`: the pins have gone in."""
-    if state.reason == Reason.REQUESTED:
+def mark_stowed(state: ModeState, stowed: bool) -> None:
+    """Note in the mode stow of an antenna with stow pins whether the pins are in, which is its arrival. The reason
+    `stow pins in` then replaces the reason `requested`."""
+    if state.now == Mode.STOW:
+        state.arrived = stowed
+    if stowed and state.reason == Reason.REQUESTED:
         state.reason = Reason.PINS_IN

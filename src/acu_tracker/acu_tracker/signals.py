@@ -74,6 +74,7 @@ class Inputs(Record):
     attitude_valid: Bit         # 1: an attitude has come
     aligning: Bit               # 1: the INS is still aligning
     drive_ready: Bit            # 1: the drive follows commands
+    steps_lost: Bit             # 1: the drive reports too many lost steps
     # for each mode that follows a table: Reason.NONE, or why there is no table
     unpredicted: Annotated[Ints, (sum(row.table for row in MODE_ROWS),)]
     gap: Bit                    # 1: rows of the program are missing at t_k
@@ -103,6 +104,7 @@ class Outputs(Record):
     coasting: Bit
     locked: Bit
     blocked: Bit
+    arrived: Bit                # 1: the axes have reached the target of the mode
     invalid_input: int          # bits of Flag
     time_to_limit: Pair         # time to the next limit at the present rates [s]; inf: never
     alarms: int                 # number of changes of the list of alarms

@@ -46,6 +46,7 @@ RESET_REQUEST_DURATION_S = 0.2
 
 # Indices of the alarms for the silence of the drive, and of those whose report contains the text of adu/state.
 DRIVE_SILENT_ALARM, DRIVE_FAULT_ALARM = table.ALARM_INDEX['drive silent'], table.ALARM_INDEX['drive fault']
+STEPS_LOST_ALARM = table.ALARM_INDEX['steps lost']
 MOTOR_LOST_ALARMS = tuple(table.ALARM_INDEX[f'{axis} motor lost'] for axis in topics.AXES)
 
 
@@ -73,6 +74,7 @@ class Acu(Unit):
     model: ModelInForce             # pointing model
     drive_state: str                # state of the drive as the drive published it
     reset_stamp: Seconds            # stamp of the last request to reset the drive
+    losses: str                     # excessive losses of steps, as text; '' without
 
     def __init__(self, parameters: AcuParameters, reads: Iterable[str]) -> None:
         super().__init__(parameters, reads)
@@ -86,6 +88,7 @@ class Acu(Unit):
         self.model = ModelInForce(parameters)
         self.desk = commands.AlarmDesk()
         self._silent, self.reset_stamp = False, -math.inf
+        self.losses = ''
 
     @property
     def silent(self) -> bool:
@@ -167,6 +170,10 @@ class Acu(Unit):
         since = datetime.timedelta(microseconds=(self.epoch + self.now) // 1000)
         return datetime.datetime(1970, 1, 1) + since if self.epoch else None
 
+    def take_losses(self, text: str) -> None:
+        """Take the excessive losses of steps that the drive reports, as text; '' without."""
+        self.losses, self.parts['inputs']['steps_lost'] = text, bool(text)
+
     def update_tables(self) -> None:
         """Bring the tables of the law to the last step, after what they follow has changed."""
         self.followed.update(self.parts, self.now)
@@ -184,8 +191,9 @@ class Acu(Unit):
         if topic == KEYHOLE_TOPIC:
             return announcement.keyhole(lookahead, self.parameters, self.epoch)
         if topic == ALARMS_TOPIC:
-            tripped = dict.fromkeys((DRIVE_FAULT_ALARM, *MOTOR_LOST_ALARMS), self.drive_state)
-            return report.message(self.alarms, tripped, self.desk.reasons)
+            details = dict.fromkeys((DRIVE_FAULT_ALARM, *MOTOR_LOST_ALARMS), self.drive_state)
+            details[STEPS_LOST_ALARM] = self.losses
+            return report.message(self.alarms, details, self.desk.reasons)
         if topic == BLOCKAGE_TOPIC:
             return announcement.hidden(lookahead, self.epoch)
         if topic == POINTING_TOPIC:
@@ -247,7 +255,7 @@ class Acu(Unit):
         """Values whose change is published at once in the diagnostics."""
         outputs, inputs = self.parts['outputs'], self.parts['inputs']
         return (control_unit.latched(self.parts['state']), outputs['mode'], outputs['reason'] == Reason.SILENCE,
-                outputs['locked'], inputs['drive'], inputs['pins'], inputs['aligning'],
+                outputs['locked'], outputs['arrived'], inputs['drive'], inputs['pins'], inputs['aligning'],
                 self.authority.requester(self.now))
 
     @staticmethod

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from acu_tracker import control_unit, signals
+from acu_tracker import acu_node, control_unit, signals
 from acu_tracker.alarms import annunciator, conditions, detectors, machine, report, table
 from acu_tracker.modes import Mode
 from acu_tracker.params import AcuParameters
@@ -318,6 +318,52 @@ def test_what_the_drive_says_itself(text, expected):
     details = {status.name: value.value for status in list_of(acu).status for value in status.values
                if value.key == 'detail'}
     assert set(details.values()) <= {text}
+
+
+@pytest.mark.parametrize(('text', 'expected'), (
+    ('fault: azimuth overspeed', 'its reset is requested'), ('emergency stop', 'only `pedestal drive reset_faults`')))
+def test_the_reply_to_a_reset_names_a_drive_that_stays_tripped(text, expected):
+    acu = Acu(build(AcuParameters, {}), (JOINT_STATES_TOPIC, DRIVE_STATE_TOPIC))
+    acu.take_text(DRIVE_STATE_TOPIC, text)
+    step(acu, 3)
+    granted, reply = acu.command(Command('reset', 'page', '1'))
+    assert granted and text in reply and expected in reply and 'cleared' not in reply
+
+
+STEADY, SLOW = [(1000 + 200 * i, 30 + (i == 3)) for i in range(8)], [(200 * i, 12 * i) for i in range(12)]
+
+
+@pytest.mark.parametrize(('counts', 'expected'), (
+    (STEADY, ''),                                               # 1 of 1000 steps
+    (SLOW[:6], '60 of the last 1000 steps were lost, 6%'),
+    (SLOW[:5], ''),                                             # nothing is judged before the window is full
+    ([*SLOW, *[(2400 + 200 * i, 132) for i in range(5)]], ''),  # over
+    ([*SLOW, (0, 0), (200, 12)], ''),                           # a drive that was started again
+    ([(8640000, 500), (8641000, 1500)], '1000 of the last 1000 steps were lost, 100%')))
+def test_lost_steps_are_judged_over_five_seconds(counts, expected):
+    losses = acu_node.StepLosses(T)
+    for _ in range(acu_node.START_COUNTS):      # of a graph whose nodes are still starting
+        assert losses.take(*counts[0]) == ''
+    assert [losses.take(*count) for count in counts][-1] == expected
+
+
+def test_lost_steps_are_an_alarm_while_they_are_lost_and_a_time_jump_stands_under_it():
+    acu = Acu(build(AcuParameters, {}), (JOINT_STATES_TOPIC, DRIVE_STATE_TOPIC))
+    step(acu, 3)
+    acu.take_losses('60 of the last 1000 steps were lost, 6%')
+    step(acu, 1)
+    acu.inputs[0][JOINT_STATES_TOPIC]['stamp'] += 100_000_000
+    step(acu, 1)
+    first, second = list_of(acu).status
+    assert (first.name, second.name) == ('steps lost', 'time jump')
+    assert {'60 of the last 1000 steps were lost, 6%'} == {value.value for value in first.values
+                                                           if value.key == 'detail'}
+    assert 'steps lost' in {value.value for value in second.values if value.key == 'cause'}
+    acu.take_losses('')
+    step(acu, 1100)
+    assert acu.request('acu/acknowledge').granted
+    step(acu, 2000)
+    assert names(acu) == set()
 
 
 def step(acu, count):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from acu_tracker.modes import REASONS, Mode, Reason
+from acu_tracker.operating import diagnosis
 from pedestal_common.graph.modes import MODES
 
 
@@ -214,3 +215,22 @@ def test_preset_from_the_topic(Rig):
 def test_reasons_and_modes_have_names():
     assert MODES[Mode.AUTOTRACK] == 'autotrack' and REASONS[Reason.BAD_STAMP] == 'stamp does not advance'
     assert len(set(REASONS)) == len(REASONS)
+
+
+@pytest.mark.parametrize(('mode', 'seconds', 'going', 'arrived'), (
+    (Mode.STOW, 3.0, 'stowing', 'stowed'), (Mode.PRESET, 3.0, 'preset, moving', 'preset, reached'),
+    (Mode.PROGRAM, 0.5, 'program, moving', 'program, on track'), (Mode.STOP, 0.2, 'stopping', 'stopped')))
+def test_a_mode_that_takes_time_is_named_by_its_progress(Rig, mode, seconds, going, arrived):
+    """The words change once, when the axes are there and, without a target to follow, at rest."""
+    rig = Rig(lambda t: (0.6, 0.6), at=(0.3, 0.3), **{'elevation.stow': 0.4, 'tracker.handover': False})
+    rig.program()
+    rig.step()
+    assert rig.ask(Mode.PRESET if mode == Mode.STOP else mode)
+    rig.run(0.2 if mode == Mode.STOP else 0.0)
+    assert rig.ask(mode)
+    words = []
+    for _ in range(round(seconds / rig.T)):
+        words.append(diagnosis.progress(rig.step()))
+    changes = [words[0], *(word for before, word in zip(words, words[1:]) if word != before)]
+    assert changes == [going, arrived]
+    assert rig.ask(Mode.STANDBY) and diagnosis.progress(rig.step()) == 'standby'

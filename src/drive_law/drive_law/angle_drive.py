@@ -4,7 +4,7 @@ Such a drive has no brakes. Two switches in its record determine its state: `wan
 `emergency`, a latched emergency stop.
 """
 
-from pedestal_common.graph import topics
+from pedestal_common.graph import nodes, topics
 from pedestal_common.node.unit import Unit
 from pedestal_common.quantities import Seconds
 from pedestal_common.wire.commands import Reply
@@ -18,7 +18,7 @@ ENABLED_TEXT, EMERGENCY_STOP_TEXT = 'enabled', 'emergency stop'
 class AngleDrive(Unit):
     """Unit with a part `switches` of its record, which has at least the fields wanted and emergency."""
     COMMAND = REFERENCE_TOPIC
-    REQUESTS = ('adu/enable', 'adu/disable', 'adu/emergency_stop', 'adu/reset_faults')
+    REQUESTS = nodes.DRIVE_SERVICES
     STATE_TEXTS: tuple[str, ...] = topics.TOPIC_BY_NAME[DRIVE_STATE_TOPIC].texts    # texts of adu/state by their code
 
     rests = True

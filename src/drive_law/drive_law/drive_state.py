@@ -13,7 +13,7 @@ from typing import Annotated
 from drive_law import axis_control, faults, stow_pins
 from drive_law.params import AduParameters, whole_speed_periods
 from pedestal_common.compiled import compiled
-from pedestal_common.graph import topics
+from pedestal_common.graph import nodes, topics
 from pedestal_common.quantities import Bit, Floats, Ints, NewtonMeters, RadiansPerSecond, Records, Seconds
 from pedestal_common.record import Record
 
@@ -21,9 +21,7 @@ PHASES = ('enabled', 'stopping', 'engaging brakes', 'disabled', 'releasing brake
 PHASE_ENABLED, PHASE_STOPPING, PHASE_ENGAGING_BRAKES, PHASE_DISABLED, PHASE_RELEASING_BRAKES = range(len(PHASES))
 
 REQUEST_ENABLE, REQUEST_DISABLE, REQUEST_EMERGENCY_STOP, REQUEST_RESET_FAULTS = range(4)
-REQUEST_CODES = {'adu/enable': REQUEST_ENABLE, 'adu/disable': REQUEST_DISABLE,
-                 'adu/emergency_stop': REQUEST_EMERGENCY_STOP,
-                 'adu/reset_faults': REQUEST_RESET_FAULTS}
+REQUEST_CODES = {service: code for code, service in enumerate(nodes.DRIVE_SERVICES)}
 """Requests to the drive, {name of the service: code}."""
 
 REPLY_ACCEPTED, REPLY_FAULT_LATCHED, REPLY_EMERGENCY_LATCHED, REPLY_AXES_MOVING, REPLY_CAUSE_PERSISTS = range(5)

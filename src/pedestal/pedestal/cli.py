@@ -6,6 +6,7 @@ from pedestal import stop  # first, because a signal during the imports below mu
 import argparse
 import contextlib
 import importlib
+import logging
 import os
 import re
 import shlex
@@ -13,7 +14,8 @@ import sys
 import typing
 from collections.abc import Container, Sequence
 
-from pedestal.console import STDOUT_PATH
+from pedestal.console import EXIT_ERROR, EXIT_WRONG_COMMAND, STDOUT_PATH
+from pedestal_common.parameters import ParameterError, did_you_mean
 
 if typing.TYPE_CHECKING:
     from pedestal.verbs.arguments import Verb
@@ -26,6 +28,8 @@ VERBS = {
     'parameters': ('design', 'list the parameters of a node: default, range, unit, meaning'),
     'status': ('operate', 'print the state of a running antenna'),
     'mode': ('operate', 'set the mode of a running antenna control unit (ACU)'),
+    'stop': ('operate', 'stop both axes of a running antenna and hold them'),
+    'drive': ('operate', 'enable, disable, stop or reset the drive of a running antenna'),
     'ask': ('operate', 'send a command to a running node'),
     'operate': ('operate', 'operate a running antenna by hand on this terminal'),
     'live': ('operate', 'show a running graph in Foxglove or Lichtblick'),
@@ -48,6 +52,11 @@ VERBS = {
 }
 """{verb: (module of `verbs` that holds it, first line of its help)}, in the order of the help."""
 
+EXIT_CLOSED_PIPE = 141  # 128 + number of SIGPIPE, the convention of shells
+COMPLETION_VARIABLE = '_ARGCOMPLETE'  # environment variable of a shell that completes a command line
+WRONG_ARGUMENTS = ParameterError, FileNotFoundError, FileExistsError
+"""Errors of a wrong argument, with ValueError itself. Other subclasses of ValueError are errors in the content of a
+file, such as BagError."""
 NEGATIVE_NUMBER_PATTERN = re.compile(r'-\.?\d')  # beginning of an argument that is a negative number
 
 
@@ -59,33 +68,51 @@ def found(name: str) -> 'Verb':
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run a verb; without any argument print the help. Return its exit code: 0; 1 with a line on stderr for an error;
-    2 for a wrong command line; 130 after a stop."""
-    given = sys.argv[1:] if args is None else args
+    2 for a wrong argument; 130 after a stop; 141 without a word if the reader of its output has ended."""
+    try:
+        try:
+            return _run(sys.argv[1:] if args is None else args)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader of the pipe, such as `head`, has closed it. From here on the output goes to the null device. This
+        # avoids a second error when Python writes its buffers at its exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_CLOSED_PIPE
+
+
+def _complete() -> None:
+    """Answer a shell that completes a command line (docs/reference/commands.md), and end the process."""
+    import argcomplete
+    words = os.environ['COMP_LINE'][:int(os.environ['COMP_POINT'])].split()[1:]
+    argcomplete.autocomplete(_parser([word for word in words if word in VERBS][:1]))
+
+
+def _run(given: Sequence[str]) -> int:
+    """Run the verb of a command line, and return its exit code."""
+    if COMPLETION_VARIABLE in os.environ:
+        _complete()
     named = next((word for word in given if word in VERBS), None)
     parser = _parser(() if named is None else (named,))
     if not given:
         parser.print_help()
         return 0
     if given[0][:1] not in ('-', '') and given[0] not in VERBS:
-        from pedestal_common.parameters import did_you_mean
         parser.error(f"no verb '{given[0]}':{did_you_mean(given[0], VERBS)} pedestal --help lists the verbs")
     options = parser.parse_args(given)
     options.command = shlex.join(('pedestal', *given))
     stop.interrupt_on_stop()
+    logging.getLogger('matplotlib').setLevel(logging.ERROR)     # it warns of a home that cannot be written
     json_on_stdout = getattr(options, 'json', None) == STDOUT_PATH
     try:
         with contextlib.redirect_stdout(sys.stderr) if json_on_stdout else contextlib.nullcontext():
-            code = options.main(options)
-        sys.stdout.flush()
-        return code
+            return int(options.main(options))
     except BrokenPipeError:
-        # The reader of the pipe, such as `head`, has closed it. From here on the output goes to the null device. This
-        # avoids a second error when Python writes its buffers at its exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        raise
     except (ValueError, RuntimeError, OSError) as error:
         print(f'pedestal: error: {error}', file=sys.stderr)
-        return 1
+        wrong = type(error) is ValueError or isinstance(error, WRONG_ARGUMENTS)
+        return EXIT_WRONG_COMMAND if wrong else EXIT_ERROR
     except KeyboardInterrupt:
         print(stop.STOP_MESSAGE, file=sys.stderr)
         return stop.STOP_EXIT_CODE
@@ -108,7 +135,19 @@ class Parser(argparse.ArgumentParser):
                 joined[-1] += f'={arg}'
             else:
                 joined.append(arg)
+        if self._subparsers is None:
+            self._check_options(joined)
         return super().parse_known_args(joined, namespace)
+
+    def _check_options(self, args: Sequence[str]) -> None:
+        """End with the usage and the nearest option if this parser lacks an option. The parser of argparse would first
+        miss other arguments, and then print the usage of the whole command line."""
+        known = self._option_string_actions
+        for arg in args[:args.index('--') if '--' in args else None]:
+            name = arg.partition('=')[0]
+            if name.startswith('--') and not any(option.startswith(name) for option in known):
+                near = did_you_mean(name, known)
+                self.error(f'unknown option {name}{f";{near}" if near else ""}')
 
     def parse_args(  # type: ignore[override]  # overloads of argparse accept other namespaces
             self, args: Sequence[str] | None = None,
@@ -121,7 +160,7 @@ class Parser(argparse.ArgumentParser):
             namespace.given = [*namespace.given, *more]
             unknown = [word for word in unknown if word not in more]
         if unknown:
-            self.error(f'unrecognized arguments: {" ".join(unknown)}')
+            getattr(namespace, 'parser', self).error(f'unexpected argument {" ".join(unknown)}')
         return namespace
 
 

@@ -156,8 +156,15 @@ def exit_codes() -> str:
 
 def _show(table: TextTable, title: str = '', width: int = 0, framed: bool = False) -> None:
     """Print a title and a table by rich, at least `width` characters wide. framed: with a frame and wrapped cells."""
+    _print(_drawn(table, title, framed), width)
+
+
+def _print(shown: RichTable, width: int = 0) -> None:
     from rich.console import Console
-    Console(width=max(Console().width, width) if width else None).print(_drawn(table, title, framed))
+    console = Console(width=max(Console().width, width) if width else None)
+    with console.capture() as captured:     # because rich ends the process if the reader of a pipe has closed it
+        console.print(shown)
+    print(captured.get(), end='')
 
 
 def _drawn(table: TextTable, title: str = '', framed: bool = False) -> RichTable:
@@ -191,7 +198,7 @@ def _show_fitted(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], opti
             break
         left_out.append(optional[-1 - len(left_out)])
     print(title, end='\n' if title else '')
-    Console(width=max(Console().width, needed)).print(drawn)
+    _print(drawn, needed)
     return left_out
 
 

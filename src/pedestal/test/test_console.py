@@ -48,7 +48,7 @@ def test_a_closed_pipe_is_no_error():
     done = subprocess.run([sys.executable, '-m', 'pedestal.cli', 'scenarios'], stdout=writer,
                           stderr=subprocess.PIPE, text=True, timeout=300)
     os.close(writer)
-    assert (done.returncode, done.stderr) == (1, '')
+    assert (done.returncode, done.stderr) == (141, '')
 
 
 def test_in_a_pipe_a_row_is_a_line(capsys):

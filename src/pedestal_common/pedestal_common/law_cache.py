@@ -28,6 +28,7 @@ from pedestal_common.law_key import digest
 
 MAX_CACHE_AGE_DAYS = 30.0  # time without use after which a file of the cache is deleted [days]
 TOUCH_PERIOD_S = 86400.0  # time after which the use of a file is noted again [s]
+_REPORTED_VARIABLE = 'PEDESTAL_LAW_CACHE_REPORTED'  # environment variable that is set after the report of a failure
 DIGEST_BYTES = 32  # length of the digest of its content at the beginning of a file [bytes]
 
 _ROOT = pathlib.Path(getattr(numba.config, 'CACHE_DIR', '') or user_cache_dir()) / 'pedestal'
@@ -91,9 +92,12 @@ def save(path: pathlib.Path, content: object) -> None:
         _remove_old_files()
 
 
-@functools.cache
 def _report(reason: str) -> None:
-    print(f'the law cache {_ROOT} cannot be written ({reason}): each process compiles its laws', file=sys.stderr)
+    """Write one line to stderr for this process and its children, which all have the same cache."""
+    if _REPORTED_VARIABLE not in os.environ:
+        os.environ[_REPORTED_VARIABLE] = '1'
+        print(f'the law cache {_ROOT} cannot be written ({reason}): each process compiles its laws; set '
+              'NUMBA_CACHE_DIR to a folder that can be written', file=sys.stderr)
 
 
 @functools.cache

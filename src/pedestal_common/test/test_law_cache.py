@@ -112,7 +112,8 @@ def test_a_cache_that_cannot_be_written_costs_one_line(cache):
     done = run(cache)
     assert done.stdout == RESULT
     assert done.stderr.splitlines() == [f'the law cache {cache}/pedestal cannot be written (Not a directory): each '
-                                        'process compiles its laws']
+                                        'process compiles its laws; set NUMBA_CACHE_DIR to a folder that can be '
+                                        'written']
 
 
 def test_a_full_disk_costs_one_line_and_leaves_no_part_of_a_file(cache):
@@ -121,7 +122,8 @@ def test_a_full_disk_costs_one_line_and_leaves_no_part_of_a_file(cache):
     done = run(cache, limit)
     assert done.stdout == RESULT
     assert done.stderr.splitlines() == [f'the law cache {cache}/pedestal cannot be written (File too large): each '
-                                        'process compiles its laws']
+                                        'process compiles its laws; set NUMBA_CACHE_DIR to a folder that can be '
+                                        'written']
     assert [path.stat().st_size for path in (cache / 'pedestal').iterdir() if path.suffix != '.lock'] == []
 
 

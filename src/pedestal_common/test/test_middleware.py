@@ -2,6 +2,7 @@
 import pytest
 
 pytest.importorskip('rclpy')
+import rclpy  # noqa: E402
 from rclpy.qos import (  # noqa: E402
     DurabilityPolicy,
     HistoryPolicy,
@@ -49,3 +50,19 @@ def test_a_writer_that_does_not_latch_is_heard_where_a_person_writes():
 def test_who_comes_late_gets_the_last(rate):
     for role in ROLES:
         assert middleware.qos(rate, role).durability == DurabilityPolicy.TRANSIENT_LOCAL
+
+
+@pytest.mark.parametrize(('given', 'period', 'kind'), (
+    ((), 0.2, 'imm'), (('-p', 'period:=0.3'), 0.3, 'imm'), (('-p', 'filter.kind:=ca', '-p', 'period:=0.4'), 0.4, 'ca'),
+    (('-p', 'period:=0.3', '-p', 'period:=0.5'), 0.5, 'imm')))
+def test_a_value_of_the_command_line_replaces_that_of_a_parameter_file(tmp_path, given, period, kind):
+    """Also where the section of the file is for one node, to which rcl gives precedence."""
+    file = tmp_path / 'station.yaml'
+    file.write_text('/**/acu:\n  ros__parameters:\n    period: 0.2\n    filter.kind: imm\n')
+    middleware.initialise(['--ros-args', *given[:2], '--params-file', str(file), *given[2:]])
+    try:
+        node = rclpy.create_node('acu', automatically_declare_parameters_from_overrides=True)
+        assert [node.get_parameter(name).value for name in ('period', 'filter.kind')] == [period, kind]
+        node.destroy_node()
+    finally:
+        rclpy.try_shutdown()

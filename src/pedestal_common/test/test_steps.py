@@ -94,6 +94,18 @@ def test_realtime_goes_on_without_a_silent_follower():
     assert answers[-1] == (10, 2, {'a': 'late'})
 
 
+def test_realtime_does_not_wait_for_a_follower_that_is_absent_until_it_returns():
+    steps, answers = collect({'a': 0}, lockstep=False)
+    waited = []
+    for k in range(20):
+        steps.take('trigger', 5 * k * MS, k)
+        waited.append(steps.pending_stamp is not None)
+        if 10 <= k < 13:
+            steps.take('a', 5 * k * MS, f'a{k}')
+    assert waited == [k < 5 or 10 < k < 18 for k in range(20)]
+    assert [inputs['a'] for _, _, inputs in answers] == [None] * 11 + ['a10', 'a11'][1:] + ['a12'] + [None] * 7
+
+
 def test_realtime_waits_only_for_messages_that_can_be_due():
     """A follower with a message every third step: only this step waits for it."""
     steps, answers = collect({'a': 0}, lockstep=False)

@@ -14,7 +14,7 @@ from rich.console import Group
 from rich.live import Live
 from rich.text import Text
 
-from pedestal_common.graph import topics
+from pedestal_common.graph import nodes, topics
 from pedestal_common.quantities import Seconds
 from pedestal_operator import state
 from pedestal_operator.remote_node import JOG_REPEAT_PERIOD_S, Remote, RemoteSession
@@ -24,7 +24,8 @@ JOG_RATES_DEG_S = (0.1, 0.5, 1.0, 2.0, 5.0)  # selectable jog rates [deg/s]
 
 KEY_COMMANDS = {'s': ('stop', 'stop'), 'b': ('standby', 'standby'), 'w': ('stow', 'stow'), 'p': ('preset', 'preset'),
              'g': ('program', 'program'), 'a': ('autotrack', 'autotrack'), 't': ('take', 'take control'),
-             'r': ('release', 'release control'), 'c': ('reset', 'reset faults')}
+             'r': ('release', 'release control'), 'c': ('reset', 'reset faults'),
+             **{row.key: (row.service, f'drive {row.name.replace("_", " ")}') for row in nodes.DRIVE_REQUESTS}}
 
 ARROW_DIRECTIONS = {'\x1b[A': (0, 1), '\x1b[B': (0, -1), '\x1b[C': (1, 0), '\x1b[D': (-1, 0)}  # azimuth, elevation
 QUIT_KEYS = ('q', '\x03', '\x04')  # keys that end the console: q, Ctrl-C and Ctrl-D
@@ -67,6 +68,7 @@ class Console:
 
     def __init__(self, session: RemoteSession) -> None:
         self._remote = session.remote
+        self._remote.connect_drive()
         self._pending = {}
         self._jog, self._press_time, self._last_jog_time = None, 0.0, 0.0
         self.rate = JOG_RATES_DEG_S[1]

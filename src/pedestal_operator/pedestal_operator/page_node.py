@@ -58,6 +58,7 @@ class PageNode(Remote, page_state.PageAntenna):
                                    lambda client, message: self._server.reply(client, message),
                                    lambda: self.texts.get('acu/mode') == 'rate')
         self._parameter_requests, self._sent_log_revision = {}, None
+        self.connect_drive()
         p = self.parameters
         names = [name.strip() for name in p.names.split(',') if name.strip()]
         if not page_security.is_loopback(p.address):
@@ -90,6 +91,11 @@ class PageNode(Remote, page_state.PageAntenna):
         super()._take_reply(status)
         with contextlib.suppress(ValueError):
             self.log.replied(self.now, *commands.of_reply(status))
+
+    def take_drive_reply(self, command: commands.Command, reply: commands.Reply) -> None:
+        """Take the reply of the drive, and log it."""
+        super().take_drive_reply(command, reply)
+        self.log.replied(self.now, command, reply)
 
     def _text_taker(self, topic: str) -> Callable[[Message], None]:
         take = super()._text_taker(topic)

@@ -1,5 +1,6 @@
 """ROS node of a client, outside the graph: it receives the state of the antenna, sends commands and receives
 replies."""
+import datetime
 import getpass
 import itertools
 import math
@@ -7,11 +8,13 @@ import os
 import socket
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
+from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.task import Future
+from std_srvs.srv import Trigger
 
 from pedestal_common import parameters
 from pedestal_common.graph import domain, nodes
@@ -20,7 +23,7 @@ from pedestal_common.node import middleware
 from pedestal_common.node.shell import Shell
 from pedestal_common.quantities import Message, Seconds
 from pedestal_common.wire import commands, messages, records
-from pedestal_common.wire.commands import Command, Reply
+from pedestal_common.wire.commands import HELD_REFUSAL, Command, Reply
 from pedestal_operator.antenna import POINTING_TOPIC, Antenna
 from pedestal_operator.state import ANGLE_ERROR_TOPIC
 
@@ -76,6 +79,9 @@ REPLY_TIMEOUT_S = 5.0  # longest wait for the reply to a command [s]
 DISCOVERY_MARGIN_S = 0.05  # for the discovery by the commanded node, after its own discovery [s]
 RETRY_PERIOD_S = 1.0  # time until a command is repeated [s], because discovery may be incomplete
 
+GRAPH_PARAMETERS = 'graph.scenario', 'graph.start'  # of every node, which name its graph
+GRAPH_REPLY_TIMEOUT_S = 1.0     # longest wait for them [s]
+
 _R = TypeVar('_R')
 
 
@@ -110,6 +116,8 @@ class Remote(Shell, Antenna):
         self.message_reader('diagnostics', self._take_status)
         self.message_reader(self.node.replies, self._take_reply)
         self._send_command = self.writer(self.node.obeys)
+        self._drive: dict[str, Client] = {}     # {service of the drive: its client}, see connect_drive
+        self._called: set[str] = set()          # numbers of the requests that were sent to the drive
 
     def subscribe_numbers(self, topic: str) -> None:
         """Subscribe to a further topic of numbers."""
@@ -125,7 +133,7 @@ class Remote(Shell, Antenna):
         return take
 
     def _take_alarms(self, array: Message) -> None:
-        self.alarms = array.status
+        self.alarms, self.arrivals['acu/alarms'] = array.status, time.monotonic()
 
     def _take_status(self, array: Message) -> None:
         for status in array.status:
@@ -145,8 +153,38 @@ class Remote(Shell, Antenna):
         return number
 
     def repeat_request(self, number: str) -> None:
-        """Send a request again under its number; its reply may then arrive twice."""
-        self._send_command(messages.serialize(commands.message(self._requests.pending_command(number))))
+        """Send a request again under its number; its reply may then arrive twice. A request to the drive is sent once
+        its service is there, and not again."""
+        command = self._requests.pending_command(number)
+        if command.verb in nodes.DRIVE_SERVICES:
+            self._call_drive(command)
+        else:
+            self._send_command(messages.serialize(commands.message(command)))
+
+    def connect_drive(self) -> None:
+        """Make the clients of the services of the drive, which `request` needs for them."""
+        self._drive = {service: self.create_client(Trigger, service) for service in nodes.DRIVE_SERVICES}
+
+    def reaches_drive(self) -> bool:
+        """Return True if the services of the drive are there."""
+        return all(client.service_is_ready() for client in self._drive.values())
+
+    def _call_drive(self, command: Command) -> None:
+        """Call the service of a command. Because the drive does not know who has control, this function refuses the
+        request of another client, as the control unit refuses its commands."""
+        holder = self.diagnostics_of('acu').get('control', '')
+        free = next(row.free for row in nodes.DRIVE_REQUESTS if row.service == command.verb)
+        if not free and holder not in ('', command.who):
+            self.take_drive_reply(command, Reply(False, f'refused: {HELD_REFUSAL} {holder}'))
+        elif command.number not in self._called and self._drive[command.verb].service_is_ready():
+            self._called.add(command.number)
+            self._drive[command.verb].call_async(Trigger.Request()).add_done_callback(
+                lambda done: self.take_drive_reply(command, Reply(done.result().success, done.result().message)))
+
+    def take_drive_reply(self, command: Command, reply: Reply) -> None:
+        """Take the reply of the drive; overridden by a client that also logs it."""
+        self._called.discard(command.number)
+        self._requests.take(command, reply)
 
     def replied(self, number: str) -> Reply | None:
         """Return the reply to a request once, None before it arrives."""
@@ -161,16 +199,21 @@ class Remote(Shell, Antenna):
         return name in self.arrivals or self.count_publishers(self._link(name)[1]) > 0
 
     def query(self, names: Sequence[str]) -> 'Query':
-        """Return a Query for parameters of the commanded node."""
+        """Return a Query for numeric parameters of the commanded node."""
         return Query(self.create_client(GetParameters, f'{self.beam}{self.node.name}/get_parameters'), names)
 
 
-class Query:
-    """Request for numeric parameters of a node."""
-    values: list[float] | None      # None before the reply of the node
+def _double(value: ParameterValue) -> float:
+    return value.double_value
 
-    def __init__(self, client: Client, names: Sequence[str]) -> None:
-        self._client, self._request = client, GetParameters.Request(names=names)
+
+class Query:
+    """Request for parameters of a node. read: function that returns the content of a ParameterValue."""
+    values: list[Any] | None    # as `read` returns them; None before the reply of the node
+
+    def __init__(self, client: Client, names: Sequence[str],
+                 read: Callable[[ParameterValue], object] = _double) -> None:
+        self._client, self._request, self._read = client, GetParameters.Request(names=names), read
         self._request_time = -math.inf
         self.values = None
 
@@ -181,9 +224,14 @@ class Query:
             self._request_time = now
             self._client.call_async(self._request).add_done_callback(self._take)
 
+    def answered(self) -> bool:
+        """Request the parameters as `look` does; return True after the reply."""
+        self.look()
+        return self.values is not None
+
     def _take(self, future: Future) -> None:
         """The reply may be that of an earlier request."""
-        self.values = self.values or [value.double_value for value in future.result().values] or None
+        self.values = self.values or [self._read(value) for value in future.result().values] or None
 
 
 class RemoteSession:
@@ -224,10 +272,34 @@ class RemoteSession:
         _, reply_topic = remote._link(row.replies)
         if not self.until(lambda: remote.count_subscribers(command_topic) > 0
                           and remote.count_publishers(reply_topic) > 0, seconds):
-            domain_id = remote.context.get_domain_id()
-            raise GraphError(f'no {remote.beam}{row.name} on ROS_DOMAIN_ID {domain_id} within {seconds:g} s: '
-                             f'{domain.hint(domain_id)}')
+            raise self._absent(remote.beam + row.name, seconds)
         self.until(lambda: False, DISCOVERY_MARGIN_S)
+
+    def connect_drive(self, seconds: Seconds) -> None:
+        """Wait for the services of the drive. Raises GraphError after `seconds`."""
+        self.remote.connect_drive()
+        if not self.until(self.remote.reaches_drive, seconds):
+            raise self._absent(nodes.DRIVE_NODE, seconds)
+
+    def _absent(self, name: str, seconds: Seconds) -> GraphError:
+        domain_id = self.remote.context.get_domain_id()
+        return GraphError(f'no {name} on ROS_DOMAIN_ID {domain_id} within {seconds:g} s: {domain.hint(domain_id)}')
+
+    def graph(self) -> dict[str, str]:
+        """Return what this client speaks to: the domain, the scenario, and the time since which it runs. A graph that
+        was started by hand has no scenario. A graph in lockstep has no time."""
+        remote = self.remote
+        query = Query(remote.create_client(GetParameters, f'{remote.beam}{remote.node.name}/get_parameters'),
+                      GRAPH_PARAMETERS, lambda value: value.string_value or value.integer_value)
+        self.until(query.answered, GRAPH_REPLY_TIMEOUT_S)
+        found = {'domain': str(remote.context.get_domain_id())}
+        if query.values:
+            scenario, start = query.values
+            found['scenario'] = scenario or 'none, started by hand'
+            if start:
+                since = datetime.datetime.fromtimestamp(start * 1e-9, datetime.timezone.utc)
+                found['since'] = f'{since:%Y-%m-%d %H:%M:%S} UTC'
+        return found
 
     def request(self, verb: str, arguments: Mapping[str, object] | None = None,
                 seconds: Seconds = REPLY_TIMEOUT_S) -> Reply:
@@ -236,7 +308,8 @@ class RemoteSession:
         while (reply := self.until(lambda: self.remote.replied(number),
                                    min(RETRY_PERIOD_S, deadline - time.monotonic()))) is None:
             if time.monotonic() > deadline:
-                raise GraphError(f'{self.remote.node.name} did not reply to {verb} within {seconds:g} s')
+                name = nodes.DRIVE_NODE if verb in nodes.DRIVE_SERVICES else self.remote.node.name
+                raise GraphError(f'{name} did not reply to {verb} within {seconds:g} s')
             self.remote.repeat_request(number)
         return reply
 

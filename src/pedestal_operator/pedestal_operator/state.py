@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from pedestal_common.graph import topics
+from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.node.unit import LEVEL_OK
 from pedestal_common.quantities import DecibelHertz, Degrees, Json, Message
@@ -20,18 +20,20 @@ BUTTON_MODES = tuple(row.name for row in MODE_ROWS if row.button)
 """Modes with a button or a key; `stop` has a separate button, `rate` is the jog, `slave` is for programs."""
 
 OPERATOR_COMMANDS = (*BUTTON_MODES, 'rate', 'take', 'release', 'allow', 'reset', 'fallback', 'acknowledge', 'shelve',
-                     'unshelve')  # all except `stop`, which is never refused in advance
+                     'unshelve', *nodes.DRIVE_SERVICES)  # all except `stop`, which is never refused in advance
 
-FREE_COMMANDS = ('standby', 'take')  # accepted from a client without control
+# accepted from a client without control
+FREE_COMMANDS = ('standby', 'take', *(row.service for row in nodes.DRIVE_REQUESTS if row.free))
 REFUSAL_PREFIX = 'refused '  # start of a key in the diagnostics of the control unit, before the name of a mode
 
-ACU_STATUS_KEYS = ('mode', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting', 'keyhole',
-                   'pointing_model')
+ACU_STATUS_KEYS = ('mode', 'progress', 'reason', 'fallback', 'control', 'drive', 'faults', 'locked', 'coasting',
+                   'keyhole', 'pointing_model')
 
 GRAPH_NODES = ('acu', 'adu', 'tracking_receiver', 'ins', 'ship_motion')  # whose silence the operator must see
 LIMIT_WARNING_S = 20.0  # time to a limit below which the axis has a warning [s]
 REST_RATE_DEG_S = 0.002  # rate below which an axis counts as stopped [deg/s]
 
+PAST_STATES = ('returned unacknowledged', 'shelved')  # states of alarms that need no action
 UNACKNOWLEDGED_STATES = ('unacknowledged', 'returned unacknowledged', 'latched unacknowledged')
 
 ALARM_KEYS = ('state', 'priority', 'annunciated', 'first_out', 'cause', 'action', 'detail', 'shelved_reason',
@@ -95,6 +97,13 @@ def node_reports(antenna: 'Antenna') -> list[tuple[str, str]]:
             for name, status in antenna.status.items() if not antenna.present(name) or status.level != LEVEL_OK]
 
 
+def alarm_reports(antenna: 'Antenna') -> list[tuple[str, str]]:
+    """Return [(alarm, text)] of the alarms of the control unit whose condition is present or that wait for a reset."""
+    found = [(each['name'], f'{each["priority"]}, {each["state"]}: {each["detail"] or each["meaning"]} -> '
+              f'{each["action"]}') for each in map(alarm, antenna.alarms) if each['state'] not in PAST_STATES]
+    return found if antenna.present(antenna.name_of('acu')) else []
+
+
 def header(antenna: 'Antenna') -> dict[str, Shown]:
     """Return {item: text} of mode, reason, drive, control, fallback and link. The mode of a silent control unit is
     unknown. The reason then states the last mode and its age."""
@@ -102,6 +111,7 @@ def header(antenna: 'Antenna') -> dict[str, Shown]:
     if acu:
         reason = acu.get('reason', '') + (', coasting' if acu.get('coasting') == '1' else '')
         mode = antenna.texts.get('acu/mode') or acu.get('mode', '')
+        mode = acu.get('progress', mode) if mode == acu.get('mode') else mode
         return {'mode': Shown(mode), 'reason': Shown(reason), 'drive': _drive(antenna, acu),
                 'control': Shown(acu.get('control') or 'none'), 'fallback': Shown(acu.get('fallback', '')),
                 'link': link}
@@ -159,11 +169,12 @@ def _axis_state(silent: bool, limited: str, limit_s: str, rate: float) -> Shown:
 
 
 def refusals(antenna: 'Antenna', holds_control: bool, may_take: bool = False) -> dict[str, str]:
-    """Return {command: reason} of the OPERATOR_COMMANDS that the control unit would refuse now. holds_control: also if
-    control is free; may_take: a supervisor takes control from others."""
+    """Return {command: reason} of the OPERATOR_COMMANDS that would be refused now. holds_control: also if control is
+    free; may_take: a supervisor takes control from others. The drive needs no control unit."""
     acu = antenna.diagnostics_of('acu')
     if not acu:
-        return dict.fromkeys(OPERATOR_COMMANDS, 'the control unit is silent')
+        return {command: 'the control unit is silent' for command in OPERATOR_COMMANDS
+                if command not in nodes.DRIVE_SERVICES}
     holder = acu.get('control', '')
     if not holds_control:
         refused = {command: f'held by {holder}' for command in OPERATOR_COMMANDS

@@ -5,6 +5,7 @@ import types
 import pytest
 
 from pedestal_common.geometry import pointing_report
+from pedestal_common.graph import nodes
 from pedestal_common.wire import messages
 from pedestal_operator import console, state
 from pedestal_operator.antenna import Antenna
@@ -66,13 +67,33 @@ def test_a_silent_drive_is_silent_in_every_place(drive, ages):
                                'unknown': ('unknown', 'bad')}[drive]
 
 
+@pytest.mark.parametrize(('mode', 'progress', 'text', 'expected'), (
+    ('stow', 'stowing', 'stow', 'stowing'), ('stow', 'stowed', 'stow', 'stowed'), ('stow', 'stowed', 'rate', 'rate')))
+def test_the_mode_is_shown_with_its_progress_until_another_mode_begins(mode, progress, text, expected):
+    """The mode arrives at once, its progress with the next diagnostics."""
+    station = Station({'mode': mode, 'progress': progress})
+    station.texts['acu/mode'] = text
+    assert state.header(station)['mode'].text == expected
+
+
+def test_the_alarms_of_the_control_unit_are_reported_while_they_need_an_action():
+    listed = [alarm('steps lost', 'acknowledged'), alarm('time jump', 'returned unacknowledged', 'steps lost'),
+              alarm('INS lost', 'shelved'), alarm('diverged', 'latched unacknowledged')]
+    assert state.alarm_reports(Station(alarms=listed)) == [
+        (name, f'high, {condition}: meaning of {name} -> mend {name}')
+        for name, condition in (('steps lost', 'acknowledged'), ('diverged', 'latched unacknowledged'))]
+    assert state.alarm_reports(Station(alarms=listed, ages={'acu': 9.0})) == []
+
+
 def test_a_silent_control_unit_has_no_mode_and_no_commands():
     station = Station({'control': 'anna@page 127.0.0.1'}, ages={'acu': 12.2})
     header = state.header(station)
     assert header['mode'] == ('unknown', 'bad') and header['reason'] == ('last: rate, 12 s ago', 'bad')
     assert header['link'] == ('no ACU', 'bad') and header['control'] == ('unknown', 'bad')
     for holds in (True, False):
-        assert state.refusals(station, holds) == dict.fromkeys(state.OPERATOR_COMMANDS, 'the control unit is silent')
+        refused = state.refusals(station, holds)        # the drive is commanded without the control unit, too
+        assert set(state.OPERATOR_COMMANDS) - set(refused) == set(nodes.DRIVE_SERVICES)
+        assert set(refused.values()) == {'the control unit is silent'}
     assert ('acu', 'silent') in state.node_reports(station)
     assert state.header(Station(ages={'acu': math.inf, 'adu': math.inf}))['drive'] == ('unknown', 'bad')
 
@@ -90,8 +111,8 @@ def test_the_holder_is_refused_by_the_mode_only(control, holds, may_take, expect
 def test_another_client_may_command_standby_and_a_supervisor_may_take_control():
     station = Station({'control': 'anna', 'refused tle': 'no elements'})
     refused, supervisor = state.refusals(station, False), state.refusals(station, False, may_take=True)
-    assert set(state.OPERATOR_COMMANDS) - set(refused) == {'standby'}
-    assert set(state.OPERATOR_COMMANDS) - set(supervisor) == {'standby', 'take'}
+    assert set(state.OPERATOR_COMMANDS) - set(refused) == {'standby', 'adu/emergency_stop'}
+    assert set(state.OPERATOR_COMMANDS) - set(supervisor) == {'standby', 'take', 'adu/emergency_stop'}
     assert set(refused.values()) == {'held by anna'}
 
 
@@ -122,6 +143,9 @@ class Remote(Station):
 
     def replied(self, number):
         return self._requests.replied(number)
+
+    def connect_drive(self):
+        pass
 
 
 def made(*arguments, **named):
@@ -162,7 +186,9 @@ def test_a_silent_drive_has_no_angles_of_now():
 
 @pytest.mark.parametrize('key, command, control, sent', [
     ('s', 'stop', 'berta', True), ('b', 'standby', 'berta', True), ('g', 'program', 'berta', False),
-    ('g', 'program', '', True), ('g', 'program', 'anna', True), ('\x1b[A', 'rate', 'x', False)])
+    ('x', 'adu/emergency_stop', 'berta', True), ('f', 'adu/reset_faults', 'berta', False),
+    ('f', 'adu/reset_faults', 'anna', True), ('g', 'program', '', True),
+    ('g', 'program', 'anna', True), ('\x1b[A', 'rate', 'x', False)])
 def test_a_key_whose_command_would_be_refused_shows_the_reason_instead(key, command, control, sent):
     remote, shown = made({'control': control})
     shown.press(key, 1.0)

@@ -27,7 +27,7 @@ from pedestal_recording.readable import Readable
 
 MAX_CACHE_BYTES = 64_000_000  # largest size of the cache of unpacked chunks [bytes]
 
-MAX_SEARCHED_DIAGNOSTICS = 100  # messages at the end of a bag in which the last diagnostics of a node are searched
+MAX_SEARCHED_DIAGNOSTICS = 100  # messages at an end of a bag in which the diagnostics of a node are searched
 
 MAX_CHANNELS = 2000  # largest number of channels of a file; a channel is the record of a topic in an MCAP file
 MAX_SHOWN_FOREIGN_MESSAGES = 3  # largest number of foreign messages of a topic whose time and size are shown
@@ -462,10 +462,10 @@ class Bag:
         count = f'{rows.size} foreign message{"s" if rows.size > 1 else ""}'
         return f'{name}: {count} left out, at {shown}{more}: {text}'
 
-    def last_values(self, node: str) -> dict[str, str]:
-        """Return {key: value} of the last readable diagnostics of a node, {} without any."""
+    def last_values(self, node: str, first: bool = False) -> dict[str, str]:
+        """Return {key: value} of the last readable diagnostics of a node, {} without any. first: of the first ones."""
         rows = self.rows('diagnostics') if 'diagnostics' in self.topics else self.index[:0]
-        for _, _, _, data in self.take(rows[:-MAX_SEARCHED_DIAGNOSTICS - 1:-1]):
+        for _, _, _, data in self.take((rows if first else rows[::-1])[:MAX_SEARCHED_DIAGNOSTICS]):
             with contextlib.suppress(ValueError):
                 for status in messages.deserialize(data, 'diagnostic_msgs/msg/DiagnosticArray').status:
                     if status.name == node:

@@ -89,8 +89,10 @@ def line(bag: Bag) -> str:
     """Return one line on the origin of a bag, 'made by: scenario ...', for the reports."""
     run = bag.metadata
     parts = ['unknown, the bag holds no configuration']
-    if bag.configuration['scenario']:
-        parts = [f'scenario {run.get("scenario", "")}', run.get('pacing', ''), f'seed {run.get("seed", "")}',
+    if 'pacing' in run:
+        of_run = [f'scenario {run.get("scenario", "")}', run['pacing'], f'seed {run.get("seed", "")}']
+        by_hand = ['a graph started by hand', run['pacing']]
+        parts = [*(of_run if bag.configuration['scenario'] else by_hand),
                  f'git {run.get("git") or "unknown"}']
         parts += [f'{key.removeprefix("version.")} {value}' for key, value in run.items()
                   if key.startswith('version.')]

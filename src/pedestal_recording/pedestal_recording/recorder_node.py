@@ -42,6 +42,7 @@ step. Such messages can come late: Fast DDS resends the messages that a subscrib
 next heartbeat, by default every 3 s.
 """
 
+SYNC_PERIOD_S = 5.0  # time between two synchronisations of the disk in realtime [s]
 LAST_OPENED_TOPIC = 'diagnostics'
 """Topic to which the recorder subscribes last, when the executor already serves all other topics.
 
@@ -145,6 +146,7 @@ class RecorderNode(shell.Shell):
         self._opening = self.every(0.0, self._record_last)
         if not self.graph.lockstep:
             self.every(1.0, lambda: self._write(self._bag.flush))
+            self.every(SYNC_PERIOD_S, self._bag.synchronise)
 
     def _record(self, index: int, topic: nodes.Link) -> None:
         """Subscribe to a topic. The queue keeps all messages in lockstep, and those of several seconds in realtime."""
@@ -176,7 +178,7 @@ class RecorderNode(shell.Shell):
                 if not checked or count(data, info):
                     put(data, info)
                 else:
-                    self._bag.write_foreign(index, self._stamp, info['source_timestamp'], data)
+                    self._bag.write_foreign(index, self._now(), info['source_timestamp'], data)
             except (BagError, OrderError) as error:
                 self._fail(str(error))
         return take
@@ -297,6 +299,10 @@ class RecorderNode(shell.Shell):
             self._without_stamp += 1
         return self._stamp
 
+    def _now(self) -> Nanoseconds:
+        """Return the time of the drive. Before its first message in realtime, UTC takes its place."""
+        return self._stamp or (0 if self.graph.lockstep else self.clock()[1])
+
     def _on_arrival(self, index: int, topic: nodes.Link) -> Take:
         """Return the function that writes a message of a topic at its arrival in realtime."""
         write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
@@ -310,7 +316,7 @@ class RecorderNode(shell.Shell):
             put(data, info)
 
         def put_unstamped(data: bytes, info: MessageInfo) -> None:
-            write(index, self._stamp, info['source_timestamp'], data)
+            write(index, self._now(), info['source_timestamp'], data)
 
         def put_diagnostics(data: bytes, info: MessageInfo) -> None:
             if self._sender(data) != self.name:

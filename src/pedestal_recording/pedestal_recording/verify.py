@@ -50,9 +50,10 @@ class Report:
     made: str   # origin of the bag, one line
     end: Nanoseconds    # time of the last step
     planned_end: Nanoseconds | None     # time of the planned last step, None if unknown
-    # in the last diagnostics of the drive, '' without any; 'of N' if its N steps are not more than `steps`
-    lost_steps: str
+    # number of lost steps and number of all steps in the last diagnostics of the drive, None if unknown
+    lost: tuple[int, int] | None
     foreign: list[str]  # lines about the foreign messages, which the check leaves out
+    damaged: bool   # True if the recording has no end, as after a killed recorder
     cut: Seconds | None     # time at which a recording of only a part of its run begins; None for a whole run
 
     @property
@@ -81,6 +82,11 @@ class Report:
         return f'aborted: ends at {self.end / 1e9:.6f} s, planned end {self.planned_end / 1e9:.6f} s'
 
     @property
+    def lost_steps(self) -> str:
+        """Lost steps of the drive as text, '' without any."""
+        return '{} of {}'.format(*self.lost) if self.lost and self.lost[0] else ''
+
+    @property
     def loss(self) -> str:
         """Line about the lost steps of the drive, '' without any."""
         return f'lost steps: {self.lost_steps}, made by the drive without the command for them' if (
@@ -105,7 +111,8 @@ class Report:
         verdict = 'complete' if self.complete else f'NOT complete, {count} problem{"s" if count > 1 else ""}'
         if self.aborted:
             verdict = f'{"part of a run" if self.cut is not None else "aborted"}; up to its end {verdict}'
-        return [*lines, f'{self.path}: {verdict}: {total} messages, {len(self.topics)} topics, {steps}']
+        cure = [f'pedestal recover {self.path} makes a complete bag of the undamaged part'] if self.damaged else []
+        return [*lines, *cure, f'{self.path}: {verdict}: {total} messages, {len(self.topics)} topics, {steps}']
 
 
 _S = typing.TypeVar('_S', Nanoseconds, Stamps)
@@ -157,18 +164,34 @@ def verify(bag: Bag) -> Report:
     problems += _unrecorded_steps([rows[name] for name in of_steps], bag.start, grid)
     if bag.path.is_dir():
         problems += _metadata_file(bag, counts)
-    drive = bag.last_values(nodes.DRIVE_NODE)
-    lost, of_all = count(drive.get('lost_steps', '')), count(drive.get('step', ''))
     planned = planned - bag.start if of_steps and planned is not None else None
     return Report(str(bag.path), checks, bag.breaks + problems, grid.steps,
                   grid.period / 1e9 if grid.period else np.nan, configuration.line(bag), grid.last, planned,
-                  f'{lost}{f" of {of_all}" if of_all <= grid.steps else ""}' if lost and of_all else '', bag.foreign,
+                  _lost_steps(bag), bag.foreign, bool(bag.damage),
                   grid.first / 1e9 if before else None)
 
 
 def count(text: str) -> int | None:
     """Return a text of the diagnostics as a whole number, None if the text is no whole number."""
     return int(text) if text.isdecimal() and len(text) < 20 else None
+
+
+def _lost_steps(bag: Bag) -> tuple[int, int] | None:
+    """Return (lost steps, all steps) by the diagnostics of the drive, None without them.
+
+    The drive counts since its start. In a graph that was started by hand, the recorder may start much later, and the
+    number of a step may count from midnight. The first diagnostics in its bag are then the begin of both counts.
+    """
+    last = _step_counts(bag.last_values(nodes.DRIVE_NODE))
+    if last is None or bag.configuration['scenario']:
+        return last
+    first = _step_counts(bag.last_values(nodes.DRIVE_NODE, first=True)) or (0, 0)
+    return (last[0] - first[0], last[1] - first[1]) if first[0] <= last[0] and first[1] <= last[1] else last
+
+
+def _step_counts(values: Mapping[str, str]) -> tuple[int, int] | None:
+    lost, steps = count(values.get('lost_steps', '')), count(values.get('step', ''))
+    return None if lost is None or steps is None else (lost, steps)
 
 
 def steps_before(bag: Bag) -> int:
@@ -193,7 +216,8 @@ def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut:
     rate = topic.rate if topic else ''
     if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
         # Missing steps of the graph, and messages of foreign publishers, are no fault of the recording.
-        return ([] if stamp.size else ['no message']) + _numbering(bag.recorded(name), cut)
+        absent = [] if stamp.size or _may_be_absent(bag, name) else ['no message']
+        return absent + _numbering(bag.recorded(name), cut)
     # A node outside the graph publishes samples. It may be restarted, and it may repeat a stamp.
     problems = _order(stamp) if topic and len(topic.writers) == 1 and rate != 'sample' else []
     if topic and rate == 'step':
@@ -201,7 +225,7 @@ def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut:
         if ours and not np.array_equal(rows.stamp, rows.log):
             problems.append(f'{np.sum(rows.stamp != rows.log)} messages with a log time that differs from their stamp')
     # The `once` topics are latched, so a restarted recorder receives their message again, in its own file.
-    elif rate == 'once' and not (not cut) <= stamp.size <= len(bag.files):
+    elif rate == 'once' and not (not (cut or _may_be_absent(bag, name))) <= stamp.size <= len(bag.files):
         problems.append(f'{stamp.size} messages, must be 1')
     elif rate == 'second' and bag.metadata.get('pacing') == 'lockstep' and grid.period:
         problems += _seconds(bag, name, stamp, grid)
@@ -210,6 +234,17 @@ def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut:
     if ours and rate != 'sample':
         problems += _numbering(bag.recorded(name), cut)
     return problems
+
+
+def _may_be_absent(bag: Bag, name: str) -> bool:
+    """Return True for a topic that needs no message in a realtime bag of a graph that was started by hand. It is the
+    topic of a node that does not run, or one that only simulated equipment publishes, such as adu/truth."""
+    if bag.configuration['scenario'] or bag.metadata.get('pacing') != 'realtime':
+        return False
+    graph = bag.graph
+    of_node = [other for other, topic in graph.items() if other in bag.topics and topic.rate == 'step'
+               and set(topic.writers) & set(graph[name].writers)]
+    return nodes.plain(name) in nodes.SIMULATED_TOPICS or not any(bag.rows(other).size for other in of_node)
 
 
 def _differences(claimed: Mapping[str, int], counts: Mapping[str, int]) -> str:

@@ -18,9 +18,11 @@ import collections
 import contextlib
 import fcntl
 import io
+import os
 import pathlib
 import struct
 import sys
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from typing import IO, cast
 
@@ -63,6 +65,13 @@ def _qos(rate: str) -> list[dict[str, object]]:
              'durability': 'transient_local' if latched else 'volatile',
              'deadline': dict(_INFINITE), 'lifespan': dict(_INFINITE), 'liveliness': 'automatic',
              'liveliness_lease_duration': dict(_INFINITE), 'avoid_ros_namespace_conventions': False}]
+
+
+def _store(descriptor: int) -> None:
+    """Let the disk store a file, and close its descriptor. The next write to the file reports an error of the disk."""
+    with contextlib.suppress(OSError):
+        os.fdatasync(descriptor)
+    os.close(descriptor)
 
 
 class _Disk:
@@ -120,6 +129,7 @@ class BagFile:
         with contextlib.suppress(OSError):  # a file system without locks
             fcntl.flock(stream, fcntl.LOCK_EX)
         self._full = False
+        self._storing: threading.Thread | None = None
         self._in_file = self._in_chunk = self._chunk_size = self._chunk_start = 0
         self._start(_Disk(self.file, stream))
 
@@ -176,6 +186,13 @@ class BagFile:
             self._full = True
             raise
         self._in_file += added
+
+    def synchronise(self) -> None:
+        """Let the disk store what is in the file, in a thread, because this may take seconds. Without this call the
+        kernel may keep it in memory for half a minute, and a power cut would lose it."""
+        if self._storing is None or not self._storing.is_alive():
+            self._storing = threading.Thread(target=_store, args=(os.dup(self._disk.stream.fileno()),), daemon=True)
+            self._storing.start()
 
     @property
     def messages(self) -> int:

@@ -1,6 +1,8 @@
 import hashlib
 import math
+import os
 import pathlib
+import threading
 
 import numpy as np
 import pytest
@@ -178,7 +180,7 @@ def test_a_bag_that_does_not_say_how_it_was_made_is_no_gap(recording):
     content = bag.read(recording)
     assert content.configuration == {'scenario': '', 'parameters': {}}
     report = verify(load(recording))
-    assert report.complete and report.made == 'made by: unknown, the bag holds no configuration'
+    assert report.complete and report.made == 'made by: a graph started by hand, lockstep, git unknown'
     assert report.made in report.lines()
 
 
@@ -461,6 +463,48 @@ def test_verify_finds_swapped_messages(tmp_path, rows):
     report = verify(load(write(tmp_path / 'b', swapped)))
     problems = [problem for check in report.topics for problem in check.problems]
     assert problems == ['1 stamps go back, the first from 0.105000 to 0.100000 s']
+
+
+def test_the_disk_stores_a_recording_while_it_is_written(tmp_path, rows, monkeypatch):
+    """The flushed messages are in the file when its storing begins; storings do not queue."""
+    stored, begun = [], threading.Event()
+
+    def slow(descriptor):
+        stored.append((os.fstat(descriptor).st_ino, os.fstat(descriptor).st_size))
+        begun.wait(60.0)
+    monkeypatch.setattr(os, 'fdatasync', slow)
+    writer = Writer(tmp_path / 'b', RECORDED, METADATA)
+    for name, stamp, data in rows[:500]:
+        writer.write(NAMES.index(name), stamp, stamp, data)
+    writer.flush()
+    for _ in range(3):
+        writer.synchronise()
+    begun.set()
+    writer._storing.join()
+    file = (tmp_path / 'b' / 'b_0.mcap').stat()
+    assert stored == [(file.st_ino, file.st_size)] and file.st_size > 10_000
+    writer.close()
+
+
+def drive_counts(k, step, lost):
+    array = diagnostics('adu', k)
+    array.status[0].values = [messages.KeyValue(key=key, value=str(value))
+                              for key, value in (('step', step), ('lost_steps', lost))]
+    return 'diagnostics', k * T, messages.serialize(array)
+
+
+@pytest.mark.parametrize('absent, problems', (
+    (('adu/truth', 'adu/motor_states', 'target/truth'), 0),             # a rotator, servo drives, one's own receiver
+    (('ship/truth', 'ship/imu/data_raw', 'acu/program_track'), 0),      # ashore, without an operator
+    (('acu/estimate',), 1), (('joint_states',), 1)))
+def test_a_graph_that_was_started_by_hand_needs_no_message_of_simulated_equipment(tmp_path, rows, absent, problems):
+    """Its drive counts its steps from midnight, and has lost some before the recorder started."""
+    kept = [row for row in rows if row[0] not in (*absent, 'diagnostics')]
+    kept += [drive_counts(k, 8_640_000 + k, 500 + k // 100) for k in (0, 200, 400)]
+    metadata = {'scenario': '', 'pacing': 'realtime', 'seed': 7, 'start': 0}
+    report = verify(load(write(tmp_path / 'by_hand', sorted(kept, key=lambda row: row[1]), metadata)))
+    assert report.lost == (4, 400) and sum(len(check.problems) for check in report.topics) == problems
+    assert report.made == 'made by: a graph started by hand, realtime, git unknown'
 
 
 def test_verify_finds_what_the_recorder_lost(tmp_path, rows):

@@ -100,7 +100,7 @@ def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name
     ))])
 def test_a_sheet_that_cannot_be_is_refused(pedestal, tmp_path, arguments, expected):
     code, output, errors = pedestal('new', 'my.yaml', *arguments)
-    assert (code, output) == (1, '') and expected in errors and errors.count('\n') == 1
+    assert (code, output) == (2, '') and expected in errors and errors.count('\n') == 1
     assert not list(tmp_path.iterdir())
 
 

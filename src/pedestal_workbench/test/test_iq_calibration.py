@@ -223,7 +223,7 @@ def test_samples_of_another_time_and_wrong_options_are_named(recorded, capfd, tm
     moved.write_text(recorded.read_text().replace('1969-12-31T23:59:59', '2019-12-10T12:00:00'))
     moved.with_suffix('.sigmf-data').symlink_to(recorded.with_suffix('.sigmf-data'))
     code, _, said = calibrated(capfd, moved)
-    assert code == 1 and 'holds samples from 2019-12-10' in said and 'must be of the same run' in said
+    assert code == 2 and 'holds samples from 2019-12-10' in said and 'must be of the same run' in said
     code, _, said = calibrated(capfd, recorded, '--param', 'tracking_receiver.source.rate=4e4')
     assert code == 1 and 'must be 40000 S/s (source.rate)' in said
     code, _, said = calibrated(capfd, tmp_path / 'none.sigmf-meta')

@@ -179,5 +179,5 @@ def test_the_design_is_that_of_a_rigid_drive():
 ])
 def test_refused(pedestal, tmp_path, arguments, expected):
     code, output, errors = pedestal('tune', *arguments, '--loops')
-    assert (code, output) == (1, '') and expected in errors and errors.count('\n') == 1
+    assert (code, output) == (2, '') and expected in errors and errors.count('\n') == 1
     assert not list(tmp_path.iterdir())

@@ -215,7 +215,7 @@ def test_the_verb_prints_rows_and_writes_a_parameter_file(tmp_path, capfd):
     assert np.sqrt((residuals[:, 2:]**2).mean()) == pytest.approx(model.rms, abs=5e-5)
     page = (tmp_path / 'page.html').read_text()
     assert page.count('<svg') == 3 and 'P8' in page and 'src=' not in page
-    assert cli.main(given) == 1      # the files are not overwritten
+    assert cli.main(given) == 2      # the files are not overwritten
     assert 'model.yaml: exists already; the file is not overwritten' in capfd.readouterr().err
 
 
@@ -229,7 +229,7 @@ def test_the_verb_prints_rows_and_writes_a_parameter_file(tmp_path, capfd):
 def test_a_wrong_option_is_refused(tmp_path, capsys, given, message):
     file = tmp_path / 'offsets.csv'
     file.write_text(table(station()))
-    assert cli.main(['calibrate', 'pointing', '--offsets', str(file), *given]) == 1
+    assert cli.main(['calibrate', 'pointing', '--offsets', str(file), *given]) == 2
     assert message in capsys.readouterr().err
 
 
@@ -241,7 +241,7 @@ def test_no_output_replaces_measurements_or_another_output(tmp_path, monkeypatch
                            (('--output', 'x', '--report', './x'), '--output x: is also the file of --report'),
                            (('--output', 'x', '--json', tmp_path / 'x'), '--output x: is also the file of --json'),
                            (('--output', '-'), '--output -: must be the name of a file')):
-        assert cli.main(['calibrate', 'pointing', '--offsets', str(file), *map(str, given)]) == 1
+        assert cli.main(['calibrate', 'pointing', '--offsets', str(file), *map(str, given)]) == 2
         assert message in capsys.readouterr().err
     assert file.read_text() == table(station()) and list(tmp_path.iterdir()) == [file]
     assert cli.main(['calibrate', 'pointing', '--offsets', str(file), '--json', 'x']) == 0
@@ -258,7 +258,7 @@ def test_the_encoder_of_p12_counts_the_turns(tmp_path, capsys):
 def test_too_few_offsets_are_refused_with_the_file(tmp_path, capsys):
     file = tmp_path / 'offsets.csv'
     file.write_text(table(station(6)))
-    assert cli.main(['calibrate', 'pointing', '--offsets', str(file)]) == 1
+    assert cli.main(['calibrate', 'pointing', '--offsets', str(file)]) == 2
     assert f'pedestal: error: {file}: 6 points, must be at least 10 for 7 terms' in capsys.readouterr().err
     assert cli.main(['calibrate', 'pointing', '--offsets', str(tmp_path / 'none.csv')]) == 1
     assert 'none.csv: No such file or directory' in capsys.readouterr().err
@@ -270,7 +270,7 @@ def test_a_plan_stays_within_the_travel_of_a_scenario(tmp_path, capsys):
     assert head.startswith('# 20 directions') and names == 'az_deg,el_deg' and len(rows) == 20
     assert cli.main(['calibrate', 'pointing', '--plan', '20', '--output', str(tmp_path / 'plan.csv')]) == 0
     assert len((tmp_path / 'plan.csv').read_text().splitlines()) == 22
-    assert cli.main(['calibrate', 'pointing', '--plan', '9']) == 1
+    assert cli.main(['calibrate', 'pointing', '--plan', '9']) == 2
     assert '--plan 9: must be 10 to 500' in capsys.readouterr().err
 
 

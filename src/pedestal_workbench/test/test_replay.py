@@ -9,7 +9,7 @@ from pedestal_common.graph import topics
 from pedestal_common.wire import messages  # noqa: E402
 from pedestal_recording import bag
 from pedestal_recording.writer import Writer
-from pedestal_workbench.again import playlist
+from pedestal_workbench.again import playlist, terminal
 
 T = 5_000_000
 OTHER = topics.TOPIC_BY_NAME['joint_states']._replace(name='camera/angle')
@@ -117,12 +117,20 @@ REFUSED = {
 }
 
 
+def test_a_wait_is_announced_once_where_there_is_no_terminal(capsys):
+    line = terminal.StatusLine()
+    for text in ('waits for acu', 'waits for acu', 'waits for adu'):
+        line.announce(text)
+    line.show('2.0 s')
+    assert capsys.readouterr().err == 'pedestal: waits for acu\npedestal: waits for adu\n'
+
+
 @pytest.mark.parametrize('case', REFUSED)
 def test_refused_in_one_line(case, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr('sys.stdin', io.StringIO())
     write(tmp_path / 'bag', ROWS)
     options, text = REFUSED[case]
-    assert cli.main(['replay', str(tmp_path / 'bag'), *options]) == 1
+    assert cli.main(['replay', str(tmp_path / 'bag'), *options]) == 2
     error = capsys.readouterr().err
     assert text in error and error.count('\n') == 1
 

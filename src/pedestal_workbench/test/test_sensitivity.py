@@ -103,7 +103,7 @@ def test_offsets_in_azimuth_shrink_with_the_elevation(tmp_path, capfd):
         assert cli.main(['calibrate', 'sensitivity', *given, '--diameter', '0.53', '--json', '-']) == 0
         found.append(values(json.loads(capfd.readouterr().out)))
     assert found[0] == pytest.approx(found[1], rel=1e-6)
-    assert cli.main(['calibrate', 'sensitivity', '--levels', turned]) == 1
+    assert cli.main(['calibrate', 'sensitivity', '--levels', turned]) == 2
     assert '--elevation must state the elevation' in capfd.readouterr().err
 
 
@@ -122,7 +122,7 @@ def test_offsets_in_azimuth_shrink_with_the_elevation(tmp_path, capfd):
      )])
 def test_bad_input_is_refused(tmp_path, capfd, change, given, message):
     file = write(tmp_path / 'bad.csv', change(measured(0.0)))
-    assert cli.main(['calibrate', 'sensitivity', '--levels', file, '--diameter', '0.53', *given]) == 1
+    assert cli.main(['calibrate', 'sensitivity', '--levels', file, '--diameter', '0.53', *given]) == 2
     error = capfd.readouterr().err
     assert message in error
 
@@ -130,7 +130,7 @@ def test_bad_input_is_refused(tmp_path, capfd, change, given, message):
 def test_a_source_of_unknown_size_is_refused(tmp_path, capfd):
     """As a point the sun would make the beam half as wide again."""
     file = write(tmp_path / 'sun.csv', measured(0.0))
-    assert cli.main(['calibrate', 'sensitivity', '--levels', file]) == 1
+    assert cli.main(['calibrate', 'sensitivity', '--levels', file]) == 2
     assert '--diameter: is needed without --flux' in capfd.readouterr().err
 
 

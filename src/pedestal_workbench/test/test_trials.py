@@ -95,7 +95,7 @@ def test_rows_of_a_file_are_trials(tmp_path, pedestal):
     assert made.runs == 2 and made.varied == {BANDWIDTH: [15, 20.5], 'acu.azimuth.filter.kind': ['ca', 'cv']}
     file.write_text(f'{BANDWIDTH}\n15\n2000\n')
     code, _, errors = pedestal('trials', 'leo_pass', '--vary', file)
-    assert code == 1 and errors.startswith(f'pedestal: error: --vary {BANDWIDTH}, trial 1: scenario leo_pass, acu: ')
+    assert code == 2 and errors.startswith(f'pedestal: error: --vary {BANDWIDTH}, trial 1: scenario leo_pass, acu: ')
 
 
 REFUSED = {
@@ -124,7 +124,7 @@ def test_refused_before_anything_runs(pedestal, tmp_path, case):
     vary, expected = REFUSED[case]
     code, output, errors = pedestal('trials', 'leo_pass', '--runs', 20, *(part for text in vary
                                                                          for part in ('--vary', text)))
-    assert (code, output) == (1, '') and expected in errors and errors.count('\n') == 1
+    assert (code, output) == (2, '') and expected in errors and errors.count('\n') == 1
     assert not list(tmp_path.iterdir())
 
 
@@ -149,7 +149,7 @@ def test_refused_before_anything_runs(pedestal, tmp_path, case):
     (('--solve', BANDWIDTH, '--until', 'loss_s = 1', '--vary', f'{BANDWIDTH}=uniform(10, 20)'), 'is varied too')])
 def test_options_that_cannot_be_met(pedestal, options, expected):
     code, output, errors = pedestal('trials', 'leo_pass', *options)
-    assert (code, output) == (1, '') and expected in errors and errors.count('\n') == 1
+    assert (code, output) == (2, '') and expected in errors and errors.count('\n') == 1
 
 
 def test_a_table_continues_after_its_last_complete_row(tmp_path):
@@ -500,3 +500,10 @@ def test_the_worst_is_the_one_that_was_not_measured(tmp_path):
     values = np.array([0.2, math.nan, 0.1, 0.3])
     assert statistics.ranking('pointing_rms_deg', values).tolist() == [1, 3, 0, 2]
     assert statistics.ranking('isolation_db', values).tolist() == [1, 2, 0, 3]
+
+
+@pytest.mark.parametrize(('name', 'duration', 'size'), (
+    ('leo_pass', 28.0, 32), ('leo_pass', 100.0, 15), ('leo_pass', 600.0, 8), ('ship_pass', 20.0, 4),
+    ('ship_pass', 120.0, 1)))
+def test_a_batch_is_short_so_that_a_stop_keeps_the_rows_of_the_last_seconds(name, duration, size):
+    assert ensemble._batch_size(plan(Variant(name, duration=duration), 100)) == size

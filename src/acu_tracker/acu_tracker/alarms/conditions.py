@@ -156,6 +156,7 @@ def _of_unit(supervision: Supervision, inputs: Inputs, outputs: Outputs, facts: 
     bits = facts.latched | Bit.AZIMUTH_STOW_PIN * outputs.pins_wrong
     bits |= Bit.TIME_JUMP * (0.0 < facts.gap < math.inf)
     bits |= Bit.DRIVE_SILENT * (DRIVE_SILENCE_GAP_S < facts.gap < math.inf)
+    bits |= Bit.STEPS_LOST * (inputs.steps_lost != 0)
     bits |= Bit.RECEIVER_SILENT * (inputs.error_came == 0 or _repeated(supervision, inputs))
     bits |= Bit.RECEIVER_NOISY * (outputs.invalid_input & Flag.ERROR_NOISY != 0)
     bits |= Bit.INVALID_INPUT * (outputs.invalid_input & INVALID_INPUT_FLAGS != 0)

@@ -39,7 +39,12 @@ ALARM_ROWS = (
     Alarm('drive silent', 'high', 0.0, 1.0, False, (),
           'the drive publishes neither angles nor time',
           'check the drive and its network'),
-    Alarm('time jump', 'medium', 0.0, 10.0, False, ('drive silent',),
+    Alarm('steps lost', 'medium', 0.0, 5.0, False, ('drive silent',),
+          'the drive has made more than 1 % of its steps of the last 5 s without a new command, or not at all; the '
+          'antenna follows worse than designed',
+          'end other programs on the computers of drive and ACU, use a faster computer, or give the nodes a realtime '
+          'priority (`scenario.priority`)'),
+    Alarm('time jump', 'medium', 0.0, 10.0, False, ('drive silent', 'steps lost'),
           'the stamps of successive steps are more than `step_gap` apart; the axes restarted from their actual angles',
           'check the clock of the drive and the load of the computers'),
     Alarm('receiver silent', 'medium', 0.95, 1.0, False, ('drive silent', 'time jump'),

@@ -170,10 +170,12 @@ def reset(unit: 'Acu') -> Reply:
         unit.reset_stamp = float(unit.parts['state']['stamp'])
     if cause != annunciator.NO_ALARM:
         return Reply(False, f'refused: the cause of {table.ALARM_NAMES[cause]} is still there')
-    if unit.drive_state.startswith('fault'):
-        return Reply(True, f'cleared; requests the reset of the drive, which reported {unit.drive_state}')
-    stopped = unit.drive_state.startswith('emergency stop')
-    return Reply(True, 'cleared' + ('; the drive reports emergency stop: only adu/reset_faults ends it' * stopped))
+    if not unit.drive_state.startswith(('fault', 'emergency stop')):
+        return Reply(True, 'cleared')
+    tripped = unit.drive_state.startswith('fault')
+    return Reply(True, f'the ACU is reset, the drive is not yet: {unit.drive_state}; '
+                 + ('its reset is requested, `pedestal drive reset_faults` shows its reply' if tripped else
+                    'only `pedestal drive reset_faults` ends an emergency stop'))
 
 
 def _rates(arguments: Arguments) -> list[RadiansPerSecond]:

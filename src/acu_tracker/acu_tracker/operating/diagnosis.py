@@ -6,6 +6,7 @@ from acu_tracker import modes, signals
 from acu_tracker.operating import announcement, refusals
 from pedestal_common.graph import topics
 from pedestal_common.node.unit import LEVEL_ERROR, LEVEL_OK, LEVEL_WARN, Diagnosis
+from pedestal_common.quantities import AnyRecord
 
 if TYPE_CHECKING:
     from acu_tracker.unit import Acu
@@ -68,9 +69,16 @@ def _gravest(unit: 'Acu', invalid: tuple[str, ...]) -> tuple[int, str]:
     return LEVEL_WARN if outputs['coasting'] else LEVEL_OK, mode
 
 
+def progress(outputs: AnyRecord) -> str:
+    """Return the words for the mode and its progress: stowing, then stowed."""
+    row = modes.MODE_ROWS[outputs['mode']]
+    return (row.arrived if outputs['arrived'] else row.going) or row.name
+
+
 def _values(unit: 'Acu', invalid: tuple[str, ...]) -> list[tuple[str, str]]:
     state, outputs = unit.parts['state'], unit.parts['outputs']
-    values = [('mode', modes.MODES[outputs['mode']]), ('reason', modes.REASONS[outputs['reason']]),
+    values = [('mode', modes.MODES[outputs['mode']]), ('progress', progress(outputs)),
+              ('reason', modes.REASONS[outputs['reason']]),
               ('fallback', modes.FALLBACK_NAMES[int(state['mode']['fallback'])]), ('control', unit.authority.holder),
               ('requester', unit.authority.requester(unit.now)),
               ('faults', ', '.join(unit.faults)), ('locked', str(int(outputs['locked']))),

@@ -1,7 +1,10 @@
 """The position loops of both axes of the antenna: start from the actual angles, following of the reference, rest."""
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from acu_tracker import modes
 from acu_tracker.geometry.vector import Motion
+from acu_tracker.modes import Mode
 from acu_tracker.servo import position_loop, reference, travel
 from acu_tracker.servo.position_loop import Command, Feedback, Instants
 from acu_tracker.signals import Inputs, Outputs
@@ -10,6 +13,9 @@ from pedestal_common.quantities import BothAxes, Pair, RadiansPerSecond, Seconds
 
 if TYPE_CHECKING:
     from acu_tracker.control_unit import Constants
+
+ARRIVAL_BEAMWIDTHS = 0.25   # largest distance of an axis from the target of its mode that counts as reached
+ARRIVAL_RATE_RAD_S = 2e-3   # rate below which an axis that follows no target has arrived [rad/s]
 
 
 class BeamInputs(NamedTuple):
@@ -52,6 +58,23 @@ def follow(axis: BothAxes[position_loop.AxisLoop], constants: 'Constants', input
         feedback = Feedback(y=inputs.position[i], dy=inputs.velocity[i], error=beam.error[i], V=beam.deck_rates[i],
                             closed=beam.closed, ends=now_ends[i])
         _write(outputs, i, position_loop.follow(axis[i], constants.axis[i], motion[i], feedback, now))
+
+
+@compiled
+def distance(constants: 'Constants', inputs: Inputs, motion: Motion, mode: int) -> float:
+    """Return the distance of the axes from the target of a mode, in units of the largest one that counts as reached.
+
+    This is ARRIVAL_BEAMWIDTHS, or `stow_window` in mode stow. In a mode that follows no target the axes must also
+    stand.
+    """
+    follows, window = modes.FOLLOWS_TARGET[mode], ARRIVAL_BEAMWIDTHS * constants.p.tracker.receiver.beamwidth
+    if mode == Mode.STOW:
+        window = constants.p.stow_window
+    scale = math.cos(motion.elevation.angle) if follows else 1.0
+    farthest = max(abs(motion.azimuth.angle - inputs.position[0]) * scale,
+                   abs(motion.elevation.angle - inputs.position[1])) / window
+    fastest = max(abs(inputs.velocity[0]), abs(inputs.velocity[1])) / ARRIVAL_RATE_RAD_S
+    return farthest if follows else max(farthest, fastest)
 
 
 @compiled

@@ -9,7 +9,7 @@ import typing
 from collections.abc import Callable, Iterable, Mapping
 
 from pedestal import console
-from pedestal_common.parameters import option_of
+from pedestal_common.parameters import flatten, option_of
 
 if typing.TYPE_CHECKING:
     from pedestal_bringup.scenario.variant import Variant
@@ -33,7 +33,7 @@ class Verb(typing.NamedTuple):
                                   formatter_class=argparse.RawDescriptionHelpFormatter)
         self.add_arguments(parser)
         if self.main:
-            parser.set_defaults(main=self.main)
+            parser.set_defaults(main=self.main, parser=parser)
 
 
 def add_steps(parser: argparse.ArgumentParser, title: str, steps: Mapping[str, tuple[str, Verb]]) -> None:
@@ -55,7 +55,26 @@ def typed(kind: type[_Options], options: argparse.Namespace, **more: object) -> 
 
 def add_scenario(parser: argparse.ArgumentParser) -> None:
     """Add the scenario as first argument."""
-    parser.add_argument('scenario', help='name (see `pedestal scenarios`) or .yaml file of the scenario')
+    action = parser.add_argument('scenario', help='name (see `pedestal scenarios`) or .yaml file of the scenario')
+    vars(action)['completer'] = scenarios_and_files
+
+
+def scenarios_and_files(prefix: str, **_: object) -> list[str]:
+    """Return the scenarios and the .yaml files whose name begins with a prefix, for the completion of a shell."""
+    from pedestal_bringup.scenario import shipped
+    folder = pathlib.Path(prefix).parent if '/' in prefix else pathlib.Path()
+    found = [f'{path}/' if path.is_dir() else str(path) for path in sorted(folder.glob('*'))
+             if path.is_dir() or path.suffix in ('.yaml', '.yml')]
+    return [*shipped.available(), *found]
+
+
+def parameter_names(prefix: str, **_: object) -> list[str]:
+    """Return the texts NODE.KEY= that begin with a prefix, for the completion of a shell."""
+    from pedestal_bringup.scenario.sections import SECTION_NODES, parameters_of
+    node = prefix.partition('.')[0]
+    if '.' not in prefix or node not in (*SECTION_NODES, 'scenario'):
+        return [f'{name}.' for name in (*SECTION_NODES, 'scenario')]
+    return [f'{node}.{name}=' for name, _ in flatten(parameters_of(node))]
 
 
 def add_duration(parser: argparse.ArgumentParser, whole: str = 'a run') -> None:
@@ -66,8 +85,9 @@ def add_duration(parser: argparse.ArgumentParser, whole: str = 'a run') -> None:
 
 def add_param(parser: argparse.ArgumentParser, example: str = 'acu.azimuth.feedforward.bandwidth=12') -> None:
     """Add --param NODE.KEY=VALUE, which may be repeated."""
-    parser.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
-                        help=f'parameter and its new value, for example {example}; may be repeated')
+    action = parser.add_argument('--param', action='append', default=[], metavar='NODE.KEY=VALUE',
+                                 help=f'parameter and its new value, for example {example}; may be repeated')
+    vars(action)['completer'] = parameter_names
 
 
 def add_station(parser: argparse.ArgumentParser) -> None:

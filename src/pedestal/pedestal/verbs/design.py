@@ -35,8 +35,12 @@ LOOP_REQUIREMENTS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'position
                      'gain_margin': 'gain_margin'}  # option: field
 
 
-def _add_scenarios(parser: argparse.ArgumentParser) -> None:
-    pass
+def _add_scenarios(_parser: argparse.ArgumentParser) -> None:
+    """The verbs that run something take the name of a scenario, or a file.
+
+        pedestal scenarios
+        pedestal run uav_flyby               run one of them
+    """
 
 
 def _scenarios(_options: argparse.Namespace) -> int:
@@ -102,21 +106,33 @@ def _new(options: argparse.Namespace) -> int:
 
 
 def _add_parameters(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument('node',
-                        help='name of the node: acu, adu, beam_steering (drive of an array), tracking_receiver, '
-                        'ship_motion, ins, recorder; or scenario')
+    from pedestal_common.graph import nodes
+    parser.add_argument('node', help='name of the node or of its executable: acu, adu, tracking_receiver, '
+                        f'ship_motion, ins, recorder, {", ".join(nodes.STANDALONE_NODES)}; or scenario')
 
 
 def _parameters(options: argparse.Namespace) -> int:
-    from pedestal_bringup.scenario.sections import parameters_of
     from pedestal_common.graph.graph_parameters import GraphParameters
     rows = []
-    for prefix, parameters_type in (('', parameters_of(options.node)), ('graph.', GraphParameters)):
+    own = _parameters_type(options.node)
+    for prefix, parameters_type in (('', own), ('graph.', GraphParameters)):
         values = parameters.defaults(parameters_type)
         rows += [(prefix + name, *_columns(field.metadata, values[name]))
                  for name, field in parameters.flatten(parameters_type)]
     console.show_list(rows)
     return 0
+
+
+def _parameters_type(name: str) -> type[parameters.Parameters]:
+    from pedestal_bringup.scenario.sections import SECTION_NODES, is_node, parameters_of
+    from pedestal_common.graph import nodes
+    short = name.removesuffix('_node').removeprefix('operator_')
+    if short in nodes.STANDALONE_NODES:
+        return nodes.STANDALONE_NODES[short].parameters_type()
+    if not (is_node(short) or short == 'scenario'):
+        known = (*SECTION_NODES, *nodes.STANDALONE_NODES, 'scenario')
+        raise ValueError(f'{name!r} is no node;{did_you_mean(name, known)} there are {", ".join(known)}')
+    return parameters_of(short)
 
 
 def _columns(meta: 'Mapping[str, Json]', value: object) -> tuple[str, str, str]:
@@ -256,6 +272,11 @@ def _tune(options: argparse.Namespace) -> int:
 
 
 def _add_bench(parser: argparse.ArgumentParser) -> None:
+    """Prints a row for each measured speed. Other programs on the machine make the numbers worse.
+
+        pedestal bench                       all benchmarks
+        pedestal bench --json speed.json     also as JSON
+    """
     from pedestal_studies import bench
     parser.add_argument('what', nargs='?', choices=tuple(bench.BENCH_MODULES), help='benchmark to run; default: all')
     console.add_json(parser)

@@ -6,25 +6,37 @@ import math
 import pathlib
 import shutil
 import sys
+import time
 import typing
 from collections.abc import Iterable, Mapping
 
 from pedestal import console
 from pedestal.verbs import arguments
 from pedestal.verbs.arguments import Verb
+from pedestal_common.graph import nodes
+from pedestal_common.graph.modes import MODE_ROWS
+from pedestal_common.graph.modes import Row as ModeRow
 
 if typing.TYPE_CHECKING:
     from pedestal_bringup.scenario.program import Plan
+    from pedestal_operator.remote_node import RemoteSession
 
 MAX_HOLD_S = 600.0  # largest time for which mode rate is repeated [s]
+DEFAULT_WAIT_S, MAX_WAIT_S = 600.0, 86400.0  # longest wait for the arrival of the axes: default, and limit [s]
+MODE_SETTLING_S = 0.3  # time after the reply to a command from which the diagnostics hold the new mode [s]
+CONTROL_TIMEOUT_S = 1.5  # longest wait for the diagnostics of the control unit before a request to the drive [s]
 DEFAULT_LIVE_PORT = 8765  # of the server for Foxglove
 START_FROM_FILE = 'file'  # value of --start for the start time in the file of the target
 
 
 def _add_status(parser: argparse.ArgumentParser) -> None:
-    """Prints angles, rates, errors, mode and its reason, receiver, drive, and the nodes that report a warning or an
-    error. Exit code 0: every node reports OK. Exit code 1: no graph runs, or a node is silent or reports a warning or
-    an error.
+    """Prints the graph, angles, rates, errors, mode and its reason, receiver, drive, the alarms of the control unit,
+    and the nodes that report a warning or an error. Exit code 0: no alarm, and every node reports OK. Exit code 1: no
+    graph runs, an alarm is present, or a node is silent or reports a warning or an error.
+
+        pedestal status
+        pedestal status --json -             the same as JSON
+        ROS_DOMAIN_ID=7 pedestal status      the graph on domain 7
     """
     console.add_json(parser)
     arguments.add_remote(parser, commands=False)
@@ -36,17 +48,18 @@ def _status(options: argparse.Namespace) -> int:
     with arguments.remote(options) as session:
         session.wait_for_node(options.timeout)
         name = session.remote.beam + 'acu'
-        session.until(lambda: session.remote.present(name) and session.remote.present('joint_states'),
-                      options.timeout)
-        rows, alarms = state.rows(session.remote), state.node_reports(session.remote)
+        session.until(lambda: all(map(session.remote.present, (name, 'joint_states', 'acu/alarms'))), options.timeout)
+        rows = [state.Row('graph', key, text) for key, text in session.graph().items()]
+        rows += state.rows(session.remote)
+        reports = [*state.alarm_reports(session.remote), *state.node_reports(session.remote)]
     table = [{'case': row.group, 'metric': row.name, 'value': row.json, 'unit': row.unit} for row in rows]
-    table += [{'case': 'alarm', 'metric': node, 'value': text, 'unit': ''} for node, text in alarms]
+    table += [{'case': 'alarm', 'metric': name, 'value': text, 'unit': ''} for name, text in reports]
     console.write_json(options.json, {'name': 'status', 'rows': table})
     for row in rows:
         print(f'{row.group:10} {row.name:22} {row.text:>14} {row.unit}'.rstrip())
-    for node, text in alarms:
-        print(f'alarm      {node}: {text}')
-    return 1 if alarms else 0
+    for name, text in reports:
+        print(f'alarm      {name}: {text}')
+    return 1 if reports else 0
 
 
 def _add_mode(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +72,7 @@ def _add_mode(parser: argparse.ArgumentParser) -> None:
         pedestal mode rate --az 0.5          turn at 0.5 deg/s for half a second
         pedestal mode rate --az 0.5 --hold 8 turn at 0.5 deg/s for 8 s; Ctrl-C ends the motion at once
         pedestal mode tle --tle iss.tle      follow the satellite of a file
-        pedestal mode stow
+        pedestal mode stow --wait            wait until the antenna is stowed
     """
     parser.add_argument('mode', help='name of the mode, for example stop; for an unknown name the reply lists '
                         'all names')
@@ -70,6 +83,8 @@ def _add_mode(parser: argparse.ArgumentParser) -> None:
                         'units; see docs/reference/nodes.md, Commands); or two numbers, as --az and --el')
     parser.add_argument('--hold', type=float, metavar='S', help='time for which mode rate is repeated before the axes '
                         'stop [s]; default: the command is sent once and lasts 0.5 s')
+    parser.add_argument('--wait', nargs='?', type=float, const=DEFAULT_WAIT_S, metavar='S', help='wait until the axes '
+                        f'have arrived; S: longest wait [s]; default: {DEFAULT_WAIT_S:g}')
     arguments.add_elements(parser)
     arguments.add_remote(parser)
 
@@ -92,7 +107,56 @@ def _mode(options: argparse.Namespace) -> int:
             given[name] = math.radians(degrees)
     if options.hold is not None and not (options.mode == 'rate' and 0.0 < options.hold <= MAX_HOLD_S):
         raise ValueError(f'--hold {options.hold:g}: must be in 0 to {MAX_HOLD_S:g} s, with mode rate only')
-    return send_command(options, options.mode, given, hold=options.hold)
+    if options.wait is not None:
+        row = next((row for row in MODE_ROWS if row.name == options.mode), None)
+        if row and not row.going:
+            raise ValueError(f'--wait: must be with a mode that arrives somewhere: '
+                             f'{", ".join(row.name for row in MODE_ROWS if row.going)}')
+        if not 0.0 < options.wait <= MAX_WAIT_S:
+            raise ValueError(f'--wait {options.wait:g}: must be above 0 to {MAX_WAIT_S:g} s')
+    return send_command(options, options.mode, given, hold=options.hold, wait=options.wait)
+
+
+def _add_stop(parser: argparse.ArgumentParser) -> None:
+    """Commands the mode `stop`: the axes brake and hold. The graph continues to run; Ctrl-C in its terminal ends it.
+    `pedestal drive emergency_stop` also engages the brakes.
+
+        pedestal stop
+    """
+    arguments.add_remote(parser)
+
+
+def _stop(options: argparse.Namespace) -> int:
+    return send_command(options, 'stop', {})
+
+
+def _add_drive(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('request', choices=[row.name for row in nodes.DRIVE_REQUESTS], help='request to the drive')
+    arguments.add_remote(parser)
+
+
+_add_drive.__doc__ = """Calls a service of the drive, without the control unit, and prints the reply of the drive. Exit
+code 0: the drive accepted the request. Exit code 1: the drive refused it; the reason is printed.
+
+""" + '\n'.join(f'    pedestal drive {row.name:14}  {row.doc}' for row in nodes.DRIVE_REQUESTS)
+
+
+def _drive(options: argparse.Namespace) -> int:
+    row = next(row for row in nodes.DRIVE_REQUESTS if row.name == options.request)
+    with arguments.remote(options) as session:
+        session.connect_drive(options.timeout)
+        if not row.free:
+            # The diagnostics of the control unit state who has control. The drive is commanded without them, too.
+            session.until(lambda: session.remote.diagnostics_of('acu'), min(CONTROL_TIMEOUT_S, options.timeout))
+        reply = session.request(row.service, {}, options.timeout)
+        print(f'{nodes.DRIVE_NODE}: {reply.text}')
+        _name_graph(session)
+    return 0 if reply.granted else 1
+
+
+def _name_graph(session: 'RemoteSession') -> None:
+    """Print on stderr which graph a session speaks to."""
+    print('graph: ' + ', '.join(f'{key} {text}' for key, text in session.graph().items()), file=sys.stderr)
 
 
 def is_number(text: str) -> bool:
@@ -171,10 +235,9 @@ def with_elements(options: argparse.Namespace, texts: Iterable[str]) -> dict[str
 
 
 def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str | float], node: str = 'acu',
-                 hold: float | None = None) -> int:
+                 hold: float | None = None, wait: float | None = None) -> int:
     """Send a command to a node and print its reply. Return the exit code. hold: time for which the command is
-    repeated, None to send it once."""
-    from pedestal_common.graph import nodes
+    repeated, None to send it once; wait: longest wait for the arrival of the axes, None to return at once."""
     commanded = [row.name for row in nodes.NODES if row.obeys]
     if node not in commanded:
         raise ValueError(f'--node {node}: must be one of {", ".join(commanded)}')
@@ -183,8 +246,27 @@ def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str
         reply = session.request(verb, given, options.timeout)
         if hold and reply.granted:
             reply = session.hold_jog(verb, given, hold)
-    print(f'{node}: {reply.text}')
+        row = next((row for row in MODE_ROWS if reply.text == f'mode is {row.name}'), None)
+        print(f'{node}: mode is {row.going}' if row and row.going else f'{node}: {reply.text}', flush=True)
+        _name_graph(session)
+        if reply.granted and row and wait is not None:
+            return _await_arrival(session, row, wait)
     return 0 if reply.granted else 1
+
+
+def _await_arrival(session: 'RemoteSession', row: ModeRow, seconds: float) -> int:
+    """Wait until the axes have arrived where a mode moves them, and print the progress. Return the exit code: 1 if the
+    mode ends before, or after `seconds`."""
+    begun, ended = time.monotonic(), {'progress': 'silent', 'mode': row.name}
+
+    def arrived() -> bool:
+        # The first diagnostics may be from before the first step of the mode.
+        if session.remote.arrivals.get(session.remote.name_of('acu'), 0.0) > begun + MODE_SETTLING_S:
+            ended.update(session.remote.diagnostics_of('acu'))
+        return ended['mode'] in (row.handover, '' if row.arrived else 'standby') or ended['progress'] == row.arrived
+    session.until(lambda: arrived() or ended['mode'] != row.name, seconds)
+    print(f'acu: {ended["progress"]} after {time.monotonic() - begun:.1f} s')
+    return 0 if arrived() else 1
 
 
 def _add_operate(parser: argparse.ArgumentParser) -> None:
@@ -207,6 +289,9 @@ def _operate(options: argparse.Namespace) -> int:
 def _add_live(parser: argparse.ArgumentParser) -> None:
     """Serves every topic of the graph, its frames and the model of the pedestal on a WebSocket of this machine,
     read-only, until Ctrl-C. Needs the extra pedestal_operator[live].
+
+        pedestal live                        then open ws://127.0.0.1:8765 in Foxglove
+        pedestal live --layouts viewers      only write the files of the viewers
     """
     parser.add_argument('--port', type=int, metavar='PORT', help='TCP port on 127.0.0.1; default: 8765')
     parser.add_argument('--beams', type=int, metavar='N', help='number of beams of an electronic array; '
@@ -274,6 +359,8 @@ def _program(options: argparse.Namespace) -> int:
 VERBS = {
     'status': Verb(_add_status, _status),
     'mode': Verb(_add_mode, _mode),
+    'stop': Verb(_add_stop, _stop),
+    'drive': Verb(_add_drive, _drive),
     'ask': Verb(_add_ask, _ask),
     'operate': Verb(_add_operate, _operate),
     'live': Verb(_add_live, _live),

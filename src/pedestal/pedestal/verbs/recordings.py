@@ -11,7 +11,11 @@ DEFAULT_DEADLINE_S = 60.0  # longest wait of a replay for a subscriber or an ans
 
 
 def _add_verify(parser: argparse.ArgumentParser) -> None:
-    """Exit code 1, with a list of the gaps, for an incomplete recording."""
+    """Exit code 1, with a list of the gaps, for an incomplete recording. `pedestal recover` repairs that of a killed
+    run.
+
+        pedestal verify my_bag
+    """
     parser.add_argument('bag', type=pathlib.Path, help='recording: a folder or an .mcap file')
 
 
@@ -58,6 +62,11 @@ def _rerun(options: argparse.Namespace) -> int:
 
 
 def _add_report(parser: argparse.ArgumentParser) -> None:
+    """The file has a page with the verdict, the versions and the changed parameters, then the figures.
+
+        pedestal report my_bag                       write my_bag/report.html
+        pedestal report my_bag --pdf --png figures   also as PDF, and each figure as PNG
+    """
     parser.add_argument('bag', type=pathlib.Path, help='recording: a folder or an .mcap file')
     parser.add_argument('--output', type=pathlib.Path, metavar='FILE', help='output file; default: report.html in '
                         'the bag')
@@ -80,6 +89,12 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def _add_export(parser: argparse.ArgumentParser) -> None:
+    """Each table has a row for each message, and the time in seconds in its first column.
+
+        pedestal export my_bag --topics joint_states acu/estimate    two topics as CSV
+        pedestal export my_bag --format parquet
+        pedestal export my_bag --format tdm                          tracking data for orbit determination
+    """
     parser.add_argument('bag', type=pathlib.Path, help='recording: a folder or an .mcap file')
     parser.add_argument('--format', choices=('csv', 'parquet', 'tdm'), default='csv', help='output format; tdm: '
                         'directions of the target for orbit determination (CCSDS 503.0-B-2); default: csv')

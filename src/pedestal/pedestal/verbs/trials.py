@@ -137,7 +137,17 @@ def _solve(options: argparse.Namespace) -> int:
         raise ValueError(f'--solve {wanted.key}: the parameter is varied too')
     aim, folder = solve.goal(options.until, experiment.result_names(nominal)), _folder(options, nominal.name)
     with monte_carlo.Pool(options.workers, options.scheduler) as pool, console.progress_of_trials() as progress:
-        found = solve.Search(make_plan, wanted, aim, folder, pool, progress).run()
+        count = [0, 0]
+
+        def counted(done: int, total: int) -> None:
+            count[:] = done, total
+            progress(done, total)
+        try:
+            found = solve.Search(make_plan, wanted, aim, folder, pool, counted).run()
+        except KeyboardInterrupt:
+            print(f'pedestal: {count[0]} of {count[1]} trials at the present value of {wanted.key} are in {folder}, '
+                  'with those of the values before; the same command continues', file=sys.stderr)
+            raise
     print(found.sentence)
     console.show_tried(wanted.key, wanted.unit, found.tried)
     print(f'tables {folder}/{solve.table_prefix(wanted.key)}*.csv')

@@ -51,7 +51,7 @@ def parameters_of_all(scenario: Scenario, bag: pathlib.Path, start: Nanoseconds,
     names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
     shared = {'graph.pacing': scenario.header.pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
               'graph.deadline': scenario.header.deadline, 'graph.start': start,
-              'graph.priority': scenario.header.priority, 'graph.simulated': True}
+              'graph.priority': scenario.header.priority, 'graph.scenario': scenario.name, 'graph.simulated': True}
     # The operator runs in this process and reads no parameter file.
     sections = {node: {**scenario.given(node), **shared} for node in scenario.nodes if node != 'operator'}
     for node, values in (changes or {}).items():

@@ -1,5 +1,6 @@
 """Texts of a scenario: its file, other ROS 2 parameter files, and changes 'node.key=value' of the option --param."""
 import contextlib
+import difflib
 import json
 import pathlib
 from collections.abc import Mapping
@@ -19,6 +20,8 @@ from pedestal_common import parameters
 from pedestal_common.graph import nodes
 from pedestal_common.quantities import Value
 from pedestal_common.text_files import files, parameter_file, plain_yaml
+
+MAX_NEAREST_NAMES = 5  # largest number of names that an error lists
 
 
 def text(name_or_path: str | pathlib.Path) -> tuple[str, str]:
@@ -91,12 +94,41 @@ def parse_override(text: str) -> tuple[str, str, Value]:
     node, dot, key = left.partition('.')
     if not (equals and dot and key):
         raise ScenarioError(f'--param {text!r}: must be node.key=value, as in '
-                            'acu.azimuth.feedforward.bandwidth=12')
-    parameters_of(node)
+                            f'acu.azimuth.feedforward.bandwidth=12{nearest(left)}')
+    try:
+        parameters_of(node)
+    except ScenarioError as error:
+        raise ScenarioError(f'--param {text!r}: {error}{nearest(left)}') from None
+    _check_key(text, node, key)
     try:
         return node, key, plain_yaml.parse(right)
     except yaml.YAMLError as error:
         raise ScenarioError(f'--param {text!r}: {plain_yaml.problem(error)}') from None
+
+
+def _check_key(text: str, node: str, key: str) -> None:
+    """Raise ScenarioError for a parameter that neither a node has nor the equipment in its place."""
+    own = parameters.defaults(parameters_of(node))
+    if key in own or not parameters.without_ros({key: True}) or any(
+            key in parameters.defaults(row.parameters_type()) for row in nodes.HARDWARE_ROWS
+            if row.name == nodes.plain(node)):
+        return
+    near = parameters.did_you_mean(key, own)
+    raise ScenarioError(f'--param {text!r}: {node}: unknown parameter {key!r}{f";{near}" if near else ""}'
+                        f'{nearest(f"{node}.{key}")}')
+
+
+def nearest(name: str) -> str:
+    """Return '; the nearest names are ...' with the parameters of all sections whose names are most like a name, whose
+    node may be wrong or missing; '' without any."""
+    known = [f'{section}.{key}' for section in (*SECTION_NODES, 'scenario')
+             for key, _ in parameters.flatten(parameters_of(section))]
+    end = name.partition('.')[2] or name
+    same = [full for full in known if full.endswith(f'.{end}')]
+    near = same or difflib.get_close_matches(name, known) or [
+        full for full in known if full.rpartition('.')[2] in difflib.get_close_matches(
+            name.rpartition('.')[2], {full.rpartition('.')[2] for full in known}, n=1)]
+    return f'; the nearest names are {", ".join(near[:MAX_NEAREST_NAMES])}' if near else ''
 
 
 def override(name: str, value: Value) -> str:

@@ -24,7 +24,7 @@ OPTIONAL_NODES = tuple(node.name for node in nodes.NODES if node.optional)  # no
 BEAM_NODES = tuple(node.name for node in nodes.NODES if node.of_beam)  # of which each beam has its own
 
 
-class ScenarioError(ValueError):
+class ScenarioError(parameters.ParameterError):
     """Error of an unknown scenario or an invalid value. Its text is one line with file, node, key and value."""
 
 

@@ -38,6 +38,7 @@ class GraphParameters(parameters.Parameters):
     priority: int = parameters.parameter(0, 0, 98, '', 'realtime: priority (SCHED_RR) of the nodes with a unit, where '
                                          'the system allows it, one more for the drive; 0: the default scheduling')
 
+    scenario: str = parameters.text('', 'name of the scenario of the run; empty: a graph started by hand')
     simulated: bool = parameters.flag(False, 'simulated antenna, as in `pedestal run`; false: in realtime each node '
                                       'names at its start the values for an antenna that are not given')
 

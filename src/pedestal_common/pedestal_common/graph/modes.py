@@ -19,36 +19,45 @@ class Row(typing.NamedTuple):
     pinned: bool = False        # the stow pins may lock the axes
     predicted: str = ''         # method of acu_tracker.program.prediction.Predictor that makes the table; '' for none
     button: bool = True         # the page has a button for the mode
+    going: str = ''             # words for the mode until the axes have arrived; '' for a mode without a destination
+    arrived: str = ''           # words for the mode after this; '': it ends by itself
 
 
 MODE_ROWS = (
     Row('standby', 'rate command 0; a drift of the position is not corrected', 'no condition; the ACU also enters it '
         'after a fault'),
-    Row('stop', 'the axes brake to a stop and hold the position reached', 'encoders valid', button=False),
+    Row('stop', 'the axes brake to a stop and hold the position reached', 'encoders valid', button=False,
+        going='stopping', arrived='stopped'),
     Row('stow', 'go to the stow angles; with `stow_pins` the pins go in after both axes have come to rest there',
-        'encoders valid, angles inside the limits', needs='stow', pinned=True),
+        'encoders valid, angles inside the limits', needs='stow', pinned=True,
+        going='stowing', arrived='stowed'),
     Row('unstow', 'rate command 0 while the stow pins go out', 'encoders valid, at least one stow pin not out',
-        'to `standby` when both pins are out', needs='pin', ends='pin', pinned=True),
-    Row('preset', 'go to the preset angles', 'encoders valid, angles inside the limits', needs='preset'),
+        'to `standby` when both pins are out', needs='pin', ends='pin', pinned=True, going='unstowing'),
+    Row('preset', 'go to the preset angles', 'encoders valid, angles inside the limits', needs='preset',
+        going='preset, moving', arrived='preset, reached'),
     Row('rate', 'follow the commanded axis rates; the axes stop when no new `rate` command arrives within 0.5 s',
         'encoders valid', button=False),
     Row('slave', 'follow the earth angles of the last command `slave`, extrapolated with its rates',
         'a direction was commanded and is still valid (default: valid for 1 s)',
         'to `stop` when the direction has expired',
-        needs='direction', ends='direction', follows=True, fallback='stop', button=False),
+        needs='direction', ends='direction', follows=True, fallback='stop', button=False,
+        going='slave, moving', arrived='slave, on target'),
     Row('program', 'follow the program track', 'a program track is loaded, has rows for this time, and is inside the '
         'limits',
         'to `autotrack` after `lock_count` accepted receiver errors; to `standby` after the last row of the track, or '
         'where rows are missing',
-        needs='program', ends='program', follows=True, handover='autotrack', table=True),
+        needs='program', ends='program', follows=True, handover='autotrack', table=True,
+        going='program, moving', arrived='program, on track'),
     Row('tle', 'follow a satellite, predicted from its elements',
         '`prediction.station` is given; elements not older than `prediction.oldest`; the satellite is above the '
         'horizon and inside the limits',
         'to `autotrack` after `lock_count` accepted receiver errors; to `standby` when the satellite has set',
-        needs='tle', ends='tle', follows=True, handover='autotrack', table=True, predicted='satellite'),
+        needs='tle', ends='tle', follows=True, handover='autotrack', table=True, predicted='satellite',
+        going='tle, moving', arrived='tle, on track'),
     Row('sun', 'follow the sun, to calibrate the pointing',
         '`prediction.station` is given; the sun is above the horizon and inside the limits',
-        'to `standby` when the sun has set', needs='sun', ends='sun', follows=True, table=True, predicted='sun'),
+        'to `standby` when the sun has set', needs='sun', ends='sun', follows=True, table=True, predicted='sun',
+        going='sun, moving', arrived='sun, on track'),
     Row('autotrack', 'follow the filtered receiver error; while the signal is lost for a short time, follow the '
         'prediction of the filter',
         'receiver locked, filter converged',

@@ -95,7 +95,8 @@ NODES = (
          answer='acu/rate_command',
          obeys='acu/command', replies='acu/command_result',
          doc='antenna control unit: filter, modes, position loop',
-         stands_for='nothing: this node is the real control unit', of_beam=True),
+         stands_for='nothing: this node is the real control unit', of_beam=True,
+         runs='acu_tracker.acu_node:AcuNode'),
     Node(DRIVE_NODE, 'adu_drive.adu_node', 'drive_law.params:AduNodeParameters', 'adu_drive.unit:Adu',
          reads=('clock', 'acu/rate_command', 'ship/truth', 'acu/stow_pins'),
          writes=('joint_states', 'adu/truth', 'clock', 'adu/motor_states', 'adu/state', 'adu/stow_pins'),
@@ -176,6 +177,28 @@ SIMULATED_IQ = Node('iq', 'equipment_sim.iq_node',
 DRIVE_ROWS = (ARRAY_DRIVE, SERVO_DRIVE, SIMULATED_DRIVES, ROTATOR_DRIVE)
 """Rows of the nodes that take the place of the drive in NODES, or simulate a part of it."""
 
+
+class DriveRequest(typing.NamedTuple):
+    """Row of DRIVE_REQUESTS: one service of every drive."""
+    name: str           # on the command line
+    service: str
+    key: str            # in the console
+    doc: str
+    free: bool = False  # True if it is open to every client at any time
+
+
+DRIVE_REQUESTS = (
+    DriveRequest('enable', 'adu/enable', 'e', 'release the brakes and follow commands; refused while a fault or an '
+                 'emergency stop is latched'),
+    DriveRequest('disable', 'adu/disable', 'd', 'stop both axes, engage the brakes, then remove the torque'),
+    DriveRequest('emergency_stop', 'adu/emergency_stop', 'x', 'stop both axes, engage the brakes, and stay so until '
+                 '`reset_faults`', free=True),
+    DriveRequest('reset_faults', 'adu/reset_faults', 'f', 'reset latched faults and the emergency stop; refused while '
+                 'an axis moves or a cause is present'))
+"""Requests to the drive that a client sends without the control unit."""
+
+DRIVE_SERVICES = tuple(request.service for request in DRIVE_REQUESTS)
+
 LEVEL_RECEIVER = Node('tracking_receiver', 'pedestal_hardware.level_receiver_node',
                       'pedestal_hardware.level.unit:LevelReceiverParameters',
                       writes=('tracking_receiver/angle_error',),
@@ -198,21 +221,33 @@ equipment becomes a message of the graph."""
 HARDWARE_ROWS = (*DRIVE_ROWS, MONOPULSE_RECEIVER, SIMULATED_IQ, *EQUIPMENT_ROWS)
 """Rows of all nodes that take the place of a node in NODES, or simulate a part of it."""
 
+SIMULATED_TOPICS = frozenset(topic for node in NODES for other in HARDWARE_ROWS if other.name == node.name
+                             for topic in node.writes if topic not in other.writes)
+"""Topics that not every node in place of a simulated one publishes, such as adu/truth."""
+
 SIMULATED_PARTS = {SIMULATED_DRIVES.name: DRIVE_NODE, SIMULATED_IQ.name: MONOPULSE_RECEIVER.name}
 """{name of a node that simulates a part of the equipment: node that commands or receives this part}."""
 
 SERVER_ROWS = (
-    Node('rotctld', 'pedestal_operator.rotctld_node', doc="serves the protocol of Hamlib's rotctld",
+    Node('rotctld', 'pedestal_operator.rotctld_node', 'pedestal_operator.rotctld_node:RotctldParameters',
+         doc="serves the protocol of Hamlib's rotctld",
          runs='pedestal_operator.rotctld_node:RotctldNode'),
-    Node('easycomm', 'pedestal_operator.easycomm_node', doc='serves EasyComm I, II and III',
+    Node('easycomm', 'pedestal_operator.easycomm_node', 'pedestal_operator.easycomm_node:EasycommParameters',
+         doc='serves EasyComm I, II and III',
          runs='pedestal_operator.easycomm_node:EasycommNode'),
-    Node('operator_page', 'pedestal_operator.operator_page', doc="serves the operator's page for a browser",
+    Node('operator_page', 'pedestal_operator.operator_page', 'pedestal_operator.page_node:PageParameters',
+         doc="serves the operator's page for a browser",
          runs='pedestal_operator.page_node:PageNode'),
-    Node('live', 'pedestal_operator.live_node', doc='serves every topic to Foxglove',
+    Node('live', 'pedestal_operator.live_node', 'pedestal_operator.live_node:LiveParameters',
+         doc='serves every topic to Foxglove',
          runs='pedestal_operator.live_node:LiveNode'),
     Node('frames', 'pedestal_operator.frames_node', doc='publishes robot_description and tf, for RViz',
          runs='pedestal_operator.frames_node:FramesNode'))
 """Rows of the servers, which connect other programs to a graph and belong to none. Each reads the topics it needs."""
+
+STANDALONE_NODES = {node.executable.removesuffix('_node').removeprefix('operator_'): node
+                    for node in (*HARDWARE_ROWS, *SERVER_ROWS) if node.parameters}
+"""{short name of an executable, such as rotator or page: its Node}, of the nodes that are no row of NODES."""
 
 EXECUTABLES = {node.executable: node for node in (*NODES, *HARDWARE_ROWS, *SERVER_ROWS) if node.program}
 """{name of an executable: its Node}."""

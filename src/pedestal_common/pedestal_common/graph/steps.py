@@ -16,6 +16,7 @@ from pedestal_common.quantities import Message, Nanoseconds
 
 NS_PER_SECOND = 1_000_000_000  # nanoseconds in a second [ns]
 SECONDS_PER_DAY = 86_400  # seconds in a day [s]
+MAX_UNMET_STEPS = 5  # number of successive steps that wait in vain for a follower, until the next do not wait for it
 RECENT_INTERVALS = 8  # number of intervals between the messages of a follower of which the shortest counts
 
 
@@ -41,7 +42,8 @@ class Steps:
     In lockstep a step waits for exactly the messages due. Triggers that arrive before the answer are queued. In
     realtime the step t_k is answered at the latest when the trigger of the next step arrives, with the newest
     messages, and None for a follower without a new one. Because real equipment may have fewer messages than steps, a
-    realtime step waits only if the next message, by the shortest of the last intervals, is due.
+    realtime step waits only if the next message, by the shortest of the last intervals, is due. A follower that is
+    absent, after MAX_UNMET_STEPS, makes no step late.
     """
 
     def __init__(self, trigger: str, followers: Mapping[str, Nanoseconds], lockstep: bool,
@@ -65,6 +67,8 @@ class Steps:
             topic: collections.deque(maxlen=RECENT_INTERVALS) for topic in followers}
         # trigger of the step that waits for its inputs
         self._pending: tuple[Nanoseconds, Message] | None = None
+        # {follower: number of successive steps that have waited for it in vain}
+        self._unmet: dict[str, int] = dict.fromkeys(followers, 0)
         # triggers whose step has not begun
         self._ahead: collections.deque[tuple[Nanoseconds, Message]] = collections.deque()
         self._period: Nanoseconds | None = None
@@ -92,6 +96,7 @@ class Steps:
             if last is not None:
                 self._intervals[topic].append(stamp - last)
             self._arrived[topic].append((stamp, message))
+            self._unmet[topic] = 0
         while self._pending or self._ahead:
             if self._pending is None:
                 self._begin(*self._ahead.popleft())
@@ -136,7 +141,8 @@ class Steps:
         while arrived and arrived[0][0] < due and len(arrived) > 1:
             arrived.popleft()
         if not self._lockstep:
-            return bool(arrived) and arrived[0][0] >= due or self._next_stamp(topic) > due
+            return (bool(arrived) and arrived[0][0] >= due or self._next_stamp(topic) > due
+                    or self._unmet[topic] >= MAX_UNMET_STEPS)
         if arrived and arrived[0][0] != due:
             raise GraphError(f'{topic} is stamped {arrived[0][0] / NS_PER_SECOND:.6f} s where '
                              f'{due / NS_PER_SECOND:.6f} s is due; its latency must be that of this node, '
@@ -158,6 +164,9 @@ class Steps:
         stamp."""
         assert self._pending is not None
         stamp, message = self._pending
+        if not self._lockstep:
+            for topic in self._due:
+                self._unmet[topic] += not self._ready(topic)
         self._pending = None
         inputs: dict[str, Message] = {}
         for topic, arrived in self._arrived.items():

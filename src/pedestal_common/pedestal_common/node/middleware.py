@@ -1,12 +1,14 @@
 """Settings of the middleware (rclpy and DDS) of every node."""
+import contextlib
 import importlib
 import os
 import pathlib
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import rclpy
+import yaml
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.context import Context
 from rclpy.exceptions import InvalidNamespaceException
@@ -16,7 +18,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_namespace import validate_namespace
 
 from pedestal_common.graph import topics
-from pedestal_common.text_files import parameter_file
+from pedestal_common.quantities import Value
+from pedestal_common.text_files import parameter_file, plain_yaml
 from pedestal_common.text_files.files import FilePath
 
 DDS_PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
@@ -70,8 +73,9 @@ def initialise(args: Sequence[str] | None = None) -> None:
     neither a home nor a disk. Raises ValueError for arguments that rcl refuses."""
     set_defaults()
     given = list(sys.argv if args is None else args)
+    stated = _stated(given)
     for place in parameter_files(given):
-        given[place] = _as_read(given[place])
+        given[place] = _as_read(given[place], stated)
     try:
         rclpy.init(args=[*given, '--ros-args', '--disable-external-lib-logs'],
                    signal_handler_options=SignalHandlerOptions.NO)
@@ -81,20 +85,38 @@ def initialise(args: Sequence[str] | None = None) -> None:
 
 def parameter_files(arguments: Sequence[str]) -> list[int]:
     """Return the places of the parameter files among the arguments of a process."""
+    return _values_of(arguments, '--params-file')
+
+
+def _values_of(arguments: Sequence[str], *options: str) -> list[int]:
     places, of_ros = [], False
     for place, argument in enumerate(arguments):
         of_ros = argument == '--ros-args' or of_ros and argument != '--'
-        if of_ros and arguments[place - 1] == '--params-file':
+        if of_ros and arguments[place - 1] in options:
             places.append(place)
     return places
 
 
-def _as_read(path: FilePath) -> str:
+def _stated(arguments: Sequence[str]) -> dict[str, Value]:
+    """Return {name: value} of the options -p NAME:=VALUE. rcl itself reports a text that is none."""
+    found = {}
+    for place in _values_of(arguments, '-p', '--param'):
+        name, assigns, text = arguments[place].partition(':=')
+        with contextlib.suppress(yaml.YAMLError):
+            if assigns:
+                found[name] = plain_yaml.parse(text)
+    return found
+
+
+def _as_read(path: FilePath, stated: Mapping[str, Value]) -> str:
     """Return the path of a copy of a parameter file in memory, which states the values as parameter_file reads them.
-    Without the copy, rcl would read 010 as 8 and `on` as true. Raises ParameterFileError."""
+    Without the copy, rcl would read 010 as 8 and `on` as true. stated: values of -p. They replace those of the file,
+    because rcl gives a section for one node precedence over -p. Raises ParameterFileError."""
+    sections = {section: {name: stated.get(name, value) for name, value in values.items()}
+                for section, values in parameter_file.read(path).items()}
     copy = os.memfd_create('parameters')
     with open(copy, 'w', closefd=False) as stream:
-        stream.write(parameter_file.dumped(parameter_file.read(path)))
+        stream.write(parameter_file.dumped(sections))
     return f'/proc/self/fd/{copy}'
 
 

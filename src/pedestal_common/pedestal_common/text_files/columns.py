@@ -18,6 +18,8 @@ _CAMEL_CASE_PATTERN = re.compile(r'(?<=[a-z])(?=[A-Z])')
 _DERIVED_WORDS = ('rate', 'vel', 'speed', 'acc', 'err', 'sigma', 'std', 'qual', 'valid')
 """If the word behind a quantity begins with one of these, the column holds something else, such as the rate or the
 error of the quantity."""
+_OTHER_HEIGHTS = {'msl': 'mean sea level', 'amsl': 'mean sea level', 'orthometric': 'the geoid', 'agl': 'the ground'}
+"""{word behind an altitude: its zero}. The altitudes of this project are above the ellipsoid."""
 MAX_LISTED_NAMES = 20  # number of names of columns that an error lists
 
 
@@ -67,6 +69,11 @@ def find(names: Iterable[str], wanted: Quantity, required: bool = True) -> Colum
         raise ColumnError(f'columns {found[0].name!r:.60} and {found[1].name!r:.60}: only one of them may be '
                           f'the {wanted.label}: rename or remove the other')
     if others and not found:
+        rest = _rest(others[0], wanted) if wanted.unit == 'm' else ''
+        if word := next(filter(rest.startswith, _OTHER_HEIGHTS), ''):
+            raise ColumnError(f'column {others[0]!r:.60}: is above {_OTHER_HEIGHTS[word]}, must be above the '
+                              'ellipsoid (WGS84): add the height of this zero above the ellipsoid, and name the '
+                              f'column without {word}')
         units = [*UNIT_NAMES[wanted.unit], *([UTC] if wanted.unit == 's' else [])]
         raise ColumnError(f'column {others[0]!r:.60}: must end with a known unit to be taken as {wanted.label}: '
                           f'{", ".join(units[:-1])} or {units[-1]}')

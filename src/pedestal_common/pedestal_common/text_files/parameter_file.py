@@ -16,7 +16,7 @@ ANY_NAMESPACE = '/**/'
 EVERY_NODE = '*'  # result of `node_of` for a section that is for every node of a namespace, such as /**
 
 
-class ParameterFileError(ValueError):
+class ParameterFileError(parameters.ParameterError):
     """Error of a parameter file that cannot be read. Its text is one line with the file and the section."""
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 
 from pedestal_common.geometry import pointing_report
 from pedestal_common.geometry.geodesy import STATION_NAMES, GivenStation
-from pedestal_common.graph import topics
+from pedestal_common.graph import nodes, topics
 from pedestal_common.parameters import NOT_GIVEN
 from pedestal_common.quantities import Degrees, Json, Seconds
 from pedestal_operator import state
@@ -79,7 +79,7 @@ def status_section(antenna: PageAntenna) -> dict[str, Json]:
     client that has control (`holder`), for another, and for another supervisor."""
     acu, header = antenna.diagnostics_of('acu'), state.header(antenna)
     texts = {name: antenna.texts.get(topic, '') if acu else '' for name, topic in TEXT_TOPIC_BY_NAME.items()}
-    return {'present': bool(acu), **texts, 'mode': header['mode'].text if acu else '',
+    return {'present': bool(acu), **texts, 'mode': (antenna.texts.get('acu/mode') or acu['mode']) if acu else '',
             **{key: acu.get(key, '') for key in ('control', 'requester', 'fallback', 'locked')},
             'header': {name: shown._asdict() for name, shown in header.items()},
             'axes': [shown._asdict() for shown in state.axis_states(antenna)],
@@ -124,6 +124,8 @@ def fixed(antenna: PageAntenna) -> dict[str, Json]:
         return math.degrees(p.get(name, math.nan))
     return {'beamwidth': degrees('tracker.receiver.beamwidth'), 'history': HISTORY_COLUMNS, 'span': CHART_SPAN_S,
             'modes': state.BUTTON_MODES,
+            'drive': [{'name': row.name.replace('_', ' '), 'verb': row.service, 'doc': row.doc}
+                      for row in nodes.DRIVE_REQUESTS],
             'limits': [[degrees(f'{axis}.limits.{end}') for end in ('low', 'high')] for axis in topics.AXES],
             'stow': [degrees(f'{axis}.stow') for axis in topics.AXES],
             'detect': p.get('receiver.acquire_level_dbhz'), 'loss': p.get('receiver.lose_level_dbhz')}

@@ -26,6 +26,15 @@ function showModes(names) {
   }));
 }
 
+function showDrive(rows) {
+  find('drive-requests').replaceChildren(make('span', 'label', 'drive'), ...rows.map(({name, verb, doc}) => {
+    const button = make('button', '', name);
+    button.setAttribute('aria-label', `drive: ${doc}`);
+    press(button, verb, () => request(verb));
+    return button;
+  }));
+}
+
 // Return the reason that at least MIN_COMMON_COUNT of the buttons share, '' without one.
 function commonReason(reasons) {
   const counts = new Map();
@@ -76,6 +85,7 @@ export function begin() {
     if (sections.fixed && known !== sections.fixed.modes.join()) {
       known = sections.fixed.modes.join();
       showModes(sections.fixed.modes);
+      showDrive(sections.fixed.drive);
     }
     if (sections.status) {
       const {fallback, mode, requester} = sections.status;

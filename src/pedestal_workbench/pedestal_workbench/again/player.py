@@ -36,6 +36,7 @@ KEY_HELP = 'space: pause, resume   n or right arrow: one step   q: quit'
 MAX_UNACKNOWLEDGED_MESSAGES = 1000
 """Largest number of unacknowledged messages of a topic. Fast DDS keeps 5000, and refuses more."""
 
+QUIET_WAIT_S = 1.0  # time of the wait for a subscriber before it is announced [s]
 DISCOVERY_SETTLING_S = 0.5
 """Time from the discovery of the last subscriber to the first message [s]. Other nodes discover each other in it."""
 
@@ -226,7 +227,8 @@ class Player(Node):
             if unread:
                 settled = now
                 name, missing = unread
-                self.status.show(f'waiting for {missing} to subscribe to {name} ...')
+                if now - begun > QUIET_WAIT_S:
+                    self.status.announce(f'waits for {missing} to subscribe to {name}, {self.deadline:g} s at most')
                 if now - begun > self.deadline:
                     present = sorted(set(self.get_node_names()) - {self.get_name()})
                     raise GraphError(f'no subscriber of {name} after {self.deadline:g} s; waited for {missing}; '

@@ -64,6 +64,13 @@ class StatusLine:
             sys.stderr.write(f'\r\x1b[K{text}')
             sys.stderr.flush()
 
+    def announce(self, text: str) -> None:
+        """Show a text; without a terminal, print a new text as a line of its own."""
+        if not self._on and text != self._last:
+            self._last = text
+            print(f'pedestal: {text}', file=sys.stderr, flush=True)
+        self.show(text)
+
     def clear(self) -> None:
         """Empty the line."""
         self.show('')

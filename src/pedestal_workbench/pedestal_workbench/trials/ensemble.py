@@ -21,9 +21,11 @@ from pedestal_workbench.trials.plan import Plan
 from pedestal_workbench.trials.statistics import WHY
 from pedestal_workbench.trials.table import Table
 
-MIN_BATCH_TRIALS = 4
-"""Smallest number of trials in a batch, the work of one worker at a time. Where trials cannot run side by side, a
-batch has this number, so that a killed worker loses no more trials."""
+MAX_SERIAL_TRIALS = 4  # largest number of trials in a batch, the work of one worker, that run one after the other
+
+MAX_PARALLEL_BATCH_S, MAX_SERIAL_BATCH_S = 1500.0, 150.0
+"""Largest simulated time of a batch, in both cases [s]. The rows of a batch are written at its end. These times take
+about 5 s of a core, so that a stop loses no more."""
 
 TRIAL_RESULTS = tuple(result.name for result in results.RESULTS if result.part not in ('run', 'supervised'))
 """Names of the results of a trial: all results of `pedestal run`, except those on its processes."""
@@ -86,14 +88,21 @@ def _batch(plan: Plan) -> list[list[Json]]:
     return [values + why for values, why in zip(found, whys)]
 
 
+def _batch_size(plan: Plan) -> int:
+    chosen = plan.scenario(0)
+    parallel, duration = side_by_side.max_parallel_trials(chosen, MEASURED_TOPICS), chosen.header.duration
+    if parallel < side_by_side.MIN_PARALLEL_LOOPS:
+        return max(1, min(MAX_SERIAL_TRIALS, int(MAX_SERIAL_BATCH_S / duration)))
+    return max(side_by_side.MIN_PARALLEL_LOOPS, min(parallel, int(MAX_PARALLEL_BATCH_S / duration)))
+
+
 def run_missing_trials(plans: Sequence[Plan], tables: Sequence[Table], pool: monte_carlo.Pool,
                        progress: Callable[[int, int], object] = lambda done, total: None) -> None:
     """Run the trials of plans that are missing in their tables, and append their rows to the tables. The batches of
     several plans alternate, so all plans advance together. progress(trials done, all trials) is called after each
     batch. Raises ValueError that names a trial."""
     pieces = []
-    size = max(MIN_BATCH_TRIALS, min(side_by_side.max_parallel_trials(plan.scenario(0), MEASURED_TOPICS)
-                                     for plan in plans))
+    size = min(map(_batch_size, plans))
     for first in range(0, max(plan.runs for plan in plans), size):
         for plan, table in zip(plans, tables):
             numbers = range(max(first, len(table.rows)), min(first + size, plan.runs))

@@ -77,6 +77,9 @@ FILE_FORMATS = (
 FOREIGN_FORMATS = (
     (re.compile(r'A[A-Z0-9]{3}[^\n]*\n(?:[^\n]*\n){0,200}?(?:HFDTE|B\d{13}[NS]\d{8}[EW][AV])'),
      'an IGC log of a glider: convert it to GPX, for example with gpsbabel -i igc -f FLIGHT.igc -o gpx -F FLIGHT.gpx'),
+    (re.compile(r'(?:<\?xml[^>]*>\s*|<!--.*?-->\s*)*<(?:\w+:)?kml\b', re.DOTALL),
+     'a KML file of Google Earth: convert it to GPX, for example with gpsbabel -i kml -f FLIGHT.kml -o gpx -F '
+     'FLIGHT.gpx; a path without times (LineString) is no flight'),
     (re.compile(r'#[a-d][PV]\d{4} '),
      'an SP3 file of precise orbits: convert the orbit of one satellite to a CCSDS OEM (KEYWORD = value)'))
 """(pattern of the beginning of a file, its name and remedy) of text formats that this project cannot read."""
