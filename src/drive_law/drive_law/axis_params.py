@@ -40,7 +40,7 @@ class MotorParameters(Parameters):
     pole_pairs: int = parameter(4, 1, 50, '', 'number of pole pairs')
     voltage: float = parameter(310.0, 10.0, 2000.0, 'V', 'largest phase voltage, peak; 310: of a 380 V line')
     torque_limit: float = parameter(90.0, 0.1, 10000.0, 'Nm', 'short-time torque limit, 3 times rated torque')
-    inertia: float = parameter(0.0085, 1e-5, 10.0, 'kg m2', 'inertia of rotor, reducer and pinion, on the motor shaft')
+    inertia: float = parameter(0.0085, 1e-6, 10.0, 'kg m2', 'inertia of rotor, reducer and pinion, on the motor shaft')
     friction: float = parameter(0.4, 0.0, 100.0, 'Nm', 'Coulomb friction')
     friction_speed: float = parameter(0.5, 0.1, 100.0, 'rad/s', 'speed v in Coulomb friction T_c tanh(omega / v)')
     viscous: float = parameter(0.003, 0.0, 10.0, 'Nms/rad', 'viscous friction')

@@ -90,6 +90,7 @@ WIDE = {'azimuth.high': 450.0}
 READ = [
     ('rot2prog', {'pulses': 2}, {}, (30.0, 45.0)), ('rot2prog', {'pulses': 1}, {}, (30.0, 45.0)),
     ('rot2prog', {'pulses': 4}, {}, (30.25, 45.5)), ('rot2prog', {'answers_sets': True}, {}, (30.3, 45.0)),
+    ('rot2prog', {'echo': True, 'pulses': 2}, {}, (30.5, 45.0)),
     ('rot2prog', {'azimuth': -20.0}, {'azimuth.low': -180.0, 'azimuth.high': 540.0}, (500.0, 30.0)),
     ('gs232', {'elevation': -5.0}, {}, (30.0, 45.0)), ('gs232', {'prompt': True}, {}, (30.0, 45.0)),
     ('gs232', {'signs': True, 'elevation': -5.0}, {}, (30.0, 45.0)), ('gs232', {'decimals': 1}, {}, (30.0, 45.0)),
@@ -116,6 +117,7 @@ CONFIGURED = [
     *((protocol, AZIMUTH_ONLY, {'fixed_elevation': 12.0}, (30.0, 12.0)) for protocol in (
         'gs232', 'gs232_azimuth', 'easycomm', 'rotctld', 'rot1prog')),
     ('gs232', {**AZIMUTH_ONLY, 'signs': True}, {'fixed_elevation': 12.0}, (30.0, 12.0)),
+    ('rot1prog', {**AZIMUTH_ONLY, 'echo': True}, {'fixed_elevation': 12.0}, (30.0, 12.0)),
 ]
 
 

@@ -50,6 +50,8 @@ ANSWERS = [
     ('easycomm', b'AZ10,5 EL-0,5\n', [Position(10.5, -0.5)]),
     ('easycomm', b'+10.5\n-0.5\n', [Position(10.5, -0.5)]),
     ('easycomm', b'AZ+010.5,EL+20.0\n', [Position(10.5, 20.0)]),
+    ('easycomm', b'AZ=10.5, EL=-20,5\n', [Position(10.5, -20.5)]),
+    ('gs232', b'AZ=+020  EL=-05\r\n', [Position(20.0, -5.0)]),
     ('rotctld', b'12,50\n-1,25\n', [Position(12.5, -1.25)]),
     ('easycomm', b'AZ EL\r\nAZ10.0 EL20.0\r\n', [Position(10.0, 20.0)]),
 ]

@@ -298,10 +298,10 @@ def remarks(known: Consistency) -> list[str]:
     for axis, name in zip(known.axes, topics.AXES):
         number, note, ratio = axis.severe
         if note:
-            found.setdefault((number, note), []).append(f'{name} {ratio:.2g}')
+            found.setdefault((number, note), []).append(f'{ratio:.2g} in {name}')
     what = {'NIS': 'innovations', 'NEES': 'errors'}
-    return [f'the filter is {note}: its {what[number]} are {", ".join(ratios)} times what it states (rms); '
-            f'{CURES[number, note]}' for (number, note), ratios in found.items()]
+    return [f'the filter is {note}: the rms of its {what[number]} over that which it states is '
+            f'{" and ".join(ratios)}; {CURES[number, note]}' for (number, note), ratios in found.items()]
 
 
 def mark(mean: float, expected: float, band: Band) -> str:

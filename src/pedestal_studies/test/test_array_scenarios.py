@@ -51,7 +51,8 @@ def test_a_beam_that_only_leads_is_seen_at_the_beginning_of_its_intervals():
     run = tracking.Tracking(t=t, encoders=beam, reference=unknown, error=np.zeros_like(beam), encoder_error=unknown,
                             measured=0.5 * begun + noise, cn0=nothing, estimate_error=noise, beam_earth=beam,
                             target_earth=beam, estimate_earth=beam, sensor_truth=beam, range=nothing, mode=mode,
-                            tracking=on, since=on, beamwidth=math.radians(1.0), boresight=np.zeros(2), begun=begun)
+                            tracking=on, since=on, obstacle=np.zeros(t.size, int),
+                            beamwidth=math.radians(1.0), boresight=np.zeros(2), begun=begun)
     values = results.measured(run.parts)
     assert values['pointing_max_deg'][0] == pytest.approx(math.degrees(0.005 * math.cos(0.7)), rel=1e-4)
     assert values['cross_elevation_rms_deg'][0] == pytest.approx(values['cross_elevation_max_deg'][0], rel=1e-6)

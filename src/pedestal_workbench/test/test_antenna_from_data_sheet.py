@@ -237,6 +237,19 @@ def test_power_and_speed_of_a_motor_give_its_torque(pedestal, tmp_path):
     assert scenario.load(tmp_path / 'my.yaml').node_parameters('adu').azimuth.thermal.rated_torque == 15.92
     assert '--motor-power = 5 kW: must be without motor_torque' in pedestal(
         'new', 'no.yaml', '--motor-power', '5', '--motor-torque', '15')[2]
+    assert '--motor-power 500 kW: must be 0.0157 to 157 at 1500 rpm' in pedestal(
+        'new', 'no.yaml', '--motor-power', '500')[2]
+    assert '--motor-power 0.3 kW: must be ' in pedestal('new', 'no.yaml', '--mirror', '25', '--motor-power', '0.3')[2]
+
+
+def test_a_small_dish_with_small_motors_names_a_limited_value_and_the_ratio_that_its_motors_need(pedestal):
+    """J = 210 kg m2 (0.6 / 3)^5; motors of 1.372e-6 kg m2 have a fiftieth of 0.1 kg m2 at a ratio of 27."""
+    given = ('--mirror', '0.6', '--motor-power', '0.05', '--motor-speed', '3000')
+    code, output, _ = pedestal('new', 'my.yaml', *given)
+    assert code == 0 and 'at least 0.1 in place of 0.0672' in output
+    assert 'azimuth: the inertia of the load is 395 times that of its motors' in output
+    assert '--ratio-azimuth 27 avoids this' in output
+    assert 'race' not in pedestal('new', 'b.yaml', *given, '--ratio-azimuth', '27.1', '--ratio-elevation', '27.1')[1]
 
 
 @pytest.mark.parametrize('rate, said', [

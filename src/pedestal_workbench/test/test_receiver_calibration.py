@@ -139,7 +139,7 @@ def test_offsets_of_the_mode_program_give_the_matrix_of_the_mode_preset(capfd):
 def test_a_program_that_hands_over_to_autotrack_is_refused(capfd):
     given = [part for change in offsets_by_command() for part in ('--param', change)]
     assert cli.main(['calibrate', 'receiver', '--scenario', 'receiver_phasing', *given]) == 2
-    assert 'unless acu.tracker.handover = false' in capfd.readouterr().err
+    assert 'set acu.tracker.handover=false' in capfd.readouterr().err
 
 
 @pytest.mark.parametrize('changes, message', [

@@ -181,6 +181,10 @@ def test_two_talkers_in_one_log(tmp_path):
                                       'HDOP 1.4): aircraft names the talker to take')
     assert read(tmp_path, both, aircraft='gp').altitude == pytest.approx(ALTITUDE, abs=1e-3)
     assert "aircraft = 'GL': must name one of the 2 in the file: GP, GN" in refused(tmp_path, both, aircraft='GL')
+    unknown = nmea([text for k in range(N) for text in (gga(k, quality='8', dilution=''), gga(k, talker='GN'))])
+    assert read(tmp_path, unknown).description.endswith(
+        'GN (8 fixes, mean HDOP 0.9), not of GP (8 fixes, HDOP not known): aircraft names the talker to take, '
+        '8 fixes of quality 8 (simulated) of GP')
     rare = nmea([*SENTENCES, gga(0, time='100008.00', talker='GN', dilution='0.5')])
     assert ' of GP (8 fixes' in read(tmp_path, rare).description
 

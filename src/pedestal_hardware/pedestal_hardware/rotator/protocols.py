@@ -152,8 +152,8 @@ class Gs232(LineProtocol):
     """Yaesu GS-232A and GS-232B, whole degrees. A set-point cannot be negative, a position can. `?>` is the answer to
     a request that the device does not understand, and the prompt of some controllers (K3NG) behind each answer."""
     ASK, STOP, RESOLUTION, RANGE = b'C2\r', b'S\r', 1.0, (0.0, 720.0)
-    _ANGLE = rb'(-?\d{2,4}(?:[.,]\d+)?)'        # below three digits only behind a sign: a line loses bytes
-    _POSITION = re.compile(rb'AZ=(?=-|\d{3})' + _ANGLE + rb'(?:\s*,?\s*EL=(?=-|\d{3})' + _ANGLE + rb')?|'
+    _ANGLE = rb'([-+]?\d{2,4}(?:[.,]\d+)?)'     # below three digits only behind a sign: a line loses bytes
+    _POSITION = re.compile(rb'AZ=(?=[-+]|\d{3})' + _ANGLE + rb'(?:\s*,?\s*EL=(?=[-+]|\d{3})' + _ANGLE + rb')?|'
                            rb'([-+]0\d{3}(?:[.,]\d+)?)\s*([-+]0\d{3}(?:[.,]\d+)?)?')
     _PROMPT = re.compile(rb'\s*\??>')
 
@@ -204,7 +204,7 @@ class Easycomm(LineProtocol):
     without the names of the axes."""
     ASK, STOP, RESOLUTION = b'AZ EL \n', b'SA SE \n', 0.1
     _WORD = re.compile(rb'(AZ|EL|(?=[-+]))=?([-+]?\d+(?:[.,]\d*)?)')
-    _BETWEEN_WORDS = re.compile(rb'[\s;]+|,(?=[A-Z+-])')
+    _BETWEEN_WORDS = re.compile(rb'[\s;]+|,(?=[A-Z\s+-]|$)')
 
     def __init__(self, azimuth_only: bool = False) -> None:
         super().__init__(azimuth_only)
@@ -245,15 +245,24 @@ class Spid(RotatorProtocol):
     def __init__(self, azimuth_only: bool = False) -> None:
         super().__init__(azimuth_only)
         self._begun = b''   # of a frame
+        self._set_point = self.ask  # the last set-point, before the first one any request
+
+    def sent(self, request: bytes) -> None:
+        """Note a set-point, because an adapter of a line with two wires echoes each request."""
+        if request not in (self.ask, self.stop):
+            self._set_point = request
 
     def answers(self, received: bytes) -> list[Answer]:
         """Return the complete answers in the received bytes."""
         found: list[Answer] = []
-        data = self._begun + received
+        data, requests = self._begun + received, (self.ask, self.stop, self._set_point)
         while True:
             begin = data.find(b'W')
             data = data[begin:] if begin >= 0 else b''
-            if len(data) < self.FRAME_BYTES:
+            if data[:len(self.ask)] in requests:
+                data = data[len(self.ask):]     # an echo
+                continue
+            if len(data) < self.FRAME_BYTES or any(request.startswith(data) for request in requests):
                 self._begun = data
                 return found
             frame = data[:self.FRAME_BYTES]

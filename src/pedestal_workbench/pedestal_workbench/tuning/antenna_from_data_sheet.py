@@ -47,6 +47,9 @@ BACK_EMF_SHARE, RESISTANCE_VOLTAGE_SHARE, INDUCTANCE_VOLTAGE_SHARE = 0.85, 0.033
 rated torque."""
 
 DRAG_PEAK, WIND_M_S = 0.12, 15.0  # largest torque coefficient of a dish (adu_drive.plant.wind); printed wind [m/s]
+MAX_INERTIA_RATIO = 50.0
+"""Ratio of the inertia of the load to that of both motors, at the load, above which a line warns [-]. A dish of 0.6 m
+starts at a ratio of 38, and trips as overspeed at 125."""
 RATE_SHARE = 0.9  # share of the rate that an axis reaches, which replaces an unreachable rate of the data sheet [-]
 
 
@@ -178,7 +181,8 @@ def _receiver(name: str) -> TrackingReceiverParameters:
 def _scaled(given: DataSheet, sheet: DataSheet) -> list[str]:
     """Return a line for each value that the data sheet `given` lacks and `sheet` has, with its rule."""
     meta = {name: field.metadata for name, field in flatten(DataSheet)}
-    rows = [(law.for_loops, option_of(name), f'{getattr(sheet, name):.4g} {meta[name]["unit"]}'.rstrip(), law.text)
+    rows = [(law.for_loops, option_of(name), f'{getattr(sheet, name):.4g} {meta[name]["unit"]}'.rstrip(),
+             law.text + _limited(getattr(sheet, name), sheet.scaled(name)))
             for name, (_, law) in data_sheet.SCALED_FIELDS.items()
             if is_absent(getattr(given, name)) and (name != 'motor_torque' or is_absent(given.motor_power))]
     axes, fields = [axis(sheet, name) for name in AXES], dict(flatten(AxisParameters))
@@ -192,6 +196,11 @@ def _scaled(given: DataSheet, sheet: DataSheet) -> list[str]:
             'elevation); * matters most for the loops:',
             *(f'{"*" if starred else " "} {label:{widths[0]}}  {value:{widths[1]}}  {law}'
               for starred, label, value, law in rows)]
+
+
+def _limited(value: float, scaled: float) -> str:
+    bound = 'at least' if value > scaled else 'at most'
+    return '' if value == scaled else f'; {bound} {value:g} in place of {scaled:g}'
 
 
 def _rates(plan: Plan, found: Mapping[str, Mapping[str, Json]]) -> str:
@@ -223,6 +232,14 @@ def _assumed(sheet: DataSheet) -> list[str]:
     if sheet.mode_share and not sheet.mode:
         lines.append(f'no --mode: {sheet.structural_frequency:.3g} Hz, the average of antennas of {sheet.mirror:g} m, '
                      'is taken for the structure')
+    for name in AXES if sheet.lash else ():
+        values = axis(sheet, name)
+        load, motors = values['load.inertia'], 2.0 * values['motor_1.inertia']
+        ratio = load / (motors * getattr(sheet, f'ratio_{name}')**2)
+        if ratio > MAX_INERTIA_RATIO:
+            lines.append(f'{name}: the inertia of the load is {ratio:.3g} times that of its motors: above '
+                         f'{MAX_INERTIA_RATIO:g} they race through the lash and may trip the drive; '
+                         f'--ratio-{name} {math.sqrt(load / (motors * MAX_INERTIA_RATIO)):.3g} avoids this')
     return lines
 
 

@@ -18,6 +18,7 @@ from pedestal_common.parameters import (
     NOT_GIVEN,
     ParameterError,
     Parameters,
+    as_dict,
     choice,
     flatten,
     is_absent,
@@ -97,17 +98,28 @@ class DataSheet(Parameters):
         super().__post_init__()
 
     def completed(self) -> 'DataSheet':
-        """Return the data sheet with a torque for its power, and with scaled values for those that it lacks."""
+        """Return the data sheet with a torque for its power, and with scaled values for those that it lacks. Raises
+        ParameterError."""
         sheet = self
-        if not is_absent(self.motor_power):
-            torque = 1e3 * self.motor_power / (self.motor_speed * math.pi / 30.0)
-            sheet = dataclasses.replace(self, motor_power=NOT_GIVEN, motor_torque=float(f'{torque:.4g}'))
         limits = {name: field.metadata for name, field in flatten(DataSheet) if name in SCALED_FIELDS}
+        if not is_absent(self.motor_power):
+            speed = self.motor_speed * math.pi / 30.0
+            low, high = (limits['motor_torque'][end] for end in ('low', 'high'))
+            torque = float(f'{1e3 * self.motor_power / speed:.4g}')
+            if not low <= torque <= high:
+                raise ParameterError(f'{option_of("motor_power")} {self.motor_power:g} kW: must be '
+                                     f'{1e-3 * low * speed:.3g} to {1e-3 * high * speed:.3g} at '
+                                     f'{self.motor_speed:g} rpm, for a torque of {low:g} to {high:g} Nm')
+            sheet = dataclasses.replace(self, motor_power=NOT_GIVEN, motor_torque=torque)
         values: dict[str, Json] = {
-            name: min(max(float(f'{known * law.share(self.mirror / KNOWN_MIRROR_M):.4g}'), limits[name]['low']),
-                      limits[name]['high'])
-            for name, (known, law) in SCALED_FIELDS.items() if is_absent(getattr(sheet, name))}
+            name: min(max(self.scaled(name), limits[name]['low']), limits[name]['high'])
+            for name in SCALED_FIELDS if is_absent(getattr(sheet, name))}
         return dataclasses.replace(sheet, **values)
+
+    def scaled(self, name: str) -> float:
+        """Return the value of one of SCALED_FIELDS by its law, also outside its range."""
+        known, law = SCALED_FIELDS[name]
+        return float(f'{known * law.share(self.mirror / KNOWN_MIRROR_M):.4g}')
 
     @property
     def structural_frequency(self) -> Hertz:
@@ -125,7 +137,9 @@ class DataSheet(Parameters):
 
 def refusal(sheet: DataSheet, error: ValueError, make: Callable[[DataSheet], object]) -> ValueError:
     """Return the error with options for the error of a data sheet. make(sheet) raises ValueError for a refused one."""
-    axis, whole = _axis(error), sheet.completed()
+    axis, whole = _axis(error), as_dict(sheet.completed())
+    if not is_absent(sheet.motor_power):        # it gives the torque
+        whole |= {'motor_power': sheet.motor_power, 'motor_torque': NOT_GIVEN}
 
     def is_made(name: str, value: float) -> bool:
         """Return True if the data sheet with another value is made, or refused for another axis."""
@@ -138,7 +152,7 @@ def refusal(sheet: DataSheet, error: ValueError, make: Callable[[DataSheet], obj
         return True
 
     fields = [(name, field) for name, field in flatten(type(sheet)) if 'low' in field.metadata
-              and name not in NO_CAUSE and getattr(whole, name) > 0.0
+              and name not in NO_CAUSE and whole[name] > 0.0
               and not (axis and name.rpartition('_')[2] in AXES and not name.endswith(axis))]
     found: list[str] = []
     # The options that differ from the default come first, because the user gave them.
@@ -146,9 +160,9 @@ def refusal(sheet: DataSheet, error: ValueError, make: Callable[[DataSheet], obj
                               or getattr(sheet, item[0]) == item[1].default):
         if len(found) == MAX_OPTIONS:
             break
-        edges = _edges(name, getattr(whole, name), field.metadata, is_made)
+        edges = _edges(name, whole[name], field.metadata, is_made)
         if edges:
-            value = f'{getattr(whole, name):g} {field.metadata["unit"]}'.rstrip()
+            value = f'{whole[name]:g} {field.metadata["unit"]}'.rstrip()
             found.append(f'{option_of(name)} {value}: must be {edges[0]:g} to {edges[1]:g}')
     if not found:
         return ValueError(f'the values of the data sheet contradict each other: {error}')

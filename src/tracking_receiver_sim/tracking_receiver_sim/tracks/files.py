@@ -65,7 +65,7 @@ FILE_FORMATS = (
                'GGA and RMC of NMEA 0183, altitude + geoidal separation in metres; UTC, without a valid RMC seconds '
                'since midnight', nmea.is_log, _read_log(nmea.rows)),
     FileFormat('sat-nms program', DIRECTIONS_KIND, 'a Julian date',
-               'Julian date (UTC), azimuth, elevation [deg]; other words and `#` comments are ignored',
+               'Julian date (UTC), azimuth, elevation [deg]; further numbers and `#` comments are ignored',
                directions.is_program, _read_object(directions.read_program)),
     FileFormat('table of azimuth and elevation', DIRECTIONS_KIND,
                'names of columns with an azimuth, or three columns of numbers',

@@ -37,7 +37,7 @@ def rows(path: str, log: fixes.Log) -> Iterator[fixes.Fix]:
     from midnight. The names of the aircraft are the talkers."""
     first_day = _first_day(path)
     log.form, log.time_name, log.dated = 'NMEA', 'time', first_day is not None
-    clock, without_separation, talkers, qualities = _Clock(first_day), False, _Talkers(), Counter[int]()
+    clock, without_separation, talkers, qualities = _Clock(first_day), False, _Talkers(), Counter[tuple[int, str]]()
     for line, sentence in _sentences(path, log):
         if sentence.sentence_type == 'RMC':
             with contextlib.suppress(ValueError):
@@ -52,7 +52,7 @@ def rows(path: str, log: fixes.Log) -> Iterator[fixes.Fix]:
             if unit.strip().upper() not in ('M', ''):
                 raise csv_table.TableError(f'{path}: line {line}: unit of {name} = {unit!r:.20}: must be M')
         talkers.take(sentence)
-        qualities[sentence.gps_qual] += 1
+        qualities[sentence.gps_qual, sentence.talker] += 1
         without_separation = without_separation or not sentence.geo_sep
         separation = csv_table.number(path, line, 'geoidal separation', sentence.geo_sep or '0', -150.0, 150.0)
         yield fixes.Fix(line, (sentence.talker,), time,
@@ -61,9 +61,10 @@ def rows(path: str, log: fixes.Log) -> Iterator[fixes.Fix]:
                         separation + csv_table.number(path, line, 'altitude', sentence.altitude, -1000.0, 1e8))
     if without_separation:
         log.remarks.append('altitude without geoidal separation taken as height above the ellipsoid')
-    log.remarks += [f'{count} fixes of quality {quality} ({QUALITIES[quality]})'
-                    for quality, count in sorted(qualities.items()) if quality in QUALITIES]
     log.receivers = talkers.described()
+    log.remarks += [f'{count} fixes of quality {quality} ({QUALITIES[quality]})'
+                    + f' of {talker}' * (len(log.receivers) > 1)
+                    for (quality, talker), count in sorted(qualities.items()) if quality in QUALITIES]
     first = None if first_day is None else datetime.date(1970, 1, 1) + datetime.timedelta(days=first_day)
     if first and first < FIRST_RECENT_DATE:
         log.remarks.append(f'dated {first}: if the week counter of its receiver has overflowed (1,024 weeks), the log '
@@ -94,7 +95,8 @@ class _Talkers:
             few = self._fixes[name] < MIN_FIX_SHARE * most
             return few, self._dilutions[name] / self._fixes[name], name != COMBINED_TALKER, name
 
-        return {name: f'{self._fixes[name]} fixes, mean HDOP {self._dilutions[name] / self._fixes[name]:.2g}'
+        return {name: f'{self._fixes[name]} fixes, ' + (f'mean HDOP {self._dilutions[name] / self._fixes[name]:.2g}'
+                                                        if math.isfinite(self._dilutions[name]) else 'HDOP not known')
                 for name in sorted(self._fixes, key=rank)}
 
 
