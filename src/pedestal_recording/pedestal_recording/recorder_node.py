@@ -113,7 +113,7 @@ class RecorderNode(shell.Shell):
         if self.graph.lockstep and not names:
             raise parameters.ParameterError("graph.nodes = '': must name the nodes of the graph in lockstep")
         beams, flags = self.graph.beams, [flag for flag in topics.TOPIC_FLAGS if getattr(self.parameters, flag)]
-        recorded = nodes.recorded(names, flags, beams) if names else list(self.links.values())
+        recorded = nodes.recorded(names, flags, beams, self.graph.own) if names else list(self.links.values())
         if self.graph.lockstep:  # a command belongs to no step; its reply does, and repeats the command
             recorded = [link for link in recorded if link.rate not in topics.REALTIME_RATES]
         # planned end of the run, since its start
@@ -123,6 +123,7 @@ class RecorderNode(shell.Shell):
             'beamwidth': self.parameters.beamwidth, **({'beams': beams} if beams else {}),
             **({'servo': 1} if nodes.SIMULATED_DRIVES.name in names else {}),
             **({'iq': 1} if nodes.SIMULATED_IQ.name in names else {}),
+            **({'own': self.graph.own} if self.graph.own else {}),
             **({} if self.graph.lockstep else {'start': self.epoch(self.clock()[1])}),
             **({'planned_end_ns': self._end} if self._end else {}),
             'git': configuration.git_revision(), **configuration.versions()},
@@ -301,9 +302,12 @@ class RecorderNode(shell.Shell):
         """Return the function that writes a message of a topic at its arrival in realtime."""
         write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
         clock = PublisherGate(lambda data: (messages.stamp_of(data),) * 2, round(self.graph.future * NS_PER_SECOND))
+        first = self.graph.start if topic.rate == 'step' else 0     # equipment may run before the run
 
         def put(data: bytes, info: MessageInfo) -> None:
-            write(index, log_time(stamp_in(data)), info['source_timestamp'], data)
+            stamp = stamp_in(data)
+            if stamp is None or not 0 < stamp < first:
+                write(index, log_time(stamp), info['source_timestamp'], data)
 
         def put_clock(data: bytes, info: MessageInfo) -> None:
             self._tick(clock.take(data, info['publication_sequence_number'], info['source_timestamp'], *self.clock()))
@@ -322,7 +326,7 @@ class RecorderNode(shell.Shell):
 
     def _tick(self, stamp: Nanoseconds | None) -> None:
         """Take a new time of the drive, None for a rejected message; end the node at the planned end."""
-        if stamp is None:
+        if stamp is None or stamp < self.graph.start:
             return
         if self.graph.lockstep and stamp // NS_PER_SECOND > self._stamp // NS_PER_SECOND:
             assert self.diagnostics

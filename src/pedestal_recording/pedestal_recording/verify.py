@@ -198,7 +198,9 @@ def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut:
     rate = topic.rate if topic else ''
     if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
         # Missing steps of the graph, and messages of foreign publishers, are no fault of the recording.
-        return ([] if stamp.size else ['no message']) + _numbering(bag.recorded(name), cut)
+        # A program of the user may measure nothing.
+        lacks = not stamp.size and topic and not set(topic.writers) <= set(nodes.own_rows(bag.own))
+        return (['no message'] if lacks else []) + _numbering(bag.recorded(name), cut)
     # A node outside the graph publishes samples. It may be restarted, and it may repeat a stamp.
     problems = _order(stamp) if topic and len(topic.writers) == 1 and rate != 'sample' else []
     if topic and rate == 'step':

@@ -66,6 +66,12 @@ class RecordedRun:
         return tracking.read(self.bag)
 
     @functools.cached_property
+    def evaluated(self) -> Tracking:
+        """The run against the truth or, where the true target is missing, against nothing but the measured errors.
+        Raises ValueError without joint_states."""
+        return self.tracking if self.holds('target/truth') else tracking.read(self.bag, needs_truth=False)
+
+    @functools.cached_property
     def no_truth(self) -> str:
         """Reason why there is no `tracking`, or ''."""
         absent = [name for name in ('joint_states', 'target/truth') if not self.holds(name)]
@@ -105,15 +111,15 @@ class RecordedRun:
     @functools.cached_property
     def parts(self) -> dict[str, object]:
         """The parts by name for results.measured; a missing part is absent, None or empty. Raises ValueError like
-        `tracking`.
+        `evaluated`.
         """
-        return {**self.tracking.parts, **mode_pointing.read(self.bag, self.tracking), 'filter': self.filter,
+        return {**self.evaluated.parts, **mode_pointing.read(self.bag, self.evaluated), 'filter': self.filter,
                 'keyholes': self.keyholes, 'isolation': self.isolation, 'attitude': self.attitude}
 
     @functools.cached_property
     def verdict(self) -> verdicts.Verdict:
-        """The Verdict on the run. Raises ValueError like `tracking`."""
-        return verdicts.of(self.bag, self.tracking)
+        """The Verdict on the run. Raises ValueError like `evaluated`."""
+        return verdicts.of(self.bag, self.evaluated)
 
     @functools.cached_property
     def raw_angles(self) -> Pairs:

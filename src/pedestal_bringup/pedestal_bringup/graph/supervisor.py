@@ -32,7 +32,7 @@ def prepare(scenario: Scenario) -> None:
     Raises RuntimeError.
     """
     units = {nodes.plain(node): node for node in scenario.nodes
-             if scenario.row(node).unit and not is_compiled(scenario.unit(node))}
+             if node not in scenario.own and scenario.row(node).unit and not is_compiled(scenario.unit(node))}
     processes = {node: subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.loop.prepare', node, scenario.name],
                                         stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                         start_new_session=True) for node in units.values()}
@@ -85,8 +85,10 @@ class Supervisor:
 
     def _is_running(self) -> bool:
         """Return True until the drive has ended at the end of the run, at the latest SHUTDOWN_GRACE_S after it. A
-        drive that is dead shortly before the end is not started again, and also ends the run."""
-        now, drive_runs = time.time_ns(), self._graph.processes[nodes.DRIVE_NODE].poll() is None
+        drive that is dead shortly before the end is not started again, and also ends the run. A drive of the user does
+        not end by itself; the recorder does."""
+        ending = 'recorder' if nodes.DRIVE_NODE in self._graph.scenario.own else nodes.DRIVE_NODE
+        now, drive_runs = time.time_ns(), self._graph.processes[ending].poll() is None
         if now < self._end:
             return drive_runs or not self._is_nearly_over()
         return drive_runs and now < self._end + SHUTDOWN_GRACE_S * NS_PER_SECOND

@@ -142,7 +142,7 @@ class Shell(Node):
         super().__init__(name)
         self._parameters_type = parameters_type
         self._declare(live)
-        self.links = nodes.links_of(self.graph.members, self.graph.beams)
+        self.links = nodes.links_of(self.graph.members, self.graph.beams, self.graph.own)
         self._root, self.beam = self._place(name)
         self.name = self.beam + name
         self.finished = False       # True ends the node in `main`
