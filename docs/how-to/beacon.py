@@ -16,6 +16,7 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 
+RELIABLE = 10      # quality of service: reliable, volatile, the last 10 messages
 AZIMUTH_RAD, ELEVATION_RAD, RANGE_M = math.radians(30.0), math.radians(20.0), 5000.0
 BEAM_RAD, NOISE_RAD, CN0_DBHZ = math.radians(1.0), 1e-4, 60.0     # noise that the control unit expects at this C/N0
 
@@ -26,10 +27,9 @@ class Beacon(Node):
     def __init__(self):
         super().__init__('tracking_receiver')
         self.noise = random.Random(1)
-        # The quality of service 10 means: reliable, volatile, the last 10 messages.
-        self.errors = self.create_publisher(Vector3Stamped, 'tracking_receiver/angle_error', 10)
-        self.truths = self.create_publisher(Odometry, 'target/truth', 10)
-        self.create_subscription(JointState, 'adu/truth', self.step, 10)
+        self.errors = self.create_publisher(Vector3Stamped, 'tracking_receiver/angle_error', RELIABLE)
+        self.truths = self.create_publisher(Odometry, 'target/truth', RELIABLE)
+        self.create_subscription(JointState, 'adu/truth', self.step, RELIABLE)
 
     def step(self, dish):
         """Publish NaN while the beacon is outside the beam, and the truth always."""

@@ -3,6 +3,7 @@
 This module receives the messages, step_order.py puts them in order, and writer.py writes them.
 """
 import collections
+import sys
 import time
 from collections.abc import Callable
 from typing import TypeAlias
@@ -132,6 +133,7 @@ class RecorderNode(shell.Shell):
         self._lost: collections.Counter[str] = collections.Counter()    # messages of a topic
         self._heard: dict[str, TopicPublishers] = {}    # by topic, in realtime
         self._stamp: Nanoseconds = self.graph.start     # newest time of the drive
+        self._last_step: Nanoseconds = sys.maxsize      # time of the drive that ended the run
         self._without_stamp = 0     # number of messages without a valid stamp
         self._received = [0] * len(recorded)    # number of messages of each recorded topic
         self._step_topics = [index for index, topic in enumerate(recorded) if topic.rate == 'step']
@@ -302,11 +304,12 @@ class RecorderNode(shell.Shell):
         """Return the function that writes a message of a topic at its arrival in realtime."""
         write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
         clock = PublisherGate(lambda data: (messages.stamp_of(data),) * 2, round(self.graph.future * NS_PER_SECOND))
-        first = self.graph.start if topic.rate == 'step' else 0     # equipment may run before the run
+        # Equipment may run before and after the run.
+        of_step, first = topic.rate == 'step', self.graph.start
 
         def put(data: bytes, info: MessageInfo) -> None:
             stamp = stamp_in(data)
-            if stamp is None or not 0 < stamp < first:
+            if not (stamp and of_step) or first <= stamp <= self._last_step:
                 write(index, log_time(stamp), info['source_timestamp'], data)
 
         def put_clock(data: bytes, info: MessageInfo) -> None:
@@ -333,6 +336,7 @@ class RecorderNode(shell.Shell):
             self.diagnostics.publish(self._stamp)
         self._stamp = stamp
         if self._end is not None and stamp - self.epoch(stamp) >= self._end:
+            self._last_step = min(self._last_step, stamp)
             self.finished = True
 
     def _write(self, write: Callable[[], None]) -> None:
