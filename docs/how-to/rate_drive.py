@@ -20,7 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 RELIABLE = 10      # quality of service: reliable, volatile, the last 10 messages
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)     # a later subscriber gets the last message
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)     # a later subscriber gets the last one
 
 AXES = ['azimuth', 'elevation']
 PERIOD_S = 0.02

@@ -131,6 +131,18 @@ class RecordedRun:
         return directions.of_target(run.encoders, run.measured, quaternions)
 
     @functools.cached_property
+    def pointing_errors(self) -> Table:
+        """Pointing error at the steps by column: `true`, target minus beam, where the recording holds the truth, and
+        `measured` by the receiver. Each in azimuth, in elevation, and in cross-elevation, which is the error of the
+        azimuth times cos(elevation). Raises ValueError like `evaluated`."""
+        run = self.evaluated
+        shrink = np.cos(run.encoders[:, 1])
+        parts = {'measured': run.measured} if self.no_truth else {'true': run.error, 'measured': run.measured}
+        return {'t [s]': run.t, 'stamp [ns]': np.round(run.t * 1e9).astype(np.int64) + self.bag.start, **{
+            f'{kind}.{axis} [rad]': values for kind, error in parts.items() for axis, values in (
+                ('azimuth', error[:, 0] / shrink), ('elevation', error[:, 1]), ('cross_elevation', error[:, 0]))}}
+
+    @functools.cached_property
     def motors(self) -> Table | None:
         """Columns of adu/motor_states, None without a message or without torques."""
         motors = self.table('adu/motor_states')

@@ -117,6 +117,18 @@ def test_the_loss_at_half_a_beamwidth_is_half_of_the_power():
     assert math.isnan(dataclasses.replace(run, beamwidth=math.nan).max_power_loss)
 
 
+def test_the_exported_pointing_error_is_that_of_the_results():
+    recorded = RecordedRun(bag.read(REFERENCES / 'leo_pass'))
+    table, run = recorded.pointing_errors, recorded.tracking
+    assert np.array_equal(table['true.cross_elevation [rad]'], run.error[:, 0])
+    assert np.array_equal(table['true.elevation [rad]'], run.error[:, 1])
+    across = table['true.azimuth [rad]'] * np.cos(run.encoders[:, 1])
+    assert np.allclose(across, run.error[:, 0], rtol=1e-12, atol=0.0)
+    # The receiver measures the true error with its noise.
+    assert 0.5 < np.corrcoef(table['measured.elevation [rad]'][run.since], run.measured[run.since, 1])[0, 1] <= 1.0
+    assert len(table['stamp [ns]']) == len(run.t) and table['stamp [ns]'][1] == round(run.t[1] * 1e9)
+
+
 def test_a_recorded_run_decodes_each_topic_once(monkeypatch):
     decoded = collections.Counter()
 

@@ -1,11 +1,16 @@
 """Verbs for a recording: check, repair, repeat, show, export, recompute and replay it."""
 import argparse
+import contextlib
 import pathlib
 import sys
+import typing
 
 from pedestal import console
 from pedestal.verbs import arguments
 from pedestal.verbs.arguments import Verb
+
+if typing.TYPE_CHECKING:
+    from pedestal_common.quantities import Table
 
 DEFAULT_DEADLINE_S = 60.0  # longest wait of a replay for a subscriber or an answer [s]
 
@@ -102,12 +107,27 @@ def _export(options: argparse.Namespace) -> int:
         raise ValueError(f'--rate, --participants: need --format tdm, not {options.format}')
     from pedestal_recording.export import export
     for file, rows_or_reason, columns in export(options.bag, options.format, options.output, options.topics,
-                                                options.overwrite):
+                                                options.overwrite, None if options.topics else _pointing(options)):
         if file is None:     # a topic that cannot be exported
             print(f'pedestal: left out: {rows_or_reason}', file=sys.stderr)
         else:
             print(f'{file}  {rows_or_reason} rows, {columns} columns')
     return 0
+
+
+def _pointing(options: argparse.Namespace) -> 'dict[str, Table]':
+    """Return {name: table of the pointing errors} of each beam of a recording with steps."""
+    from pedestal_common.graph import nodes
+    from pedestal_recording import bag as bags
+    from pedestal_results.recorded_run import RecordedRun
+    bag = bags.read(options.bag)
+    found = {}
+    for prefix in nodes.prefixes(bag.beams):
+        run = RecordedRun(bag.view(prefix[:-1]))
+        with contextlib.suppress(KeyError, ValueError):     # a recording of other tools may lack a topic or a number
+            if not run.no_truth or run.receiver:
+                found[f'{prefix}pointing_error'] = run.pointing_errors
+    return found
 
 
 def _tracking_data(options: argparse.Namespace) -> int:
