@@ -82,7 +82,8 @@ def test_a_filter_that_is_off_is_marked_in_the_table(capsys):
 
 def test_the_eight_results_come_first_and_others_fill_their_places():
     leo = results.measured(RecordedRun(bag.read(REFERENCES / 'leo_pass')).parts)
-    flagged = [result.name for result in results.RESULTS if result.brief]
+    # The results of the part `receiver` take the place of the true ones in a run without truth.
+    flagged = [result.name for result in results.RESULTS if result.brief and result.part != 'receiver']
     assert len(flagged) == results.BRIEF_COUNT
     run = {'lost_steps': (0.0, 'steps'), 'messages': (4.0, 'messages')}
     assert results.brief([leo, run]) == flagged

@@ -156,7 +156,8 @@ def _add_recompute(parser: argparse.ArgumentParser) -> None:
     acu/mode or adu/state that no recorded input explains is repeated as a request. The report states the number of the
     repeated commands. Changes of parameters during the run are not recorded. Diagnostics are not recomputed.
 
-    With --param the verb compares old with new results, and a difference is no failure. Because the recorded antenna
+    With --param the verb compares old with new results, and a difference is no failure. The first line states whether
+    the difference is significant: paired, with its interval. Because the recorded antenna
     does not follow the recomputed command, only two results are compared: the estimate against the recorded truth
     (error, noise, lag), and the noise of the command. The effect of a parameter on the pointing needs a new run.
     """
@@ -178,6 +179,7 @@ def _add_recompute(parser: argparse.ArgumentParser) -> None:
                         'value; default: 1e-9')
     parser.add_argument('--ignore', action='append', default=[], metavar='PATTERN',
                         help="topics or topic.field not to compare, for example 'acu/reference*'; may be repeated")
+    parser.add_argument('--fields', action='store_true', help='with --param: also the differences of every field')
     parser.add_argument('--allow-idle', action='store_true', help='accept a node that did nothing in the recording '
                         '(never locked, never in autotrack, never moved)')
     console.add_json(parser)
@@ -193,7 +195,7 @@ def _recompute(options: argparse.Namespace) -> int:
     console.check_json(options.json)
     if options.iq is not None:
         arguments.refuse_given(options, ('node', 'param', 'params_file', 'pacing', 'absolute', 'relative', 'ignore',
-                                         'allow_idle', 'explain', 'output'), 'has no effect with --iq')
+                                         'allow_idle', 'fields', 'explain', 'output'), 'has no effect with --iq')
         from pedestal_workbench.again import iq
         lines, rows, well = iq.main(options.bag, options.iq)
         print('\n'.join(lines))
