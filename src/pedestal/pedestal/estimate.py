@@ -157,8 +157,8 @@ def filter(t: ArrayLike, az: ArrayLike, el: ArrayLike, kind: str = 'imm', *, sig
     (369.9, 1.0, [])
     """
     if kind not in FILTER_KINDS:
-        hint = did_you_mean(str(kind), FILTER_KINDS)
-        raise ValueError(f'kind = {kind!r}:{hint} must be one of {", ".join(FILTER_KINDS)}')
+        raise ValueError(f'kind = {kind!r}:{did_you_mean(str(kind), FILTER_KINDS)} must be one of '
+                         f'{", ".join(FILTER_KINDS)}')
     stamps = _numbers('t', t, -1e11, 1e11, 's', None)
     steps = np.diff(stamps)
     if len(stamps) < 2 or steps.min() <= 0.0:
@@ -166,8 +166,8 @@ def filter(t: ArrayLike, az: ArrayLike, el: ArrayLike, kind: str = 'imm', *, sig
         raise ValueError(f't = ... {stamps[k:k + 2].tolist()} ...: must be two or more times that increase')
     azimuth = _numbers('az', az, *AZIMUTH_LIMITS_DEG, 'deg', stamps)
     elevation = _numbers('el', el, *ELEVATION_LIMITS_DEG, 'deg', stamps)
-    spread = _numbers('sigma', np.full(len(stamps), sigma) if np.ndim(sigma) == 0 else sigma, *SIGMA_LIMITS_DEG, 'deg',
-                      stamps)
+    each = np.full(len(stamps), sigma) if np.ndim(sigma) == 0 else sigma
+    spread = _numbers('sigma', each, *SIGMA_LIMITS_DEG, 'deg', stamps)
     longest = max(MIN_BRIDGED_TIME_S, BRIDGED_STEPS * float(np.median(steps))) if gap is None else gap
     bridged = float(_numbers('gap', [longest], 1e-9, 1e12, 's', None)[0])
     chosen = build(FilterParameters, {**(changes or {}), 'kind': kind})

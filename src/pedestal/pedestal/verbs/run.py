@@ -49,9 +49,8 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
                         'servo drives on a CAN bus of this machine, and drive_node in place of the drive unit; needs '
                         '--pacing realtime; default: value of the scenario')
     parser.add_argument('--receiver', metavar='PROGRAM', help='ROS 2 node of yours in place of the simulated '
-                        'receiver: FILE.py or PACKAGE/EXECUTABLE, in quotes with its arguments; or simulated-iq: '
-                        'simulated I/Q samples by UDP on this machine, and monopulse_receiver_node, in realtime; '
-                        'default: value of the scenario')
+                        'receiver: FILE.py or PACKAGE/EXECUTABLE, in quotes with its arguments. simulated-iq: I/Q '
+                        'samples by UDP, and monopulse_receiver_node, in realtime; default: value of the scenario')
     for name, place in (('ship', 'ship and its IMU'), ('ins', 'INS'), ('drive', 'drive, in realtime')):
         parser.add_argument(f'--{name}', metavar='PROGRAM', help='ROS 2 node of yours, as for --receiver, in place of '
                             f'the simulated {place}')

@@ -77,6 +77,10 @@ def _load_node(scenario: 'Scenario', node: str) -> None:
             unit.prepare()
 
 
+def _load_server(command: list[str]) -> None:
+    nodes.EXECUTABLES[command[3]].node_type()
+
+
 class Graph:
     """Processes of the nodes and servers of one run, with their logs, as a context.
 
@@ -184,7 +188,7 @@ class Graph:
                 self._unannounced.add(node)
                 command = self.servers[node].command
 
-                rehearse = functools.partial(nodes.EXECUTABLES[command[3]].node_type)
+                rehearse = functools.partial(_load_server, command)
             elif node in self.scenario.own:
                 command, rehearse = self._own[node], None
             else:

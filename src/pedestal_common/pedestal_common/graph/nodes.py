@@ -339,8 +339,8 @@ def reads(node: Node, names: Iterable[str], flags: Collection[str] = (), own: st
     """Return the topics that a Node subscribes to in a graph of these nodes, its trigger first.
 
     A node that is not in the graph may be real equipment, so its topics are included. Excluded are the topics of an
-    optional node that is not among the names, topics that a program of the user (`own_rows`) in the place of their
-    publisher does not publish, and topics whose flag is not set.
+    optional node that is not among the names, and topics whose flag is not set. Of a program of the user (`own_rows`),
+    only the topics that it publishes are included.
     """
     plain_names = {plain(name) for name in names}
 
