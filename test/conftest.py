@@ -397,8 +397,8 @@ def _clients():
     """Give what opens clients, and close them."""
     clients = []
     before = dict(os.environ)
-    from pedestal_common.node import middleware
-    middleware.set_defaults()
+    from pedestal_common.graph import domain
+    domain.set_defaults()
 
     def open_client(domain_id, name='client'):
         client = Client(domain_id, name)

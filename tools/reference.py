@@ -58,7 +58,7 @@ VERB_GROUPS = {
     'see what exists': ('scenarios', 'samples', 'parameters'),
     'run a scenario': ('run',),
     'operate a running antenna': ('status', 'mode', 'stop', 'drive', 'ask', 'operate', 'program', 'live', 'simulate'),
-    'use a recording': ('verify', 'recover', 'rerun', 'report', 'replay', 'export'),
+    'use a recording': ('verify', 'recover', 'rerun', 'report', 'replay', 'export', 'filter'),
     'compare settings': ('trials', 'recompute'),
     'design an antenna': ('new', 'tune'),
     'calibrate an antenna': ('calibrate',),

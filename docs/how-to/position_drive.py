@@ -1,6 +1,6 @@
 """A drive of your own that follows angles: the amplifiers close the position loops themselves.
 
-    python position_drive.py 5006
+    pedestal run uav_flyby --pacing realtime --param adu.period=0.02 --drive 'position_drive.py 5006 --truth'
 
 It differs from rate_drive.py in one function: the numbers for the amplifiers are set-points [rad], the integral of the
 rate commands.

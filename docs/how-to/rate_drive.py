@@ -1,23 +1,26 @@
 """A drive of your own that follows rates: the amplifiers close the speed loops, and answer by UDP.
 
-    python rate_drive.py 5006
+    pedestal run uav_flyby --pacing realtime --param adu.period=0.02 --drive 'rate_drive.py 5006 --truth'
 
 Every period the drive sends 'AZIMUTH_RATE ELEVATION_RATE' [rad/s] to the port of the amplifiers. They answer with
 'AZIMUTH ELEVATION AZIMUTH_RATE ELEVATION_RATE' [rad, rad/s] of their encoders.
 """
 import argparse
-import signal
 import socket
 import sys
 import time
 
 import rclpy
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from pedestal_common.node import middleware
+RELIABLE = 10      # quality of service: reliable, volatile, the last 10 messages
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)     # a later subscriber gets the last one
 
 AXES = ['azimuth', 'elevation']
 PERIOD_S = 0.02
@@ -28,18 +31,22 @@ COMMAND_TIMEOUT_S, ANSWER_TIMEOUT_S = 10.0 * PERIOD_S, 0.2
 
 
 class Drive(Node):
-    """Publisher of clock, joint_states and adu/state; it commands the amplifiers at a UDP port."""
+    """Publisher of clock, joint_states and adu/state; it commands the amplifiers at a UDP port.
 
-    def __init__(self, port):
+    truth: it also publishes its encoder angles as the true ones, which a simulated receiver needs.
+    """
+
+    def __init__(self, port, truth):
         super().__init__('adu')
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.connect(('127.0.0.1', port))
         self.socket.setblocking(False)
         self.rates, self.commanded, self.answered, self.state = [0.0, 0.0], 0.0, 0.0, ''
-        self.clock = self.create_publisher(Clock, 'clock', middleware.qos('step'))
-        self.joints = self.create_publisher(JointState, 'joint_states', middleware.qos('step'))
-        self.states = self.create_publisher(String, 'adu/state', middleware.qos('change'))
-        self.create_subscription(JointState, 'acu/rate_command', self.take, middleware.qos('step'))
+        self.clock = self.create_publisher(Clock, 'clock', RELIABLE)
+        self.joints = [self.create_publisher(JointState, topic, RELIABLE)
+                       for topic in ['joint_states'] + ['adu/truth'] * truth]
+        self.states = self.create_publisher(String, 'adu/state', LATCHED)
+        self.create_subscription(JointState, 'acu/rate_command', self.take, RELIABLE)
         self.create_timer(PERIOD_S, self.step)
 
     def take(self, command):
@@ -56,7 +63,8 @@ class Drive(Node):
             joints = JointState(name=AXES, position=measured[:2], velocity=measured[2:])
             joints.header.stamp = self.get_clock().now().to_msg()     # UTC of the measurement
             self.clock.publish(Clock(clock=joints.header.stamp))
-            self.joints.publish(joints)
+            for publisher in self.joints:
+                publisher.publish(joints)
         self.report('enabled' if now - self.answered < ANSWER_TIMEOUT_S else 'fault: amplifiers silent')
         stale = now - self.commanded > COMMAND_TIMEOUT_S
         self.send(self.command([0.0, 0.0] if stale else self.rates, measured))
@@ -93,10 +101,14 @@ def main(drive):
     parser = argparse.ArgumentParser(description=sys.modules[drive.__module__].__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('port', type=int, help='UDP port of the amplifiers on 127.0.0.1, 1 to 65535')
-    options = parser.parse_args()
-    middleware.initialise()
-    signal.signal(signal.SIGINT, signal.SIG_DFL)      # Ctrl-C also ends a node that waits for a message
-    rclpy.spin(drive(options.port))
+    parser.add_argument('--truth', action='store_true', help='encoder angles also on adu/truth, which a simulated '
+                        'receiver needs')
+    options = parser.parse_args(remove_ros_args()[1:])     # `pedestal run` adds arguments of ROS 2
+    rclpy.init()
+    try:
+        rclpy.spin(drive(options.port, options.truth))
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
 
 
 if __name__ == '__main__':

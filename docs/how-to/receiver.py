@@ -1,19 +1,20 @@
 """A receiver of your own: angle errors that arrive by UDP become the topic tracking_receiver/angle_error.
 
-    python receiver.py 5005
+    pedestal run uav_flyby --pacing realtime --receiver 'receiver.py 5005'
 
 A datagram is 'CROSS_ELEVATION ELEVATION CN0' in rad, rad, dB-Hz; 'nan nan 20' states that the receiver is not locked.
 """
 import argparse
-import signal
 import socket
 
 import rclpy
 from geometry_msgs.msg import Vector3Stamped
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 
-from pedestal_common.node import middleware
+RELIABLE = 10      # quality of service: reliable, volatile, the last 10 messages
 
 
 class Receiver(Node):
@@ -24,8 +25,8 @@ class Receiver(Node):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(('127.0.0.1', port))
         self.socket.setblocking(False)
-        self.publisher = self.create_publisher(Vector3Stamped, 'tracking_receiver/angle_error', middleware.qos('step'))
-        self.create_subscription(JointState, 'joint_states', self.step, middleware.qos('step'))
+        self.publisher = self.create_publisher(Vector3Stamped, 'tracking_receiver/angle_error', RELIABLE)
+        self.create_subscription(JointState, 'joint_states', self.step, RELIABLE)
 
     def step(self, joints):
         if text := self.newest():
@@ -52,10 +53,12 @@ def main():
     """Run the receiver on the port of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('port', type=int, help='UDP port on 127.0.0.1, 1 to 65535')
-    options = parser.parse_args()
-    middleware.initialise()
-    signal.signal(signal.SIGINT, signal.SIG_DFL)      # Ctrl-C also ends a node that waits for a message
-    rclpy.spin(Receiver(options.port))
+    options = parser.parse_args(remove_ros_args()[1:])     # `pedestal run` adds arguments of ROS 2
+    rclpy.init()
+    try:
+        rclpy.spin(Receiver(options.port))
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
 
 
 if __name__ == '__main__':

@@ -25,7 +25,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from station import NODES, Station, reads
 
 from pedestal_bringup.scenario import scenario
-from pedestal_common.graph import nodes, topics
+from pedestal_common.graph import domain, nodes, topics
 from pedestal_common.node import middleware, subscriptions
 from pedestal_common.wire import messages
 
@@ -131,7 +131,7 @@ class Stranger:
     """A node that sends what it should not, and watches the antenna."""
 
     def __init__(self, domain_id):
-        middleware.set_defaults()
+        domain.set_defaults()
         self.context = rclpy.Context()
         rclpy.init(args=[], context=self.context, domain_id=domain_id)
         self.node = rclpy.create_node('stranger', context=self.context)

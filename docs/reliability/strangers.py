@@ -21,7 +21,7 @@ import rclpy
 from messages import Stranger
 from station import Station
 
-from pedestal_common.graph import topics
+from pedestal_common.graph import domain, topics
 from pedestal_common.node import middleware
 from pedestal_common.wire import messages
 
@@ -30,7 +30,7 @@ COUNTERS = 'step', 'lost_steps', 'missed_steps', 'late_ticks'
 
 def node_of(domain_id):
     """A node of rclpy in a process of its own."""
-    middleware.set_defaults()
+    domain.set_defaults()
     rclpy.init(args=[], domain_id=domain_id)
     return rclpy.create_node('stranger')
 

@@ -46,6 +46,7 @@ VERBS = {
                'CCSDS TDM'),
     'recompute': ('recordings', 'feed recorded inputs to a node again and compare its outputs'),
     'tune': ('design', 'tune a filter, the feed-forward, or the loops of your own plant'),
+    'filter': ('design', 'filter measured angles of a file: angles, rates, and how sure both are'),
     'calibrate': ('calibrate', 'calibrate an antenna from measurements: each step is a verb of its own'),
     'replay': ('recordings', 'publish a recording into a running graph'),
     'bench': ('design', 'measure the speed of this machine: nodes in lockstep, compiled control laws, recordings'),

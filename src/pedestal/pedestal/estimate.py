@@ -1,6 +1,8 @@
-"""The target filter of the control unit on angles of the caller: `pedestal.filter` returns a Filtered."""
+"""The target filter of the control unit on angles of the caller: `pedestal.filter` returns a Filtered, and `read`
+reads the angles of a CSV file."""
 from __future__ import annotations
 
+import array
 import datetime
 import math
 import typing
@@ -21,6 +23,9 @@ from pedestal_common.compiled import compiled
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import build, did_you_mean
 from pedestal_common.quantities import Floats, Ints, Pairs, Seconds, Times
+from pedestal_common.text_files import columns, csv_table
+from pedestal_common.text_files.files import FilePath
+from tracking_receiver_sim.tracks import directions, times
 
 if typing.TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,6 +37,55 @@ UNITS = {'t': 's', 'outcome': '', **{f'{axis}.{column}': unit for axis in AXES
 GAP_STEPS, BRIDGED_STEPS, MIN_BRIDGED_TIME_S = 2.5, 20.0, 1.0   # median steps: a gap; default of `gap`, its least [s]
 # A receiver whose error has the variance 1 / (C/N0) + sigma_floor^2 [rad2].
 UNIT_RECEIVER = ReceiverModelParameters(beamwidth=1.0, slope=1.0, integration=0.5, sigma_floor=1e-9)
+
+
+AZIMUTH_LIMITS_DEG, ELEVATION_LIMITS_DEG, SIGMA_LIMITS_DEG = (-36_000.0, 36_000.0), (-90.0, 90.0), (1e-6, 5.0)
+SIGMA = columns.Quantity('sigma_deg', {'sigma': 'deg'}, 'deg')
+
+
+class Measured(typing.NamedTuple):
+    """Measured angles of a file."""
+    t: Times                # [s], as in the file; of dates: since the midnight before the first row, UTC
+    azimuth: Floats         # [deg]
+    elevation: Floats       # [deg]
+    sigma: Floats | None    # standard deviation [deg], None without such a column
+    description: str        # columns and number of rows
+
+
+def read(path: FilePath) -> Measured:
+    """Return the angles of a CSV file with the columns time, azimuth, elevation and perhaps sigma; with three columns
+    without names, in this order. A row that repeats the row before is skipped. Raises TableError."""
+    rows, repeated = array.array('d'), 0
+    with csv_table.opened(path, directions.BARE_NAMES) as table:
+        clock = times.Times(table, times.TIME)
+        limits = {table.column(directions.AZIMUTH): AZIMUTH_LIMITS_DEG,
+                  table.column(directions.ELEVATION): ELEVATION_LIMITS_DEG}
+        sigma = table.column(SIGMA, required=False)
+        limits |= {sigma: SIGMA_LIMITS_DEG} if sigma else {}
+        width = 1 + len(limits)
+        for row in table:
+            numbers = array.array('d', (clock.seconds(row), *(table.number(column, row[column.name], *limits[column])
+                                                              for column in limits)))
+            if numbers == rows[-width:]:
+                repeated += 1
+                continue
+            step = numbers[0] - rows[-width] if rows else math.inf
+            if step <= 0.0:
+                raise csv_table.bad_step(path, table.line_num, f'{clock.name} = {row[clock.column.name]}', step, 's',
+                                         math.inf, '')
+            rows.extend(numbers)
+            if len(rows) > csv_table.MAX_CSV_ROWS * width:
+                raise csv_table.too_long(path, table.line_num)
+        clock.check()
+    found = np.array(rows).reshape(-1, width)
+    if len(found) < 2:
+        raise csv_table.TableError(f'{path}: {len(found)} rows, must be at least 2')
+    t, azimuth, elevation, *more = found.T
+    midnight = 86_400.0 * math.floor(t[0] / 86_400.0) if clock.dated else 0.0
+    names = ', '.join((clock.described(), *(column.described() for column in limits)))
+    skipped = f', passed over {repeated} x {csv_table.REPEATED_ROW}' if repeated else ''
+    return Measured(t - midnight, azimuth, elevation, more[0] if more else None,
+                    f'columns {names}: {len(t)} rows{skipped}')
 
 
 class Filtered(Table):
@@ -104,16 +158,17 @@ def filter(t: ArrayLike, az: ArrayLike, el: ArrayLike, kind: str = 'imm', *, sig
     (369.9, 1.0, [])
     """
     if kind not in FILTER_KINDS:
-        hint = did_you_mean(str(kind), FILTER_KINDS)
-        raise ValueError(f'kind = {kind!r}:{hint} must be one of {", ".join(FILTER_KINDS)}')
-    times = _numbers('t', _seconds(t), -1e11, 1e11, 's', None)
-    steps = np.diff(times)
-    if len(times) < 2 or steps.min() <= 0.0:
+        raise ValueError(f'kind = {kind!r}:{did_you_mean(str(kind), FILTER_KINDS)} must be one of '
+                         f'{", ".join(FILTER_KINDS)}')
+    stamps = _numbers('t', _seconds(t), -1e11, 1e11, 's', None)
+    steps = np.diff(stamps)
+    if len(stamps) < 2 or steps.min() <= 0.0:
         k = int(np.argmin(steps)) if len(steps) else 0
-        raise ValueError(f't = ... {times[k:k + 2].tolist()} ...: must be two or more times that increase')
-    azimuth = _numbers('az', az, -36_000.0, 36_000.0, 'deg', times)
-    elevation = _numbers('el', el, -90.0, 90.0, 'deg', times)
-    spread = _numbers('sigma', np.full(len(times), sigma) if np.ndim(sigma) == 0 else sigma, 1e-6, 5.0, 'deg', times)
+        raise ValueError(f't = ... {stamps[k:k + 2].tolist()} ...: must be two or more times that increase')
+    azimuth = _numbers('az', az, *AZIMUTH_LIMITS_DEG, 'deg', stamps)
+    elevation = _numbers('el', el, *ELEVATION_LIMITS_DEG, 'deg', stamps)
+    each = np.full(len(stamps), sigma) if np.ndim(sigma) == 0 else sigma
+    spread = _numbers('sigma', each, *SIGMA_LIMITS_DEG, 'deg', stamps)
     longest = max(MIN_BRIDGED_TIME_S, BRIDGED_STEPS * float(np.median(steps))) if gap is None else gap
     bridged = float(_numbers('gap', [longest], 1e-9, 1e12, 's', None)[0])
     chosen = build(FilterParameters, {**(changes or {}), 'kind': kind})
@@ -121,14 +176,14 @@ def filter(t: ArrayLike, az: ArrayLike, el: ArrayLike, kind: str = 'imm', *, sig
                            tracker=TrackerParameters(receiver=UNIT_RECEIVER))
     state, inputs = tracking.Tracking.zeros(), signals.Inputs.of(range=math.nan, error_rate=math.nan)
     tracking.initialise(state, params.pointing)
-    measured, estimates = np.column_stack((azimuth, elevation)), np.empty((len(times), 2, len(COLUMNS)))
-    outcomes = np.zeros(len(times), int)
-    take_each(state[0], control_unit.constants(params)[0], inputs[0], signals.Outputs.zeros()[0], times,
+    measured, estimates = np.column_stack((azimuth, elevation)), np.empty((len(stamps), 2, len(COLUMNS)))
+    outcomes = np.zeros(len(stamps), int)
+    take_each(state[0], control_unit.constants(params)[0], inputs[0], signals.Outputs.zeros()[0], stamps,
               np.radians(measured), cn0_of(np.radians(spread)), bridged, estimates, outcomes)
     estimates[:, :, :-1] = np.degrees(estimates[:, :, :-1])
     estimates[:, 0, 0] = np.unwrap(np.concatenate((azimuth[:1], estimates[:, 0, 0])), period=360.0)[1:]
     measured[:, 0] += 360.0 * np.round((estimates[:, 0, 0] - measured[:, 0]) / 360.0)
-    return Filtered({'t': times, 'outcome': np.array(OUTCOMES)[outcomes],
+    return Filtered({'t': stamps, 'outcome': np.array(OUTCOMES)[outcomes],
                      **{f'{axis}.measured': measured[:, i] for i, axis in enumerate(AXES)},
                      **{f'{axis}.{column}': estimates[:, i, j] for i, axis in enumerate(AXES)
                         for j, column in enumerate(COLUMNS)}}, UNITS)

@@ -19,6 +19,7 @@ from pedestal_results.recorded_run import RecordedRun
 from pedestal_results.report import run_figures
 
 if typing.TYPE_CHECKING:
+    import pandas
     from matplotlib.axes import Axes
 
 class Panel(typing.NamedTuple):
@@ -58,6 +59,13 @@ class Table(Mapping[str, np.ndarray]):
 
     def __len__(self) -> int:
         return len(self._arrays)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the table as a pandas.DataFrame. Its `attrs` hold the units. Needs pandas."""
+        import pandas
+        frame = pandas.DataFrame(self._arrays)
+        frame.attrs.update(self.units)
+        return frame
 
     def __repr__(self) -> str:
         columns = ', '.join(f'{name} [{self.units[name]}]' if self.units[name] else name for name in self)

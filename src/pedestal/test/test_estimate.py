@@ -139,3 +139,49 @@ def test_wrong_arguments_are_named(name, wrong, said):
     given = {'t': [0.0, 1.0, 2.0, 3.0], 'az': np.ones(4), 'el': np.ones(4), 'sigma': 0.1, name: wrong}
     with pytest.raises(ValueError, match=said):
         pedestal.filter(**given)
+
+
+ANGLES = 't,az,el\n' + ''.join(f'{0.1 * k:.1f},{(350.0 + k) % 360.0:.2f},{40.0 + 0.01 * k:.2f}\n'
+                               for k in range(40) if not 12 <= k < 16)
+
+
+@pytest.mark.every_case
+@pytest.mark.parametrize('kind', ['imm', 'ca'])
+def test_the_verb_writes_what_the_library_returns(kind, pedestal, tmp_path):
+    (tmp_path / 'angles.csv').write_text(ANGLES)
+    code, said, errors = pedestal('filter', 'angles.csv', '--sigma', 0.03, '--kind', kind, '--plot', 'track.png')
+    assert code == 0 and 'gap from 1.1 to 1.6 s: bridged' in said and (tmp_path / 'track.png').stat().st_size, errors
+    with open(tmp_path / 'angles-filtered.csv') as file:
+        names, *rows = [line.strip().split(',') for line in file]
+    t, az, el = np.loadtxt(tmp_path / 'angles.csv', delimiter=',', skiprows=1, unpack=True)
+    made = estimate.filter(t, az, el, kind, sigma=0.03)
+    for column, unit in made.units.items():
+        written = [row[names.index(f'{column} [{unit}]' if unit else column)] for row in rows]
+        assert written == made[column].tolist() if column == 'outcome' else np.array_equal(
+            np.array(written, float), made[column], equal_nan=True)
+    assert list(made.to_pandas()['azimuth.position']) == made['azimuth.position'].tolist()
+
+
+@pytest.mark.every_case
+@pytest.mark.parametrize('text, options, error', [
+    (ANGLES.replace('40.02', '400.2'), ('--sigma', 0.03), 'line 4: el = 400.2: must be -90 to 90'),
+    (ANGLES.replace('40.02', ''), ('--sigma', 0.03), "line 4: el = '': must be a number"),
+    (ANGLES.replace('\n0.3', '\n0.1'), ('--sigma', 0.03), 'line 5: t = 0.1: -0.1 s after the row before'),
+    (ANGLES.replace('az', 'bearing'), ('--sigma', 0.03), "line 1: column 'azimuth' is missing"),
+    (ANGLES, (), 'has no column sigma_deg; give --sigma DEG'),
+    (ANGLES, ('--sigma', 9.0), '--sigma 9: must be 1e-06 to 5 deg'),
+    (ANGLES, ('--sigma', 0.03, '--plot', 'a.jpg'), '--plot a.jpg: must end with .png, .svg, .pdf'),
+    ('', ('--sigma', 0.03), "line 1: column 'time' is missing")])
+def test_the_verb_names_what_is_wrong(text, options, error, pedestal, tmp_path):
+    (tmp_path / 'angles.csv').write_text(text)
+    code, _, errors = pedestal('filter', 'angles.csv', *options)
+    assert code and error in errors, errors
+
+
+def test_units_dates_and_a_sigma_of_each_row(tmp_path):
+    file = tmp_path / 'angles.csv'
+    file.write_text('utc;az_rad;el_rad;sigma_mrad\n2020-01-01T00:00:01.5;0,5;0,25;1\n2020-01-01T00:00:02.5;0,6;0,25;2\n'
+                    '2020-01-01T00:00:02.5;0,6;0,25;2\n')
+    found = estimate.read(file)
+    assert found.t.tolist() == [1.5, 2.5] and 'passed over 1' in found.description
+    assert np.allclose(np.radians([found.azimuth, found.sigma]), [[0.5, 0.6], [0.001, 0.002]])

@@ -361,9 +361,18 @@ class Bag:
         return self.metadata.get('iq') == '1' or any(key.startswith('source.') for key in given)
 
     @property
+    def own(self) -> str:
+        """Programs of the user in the recorded graph, as in nodes.own_rows. Raises BagError for another text."""
+        try:
+            nodes.own_rows(text := self.metadata.get('own', ''))
+        except ValueError as error:
+            raise BagError(f'{self.file}: its record `pedestal`: {error}') from None
+        return text
+
+    @property
     def graph(self) -> dict[str, nodes.Link]:
         """Topics of the recorded graph by name."""
-        return nodes.links(self.beams, self.servo, self.iq)
+        return nodes.links(self.beams, self.servo, self.iq, self.own)
 
     def view(self, beam: str = '') -> 'Bag':
         """Return this Bag reduced to one beam of an array; '' for the first beam. Raises BagError for a missing beam.

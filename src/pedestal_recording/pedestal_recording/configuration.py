@@ -7,7 +7,7 @@ import importlib.metadata
 import pathlib
 import platform
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Protocol
 
 from pedestal_common import parameters
@@ -30,6 +30,10 @@ class Scenario(Protocol):
     @property
     def nodes(self) -> Iterable[str]:
         """Names of its nodes."""
+
+    @property
+    def own(self) -> Collection[str]:
+        """Those of its nodes that are programs of the user."""
 
     def node_parameters(self, name: str) -> parameters.Parameters:
         """Return the parameters of a node."""
@@ -69,7 +73,7 @@ def versions() -> dict[str, str]:
 def recorder_parameters(scenario: Scenario) -> dict[str, str]:
     """Return the parameters of the recorder node that hold the configuration of a scenario."""
     values = {node: parameters.as_dict(scenario.node_parameters(node))
-              for node in scenario.nodes if node != 'operator'}
+              for node in scenario.nodes if node != 'operator' and node not in scenario.own}
     values['recorder'] = {key: value for key, value in values['recorder'].items() if key not in OMITTED_PARAMETERS}
     return {'scenario_yaml': scenario.as_yaml(), 'parameters_yaml': plain_yaml.dump(values)}
 

@@ -8,7 +8,7 @@ import contextlib
 import csv
 import os
 import pathlib
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -25,37 +25,43 @@ _TableWriter: TypeAlias = Callable[[pathlib.Path, Table, dict[str, str]], None] 
 
 def export(path: str | pathlib.Path, file_format: str = 'csv', output: str | pathlib.Path | None = None,
            names: Collection[str] = (),
-           overwrite: bool = False) -> Iterator[tuple[pathlib.Path, int, int] | tuple[None, str, str]]:
+           overwrite: bool = False, more: Mapping[str, Table] | None = None,
+           ) -> Iterator[tuple[pathlib.Path, int, int] | tuple[None, str, str]]:
     """Write the topics of the bag at a path as tables ('csv' or 'parquet').
 
-    Yield (file, number of rows, number of columns) per topic, or (None, reason, name) for a topic that is omitted.
+    Yield (file, number of rows, number of columns) per table, or (None, reason, name) for a topic that is omitted.
 
     names         topics to write, each of a known type; when empty, all topics except those of unknown type
     output        folder of the tables, by default `export` in the bag (beside a bare .mcap). The table of the topic
                   acu/rate_command is `acu.rate_command.csv`.
+    more          {name: further table}, with TIME_COLUMN and STAMP_COLUMN
 
     Raises bag.BagError, ValueError if Parquet cannot be written, or FileExistsError before the first write.
     """
-    write = _parquet_writer() if file_format == 'parquet' else _write_csv
+    write = _parquet_writer() if file_format == 'parquet' else write_csv
     bag = bags.read(path)
     chosen = bags.chosen_topics(bag, names) if names else list(bag.topics)
     folder = pathlib.Path(output) if output is not None else bag.file.parent / 'export'
-    files = {name: folder / f'{name.replace("/", ".")}.{file_format}' for name in chosen}
+    more = more or {}
+    files = {name: folder / f'{name.replace("/", ".")}.{file_format}' for name in (*chosen, *more)}
     existing = [file for file in files.values() if file.exists()]
     if existing and not overwrite:
-        more = f' and {len(existing) - 1} more' if len(existing) > 1 else ''
-        raise FileExistsError(f'{existing[0]} exists already{more}; --overwrite replaces the files')
+        others = f' and {len(existing) - 1} more' if len(existing) > 1 else ''
+        raise FileExistsError(f'{existing[0]} exists already{others}; --overwrite replaces the files')
     folder.mkdir(parents=True, exist_ok=True)
     for name, file in files.items():
-        if bag.topics[name] not in messages.ROS_TYPESTORE.fielddefs:
+        if name in more:
+            content, origin = more[name], {}
+        elif bag.topics[name] not in messages.ROS_TYPESTORE.fielddefs:
             reason = f'{name} is of the unknown type {bag.topics[name]}'
             if names:
                 raise bags.BagError(f'{path}: {reason}')
             yield None, reason, name
             continue
-        content = table(bag, name)
+        else:
+            content, origin = table(bag, name), {'topic': name, 'type': bag.topics[name]}
         with atomic_file(file) as part:
-            write(part, content, {'topic': name, 'type': bag.topics[name], **bag.metadata})
+            write(part, content, {**origin, **bag.metadata})
         yield file, len(content[STAMP_COLUMN]), len(content)
 
 
@@ -131,7 +137,7 @@ def _diagnostics(bag: bags.Bag, name: str, stamps: Stamps) -> Table:
                        for _, status in statuses]}
 
 
-def _write_csv(file: pathlib.Path, content: Table, _description: object) -> None:
+def write_csv(file: pathlib.Path, content: Table, _description: object = None) -> None:
     """Write a table as CSV. A number is the shortest text that reads back as the same float, else NaN."""
     with open(file, 'w', newline='', encoding='utf-8') as stream:
         writer = csv.writer(stream, lineterminator='\n')

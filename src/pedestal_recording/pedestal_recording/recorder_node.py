@@ -3,6 +3,7 @@
 This module receives the messages, step_order.py puts them in order, and writer.py writes them.
 """
 import collections
+import sys
 import time
 from collections.abc import Callable
 from typing import TypeAlias
@@ -114,7 +115,7 @@ class RecorderNode(shell.Shell):
         if self.graph.lockstep and not names:
             raise parameters.ParameterError("graph.nodes = '': must name the nodes of the graph in lockstep")
         beams, flags = self.graph.beams, [flag for flag in topics.TOPIC_FLAGS if getattr(self.parameters, flag)]
-        recorded = nodes.recorded(names, flags, beams) if names else list(self.links.values())
+        recorded = nodes.recorded(names, flags, beams, self.graph.own) if names else list(self.links.values())
         if self.graph.lockstep:  # a command belongs to no step; its reply does, and repeats the command
             recorded = [link for link in recorded if link.rate not in topics.REALTIME_RATES]
         # planned end of the run, since its start
@@ -124,6 +125,7 @@ class RecorderNode(shell.Shell):
             'beamwidth': self.parameters.beamwidth, **({'beams': beams} if beams else {}),
             **({'servo': 1} if nodes.SIMULATED_DRIVES.name in names else {}),
             **({'iq': 1} if nodes.SIMULATED_IQ.name in names else {}),
+            **({'own': self.graph.own} if self.graph.own else {}),
             **({} if self.graph.lockstep else {'start': self.epoch(self.clock()[1])}),
             **({'planned_end_ns': self._end} if self._end else {}),
             'git': configuration.git_revision(), **configuration.versions()},
@@ -132,6 +134,7 @@ class RecorderNode(shell.Shell):
         self._lost: collections.Counter[str] = collections.Counter()    # messages of a topic
         self._heard: dict[str, TopicPublishers] = {}    # by topic, in realtime
         self._stamp: Nanoseconds = self.graph.start     # newest time of the drive
+        self._last_step: Nanoseconds = sys.maxsize      # time of the drive that ended the run
         self._without_stamp = 0     # number of messages without a valid stamp
         self._received = [0] * len(recorded)    # number of messages of each recorded topic
         self._step_topics = [index for index, topic in enumerate(recorded) if topic.rate == 'step']
@@ -307,9 +310,13 @@ class RecorderNode(shell.Shell):
         """Return the function that writes a message of a topic at its arrival in realtime."""
         write, stamp_in, log_time = self._bag.write, self._stamp_in, self._log_time
         clock = PublisherGate(lambda data: (messages.stamp_of(data),) * 2, round(self.graph.future * NS_PER_SECOND))
+        # Equipment may run before and after the run.
+        of_step, first = topic.rate == 'step', self.graph.start
 
         def put(data: bytes, info: MessageInfo) -> None:
-            write(index, log_time(stamp_in(data)), info['source_timestamp'], data)
+            stamp = stamp_in(data)
+            if not (stamp and of_step) or first <= stamp <= self._last_step:
+                write(index, log_time(stamp), info['source_timestamp'], data)
 
         def put_clock(data: bytes, info: MessageInfo) -> None:
             self._tick(clock.take(data, info['publication_sequence_number'], info['source_timestamp'], *self.clock()))
@@ -328,13 +335,14 @@ class RecorderNode(shell.Shell):
 
     def _tick(self, stamp: Nanoseconds | None) -> None:
         """Take a new time of the drive, None for a rejected message; end the node at the planned end."""
-        if stamp is None:
+        if stamp is None or stamp < self.graph.start:
             return
         if self.graph.lockstep and stamp // NS_PER_SECOND > self._stamp // NS_PER_SECOND:
             assert self.diagnostics
             self.diagnostics.publish(self._stamp)
         self._stamp = stamp
         if self._end is not None and stamp - self.epoch(stamp) >= self._end:
+            self._last_step = min(self._last_step, stamp)
             self.finished = True
 
     def _write(self, write: Callable[[], None]) -> None:

@@ -216,7 +216,9 @@ def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut:
     rate = topic.rate if topic else ''
     if bag.metadata.get('pacing') == 'realtime' and rate == 'step':
         # Missing steps of the graph, and messages of foreign publishers, are no fault of the recording.
-        absent = [] if stamp.size or _may_be_absent(bag, name) else ['no message']
+        # A program of the user may measure nothing.
+        own = topic is not None and set(topic.writers) <= set(nodes.own_rows(bag.own))
+        absent = [] if stamp.size or own or _may_be_absent(bag, name) else ['no message']
         return absent + _numbering(bag.recorded(name), cut)
     # A node outside the graph publishes samples. It may be restarted, and it may repeat a stamp.
     problems = _order(stamp) if topic and len(topic.writers) == 1 and rate != 'sample' else []

@@ -127,9 +127,9 @@ def export(*arguments):
 
 def test_csv_reads_back_to_the_last_bit(recording, expected, tmp_path, capsys):
     assert export(recording, '--output', tmp_path) == 0
-    assert len(capsys.readouterr().out.splitlines()) == len(topics.TOPICS)
-    assert {file.name for file in tmp_path.iterdir()} == {f'{topic.name.replace("/", ".")}.csv'
-                                                          for topic in topics.TOPICS}
+    assert len(capsys.readouterr().out.splitlines()) == len(topics.TOPICS) + 1     # and pointing_error.csv
+    assert {file.name for file in tmp_path.iterdir()} == {
+        'pointing_error.csv', *(f'{topic.name.replace("/", ".")}.csv' for topic in topics.TOPICS)}
     for name, rows in expected.items():
         with open(tmp_path / f'{name.replace("/", ".")}.csv', newline='', encoding='utf-8') as file:
             found = list(csv.DictReader(file))

@@ -66,6 +66,12 @@ class RecordedRun:
         return tracking.read(self.bag)
 
     @functools.cached_property
+    def evaluated(self) -> Tracking:
+        """The run against the truth or, where the true target is missing, against nothing but the measured errors.
+        Raises ValueError without joint_states."""
+        return self.tracking if self.holds('target/truth') else tracking.read(self.bag, needs_truth=False)
+
+    @functools.cached_property
     def no_truth(self) -> str:
         """Reason why there is no `tracking`, or ''."""
         absent = [name for name in ('joint_states', 'target/truth') if not self.holds(name)]
@@ -105,15 +111,15 @@ class RecordedRun:
     @functools.cached_property
     def parts(self) -> dict[str, object]:
         """The parts by name for results.measured; a missing part is absent, None or empty. Raises ValueError like
-        `tracking`.
+        `evaluated`.
         """
-        return {**self.tracking.parts, **mode_pointing.read(self.bag, self.tracking), 'filter': self.filter,
+        return {**self.evaluated.parts, **mode_pointing.read(self.bag, self.evaluated), 'filter': self.filter,
                 'keyholes': self.keyholes, 'isolation': self.isolation, 'attitude': self.attitude}
 
     @functools.cached_property
     def verdict(self) -> verdicts.Verdict:
-        """The Verdict on the run. Raises ValueError like `tracking`."""
-        return verdicts.of(self.bag, self.tracking)
+        """The Verdict on the run. Raises ValueError like `evaluated`."""
+        return verdicts.of(self.bag, self.evaluated)
 
     @functools.cached_property
     def raw_angles(self) -> Pairs:
@@ -123,6 +129,18 @@ class RecordedRun:
             at = np.searchsorted(ship['t'], run.t - 1e-9).clip(0, ship['t'].size - 1)
             quaternions = np.column_stack([ship[f'orientation.{axis}'][at] for axis in 'xyzw'])
         return directions.of_target(run.encoders, run.measured, quaternions)
+
+    @functools.cached_property
+    def pointing_errors(self) -> Table:
+        """Pointing error at the steps by column: `true`, target minus beam, where the recording holds the truth, and
+        `measured` by the receiver. Each in azimuth, in elevation, and in cross-elevation, which is the error of the
+        azimuth times cos(elevation). Raises ValueError like `evaluated`."""
+        run = self.evaluated
+        shrink = np.cos(run.encoders[:, 1])
+        parts = {'measured': run.measured} if self.no_truth else {'true': run.error, 'measured': run.measured}
+        return {'t [s]': run.t, 'stamp [ns]': np.round(run.t * 1e9).astype(np.int64) + self.bag.start, **{
+            f'{kind}.{axis} [rad]': values for kind, error in parts.items() for axis, values in (
+                ('azimuth', error[:, 0] / shrink), ('elevation', error[:, 1]), ('cross_elevation', error[:, 0]))}}
 
     @functools.cached_property
     def motors(self) -> Table | None:

@@ -6,6 +6,7 @@ tracking    tracking.Tracking
 motors      tracking.Tracking of a drive with motors, not of an array
 encoders    tracking.Tracking of a bag that holds the true direction of the dish beside the encoders
 filter      consistency.Consistency
+receiver    the same Tracking, of a recording without the true target
 keyholes    the slews through a keyhole, of tracking.keyholes
 isolation   isolation.Isolation
 attitude    known_attitude.KnownAttitude
@@ -74,6 +75,14 @@ RESULTS = (
     Result('pointing_loss_max_db', 'dB', 'tracking', lambda run: run.max_power_loss,
            'Largest loss of received power by the true pointing error, from the pattern of the beam, in settled '
            'autotrack.', 'largest loss of received power by the pointing error', brief=True),
+    Result('measured_pointing_rms_deg', 'deg', 'receiver',
+           lambda run: known_rms(run.measured[run.tracking]) * DEG_PER_RAD,
+           'Rms of the angle error that the receiver measured, both axes together, in settled autotrack of a run '
+           'without a true target.', 'pointing error that the receiver measured, rms', brief=True),
+    Result('measured_pointing_max_deg', 'deg', 'receiver',
+           lambda run: largest(run.measured[run.tracking]) * DEG_PER_RAD,
+           'Largest angle error that the receiver measured on either axis, in settled autotrack of a run without a '
+           'true target.', 'pointing error that the receiver measured, largest', brief=True),
     *itertools.chain.from_iterable(map(_of_mode, mode_pointing.FOLLOWED_DIRECTIONS)),
     Result('cross_elevation_rms_deg', 'deg', 'tracking', lambda run: run.pointing(known_rms, 0),
            'Rms of the true pointing error in cross-elevation, in settled autotrack.'),

@@ -175,7 +175,7 @@ class Tracking:
     def parts(self) -> dict[str, object]:
         """The parts by name for results.measured that the run provides, None for a missing part."""
         return {'motors': None if self.electronic else self, 'encoders': self if self.has_encoders else None,
-                'tracking': self}
+                'tracking': self, 'receiver': None if np.isfinite(self.target_earth).any() else self}
 
     @property
     def period(self) -> Seconds:
@@ -316,7 +316,7 @@ class Tracking:
         than half a beamwidth off; else NaN.
         """
         counted = self.since & self.trackable
-        if not (counted.any() and math.isfinite(self.beamwidth)):
+        if not (counted.any() and math.isfinite(self.beamwidth) and np.isfinite(self.distance).any()):
             return math.nan
         return float(np.sum(self.distance[counted] > 0.5 * self.beamwidth) * self.period)
 
@@ -360,9 +360,10 @@ def by_encoders(bag: Recording) -> bool:
     return not bag.beams and 'adu/truth' not in bag.topics
 
 
-def read(bag: Recording) -> Tracking:
-    """Return the Tracking of a recording of one beam. Raises ValueError without joint_states or target/truth."""
-    if missing := recordings.missing(bag, 'joint_states', 'target/truth'):
+def read(bag: Recording, needs_truth: bool = True) -> Tracking:
+    """Return the Tracking of a recording of one beam. Raises ValueError without joint_states or target/truth. Without
+    `needs_truth`, all errors against a missing target/truth are NaN."""
+    if missing := recordings.missing(bag, 'joint_states', *['target/truth'] * needs_truth):
         raise ValueError(f'{bag.path}: no {missing} in the bag, so no comparison with the truth is possible')
     joints = bag.table('joint_states')
     t = joints['t']

@@ -205,8 +205,10 @@ def _never_tracked(bag: Recording, run: Tracking, distance: Floats, near: Bools,
         return NOT_TRACKED, f'tracked 0 %: {lost}' + (f': {reason}' if reason else '')
     allowance = receiver.get('receiver.acquire_time', 0.0) + LOCK_ALLOWANCE_S
     level, needed = run.cn0[np.isfinite(run.cn0)], receiver.get('receiver.acquire_level_dbhz', math.nan)
-    best = (f'never locked: best level {level.max():.3g} dB-Hz, lock at {needed:.3g}'
-            if level.size else 'never locked: no level was recorded')
+    at = f', lock at {needed:.3g}' if math.isfinite(needed) else ''
+    best = 'never locked: ' + (f'best level {level.max():.3g} dB-Hz{at}' if level.size else 'no level was recorded')
+    if not np.isfinite(distance).any():     # the true target is unknown
+        return NOT_LOCKED, best
     if not run.trackable.any():
         return NOT_LOCKED, f'{best}: the target was {trackable.rest(bag, run.obstacle, run.period)}'
     if np.sum(near & run.trackable) * run.period >= allowance:

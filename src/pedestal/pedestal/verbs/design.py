@@ -31,6 +31,8 @@ SAMPLE_FILES = {
 }
 """{name of a file in the folder samples of this package: its content in a sentence}."""
 
+PLOT_SUFFIXES = '.png', '.svg', '.pdf'
+
 LOOP_REQUIREMENTS = {'speed_bandwidth': 'speed', 'position_bandwidth': 'position', 'phase_margin': 'phase_margin',
                      'gain_margin': 'gain_margin'}  # option: field
 
@@ -271,6 +273,54 @@ def _tune(options: argparse.Namespace) -> int:
     return 0
 
 
+def _add_filter(parser: argparse.ArgumentParser) -> None:
+    """The filter of the control unit, to the last bit, on the azimuths and elevations of a CSV file. The output has
+    angles, rates, their standard deviations and the NIS of each row. The azimuth has no wraps.
+
+    Example: pedestal filter angles.csv --sigma 0.03 --plot filtered.png
+    """
+    from acu_tracker.estimation.filters.kinds import FILTER_KINDS
+    parser.add_argument('file', type=pathlib.Path, help='CSV file with columns time, azimuth, elevation, and sigma or '
+                        'not; for example time_s,az_deg,el_deg')
+    parser.add_argument('--kind', choices=FILTER_KINDS, default='imm', help='kind of the filter; default: imm')
+    parser.add_argument('--sigma', type=float, metavar='DEG', help='standard deviation of a measured direction '
+                        'across the line of sight [deg]; default: the column sigma')
+    parser.add_argument('--gap', type=float, metavar='S', help='longest gap that the filter bridges [s]; after a '
+                        'longer one it starts again; default: 20 median steps, at least 1 s')
+    parser.add_argument('--output', type=pathlib.Path, metavar='FILE', help='output file; default: FILE-filtered.csv')
+    parser.add_argument('--plot', type=pathlib.Path, metavar='FILE', help='output picture of the angles, the rates '
+                        'and the NIS: .png, .svg or .pdf')
+
+
+def _filter(options: argparse.Namespace) -> int:
+    from pedestal import estimate
+    from pedestal_recording import export
+    output = options.output or options.file.with_name(f'{options.file.stem}-filtered.csv')
+    for name, path in (('--output', output), ('--plot', options.plot)):
+        arguments.check_new_file(name, path)
+    if options.plot and options.plot.suffix not in PLOT_SUFFIXES:
+        raise ValueError(f'--plot {options.plot}: must end with {", ".join(PLOT_SUFFIXES)}')
+    low, high = estimate.SIGMA_LIMITS_DEG
+    if options.sigma is not None and not low <= options.sigma <= high:
+        raise ValueError(f'--sigma {options.sigma:g}: must be {low:g} to {high:g} deg')
+    measured = estimate.read(options.file)
+    sigma = measured.sigma if options.sigma is None else options.sigma
+    if sigma is None:
+        raise ValueError(f'{options.file}: has no column sigma_deg; give --sigma DEG')
+    made = estimate.filter(measured.t, measured.azimuth, measured.elevation, options.kind, sigma=sigma,
+                           gap=options.gap)
+    headers = {column: f'{column} [{unit}]' if unit else column for column, unit in made.units.items()}
+    export.write_csv(output, {headers[column]: values.tolist() if column == 'outcome' else values
+                              for column, values in made.items()})
+    print(f'{measured.description}\n{made.verdict}')
+    for begin, end, bridged in made.gaps:
+        print(f'gap from {begin:.10g} to {end:.10g} s: ' + ('bridged' if bridged else 'the filter starts again'))
+    if options.plot:
+        made.plot().savefig(options.plot)
+    print(*filter(None, (output, options.plot)), sep='\n')
+    return 0
+
+
 def _add_bench(parser: argparse.ArgumentParser) -> None:
     """Prints a row for each measured speed. Other programs on the machine make the numbers worse.
 
@@ -301,5 +351,6 @@ VERBS = {
     'parameters': Verb(_add_parameters, _parameters),
     'study': Verb(_add_study, _study),
     'tune': Verb(_add_tune, _tune),
+    'filter': Verb(_add_filter, _filter),
     'bench': Verb(_add_bench, _bench),
 }

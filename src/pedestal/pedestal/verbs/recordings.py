@@ -1,11 +1,16 @@
 """Verbs for a recording: check, repair, repeat, show, export, recompute and replay it."""
 import argparse
+import contextlib
 import pathlib
 import sys
+import typing
 
 from pedestal import console
 from pedestal.verbs import arguments
 from pedestal.verbs.arguments import Verb
+
+if typing.TYPE_CHECKING:
+    from pedestal_common.quantities import Table
 
 DEFAULT_DEADLINE_S = 60.0  # longest wait of a replay for a subscriber or an answer [s]
 
@@ -117,12 +122,27 @@ def _export(options: argparse.Namespace) -> int:
         raise ValueError(f'--rate, --participants: need --format tdm, not {options.format}')
     from pedestal_recording.export import export
     for file, rows_or_reason, columns in export(options.bag, options.format, options.output, options.topics,
-                                                options.overwrite):
+                                                options.overwrite, None if options.topics else _pointing(options)):
         if file is None:     # a topic that cannot be exported
             print(f'pedestal: left out: {rows_or_reason}', file=sys.stderr)
         else:
             print(f'{file}  {rows_or_reason} rows, {columns} columns')
     return 0
+
+
+def _pointing(options: argparse.Namespace) -> 'dict[str, Table]':
+    """Return {name: table of the pointing errors} of each beam of a recording with steps."""
+    from pedestal_common.graph import nodes
+    from pedestal_recording import bag as bags
+    from pedestal_results.recorded_run import RecordedRun
+    bag = bags.read(options.bag)
+    found = {}
+    for prefix in nodes.prefixes(bag.beams):
+        run = RecordedRun(bag.view(prefix[:-1]))
+        with contextlib.suppress(KeyError, ValueError):     # a recording of other tools may lack a topic or a number
+            if not run.no_truth or run.receiver:
+                found[f'{prefix}pointing_error'] = run.pointing_errors
+    return found
 
 
 def _tracking_data(options: argparse.Namespace) -> int:
@@ -151,7 +171,8 @@ def _add_recompute(parser: argparse.ArgumentParser) -> None:
     acu/mode or adu/state that no recorded input explains is repeated as a request. The report states the number of the
     repeated commands. Changes of parameters during the run are not recorded. Diagnostics are not recomputed.
 
-    With --param the verb compares old with new results, and a difference is no failure. Because the recorded antenna
+    With --param the verb compares old with new results, and a difference is no failure. The first line states whether
+    the difference is significant: paired, with its interval. Because the recorded antenna
     does not follow the recomputed command, only two results are compared: the estimate against the recorded truth
     (error, noise, lag), and the noise of the command. The effect of a parameter on the pointing needs a new run.
     """
@@ -173,6 +194,7 @@ def _add_recompute(parser: argparse.ArgumentParser) -> None:
                         'value; default: 1e-9')
     parser.add_argument('--ignore', action='append', default=[], metavar='PATTERN',
                         help="topics or topic.field not to compare, for example 'acu/reference*'; may be repeated")
+    parser.add_argument('--fields', action='store_true', help='with --param: also the differences of every field')
     parser.add_argument('--allow-idle', action='store_true', help='accept a node that did nothing in the recording '
                         '(never locked, never in autotrack, never moved)')
     console.add_json(parser)
@@ -188,7 +210,7 @@ def _recompute(options: argparse.Namespace) -> int:
     console.check_json(options.json)
     if options.iq is not None:
         arguments.refuse_given(options, ('node', 'param', 'params_file', 'pacing', 'absolute', 'relative', 'ignore',
-                                         'allow_idle', 'explain', 'output'), 'has no effect with --iq')
+                                         'allow_idle', 'fields', 'explain', 'output'), 'has no effect with --iq')
         from pedestal_workbench.again import iq
         lines, rows, well = iq.main(options.bag, options.iq)
         print('\n'.join(lines))

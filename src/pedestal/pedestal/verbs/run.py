@@ -49,9 +49,12 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--drives', choices=('adu', 'simulated'), help='simulated: four simulated CiA 402 '
                         'servo drives on a CAN bus of this machine, and drive_node in place of the drive unit; needs '
                         '--pacing realtime; default: value of the scenario')
-    parser.add_argument('--receiver', choices=('simulated', 'simulated-iq'), help='simulated-iq: simulated I/Q '
-                        'samples by UDP on this machine, and monopulse_receiver_node in place of the simulated '
-                        'receiver; needs --pacing realtime; default: value of the scenario')
+    parser.add_argument('--receiver', metavar='PROGRAM', help='ROS 2 node of yours in place of the simulated '
+                        'receiver: FILE.py or PACKAGE/EXECUTABLE, in quotes with its arguments. simulated-iq: I/Q '
+                        'samples by UDP, and monopulse_receiver_node, in realtime; default: value of the scenario')
+    for name, place in (('ship', 'ship and its IMU'), ('ins', 'INS'), ('drive', 'drive, in realtime')):
+        parser.add_argument(f'--{name}', metavar='PROGRAM', help='ROS 2 node of yours, as for --receiver, in place of '
+                            f'the simulated {place}')
     from pedestal_bringup.graph.operator_servers import SERVER_ADDRESS, SERVERS, port
     for name, server in SERVERS.items():
         if server.port:
@@ -114,8 +117,10 @@ def _results(options: argparse.Namespace, chosen: 'Scenario', outcome: 'Outcome'
     # whole: results of the run, such as lost steps, in contrast to the results of each beam
     whole = results.measured({'run': outcome, 'supervised': outcome if chosen.header.pacing == 'realtime' else None})
     lost, steps = whole['lost_steps'][0], outcome.drive.get('steps')
-    for beam, found in zip(beams, verdicts):
+    for beam, run, found in zip(beams, runs, verdicts):
         print(f'{beam}: {found.text}' if beam else found.text)
+        if run.no_truth:
+            print(f'no comparison with the truth: {run.no_truth}')
     shown = [*of_beams[0], *whole] if options.all else results.brief([*of_beams, whole])
     printed = {**whole, 'lost_steps': (lost, f'of {steps}' if lost and steps else 'steps')}
     console.show_results(f'{chosen.name}: {chosen.header.title}', beams, [_some(values, shown) for values in of_beams],
@@ -171,9 +176,12 @@ def _some(values: dict[str, tuple[float, str]], names: Collection[str]) -> dict[
 
 def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     """Return the Scenario with the satellite, station and pass of the options; None after listing the passes."""
-    from pedestal_bringup.scenario import scenario
-    equipment = [f'scenario.{name}={value}' for name in ('drives', 'receiver')
-                 if (value := getattr(options, name)) is not None]
+    from pedestal_bringup.scenario import files, scenario
+    from pedestal_bringup.scenario.header import RECEIVERS
+    from pedestal_common.graph import nodes
+    given = {name: value for name in ('drives', *nodes.OWN_PLACES) if (value := getattr(options, name)) is not None}
+    equipment = [files.override(f'scenario.{name}' if name == 'drives' or value in RECEIVERS else
+                                f'scenario.own.{name}', value) for name, value in given.items()]
     changes = equipment + arguments.variant(options).overrides()
     arguments.check_elements(options)
     if options.tle is options.station is options.which is options.start is None:
@@ -185,7 +193,7 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     if options.which == 'list':
         from pedestal_bringup.graph import operator_servers
         arguments.refuse_given(options, ('bag', 'json', 'all', 'explain', 'duration', 'start', 'seed', 'pacing',
-                                         'drives', 'receiver', *operator_servers.SERVERS),
+                                         'drives', *nodes.OWN_PLACES, *operator_servers.SERVERS),
                                'has no effect with --pass list, which runs nothing')
         satellite.PassSelection(satellite.with_satellite(draft, changes, choice, now).draft, now).print_passes()
         return None

@@ -59,11 +59,11 @@ class Child:
     command   interpreter, '-m', module, arguments ...
     output    file descriptor of its log
     rehearse  function that a held copy calls to import the node and load its laws. Errors are ignored, because the
-              node meets the same error later and reports it.
+              node meets the same error later and reports it. None: the command is any program, never a copy
     """
 
-    def __init__(self, command: list[str], output: int, rehearse: Callable[[], object]) -> None:
-        copy = 'rclpy' not in sys.modules and threading.active_count() == 1
+    def __init__(self, command: list[str], output: int, rehearse: Callable[[], object] | None) -> None:
+        copy = rehearse is not None and 'rclpy' not in sys.modules and threading.active_count() == 1
         gate, self._begin = os.pipe()
         self.returncode: int | None = None
         parent = os.getpid()
@@ -176,7 +176,7 @@ def _as_interpreter(command: list[str], gate: int, _: object) -> NoReturn:
     os.execv(command[0], command)
 
 
-def _as_copy(command: list[str], gate: int, rehearse: Callable[[], object]) -> int:
+def _as_copy(command: list[str], gate: int, rehearse: Callable[[], object] | None) -> int:
     sys.stdout, sys.stderr = (open(descriptor, 'w', buffering, errors='backslashreplace', closefd=False)
                               for descriptor, buffering in ((1, -1), (2, 1)))
     module = command[2]
@@ -185,6 +185,7 @@ def _as_copy(command: list[str], gate: int, rehearse: Callable[[], object]) -> i
     sys.argv = [found.origin, *command[3:]]
     main = importlib.import_module(module).main
     with contextlib.suppress(Exception):
+        assert rehearse is not None
         rehearse()
     _wait(gate)
     return main()

@@ -60,9 +60,12 @@ def load_scenario(given: Mapping[str, str]) -> scenario.Scenario:
     from pedestal_common.node import middleware  # loads rclpy, which --show-args does not need
     namespace = middleware.namespace('namespace:=', given['namespace'])
     changes = scenario_files.file_overrides(given['params_file'], namespace) if given['params_file'] else ()
-    return scenario.load(given['scenario'], changes,
-                         _number(given, 'seed', int, 'a whole number'),
-                         _number(given, 'duration', float, 'a number of seconds'), given['pacing'] or None)
+    chosen = scenario.load(given['scenario'], changes,
+                           _number(given, 'seed', int, 'a whole number'),
+                           _number(given, 'duration', float, 'a number of seconds'), given['pacing'] or None)
+    for program in chosen.own.values():
+        raise ValueError(f'{program}: only `pedestal run` starts a program of the user in the place of a node')
+    return chosen
 
 
 def servers(given: Mapping[str, str],

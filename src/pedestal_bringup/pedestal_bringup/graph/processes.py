@@ -10,9 +10,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
+from pedestal_bringup.graph import own_programs
 from pedestal_bringup.graph.child import Child
 from pedestal_common.graph import nodes
 from pedestal_common.node import run
@@ -76,6 +77,10 @@ def _load_node(scenario: 'Scenario', node: str) -> None:
             unit.prepare()
 
 
+def _load_server(command: list[str]) -> None:
+    nodes.EXECUTABLES[command[3]].node_type()
+
+
 class Graph:
     """Processes of the nodes and servers of one run, with their logs, as a context.
 
@@ -85,7 +90,7 @@ class Graph:
 
     The folder BAG.log beside the bag holds NODE.log for each process, parameters.yaml, and NODE.state with the last
     angles of a drive. Those of an earlier run of the same name are deleted. Raises RuntimeError if the folder cannot
-    be written.
+    be written, ValueError for a missing program of the user.
     """
     log: pathlib.Path
 
@@ -97,6 +102,7 @@ class Graph:
         self.bag = pathlib.Path(bag)
         self.log = log_folder(bag)
         self.file = self.log / 'parameters.yaml'
+        self._own = {node: own_programs.command(program, node, self.file) for node, program in scenario.own.items()}
         self.processes: dict[str, Child] = {}
         self._begun: set[str] = set()
         self._log_starts: dict[str, int] = {}
@@ -172,6 +178,7 @@ class Graph:
         self.processes[node].begin()
 
     def _hold(self, node: str) -> None:
+        rehearse: Callable[[], object] | None
         with open(self._log_of(node), 'ab') as output:
             self._log_starts[node] = size = output.seek(0, os.SEEK_END)
             _libc.fallocate(output.fileno(), FALLOC_FL_KEEP_SIZE, ctypes.c_long(size),
@@ -181,8 +188,9 @@ class Graph:
                 self._unannounced.add(node)
                 command = self.servers[node].command
 
-                def rehearse() -> object:
-                    return nodes.EXECUTABLES[command[3]].node_type()
+                rehearse = functools.partial(_load_server, command)
+            elif node in self.scenario.own:
+                command, rehearse = self._own[node], None
             else:
                 command = command_line(node, self.scenario.row(node).executable, self.file)
                 rehearse = functools.partial(_load_node, self.scenario, node)
@@ -197,30 +205,31 @@ class Graph:
         self.processes[node].wait()
 
     def stop(self) -> bool:
-        """Stop the processes that still run, and return True if every process has ended with exit code 0. The recorder
-        ends last. In realtime the drive ends first, so that it stops its axes while the other nodes are still present.
-        """
+        """Stop the processes that still run, and return True if every process has ended with exit code 0, except the
+        programs of the user, whose codes may be any. The recorder ends last. In realtime the drive ends first, so that
+        it stops its axes while the other nodes are still present."""
         first = [nodes.DRIVE_NODE] if self.scenario.header.pacing == 'realtime' else []
         others = [node for node in self.processes if node not in (*first, 'recorder')]
         with uninterrupted():
             return not any([code for group in (first, others, ['recorder']) for code in self._stop(group)])
 
     def _stop(self, names: Iterable[str]) -> list[int]:
-        """Stop processes together, and return their exit codes; kill one that ignores SIGTERM for NODE_STOP_TIMEOUT_S.
-        """
-        processes = [self.processes[node] for node in names if node in self.processes]
-        for process in processes:
+        """Stop processes together, and return the exit codes of the nodes; kill one that ignores SIGTERM for
+        NODE_STOP_TIMEOUT_S."""
+        processes = {node: self.processes[node] for node in names if node in self.processes}
+        for process in processes.values():
             if process.poll() is None:
                 process.send_signal(signal.SIGTERM)
                 # A suspended process acts on SIGTERM only after SIGCONT.
                 process.send_signal(signal.SIGCONT)
         deadline = time.monotonic() + NODE_STOP_TIMEOUT_S
-        for process in processes:
+        for process in processes.values():
             try:
                 process.wait(max(deadline - time.monotonic(), 0.0))
             except subprocess.TimeoutExpired:
                 process.kill()
-        return [process.wait() for process in processes]
+        codes = {node: process.wait() for node, process in processes.items()}
+        return [code for node, code in codes.items() if node not in self.scenario.own]
 
     def _log_of(self, node: str) -> pathlib.Path:
         return self.log / f'{node.replace("/", ".")}.log'

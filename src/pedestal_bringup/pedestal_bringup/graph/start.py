@@ -42,22 +42,25 @@ def begins(scenario: Scenario) -> Nanoseconds:
 
 
 def parameters_of_all(scenario: Scenario, bag: pathlib.Path, start: Nanoseconds,
-                      changes: Mapping[str, Mapping[str, object]] | None = None) -> str:
+                      changes: Mapping[str, Mapping[str, object]] | None = None, own: str = '') -> str:
     """Return the text of the ROS 2 parameter file of a run: the values of a scenario for each node, and the parameters
     `graph.` that all share.
 
-    changes: {node: {name: value}} that the scenario does not contain.
+    changes: {node: {name: value}} that the scenario does not contain; own: graph.own. A program of the user gets only
+    the parameters `graph.`.
     """
     names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
     shared = {'graph.pacing': scenario.header.pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
               'graph.deadline': scenario.header.deadline, 'graph.start': start,
               'graph.priority': scenario.header.priority, 'graph.scenario': scenario.name, 'graph.simulated': True}
+    shared |= {'graph.own': own} if own else {}
     # The operator runs in this process and reads no parameter file.
-    sections = {node: {**scenario.given(node), **shared} for node in scenario.nodes if node != 'operator'}
+    sections = {node: {**({} if node in scenario.own else scenario.given(node)), **shared}
+                for node in scenario.nodes if node != 'operator'}
     for node, values in (changes or {}).items():
         sections[node].update(values)
     sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))
     # In realtime a drive that is started again continues at its last angles; an array has no angles to keep.
-    if start and not scenario.header.beam:
+    if start and not scenario.header.beam and nodes.DRIVE_NODE not in scenario.own:
         sections[nodes.DRIVE_NODE].setdefault('state_file', str(log_folder(bag) / f'{nodes.DRIVE_NODE}.state'))
     return parameter_file.text(sections)

@@ -21,6 +21,7 @@ from pedestal_recording.verify import count
 
 RESTART_CUTOFF_S = 0.5  # time before the end of a run within which a dead node is not started again [s]
 SHUTDOWN_GRACE_S = 20.0  # grace period of the drive after the end of the run [s]
+OWN_DRIVE_GRACE_S = 1.0  # time after the end of the run in which a drive of the user makes its last step [s]
 
 MAX_SILENCE_S = 5.0
 """Time without diagnostics after which a node is reported as silent [s]. A node publishes diagnostics every second."""
@@ -32,7 +33,7 @@ def prepare(scenario: Scenario) -> None:
     Raises RuntimeError.
     """
     units = {nodes.plain(node): node for node in scenario.nodes
-             if scenario.row(node).unit and not is_compiled(scenario.unit(node))}
+             if node not in scenario.own and scenario.row(node).unit and not is_compiled(scenario.unit(node))}
     processes = {node: subprocess.Popen([sys.executable, '-m', 'pedestal_bringup.loop.prepare', node, scenario.name],
                                         stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                         start_new_session=True) for node in units.values()}
@@ -85,11 +86,13 @@ class Supervisor:
 
     def _is_running(self) -> bool:
         """Return True until the drive has ended at the end of the run, at the latest SHUTDOWN_GRACE_S after it. A
-        drive that is dead shortly before the end is not started again, and also ends the run."""
+        drive that is dead shortly before the end is not started again, and also ends the run. A drive of the user does
+        not end by itself."""
+        grace = OWN_DRIVE_GRACE_S if nodes.DRIVE_NODE in self._graph.scenario.own else SHUTDOWN_GRACE_S
         now, drive_runs = time.time_ns(), self._graph.processes[nodes.DRIVE_NODE].poll() is None
         if now < self._end:
             return drive_runs or not self._is_nearly_over()
-        return drive_runs and now < self._end + SHUTDOWN_GRACE_S * NS_PER_SECOND
+        return drive_runs and now < self._end + grace * NS_PER_SECOND
 
     def _is_nearly_over(self) -> bool:
         return time.time_ns() > self._end - RESTART_CUTOFF_S * NS_PER_SECOND

@@ -12,7 +12,7 @@ from typing import TypeAlias
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.utilities import try_shutdown
 
-from pedestal_bringup.graph import lockstep, supervisor
+from pedestal_bringup.graph import lockstep, own_programs, supervisor
 from pedestal_bringup.graph.operator_node import Operator
 from pedestal_bringup.graph.processes import Graph, exit_description
 from pedestal_bringup.graph.start import LATEST_START_S, START_LEAD_TIME_S, Outcome, begins, parameters_of_all
@@ -39,8 +39,14 @@ def run(graph: Graph, tracks: Mapping[str, Message], progress: Callable[[Seconds
         operator = Operator(graph.scenario.header.graph_beams, graph.scenario.nodes)
         try:
             operator.check_domain_free()
+            own = ''
+            if graph.scenario.own:
+                graph.begin(parameters_of_all(graph.scenario, graph.bag, 0), graph.scenario.own)
+                own = own_programs.begin(graph, operator)
             realtime = graph.scenario.header.pacing == 'realtime'
-            return (_in_realtime if realtime else _in_lockstep)(graph, operator, tracks, progress)
+            return (_in_realtime if realtime else _in_lockstep)(graph, operator, tracks, progress, own)
+        except KeyboardInterrupt:
+            return Outcome({}, {}, stopped=True)
         finally:
             operator.destroy_node()
     finally:
@@ -48,8 +54,8 @@ def run(graph: Graph, tracks: Mapping[str, Message], progress: Callable[[Seconds
 
 
 def _in_lockstep(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
-                 progress: Callable[[Seconds], object]) -> Outcome:
-    graph.begin(parameters_of_all(graph.scenario, graph.bag, 0))
+                 progress: Callable[[Seconds], object], own: str) -> Outcome:
+    graph.begin(parameters_of_all(graph.scenario, graph.bag, 0, own=own))
     try:
         lockstep.watch(graph, operator, tracks, progress)
     except KeyboardInterrupt:
@@ -59,17 +65,14 @@ def _in_lockstep(graph: Graph, operator: Operator, tracks: Mapping[str, Message]
 
 
 def _in_realtime(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
-                 progress: Callable[[Seconds], object]) -> Outcome:
+                 progress: Callable[[Seconds], object], own: str) -> Outcome:
     supervisor.prepare(graph.scenario)
     start, changes = begins(graph.scenario), _addresses(graph.scenario)
     if graph.scenario.header.simulated_parts:
-        try:
-            start = _equipment_begun(graph, operator, changes)
-        except KeyboardInterrupt:
-            return Outcome({}, {}, stopped=True)
+        start = _equipment_begun(graph, operator, changes, own)
     for track in tracks.values():
         messages.put_stamp(track.header.stamp, start)
-    graph.begin(parameters_of_all(graph.scenario, graph.bag, start, changes))
+    graph.begin(parameters_of_all(graph.scenario, graph.bag, start, changes, own))
     supervised = supervisor.Supervisor(graph, operator, start)
     try:
         supervised.watch(tracks, progress)
@@ -110,7 +113,7 @@ ANSWER_PARAMETERS = {
 """{simulated equipment: parameters with which its node chooses time 0 at the answer of the equipment}."""
 
 
-def _equipment_begun(graph: Graph, operator: Operator, changes: Changes) -> Nanoseconds:
+def _equipment_begun(graph: Graph, operator: Operator, changes: Changes, own: str) -> Nanoseconds:
     """Let simulated equipment and its node begin, and return graph.start, which its node chooses at the answer of the
     equipment. If several are simulated, time 0 follows the answer of the drives. Raises RuntimeError."""
     part = graph.scenario.header.simulated_parts[0]
@@ -118,7 +121,7 @@ def _equipment_begun(graph: Graph, operator: Operator, changes: Changes) -> Nano
     provisional = time.time_ns() + round((LATEST_START_S + START_LEAD_TIME_S) * NS_PER_SECOND)
     waiting = {node: {**values, **(ANSWER_PARAMETERS[part] if node in (chooser, part) else {})}
                for node, values in changes.items()}
-    graph.begin(parameters_of_all(graph.scenario, graph.bag, provisional, waiting), (chooser, part))
+    graph.begin(parameters_of_all(graph.scenario, graph.bag, provisional, waiting, own), (chooser, part))
     executor = SingleThreadedExecutor()
     executor.add_node(operator)
     # A drive node ends by itself after LATEST_START_S, with an error that names the drives.

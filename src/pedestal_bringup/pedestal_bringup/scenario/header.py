@@ -1,5 +1,6 @@
 """Header of a scenario: its section `scenario`, the parameters that belong to no single node."""
 import dataclasses
+import shlex
 
 from pedestal_bringup.scenario.link import DishParameters, LinkParameters
 from pedestal_common import parameters
@@ -23,6 +24,8 @@ class ProgramParameters(parameters.Parameters):
     light_time: bool = parameters.flag(False, 'travel time of the wave is part of the prediction')
 
 
+RECEIVERS = 'simulated', 'simulated-iq'     # the simulated receivers
+
 PROGRAM_ERRORS = {'program.time_offset': 's', 'program.azimuth_offset': 'rad', 'program.elevation_offset': 'rad'}
 
 
@@ -37,6 +40,28 @@ class RestartParameters(parameters.Parameters):
                                         'first restart has none')
     silence: float = parameters.parameter(30.0, 0.0, 3600.0, 's', 'time without diagnostics after which a node is '
                                           'killed and started again; 0: never')
+
+
+@dataclasses.dataclass(frozen=True)
+class OwnParameters(parameters.Parameters):
+    """Parameters that name programs of the user, ROS 2 nodes which `pedestal run` starts in the place of its own."""
+    receiver: str = parameters.text('', 'program in the place of the receiver: FILE.py or PACKAGE/EXECUTABLE, and its '
+                                    'arguments')
+    ship: str = parameters.text('', 'program in the place of the ship and its IMU, likewise')
+    ins: str = parameters.text('', 'program in the place of the INS, likewise')
+    drive: str = parameters.text('', 'program in the place of the drive, likewise; it sets the time, and needs '
+                                 'pacing = realtime')
+
+    def check(self) -> None:
+        """Raise ParameterError for a text that names no program."""
+        for option, program in parameters.as_dict(self).items():
+            try:
+                file = (shlex.split(program) or [''])[0]
+            except ValueError as error:
+                raise parameters.ParameterError(f'{option} = {program!r}: {error}') from None
+            if program and not file.endswith('.py') and file.count('/') != 1:
+                raise parameters.ParameterError(f'{option} = {program!r}: must begin with FILE.py or '
+                                                'PACKAGE/EXECUTABLE')
 
 
 def _of_graph(name: str) -> Value:
@@ -57,7 +82,7 @@ class ScenarioParameters(parameters.Parameters):
     beam: bool = parameters.flag(False, 'the drive is an electronically steered array: beam_steering_node')
     drives: str = parameters.choice('adu', ('adu', 'simulated'), 'adu: the drive unit with its simulated mechanics; '
                                     'simulated: drive_node with four simulated CiA 402 drives on a CAN bus')
-    receiver: str = parameters.choice('simulated', ('simulated', 'simulated-iq'), 'simulated: the receiver with its '
+    receiver: str = parameters.choice('simulated', RECEIVERS, 'simulated: the receiver with its '
                                       'simulated target; simulated-iq: monopulse_receiver_node with simulated I/Q '
                                       'samples')
     beams: int = parameters.parameter(1, 1, nodes.MAX_BEAMS, '', 'number of beams of the array; with several beams, '
@@ -68,15 +93,25 @@ class ScenarioParameters(parameters.Parameters):
     dish: DishParameters = parameters.group(DishParameters)
     link: LinkParameters = parameters.group(LinkParameters)
     restart: RestartParameters = parameters.group(RestartParameters)
+    own: OwnParameters = parameters.group(OwnParameters)
 
     def check(self) -> None:
-        """Raise ParameterError for several beams of a drive with motors, and for servo drives or I/Q of an array."""
+        """Raise ParameterError for several beams of a drive with motors, for servo drives or I/Q of an array, and for
+        a program of the user that does not fit the graph."""
         if self.servo and self.beam:
             raise parameters.ParameterError(f'drives = {self.drives}: must be adu with beam = true')
         if self.iq and self.beam:
             raise parameters.ParameterError(f'receiver = {self.receiver}: must be simulated with beam = true')
         if self.beams > 1 and not self.beam:
             raise parameters.ParameterError(f'beams = {self.beams}: must be 1 unless beam = true')
+        own = self.own
+        for option, fits, needed in (
+                ('ship', self.ship, 'ship = true'), ('ins', self.ship, 'ship = true'),
+                ('receiver', not self.iq, 'receiver = simulated'), ('receiver', self.beams == 1, 'beams = 1'),
+                ('drive', not self.servo, 'drives = adu'), ('drive', not self.beam, 'beam = false'),
+                ('drive', self.pacing == 'realtime', 'pacing = realtime, because a drive of the user sets the time')):
+            if getattr(own, option) and not fits:
+                raise parameters.ParameterError(f'own.{option} = {getattr(own, option)}: needs {needed}')
 
     @property
     def servo(self) -> bool:
@@ -92,6 +127,12 @@ class ScenarioParameters(parameters.Parameters):
     def simulated_parts(self) -> tuple[str, ...]:
         """Nodes that simulate a part of the equipment for a node that is made for real equipment."""
         return ((nodes.SIMULATED_DRIVES.name,) if self.servo else ()) + ((nodes.SIMULATED_IQ.name,) if self.iq else ())
+
+    @property
+    def own_programs(self) -> dict[str, str]:
+        """{node: program of the user in its place, with its arguments}."""
+        return {nodes.OWN_PLACES[option]: program for option, program in parameters.as_dict(self.own).items()
+                if program}
 
     @property
     def graph_beams(self) -> int:

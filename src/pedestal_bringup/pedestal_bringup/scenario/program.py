@@ -94,7 +94,9 @@ class Plan:
         stations = [self.scenario.node_parameters(f'{prefix}acu').prediction.station
                     for prefix in self.scenario.prefixes]
         lines = [*(f'antenna at {station.text}' for station in stations), *self.scenario.notes, *self.ship_summary]
-        for prefix, built in self.targets.items():
+        # The target of a receiver of the user is its own, unless the scenario predicts it.
+        unseen = 'tracking_receiver' in self.scenario.own and self.scenario.header.program.source == 'none'
+        for prefix, built in ({} if unseen else self.targets).items():
             lines += [*built.summary, *_sky(built, self._parameters(prefix).kind, self.scenario.header.duration,
                                             self._mask(prefix)),
                       *_link(built, self.scenario.node_parameters(f'{prefix}tracking_receiver'),

@@ -135,8 +135,10 @@ class _Rules:
         """Share the flags of the optional topics that exist. A flag that the scenario itself sets is checked too."""
         sections = self.sections
         for owner, key, flag in MEASUREMENT_FLAGS:
+            # A program of the user measures only what the scenario states.
             measured = ((self.header.ship or not nodes.row(owner).optional)
-                        and self.value_of(owner, key, False))
+                        and (sections[owner].get(key, False) if owner in self.header.own_programs else
+                             self.value_of(owner, key, False)))
             for node in ('acu', 'recorder'):
                 if measured or any(flag in values for section, values in sections.items()
                                    if nodes.plain(section) == node):

@@ -60,6 +60,11 @@ class Scenario:
                               self.header.graph_beams)
 
     @property
+    def own(self) -> dict[str, str]:
+        """{node: program of the user in its place}."""
+        return self.header.own_programs
+
+    @property
     def prefixes(self) -> tuple[str, ...]:
         """Prefix of the names of each beam's nodes, ('beam_1/', 'beam_2/', ...); ('',) for a single beam."""
         return nodes.prefixes(self.header.graph_beams)
@@ -77,7 +82,11 @@ class Scenario:
         return built(self.row(node).parameters_type(), parameters.without_ros(self.given(node)))
 
     def unit(self, node: str, parameters: parameters.Parameters | None = None) -> 'Unit':
-        """Return the unit of one of its nodes. parameters: parameter dataclass in place of that of the scenario."""
+        """Return the unit of one of its nodes. parameters: parameter dataclass in place of that of the scenario.
+        Raises ScenarioError for a program of the user."""
+        if node in self.own:
+            raise ScenarioError(f'scenario {self.name}: {self.own[node]} in the place of {node}: only `pedestal run` '
+                                'starts a program of the user')
         row, chosen = self.row(node), parameters or self.node_parameters(node)
         flags = [flag for flag in topics.TOPIC_FLAGS if getattr(chosen, flag, False)]
         return row.unit_type()(chosen, nodes.reads(row, self.nodes, flags))

@@ -17,6 +17,25 @@ MAX_DOMAIN = 232  # largest domain of DDS
 
 _SOCKET_NAME = 'pedestal-domain-'
 
+DDS_PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
+"""{ROS_AUTOMATIC_DISCOVERY_RANGE: the DDS profile for it}."""
+
+
+def set_defaults() -> None:
+    """Set the DDS profile of this process and its children by ROS_AUTOMATIC_DISCOVERY_RANGE, unless the user names a
+    profile.
+
+    Not set, or LOCALHOST: the graph stays on the loopback of this machine. rclpy then gets SYSTEM_DEFAULT, because
+    under LOCALHOST rmw_fastrtps opens transports of its own on every interface. SUBNET: the graph may spread over
+    several hosts, by UDP.
+    """
+    scope = os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    if scope in DDS_PROFILES:
+        profile = str(pathlib.Path(__file__).parents[1] / DDS_PROFILES[scope])
+        chosen = os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', profile)
+        if (scope, chosen) == ('LOCALHOST', profile):
+            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SYSTEM_DEFAULT'
+
 
 def another_graph(domain_id: int) -> GraphError:
     """Return the GraphError of a ROS domain on which another graph runs."""
@@ -29,8 +48,10 @@ def of_run() -> Iterator[int]:
     children.
 
     This is the domain of the user, else the first free one; a line on stdout names a domain other than the default.
-    Raises GraphError if another run holds the domain, ValueError for a domain that is no number of DDS.
+    Raises GraphError if another run holds the domain, ValueError for a domain that is no number of DDS. The DDS
+    profile is also set here, because the programs of the user do not set it.
     """
+    set_defaults()
     before = os.environ.get(VARIABLE)
     with _reserved(before) as domain_id:
         os.environ[VARIABLE] = str(domain_id)

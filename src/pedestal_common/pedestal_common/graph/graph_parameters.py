@@ -39,11 +39,17 @@ class GraphParameters(parameters.Parameters):
                                          'the system allows it, one more for the drive; 0: the default scheduling')
 
     scenario: str = parameters.text('', 'name of the scenario of the run; empty: a graph started by hand')
+    own: str = parameters.text('', 'programs of the user in the place of nodes, which `pedestal run` has found: JSON '
+                               '{node: [topics that it reads, topics that it publishes]}')
     simulated: bool = parameters.flag(False, 'simulated antenna, as in `pedestal run`; false: in realtime each node '
                                       'names at its start the values for an antenna that are not given')
 
     def check(self) -> None:
-        """Raise ParameterError for a name in `nodes` that is no node."""
+        """Raise ParameterError for a name in `nodes` that is no node, or an invalid `own`."""
+        try:
+            nodes.own_rows(self.own)
+        except ValueError as error:
+            raise parameters.ParameterError(str(error)) from None
         known = (*nodes.NODE_NAMES, *nodes.SIMULATED_PARTS)
         for name in self._names:
             if name not in known:

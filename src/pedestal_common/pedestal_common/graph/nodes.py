@@ -5,6 +5,7 @@ In an electronic array of several beams the nodes `of_beam` and their topics exi
 """
 import functools
 import importlib
+import json
 import re
 import typing
 from collections.abc import Callable, Collection, Iterable
@@ -274,6 +275,26 @@ def row(name: str, array: bool = False, servo: bool = False, iq: bool = False) -
     return NODES[NODE_NAMES.index(plain(name))]
 
 
+OWN_PLACES = {'receiver': 'tracking_receiver', 'ship': 'ship_motion', 'ins': 'ins', 'drive': DRIVE_NODE}
+"""{name of an option of `pedestal run`: node in whose place it starts a program of the user}."""
+
+
+@functools.cache
+def own_rows(text: str) -> dict[str, Node]:
+    """Return {name: Node} of the programs of the user in a graph. text: parameter graph.own, JSON {node: [topics that
+    it reads, topics that it publishes]}, '' for none. Raises ValueError."""
+    try:
+        found = {name: Node(name, reads=tuple(reads), writes=tuple(writes))
+                 for name, (reads, writes) in json.loads(text or '{}').items()}
+    except (AttributeError, TypeError, ValueError):
+        raise ValueError(f'own = {text:.60}: must be JSON {{node: [topics read, topics published]}}') from None
+    for name, node in found.items():
+        for wrong in ([name] if name not in OWN_PLACES.values() else
+                      [topic for topic in (*node.reads, *node.writes) if topic not in TOPIC_BY_NAME]):
+            raise ValueError(f'own = {text:.60}: {wrong!r:.60}: is no such node or topic of a graph')
+    return found
+
+
 def beam_of(name: str) -> str:
     """Return the beam in the name of a node or topic, 'beam_2' for 'beam_2/acu'; '' for a name without a beam."""
     match = re.match(r'beam_[1-9]\d*(?=/)', name)
@@ -306,10 +327,11 @@ class Link(typing.NamedTuple):
 
 
 @functools.cache
-def links(beams: int = 0, servo: bool = False, iq: bool = False) -> dict[str, Link]:
+def links(beams: int = 0, servo: bool = False, iq: bool = False, own: str = '') -> dict[str, Link]:
     """Return {name: Link} of a graph, in the order of TOPICS. beams: of an electronic array, 0 for a drive with
-    motors; servo, iq: as in `row`, simulated."""
-    rows = [row(node.name, beams > 0, servo, iq) for node in NODES] + [SIMULATED_DRIVES] * servo + [SIMULATED_IQ] * iq
+    motors; servo, iq: as in `row`, simulated; own: as in `own_rows`."""
+    rows = [own_rows(own).get(node.name) or row(node.name, beams > 0, servo, iq) for node in NODES]
+    rows += [SIMULATED_DRIVES] * servo + [SIMULATED_IQ] * iq
     links = {}
     for topic in TOPICS:
         writers = [node.name for node in rows if topic.name in (*node.writes, node.replies)
@@ -325,15 +347,15 @@ def links(beams: int = 0, servo: bool = False, iq: bool = False) -> dict[str, Li
     return links
 
 
-def links_of(names: Collection[str], beams: int = 0) -> dict[str, Link]:
+def links_of(names: Collection[str], beams: int = 0, own: str = '') -> dict[str, Link]:
     """Return {name: Link} of a graph of these nodes, see `links`."""
-    return links(beams, SIMULATED_DRIVES.name in names, SIMULATED_IQ.name in names)
+    return links(beams, SIMULATED_DRIVES.name in names, SIMULATED_IQ.name in names, own)
 
 
-def recorded(names: Collection[str], flags: Collection[str] = (), beams: int = 0) -> list[Link]:
+def recorded(names: Collection[str], flags: Collection[str] = (), beams: int = 0, own: str = '') -> list[Link]:
     """Return the Links that have a publisher in a graph of these nodes, or to which any client may publish. flags:
-    those of topics.TOPIC_FLAGS that are set."""
-    return [link for link in links_of(names, beams).values()
+    those of topics.TOPIC_FLAGS that are set; own: as in `own_rows`."""
+    return [link for link in links_of(names, beams, own).values()
             if any(name in names for name in (link.readers if link.rate in REALTIME_RATES else link.writers))
             and (not link.flag or link.flag in flags)]
 
@@ -348,16 +370,17 @@ def readers(link: Link, names: Iterable[str]) -> list[str]:
     return [name for name in names if name in link.readers or name == 'recorder']
 
 
-def reads(node: Node, names: Iterable[str], flags: Collection[str] = ()) -> tuple[str, ...]:
+def reads(node: Node, names: Iterable[str], flags: Collection[str] = (), own: str = '') -> tuple[str, ...]:
     """Return the topics that a Node subscribes to in a graph of these nodes, its trigger first.
 
     A node that is not in the graph may be real equipment, so its topics are included. Excluded are the topics of an
-    optional node that is not among the names, and topics whose flag is not set.
+    optional node that is not among the names, and topics whose flag is not set. Of a program of the user (`own_rows`),
+    only the topics that it publishes are included.
     """
     plain_names = {plain(name) for name in names}
 
     def is_read(topic: str) -> bool:
-        writers = [other for other in NODES if topic in other.writes]
+        writers = [other for other in NODES if topic in own_rows(own).get(other.name, other).writes]
         absent = all(other.optional and other.name not in plain_names for other in writers)
         flag = TOPIC_BY_NAME[topic].flag
         return topic == node.reads[0] or not absent and (not flag or flag in flags)

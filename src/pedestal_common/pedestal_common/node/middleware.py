@@ -2,7 +2,6 @@
 import contextlib
 import importlib
 import os
-import pathlib
 import re
 import sys
 from collections.abc import Mapping, Sequence
@@ -17,13 +16,10 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_namespace import validate_namespace
 
-from pedestal_common.graph import topics
+from pedestal_common.graph import domain, topics
 from pedestal_common.quantities import Value
 from pedestal_common.text_files import parameter_file, plain_yaml
 from pedestal_common.text_files.files import FilePath
-
-DDS_PROFILES = {'LOCALHOST': 'fastdds.xml', 'SUBNET': 'fastdds_subnet.xml'}
-"""{ROS_AUTOMATIC_DISCOVERY_RANGE: the DDS profile for it}."""
 
 
 def qos(rate: str, role: str = 'lockstep') -> QoSProfile:
@@ -52,26 +48,10 @@ def namespace(option: str, name: str) -> str:
     return place
 
 
-def set_defaults() -> None:
-    """Set the DDS profile of this process and its children by ROS_AUTOMATIC_DISCOVERY_RANGE, unless the user names a
-    profile.
-
-    Not set, or LOCALHOST: the graph stays on the loopback of this machine. rclpy then gets SYSTEM_DEFAULT, because
-    under LOCALHOST rmw_fastrtps opens transports of its own on every interface. SUBNET: the graph may spread over
-    several hosts, by UDP.
-    """
-    scope = os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    if scope in DDS_PROFILES:
-        profile = str(pathlib.Path(__file__).parents[1] / DDS_PROFILES[scope])
-        chosen = os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', profile)
-        if (scope, chosen) == ('LOCALHOST', profile):
-            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SYSTEM_DEFAULT'
-
-
 def initialise(args: Sequence[str] | None = None) -> None:
     """Initialise rclpy and DDS in this process; signals are left to the caller. Logs go to stderr only, which needs
     neither a home nor a disk. Raises ValueError for arguments that rcl refuses."""
-    set_defaults()
+    domain.set_defaults()
     given = list(sys.argv if args is None else args)
     stated = _stated(given)
     for place in parameter_files(given):

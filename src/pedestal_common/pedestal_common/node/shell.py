@@ -50,6 +50,10 @@ from pedestal_common.wire import messages
 START_DEADLINE_S = 300.0
 """Longest time that a node waits for its graph, whose other nodes may compile their laws for the first time [s]."""
 
+OWN_MATCHING_TIME_S = 2.0
+"""Time before the first step of a lockstep run with a program of the user, in which DDS connects its publishers to the
+other nodes [s]. Such a program does not wait for its subscribers, and its first message would be lost."""
+
 ACKNOWLEDGE_TIMEOUT_S = 1.0  # longest time that a node waits at its end for the acknowledgement of its messages [s]
 TIMEX_BYTES, TIME_ERROR = 256, 5  # at least the size of struct timex; result of adjtimex for an unsynchronised clock
 EXIT_DELAY_S = 0.1  # time for which a process stays after its publishers and subscribers have left the graph [s]
@@ -142,7 +146,7 @@ class Shell(Node):
         super().__init__(name)
         self._parameters_type = parameters_type
         self._declare(live)
-        self.links = nodes.links_of(self.graph.members, self.graph.beams)
+        self.links = nodes.links_of(self.graph.members, self.graph.beams, self.graph.own)
         self._root, self.beam = self._place(name)
         self.name = self.beam + name
         self.finished = False       # True ends the node in `main`
@@ -384,6 +388,8 @@ class Shell(Node):
                 if _stop:
                     raise Stopped
                 time.sleep(0.01)
+        if self.graph.own and self.name == nodes.DRIVE_NODE:
+            time.sleep(OWN_MATCHING_TIME_S)
         for link, publisher in self.publishers_by_link.items():
             if len(link.writers) == 1 and self.count_publishers(publisher.topic_name) > 1:
                 raise GraphError(f'{link.name} already has a publisher: another graph runs on ROS_DOMAIN_ID '

@@ -131,7 +131,7 @@ class UnitNode(shell.Shell):
         self.row, unit_type = row, row.unit_type()
         super().__init__(self.row.name, self.row.parameters_type(), unit_type.LIVE)
         flags = [flag for flag in topics.TOPIC_FLAGS if getattr(self.parameters, flag, False)]
-        reads = nodes.reads(self.row, self.graph.members, flags)
+        reads = nodes.reads(self.row, self.graph.members, flags, self.graph.own)
         prefixes = nodes.prefixes(self.graph.beams) if serves_beams else ('',)
         self.ports: list[Port] = []
         for prefix in prefixes:
@@ -297,6 +297,8 @@ class UnitNode(shell.Shell):
         steps = self.steps
 
         def take(message: records.Decoded, after_gap: bool) -> None:
+            if message[0] < self.graph.start:     # equipment that runs before the run
+                return
             if message[0] <= self._stamp:
                 self._look_for_replay()
             if after_gap:

@@ -142,6 +142,9 @@ def _results(bag: bags.Bag, run: RecordedRun, check: Report) -> list[str]:
         parts.append(f'<p class="bad">No comparison with the truth: {html.escape(run.no_truth)}.</p>')
         if run.motors:
             parts.append(TextTable(('', 'azimuth', 'elevation', ''), _torques(run)).html('n'))
+        if bag.own:
+            rows = _labelled(run.parts, 'measured_pointing_rms_deg', 'measured_pointing_max_deg', 'lock_time_s',
+                             'autotrack_time_s', 'evaluated_time_s')
     else:
         known = run.tracking.parts
         if tracking.by_encoders(bag):
@@ -274,7 +277,7 @@ def _page(bag: bags.Bag, run: RecordedRun, check: Report, author: str) -> str:
     scenario = bag.metadata.get('scenario', '')
     name = (scenario or bag.file.stem) + f'/{bag.beam}'.rstrip('/')
     of_paper = scenario in PAPER_SCENARIOS
-    found = None if run.no_truth else run.verdict
+    found = None if run.no_truth and not bag.own else run.verdict
     paper = ('"The paper" is the one on antenna tracking with a Kalman filter and a dual-motor anti-backlash drive; '
              'its figures are from a UAV experiment. ') if of_paper else ''
     parts = [

@@ -110,7 +110,7 @@ def unit_of(recording: FedRecording, node: str, params: parameters.Parameters) -
     row = row_of(recording, node)
     names = [other.name for other in nodes.NODES if any(map(recording.has, other.writes))]
     flags = [flag for flag in topics.TOPIC_FLAGS if getattr(params, flag, False)]
-    unit = row.unit_type()(params, nodes.reads(row, names, flags))
+    unit = row.unit_type()(params, nodes.reads(row, names, flags, recording.bag.own))
     unit.epoch = recording.bag.start
     return unit
 
@@ -157,6 +157,8 @@ def unrecorded(recording: FedRecording, node: str) -> str:
     """Return the reason why a recording cannot hold the inputs of a node, '' if it can."""
     if node == nodes.DRIVE_NODE and recording.bag.servo:
         return 'the drives of this recording were on a bus, which is not recorded'
+    if node in nodes.own_rows(recording.bag.own):
+        return 'a program of the user was in its place'
     if node == nodes.MONOPULSE_RECEIVER.name and recording.bag.iq:
         return 'the I/Q samples of this recording are not in the bag; give their file with --iq'
     return ''

@@ -2,10 +2,12 @@
 import dataclasses
 import math
 import pathlib
+import shlex
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from pedestal_bringup.scenario import files, shipped
 from pedestal_common import parameters
 from pedestal_common.graph import topics
 from pedestal_common.graph.steps import NS_PER_SECOND
@@ -30,6 +32,7 @@ class NodeReport:
     outputs: Mapping[str, Output]   # the recomputed outputs, by topic
     templates: Mapping[str, Message]    # {topic: message that the node makes}, from which `write` makes the messages
     well: bool = True   # True if the outputs are as required
+    first: Sequence[str] = ()   # lines above all others
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,6 +49,7 @@ class RecomputeOptions:
     ignore: list[str]       # patterns of topics and fields that are not compared
     allow_idle: bool        # True to accept a node that did nothing
     output: pathlib.Path | None             # new bag with the recomputed outputs
+    fields: bool            # True to print the differences of each field beside changed parameters
 
 
 def main(options: RecomputeOptions) -> tuple[list[str], list[Row], bool]:
@@ -84,10 +88,11 @@ def _node_report(recording: FedRecording, node: str, given: recompute.Values | N
     if changes:
         new = recompute.recompute(recording, node, recompute.parameters_of(recording, node, given, changes),
                                   {step: [command for command, _ in made] for step, made in done.requests.items()})
-        report = _old_against_new(recording, done, new, tolerance, _changed(params, changes, options.params_file))
+        report = _old_against_new(recording, done, new, tolerance if options.fields else None,
+                                  _changed(params, changes, options.params_file), changes)
     else:
         report = _against_recorded(recording, done, tolerance)
-    report.lines[:0] = [_title(recording, done, options.params_file), *_substitutes(recording, done),
+    report.lines[:0] = [*report.first, _title(recording, done, options.params_file), *_substitutes(recording, done),
                          *_input_problems(done), *_requests(done)]
     if not (changes or recording.lockstep or report.well):
         report.lines.append(f'{node}: the recording is realtime: a step differs if one of its messages was in '
@@ -169,7 +174,7 @@ def _new_numbers(recording: FedRecording, done: Recomputed) -> NodeReport:
     lines += [f'{name:34} {len(output.stamps):9} messages' for name, output in done.outputs.items()]
     rows = [single(done.node, f'{name} recomputed', len(output.stamps)) for name, output in done.outputs.items()]
     if done.node == 'acu' and len(done.feed.stamps):
-        numbers = what_if.numbers(recording.bag, [done.outputs])
+        numbers = what_if.numbers(what_if.evaluated(recording.bag, [done.outputs]))
         lines += _encoder_note(recording)
         lines += TextTable((('', '<42'), ('', '>12'), ''), [(name, intervals.measured(value), unit)
                                                            for name, ((value,), unit) in numbers.items()]).lines()
@@ -192,25 +197,40 @@ def _changed(params: parameters.Parameters, changes: Mapping[str, Json], params_
     return f'changed: {different}' + (f'; the same as in {origin}: {same}' if same else '')
 
 
-def _old_against_new(recording: FedRecording, old: Recomputed, new: Recomputed, tolerance: difference.Tolerance,
-                     changed: str) -> NodeReport:
-    """Return the report on a node with changed parameters: old and new results, and differences of the messages."""
+def _old_against_new(recording: FedRecording, old: Recomputed, new: Recomputed, tolerance: difference.Tolerance | None,
+                     changed: str, changes: Mapping[str, Json]) -> NodeReport:
+    """Return the report on a node with changed parameters: whether the difference is significant, old and new results,
+    and with a tolerance the differences of the fields."""
     before = {name: recording.output(name) if recording.has(name) else output for name, output in old.outputs.items()}
     origin = 'recorded' if any(map(recording.has, old.outputs)) else 'recomputed with unchanged parameters'
     lines = [f'{changed}; old: {origin}']
     lines += [line for step, made in new.requests.items() for line in _requests_of_step(new, step, made)]
-    rows = []
+    rows, first = [], []
     if new.node == 'acu' and len(new.feed.stamps):
         cells = []
-        for name, ((a, b), unit) in what_if.numbers(recording.bag, [before, new.outputs]).items():
+        versions = what_if.evaluated(recording.bag, [before, new.outputs])
+        first = [what_if.significance(versions)]
+        for name, ((a, b), unit) in what_if.numbers(versions).items():
             ratio = b / a if a and math.isfinite(b / a) else None
             cells.append((name, intervals.measured(a), intervals.measured(b), ratio, unit))
             rows += [single(new.node, f'{name} old', a, unit), single(new.node, f'{name} new', b, unit)]
         table = TextTable((('metric', '<42'), ('old', '>12'), ('new', '>12'), ('new/old', '>9.4g'), ''), cells)
-        lines += [f'note: {what_if.COMPARISON_NOTE}', *_encoder_note(recording), *table.lines()]
-    lines += difference.lines([difference.compare(name, before[name], output, tolerance)
-                               for name, output in new.outputs.items() if not tolerance.ignores(name)])
-    return NodeReport(lines, rows, new.outputs, new.unit.messages)
+        lines += [f'note: {what_if.COMPARISON_NOTE}', *_encoder_note(recording), *table.lines(),
+                  *_trials_of(recording, changes)]
+    if tolerance is not None:
+        lines += difference.lines([difference.compare(name, before[name], output, tolerance)
+                                   for name, output in new.outputs.items() if not tolerance.ignores(name)])
+    return NodeReport(lines, rows, new.outputs, new.unit.messages, first=first)
+
+
+def _trials_of(recording: FedRecording, changes: Mapping[str, Json]) -> list[str]:
+    """Return the line with the command that compares the pointing of both settings over many runs."""
+    name = recording.bag.metadata.get('scenario', '')
+    if name not in shipped.available():
+        return []
+    given = [('--against-param', files.override(f'acu.{key}', value)) for key, value in changes.items()]
+    command = shlex.join(['pedestal', 'trials', name, *(part for pair in given for part in pair)])
+    return [f'the pointing with both settings, over many seeds: {command}']
 
 
 def write(path: pathlib.Path, recording: FedRecording, outputs: Mapping[str, Output], templates: Mapping[str, Message],

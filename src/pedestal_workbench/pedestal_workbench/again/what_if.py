@@ -27,12 +27,15 @@ from pedestal_common.quantities import (
 )
 from pedestal_recording import recording as recordings
 from pedestal_recording.recording import Recording
-from pedestal_results import results, sensor_frame, tracking
+from pedestal_results import intervals, results, sensor_frame, tracking
 from pedestal_results.results import Result
 from pedestal_results.tracking import DEG_PER_RAD, known_rms, largest
 from pedestal_workbench.again.difference import Output
 
 RIPPLE_WINDOW_S = 0.25  # length of the moving mean of a rate [s]. The rate minus this mean counts as noise.
+
+MIN_STRETCHES, MAX_STRETCHES, MIN_STRETCH_S = 5, 20, 1.0
+"""Number of stretches of a recording by which `significance` judges a difference, and their least length [s]."""
 
 COMPARISON_NOTE = ('the recorded antenna does not move with the recomputed command, so the table compares the '
                    'estimate with the recorded truth, and the noise of estimate and command; for the pointing, run '
@@ -81,6 +84,7 @@ class RecomputedAcu:
 
     def __init__(self, overlay: Overlay) -> None:
         self.estimate, self.command = overlay.table('acu/estimate'), overlay.table('acu/rate_command')
+        self.filter = overlay.table('acu/filter') if 'acu/filter' in overlay.topics else None
         t: Times = self.estimate['t']
         mode = recordings.modes(overlay, t)
         self.autotrack = t[mode == 'autotrack']     # stamps of the estimates in autotrack
@@ -91,6 +95,17 @@ class RecomputedAcu:
         """Return the rms of the velocities in a table minus their moving mean over RIPPLE_WINDOW_S."""
         return known_rms(np.concatenate([_ripple(table['t'], table[f'{axis}.velocity'], self.common)
                                          for axis in AXES]))
+
+
+    @property
+    def innovations(self) -> Pairs:
+        """Measured minus predicted angles [rad] at the common stamps: cross-elevation, elevation; NaN without one."""
+        out = np.full((self.common.size, 2), math.nan)
+        if self.filter is not None:
+            _, here, there = np.intersect1d(self.common, self.filter['t'], return_indices=True)
+            out[here] = np.column_stack([self.filter[f'{axis}_innovation.position'] for axis in AXES])[there]
+            out[:, 0] *= np.cos(self.estimate['elevation.position'][np.isin(self.estimate['t'], self.common)])
+        return out
 
 
 def _ripple(t: Times, values: Floats, common: Times) -> Floats:
@@ -190,9 +205,16 @@ COMPARISON_RESULTS = (
 )
 
 
-def numbers(bag: Recording, versions: Sequence[Mapping[str, Output]]) -> dict[str, tuple[list[float], str]]:
-    """Return {metric: ([value of each version], unit)} of several versions of the outputs of an ACU. All versions are
-    evaluated on the samples in which all of them are in settled autotrack."""
+@dataclasses.dataclass
+class Versions:
+    """Several versions of the outputs of an ACU, evaluated on the samples in which all of them are in settled
+    autotrack. truths: None for each version of a recording without truth."""
+    acus: list[RecomputedAcu]
+    truths: Sequence[TruthComparison | None]
+
+
+def evaluated(bag: Recording, versions: Sequence[Mapping[str, Output]]) -> Versions:
+    """Return the Versions of some outputs by topic."""
     overlays = [Overlay(bag, outputs) for outputs in versions]
     acus = [RecomputedAcu(overlay) for overlay in overlays]
     try:
@@ -204,5 +226,42 @@ def numbers(bag: Recording, versions: Sequence[Mapping[str, Output]]) -> dict[st
     first = max((acu.autotrack[0] for acu in acus if acu.autotrack.size), default=math.inf)
     for acu in acus:
         acu.common = common[common >= first + tracking.HANDOVER_SETTLING_S]
-    columns = [results.measured({'acu': acu, 'truth': truth}, COMPARISON_RESULTS) for acu, truth in zip(acus, truths)]
+    return Versions(acus, truths)
+
+
+def numbers(versions: Versions) -> dict[str, tuple[list[float], str]]:
+    """Return {metric: ([value of each version], unit)}."""
+    columns = [results.measured({'acu': acu, 'truth': truth}, COMPARISON_RESULTS)
+               for acu, truth in zip(versions.acus, versions.truths)]
     return {name: ([column[name][0] for column in columns], unit) for name, (_, unit) in columns[0].items()}
+
+
+def significance(versions: Versions) -> str:
+    """Return the sentence that compares a new with an old version: which has the smaller rms error of the estimate, by
+    how much, and whether a difference of this size may be chance.
+
+    The errors are those against the recorded truth or, without it, the innovations. The samples are cut into equal
+    stretches, which are longer than the memory of the filter. The interval is that of the jackknife over the pairs of
+    stretches.
+    """
+    truths = [truth for truth in versions.truths if truth is not None]
+    old, new = [truth.error for truth in truths] if truths else [acu.innovations for acu in versions.acus]
+    subject = 'rms error of the estimate' if truths else 'rms innovation (measured minus predicted angle)'
+    known = np.isfinite(old).all(axis=1) & np.isfinite(new).all(axis=1)
+    t = versions.acus[0].common
+    period = float(np.median(np.diff(t))) if t.size > 1 else 0.0
+    count = min(MAX_STRETCHES, int(known.sum() * period / MIN_STRETCH_S))
+    if count < MIN_STRETCHES:
+        return (f'not judged: {known.sum() * period:.3g} s with both settings in settled autotrack, must be at least '
+                f'{MIN_STRETCHES * MIN_STRETCH_S:g} s')
+    squares = np.column_stack([np.sum(error[known]**2, axis=1) for error in (old, new)])
+    if (squares[:, 0] == squares[:, 1]).all():
+        return f'no difference: the {subject} is the same'
+    parts = [part.mean(axis=0) for part in np.array_split(squares, count)]
+    ratio, low, high = np.exp(intervals.interval(intervals.pseudo_values(
+        parts, lambda some: 0.5 * float(np.log(np.divide(*np.mean(some, axis=0)[::-1]))))))
+    size = (f'{ratio:.3g} times as large' if not 0.5 < ratio < 2.0 else
+            f'{abs(ratio - 1.0):.1%} {"larger" if ratio > 1.0 else "smaller"}')
+    word = 'no significant difference' if low <= 1.0 <= high else 'better' if ratio < 1.0 else 'worse'
+    return (f'{word}: with the new setting the {subject} is {size} (new / old {ratio:.3g}, 95 % interval {low:.3g} to '
+            f'{high:.3g}; {count} paired stretches of {known.sum() * period / count:.3g} s)')

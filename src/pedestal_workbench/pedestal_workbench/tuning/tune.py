@@ -147,7 +147,8 @@ class RecordedSource:
         unit, steps = self._run(params)
         innovation, sigma, nis = self._innovations(steps)
         density = log_density(innovation, sigma)
-        numbers = what_if.numbers(self.recording.bag, [recompute.outputs_of(unit, self.feed, steps)])
+        outputs = recompute.outputs_of(unit, self.feed, steps)
+        numbers = what_if.numbers(what_if.evaluated(self.recording.bag, [outputs]))
         pointing = {}
         for name in ESTIMATE_ERRORS:
             if name in numbers:
