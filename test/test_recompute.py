@@ -283,7 +283,8 @@ def test_a_parameter_with_its_recorded_value_is_named(runs, pedestal):
 
 
 def test_a_bag_with_inputs_only_and_a_changed_parameter(inputs_only, pedestal):
-    code, said, _ = pedestal(inputs_only, '--node', 'acu', '--param', 'azimuth.filter.imm.dwell=2')
+    code, said, _ = pedestal(inputs_only, '--node', 'acu', '--param', 'azimuth.filter.imm.dwell=2',
+                             '--fields')
     assert code == 0
     assert 'old: recomputed with unchanged parameters' in said
     assert lines_of(said, ESTIMATE)[1].split()[0] == 'azimuth.position'
