@@ -122,7 +122,8 @@ def test_the_horizon_mask_of_the_receiver_is_that_of_rise_and_set():
     (('--start', '2019-12-10T10:00', '--duration', '30'), 'and last until the rise'),
     (('--start', '2019-12-10T02:30'), 'at most 3600 s before the rise'),
     (('--pass', '3', '--start', '+x'), '--start +x: must be a UTC such as 2019-12-10T12:35, or +SECONDS after the'),
-    (('--pass', '3', '--start', 'soon'), "--start = 'soon': must be UTC as ISO 8601"),
+    (('--pass', '3', '--start', 'soon'), "--start = 'soon': must be UTC as ISO 8601, for example "
+     '2019-12-10T06:00:00; or +SECONDS after the rise'),
     (('--start', '2019-12-10T11:03', '--param', 'tracking_receiver.target.leo_pass.start_time=2019-12-10T00:00'),
      '--start 2019-12-10T11:03: sets tracking_receiver.target.leo_pass.start_time, which is also given'),
     (('--pass', 'list', '--start', '+5'), '--start: has no effect with --pass list')])

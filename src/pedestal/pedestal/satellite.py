@@ -20,6 +20,8 @@ if typing.TYPE_CHECKING:
     from pedestal_bringup.scenario.scenario import Draft
 
 START_TIME_PARAMETER = 'tracking_receiver.target.leo_pass.start_time'
+OTHER_FORMS = {'--pass': 'next, list, or a number of the list', '--start': '+SECONDS after the rise'}
+"""{option: its values that are no UTC}."""
 MAX_EARLY_START_S = 3600.0  # largest time from the start of a run to the rise of its pass [s]
 
 
@@ -86,7 +88,10 @@ def _instant(option: str, text: str | None) -> datetime.datetime | None:
     """Return the UTC of a value of --pass or --start, None for another kind of value. Raises TargetError."""
     if text is None or text in ('list', 'next') or text.isdecimal() or text.startswith('+'):
         return None
-    return orbit.instant(option, text)
+    try:
+        return orbit.instant(option, text)
+    except TargetError as error:
+        raise TargetError(f'{error}; or {OTHER_FORMS[option]}') from None
 
 
 def _without_prediction_errors(draft: 'Draft', changes: Sequence[str]) -> tuple[list[str], list[str]]:
