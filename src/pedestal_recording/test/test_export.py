@@ -165,7 +165,7 @@ def test_parquet_reads_back_to_the_last_bit(recording, expected, tmp_path):
 
 def test_parquet_without_its_library_is_one_line(recording, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, 'pyarrow', None)
-    assert export(recording, '--output', tmp_path / 'new', '--format', 'parquet') == 1
+    assert export(recording, '--output', tmp_path / 'new', '--format', 'parquet') == 2
     error = capsys.readouterr().err
     assert 'pedestal_recording[parquet]' in error and error.count('\n') == 1
     assert not (tmp_path / 'new').exists()
@@ -174,7 +174,7 @@ def test_parquet_without_its_library_is_one_line(recording, tmp_path, capsys, mo
 def test_a_table_that_is_there_is_not_replaced_unasked(recording, tmp_path, capsys):
     file = tmp_path / 'acu.mode.csv'
     file.write_text('mine')
-    assert export(recording, '--output', tmp_path) == 1
+    assert export(recording, '--output', tmp_path) == 2
     error = capsys.readouterr().err
     assert f'{file} exists already; --overwrite replaces' in error and error.count('\n') == 1
     assert file.read_text() == 'mine' and list(tmp_path.iterdir()) == [file]

@@ -324,7 +324,7 @@ def test_the_report_as_pdf_with_its_author(story, tmp_path, capsys):
 
 def test_a_pdf_without_a_browser_is_refused_with_the_cure(story, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv('PATH', str(tmp_path))
-    assert cli.main(['report', str(story), '--output', str(tmp_path / 'r.html'), '--pdf']) == 1
+    assert cli.main(['report', str(story), '--output', str(tmp_path / 'r.html'), '--pdf']) == 2
     assert 'apt install chromium' in capsys.readouterr().err and not (tmp_path / 'r.html').exists()
 
 

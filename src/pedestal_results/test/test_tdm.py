@@ -131,7 +131,7 @@ def test_what_cannot_be_is_refused_in_one_line(tmp_path, capsys, arguments, mess
     made(tmp_path / 'a')
     assert cli.main(['export', str(tmp_path / 'a'), '--format', 'tdm']) == 0
     capsys.readouterr()
-    assert cli.main(['export', str(tmp_path / 'a'), '--format', 'tdm', *arguments]) == 1
+    assert cli.main(['export', str(tmp_path / 'a'), '--format', 'tdm', *arguments]) == 2
     [line] = capsys.readouterr().err.splitlines()
     assert re.search(message, line)
 
