@@ -278,6 +278,24 @@ def test_a_lag_behind_a_smooth_motion_shows_in_the_stated_covariance(distance):
     assert of_seconds.max() < 0.75 * of_bank_alone.max() and of_seconds.mean() < 2.4
 
 
+@pytest.mark.parametrize('frequency', [0.0, 0.5, 1.0])
+def test_a_swing_below_the_noise_shows_in_the_stated_covariance(frequency):
+    """A swing of a fifth of sigma, which the bank is right not to follow. Without a swing nothing is added."""
+    t = T * np.arange(6000)
+    angle = SIGMA / 5.0 * np.sin(2.0 * np.pi * frequency * t)
+    stated, bank = [], []
+    for seed in range(12):
+        out = run(t, noisy(angle, seed), kind='imm')[4000:]
+        e = out['angle'] - angle[4000:]
+        stated.append(np.mean(e * e / out['variance']))
+        bank.append(np.mean(e * e / out['variance'] * out['inflation']))
+    print(f'{frequency:g} Hz: squared error over its variance {np.mean(stated):.2f}, by the bank {np.mean(bank):.2f}')
+    if frequency:
+        assert np.mean(bank) > 5.0 and np.mean(stated) < 0.5 * np.mean(bank)
+    else:
+        assert np.mean(stated) == pytest.approx(np.mean(bank) / axis_filter.CONSISTENT_INFLATION, rel=0.05)
+
+
 @pytest.mark.parametrize('kind', FILTER_KINDS)
 def test_what_is_missing_or_does_not_advance_is_not_taken(kind):
     t = T * np.arange(400)
