@@ -224,8 +224,9 @@ def test_an_error_is_compared_with_what_was_told_in_the_coast(kind, gap):
     for k in range(300):
         target.observe(k * T, 0.1 + 0.02 * k * T + 0.5 * 0.02 * max(k * T - 2.0, 0.0)**2)
     stamp = 299 * T + gap
-    angle, variance = target.outlook(stamp)[0], target.variances(gap)[0]
-    variance /= axis_filter.inflation(target.state[0]['filter']['axis'][0])
+    angle, stated = target.outlook(stamp)[0], target.variances(gap)[0]
+    variance = axis_filter.expected(target.state[0]['filter']['axis'][0]).P.p11
+    assert stated >= axis_filter.CONSISTENT_INFLATION * variance
     outcome, azimuth = target.observe(stamp, 0.3)
     assert outcome == receiver_error.OUTCOME_ACCEPTED and azimuth.nu == pytest.approx(0.3 - angle, abs=1e-12)
     assert azimuth.S == pytest.approx(variance + SIGMA**2, rel=1e-12)

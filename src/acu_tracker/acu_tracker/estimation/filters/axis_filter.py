@@ -43,7 +43,13 @@ BANK_SIZE = len(COLUMN_NAMES)  # largest number of models in a bank
 TREND_MEMORY = 4.0
 """Memory of the mean innovation over that of the filter [-]. A short one shows a lag soon, a long one a small lag."""
 
-MAX_INFLATION = 10.0  # largest factor of the stated variances [-]
+SWING_TIME_S, SWING_MEMORY_S = 0.1, 20.0  # memories of the short mean, and of its square
+MIN_SWING, MAX_SWING = 1.14, 10.0
+"""Smallest and largest counted square of the short mean, over the variance that white innovations give it [-]. The
+first is the mean of white innovations plus two standard deviations. With the last, one jump of the motion is no
+swing."""
+
+MAX_INFLATION = 30.0  # largest factor of the stated variances [-]
 CONSISTENT_INFLATION = 0.891
 """Factor of the stated variances without a lag [-]. A consistent filter sometimes shows a lag by chance. This factor
 keeps its mean NEES."""
@@ -86,6 +92,9 @@ class Filter(Record):
     weights: Annotated[Floats, (BANK_SIZE,)]    # scratch
     trend: Radians          # mean of the last innovations of the angle
     trend_variance: Radians2    # its variance in a consistent filter; 0: no innovation yet
+    short: Radians          # mean of the innovations of the last SWING_TIME_S
+    short_variance: Radians2    # its variance if the innovations are white
+    swing: Radians2         # mean square of an error that swings about 0; below 0: none is seen
     # variance per second [rad2/s] that each prediction adds to the variance of the angle, for the random walk of the
     # attitude error (estimation/receiver_error.py)
     drift_variance_rate: float
@@ -160,7 +169,7 @@ def start(state: Filter, constants: Constants, y: Radians, R: Radians2, rate_sig
                                      Symmetric(R, 0.0, 0.0, rate_sigma * rate_sigma, 0.0, 0.0)))
     _reset_acceleration_variance(state, constants)
     state.last_angle, state.correlated = y, 1
-    state.trend = state.trend_variance = 0.0
+    state.trend = state.trend_variance = state.short = state.short_variance = state.swing = 0.0
 
 
 @compiled
@@ -236,22 +245,25 @@ def expected_motion(state: Filter) -> AxisMotion:
 
 
 @compiled
-def inflation(state: Filter) -> float:
-    """Return the factor of the stated variances over those of the bank.
+def inflation(state: Filter, variance: Radians2) -> float:
+    """Return the factor of the stated variances over those of the bank; variance: of the angle by the bank.
 
     The innovations of a consistent filter have mean 0. A filter that lags behind a motion has an error b, and its last
     innovations have the mean b. The square of this mean over its variance in a consistent filter is 1 + k b^2 on
-    average; 2 / k is about the variance of the angle. The factor adds b^2 to this variance, within its limit."""
+    average; 2 / k is about the variance of the angle. The factor adds b^2 to this variance, within its limit.
+
+    A target may also swing by less than the noise of a filter that would follow it. The bank is then right not to
+    follow, and the mean of b over its memory is 0. The mean square of a short mean shows this b^2: `swing`."""
     if state.trend_variance == 0.0:
         return 1.0
-    excess = state.trend * state.trend / state.trend_variance - 1.0
-    return min(CONSISTENT_INFLATION * (1.0 + 0.5 * max(excess, 0.0)), MAX_INFLATION)
+    lag = 0.5 * (state.trend * state.trend / state.trend_variance - 1.0)
+    return min(CONSISTENT_INFLATION * (1.0 + max(lag, state.swing / variance, 0.0)), MAX_INFLATION)
 
 
 @compiled
 def variances(state: Filter, gaussian: Gaussian) -> AxisVariances:
     """Return the variances of angle and rate that the filter states with a Gaussian of the bank."""
-    factor, P = inflation(state), gaussian.P
+    factor, P = inflation(state, gaussian.P.p11), gaussian.P
     return AxisVariances(factor * P.p11, factor * P.p12, factor * P.p22)
 
 
@@ -316,6 +328,7 @@ def correct(state: Filter, constants: Constants, measurement: AxisMeasurement) -
     imm.weigh(state.mu_prior, state.weights, constants.count, state.mu)
     state.last_angle, state.correlated = measurement.angle, 1
     _take_innovation(state, nu_mean, nu_square - nu_mean * nu_mean, own)
+    _take_swing(state, nu_mean / (1.0 - rho))
 
 
 @compiled
@@ -325,6 +338,16 @@ def _take_innovation(state: Filter, nu: Radians, S: Radians2, own: Radians2) -> 
     gain = (1.0 - own / S) / TREND_MEMORY
     state.trend += gain * (nu - state.trend)
     state.trend_variance = (1.0 - gain) * (1.0 - gain) * state.trend_variance + gain * gain * S
+
+
+@compiled
+def _take_swing(state: Filter, nu: Radians) -> None:
+    """Add an innovation of the bank, as an angle, to the short mean, and its excess over white noise to the swing."""
+    gain, share = min(state.T / SWING_TIME_S, 1.0), min(state.T / SWING_MEMORY_S, 1.0)
+    state.short += gain * (nu - state.short)
+    state.short_variance = (1.0 - gain) * (1.0 - gain) * state.short_variance + gain * gain * nu * nu
+    excess = min(state.short * state.short, MAX_SWING * state.short_variance) - MIN_SWING * state.short_variance
+    state.swing += share * (excess - state.swing)
 
 
 @compiled
@@ -390,5 +413,5 @@ def estimates(constants: Records, t: Times, y: Floats, R: Floats, y_rate: Floats
         g = expected(state)
         o.angle, o.rate, o.acceleration = g.x
         o.variance, o.covariance, o.rate_variance = variances(state, g)
-        o.inflation = inflation(state)
+        o.inflation = inflation(state, g.P.p11)
         probabilities(state, model, o.mu)
