@@ -277,7 +277,7 @@ def to_lanes(records: Records) -> Floats:
 
 def _aligned(count: int) -> Floats:
     """Return an array (count,) that begins at a cache line. In an array of numpy each vector of 8 lanes may lie in two
-    lines, and the drives then take an eighth more time."""
+    lines, and the drives then take up to an eighth more time."""
     store = np.empty(count + CACHE_LINE_BYTES // WORD_BYTES)
     skipped = -store.ctypes.data % CACHE_LINE_BYTES // WORD_BYTES
     return store[skipped:skipped + count]
