@@ -376,6 +376,7 @@ def test_outlook_coasts_as_the_model_moves(kind, alpha):
     c = axis_filter.constants(build(FilterParameters, {'kind': kind, f'{kind}.alpha': 0.5}))[0]
     f = axis_filter.Filter.zeros()[0]
     f['count'], f['mu'][0], f['x'][0] = 1, 1.0, (0.1, 0.2, 0.3)
+    axis_filter.join(f)
     t = np.linspace(0, 3, 30001)
     a = 0.3 * np.exp(-alpha * t)
     v = 0.2 + np.concatenate(([0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))))
@@ -393,6 +394,7 @@ def test_outlook_and_variance_of_a_bank_are_those_of_a_draw_from_it():
     f['count'], f['mu'][:2] = 2, (0.3, 0.7)
     f['x'][:2] = (1.0, 0.2, 0.0), (1.002, 0.21, 0.03)
     f['p'][:2] = (1e-6, 1e-7, 0, 1e-4, 0, 0), (4e-6, 1e-6, 0, 2e-4, 1e-5, 1e-4)
+    axis_filter.join(f)
     held = (rng.random(1_000_000) < 0.7).astype(int)
     X = np.empty((len(held), 3))
     for i in range(2):

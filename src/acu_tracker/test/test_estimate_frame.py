@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker.estimation.filters import target_filter, unscented
+from acu_tracker.estimation.filters import axis_filter, target_filter, unscented
 from acu_tracker.estimation.filters.measurement import AxisMeasurement, Measurement
 from acu_tracker.estimation.params import FilterParameters, UkfParameters
 from acu_tracker.geometry import frames
@@ -72,9 +72,8 @@ def test_variances_turn_with_the_frame():
     A, E = 0.05 + sigma[0] * rng.normal(size=4000), 0.02 + sigma[1] * rng.normal(size=4000)
     framed = np.column_stack((np.cos(E) * np.sin(A), np.cos(E) * np.cos(A), np.sin(E))) @ frame['mat'].T
     azimuth, elevation = np.arctan2(framed[:, 0], framed[:, 1]), np.arcsin(framed[:, 2])
-    variances = frames.earth_variances(frame, standing(0.05, 0.02), standing(azimuth.mean(), elevation.mean()),
-                                       sigma[0]**2, sigma[1]**2)
-    np.testing.assert_allclose(variances, [azimuth.var(), elevation.var()], rtol=0.1)
+    shares = frames.earth_shares(frame, standing(0.05, 0.02), standing(azimuth.mean(), elevation.mean()))
+    np.testing.assert_allclose(np.array(shares) @ np.square(sigma), [azimuth.var(), elevation.var()], rtol=0.1)
 
 
 def test_a_filter_turns_with_its_frame():
@@ -94,6 +93,7 @@ def test_a_filter_turns_with_its_frame():
     target_filter.start(f, c, Measurement(0.0, tuple(axis), math.nan, math.nan), 0.1)
     for i in range(2):
         f['axis'][i]['x'][0] = motion[i]
+        axis_filter.join(f['axis'][i])
     target_filter.predict(f, c, 0.0)
     unscented.start(f['cartesian'], c['cartesian'], target_filter.read_axes(f), 1000.0, 1.0)
     cartesian = f['cartesian']['p'].copy()

@@ -272,8 +272,7 @@ def _converged(state: target_filter.Filter, constants: target_filter.Constants, 
     bandwidth never estimates it much better than it is measured. The ratio of the measured variances converts the
     azimuth rate to a rate across the line of sight.
     """
-    target_filter.predict(state, constants, 0.0)
-    azimuth, elevation = target_filter.read(state).variances
+    azimuth, elevation = target_filter.read_corrected(state, constants).variances
     known = (0.25 * initial_rate)**2
     return azimuth.p22 * measurement.axis[1].variance < known * measurement.axis[0].variance and elevation.p22 < known
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from acu_tracker.estimation import monitors
 from acu_tracker.estimation.filters import target_filter
-from acu_tracker.estimation.filters.measurement import AxisVariances, Estimate
+from acu_tracker.estimation.filters.measurement import Estimate, weighted
 from acu_tracker.estimation.params import FilterParameters, TrackerParameters
 from acu_tracker.geometry import attitude, frames, lever_arm
 from acu_tracker.geometry.attitude import DeckAttitude
@@ -140,14 +140,10 @@ def read(target: Target, params: 'SharedParameters', constants: Constants, deck:
     """Return the Estimate at t in earth angles, as seen from the antenna; t as in `outlook`."""
     target_filter.predict(target.filter, constants.filter, max(t - target.stamp, 0.0))
     framed, variances = target_filter.read(target.filter)
-    azimuth, elevation = variances
     motion = earth_angles(frames.to_earth(target.frame, framed))
-    A11, E11 = frames.earth_variances(target.frame, framed, motion, azimuth.p11, elevation.p11)
-    A12, E12 = frames.earth_variances(target.frame, framed, motion, azimuth.p12, elevation.p12)
-    A22, E22 = frames.earth_variances(target.frame, framed, motion, azimuth.p22, elevation.p22)
-    azimuth, elevation = AxisVariances(A11, A12, A22), AxisVariances(E11, E12, E22)
+    azimuth, elevation = frames.earth_shares(target.frame, framed, motion)
     if target.lever_arm.range > 0.0:
         known, now = attitude.at(deck, params, t)
         if known:
             motion = lever_arm.earth_angles_to_antenna(target.lever_arm, now.mat, motion)
-    return Estimate(motion, (azimuth, elevation))
+    return Estimate(motion, (weighted(variances, azimuth), weighted(variances, elevation)))

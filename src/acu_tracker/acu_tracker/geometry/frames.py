@@ -142,15 +142,15 @@ def of_deck(frame: Frame, attitude: Attitude) -> Attitude:
 
 
 @compiled
-def earth_variances(frame: Frame, framed: Motion, earth: Motion, p_A: float, p_E: float) -> tuple[float, float]:
-    """Return the variances of azimuth and elevation in the earth frame, of p_A and p_E in the frame of the filter.
-    p_A, p_E: variances of angles or of rates, or covariances of both. The correlation of azimuth and elevation is
-    taken as zero, because the filter does not estimate it."""
-    A, E = framed.azimuth.angle, framed.elevation.angle
-    azimuth, elevation = earth.azimuth.angle, earth.elevation.angle
-    # Unit vectors of both frames in the direction of growing azimuth, and the cosine c of the angle between them.
+def earth_shares(frame: Frame, framed: Motion, earth: Motion) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the shares ((A, E) of azimuth, (A, E) of elevation) that variances of azimuth A and elevation E in the
+    frame of the filter have in those of the earth frame. Variances of angles, of rates, and covariances of both have
+    the same shares. The correlation of azimuth and elevation is taken as zero, because the filter does not estimate
+    it."""
+    A, azimuth = framed.azimuth.angle, earth.azimuth.angle
+    # Unit vectors of both frames in the direction of growing azimuth, and the square of the cosine of their angle.
     across = rotated(rotation(frame.mat), Vector(math.cos(A), -math.sin(A), 0.0))
-    c = across.x * math.cos(azimuth) - across.y * math.sin(azimuth)
-    p_across = p_A * math.cos(E)**2
-    cos_el = max(math.cos(elevation), 0.01)
-    return (c * c * p_across + (1.0 - c * c) * p_E) / (cos_el * cos_el), c * c * p_E + (1.0 - c * c) * p_across
+    cos2 = (across.x * math.cos(azimuth) - across.y * math.sin(azimuth))**2
+    scale = math.cos(framed.elevation.angle)**2     # variance across the line of sight over that of the azimuth
+    per_scale = 1.0 / max(math.cos(earth.elevation.angle), 0.01)**2
+    return (cos2 * scale * per_scale, (1.0 - cos2) * per_scale), ((1.0 - cos2) * scale, cos2)

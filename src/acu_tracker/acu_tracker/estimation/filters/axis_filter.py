@@ -32,6 +32,7 @@ from pedestal_common.quantities import (
     Records,
     Seconds,
     Times,
+    Vector3,
 )
 from pedestal_common.record import Record
 
@@ -82,6 +83,8 @@ class Filter(Record):
     x: Annotated[Floats, (BANK_SIZE, 3)]    # estimate of each model after the last measurement
     p: Annotated[Floats, (BANK_SIZE, 6)]    # its covariance, as in kalman.Symmetric
     mu: Annotated[Floats, (BANK_SIZE,)]     # probability of each model after the last measurement
+    bank_x: Vector3                         # bank_x, bank_p: Gaussian of the whole bank after the last measurement
+    bank_p: Annotated[Floats, (6,)]
     x_prior: Annotated[Floats, (BANK_SIZE, 3)]  # x_prior, p_prior, mu_prior: prediction of x, p and mu by T
     p_prior: Annotated[Floats, (BANK_SIZE, 6)]
     mu_prior: Annotated[Floats, (BANK_SIZE,)]
@@ -89,7 +92,8 @@ class Filter(Record):
     correlated: Bit         # 1 if the noise of the next angle is correlated with that of last_angle
     # x1, p11, c1, c2, c3 of the kalman.PreviousAngle of each model, for this prediction
     past: Annotated[Floats, (BANK_SIZE, 5)]
-    weights: Annotated[Floats, (BANK_SIZE,)]    # scratch
+    exponents: Annotated[Floats, (BANK_SIZE,)]  # exponents, scales: likelihoods for imm.weigh; scratch
+    scales: Annotated[Floats, (BANK_SIZE,)]
     trend: Radians          # mean of the last innovations of the angle
     trend_variance: Radians2    # its variance in a consistent filter; 0: no innovation yet
     short: Radians          # mean of the innovations of the last SWING_TIME_S
@@ -148,18 +152,28 @@ def _previous_angle(row: Floats) -> PreviousAngle:
 
 
 @compiled
+def join(state: Filter) -> None:
+    """Set the Gaussian of the whole bank, after each change of a model."""
+    (bank_x, bank_p), x, p = imm.combine(state.mu, state.x, state.p, state.count), state.bank_x, state.bank_p
+    x[0], x[1], x[2] = bank_x
+    p[0], p[1], p[2], p[3], p[4], p[5] = bank_p
+
+
+@compiled
 def _fill(state: Filter, constants: Constants, gaussian: Gaussian) -> None:
     """Give every model in use the same Gaussian and equal probability."""
     state.bank, state.count, state.states = constants.bank, constants.count, constants.states
     for j in range(constants.count):
         state.mu[j] = 1.0 / constants.count
         _put(state.x, state.p, j, gaussian)
+    join(state)
 
 
 @compiled
 def _reset_acceleration_variance(state: Filter, constants: Constants) -> None:
     for j in range(constants.count):
         state.p[j, P33_COLUMN] = constants.models[j].initial_sigma * constants.models[j].initial_sigma
+    join(state)
 
 
 @compiled
@@ -195,6 +209,7 @@ def move(state: Filter, constants: Constants, motion: AxisMotion) -> None:
         state.x[j, 1] += motion.rate - x.rate
         if constants.models[j].states > 2:
             state.x[j, 2] += motion.acceleration - x.acceleration
+    join(state)
 
 
 @compiled
@@ -208,12 +223,13 @@ def blend(state: Filter, constants: Constants, own: float, share: float, other: 
             own * P.p11 + share * other.p11, own * P.p12 + share * other.p12,
             own * P.p13 + of_acceleration * other.p13, own * P.p22 + share * other.p22,
             own * P.p23 + of_acceleration * other.p23, own * P.p33 + of_acceleration * other.p33)))
+    join(state)
 
 
 @compiled
 def corrected(state: Filter) -> Gaussian:
     """Return the Gaussian of the bank at the last measurement."""
-    return imm.combine(state.mu, state.x, state.p, state.count)
+    return _gaussian(state.bank_x, state.bank_p)
 
 
 @compiled
@@ -278,10 +294,11 @@ def _correlation(state: Filter, constants: Constants) -> float:
 def innovation(state: Filter, constants: Constants, measurement: AxisMeasurement) -> AxisInnovation:
     """Return the innovation of a measurement; that of the angle is the one of y_k - rho y_k-1."""
     rho = _correlation(state, constants)
-    x, P = expected(state)
+    x = expected_motion(state)
     # u, U: mean and variance of the predicted difference y_k - rho y_k-1, without the noise of the angle; p12: its
-    # covariance with the rate. w: probability of a model; d1, d2: differences between the model and the means.
-    u = U = p12 = 0.0
+    # covariance with the rate; p22: variance of the rate. w: probability of a model; d1, d2: differences between the
+    # model and the means.
+    u = U = p12 = p22 = 0.0
     for j in range(constants.count):
         u += state.mu_prior[j] * (state.x_prior[j, 0] - rho * _previous_angle(state.past[j]).x1)
     for j in range(constants.count):
@@ -289,11 +306,12 @@ def innovation(state: Filter, constants: Constants, measurement: AxisMeasurement
         d1, d2 = g.x.angle - rho * o.x1 - u, g.x.rate - x.rate
         U += w * (g.P.p11 - 2.0 * rho * o.c1 + rho * rho * o.p11 + d1 * d1)
         p12 += w * (g.P.p12 - rho * o.c2 + d1 * d2)
+        p22 += w * (g.P.p22 + d2 * d2)
     nu, nu_rate = measurement.angle - rho * state.last_angle - u, measurement.rate - x.rate
     S = U + (1.0 - rho * rho) * measurement.variance
     nu_rate_given_angle = nu_rate - p12 / S * nu
     return AxisInnovation(nu, S, nu * nu / S, nu_rate, nu_rate_given_angle * nu_rate_given_angle
-                          / (P.p22 + measurement.rate_variance - p12 * p12 / S))
+                          / (p22 + measurement.rate_variance - p12 * p12 / S))
 
 
 @compiled
@@ -308,7 +326,7 @@ def correct(state: Filter, constants: Constants, measurement: AxisMeasurement) -
         g, o = _gaussian(state.x_prior[j], state.p_prior[j]), _previous_angle(state.past[j])
         nu = measurement.angle - rho * state.last_angle - (g.x.angle - rho * o.x1)
         S = g.P.p11 - 2.0 * rho * o.c1 + rho * rho * o.p11 + own
-        state.weights[j] = kalman.log_likelihood(nu, S)
+        state.exponents[j], state.scales[j] = kalman.exponent(nu, S), math.sqrt(S)
         nu_mean += state.mu_prior[j] * nu
         nu_square += state.mu_prior[j] * (S + nu * nu)
         # A filter of constant gain uses alpha only where the Kalman gain p11 / S is below alpha. After a start or a
@@ -322,10 +340,13 @@ def correct(state: Filter, constants: Constants, measurement: AxisMeasurement) -
             g = kalman.update(g, nu, measurement.variance)
         if not math.isnan(measurement.rate):
             nu = measurement.rate - g.x.rate
-            state.weights[j] += kalman.log_likelihood(nu, g.P.p22 + measurement.rate_variance)
+            S = g.P.p22 + measurement.rate_variance
+            state.exponents[j] += kalman.exponent(nu, S)
+            state.scales[j] *= math.sqrt(S)
             g = kalman.update_rate(g, nu, measurement.rate_variance)
         _put(state.x, state.p, j, g)
-    imm.weigh(state.mu_prior, state.weights, constants.count, state.mu)
+    imm.weigh(state.mu_prior, state.exponents, state.scales, constants.count, state.mu)
+    join(state)
     state.last_angle, state.correlated = measurement.angle, 1
     _take_innovation(state, nu_mean, nu_square - nu_mean * nu_mean, own)
     _take_swing(state, nu_mean / (1.0 - rho))
@@ -356,7 +377,7 @@ def outlook(state: Filter, constants: Constants, T: Seconds) -> AxisMotion:
     change. Because no covariance is computed, this is faster than `predict`."""
     angle = rate = acceleration = 0.0
     end = imm.ending(T, constants.dwell, constants.count)
-    bank = imm.mean(state.mu, state.x, constants.count)
+    bank = corrected(state).x
     for j in range(constants.count):
         mu, share = imm.mix(state.mu[j], end, constants.arrival[j])
         own, rest = state.x[j], 1.0 - share

@@ -6,8 +6,8 @@ mean of all filters, weighted with these probabilities.
 
 The equations are those of Lin 2020, eq. 5 to 11, with two corrections. The paper omits the mixing before the
 prediction. In its eq. 11 the second factor has a reversed sign, which would subtract the spread of the models. Here
-the weights in eq. 11 are the probabilities, and the spread is added. The likelihoods are kept as logarithms, so that
-even a measurement far from all models ranks the models.
+the weights in eq. 11 are the probabilities, and the spread is added. Of the likelihoods the exponents are kept. Even a
+measurement far from all models therefore ranks the models.
 
 x, p: estimates (n, 3) of the models, and covariances (n, 6) as in kalman.Symmetric; count: number of models in use.
 """
@@ -83,16 +83,20 @@ def combine(weights: Floats, x: Floats, p: Floats, count: int) -> Gaussian:
 
 
 @compiled
-def weigh(mu_prior: Floats, log_likelihoods: Floats, count: int, mu: Floats) -> None:
-    """Set mu[j] to the probability of model j after the measurement (eq. 9); mu_prior: before it."""
-    # The largest logarithm is subtracted. Otherwise all exponentials might underflow to 0.
+def weigh(mu_prior: Floats, exponents: Floats, scales: Floats, count: int, mu: Floats) -> None:
+    """Set mu[j] to the probability of model j after the measurement (eq. 9); mu_prior: before it.
+
+    exponents, scales: the likelihood of the measurement is proportional to exp(exponents[j]) / scales[j]. The scale is
+    the square root of the determinant of the covariance of the innovation."""
+    # The largest exponent of a possible model is subtracted. Otherwise all exponentials might underflow to 0.
     best = -math.inf
     for j in range(count):
-        mu[j] = math.log(mu_prior[j]) + log_likelihoods[j]
-        best = max(best, mu[j])
+        if mu_prior[j] > 0.0:
+            best = max(best, exponents[j])
     total = 0.0
     for j in range(count):
-        mu[j] = math.exp(mu[j] - best)
+        mu[j] = mu_prior[j] * math.exp(exponents[j] - best) / scales[j]
         total += mu[j]
+    per_total = 1.0 / total
     for j in range(count):
-        mu[j] /= total
+        mu[j] *= per_total

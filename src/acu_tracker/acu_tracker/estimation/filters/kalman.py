@@ -87,8 +87,8 @@ def update(gaussian: Gaussian, nu: Radians, R: Radians2) -> Gaussian:
     """Return the Gaussian after a measured angle of variance R with the innovation nu. H = [1 0 0], K = P H' / S
     (Ma 2023, eq. 8, 9, 10). The first row of the new P is p1j - k1 p1j. The equal form kj R is used, because it
     loses no digits in a difference."""
-    P, S = gaussian.P, gaussian.P.p11 + R
-    k1, k2, k3 = P.p11 / S, P.p12 / S, P.p13 / S
+    P, per_S = gaussian.P, 1.0 / (gaussian.P.p11 + R)
+    k1, k2, k3 = P.p11 * per_S, P.p12 * per_S, P.p13 * per_S
     return Gaussian(_corrected(gaussian.x, k1, k2, k3, nu),
                     Symmetric(k1 * R, k2 * R, k3 * R, P.p22 - k2 * P.p12, P.p23 - k2 * P.p13, P.p33 - k3 * P.p13))
 
@@ -133,9 +133,9 @@ def update_with_gain(gaussian: Gaussian, nu: Radians, R: Radians2, K: Xyz) -> Ga
 
 
 @compiled
-def log_likelihood(nu: float, S: float) -> float:
-    """Return the logarithm of the normal density of an innovation nu of variance S, without the constant term."""
-    return -0.5 * (nu * nu / S + math.log(S))
+def exponent(nu: float, S: float) -> float:
+    """Return the exponent of the normal density exp(exponent) / sqrt(2 pi S) of an innovation nu of variance S."""
+    return -0.5 * nu * nu / S
 
 
 @compiled

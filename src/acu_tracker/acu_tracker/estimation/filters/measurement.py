@@ -56,6 +56,13 @@ class Estimate(NamedTuple):
     variances: tuple[AxisVariances, AxisVariances]
 
 
+@compiled
+def weighted(variances: tuple[AxisVariances, AxisVariances], shares: tuple[float, float]) -> AxisVariances:
+    """Return the sum of the variances of both axes, each times its share."""
+    (p, q), (a, b) = variances, shares
+    return AxisVariances(a * p.p11 + b * q.p11, a * p.p12 + b * q.p12, a * p.p22 + b * q.p22)
+
+
 _NONE = AxisInnovation(math.nan, math.nan, math.nan, math.nan, math.nan)
 NO_INNOVATION = Innovation((_NONE, _NONE), math.nan, math.nan)  # innovation of a measurement without a prediction
 

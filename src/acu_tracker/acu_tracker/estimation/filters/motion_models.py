@@ -192,15 +192,15 @@ def mean_transition(model: MotionModelRecord, T: Seconds) -> Transition:
 def cv(model: MotionModelRecord, T: Seconds) -> Discrete:
     """Return the Discrete of constant rate over T."""
     F, k = mean_transition(model, T), model.noise * model.noise
-    return Discrete(F, F, Symmetric(k * T * T * T / 3.0, k * T * T / 2.0, 0.0, k * T, 0.0, 0.0))
+    return Discrete(F, F, Symmetric(k * (T * T * T / 3.0), k * (T * T / 2.0), 0.0, k * T, 0.0, 0.0))
 
 
 @inlined
 def ca(model: MotionModelRecord, T: Seconds) -> Discrete:
     """Return the Discrete of constant acceleration over T."""
     F, k, T2 = mean_transition(model, T), model.noise * model.noise, T * T
-    return Discrete(F, F, Symmetric(k * T2 * T2 * T / 20.0, k * T2 * T2 / 8.0, k * T2 * T / 6.0, k * T2 * T / 3.0,
-                                    k * T2 / 2.0, k * T))
+    return Discrete(F, F, Symmetric(k * (T2 * T2 * T / 20.0), k * (T2 * T2 / 8.0), k * (T2 * T / 6.0),
+                                    k * (T2 * T / 3.0), k * (T2 / 2.0), k * T))
 
 
 @inlined

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from acu_tracker.estimation.filters import axis_filter, unscented
+from acu_tracker.estimation.filters.kalman import Gaussian
 from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.filters.measurement import AxisInnovation, Estimate, Innovation, Measurement, with_rate
 from acu_tracker.geometry.vector import (
@@ -169,11 +170,25 @@ def read(state: Filter) -> Estimate:
 
 
 @compiled
+def read_corrected(state: Filter, constants: Constants) -> Estimate:
+    """Return the Estimate at the last measurement."""
+    if state.running:
+        predict(state, constants, 0.0)
+        return read(state)
+    azimuth, elevation = axis_filter.corrected(state.axis[0]), axis_filter.corrected(state.axis[1])
+    return _of_axes(state, azimuth, elevation)
+
+
+@compiled
 def read_axes(state: Filter) -> Estimate:
     """Return the Estimate of the axis filters alone, at the instant of their last `predict`."""
-    azimuth, elevation = axis_filter.expected(state.axis[0]), axis_filter.expected(state.axis[1])
+    return _of_axes(state, axis_filter.expected(state.axis[0]), axis_filter.expected(state.axis[1]))
+
+
+@compiled
+def _of_axes(state: Filter, azimuth: Gaussian, elevation: Gaussian) -> Estimate:
     return Estimate(Motion(azimuth.x, elevation.x), (axis_filter.variances(state.axis[0], azimuth),
-                                                         axis_filter.variances(state.axis[1], elevation)))
+                                                     axis_filter.variances(state.axis[1], elevation)))
 
 
 @compiled

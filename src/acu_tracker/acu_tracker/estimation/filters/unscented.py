@@ -77,6 +77,7 @@ class State(Record):
     g: Annotated[Floats, (2, N, 3)]     # covariance of z with X; `correct` overwrites it
     points: Annotated[Floats, (2, 3, 3)]    # points, weights, mean, covariance: scratch
     weights: Pair
+    scales: Pair
     mean: Annotated[Floats, (N,)]
     covariance: Annotated[Floats, (N, N)]
 
@@ -299,8 +300,8 @@ def _axis_innovation(state: State, i: int, measurement: Measurement) -> AxisInno
 
 
 @compiled
-def _corrected(state: State, j: int, azimuth: Radians, elevation: Radians, range_: Meters) -> float:
-    """Correct mode j with a measurement; return the logarithm of its likelihood, without terms equal in both modes.
+def _corrected(state: State, j: int, azimuth: Radians, elevation: Radians, range_: Meters) -> tuple[float, float]:
+    """Correct mode j with a measurement; return exponent and scale of its likelihood, as imm.weigh takes them.
 
     The covariance S of the innovation nu is factored: S = G G', G lower triangular. The correction is X += w n, P -= w
     w'. Here n = G^-1 nu is the standardised innovation, and w is the gain times G. per_G22 is 1 / G22, or 0 without a
@@ -313,13 +314,13 @@ def _corrected(state: State, j: int, azimuth: Radians, elevation: Radians, range
     n0 = wrap(azimuth - state.z[j, 0]) / G00
     n1 = (elevation - state.z[j, 1] - G10 * n0) / G11
     G20 = G21 = n2 = per_G22 = 0.0
-    likelihood = -0.5 * (n0 * n0 + n1 * n1) - math.log(G00 * G11)
+    square, scale = n0 * n0 + n1 * n1, G00 * G11
     if range_ == range_:
         G20 = S[2, 0] / G00
         G21 = (S[2, 1] - G20 * G10) / G11
         per_G22 = 1.0 / math.sqrt(S[2, 2] - G20 * G20 - G21 * G21)
         n2 = (range_ - state.z[j, 2] - G20 * n0 - G21 * n1) * per_G22
-        likelihood += math.log(per_G22) - 0.5 * n2 * n2
+        square, scale = square + n2 * n2, scale / per_G22
     for i in range(N):
         w0 = g[i, 0] / G00
         w1 = (g[i, 1] - G10 * w0) / G11
@@ -330,16 +331,16 @@ def _corrected(state: State, j: int, azimuth: Radians, elevation: Radians, range
         for b in range(a, N):
             state.p[j, a, b] = state.p[j, b, a] = state.p_prior[j, a, b] - (g[a, 0] * g[b, 0] + g[a, 1] * g[b, 1]
                                                                             + g[a, 2] * g[b, 2])
-    return likelihood
+    return -0.5 * square, scale
 
 
 @compiled
 def correct(state: State, measurement: Measurement) -> None:
     """Correct the prediction with a measurement, after `innovation` of it; of a NaN range only the angles are used."""
     for j in range(2):
-        state.weights[j] = _corrected(state, j, measurement.axis[0].angle, measurement.axis[1].angle,
-                                      measurement.range)
-    imm.weigh(state.mu_prior, state.weights, 2, state.mu)
+        state.weights[j], state.scales[j] = _corrected(
+            state, j, measurement.axis[0].angle, measurement.axis[1].angle, measurement.range)
+    imm.weigh(state.mu_prior, state.weights, state.scales, 2, state.mu)
 
 
 @compiled
