@@ -469,7 +469,7 @@ def outcome(verb, arguments, errors):
     wrong = ''
     if hung:
         wrong = f'hangs, {seconds:.1f} s of a core in {WAITING:g} s'
-    elif 'Traceback' in said or os.WIFSIGNALED(status) or os.WEXITSTATUS(status) not in (0, 1):
+    elif 'Traceback' in said or os.WIFSIGNALED(status) or os.WEXITSTATUS(status) not in (0, 1, 2):
         wrong = f'ends with {status}: {lines[-1] if lines else ""}'
     elif verb != 'run' and len(lines) > 1:
         wrong = f'{len(lines)} lines: {lines[0]} / {lines[1]}'

@@ -62,7 +62,7 @@ def test_a_parameter_file_gives_the_arguments_of_the_command(tmp_path):
 
 
 def test_a_run_refuses_a_model_of_the_future(capsys):
-    assert cli.main(['run', 'leo_pass', '--duration', '1', '--param', 'acu.pointing.date=2999-01-01']) == 1
+    assert cli.main(['run', 'leo_pass', '--duration', '1', '--param', 'acu.pointing.date=2999-01-01']) == 2
     assert "pointing.date = '2999-01-01': must not be later than now" in capsys.readouterr().err
 
 

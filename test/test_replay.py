@@ -79,7 +79,8 @@ def test_a_live_acu_answers_as_it_did(pace, run, acu_and_recorder, run_process, 
     pacing = 'lockstep' if pace == ['--lockstep'] else 'realtime'
     acu, recorder = acu_and_recorder(pacing)
     done = run_process([*PEDESTAL, 'replay', run.bag, '--node', 'acu', *pace], 60.0, ROS_DOMAIN_ID=str(domain))
-    assert (done.returncode, done.stderr) == (0, '')
+    said = re.sub('pedestal: waits for acu to subscribe to .* at most\n', '', done.stderr)     # on a busy machine
+    assert (done.returncode, said) == (0, '')
     assert sent(done.stdout) == {name: len(data(run.bag, name)) for name in INPUTS}
     [answered] = re.findall(f'^acu answered (\\d+) of {STEPS} steps$', done.stdout, re.MULTILINE)
     assert int(answered) in ENOUGH[' '.join(pace)]

@@ -15,7 +15,7 @@ import typing
 from collections.abc import Container, Sequence
 
 from pedestal.console import EXIT_ERROR, EXIT_WRONG_COMMAND, STDOUT_PATH
-from pedestal_common.parameters import ParameterError, did_you_mean
+from pedestal_common.parameters import did_you_mean
 
 if typing.TYPE_CHECKING:
     from pedestal.verbs.arguments import Verb
@@ -55,9 +55,10 @@ VERBS = {
 
 EXIT_CLOSED_PIPE = 141  # 128 + number of SIGPIPE, the convention of shells
 COMPLETION_VARIABLE = '_ARGCOMPLETE'  # environment variable of a shell that completes a command line
-WRONG_ARGUMENTS = ParameterError, FileNotFoundError, FileExistsError
-"""Errors of a wrong argument, with ValueError itself. Other subclasses of ValueError are errors in the content of a
-file, such as BagError."""
+WRONG_ARGUMENTS = ValueError, FileNotFoundError, FileExistsError, NotADirectoryError
+DATA_ERROR_NAMES = 'BagError', 'CalibrationError', 'OrderError', 'StreamError'
+"""Names of the errors of recorded data, which are no wrong argument. They are names, because an import of the classes
+would make every verb slow."""
 NEGATIVE_NUMBER_PATTERN = re.compile(r'-\.?\d')  # beginning of an argument that is a negative number
 
 
@@ -112,7 +113,7 @@ def _run(given: Sequence[str]) -> int:
         raise
     except (ValueError, RuntimeError, OSError) as error:
         print(f'pedestal: error: {error}', file=sys.stderr)
-        wrong = type(error) is ValueError or isinstance(error, WRONG_ARGUMENTS)
+        wrong = isinstance(error, WRONG_ARGUMENTS) and type(error).__name__ not in DATA_ERROR_NAMES
         return EXIT_WRONG_COMMAND if wrong else EXIT_ERROR
     except KeyboardInterrupt:
         print(stop.STOP_MESSAGE, file=sys.stderr)

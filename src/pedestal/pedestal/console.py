@@ -34,7 +34,7 @@ EXIT_CODES = {
     0: 'the run came to its planned end, and the recording is complete',
     EXIT_ERROR: 'the run did not start, a node failed, or the recording is not complete; the last line states the '
                 'reason',
-    EXIT_WRONG_COMMAND: 'the command line has a wrong argument',
+    EXIT_WRONG_COMMAND: 'the command line has a wrong argument, or names a file that cannot be used',
     EXIT_DISTURBED: 'a realtime run ended early, or its drive lost more than 1 % of its steps (steps in the 5 s after '
                     'a node died are not counted)',
     EXIT_FAILED_RUN: 'the drive tripped, a command of the scenario was refused, or the antenna never tracked a '

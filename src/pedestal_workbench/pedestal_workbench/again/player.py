@@ -36,7 +36,7 @@ KEY_HELP = 'space: pause, resume   n or right arrow: one step   q: quit'
 MAX_UNACKNOWLEDGED_MESSAGES = 1000
 """Largest number of unacknowledged messages of a topic. Fast DDS keeps 5000, and refuses more."""
 
-QUIET_WAIT_S = 1.0  # time of the wait for a subscriber before it is announced [s]
+QUIET_WAIT_S = 3.0  # time of the wait for a subscriber before it is announced [s]
 DISCOVERY_SETTLING_S = 0.5
 """Time from the discovery of the last subscriber to the first message [s]. Other nodes discover each other in it."""
 
