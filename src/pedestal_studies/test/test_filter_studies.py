@@ -275,6 +275,6 @@ def test_the_command_takes_runs_and_workers(pedestal, tmp_path):
     (('manoeuvre', '--scheduler', 'x'), '--scheduler x: must be an address')])
 def test_runs_and_workers_that_cannot_be_are_refused(arguments, message, tmp_path, pedestal):
     code, output, errors = pedestal('study', *arguments)
-    assert (code, output) == (1, '')
+    assert (code, output) == (2, '')
     assert errors.startswith(f'pedestal: error: {message}') and len(errors.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []

@@ -67,4 +67,4 @@ def test_bias_takes_the_backlash_out_of_a_plant(pedestal, tmp_path):
     (('servo', '--scenario', 'leo_pas'), "did you mean 'leo_pass'?")])
 def test_refused(pedestal, arguments, expected):
     code, output, errors = pedestal('study', *arguments)
-    assert (code, output) == (1, '') and expected in errors and errors.count('\n') == 1
+    assert (code, output) == (2, '') and expected in errors and errors.count('\n') == 1

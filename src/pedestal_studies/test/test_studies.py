@@ -133,5 +133,5 @@ def test_a_misspelt_study_is_guessed(pedestal, tmp_path):
 def test_a_place_that_cannot_be_written_is_refused_before_the_work(option, place, pedestal, tmp_path):
     (tmp_path / 'file').write_text('')
     code, output, errors = pedestal('study', 'servo', option, tmp_path / place)
-    assert (code, output) == (1, '')
+    assert (code, output) == (2, '')
     assert len(errors.strip().splitlines()) == 1 and place.strip('.') in errors

@@ -260,7 +260,7 @@ def test_too_few_offsets_are_refused_with_the_file(tmp_path, capsys):
     file.write_text(table(station(6)))
     assert cli.main(['calibrate', 'pointing', '--offsets', str(file)]) == 2
     assert f'pedestal: error: {file}: 6 points, must be at least 10 for 7 terms' in capsys.readouterr().err
-    assert cli.main(['calibrate', 'pointing', '--offsets', str(tmp_path / 'none.csv')]) == 1
+    assert cli.main(['calibrate', 'pointing', '--offsets', str(tmp_path / 'none.csv')]) == 2
     assert 'none.csv: No such file or directory' in capsys.readouterr().err
 
 

@@ -107,12 +107,14 @@ def estimate(recordings: Sequence[DriveRecording], motions: Sequence[Motion], na
     axes = [getattr(recording.drive, name) for recording in recordings]
     gravity = name == 'elevation'
     loads = [motion.load_torque(axis) for motion, axis in zip(motions, axes)]
+    # Teeth that rattle without bias torque hide the mode.
+    in_contact = [(motion, load) for motion, load, axis in zip(motions, loads, axes) if axis.bias.schedule != 'off']
     found: Estimates = {}
     for _ in range(PASS_COUNT):
         # At a constant rate a dish may swing for seconds, so the friction needs the inertias and the inertias need it.
         pieces = np.concatenate([constant_rates(motion, load, found) for motion, load in zip(motions, loads)])
         found = dict(estimates.friction(pieces, gravity))
-        found |= mode.identify(list(zip(motions, loads)), found, gravity, flexible)
+        found |= mode.identify(in_contact or list(zip(motions, loads)), found, gravity, flexible)
     found |= estimates.lash([(motion, motion.mesh_torque(axis)) for motion, axis in zip(motions, axes)],
                             axes[0].gear_train.ratio)
     return found
