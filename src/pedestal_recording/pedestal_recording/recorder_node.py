@@ -134,6 +134,7 @@ class RecorderNode(shell.Shell):
         self._lost: collections.Counter[str] = collections.Counter()    # messages of a topic
         self._heard: dict[str, TopicPublishers] = {}    # by topic, in realtime
         self._stamp: Nanoseconds = self.graph.start     # newest time of the drive
+        self._has_time = self.graph.lockstep or self.graph.start > 0    # False before the first time of the drive
         self._last_step: Nanoseconds = sys.maxsize      # time of the drive that ended the run
         self._without_stamp = 0     # number of messages without a valid stamp
         self._received = [0] * len(recorded)    # number of messages of each recorded topic
@@ -300,11 +301,11 @@ class RecorderNode(shell.Shell):
             if abs(stamp - now) < MAX_STAMP_DISTANCE_NS and stamp <= latest:
                 return stamp
             self._without_stamp += 1
-        return self._stamp
+        return self._now()
 
     def _now(self) -> Nanoseconds:
         """Return the time of the drive. Before its first message in realtime, UTC takes its place."""
-        return self._stamp or (0 if self.graph.lockstep else self.clock()[1])
+        return self._stamp if self._has_time else self.clock()[1]
 
     def _on_arrival(self, index: int, topic: nodes.Link) -> Take:
         """Return the function that writes a message of a topic at its arrival in realtime."""
@@ -340,7 +341,7 @@ class RecorderNode(shell.Shell):
         if self.graph.lockstep and stamp // NS_PER_SECOND > self._stamp // NS_PER_SECOND:
             assert self.diagnostics
             self.diagnostics.publish(self._stamp)
-        self._stamp = stamp
+        self._stamp, self._has_time = stamp, True
         if self._end is not None and stamp - self.epoch(stamp) >= self._end:
             self._last_step = min(self._last_step, stamp)
             self.finished = True

@@ -81,7 +81,7 @@ def test_start_and_duration_count_from_the_first_step_and_keep_what_holds(tmp_pa
     assert marks(played(recording, ALL, 3 * T / 1e9)) == [(4, ['program', 'g', 'i'])]
     assert marks(played(recording, ALL, T / 1e9, T / 1e9)) == [
         (2, ['g', 'stow', 'd', 'e', 'c', 'b', 'a']), (3, ['preset', 'program', 'h'])]
-    with pytest.raises(bag.BagError, match=r'bag: no message from 1 s on; the recording is 0\.015 s long'):
+    with pytest.raises(ValueError, match=r'--start 1 s: .*bag has no message from there on; .* 0\.015 s long'):
         played(recording, ALL, 1.0)
     with pytest.raises(bag.BagError, match='no message of ship/truth'):
         played(recording, ['ship/truth'])
@@ -113,7 +113,7 @@ REFUSED = {
     'lockstep without a node': (['--lockstep'], '--lockstep: set --node to a node that answers the steps; must be'),
     'lockstep with the INS': (['--lockstep', '--node', 'ins'], '--lockstep: ins does not answer steps at their stamp'),
     'paused for ever': (['--paused'], '--paused: standard input must be a terminal'),
-    'past the end': (['--start', '7'], 'no message from 7 s on; the recording is 0.015 s long'),
+    'past the end': (['--start', '7'], 'bag has no message from there on; the recording is 0.015 s long'),
 }
 
 

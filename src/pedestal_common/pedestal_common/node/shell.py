@@ -253,6 +253,12 @@ class Shell(Node):
             self._epoch = stamp // (SECONDS_PER_DAY * NS_PER_SECOND) * SECONDS_PER_DAY * NS_PER_SECOND
         return self._epoch
 
+    @property
+    def run_start(self) -> Nanoseconds:
+        """Return the UTC at which the run begins, 0 without one: `graph.start`, or the time that equipment has chosen
+        in its place."""
+        return self.graph.start and (self._epoch or 0)
+
     def writer(self, name: str) -> Callable[[bytes], None]:
         """Return a function that publishes the CDR bytes of a message on a topic of the graph."""
         link, ros_name = self._link(name)

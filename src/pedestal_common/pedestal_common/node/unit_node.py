@@ -297,7 +297,7 @@ class UnitNode(shell.Shell):
         steps = self.steps
 
         def take(message: records.Decoded, after_gap: bool) -> None:
-            if message[0] < self.graph.start:     # equipment that runs before the run
+            if message[0] < self.run_start:     # equipment that runs before the run
                 return
             if message[0] <= self._stamp:
                 self._look_for_replay()
@@ -353,10 +353,10 @@ class UnitNode(shell.Shell):
             self.get_logger().warning(f'{name}: {response.message}')
 
     def _watch_trigger(self) -> None:
-        """Set `silent` of the units while the trigger is absent, except after a stall and before graph.start."""
+        """Set `silent` of the units while the trigger is absent, except after a stall and before the run."""
         assert self.steps
         now, limit = time.monotonic_ns(), self.graph.silence * NS_PER_SECOND
-        if self.clock()[1] < self.graph.start:
+        if self.clock()[1] < self.run_start:
             self._answered = self._begun = now
         stalled, self._watched = now - self._watched > limit, now
         # A step that waits for its inputs has a trigger, but no answer yet.

@@ -39,7 +39,7 @@ def selected_topics(bag: bags.Bag, input_nodes: Sequence[str], names: Sequence[s
     """Return the topics in names, without names the inputs of input_nodes that none of these nodes publishes, and
     without both all topics.
 
-    Raises BagError for a topic that is not in the bag, an unknown node, or a node without inputs in the bag.
+    Raises ValueError for an unknown node, BagError for a topic or all inputs of a node that are not in the bag.
     """
     if names:
         return bags.chosen_topics(bag, names)
@@ -49,8 +49,8 @@ def selected_topics(bag: bags.Bag, input_nodes: Sequence[str], names: Sequence[s
     graph, known = bag.graph, nodes.members(nodes.NODE_NAMES, bag.beams)
     for node in input_nodes:
         if node not in known:
-            raise bags.BagError(f'--node {node}: unknown node;{did_you_mean(node, known)} must be one of '
-                                f'{", ".join(known)}')
+            raise ValueError(f'--node {node}: unknown node;{did_you_mean(node, known)} must be one of '
+                             f'{", ".join(known)}')
         inputs = [name for name in bag.topics
                   if reads(graph, node, name) and not any(writes(graph, other, name) for other in input_nodes)]
         if not inputs:
@@ -64,7 +64,7 @@ class Playlist:
     """Messages of some topics of a bag, in the order that the module states. start: counted from `origin`.
 
     Because a latched message stays valid, the last message of each latched topic before the start comes first.
-    Raises BagError if there are no messages.
+    Raises BagError if there are no messages, ValueError if there are none from the start on.
     """
 
     def __init__(self, bag: bags.Bag, names: Sequence[str], start: Seconds, duration: Seconds | None) -> None:
@@ -92,8 +92,8 @@ class Playlist:
         held = np.array([before[ranks[before] == topic][-1] for topic in np.unique(ranks[before])], int)
         inside = np.flatnonzero((stamps >= begin) & (stamps <= stop))
         if not inside.size:
-            raise bags.BagError(f'{bag.path}: no message from {start:g} s on; the recording is '
-                                f'{(self.end - self.origin) / NS_PER_SECOND:g} s long')
+            raise ValueError(f'--start {start:g} s: {bag.path} has no message from there on; the recording is '
+                             f'{(self.end - self.origin) / NS_PER_SECOND:g} s long')
         self.first, self.last = int(stamps[inside[0]]), int(stamps[inside[-1]])
         stamps[held] = self.first
         chosen = np.concatenate((held, inside))
