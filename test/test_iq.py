@@ -197,7 +197,8 @@ def test_a_pass_is_tracked_from_samples_and_computed_again(start_run, patient, p
     if feed != 'three_channels':
         code, _, said = pedestal('calibrate', 'receiver', '--bag', run.bag, '--iq', samples)
         assert code == 1 and f'feed.kind = {feed}: must be three_channels with --iq' in said
-    # The samples of the last 2 s are cut off, some of them from after the run: the errors that need them are missing, and are named.
+    # The samples of the last 2 s are cut off, some of them from after the run: the errors that need them are missing,
+    # and are named.
     data = samples.with_suffix('.sigmf-data')
     data.write_bytes(data.read_bytes()[:-100 * 8 * (3 if feed == 'three_channels' else 2) * BLOCK - 7])
     code, said, _ = pedestal('recompute', run.bag, '--iq', samples)

@@ -61,12 +61,12 @@ def test_a_track_that_rises_and_sets_within_the_run_says_so(tmp_path):
     assert rises.startswith('the target rises after 5.') and sets.startswith('the target sets after 15.0')
     masked = Plan(scenario.load('track_file', [f'tracking_receiver.target.track_file.path={path}',
                                                'tracking_receiver.receiver.horizon_mask=0.04'])).announced()
-    assert masked[-2].startswith('the target rises above the horizon mask of 2.29 deg after 7.')
-    assert masked[-1].startswith('the target sets below the horizon mask of 2.29 deg after 12.')
+    assert any(line.startswith('the target rises above the horizon mask of 2.29 deg after 7.') for line in masked)
+    assert any(line.startswith('the target sets below the horizon mask of 2.29 deg after 12.') for line in masked)
     never = Plan(scenario.load('track_file', [f'tracking_receiver.target.track_file.path={path}',
                                               'tracking_receiver.receiver.horizon_mask=0.2'])).announced()
-    assert never[-1] == ('the target never rises above the horizon mask of 11.5 deg, highest 5.0 deg: nothing can be '
-                         'tracked')
+    assert ('the target never rises above the horizon mask of 11.5 deg, highest 5.0 deg: nothing can be '
+            'tracked') in never
 
 
 @pytest.mark.parametrize('before, said', [(0.8, False), (1.9, False), (2.5, True)])
