@@ -120,6 +120,8 @@ class Identified(Calibration):
             off = any(getattr(recording.drive, name).bias.schedule == 'off' for recording in self.recordings)
             missing.append('lash: not shown, because no motor changes the sign of a firm torque'
                            + ('' if off else f'; add a run with adu.{name}.bias.schedule=off'))
+        elif 'stiffness' not in found:
+            missing.append('stiffness: not shown, because the torques of the motions twist the gears too little')
         if 'frequency' not in found:
             missing.append('structure: no mode between 2 and 30 Hz shows in the torque, or a rigid twin shows it too')
         if 'stribeck_rate' not in found:
