@@ -196,9 +196,9 @@ def test_a_pass_is_tracked_from_samples_and_computed_again(start_run, patient, p
     assert code == 2 and 'give their file with --iq' in said
     if feed != 'three_channels':
         code, _, said = pedestal('calibrate', 'receiver', '--bag', run.bag, '--iq', samples)
-        assert code == 1 and f'feed.kind = {feed}: must be three_channels with --iq' in said
-    # The samples of the last 2 s are cut off, some of them from after the run: the errors that need them are missing,
-    # and are named.
+        assert code == 2 and f'feed.kind = {feed}: must be three_channels with --iq' in said
+    # The samples of the last 2 s, of which some are later than the run, are cut off: the errors that need them are
+    # missing, and are named.
     data = samples.with_suffix('.sigmf-data')
     data.write_bytes(data.read_bytes()[:-100 * 8 * (3 if feed == 'three_channels' else 2) * BLOCK - 7])
     code, said, _ = pedestal('recompute', run.bag, '--iq', samples)
@@ -235,7 +235,7 @@ def test_the_calibration_matrix_is_measured_from_a_run_and_its_samples(start_run
     data = samples.with_suffix('.sigmf-data')
     np.fromfile(data, np.complex64).reshape(-1, 3)[:, [0, 2, 1]].tofile(data)
     code, _, said = pedestal('calibrate', 'receiver', '--bag', run.bag, '--iq', samples)
-    assert code == 1 and 'differ by' in said and 'both must be of the same run' in said
+    assert code == 2 and 'differ by' in said and 'both must be of the same run' in said
 
 
 def test_a_calibration_of_other_recordings_is_refused(pedestal):
