@@ -79,7 +79,7 @@ def test_a_target_that_reverses_is_no_reversed_slope(name):
         assert done['acu/mode'][-1] == Mode.AUTOTRACK and not state['tracking']['divergence']['diverged']
 
 
-@pytest.mark.parametrize('wrong', ['slope_factor=2', 'cross_coupling=0.6', 'slope_factor=0.5', 'phase_error=0.8'])
+@pytest.mark.parametrize('wrong', ['slope_factor=2', 'cross_coupling=0.4', 'slope_factor=0.5', 'phase_error=0.8'])
 def test_errors_that_are_merely_wrong_are_tracked(wrong):
     done = run(f'tracking_receiver.antenna.{wrong}')
     assert done['acu/mode'][-1] == Mode.AUTOTRACK and off(done)[-200:].max() < 0.2

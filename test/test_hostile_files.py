@@ -43,7 +43,7 @@ def refused(tmp_path, capsys, one_line):
     def check(name):
         path = hostile_files.CRAFTED[name](hostile_files.Files(tmp_path, None))
         [arguments] = hostile_files.commands(path, tmp_path).values()
-        assert hostile_files.cli.main(['run', *arguments]) == 1
+        assert hostile_files.cli.main(['run', *arguments]) == 2
         assert str(path) in one_line(capsys.readouterr().err)
         if path.is_file():
             path.unlink()

@@ -172,7 +172,8 @@ class PassSelection:
         duration    None for the time up to the set
         start       value of --start
         """
-        which = which or (start if start and _instant('--start', start) else 'next')
+        if which is None:
+            which = start if start and _instant('--start', start) else 'next'
         p = passes.chosen_pass(self.satellite, self.station, which, self.now, self.least)
         begin = _start(p, which, duration, start)
         if p.duration > passes.MAX_RUN_S:
