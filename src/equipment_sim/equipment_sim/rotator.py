@@ -77,7 +77,7 @@ class Axes:
             self.set_points = list(self.angles)
 
     @property
-    def told(self) -> tuple[Degrees, Degrees]:
+    def reported(self) -> tuple[Degrees, Degrees]:
         """Angles of an answer."""
         low = {'travel': -math.inf, '0..360': 0.0, '-180..180': -180.0}[self.habits.circle]
         azimuth, elevation = self.angles
@@ -106,7 +106,7 @@ def gs232(axes: Axes, request: bytes) -> bytes:
     habits, answer = axes.habits, b''
     if request.strip() in (b'C2', b'C'):
         parts = [(b'+' if habits.signs and angle >= 0.0 else b'') + axes.number(angle, 0, 4 if habits.signs else 3)
-                 for angle in axes.told]
+                 for angle in axes.reported]
         if habits.signs:
             parts = [part.replace(b'-', b'-0', 1) if len(part) < 5 else part for part in parts]
         else:
@@ -133,8 +133,8 @@ def easycomm(axes: Axes, request: bytes) -> bytes:
         goal = float(found[2])
         axes.go(*((goal, None) if found[1] == b'AZ' else (None, goal)))
     asked = [i for i, name in enumerate((b'AZ', b'EL')) if name in words and not (i and habits.azimuth_only)]
-    texts = [(b'+' if axes.told[i] >= 0.0 else b'') + axes.number(axes.told[i], 1) if habits.signs
-             else (b'AZ', b'EL')[i] + axes.number(axes.told[i], 1) for i in asked]
+    texts = [(b'+' if axes.reported[i] >= 0.0 else b'') + axes.number(axes.reported[i], 1) if habits.signs
+             else (b'AZ', b'EL')[i] + axes.number(axes.reported[i], 1) for i in asked]
     if habits.signs or habits.two_lines:
         return b''.join(axes.line(text) for text in texts)
     return axes.line(b' '.join(texts)) if texts else b''
@@ -144,7 +144,7 @@ def rotctld(axes: Axes, request: bytes) -> bytes:
     """Return the answer of rotctld to a line."""
     word, *given = request.split() or [b'']
     if word == b'p':
-        return b''.join(axes.line(axes.number(angle, 2)) for angle in axes.told)
+        return b''.join(axes.line(axes.number(angle, 2)) for angle in axes.reported)
     if word == b'S':
         axes.stop()
     elif word == b'P' and len(given) == 2 and not (axes.habits.azimuth_only and float(given[1])):
@@ -163,7 +163,7 @@ def rot1prog(axes: Axes, frame: bytes) -> bytes:
         return b''
     if frame[11] == 0x0F:
         axes.stop()
-    return b'W' + bytes(digit - 48 for digit in b'%03d' % round(360.0 + axes.told[0])) + b' '
+    return b'W' + bytes(digit - 48 for digit in b'%03d' % round(360.0 + axes.reported[0])) + b' '
 
 
 def rot2prog(axes: Axes, frame: bytes) -> bytes:
@@ -178,7 +178,7 @@ def rot2prog(axes: Axes, frame: bytes) -> bytes:
             return b''
     if frame[11] == 0x0F:
         axes.stop()
-    digits = [b'%04d' % round(10.0 * (360.0 + angle)) for angle in axes.told]
+    digits = [b'%04d' % round(10.0 * (360.0 + angle)) for angle in axes.reported]
     azimuth, elevation = (bytes(digit - 48 for digit in number) for number in digits)
     return b'W' + azimuth + bytes([pulses]) + elevation + bytes([pulses]) + b' '
 

@@ -172,26 +172,26 @@ def test_other_pulses_of_a_device_trip_the_drive_and_its_reset_adopts_them():
     assert station.axes.angles == pytest.approx((50.0, 45.0)) and station.unit.condition == 'enabled'
 
 
-@pytest.mark.parametrize(('protocol', 'habits', 'told'), [
+@pytest.mark.parametrize(('protocol', 'habits', 'reason'), [
     ('rot2prog', {'pulses': 0}, '0 and 0 pulses per degree: must be 1 to 10'),
     ('gs232', AZIMUTH_ONLY, 'the answer has no elevation; the parameter fixed_elevation'),
 ])
-def test_an_answer_that_cannot_be_used_is_refused_by_name_before_any_motion(protocol, habits, told):
+def test_an_answer_that_cannot_be_used_is_refused_by_name_before_any_motion(protocol, habits, reason):
     line = Line('device', functools.partial(PROTOCOLS[protocol], False), 0.2, 0.05)
     with pytest.raises(OSError, match='no position'):
         line.ask(Terminal(protocol, Axes(6.0, 0.0, build(Habits, habits))))
-    assert told in line.fault
+    assert reason in line.fault
 
 
-@pytest.mark.parametrize(('given', 'told'), [
+@pytest.mark.parametrize(('given', 'reason'), [
     ({'protocol': 'rot1prog'}, 'fixed_elevation: must be given'),
     ({'azimuth_circle': '0..360', 'azimuth.high': 450.0}, 'must be travel with a travel above 360 deg'),
     ({'protocol': 'rot2prog', 'azimuth.high': 700.0}, 'at most 639.9 deg, the range of rot2prog'),
     ({'protocol': 'gs232', 'elevation.low': -5.0}, 'must be at least 0 deg'),
     ({'protocol': 'gs232', 'azimuth_circle': '-180..180'}, 'must be at least 0 deg'),
 ])
-def test_parameters_that_no_device_of_the_protocol_has(given, told):
-    with pytest.raises(ParameterError, match=told):
+def test_parameters_that_no_device_of_the_protocol_has(given, reason):
+    with pytest.raises(ParameterError, match=reason):
         build(RotatorParameters, given)
 
 
