@@ -14,7 +14,7 @@
 PYTHON ?= python3
 PACKAGES := pedestal_common receiver_law drive_law ship_motion_sim tracking_receiver_sim acu_tracker adu_drive \
 	pedestal_operator pedestal_recording pedestal_results pedestal_hardware equipment_sim pedestal_bringup pedestal_workbench \
-	pedestal_studies pedestal
+	pedestal_station pedestal_studies pedestal
 ROS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
 # pip would write the bytecode of all that it installs on one core, tests of others included; here that of the product is
 # written on all cores, and the rest when it is imported.

@@ -38,6 +38,7 @@ EXECUTABLES = {
                       'simulated_drives_node': 'pedestal_common.node.run:main'},
     'pedestal_bringup': {},
     'pedestal_workbench': {},
+    'pedestal_station': {},
     'pedestal_studies': {},
     'pedestal': {'pedestal': 'pedestal.cli:main'},
 }
