@@ -100,7 +100,7 @@ SECTIONS = {
 PAGES = tuple(page for pages in SECTIONS.values() for page in pages)
 BUILT_PAGES = ('docs/reference/verbs.md', 'docs/reference/laws.md')
 """Pages that only the book has, because tools/book.py makes them. No page of the checkout has a link to them."""
-MAX_WORDS = 45_000 + 2 * 800  # largest number of words of all pages with a limit: of 39 pages, and of the two of a night of passes
+MAX_WORDS = 45_000 + 2 * 800  # largest number of words: of 39 pages, and of two of a night of passes
 BUDGET_MARGIN = 1.1  # factor of its limit up to which a page needs no reason
 
 
