@@ -34,6 +34,7 @@ VERBS = {
     'operate': ('operate', 'operate a running antenna by hand on this terminal'),
     'live': ('operate', 'show a running graph in Foxglove or Lichtblick'),
     'program': ('operate', 'send a table of times and angles (program track) of a scenario to a running ACU'),
+    'plan': ('plan', 'plan a night of passes: which satellites the antenna tracks, when, and what it will lose'),
     'simulate': ('simulate', 'simulate equipment as a program of its own, to rehearse with'),
     'verify': ('recordings', 'prove that a recording is complete up to the planned end of its run'),
     'recover': ('recordings', 'make a readable bag from the undamaged part of a bag'),

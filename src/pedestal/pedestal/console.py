@@ -25,6 +25,7 @@ if typing.TYPE_CHECKING:    # these imports are slow, and most verbs need none o
 
     from pedestal_common.quantities import Row, Seconds
     from pedestal_results.results import Result, Values
+    from pedestal_station.night import Night
     from pedestal_workbench.trials.solve import Tried
 
     _Columns: typing.TypeAlias = Iterable[progress.ProgressColumn]
@@ -335,6 +336,15 @@ def _without_hidden_factors(rows: Sequence[Row]) -> list[Row]:
 
 
 _COMPARISON_KEYS = 'rate', 'difference', 'gain', 'ratio', 'wins'    # of the rows that are no statistics of a result
+
+
+def show_night(night: Night) -> None:
+    """Print the plan of a night as a table."""
+    from pedestal_station.outputs import table
+    left_out = _show_fitted(table.COLUMNS, table.cells(night), table.OPTIONAL_COLUMNS, table.title(night))
+    if left_out:
+        print(f'not shown for want of space: {", ".join(left_out)}; a wider terminal (COLUMNS={MIN_TABLE_COLUMNS}), '
+              '--csv or --html has them')
 
 
 def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:

@@ -17,7 +17,7 @@ from rclpy.task import Future
 
 from pedestal_common import parameters
 from pedestal_common.graph.nodes import Node
-from pedestal_common.quantities import Message, Seconds
+from pedestal_common.quantities import Json, Message, Seconds
 from pedestal_common.wire import commands
 from pedestal_operator.page import page_security, page_sky, page_state
 from pedestal_operator.page.page_log import Log
@@ -48,6 +48,7 @@ class PageNode(Remote, page_state.PageAntenna):
     _history: collections.deque[list[float]]                                # rows of the strip charts
     _parameter_requests: dict[str, tuple[Client | None, Future | None]]     # {node: client, pending request}
     _sent_log_revision: int | None
+    _night: dict[str, Json] | None      # of a station, page_state.night
 
     def __init__(self, row: Node) -> None:
         super().__init__(row.name, 'page', parameters_type=PageParameters)
@@ -57,7 +58,7 @@ class PageNode(Remote, page_state.PageAntenna):
         self._pages = PageRequests(self._request_for, self.replied,
                                    lambda client, message: self._server.reply(client, message),
                                    lambda: self.texts.get('acu/mode') == 'rate')
-        self._parameter_requests, self._sent_log_revision = {}, None
+        self._parameter_requests, self._sent_log_revision, self._night = {}, None, None
         self.connect_drive()
         p = self.parameters
         names = [name.strip() for name in p.names.split(',') if name.strip()]
@@ -71,6 +72,7 @@ class PageNode(Remote, page_state.PageAntenna):
         self.message_reader('ins/state', self._text_taker('ins/state'))
         self.message_reader('acu/blockage', self._text_taker('acu/blockage'))
         self.message_reader('acu/program_track', self._take_program)
+        self.message_reader(page_state.NIGHT_TOPIC, self._take_night)
         for role in page_security.PAGE_ROLES:
             print(f'page, {role}: {self._server.access.url(role)}', flush=True)
         self.every(POLL_PERIOD_S, self._take_commands)
@@ -113,6 +115,9 @@ class PageNode(Remote, page_state.PageAntenna):
         path = page_sky.path(message, page_state.epoch(self))
         self.path = self.path if path is None else path
 
+    def _take_night(self, message: Message) -> None:
+        self._night = page_state.night(message.data)
+
     def _take_commands(self) -> None:
         now = time.monotonic()
         while not self._server.requests.empty():
@@ -137,7 +142,9 @@ class PageNode(Remote, page_state.PageAntenna):
             self._request_parameters(node, names)
         if self.present('joint_states'):
             self._beam_history.add(self.now, page_state.now(self)['beam'])
-        self._server.publish({'fixed': page_state.fixed(self), 'past': self._beam_history.places,
+        # The last message of a station that has ended is latched in this node, but no longer valid.
+        night = self._night if self.publishers_of(self.resolve_topic_name(page_state.NIGHT_TOPIC)) else None
+        self._server.publish({'fixed': page_state.fixed(self), 'past': self._beam_history.places, 'night': night,
                               'sky': page_state.sky(self, self._upcoming_passes.look(self))})
 
     def _request_parameters(self, node: str, names: Sequence[str]) -> None:

@@ -6,7 +6,7 @@ import itertools
 import os
 import pathlib
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from pedestal import console
 from pedestal_common.parameters import flatten, option_of
@@ -235,11 +235,11 @@ def refuse_given(options: argparse.Namespace, names: Iterable[str], reason: str,
             raise ValueError(f'{option_of(name)}{text if stated else ""}: {reason}')
 
 
-def check_result_files(options: argparse.Namespace, *more: str) -> None:
-    """Check --output, --report and --json, and the options `more` that name new files. Raises ValueError, also for two
-    options of which one would overwrite the file of the other."""
+def check_result_files(options: argparse.Namespace, *more: str, new: Sequence[str] = ('output', 'report')) -> None:
+    """Check --json, and the options `new` and `more` that name new files. Raises ValueError, also for two options of
+    which one would overwrite the file of the other."""
     console.check_json(options.json)
-    new = ('output', 'report', *more)
+    new = (*new, *more)
     for name in new:
         check_new_file(option_of(name), getattr(options, name))
     paths = [(name, path) for name, given in vars(options).items()

@@ -1,5 +1,6 @@
 """Content of the page of the operator: the sections of the state, of an antenna or of a recording. No ROS here."""
 import abc
+import json
 import math
 from collections.abc import Iterable, Mapping
 
@@ -16,6 +17,8 @@ MOTOR_STATES_TOPIC = 'adu/motor_states'
 ATTITUDE_TOPIC = 'ship/imu/data'
 EXTRA_NUMBER_TOPICS = (MOTOR_STATES_TOPIC, ATTITUDE_TOPIC)
 
+NIGHT_TOPIC = 'station/night'
+PASS_STATES = 'queued', 'running', 'done', 'failed', 'skipped', 'dropped'
 TEXT_TOPIC_BY_NAME = {'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}  # {name on the page: topic of the text}
 
 ELEMENT_PARAMETERS = 'line_1', 'line_2', 'omm'
@@ -114,6 +117,19 @@ def station(antenna: PageAntenna) -> GivenStation:
     """Return the position of an antenna, as far as it is known."""
     return GivenStation(*(antenna.configuration.get(f'prediction.station.{name}', NOT_GIVEN)
                           for name in STATION_NAMES))
+
+
+def night(text: str) -> dict[str, Json] | None:
+    """Return the night of a station from its text: what it does now, and its passes with times in UTC [s]. None for a
+    text of another form."""
+    try:
+        given = json.loads(text)
+        found = [{'case': str(each['case']), 'begin': float(each['begin']), 'end': float(each['end']),
+                  'highest': float(each['max_elevation_deg']), 'state': PASS_STATES[PASS_STATES.index(each['state'])],
+                  'text': str(each['text'])} for each in given['passes']]
+        return {'now': str(given['now']), 'passes': found}
+    except (ValueError, TypeError, KeyError, RecursionError):
+        return None
 
 
 def fixed(antenna: PageAntenna) -> dict[str, Json]:

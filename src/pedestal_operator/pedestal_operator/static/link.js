@@ -5,7 +5,7 @@ const MAX_STATE_AGE_MS = 1000;  // after which the state on the page is stale
 const SILENCE_TIMEOUT_MS = 5000;  // after which a silent web socket counts as lost, as on the server
 const DRAW_PERIOD_MS = 50;  // equal to the period of the state
 
-export const state = {now: null, status: null, fixed: null, sky: null, alarms: [], log: [], replay: null};
+export const state = {now: null, status: null, fixed: null, sky: null, night: null, alarms: [], log: [], replay: null};
 export const me = {name: localStorage.getItem('name') || '', role: '', refused: {}, open: false};
 
 const receivers = [];

@@ -7,7 +7,8 @@ import * as header from './header.js';
 import * as link from './link.js';
 import * as lists from './lists.js';
 import * as loss from './loss.js';
+import * as night from './night.js';
 import * as replay from './replay.js';
 import * as sky from './sky.js';
 
-for (const part of [header, hands, axes, charts, sky, lists, replay, figures, loss, link]) part.begin();
+for (const part of [header, hands, axes, charts, sky, night, lists, replay, figures, loss, link]) part.begin();

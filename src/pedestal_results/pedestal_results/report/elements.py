@@ -43,11 +43,11 @@ BROWSERS = 'chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stabl
 MAX_PRINT_TIME_S = 300.0  # longest time for the print of a page [s]
 
 
-def page(title: str, parts: Iterable[str]) -> str:
-    """Return the text of an HTML page; parts: its elements as texts."""
+def page(title: str, parts: Iterable[str], css: str = '') -> str:
+    """Return the text of an HTML page; parts: its elements as texts; css: rules beside those of every page."""
     return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f'<title>{html.escape(title)}</title><style>{PAGE_CSS}</style></head>\n<body>\n'
+            f'<title>{html.escape(title)}</title><style>{PAGE_CSS}{css}</style></head>\n<body>\n'
             + '\n'.join(parts) + '\n</body></html>\n')
 
 

@@ -1,0 +1,157 @@
+"""A night as numbers: the metrics of a pass, which the JSON, the CSV and the page share, and the plan in words."""
+import csv
+import datetime
+import io
+import math
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.quantities import Json, Seconds, SingleRow
+from pedestal_station import objects
+from pedestal_station.night import Night, Pass, Share
+
+LOSS_REASONS = 'keyhole', 'blockage', 'sun', 'travel', 'limit of the elevation', 'rate of the elevation'
+WHOLE, TRIMMED, DROPPED = 'whole', 'trimmed', 'dropped'
+NUMBER_DIGITS = 6  # digits after the point of a number in a file
+
+
+class Line(NamedTuple):
+    """A pass with what the exact and the greedy plan do with it."""
+    night: Night
+    each: Pass
+    share: Share
+    greedy: Share
+
+
+class Metric(NamedTuple):
+    """A number of a pass."""
+    name: str
+    unit: str
+    value: Callable[[Line], float]  # NaN if it does not exist
+
+
+def _seconds(reason: str) -> Callable[[Line], float]:
+    return lambda line: sum(loss.seconds for loss in line.each.prediction.losses if loss.reason == reason)
+
+
+def _degrees(name: str, axis: int) -> Callable[[Line], float]:
+    return lambda line: math.degrees(getattr(line.each.prediction, name)[axis])
+
+
+METRICS = (
+    Metric('rise_s', 's', lambda line: line.each.window.rise),
+    Metric('culmination_s', 's', lambda line: line.each.window.culmination),
+    Metric('set_s', 's', lambda line: line.each.window.set),
+    Metric('max_elevation_deg', 'deg', lambda line: math.degrees(line.each.window.max_elevation)),
+    Metric('peak_azimuth_rate_deg_s', 'deg/s', _degrees('peak_rate', 0)),
+    Metric('loss_s', 's', lambda line: line.each.prediction.loss),
+    Metric('taken', '', lambda line: line.share.taken),
+    Metric('begin_s', 's', lambda line: line.share.begin),
+    Metric('end_s', 's', lambda line: line.share.end),
+    Metric('greedy_begin_s', 's', lambda line: line.greedy.begin),
+    Metric('greedy_end_s', 's', lambda line: line.greedy.end),
+    Metric('priority', '', lambda line: line.each.object.priority),
+    Metric('elements_age_d', 'd', lambda line: line.each.prediction.age / SECONDS_PER_DAY),
+    Metric('culminations', '', lambda line: len(line.each.window.culminations)),
+    Metric('peak_elevation_rate_deg_s', 'deg/s', _degrees('peak_rate', 1)),
+    Metric('peak_azimuth_acceleration_deg_s2', 'deg/s2', _degrees('peak_acceleration', 0)),
+    Metric('peak_elevation_acceleration_deg_s2', 'deg/s2', _degrees('peak_acceleration', 1)),
+    Metric('rise_azimuth_deg', 'deg', _degrees('azimuth', 0)),
+    Metric('set_azimuth_deg', 'deg', _degrees('azimuth', 1)),
+    Metric('turn_deg', 'deg', lambda line: math.degrees(line.each.prediction.turn)),
+    Metric('travel_left_before_deg', 'deg', _degrees('travel_left', 0)),
+    Metric('travel_left_after_deg', 'deg', _degrees('travel_left', 1)),
+    Metric('early_turn', '', lambda line: line.each.prediction.early_turn),
+    *(Metric(f'{reason.replace(" ", "_")}_loss_s', 's', _seconds(reason)) for reason in LOSS_REASONS),
+    Metric('loss_db', 'dB', lambda line: line.each.prediction.loss_db),
+    Metric('min_range_km', 'km', lambda line: 1e-3 * line.each.prediction.min_range),
+    Metric('min_cn0_dbhz', 'dB-Hz', lambda line: line.each.prediction.cn0[0]),
+    Metric('max_cn0_dbhz', 'dB-Hz', lambda line: line.each.prediction.cn0[1]))
+
+
+def lines(night: Night) -> Iterator[Line]:
+    """Yield the passes with their shares, in the order of rise."""
+    for each, share, greedy in zip(night.passes, night.exact.shares, night.greedy.shares, strict=True):
+        yield Line(night, each, share, greedy)
+
+
+def number(value: float) -> float | None:
+    """Return a number of a file: rounded, None for NaN."""
+    return round(float(value), NUMBER_DIGITS) if math.isfinite(value) else None
+
+
+def json_content(night: Night) -> dict[str, Json]:
+    """Return the content of --json."""
+    found = [SingleRow(case=line.each.case, metric=metric.name, value=number(metric.value(line)), unit=metric.unit,
+                       paper=None, target=None) for line in lines(night) for metric in METRICS]
+    plan = {name: number(getattr(night.exact, name)) for name in ('value', 'bound')}
+    return {'name': 'plan', 'rows': found,
+            'plan': {**plan, 'optimal': night.exact.optimal, 'greedy_value': number(night.greedy.value)},
+            'refused': [{'file': str(each.path), 'line': each.line, 'name': each.name, 'reason': each.reason}
+                        for each in night.refusals]}
+
+
+def csv_text(night: Night) -> str:
+    """Return the content of --csv: a row for each pass, with its times as UTC before its metrics."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator='\n')
+    writer.writerow(['case', 'catalogue_number', 'rise_utc', 'set_utc', 'plan', 'lost_to',
+                     *(metric.name for metric in METRICS)])
+    for line in lines(night):
+        numbers = (number(metric.value(line)) for metric in METRICS)
+        writer.writerow([line.each.case, line.each.object.number, iso(night, line.each.window.rise),
+                         iso(night, line.each.window.set), state(line.share), '; '.join(line.share.lost_to),
+                         *('' if value is None else f'{value:g}' if value % 1.0 == 0.0 else repr(value)
+                           for value in numbers)])
+    return stream.getvalue()
+
+
+def utc(night: Night, t: Seconds) -> datetime.datetime:
+    """Return a time of the night as UTC, to the second."""
+    return night.begin + datetime.timedelta(seconds=round(t))
+
+
+def iso(night: Night, t: Seconds) -> str:
+    """Return a time of the night as text, to the millisecond."""
+    when = night.begin + datetime.timedelta(milliseconds=round(1e3 * t))
+    return f'{when.isoformat(timespec="milliseconds")}Z'
+
+
+def place(night: Night) -> str:
+    """Return the position of the station."""
+    return night.station.text.partition(':')[0]     # without the remark on the default of a simulation
+
+
+def state(share: Share) -> str:
+    """Return what a plan does with a pass, in one word."""
+    return DROPPED if not share.taken else TRIMMED if share.reason else WHOLE
+
+
+def decision(night: Night, share: Share) -> str:
+    """Return what a plan does with a pass, and the passes to which its time is lost."""
+    text = state(share)
+    if text == TRIMMED:
+        text = f'{utc(night, share.begin):%H:%M:%S} to {utc(night, share.end):%H:%M:%S}'
+    because = ', '.join(share.lost_to) or share.reason
+    return f'{text}: {because}' if because else text
+
+
+def verdict(night: Night) -> str:
+    """Return the plan as a sentence, with the greedy plan and, without a proof, the bound."""
+    counts = {name: sum(state(share) == name for share in night.exact.shares) for name in (WHOLE, TRIMMED, DROPPED)}
+    passes = ', '.join(f'{count} {name}' for name, count in counts.items())
+    proof = 'which is the optimum' if night.exact.optimal else (
+        f'not proven to be the optimum, which is at most {night.exact.bound:.0f} s')
+    objects = len({each.object.name for each in night.passes})
+    return (f'{len(night.passes)} passes of {objects} objects: {passes}. Weighted contact time {night.exact.value:.0f}'
+            f' s, {proof}; the greedy plan has {night.greedy.value:.0f} s')
+
+
+def warnings(night: Night) -> list[str]:
+    """Return a line for each object in a low orbit whose elements are old at a pass, of its worst pass."""
+    worst: dict[str, Pass] = {}
+    for each in sorted(night.passes, key=lambda each: abs(each.prediction.age)):
+        worst[each.object.name] = each
+    texts = [(each, objects.age_warning(each.object.orbit, each.window.culmination)) for each in worst.values()]
+    return [f'{each.object.path}: line {each.object.line}: {each.case}: {text}' for each, text in texts if text]

@@ -1,0 +1,146 @@
+"""The plan of a night: from files of elements to the passes, their predictions, and the choice among them."""
+import datetime
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from pedestal_bringup.scenario import scenario
+from pedestal_bringup.scenario.variant import Variant
+from pedestal_common.geometry import orbit
+from pedestal_common.geometry.geodesy import StationParameters
+from pedestal_common.geometry.orbit import TargetError
+from pedestal_common.parameters import did_you_mean
+from pedestal_common.quantities import Decibels, Degrees, Seconds
+from pedestal_common.text_files.files import FilePath
+from pedestal_station import antenna, choice, objects, prediction, windows
+from pedestal_station.antenna import Antenna
+from pedestal_station.changeover import Changeovers
+from pedestal_station.choice import Rules
+from pedestal_station.night import Choice, Night, Object, Pass, Refusal, Share, Window
+
+MAX_NAMED = 3  # largest number of refusals in an error
+CUT_POINTS = 1000  # number of instants among which the highest one of a chosen time is
+NO_WINDOW = 'does not set: choose its times with --window NAME=UTC/UTC'
+UNDER_WAY = 'under way at the beginning'
+
+Progress: TypeAlias = Callable[[float, str], None]  # share of the work that is done, name of the object
+Interval: TypeAlias = tuple[Seconds, Seconds]
+
+
+class Wishes(NamedTuple):
+    """What the user wants of a night."""
+    paths: Sequence[FilePath]   # files of elements, or folders
+    station: StationParameters
+    begin: datetime.datetime    # UTC
+    duration: Seconds
+    horizon: Degrees | None     # None for the mask of the antenna
+    antenna: Variant            # scenario of the antenna; without a source: that of the defaults
+    priorities: Sequence[str]   # texts NAME=W
+    windows: Sequence[str]      # texts NAME=UTC/UTC
+    rain_margin: Decibels       # loss of C/N0 by rain
+    rules: Rules
+
+
+def night(wishes: Wishes, progress: Progress = lambda *_: None) -> Night:
+    """Return the plan. A bad object is refused, and the others are planned. Raises ValueError for a wrong wish, and if
+    no object remains."""
+    used = antenna.of(_scenario(wishes.antenna), wishes.station, wishes.begin, wishes.rain_margin)
+    found, refusals = objects.read(wishes.paths, wishes.station, wishes.begin, wishes.duration,
+                                   used.acu.prediction.oldest)
+    if not found:
+        raise ValueError('; '.join([*map(refusal_text, refusals[:MAX_NAMED]), 'no object is left to plan']))
+    found = objects.weighted(found, wishes.priorities)
+    chosen = _chosen(found, wishes)
+    passes: list[Pass] = []
+    for i, each in enumerate(found):
+        progress(i / len(found), each.name)
+        try:
+            for known in _passes(each, wishes, chosen.get(each.name, []), used):
+                (passes if isinstance(known, Pass) else refusals).append(known)
+        except TargetError as error:
+            refusals.append(Refusal(each.path, each.line, each.name, str(error)))
+    progress(1.0, f'choice among {len(passes)} passes')
+    passes.sort(key=lambda each: (each.window.rise, each.case))
+    exact, greedy = _choices(passes, used, wishes.rules)
+    return Night(wishes.begin, wishes.duration, wishes.station, wishes.horizon, wishes.antenna.source or 'the defaults',
+                 tuple(passes), exact, greedy, tuple(refusals))
+
+
+def refusal_text(refused: Refusal) -> str:
+    """Return a refusal as a line."""
+    return f'{refused.path}: line {refused.line}: {refused.name}: {refused.reason}'
+
+
+def _scenario(variant: Variant) -> scenario.Scenario:
+    if variant.source:
+        return variant.load()
+    return scenario.parse('of the defaults', antenna.NO_SCENARIO, variant.overrides())
+
+
+def _chosen(found: Sequence[Object], wishes: Wishes) -> dict[str, list[Interval]]:
+    """Return {object: its times in order} of the texts NAME=UTC/UTC. Raises ValueError."""
+    chosen: dict[str, list[Interval]] = {}
+    for text in wishes.windows:
+        name, _, times = text.rpartition('=')
+        option, parts = f'--window {text}', times.split('/')
+        known = [each.name for each in found if name.strip().upper() in (each.name.upper(), each.number)]
+        if len(parts) != 2:
+            raise ValueError(f'{option}: must be NAME=UTC/UTC, for example GEO=2026-12-01T20:00/2026-12-01T21:00')
+        if not known:
+            hint = did_you_mean(name, [each.name for each in found])
+            raise ValueError(f'{option}: no object {name!r:.60} in the files;{hint}'.removesuffix(';'))
+        begin, end = ((orbit.instant(option, part) - wishes.begin).total_seconds() for part in parts)
+        if not 0.0 <= begin < end <= wishes.duration:
+            raise ValueError(f'{option}: must begin before it ends, inside the night, which lasts '
+                             f'{wishes.duration / 3600.0:g} h from {wishes.begin.isoformat()} on')
+        chosen.setdefault(known[0], []).append((begin, end))
+    return {name: sorted(times) for name, times in chosen.items()}
+
+
+def _passes(each: Object, wishes: Wishes, chosen: Sequence[Interval], used: Antenna) -> Iterator[Pass | Refusal]:
+    """Yield the passes of an object, and the refusals of those with old elements. Raises ValueError for chosen times of
+    an object that sets."""
+    horizon = (windows.Horizon.of_floor(used.acu.floor, used.acu.elevation.limits.low) if wishes.horizon is None
+               else windows.Horizon.constant(wishes.horizon))
+    known = windows.find(each.orbit, horizon, wishes.duration)
+    if chosen and not any(window.endless for window in known):
+        raise ValueError(f'--window {each.name}: the object rises and sets; must be one that does not set')
+    if chosen:
+        known = [_cut(each, *times) for times in chosen]
+    for number, window in enumerate(known, 1):
+        reason = objects.age_refusal(each.orbit, window.culmination, used.acu.prediction.oldest)
+        if reason:
+            yield Refusal(each.path, each.line, f'{each.name}/{number}', reason)
+        else:
+            yield Pass(each, number, window, prediction.predict(each, window, used))
+
+
+def _cut(each: Object, begin: Seconds, end: Seconds) -> Window:
+    """Return the window of a chosen time."""
+    times = np.linspace(begin, end, CUT_POINTS)
+    elevation = windows.angles(each.orbit, times)[:, 1]
+    best = int(np.argmax(elevation))
+    return Window(begin, (float(times[best]),), float(times[best]), end, float(elevation[best]), False)
+
+
+def _choices(passes: Sequence[Pass], used: Antenna, rules: Rules) -> tuple[Choice, Choice]:
+    """Return the exact and the greedy plan. A track without end is left out, and a pass under way has only its rest."""
+    places = [i for i, each in enumerate(passes) if not each.window.endless]
+    rest = [passes[i] for i in places]
+    for i, each in enumerate(rest):
+        if each.window.rise < 0.0:
+            window = each.window._replace(rise=0.0)
+            rest[i] = each._replace(window=window, prediction=prediction.predict(each.object, window, used))
+    axes = used.acu.azimuth.shaper, used.acu.elevation.shaper
+    exact, greedy = choice.choose(rest, Changeovers(rest, axes, rules), rules)
+    return _whole(exact, passes, places), _whole(greedy, passes, places)
+
+
+def _whole(plan: Choice, passes: Sequence[Pass], places: Sequence[int]) -> Choice:
+    """Return a plan with the passes that took no part in it; places: of those that did."""
+    shares = [Share(False, np.nan, np.nan, (), NO_WINDOW)] * len(passes)
+    for i, share in zip(places, plan.shares, strict=True):
+        late = share.taken and passes[i].window.rise < 0.0 and not share.reason
+        shares[i] = share._replace(reason=UNDER_WAY) if late else share
+    return plan._replace(shares=tuple(shares))
