@@ -73,7 +73,8 @@ class Loss(NamedTuple):
     reason: str             # 'keyhole', 'blockage', 'sun', 'travel' ...
     begin: Seconds
     end: Seconds
-    seconds: Seconds        # expected loss inside it
+    seconds: Seconds        # expected loss inside it; no instant is in two losses of a pass
+    detail: str = ''        # more on it, '' for nothing
 
 
 class Prediction(NamedTuple):
