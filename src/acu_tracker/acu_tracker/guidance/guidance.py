@@ -31,6 +31,7 @@ from acu_tracker.signals import Inputs
 from acu_tracker.tracking import Tracking
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry import line_of_sight as pointing
+from pedestal_common.geometry.pointing_model import PointingModel
 from pedestal_common.quantities import Bit, BothAxes, Pair, Radians, Records, Seconds
 from pedestal_common.record import Record
 
@@ -128,18 +129,27 @@ def _reference(guidance: Guidance, tracking: Tracking, constants: 'Constants', o
     guidance.direction[0], guidance.direction[1] = on_sky.azimuth.angle, on_sky.elevation.angle
     motion = _on_encoders(guidance, tracking, on_sky)
     guidance.target_angles[0], guidance.target_angles[1] = motion.azimuth.angle, motion.elevation.angle
+    level = motion.azimuth
+    if planner.slewing(guidance.lookahead, t) and tracking.attitude.stabilised:
+        on_level = target.on_levelled_deck(tracking.target, rotation(guidance.lookahead.level), source)
+        level = model.to_encoders(tracking.pointing.model, on_level)[0].azimuth
+    return on_axes(guidance, constants, tracking.pointing.model, order, way.program, t, on_sky, motion, level)
+
+
+@compiled
+def on_axes(guidance: Guidance, constants: 'Constants', terms: PointingModel, order: Order, program: ProgramTrack,
+            t: Seconds, on_sky: Motion, encoders: Motion, level: AxisMotion) -> Motion:
+    """Return the reference of both axes at t for a target: a planned slew, else the target on its azimuth wrap.
+    on_sky, encoders: of the target; level: its azimuth on the levelled deck of the plan, encoder angle."""
     guidance.pointing_offset = 0.0
     if planner.slewing(guidance.lookahead, t):
-        level = motion.azimuth
-        if tracking.attitude.stabilised:
-            on_level = target.on_levelled_deck(tracking.target, rotation(guidance.lookahead.level), source)
-            level = model.to_encoders(tracking.pointing.model, on_level)[0].azimuth
-        motion, guidance.pointing_offset = planner.motion_at(guidance.lookahead, constants.lookahead, t, motion, level)
+        motion, guidance.pointing_offset = planner.motion_at(guidance.lookahead, constants.lookahead, t, encoders,
+                                                             level)
         start_from(guidance, motion.azimuth.angle)
         return motion
-    wrapped = _wrapped(guidance, constants.axis[0].p, order, way.program, t, motion.azimuth)
-    start_from(guidance, model.in_turn(tracking.pointing.model, on_sky, motion.azimuth.angle, wrapped.angle))
-    return Motion(AxisMotion(guidance.azimuth, wrapped.rate, wrapped.acceleration), motion.elevation)
+    wrapped = _wrapped(guidance, constants.axis[0].p, order, program, t, encoders.azimuth)
+    start_from(guidance, model.in_turn(terms, on_sky, encoders.azimuth.angle, wrapped.angle))
+    return Motion(AxisMotion(guidance.azimuth, wrapped.rate, wrapped.acceleration), encoders.elevation)
 
 
 @compiled
