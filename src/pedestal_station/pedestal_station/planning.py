@@ -1,6 +1,6 @@
 """The plan of a night: from files of elements to the passes, their predictions, and the choice among them."""
 import datetime
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -56,15 +56,16 @@ def night(wishes: Wishes, progress: Progress = lambda *_: None) -> Night:
     for i, each in enumerate(found):
         progress(i / len(found), each.name)
         try:
-            for known in _passes(each, wishes, chosen.get(each.name, []), used):
-                (passes if isinstance(known, Pass) else refusals).append(known)
+            known, refused = _passes(each, wishes, chosen.get(each.name, []), used)
+            passes += known
+            refusals += refused
         except TargetError as error:
             refusals.append(Refusal(each.path, each.line, each.name, str(error)))
     progress(1.0, f'choice among {len(passes)} passes')
     passes.sort(key=lambda each: (each.window.rise, each.case))
     exact, greedy = _choices(passes, used, wishes.rules)
-    return Night(wishes.begin, wishes.duration, wishes.station, wishes.horizon, wishes.antenna.source or 'the defaults',
-                 tuple(passes), exact, greedy, tuple(refusals))
+    return Night(wishes.begin, wishes.duration, wishes.station, wishes.horizon,
+                 wishes.antenna.source or 'the defaults', tuple(passes), exact, greedy, tuple(refusals))
 
 
 def refusal_text(refused: Refusal) -> str:
@@ -98,22 +99,24 @@ def _chosen(found: Sequence[Object], wishes: Wishes) -> dict[str, list[Interval]
     return {name: sorted(times) for name, times in chosen.items()}
 
 
-def _passes(each: Object, wishes: Wishes, chosen: Sequence[Interval], used: Antenna) -> Iterator[Pass | Refusal]:
-    """Yield the passes of an object, and the refusals of those with old elements. Raises ValueError for chosen times of
-    an object that sets."""
+def _passes(each: Object, wishes: Wishes, chosen: Sequence[Interval],
+            used: Antenna) -> tuple[list[Pass], list[Refusal]]:
+    """Return the passes of an object, and the refusals of those with old elements. chosen: its times, [] for all
+    passes. Raises ValueError for chosen times of an object that sets."""
     horizon = (windows.Horizon.of_floor(used.acu.floor, used.acu.elevation.limits.low) if wishes.horizon is None
                else windows.Horizon.constant(wishes.horizon))
     known = windows.find(each.orbit, horizon, wishes.duration)
     if chosen and not any(window.endless for window in known):
-        raise ValueError(f'--window {each.name}: the object rises and sets; must be one that does not set')
-    if chosen:
-        known = [_cut(each, *times) for times in chosen]
-    for number, window in enumerate(known, 1):
+        course = 'rises and sets' if known else 'stays below the horizon'
+        raise ValueError(f'--window {each.name}: the object {course}; must be one that does not set')
+    passes, refusals = list[Pass](), list[Refusal]()
+    for number, window in enumerate((_cut(each, *times) for times in chosen) if chosen else known, 1):
         reason = objects.age_refusal(each.orbit, window.culmination, used.acu.prediction.oldest)
         if reason:
-            yield Refusal(each.path, each.line, f'{each.name}/{number}', reason)
+            refusals.append(Refusal(each.path, each.line, f'{each.name}/{number}', reason))
         else:
-            yield Pass(each, number, window, prediction.predict(each, window, used))
+            passes.append(Pass(each, number, window, prediction.predict(each, window, used)))
+    return passes, refusals
 
 
 def _cut(each: Object, begin: Seconds, end: Seconds) -> Window:
@@ -125,7 +128,7 @@ def _cut(each: Object, begin: Seconds, end: Seconds) -> Window:
 
 
 def _choices(passes: Sequence[Pass], used: Antenna, rules: Rules) -> tuple[Choice, Choice]:
-    """Return the exact and the greedy plan. A track without end is left out, and a pass under way has only its rest."""
+    """Return the exact and the greedy plan. An endless track is left out, and a pass under way has only its rest."""
     places = [i for i, each in enumerate(passes) if not each.window.endless]
     rest = [passes[i] for i in places]
     for i, each in enumerate(rest):

@@ -30,6 +30,7 @@ class Line:
 
     def __init__(self, nearest, age=0.0, height=500e3, offset=100e3):
         self.nearest, self.age, self.height, self.offset = nearest, age, height, offset
+        self.low = height < 2e6
 
     def enu(self, times):
         t = np.asarray(times) - self.nearest
@@ -58,14 +59,15 @@ def made_night():
     whole = Share(True, 0.0, 600.0, (), '')
     last = Share(True, 7000.0, 7600.0, (), '')
     shares = (whole, Share(True, 660.0, 1300.0, ('ISS/1',), 'begins 160.0 s late after ISS/1'),
-              Share(False, NAN, NAN, ('ISS/1', 'NOAA 19/1'), 'shorter than 60 s'), Share(False, NAN, NAN, (), 'no window'),
-              last)
+              Share(False, NAN, NAN, ('ISS/1', 'NOAA 19/1'), 'shorter than 60 s'),
+              Share(False, NAN, NAN, (), 'no window'), last)
     order = (0, 3, 1, 2, 4)
     passes, shares = tuple(passes[i] for i in order), tuple(shares[i] for i in order)
     greedy = tuple(Share(False, NAN, NAN, (), 'overlaps ISS/1') if each.case == 'NOAA 19/1' else share
                    for each, share in zip(passes, shares))
     return Night(BEGIN, 86400.0, StationParameters(), None, 'leo_pass', passes, Choice(shares, 2440.0, 2500.0, False),
-                 Choice(greedy, 1800.0, 2500.0, False), (Refusal(pathlib.Path('bad.tle'), 4, 'DEAD', 'has <decayed>'),))
+                 Choice(greedy, 1800.0, 2500.0, False),
+                 (Refusal(pathlib.Path('bad.tle'), 4, 'DEAD', 'has <decayed>'),))
 
 
 FIRST_METRICS = ['rise_s', 'culmination_s', 'set_s', 'max_elevation_deg', 'peak_azimuth_rate_deg_s', 'loss_s', 'taken']
@@ -89,7 +91,8 @@ def test_rows_are_those_of_the_interface(night):
     assert list(of_passes) == [each.case for each in night.passes]
     assert all(list(values)[:len(FIRST_METRICS)] == FIRST_METRICS for values in of_passes.values())
     noaa = of_passes['NOAA 19/1']
-    assert [noaa[name] for name in FIRST_METRICS] == [500.0, 900.0, 1300.0, pytest.approx(78.69, abs=0.01), 4.0, 12.5, 1]
+    assert [noaa[name] for name in FIRST_METRICS] == [500.0, 900.0, 1300.0, pytest.approx(78.69, abs=0.01), 4.0, 12.5,
+                                                      1]
     assert (noaa['begin_s'], noaa['greedy_begin_s'], noaa['keyhole_loss_s'], noaa['min_cn0_dbhz']) == (
         660.0, None, 12.5, None)
     assert [values['taken'] for values in of_passes.values()] == [1, 0, 1, 0, 1]
@@ -134,7 +137,7 @@ def test_the_table_fits_a_narrow_terminal_and_says_what_it_leaves_out(night, cap
     for text in ('22:41:00-22:51:40', 'ISS/1 +1', 'no window', 'whole'):
         assert text in said[80], text
     [warning] = rows.warnings(night)        # of the low orbit with old elements alone
-    assert warning.startswith('x.tle: line 3: NOAA 19: elements are 4.0 days')
+    assert warning.startswith('x.tle: line 3: NOAA 19/1: elements 4.0 days')
     assert '2 whole, 1 trimmed, 2 dropped' in rows.verdict(night) and 'at most 2500 s' in rows.verdict(night)
 
 
@@ -186,7 +189,7 @@ def test_the_page_in_a_browser(night, scheme, tmp_path):
         shown.on('pageerror', lambda error: errors.append(str(error)))
         shown.goto(file.as_uri())
         assert shown.evaluate('document.documentElement.scrollWidth') <= 1000
-        outside = shown.evaluate("""() => [...document.querySelectorAll('svg :is(text, rect, polyline)')].filter(part => {
+        outside = shown.evaluate("""() => [...document.querySelectorAll('svg :is(text, rect, line)')].filter(part => {
             const box = part.getBoundingClientRect(), svg = part.closest('svg').getBoundingClientRect();
             return box.left < svg.left - 1 || box.right > svg.right + 1 || box.top < svg.top - 1
                 || box.bottom > svg.bottom + 1 }).map(part => part.outerHTML)""")

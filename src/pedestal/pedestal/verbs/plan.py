@@ -18,7 +18,10 @@ if typing.TYPE_CHECKING:
 
 NEW_FILES = 'output', 'csv', 'ics', 'html'  # options of files that are not overwritten
 MAX_HOURS = 31 * 24.0  # longest night [h]
-DEFAULT_SCENARIO = 'leo_pass'
+FIRST_YEAR, LAST_YEAR = 1957, 2099  # of a night
+HORIZON_LIMITS_DEG = -5.0, 89.0  # of --horizon [deg]
+MAX_RAIN_MARGIN_DB = 100.0  # largest --rain-margin [dB]
+
 
 
 def _add_plan(parser: argparse.ArgumentParser) -> None:
@@ -44,8 +47,8 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
                         f'{MAX_HOURS:g}; default: 24')
     parser.add_argument('--horizon', type=float, metavar='DEG', help='elevation of rise and set [deg]; default: the '
                         'mask acu.floor of the antenna and its lower elevation limit')
-    action = parser.add_argument('--scenario', default=DEFAULT_SCENARIO, metavar='NAME', help='scenario that describes '
-                                 f'the antenna: name or .yaml file; default: {DEFAULT_SCENARIO}')
+    action = parser.add_argument('--scenario', default='', metavar='NAME', help='scenario that describes '
+                                 'the antenna: name or .yaml file; default: every parameter has its default')
     vars(action)['completer'] = arguments.scenarios_and_files
     arguments.add_param(parser, 'acu.azimuth.limits.rate=0.1')
     arguments.add_params_file(parser)
@@ -68,12 +71,13 @@ def _add_choice(parser: argparse.ArgumentParser) -> None:
                         'default: 30')
     parser.add_argument('--time-limit', type=float, metavar='S', help='time of the search for the best plan [s]; '
                         'default: 5')
-    parser.add_argument('--rain-margin', type=float, metavar='DB', help='loss of C/N0 by rain to allow for [dB]; '
-                        'default: 0')
+    parser.add_argument('--rain-margin', type=float, default=0.0, metavar='DB', help='loss of C/N0 by rain to allow '
+                        'for [dB]; default: 0')
 
 
 def _plan(options: argparse.Namespace) -> int:
     arguments.check_result_files(options, new=NEW_FILES)
+    _check(options)
     from pedestal_station import planning
     from pedestal_station.outputs import rows
     wishes = planning.Wishes(options.files, _station(options.station), *_time(options), options.horizon,
@@ -82,7 +86,7 @@ def _plan(options: argparse.Namespace) -> int:
     with console.progress_of_share() as progress:
         night = planning.night(wishes, progress)
     for refused in night.refusals:
-        print(f'{refused.path}: line {refused.line}: {refused.name}: {refused.reason}; left out', file=sys.stderr)
+        print(f'{planning.refusal_text(refused)}; left out', file=sys.stderr)
     for warning in rows.warnings(night):
         print(f'warning: {warning}', file=sys.stderr)
     console.show_night(night)
@@ -108,7 +112,19 @@ def _time(options: argparse.Namespace) -> tuple[datetime.datetime, float]:
     if not 0.0 < options.hours <= MAX_HOURS:
         raise ValueError(f'--hours {options.hours:g}: must be above 0 and at most {MAX_HOURS:g}')
     now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None, microsecond=0)
-    return now if options.begin is None else orbit.instant('--from', options.begin), 3600.0 * options.hours
+    begin = now if options.begin is None else orbit.instant('--from', options.begin)
+    if not FIRST_YEAR <= begin.year <= LAST_YEAR:
+        raise ValueError(f'--from {options.begin}: must be in the years {FIRST_YEAR} to {LAST_YEAR}')
+    return begin, 3600.0 * options.hours
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Raise ValueError for a number outside of its range."""
+    for name, (low, high), unit in (('horizon', HORIZON_LIMITS_DEG, 'deg'),
+                                    ('rain_margin', (0.0, MAX_RAIN_MARGIN_DB), 'dB')):
+        value = getattr(options, name)
+        if value is not None and not low <= value <= high:
+            raise ValueError(f'{parameters.option_of(name)} {value:g}: must be {low:g} to {high:g} {unit}')
 
 
 def _rules(options: argparse.Namespace) -> 'Rules':

@@ -1,5 +1,5 @@
 """The taken passes of a night as iCalendar (RFC 5545). Equal nights give equal bytes, because the stamp of each event
-is the beginning of the night. The form has ten lines for an event, so this needs no library; a test reads it by one."""
+is the beginning of the night. An event has ten lines, so this needs no library; a test reads them by one."""
 import math
 import re
 from collections.abc import Iterator

@@ -12,10 +12,14 @@ from pedestal_station.outputs import rows
 
 CSS = """
 .chart text { fill: var(--soft); font: 11px system-ui, sans-serif; } .chart .name { fill: var(--ink); }
-.chart .grid { stroke: var(--line); fill: none; } .chart .pass { fill: none; stroke: var(--soft); }
+.chart .grid { stroke: var(--soft); stroke-opacity: .45; fill: none; }
+.chart .pass { fill: none; stroke: var(--soft); }
 .chart .taken { fill: #1f6fd1; } .chart .lost { fill: #e57a00; } .chart polyline { fill: none; stroke-width: 1.5; }
 .chart polyline.pass { stroke-dasharray: 3 2; } .chart polyline.taken { fill: none; stroke: #1f6fd1; stroke-width: 3; }
 .chart polyline.lost { fill: none; stroke: #e57a00; stroke-width: 3; }
+table.plan { font-size: .8rem; } .plan th, .plan td { padding-right: .6rem; }
+.plan td { white-space: nowrap; } .plan td:nth-child(4) { white-space: normal; min-width: 8rem; }
+@media print { table.plan { font-size: .6rem; } }
 .sky { display: grid; grid-template-columns: repeat(auto-fill, minmax(13rem, 1fr)); gap: 1rem; }
 .sky figure { margin: 0; } .sky figure svg { min-width: 0; }
 """
@@ -35,8 +39,8 @@ def gantt(night: Night) -> str:
     names = list(dict.fromkeys(each.object.name for each in night.passes))
     scale = (WIDTH - NAME_WIDTH) / night.duration
     height = ROW_HEIGHT * (len(names) + 2)
-    parts = [_rectangle('grid', NAME_WIDTH, ROW_HEIGHT, WIDTH - NAME_WIDTH, height - ROW_HEIGHT), *_time(night, height),
-             _text(0, 2 * ROW_HEIGHT - 6, 'antenna', 'name')]
+    parts = [_rectangle('grid', NAME_WIDTH, ROW_HEIGHT, WIDTH - NAME_WIDTH, height - ROW_HEIGHT),
+             *_time(night, height), _text(0, 2 * ROW_HEIGHT - 6, 'antenna', 'name')]
     for i, name in enumerate(names):
         cut = name if len(name) <= MAX_NAME_CHARS else f'{name[:MAX_NAME_CHARS - 1]}\N{HORIZONTAL ELLIPSIS}'
         parts.append(_text(0, (i + 3) * ROW_HEIGHT - 6, cut, 'name'))

@@ -22,9 +22,9 @@ def text(night: Night, command: str) -> str:
     parts = [f'<h1>{html.escape(title)}</h1>', f'<p class="verdict">{html.escape(rows.verdict(night))}.</p>',
              *(f'<p class="bad">{html.escape(warning)}.</p>' for warning in rows.warnings(night)),
              TextTable(('', ''), about).html('meta'), '<h2 id="night">Night</h2>',
-             '<p class="soft">Frame: a pass. Blue: the part that the plan takes. Orange: a time of loss. All times are '
-             f'UTC.</p><div class="wide">{charts.gantt(night)}</div>',
-             '<h2 id="passes">Passes</h2>', TextTable(HEADS, map(_cells, lines)).html(), '<h2 id="sky">Sky</h2>',
+             '<p class="soft">Frame: a pass. Blue: the part that the plan takes. Orange: a time of loss. All times '
+             f'are UTC.</p><div class="wide">{charts.gantt(night)}</div>',
+             '<h2 id="passes">Passes</h2>', TextTable(HEADS, map(_cells, lines)).html('plan'), '<h2 id="sky">Sky</h2>',
              '<p class="soft">North is up, east is right, the zenith is in the middle.</p><div class="sky">',
              *(f'<figure>{charts.sky(night, line.each, line.share)}<figcaption>{html.escape(line.each.case)}: '
                f'{html.escape(rows.decision(night, line.share))}</figcaption></figure>' for line in lines), '</div>']
@@ -41,8 +41,9 @@ def _cells(line: Line) -> list[Cell]:
               for loss in prediction.losses}
     first, last = (f'{math.degrees(azimuth):.0f}' for azimuth in prediction.azimuth)
     least, most = prediction.cn0
-    return [each.case, *(f'{rows.utc(night, t):%d %b %H:%M:%S}' for t in (each.window.rise, each.window.set)),
-            rows.decision(night, line.share), rows.state(line.greedy), f'{math.degrees(each.window.max_elevation):.1f}',
+    return [each.case, f'{rows.utc(night, each.window.rise):%d %b %H:%M:%S}',
+            f'{rows.utc(night, each.window.set):%H:%M:%S}', rows.decision(night, line.share), rows.state(line.greedy),
+            f'{math.degrees(each.window.max_elevation):.1f}',
             f'{first} to {last}', f'{math.degrees(prediction.peak_rate[0]):.2f}',
             ', '.join(f'{reason} {seconds:.1f} s' for reason, seconds in losses.items()) + (
                 ', early turn' if prediction.early_turn else ''),

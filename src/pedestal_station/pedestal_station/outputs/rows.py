@@ -140,12 +140,17 @@ def decision(night: Night, share: Share) -> str:
 def verdict(night: Night) -> str:
     """Return the plan as a sentence, with the greedy plan and, without a proof, the bound."""
     counts = {name: sum(state(share) == name for share in night.exact.shares) for name in (WHOLE, TRIMMED, DROPPED)}
-    passes = ', '.join(f'{count} {name}' for name, count in counts.items())
+    shares = ', '.join(f'{count} {name}' for name, count in counts.items())
     proof = 'which is the optimum' if night.exact.optimal else (
         f'not proven to be the optimum, which is at most {night.exact.bound:.0f} s')
     objects = len({each.object.name for each in night.passes})
-    return (f'{len(night.passes)} passes of {objects} objects: {passes}. Weighted contact time {night.exact.value:.0f}'
-            f' s, {proof}; the greedy plan has {night.greedy.value:.0f} s')
+    return (f'{_count(len(night.passes), "pass", "passes")} of {_count(objects, "object", "objects")}: {shares}. '
+            f'Weighted contact time {night.exact.value:.0f} s, {proof}; the greedy plan has '
+            f'{night.greedy.value:.0f} s')
+
+
+def _count(count: int, one: str, many: str) -> str:
+    return f'{count} {one if count == 1 else many}'
 
 
 def warnings(night: Night) -> list[str]:

@@ -16,7 +16,8 @@ OPTIONAL_COLUMNS = 'sets', 'loss', 'deg/s', 'age', 'greedy', 'C/N0'
 
 def cells(night: Night) -> list[list[Cell]]:
     """Return the rows of the table."""
-    day = '%d ' if night.duration > SECONDS_PER_DAY else ''
+    times = [t for each in night.passes for t in (each.window.rise, each.window.set)]
+    day = '%d ' if max(times, default=0.0) - min(times, default=0.0) > SECONDS_PER_DAY else ''
     found: list[list[Cell]] = []
     for _, each, share, greedy in rows.lines(night):
         window, prediction = each.window, each.prediction
