@@ -34,7 +34,8 @@ class Orbit(Protocol):
     """Where an object is, by its elements or by its ephemeris."""
 
     def enu(self, times: Times) -> Vectors3:
-        """Return the positions of the object in ENU [m] from the station (n, 3), geometric. Raises TargetError."""
+        """Return the positions of the object in ENU [m] from the station (n, 3), geometric; NaN outside an ephemeris.
+        Raises TargetError."""
 
     def elements_age(self, t: Seconds) -> Seconds:
         """Return the time from the epoch of the elements to t; 0 inside an ephemeris."""
@@ -48,6 +49,7 @@ class Object(NamedTuple):
     line: int               # first line of its elements there
     orbit: Orbit
     priority: float         # weight of a second of contact
+    remark: str = ''        # the set of elements that was taken of several, values that were missing
 
 
 class Refusal(NamedTuple):
@@ -59,13 +61,13 @@ class Refusal(NamedTuple):
 
 
 class Window(NamedTuple):
-    """Time in which an object is above the horizon of the station."""
-    rise: Seconds           # begin of the night for an object that is up already and that is no pass of its own
-    culminations: tuple[Seconds, ...]   # each highest instant, in order of time
+    """Time in which an object is above the horizon of the station. It may begin before the night and end after it."""
+    rise: Seconds           # begin of the night without a rise in the day before it; begin of an ephemeris
+    culminations: tuple[Seconds, ...]   # in order of time; the highest instant may also be the rise or the set
     culmination: Seconds    # the highest one
-    set: Seconds
+    set: Seconds            # end of the night without a set in the day after it; end of an ephemeris
     max_elevation: Radians
-    endless: bool           # True for a track without rise and set in the night, such as that of a GEO
+    endless: bool           # True for a track without rise and set, such as that of a GEO
 
 
 class Loss(NamedTuple):

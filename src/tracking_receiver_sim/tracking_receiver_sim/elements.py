@@ -25,6 +25,7 @@ MAX_COMPARED_NAMES = 40_000  # with which an error compares a name: more than ca
 MAX_XML_DEPTH, MAX_VALUE_CHARS = 100, 200  # of nested elements; length to which a value is cut
 PARSE_CHUNK_BYTES = 1 << 20  # number of bytes of XML that are parsed at once
 TLE_EPOCH_COLUMNS = slice(18, 32)  # columns of the epoch in line 1 of a TLE
+TLE_LINE_PATTERN = re.compile(r'[12] [ 0-9A-Z][ 0-9]{4}[ A-Z]? .{40}')  # beginning of a line of a TLE
 
 
 class Elements(NamedTuple):
@@ -54,21 +55,37 @@ class Satellite(NamedTuple):
         return name.strip().upper() in (self.name.upper(), number, self.number, self.designator)
 
 
+class Loose(csv_table.TableError):
+    """A line of a TLE without the other one."""
+
+
+def satellites(path: FilePath) -> Iterator[Satellite | csv_table.TableError]:
+    """Yield the sets of elements of a file, and a TableError in the place of each set that cannot be read. Raises
+    TableError where the rest of the file cannot be read."""
+    with csv_table.stream(path) as stream:
+        beginning = files.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
+    count = 0
+    for each in _reader(beginning)(path):
+        count += 1
+        if count > MAX_SATELLITES and isinstance(each, Satellite):
+            raise csv_table.TableError(f'{path}: line {each.line}: must be at most {MAX_SATELLITES} satellites')
+        yield each
+
+
 def read(path: FilePath, name: str = '', when: datetime.datetime | None = None) -> Elements:
     """Return the elements of a satellite in a file. Raises TargetError. name: name, catalogue number or international
     designator; it may be empty for a file of one satellite. From several sets the function takes that whose epoch is
     nearest to `when` (UTC), or the latest one."""
+    # history: sets of elements of the wanted satellite; others: number of sets of other satellites of this name.
+    names, others = list[str](), 0
+    history: list[Satellite] = []
     try:
-        with csv_table.stream(path) as stream:
-            beginning = files.beginning(stream.read(FORMAT_PROBE_BYTES)).lstrip()
-        # history: sets of elements of the wanted satellite; others: number of sets of other satellites of this name.
-        names, others = [], 0
-        history: list[Satellite] = []
-        for satellite in _reader(beginning)(path):
+        for satellite in satellites(path):
+            if isinstance(satellite, Loose):
+                continue
+            if isinstance(satellite, csv_table.TableError):
+                raise satellite
             names.append(satellite.name)
-            if len(names) > MAX_SATELLITES:
-                raise csv_table.TableError(f'{path}: line {satellite.line}: must be at most {MAX_SATELLITES} '
-                                           'satellites')
             if not name or satellite.is_named(name):
                 if history and satellite.identity != history[0].identity:
                     others += 1
@@ -88,22 +105,29 @@ def read(path: FilePath, name: str = '', when: datetime.datetime | None = None) 
             remedy = f'{count}; name it by its number' if history else f'{count};{hint}'.removesuffix(';')
         raise TargetError(f'TLE file {path}: satellites: {len(names)} found, {listed}: {remedy}')
     satellite, remark = _nearest(path, history, when)
+    values, missing = checked(path, satellite)
+    return Elements(satellite.name, {key: getattr(values, key) for key in ('line_1', 'line_2', 'omm')},
+                    '; '.join(filter(None, (remark, missing))))
+
+
+def checked(path: FilePath, satellite: Satellite) -> tuple[LeoPassParameters, str]:
+    """Return (valid elements, remark on values that were missing). Raises TargetError."""
+    remark = ''
     if not (satellite.lines or satellite.fields.get('BSTAR', '').partition('[')[0].strip()):
-        remark = '; '.join(filter(None, (remark, f'{pathlib.Path(path).name}: line {satellite.line}: BSTAR is '
-                                         'missing: taken as 0, without drag')))
+        remark = f'{pathlib.Path(path).name}: line {satellite.line}: BSTAR is missing: taken as 0, without drag'
     line_1, line_2 = satellite.lines or ('', '')
     values = LeoPassParameters(line_1=line_1, line_2=line_2, omm='' if satellite.lines else _omm_text(path, satellite))
     try:
         orbit.satellite(values)
     except TargetError as error:
         raise TargetError(f'TLE file {path}: line {satellite.line}: {error}') from None
-    return Elements(satellite.name, {key: getattr(values, key) for key in ('line_1', 'line_2', 'omm')}, remark)
+    return values, remark
 
 
 def _nearest(path: FilePath, history: list[Satellite], when: datetime.datetime | None) -> tuple[Satellite, str]:
     if len(history) == 1:
         return history[0], ''
-    epochs = [_epoch(path, satellite) for satellite in history]
+    epochs = [epoch(path, satellite) for satellite in history]
     wanted = when or max(epochs)
     # Of two sets that are equally near, the later one in the file is taken.
     i = min(range(len(history)), key=lambda i: (abs(epochs[i] - wanted), -i))
@@ -113,7 +137,8 @@ def _nearest(path: FilePath, history: list[Satellite], when: datetime.datetime |
                         f'{history[i].line}, the nearest to {wanted:%Y-%m-%d %H:%M:%S}')
 
 
-def _epoch(path: FilePath, satellite: Satellite) -> datetime.datetime:
+def epoch(path: FilePath, satellite: Satellite) -> datetime.datetime:
+    """Return the epoch of a set of elements, UTC. Raises TargetError."""
     if satellite.lines:
         text = satellite.lines[0][TLE_EPOCH_COLUMNS]
         try:
@@ -128,7 +153,7 @@ def _epoch(path: FilePath, satellite: Satellite) -> datetime.datetime:
     return datetime.datetime(1970, 1, 1) + datetime.timedelta(seconds=SECONDS_PER_DAY * day + second)
 
 
-def _reader(beginning: str) -> Callable[[FilePath], Iterator[Satellite]]:
+def _reader(beginning: str) -> Callable[[FilePath], Iterator[Satellite | csv_table.TableError]]:
     if beginning.startswith('<'):
         return _xml
     if beginning.startswith(('{', '[')):
@@ -142,17 +167,29 @@ def _reader(beginning: str) -> Callable[[FilePath], Iterator[Satellite]]:
     return _csv if 'EPOCH' in names else _tles
 
 
-def _tles(path: FilePath) -> Iterator[Satellite]:
+def _tles(path: FilePath) -> Iterator[Satellite | csv_table.TableError]:
     """A line of the name may stand before each TLE."""
     # first: (line number, text) of the line before; before: that of the line before `first`, which may hold a name.
-    before, first = (0, ''), (0, '')
+    before, first, paired = (0, ''), (0, ''), True
     for number, text in lines.read(path):
         text = text.strip()
-        if first[1].startswith('1 ') and text.startswith('2 '):
-            title = '' if before[1].startswith('2 ') else before[1].removeprefix('0 ').strip()
+        pair = first[1].startswith('1 ') and text.startswith('2 ')
+        if not (pair or paired) and TLE_LINE_PATTERN.match(first[1]):
+            yield _loose(path, *first)
+        if pair:
+            title = ('' if before[1].startswith('2 ') or TLE_LINE_PATTERN.match(before[1]) else
+                     before[1].removeprefix('0 ').strip())
             yield Satellite(first[0], title or first[1][2:7].strip(), _number(first[1][2:7]), _designator(first[1]),
                             (first[1], text), {})
-        before, first = first, (number, text)
+        before, first, paired = first, (number, text), pair
+    if not paired and TLE_LINE_PATTERN.match(first[1]):
+        yield _loose(path, *first)
+
+
+def _loose(path: FilePath, number: int, text: str) -> Loose:
+    other = '2 " behind' if text.startswith('1') else '1 " before'
+    return Loose(f'{path}: line {number}: satellite {text[2:7].strip()}: must have a line that begins with "{other} '
+                 'this one')
 
 
 def _number(text: str) -> str:
@@ -174,10 +211,10 @@ def _omm(line: int, fields: dict[str, str]) -> Satellite:
                      fields.get('OBJECT_ID', '').upper(), None, fields)
 
 
-def _kvn(path: FilePath) -> Iterator[Satellite]:
-    """Each OMM begins with its CCSDS_OMM_VERS."""
+def _kvn(path: FilePath) -> Iterator[Satellite | csv_table.TableError]:
+    """Each OMM begins with its CCSDS_OMM_VERS. An OMM with a wrong line is left out."""
     fields: dict[str, str] = {}
-    begun = 0
+    begun = 0       # line of the beginning of an OMM; 0 outside one, and after a wrong line
     for number, text in lines.read(path):
         keyword, equals, value = text.partition('=')
         keyword = keyword.strip()
@@ -190,15 +227,23 @@ def _kvn(path: FilePath) -> Iterator[Satellite]:
             value = value if keyword in omm.STANDARD_UNITS or keyword == 'EPOCH' else value.partition('[')[0]
             fields[keyword] = value.strip()[:MAX_VALUE_CHARS]
         elif not equals and keyword.split(None, 1)[0] not in ('COMMENT', 'META_START', 'META_STOP'):
-            raise lines.wrong(path, number, 1, f'{text.strip()!r:.60}: must be KEYWORD = value')
+            begun = 0
+            yield lines.wrong(path, number, 1, f'{text.strip()!r:.60}: must be KEYWORD = value')
     if begun:
         yield _omm(begun, fields)
 
 
-def _csv(path: FilePath) -> Iterator[Satellite]:
+def _csv(path: FilePath) -> Iterator[Satellite | csv_table.TableError]:
     with csv_table.opened(path) as reader:
         csv_table.require(reader, ('EPOCH', 'NORAD_CAT_ID'))
-        for row in reader:
+        while True:
+            try:
+                row = next(iter(reader), None)      # goes on behind the last row
+            except csv_table.TableError as error:
+                yield error
+                continue
+            if row is None:
+                return
             # The name of a column may have a unit behind it, as in `INCLINATION [deg]`.
             named = ((name.partition('['), cell.strip()[:MAX_VALUE_CHARS]) for name, cell in row.items() if cell)
             yield _omm(reader.line_num, {keyword: f'{cell} {bracket}{unit}' if bracket else cell
@@ -206,7 +251,7 @@ def _csv(path: FilePath) -> Iterator[Satellite]:
                                          if (keyword := column.strip()) in omm.KEYWORDS})
 
 
-def _json(path: FilePath) -> Iterator[Satellite]:
+def _json(path: FilePath) -> Iterator[Satellite | csv_table.TableError]:
     """Decode an array of objects, or one object, one by one."""
     text = csv_table.text(path)
     decoder, between = json.JSONDecoder(parse_int=str, parse_float=str), re.compile(r'[\s,\[\]]*')
@@ -226,13 +271,14 @@ def _json(path: FilePath) -> Iterator[Satellite]:
             raise lines.wrong(path, error.lineno, error.colno, f'not valid JSON: {error.msg}') from None
         except RecursionError:
             raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'JSON nested too deeply') from None
+        column = begun - text.rfind('\n', 0, begun)
         if not isinstance(value, dict):
-            raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun), 'must be an object of an OMM')
-        if 'EPOCH' not in value:
-            raise lines.wrong(path, line, begun - text.rfind('\n', 0, begun),
-                              f'EPOCH is missing; keywords found: {", ".join(value):.60}')
-        yield _omm(line, {keyword: str(value[keyword]).strip()[:MAX_VALUE_CHARS] for keyword in omm.KEYWORDS
-                          if value.get(keyword) is not None})
+            yield lines.wrong(path, line, column, 'must be an object of an OMM')
+        elif 'EPOCH' not in value:
+            yield lines.wrong(path, line, column, f'EPOCH is missing; keywords found: {", ".join(value):.60}')
+        else:
+            yield _omm(line, {keyword: str(value[keyword]).strip()[:MAX_VALUE_CHARS] for keyword in omm.KEYWORDS
+                              if value.get(keyword) is not None})
         at = skipped(at)
 
 
@@ -284,8 +330,10 @@ def _xml(path: FilePath) -> Iterator[Satellite]:
             parser = files.xml_parser(stream)
             segments = _Segments(path, parser)
             while piece := stream.read(PARSE_CHUNK_BYTES):
-                parser.Parse(piece)
-                yield from segments.satellites
+                try:
+                    parser.Parse(piece)
+                finally:
+                    yield from segments.satellites
                 segments.satellites.clear()
             parser.Parse(b'', True)
     except expat.ExpatError as error:

@@ -1,20 +1,20 @@
-"""Passes of a satellite over a station, by SGP4 every SEARCH_STEP_S seconds. A satellite rises and sets at a least
-elevation, such as that of a horizon mask. Rise and set are exact to a millisecond, and the culmination is the highest
-instant between them. A shorter pass may be missed, which stays below 1 deg above the least elevation. A pass under way
-at the beginning or at the end of the search is followed to its rise and to its set."""
+"""Passes of a satellite over a station, by its height (an elevation, or an elevation above a horizon mask) every
+SEARCH_STEP_S seconds. Between two steps the height has at most one maximum or minimum, which is refined first. So a
+pass of a second is found as well, and two passes that a short dip divides. Rise and set are exact to 0.1 ms, and a
+culmination to a few ms. A pass under way at the beginning or at the end of the search is followed to its rise and to
+its set."""
 import datetime
 import math
 import typing
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.geometry.orbit import Satellite, TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
-from pedestal_common.quantities import Days, Degrees, Floats, Seconds, Times
+from pedestal_common.quantities import Bools, Days, Degrees, Floats, Ints, Seconds, Times
 
 SEARCH_STEP_S = 20.0  # time between two elevations [s]
 MIN_CULMINATION_DEG = 10.0
@@ -23,7 +23,87 @@ SEARCH_DAYS = 5.0  # time that is searched [days]
 MAX_PASS_DAYS = 30.0
 """Longest time before and after the search in which the rise and the set of a pass under way are searched [days]."""
 PASS_CHUNK_STEPS = 540  # number of steps computed at once on the way to a rise or set: three hours
+SECTION_POINTS = 9  # number of points at which an interval is evaluated at once
+PEAK_SPACING_S, CROSSING_SPACING_S = 0.2, 1e-4
+"""Interval to which the search for a maximum narrows [s], before a parabola is laid through it; to which that for a
+rise or a set narrows."""
 MAX_RUN_S = float(SECONDS_PER_DAY)  # largest duration of a run [s]
+
+
+Height: typing.TypeAlias = Callable[[Times], Floats]    # NaN where it is unknown, which counts as below 0
+
+
+class Span(typing.NamedTuple):
+    """Time in which a height is above 0."""
+    begin: Seconds
+    end: Seconds
+    rises: bool     # False if the search begins inside the span
+    sets: bool      # False if the search ends inside the span
+
+
+def spans(height: Height, times: Times, heights: Floats) -> list[Span]:
+    """Return the spans between the first and the last of the times, which grow. heights: at the times."""
+    turns = np.concatenate((maxima(height, times, heights), maxima(lambda t: -height(t), times, -heights)))
+    at = np.concatenate((times, turns))
+    order = np.argsort(at, kind='stable')
+    at, above = at[order], (np.concatenate((heights, height(turns))) > 0.0)[order]
+    edges = np.flatnonzero(above[1:] != above[:-1])
+    crossings = crossed(height, at[edges], at[edges + 1], above[edges]).tolist()
+    up, down = bool(above[0]), bool(above[-1])
+    ends = [at[0].item()] * up + crossings + [at[-1].item()] * down
+    count = len(ends) // 2
+    return [Span(begin, end, i > 0 or not up, i + 1 < count or not down)
+            for i, (begin, end) in enumerate(zip(ends[::2], ends[1::2]))]
+
+
+def crossed(height: Height, low: Times, high: Times, above: Bools) -> Times:
+    """Return the times between low and high (n,) at which a height passes 0, on the side above 0. above: True for a
+    height above 0 at low."""
+    while len(low) and (high - low).max() > CROSSING_SPACING_S:
+        at, values = _section(height, low, high)
+        other = (values > 0.0) != above
+        other[-1] = True
+        first = np.argmax(other[1:], axis=0)
+        low, high = _taken(at, first), _taken(at, first + 1)
+    return np.where(above, low, high)
+
+
+def maxima(height: Height, times: Times, heights: Floats) -> Times:
+    """Return the times of the maxima of a height between the first and the last of the times. heights: there."""
+    known = np.where(np.isnan(heights), -math.inf, heights)
+    i = np.flatnonzero((known[1:-1] > known[:-2]) & (known[1:-1] >= known[2:])) + 1
+    low, high = times[i - 1], times[i + 1]
+    while len(i) and (high - low).max() > PEAK_SPACING_S:
+        at, values = _section(height, low, high)
+        best = np.argmax(np.where(np.isnan(values), -math.inf, values), axis=0).clip(1, SECTION_POINTS - 2)
+        low, high = _taken(at, best - 1), _taken(at, best + 1)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    before, at_middle, after = height(np.concatenate((low, middle, high))).reshape(3, -1)
+    bend = before - 2.0 * at_middle + after
+    with np.errstate(invalid='ignore', divide='ignore'):
+        shift = np.where(bend < 0.0, 0.5 * (before - after) / bend, 0.0)
+    return middle + half * shift.clip(-1.0, 1.0)
+
+
+def _section(height: Height, low: Times, high: Times) -> tuple[Floats, Floats]:
+    """Return (times, heights), both (SECTION_POINTS, n), at even distances from low to high (n,)."""
+    at = np.linspace(low, high, SECTION_POINTS)
+    return at, height(at.ravel()).reshape(at.shape)
+
+
+def _taken(table: Floats, rows: Ints) -> Floats:
+    return np.take_along_axis(table, rows[np.newaxis], axis=0)[0]
+
+
+def culminations(elevation: Height, peaks: Times, span: Span) -> tuple[Times, Floats]:
+    """Return (times, elevations) of those of the peaks, the maxima of the elevation, that lie inside a span, and of an
+    end of the span if it is the highest instant."""
+    at = np.concatenate(([span.begin], peaks[(peaks > span.begin) & (peaks < span.end)], [span.end]))
+    values = elevation(at)
+    chosen = np.full(len(at), True)
+    chosen[[0, -1]] = False
+    chosen[np.nanargmax(values)] = True
+    return at[chosen], values[chosen]
 
 
 class Pass(typing.NamedTuple):
@@ -59,65 +139,57 @@ def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.
     sets. Raises TargetError if the satellite does not rise, or if SGP4 ends."""
     julian, fraction = orbit.julian_date(begin)
 
-    def elevation(t: Seconds | Times) -> Floats:    # above `least`
-        return orbit.elevations(satrec, station, julian, fraction, np.atleast_1d(t)) - least
+    def elevation(t: Times) -> Floats:    # above `least`
+        return orbit.elevations(satrec, station, julian, fraction, t) - least
 
-    def azimuth(t: Seconds) -> Degrees:
+    def azimuth(t: Seconds | None) -> Degrees:
+        if t is None:
+            return math.nan
         [[east, north, _]], _ = orbit.enu(satrec, station, julian, fraction, np.array([t]))
         return math.degrees(math.atan2(east, north)) % 360.0
 
-    def crossing(i: int) -> Seconds:
-        return brentq(lambda t: elevation(t)[0], times[i], times[i + 1], xtol=1e-3)
+    def utc(t: Seconds | None) -> datetime.datetime | None:
+        return None if t is None else begin + datetime.timedelta(milliseconds=round(1e3 * t))
 
-    def utc(t: Seconds) -> datetime.datetime:
-        return begin + datetime.timedelta(milliseconds=round(1e3 * t))
-
-    times = np.arange(0.0, SECONDS_PER_DAY * days, SEARCH_STEP_S)
-    heights = elevation(times)
-    if not (heights > 0.0).any():
+    times, heights = followed(elevation, np.arange(0.0, SECONDS_PER_DAY * days, SEARCH_STEP_S), MAX_PASS_DAYS)
+    known, peaks = spans(elevation, times, heights), maxima(elevation, times, heights)
+    if not known:
         mask = f'above {least:.3g} deg ' if least else ''
         raise TargetError(f'satellite {satrec.number} does not rise {mask}within {days:g} days of '
                           f'{begin:%Y-%m-%dT%H:%M:%SZ} at latitude {station.latitude_deg:g}, longitude '
                           f'{station.longitude_deg:g} deg')
-    if heights[0] > 0.0:
-        before, above = _until_below(elevation, times[0], -SEARCH_STEP_S)
-        times, heights = np.append(before[::-1], times), np.append(above[::-1], heights)
-    if heights[-1] > 0.0:
-        after, above = _until_below(elevation, times[-1], SEARCH_STEP_S)
-        times, heights = np.append(times, after), np.append(heights, above)
-    # +1 at the first step above the horizon, -1 at the first step below it again.
-    edges = np.diff(np.concatenate(([False], heights > 0.0, [False])).astype(int))
     found = []
-    for i, j in zip(np.flatnonzero(edges > 0).tolist(), (np.flatnonzero(edges < 0) - 1).tolist()):
-        rise, down = crossing(i - 1) if i else None, crossing(j) if j + 1 < len(times) else None
-        best = i + int(np.argmax(heights[i:j + 1]))
-        top = minimize_scalar(lambda t: -elevation(t)[0], bounds=(
-            max(times[i] if rise is None else rise, times[best] - SEARCH_STEP_S),
-            min(times[j] if down is None else down, times[best] + SEARCH_STEP_S)), method='bounded',
-            options={'xatol': 1e-3})
-        each = Pass(None if rise is None else utc(rise), utc(top.x), None if down is None else utc(down),
-                    math.nan if rise is None else azimuth(rise), float(least - top.fun),
-                    math.nan if down is None else azimuth(down), begin)
+    for span in known:
+        rise, down = span.begin if span.rises else None, span.end if span.sets else None
+        tops, highest = culminations(elevation, peaks, span)
+        top = int(np.argmax(highest))
+        each = Pass(utc(rise), begin + datetime.timedelta(milliseconds=round(1e3 * tops[top])), utc(down),
+                    azimuth(rise), float(least + highest[top]), azimuth(down), begin)
         if each.elevation >= MIN_CULMINATION_DEG or each.duration > MAX_RUN_S:
             found.append(each)
     return found
 
 
-def _until_below(elevation: Callable[[Times], Floats], start: Seconds, step: Seconds) -> tuple[Times, Floats]:
-    """Return (times, elevations [deg]) from `start` up to the first elevation that is not above 0, at most
-    MAX_PASS_DAYS away, or where SGP4 fails. A negative step goes back in time."""
-    times, heights = np.zeros(0), np.zeros(0)
-    while len(times) * abs(step) < MAX_PASS_DAYS * SECONDS_PER_DAY:
-        chunk = start + step * np.arange(len(times) + 1, len(times) + 1 + PASS_CHUNK_STEPS, dtype=np.float64)
-        try:
-            above = elevation(chunk)
-        except TargetError:
-            break
-        down = np.flatnonzero(above <= 0.0)
-        last = int(down[0]) + 1 if down.size else len(chunk)
-        times, heights = np.append(times, chunk[:last]), np.append(heights, above[:last])
-        if down.size:
-            break
+def followed(height: Height, times: Times, most: Days) -> tuple[Times, Floats]:
+    """Return (times, heights) of times in steps of SEARCH_STEP_S, which go on before the first and after the last one
+    where the height is above 0 there: up to the first height that is not, at most for `most`, or where SGP4 fails."""
+    heights = height(times)
+    for end, step in ((0, -SEARCH_STEP_S), (-1, SEARCH_STEP_S)):
+        count, start = 0, times[end]
+        while heights[end] > 0.0 and count * SEARCH_STEP_S < most * SECONDS_PER_DAY:
+            chunk = start + step * np.arange(count + 1, count + 1 + PASS_CHUNK_STEPS, dtype=np.float64)
+            try:
+                above = height(chunk)
+            except TargetError:
+                break
+            down = np.flatnonzero(~(above > 0.0))
+            last = int(down[0]) + 1 if down.size else len(chunk)
+            count += last
+            if step > 0.0:
+                times, heights = np.append(times, chunk[:last]), np.append(heights, above[:last])
+            else:
+                times = np.append(chunk[:last][::-1], times)
+                heights = np.append(above[:last][::-1], heights)
     return times, heights
 
 

@@ -54,6 +54,16 @@ def elevation(ephemeris: states.Ephemeris, station: StationParameters, t: Times 
     return arctan2(up, np.hypot(east, north))
 
 
+def gaps(ephemeris: states.Ephemeris) -> list[tuple[Seconds, Seconds, int]]:
+    """Return (begin, end, line of the state at the end) of each time inside an orbit without a position."""
+    found = [(before.end, after.begin, int(after.line[0]))
+             for before, after in zip(ephemeris.segments, ephemeris.segments[1:])]
+    for segment in ephemeris.segments:
+        found += [(segment.t[i], segment.t[i + 1], int(segment.line[i + 1]))
+                  for i in np.flatnonzero(states.gaps(segment.t))]
+    return [each for each in found if each[1] - each[0] > SEGMENT_GAP_TOLERANCE_S]
+
+
 def require_covered(ephemeris: states.Ephemeris, begin: Seconds, end: Seconds) -> None:
     """Raise csv_table.TableError if an orbit does not cover all of the time from begin to end."""
     def utc(t: Seconds) -> str:
@@ -65,12 +75,8 @@ def require_covered(ephemeris: states.Ephemeris, begin: Seconds, end: Seconds) -
         raise csv_table.TableError(f'{ephemeris.path}: line {line}: the run from {utc(begin)} to {utc(end)} must be '
                                    f'inside the usable time of the file, {utc(ephemeris.begin)} to '
                                    f'{utc(ephemeris.end)}')
-    gaps = [(before.end, after.begin, after.line[0])
-            for before, after in zip(ephemeris.segments, ephemeris.segments[1:])]
-    for segment in ephemeris.segments:
-        gaps += [(segment.t[i], segment.t[i + 1], segment.line[i + 1]) for i in np.flatnonzero(states.gaps(segment.t))]
-    for since, until, line in gaps:
-        if until - since > SEGMENT_GAP_TOLERANCE_S and begin < until and end > since:
+    for since, until, line in gaps(ephemeris):
+        if begin < until and end > since:
             raise csv_table.TableError(f'{ephemeris.path}: line {line}: gap of {until - since:g} s above this state, '
                                        f'in the run from {utc(begin)} to {utc(end)}')
 

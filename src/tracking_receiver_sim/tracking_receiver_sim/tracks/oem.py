@@ -37,43 +37,70 @@ class _Block(NamedTuple):
     line: int       # at which the metadata end
     meta: _Entries
     rows: Floats    # (n, COLUMN_COUNT)
+    error: csv_table.TableError | None      # of its first wrong row
+
+
+class Object(NamedTuple):
+    """An object of an OEM."""
+    name: str
+    designator: str     # OBJECT_ID
+    line: int           # at which the metadata of its first segment end
+    blocks: tuple[_Block, ...]
+    midnight: Seconds   # instant of t = 0
+
+    def ephemeris(self, path: str) -> states.Ephemeris:
+        """Return the Ephemeris of the object. Raises TableError."""
+        for block in self.blocks:
+            if block.error:
+                raise block.error
+        segments = tuple(_segment(path, block, self.midnight) for block in self.blocks)
+        for before, after, block in zip(segments, segments[1:], self.blocks[1:]):
+            if after.begin < before.end:
+                place = block.meta.get('USEABLE_START_TIME', block.meta['OBJECT_NAME'])
+                raise lines.wrong(path, place.line, place.column, 'the segment begins before the end of the one above')
+        first = self.blocks[0].meta
+        count, given = sum(len(segment.t) for segment in segments), sum(len(block.rows) for block in self.blocks)
+        passed_over = f', passed over {given - count} x {REPEATED_STATE}' if given > count else ''
+        return states.Ephemeris(path, self.midnight, segments,
+                                f'CCSDS OEM of {first["OBJECT_NAME"]:.40} ({first["OBJECT_ID"]:.40}): {count} states '
+                                f'in {first["REF_FRAME"]}, {segments[0].method} of degree '
+                                f'{segments[0].degree}{passed_over}')
+
+
+def objects(path: str) -> list[Object]:
+    """Return the objects of an OEM in the order of the file. Raises TableError for a file of another form."""
+    found: dict[tuple[str, str], list[_Block]] = {}
+    for block in _blocks(path):
+        found.setdefault((block.meta['OBJECT_NAME'].upper(), block.meta['OBJECT_ID'].upper()), []).append(block)
+    if not found:
+        raise csv_table.TableError(f'{path}: META_START is missing')
+    rows = next(iter(found.values()))[0].rows
+    midnight = instant.of_day(int(rows[0, DAY_COLUMN]), 0.0) if len(rows) else 0.0
+    return [Object(str(blocks[0].meta['OBJECT_NAME']), str(blocks[0].meta['OBJECT_ID']), blocks[0].line, tuple(blocks),
+                   midnight) for blocks in found.values()]
 
 
 def read(path: str, wanted: str = '') -> states.Ephemeris:
     """Return the Ephemeris of one object in an OEM. Raises TableError. wanted: name or international designator of the
     object; it may be empty for a file of one object."""
-    objects: dict[tuple[str, str], list[_Block]] = {}
-    midnight = 0.0
-    for block in _blocks(path):
-        names = block.meta['OBJECT_NAME'].upper(), block.meta['OBJECT_ID'].upper()
-        if not objects:
-            midnight = instant.of_day(int(block.rows[0, DAY_COLUMN]), 0.0) if len(block.rows) else 0.0
-        objects.setdefault(names, []).append(block)
-    if not objects:
-        raise csv_table.TableError(f'{path}: META_START is missing')
+    known = objects(path)
+    for block in (block for each in known for block in each.blocks):
+        if block.error:
+            raise block.error
     wanted = wanted.strip().upper()
-    found = [names for names in objects if not wanted or wanted in names]
+    found = [each for each in known if not wanted or wanted in (each.name.upper(), each.designator.upper())]
     if len(found) != 1:
-        raise csv_table.TableError(f'{path}: aircraft = {wanted!r:.60}: must name one of the {len(objects)} objects '
-                                   f'in the file: {", ".join(" ".join(names)[:60] for names in list(objects)[:12])}')
-    of_object = objects[found[0]]
-    segments = tuple(_segment(path, block, midnight) for block in of_object)
-    for before, after, block in zip(segments, segments[1:], of_object[1:]):
-        if after.begin < before.end:
-            place = block.meta.get('USEABLE_START_TIME', block.meta['OBJECT_NAME'])
-            raise lines.wrong(path, place.line, place.column, 'the segment begins before the end of the one above')
-    first = of_object[0].meta
-    count, given = sum(len(segment.t) for segment in segments), sum(len(block.rows) for block in of_object)
-    passed_over = f', passed over {given - count} x {REPEATED_STATE}' if given > count else ''
-    return states.Ephemeris(path, midnight, segments,
-                            f'CCSDS OEM of {first["OBJECT_NAME"]:.40} ({first["OBJECT_ID"]:.40}): {count} states in '
-                            f'{first["REF_FRAME"]}, {segments[0].method} of degree {segments[0].degree}{passed_over}')
+        listed = ', '.join(f'{each.name} {each.designator}'.upper()[:60] for each in known[:12])
+        raise csv_table.TableError(f'{path}: aircraft = {wanted!r:.60}: must name one of the {len(known)} objects '
+                                   f'in the file: {listed}')
+    return found[0].ephemeris(path)
 
 
 def _blocks(path: str) -> Iterator[_Block]:
     # begun: line of the last META_START; ended: of the last META_STOP; state: part of the file that contains the line.
     meta: _Entries = {}
     rows, begun, ended, state, count = array.array('d'), 0, 0, 'header', 0
+    wrong: csv_table.TableError | None = None
     for line, text in lines.read(path):
         word = text.split(None, 1)[0]
         if state == 'covariance':
@@ -82,11 +109,11 @@ def _blocks(path: str) -> Iterator[_Block]:
             if state == 'meta':
                 raise lines.wrong(path, line, 1, f'META_START inside the metadata of line {begun}')
             if state == 'data':
-                yield _Block(ended, meta, _table(rows))
+                yield _Block(ended, meta, _table(rows), wrong)
             count += 1
             if count > MAX_SEGMENTS:
                 raise csv_table.TableError(f'{path}: line {line}: must be at most {MAX_SEGMENTS} segments')
-            meta, rows, begun, state = {}, array.array('d'), line, 'meta'
+            meta, rows, begun, state, wrong = {}, array.array('d'), line, 'meta', None
         elif word == 'META_STOP' and state == 'meta':
             missing = [name for name in REQUIRED_KEYWORDS if name not in meta]
             if missing:
@@ -95,7 +122,10 @@ def _blocks(path: str) -> Iterator[_Block]:
         elif word == 'COVARIANCE_START' and state == 'data':
             state = 'covariance'
         elif state == 'data' and word != 'COMMENT':
-            rows.extend(_row(path, line, text))
+            try:
+                rows.extend(_row(path, line, text))
+            except csv_table.TableError as error:
+                wrong = wrong or error
         elif word != 'COMMENT':
             entry = ENTRY_PATTERN.fullmatch(text.strip())
             if not entry:
@@ -104,7 +134,7 @@ def _blocks(path: str) -> Iterator[_Block]:
     if state == 'meta':
         raise csv_table.TableError(f'{path}: the file ends inside the metadata of line {begun}')
     if state in ('data', 'covariance'):
-        yield _Block(ended, meta, _table(rows))
+        yield _Block(ended, meta, _table(rows), wrong)
 
 
 def _table(rows: 'array.array[float]') -> Floats:
