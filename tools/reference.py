@@ -66,7 +66,8 @@ VERB_GROUPS = {
 """{what a user wants: the verbs for it}, the sections of docs/reference/commands.md."""
 
 RATE_TEXTS = {'step': 'every step', 'once': 'once, latched or not', 'second': '1 Hz', 'change': 'on change, latched',
-              'reply': 'after each request', 'command': 'on request', 'sample': 'at any time, in realtime only'}
+              'reply': 'after each request', 'command': 'on request', 'sample': 'at any time, in realtime only',
+              'station': 'on change, latched, in realtime only'}
 """{rate of a topic, as in topics.Topic: its text in the table of topics}."""
 
 

@@ -20,5 +20,6 @@ setup(
     license='Apache-2.0',
     entry_points={'console_scripts': [
         'recorder_node = pedestal_common.node.run:main',
+        'pass_recorder_node = pedestal_common.node.run:main',
     ]},
 )

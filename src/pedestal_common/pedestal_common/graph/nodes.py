@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterable
 
 import numpy as np
 
-from pedestal_common.graph.topics import REALTIME_RATES, TOPIC_BY_NAME, TOPICS
+from pedestal_common.graph.topics import REALTIME_RATES, STATION_RATE, TOPIC_BY_NAME, TOPICS
 from pedestal_common.parameters import AnyParameters
 
 MAX_BEAMS = 16  # largest number of beams of an electronic array
@@ -114,6 +114,10 @@ NODES = (
     Node('weather_station', writes=('weather/pressure', 'weather/temperature', 'weather/humidity'),
          doc='measures the weather for the refraction; no program of this project, and not simulated',
          stands_for='the weather station'),
+    Node('station', writes=('station/night', 'station/log'), obeys='station/command',
+         replies='station/command_result',
+         doc='takes the passes of a plan one after another; is `pedestal station`, a program beside the graph',
+         stands_for='the operator'),
 )
 """Rows of the nodes, in the order in which a graph is started. Nodes with a unit also publish `diagnostics`."""
 
@@ -246,11 +250,16 @@ SERVER_ROWS = (
          runs='pedestal_operator.frames_node:FramesNode'))
 """Rows of the servers, which connect other programs to a graph and belong to none. Each reads the topics it needs."""
 
+PASS_RECORDER = Node('pass_recorder', 'pedestal_recording.pass_recorder_node',
+                     'pedestal_recording.recorder_params:RecorderParameters',
+                     doc='recorder of one pass, which the station starts beside the recorder of the graph',
+                     runs='pedestal_recording.recorder_node:RecorderNode')
+
 STANDALONE_NODES = {node.executable.removesuffix('_node').removeprefix('operator_'): node
                     for node in (*HARDWARE_ROWS, *SERVER_ROWS) if node.parameters}
 """{short name of an executable, such as rotator or page: its Node}, of the nodes that are no row of NODES."""
 
-EXECUTABLES = {node.executable: node for node in (*NODES, *HARDWARE_ROWS, *SERVER_ROWS) if node.program}
+EXECUTABLES = {node.executable: node for node in (*NODES, *HARDWARE_ROWS, *SERVER_ROWS, PASS_RECORDER) if node.program}
 """{name of an executable: its Node}."""
 
 NODE_NAMES = tuple(node.name for node in NODES)
@@ -356,7 +365,8 @@ def recorded(names: Collection[str], flags: Collection[str] = (), beams: int = 0
     """Return the Links that have a publisher in a graph of these nodes, or to which any client may publish. flags:
     those of topics.TOPIC_FLAGS that are set; own: as in `own_rows`."""
     return [link for link in links_of(names, beams, own).values()
-            if any(name in names for name in (link.readers if link.rate in REALTIME_RATES else link.writers))
+            if link.rate == STATION_RATE
+            or any(name in names for name in (link.readers if link.rate in REALTIME_RATES else link.writers))
             and (not link.flag or link.flag in flags)]
 
 

@@ -8,6 +8,7 @@ subscribers.
     sample  a message whenever its publisher has measured, in realtime only; a lockstep run takes none
     command a message for each command; the reply states the result, and the step before which the command took effect
     reply   a message for each command that the node accepted or refused
+    station a message of the station, a program beside a graph in realtime
 """
 import typing
 from collections.abc import Mapping
@@ -53,12 +54,16 @@ QOS_BY_RATE = {'step': Qos(latched=False, lockstep=0, written=1000, read=8, reli
                'command': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
                'reply': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
                'second': Qos(latched=False, lockstep=10, written=10, read=100, reliable=True, recorded=1000),
-               'sample': Qos(latched=False, lockstep=10, written=10, read=10, reliable=False, recorded=1000)}
+               'sample': Qos(latched=False, lockstep=10, written=10, read=10, reliable=False, recorded=1000),
+               'station': Qos(latched=True, lockstep=1, written=10, read=10, reliable=True, recorded=1000)}
 
 UNSTEPPED_RATES = 'once', 'sample'  # rates of messages that belong to no step, and that a unit takes by `decode`
 
-REALTIME_RATES = 'command', 'sample'
-"""Rates of messages that any client may publish, and that are recorded in realtime only."""
+STATION_RATE = 'station'
+"""Rate of the messages of the station, a program beside the graph: on change, latched."""
+
+REALTIME_RATES = 'command', 'sample', STATION_RATE
+"""Rates of messages that come from outside the graph, and that are recorded in realtime only."""
 
 EVENT_RATES = 'change', 'reply'
 """Rates of messages that are published between two steps, when there is a change or a reply."""
@@ -202,6 +207,16 @@ TOPICS = (
         Topic(f'{node}/injected', 'diagnostic_msgs/msg/DiagnosticStatus', 'reply',
               'every injection that was accepted or refused, as on `acu/command_result`'
               + ('; also the replies to its services (enable, disable ...)' if node == 'adu' else '')))),
+    Topic('station/command', 'diagnostic_msgs/msg/DiagnosticStatus', 'command',
+          'command to the station, as on `acu/command`'),
+    Topic('station/command_result', 'diagnostic_msgs/msg/DiagnosticStatus', 'reply',
+          'every command that the station accepted or refused, as on `acu/command_result`'),
+    Topic('station/night', 'std_msgs/msg/String', STATION_RATE,
+          'the night, as JSON: `now` (what the station does) and `passes`, each with `case`, `begin` and `end` of its '
+          'contact (UTC [s]), `max_elevation_deg`, `state` (`queued`, `running`, `done`, `failed`, `skipped` or '
+          '`dropped`) and `text`'),
+    Topic('station/log', 'std_msgs/msg/String', STATION_RATE,
+          'decisions of the station: a line for each, with its UTC'),
     Topic('diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'second', 'state of each node'),
 )
 

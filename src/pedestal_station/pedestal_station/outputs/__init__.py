@@ -1,0 +1,1 @@
+"""Outputs of a night: table, rows, files and charts."""

@@ -1,0 +1,77 @@
+"""Commands of an operator to the station on `station/command`: their table, and what each of them requests."""
+import math
+from typing import NamedTuple
+
+from pedestal_common.geometry import orbit
+from pedestal_common.geometry.geodesy import StationParameters
+from pedestal_common.quantities import Seconds
+from pedestal_common.wire import commands
+from pedestal_common.wire.commands import Argument, Command, CommandDefinition
+from pedestal_station.outputs.file import (
+    ELEMENT_NAMES,
+    MAX_CONTACT_S,
+    MAX_NAME_CHARACTERS,
+    Contact,
+    direction,
+    satellite_number,
+    seconds,
+)
+
+INSERTED_PRIORITY = 1.0  # weight of a second of contact of an inserted pass
+
+_CASE = Argument('case', 'name of the pass in the plan, NAME/K', default='')
+
+STATION_COMMANDS = (
+    CommandDefinition('hold', 'send no more commands to the antenna until `resume`; a recording continues', (
+        Argument('reason', 'reason', default=''),)),
+    CommandDefinition('resume', 'go on after `hold`, or after another client has commanded a mode'),
+    CommandDefinition('skip', 'leave out a pass, also the one under way', (
+        _CASE._replace(doc=f'{_CASE.doc}; default: the pass under way, else the next'),)),
+    CommandDefinition('insert', 'take a pass that is dropped, skipped or failed, or one of other elements; queued '
+                      'passes that overlap it are dropped', (
+                          _CASE, Argument('name', 'name of another satellite; default: its number', default=''),
+                          *(Argument(name, 'its elements, as in the command `tle`', default='')
+                            for name in ELEMENT_NAMES),
+                          *(Argument(name, f'{name} of the contact, UTC', default='') for name in ('begin', 'end')))))
+"""Table of the commands of the station."""
+
+
+class Request(NamedTuple):
+    """A command of an operator, checked as far as that needs no state of the station."""
+    command: Command
+    case: str = ''                  # of a pass of the plan
+    contact: Contact | None = None  # to be inserted, without the number in its case
+
+
+def request(command: Command, station: StationParameters) -> Request:
+    """Return the Request of a Command. Raises ValueError."""
+    found = {name: str(value) for name, value in commands.values(STATION_COMMANDS, command).items()}
+    case = found.get('case', '')
+    if command.verb != 'insert':
+        return Request(command, case)
+    others = [name for name, text in found.items() if text and name != 'case']
+    if bool(case) == bool(others):
+        raise ValueError('insert: must have either case, or elements with begin and end'
+                         + (f'; case = {case} and {", ".join(others)} are given' if case else ''))
+    return Request(command, case, None if case else _contact(found, station))
+
+
+def _contact(found: dict[str, str], station: StationParameters) -> Contact:
+    """Return the contact of the arguments of `insert`. Raises ValueError."""
+    elements = {name: found[name].replace('_', ' ') if name != 'omm' else found[name]
+                for name in ELEMENT_NAMES if found[name]}
+    if set(elements) not in ({'line_1', 'line_2'}, {'omm'}):
+        raise ValueError(f'insert: elements = {", ".join(elements) or "none"}: must be line_1 and line_2, or omm')
+    times: list[Seconds] = [seconds(orbit.instant(name, found[name])) for name in ('begin', 'end')]
+    begin, end = times
+    if not begin < end <= begin + MAX_CONTACT_S:
+        raise ValueError(f'insert: end = {found["end"]}: must be after begin, at most {MAX_CONTACT_S:g} s')
+    number = satellite_number(elements)
+    name = found['name'] or number
+    if len(name) > MAX_NAME_CHARACTERS:
+        raise ValueError(f'insert: name = {name:.20}...: must be at most {MAX_NAME_CHARACTERS} characters')
+    points = [direction(elements, station, utc) for utc in (begin, 0.5 * (begin + end), end)]
+    highest = max(elevation for _, elevation in points)
+    if math.isnan(highest) or highest <= 0.0:
+        raise ValueError(f'insert: {name} is below the horizon from {found["begin"]} to {found["end"]}')
+    return Contact(name, name, number, elements, (), begin, end, points[0], highest, INSERTED_PRIORITY, True, '')
