@@ -23,7 +23,7 @@ from tunnel import Tunnel
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect as connect_web_socket
 
-from pedestal_common.wire import commands
+from pedestal_common.wire import commands, messages
 from pedestal_recording import bag as bags
 
 CHROMIUM = shutil.which('chromium')
@@ -288,6 +288,54 @@ def stops_in_vain(page):
     page.locator('#stop').dispatch_event('click')
     reads(page, '#banner', 'STOP was not sent: no link. ')
     reads(page, '#banner', 'Use the emergency stop of the antenna.')
+
+
+NIGHT_BEGIN = 1_900_000_000.0  # [s]
+
+
+def night_of(states):
+    """The text of station/night: passes of a minute in these states."""
+    return json.dumps({'now': 'tracks ISS/2', 'passes': [
+        {'case': f'<b>SAT</b> {i}/1', 'begin': NIGHT_BEGIN + 600.0 * i, 'end': NIGHT_BEGIN + 600.0 * i + 60.0,
+         'max_elevation_deg': 30.4 + i, 'state': state, 'text': 'no signal' if state == 'failed' else ''}
+        for i, state in enumerate(states)]})
+
+
+@pytest.mark.thorough
+@needs_chromium
+def test_the_night_of_a_station_is_shown_while_the_station_is_there(start_node, connect, browser):
+    """What runs comes first, then what is queued; the panel is hidden before the station, and after it."""
+    server = start_node('page', '-p', 'port:=0')
+    page = opened(browser[1], Site(begins_with(server.process, 3)).urls['operator'])
+    reads(page, '#link', 'no ACU')
+    assert page.locator('#night').is_hidden()
+    client = connect(server.domain_id, 'station')
+    client.write('station/night')
+
+    def publish(text):
+        client.publish('station/night', messages.String(data=text))
+        client.spin(1.0)
+    publish(night_of(['done', 'failed', 'running', 'queued', 'queued', 'dropped']))
+    reads(page, '#night', 'tracks ISS/2')
+    shown = page.locator('#night div[data-state]')
+    assert [row.get_attribute('data-state') for row in shown.all()] == ['running', 'queued', 'queued', 'dropped',
+                                                                        'failed', 'done']
+    assert shown.first.inner_text() == 'running <b>SAT</b> 2/1 from 18:06 to 18:07, 32°'
+    assert 'no signal' in page.locator('#night .warn').inner_text()
+    publish(night_of(['done'] * 40))
+    holds(page, '() => document.querySelectorAll("#night [data-state=done]").length === 40')
+    for width, height in SIZES:     # a long list leaves the plot its place
+        page.set_viewport_size({'width': width, 'height': height})
+        assert page.locator('#sky-plot').bounding_box()['height'] > 150.0
+        assert 60.0 < page.locator('#night').bounding_box()['height'] < 130.0
+    publish('{"passes": 3}')
+    holds(page, '() => document.querySelector("#night").hidden')
+    publish(night_of(['running']))
+    reads(page, '#night', 'running')
+    client.close()
+    holds(page, '() => document.querySelector("#night").hidden')
+    assert page.errors == [] and server.process.poll() is None
+    page.context.close()
 
 
 @pytest.mark.thorough

@@ -1,4 +1,5 @@
 """The rules of the operator's page without a server: who is served, dead men, the event log, the sky."""
+import json
 import math
 from time import monotonic, sleep
 
@@ -279,3 +280,14 @@ def test_without_elements_station_or_utc_no_pass_is_looked_for():
     old = page_passes.pass_query(Station(1575909000.0 + 40.0 * 86400.0))
     # elements of 40 days ago
     assert page_passes.upcoming_passes(old) == []
+
+
+def test_the_night_of_a_station_is_taken_only_in_its_form():
+    row = {'case': 'ISS/1', 'begin': 1.0, 'end': 2, 'max_elevation_deg': 30.5, 'state': 'queued', 'text': ''}
+    text = json.dumps({'now': 'waits', 'passes': [row]})
+    assert page_state.night(text) == {'now': 'waits', 'passes': [
+        {'case': 'ISS/1', 'begin': 1.0, 'end': 2.0, 'highest': 30.5, 'state': 'queued', 'text': ''}]}
+    assert page_state.night('{"now": "", "passes": []}') == {'now': '', 'passes': []}
+    for wrong in ('', '[]', 'null', '{"now": ""}', '[' * 100_000, text.replace('queued', 'eaten'),
+                  text.replace('1.0', '"x"'), text.replace('30.5', 'null'), text.replace('"state"', '"stat"')):
+        assert page_state.night(wrong) is None, wrong[:40]
