@@ -1,0 +1,332 @@
+"""The choice among the passes of a night for one antenna: the exact plan, and the greedy plan beside it.
+
+A pass has at most one contact. The contact lies inside the window of the pass and lasts at least `min_pass`. Either
+end of a contact may be trimmed. Between any two contacts lies the changeover of the antenna. A second of contact is
+worth
+
+    gain = priority (1 - loss / (set - rise))
+
+so that a whole pass is worth its priority times its seconds without the expected loss. The exact plan maximises the
+sum. An endless track, such as that of a GEO, is a pass like any other: the plan gives it one contact, the most
+valuable one. For several contacts the user chooses several windows.
+
+Passes that cannot disturb each other, directly or through others, are independent problems. For each of them, HiGHS
+(scipy.optimize.milp) solves with
+
+    x       1 if the pass is taken                  p, q    seconds trimmed at the begin and at the end
+    z       1 if both passes are taken in this order, only where both orders are possible
+
+    maximise sum gain ((set - rise) x - p - q)
+    p + q <= (set - rise - min_pass) x
+    q_i + p_j >= O_ij z_ij,  O_ij = set_i + changeover_ij - rise_j          the overlap that trims remove
+    z_ij + z_ji >= x_i + x_j - 1
+
+Of two equal plans it takes the one with more contact in the earlier passes (TIE). A limit of nodes makes the plan
+repeatable; the limit of time ends a search only on a slower computer. After either limit the plan is the better one of
+HiGHS's and the greedy plan, with the bound that HiGHS has proved.
+"""
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from scipy import sparse
+from scipy.optimize import Bounds, LinearConstraint, milp
+
+from pedestal_common.parameters import ParameterError, Parameters, parameter
+from pedestal_common.quantities import Floats, Seconds
+from pedestal_station.night import Choice, Pass, Share
+
+MAX_NODES = 20_000
+"""Largest number of nodes that HiGHS visits for a problem."""
+TIE = 1e-7
+"""Largest relative change of a gain that prefers the earlier one of two equal passes."""
+MAX_CUT_PASSES = 12
+"""Largest number of passes that share a stretch of time in an inequality of `_stretches`."""
+EQUAL_S = 1e-6
+"""Difference of times below which they are equal [s]: the tolerance of HiGHS."""
+
+Changeover: TypeAlias = Callable[[int, int], Seconds]   # from the end of pass i to the begin of pass j
+Contact: TypeAlias = tuple[Seconds, Seconds]            # begin, end
+Contacts: TypeAlias = dict[int, Contact]                # of the taken passes
+Row: TypeAlias = tuple[dict[int, float], float]         # sum of coefficient times variable is at most a limit
+
+
+@dataclasses.dataclass(frozen=True)
+class Rules(Parameters):
+    """What the plan keeps to."""
+
+    min_pass: float = parameter(60.0, 1.0, 86400.0, 's', 'shortest contact')
+    setup: float = parameter(30.0, 0.0, 86400.0, 's', 'time for setting up between two contacts, beside the slew')
+    time_limit: float = parameter(5.0, 1e-3, 3600.0, 's', 'time after which the best plan found is given')
+
+
+class _Problem(NamedTuple):
+    """The passes in the order of rise; the changeovers between those that disturb each other."""
+    rise: list[Seconds]
+    set: list[Seconds]
+    gain: list[float]
+    min_pass: Seconds
+    gaps: dict[tuple[int, int], Seconds]    # in both orders; inf for an order that is impossible
+    near: list[list[int]]       # the passes that disturb each pass
+    shortest: Seconds           # of all changeovers
+
+    def length(self, i: int) -> Seconds:
+        return self.set[i] - self.rise[i]
+
+    def value(self, contacts: Contacts) -> float:
+        return math.fsum(self.gain[i] * (end - begin) for i, (begin, end) in contacts.items())
+
+
+def choose(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> tuple[Choice, Choice]:
+    """Return (exact plan, greedy plan). Raises ParameterError for a pass or a changeover that is not a number of its
+    range."""
+    for each in passes:
+        _check(each)
+    order = sorted(range(len(passes)), key=lambda i: (passes[i].window.rise, passes[i].window.set, passes[i].case))
+    ranked = [passes[i] for i in order]
+    problem = _problem(ranked, lambda i, j: changeover(order[i], order[j]), rules)
+    exact: Contacts = {}
+    greedy: Contacts = {}
+    bounds, optimal = [], True
+    groups = list(_groups(problem))
+    size = sum(len(group)**3 for group in groups)
+    for group in groups:
+        usual = _fill(problem, _greedy_order(problem, group), {})
+        found, limit = _solve(problem, group, rules.time_limit * len(group)**3 / size)
+        found = max(usual, found, key=problem.value)
+        optimal = optimal and limit is None
+        bounds.append(problem.value(found) if limit is None else limit)
+        exact.update(found)
+        greedy.update(usual)
+    value = problem.value(exact)
+    bound = value if optimal else max(value, math.fsum(bounds))
+    usual_value = problem.value(greedy)
+    return (Choice(_shares(problem, ranked, order, exact), value, bound, optimal or value >= bound),
+            Choice(_shares(problem, ranked, order, greedy), usual_value, bound, usual_value >= bound))
+
+
+def _check(each: Pass) -> None:
+    window, length = each.window, each.window.set - each.window.rise
+    values = [('priority', each.object.priority, each.object.priority > 0.0, 'above 0'),
+              ('rise', window.rise, True, 'of seconds'),
+              ('set', window.set, length > 0.0, f'above rise, {window.rise:g} s'),
+              ('loss', each.prediction.loss, each.prediction.loss >= 0.0, 'at least 0 s')]
+    for name, value, allowed, words in values:
+        if not (math.isfinite(value) and allowed):
+            raise ParameterError(f'{each.case}: {name} = {value:g}: must be a finite number {words}')
+
+
+def _gain(each: Pass) -> float:
+    return each.object.priority * max(0.0, 1.0 - each.prediction.loss / (each.window.set - each.window.rise))
+
+
+def _problem(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> _Problem:
+    """Return the problem of passes in the order of rise."""
+    problem = _Problem([each.window.rise for each in passes], [each.window.set for each in passes],
+                       [_gain(each) for each in passes], rules.min_pass, {}, [[] for _ in passes], 0.0)
+    shortest = math.inf
+    for j in range(len(passes)):
+        for i in range(j):
+            first = second = _gap(problem, passes, changeover, i, j)
+            if problem.set[i] + first > problem.rise[j]:
+                second = _gap(problem, passes, changeover, j, i)
+                problem.gaps.update({(i, j): first, (j, i): second})
+                problem.near[i].append(j)
+                problem.near[j].append(i)
+            shortest = min(shortest, first, second)
+    return problem._replace(shortest=shortest if math.isfinite(shortest) else 0.0)
+
+
+def _gap(problem: _Problem, passes: Sequence[Pass], changeover: Changeover, i: int, j: int) -> Seconds:
+    """Return the changeover from pass i to pass j; inf if no two contacts fit in this order."""
+    room = problem.set[j] - problem.rise[i] - 2.0 * problem.min_pass
+    if room < 0.0 or min(problem.length(i), problem.length(j)) < problem.min_pass:
+        return math.inf
+    gap = changeover(i, j)
+    if not gap >= 0.0:
+        raise ParameterError(f'{passes[i].case} to {passes[j].case}: changeover = {gap:g}: must be a number at least '
+                             f'0 s')
+    return gap if gap <= room else math.inf
+
+
+def _groups(problem: _Problem) -> Iterator[list[int]]:
+    """Yield the groups of passes that disturb each other, without those that no plan can take."""
+    left = [problem.length(i) >= problem.min_pass and problem.gain[i] > 0.0 for i in range(len(problem.rise))]
+    for first in range(len(left)):
+        group = [first] if left[first] else []
+        left[first] = False
+        for i in group:
+            group += [j for j in problem.near[i] if left[j]]
+            for j in problem.near[i]:
+                left[j] = False
+        if group:
+            yield sorted(group)
+
+
+def _greedy_order(problem: _Problem, group: Iterable[int]) -> list[int]:
+    """Return the passes from the most to the least valuable second, then the longer ones, then the earlier ones."""
+    return sorted(group, key=lambda i: (-problem.gain[i], -problem.length(i), i))
+
+
+def _fill(problem: _Problem, order: Iterable[int], contacts: Contacts) -> Contacts:
+    """Return contacts to which each pass, in order, has been added or fitted anew where it is longest."""
+    contacts = dict(contacts)
+    for i in order:
+        known = contacts.pop(i, None)
+        longest = max(_free(problem, i, contacts, known), key=lambda free: free[1] - free[0])
+        if longest[1] - longest[0] >= problem.min_pass - EQUAL_S:
+            contacts[i] = longest
+    return contacts
+
+
+def _free(problem: _Problem, i: int, contacts: Contacts, known: Contact | None = None) -> list[Contact]:
+    """Return the stretches of the window of pass i between the contacts of others, earliest first; some may end before
+    they begin. known: a contact of the pass; then the one stretch between the same contacts."""
+    others = sorted((j for j in problem.near[i] if j in contacts), key=lambda j: contacts[j])
+    places = range(len(others) + 1)
+    if known is not None:
+        places = range(place := sum(contacts[j] < known for j in others), place + 1)
+    return [(max([problem.rise[i]] + [contacts[j][1] + problem.gaps[j, i] for j in others[:place]]),
+             min([problem.set[i]] + [contacts[j][0] - problem.gaps[i, j] for j in others[place:]]))
+            for place in places]
+
+
+def _solve(problem: _Problem, group: Sequence[int], time_limit: Seconds) -> tuple[Contacts, float | None]:
+    """Return (contacts of a group, None if they are the best ones, else a bound of the value)."""
+    n, lengths = len(group), np.array([problem.length(i) for i in group])
+    if n == 1:
+        return _fill(problem, group, {}), None
+    rows, size = _rows(problem, group)
+    gains = np.array([problem.gain[i] for i in group]) * (1.0 + TIE * np.arange(n, 0, -1) / n)
+    worth = np.concatenate([gains * lengths, -gains, -gains, np.zeros(size - 3 * n)])
+    room = lengths - problem.min_pass
+    upper = np.concatenate([np.ones(n), room, room, np.ones(size - 3 * n)])
+    binary = np.ones(size)
+    binary[n:3 * n] = 0.0
+    result = milp(-worth, integrality=binary, bounds=Bounds(0.0, upper), constraints=_constraint(rows, size),
+                  options={'time_limit': time_limit, 'node_limit': MAX_NODES, 'mip_rel_gap': 0.0})
+    contacts: Contacts = {}
+    if result.x is not None:
+        x, p, q = result.x[:n], result.x[n:2 * n], result.x[2 * n:3 * n]
+        contacts = {i: (problem.rise[i] + p[k], problem.set[i] - q[k]) for k, i in enumerate(group) if x[k] > 0.5}
+    # Trims of a plan before its optimum may be too long, and those of any plan have the tolerance of HiGHS.
+    contacts = _fill(problem, sorted(group, key=lambda i: (i not in contacts, -problem.gain[i], i)), contacts)
+    if result.status == 0:
+        return contacts, None
+    proved = math.inf if result.mip_dual_bound is None else -result.mip_dual_bound
+    return contacts, min(proved, _most(problem, group))
+
+
+def _rows(problem: _Problem, group: Sequence[int]) -> tuple[list[Row], int]:
+    """Return (inequalities of a group, number of its variables)."""
+    n, size = len(group), 3 * len(group)
+    rows: list[Row] = [({n + k: 1.0, 2 * n + k: 1.0, k: problem.min_pass - problem.length(i)}, 0.0)
+                       for k, i in enumerate(group)]
+    for b, j in enumerate(group):
+        for a, i in enumerate(group[:b]):
+            if (i, j) not in problem.gaps:
+                continue
+            orders = [(2 * n + first, n + second, problem.set[one] + problem.gaps[one, other] - problem.rise[other])
+                      for first, one, second, other in ((a, i, b, j), (b, j, a, i))
+                      if _possible(problem, one, other)]
+            if len(orders) < 2:     # no order, or one
+                rows += [({q: -1.0, p: -1.0, a: overlap, b: overlap}, overlap)
+                         for q, p, overlap in orders] or [({a: 1.0, b: 1.0}, 1.0)]
+                continue
+            rows += [({q: -1.0, p: -1.0, size + k: overlap}, 0.0) for k, (q, p, overlap) in enumerate(orders)]
+            rows.append(({size: -1.0, size + 1: -1.0, a: 1.0, b: 1.0}, 1.0))
+            size += 2
+    return rows + _stretches(problem, group), size
+
+
+def _possible(problem: _Problem, i: int, j: int) -> bool:
+    """Return True if contacts of pass i and then of pass j fit."""
+    overlap = problem.set[i] + problem.gaps[i, j] - problem.rise[j]
+    return overlap <= problem.length(i) + problem.length(j) - 2.0 * problem.min_pass
+
+
+def _stretches(problem: _Problem, group: Sequence[int]) -> list[Row]:
+    """Return inequalities that every plan meets, and that shorten the search: contacts of passes inside a stretch of
+    time, with the changeovers between them, fit into it."""
+    n, least, rows = len(group), problem.shortest, []
+    for a in range(n):
+        inside = sorted((problem.set[i], k) for k, i in enumerate(group[a:], a))[:MAX_CUT_PASSES]
+        for count, (end, _) in enumerate(inside, 1):
+            ks = [k for _, k in inside[:count]]
+            span = end - problem.rise[group[a]]
+            if a in ks and sum(problem.length(group[k]) + least for k in ks) > span + least:
+                row = {k: problem.length(group[k]) + least for k in ks}
+                row.update({n + k: -1.0 for k in ks} | {2 * n + k: -1.0 for k in ks})
+                rows.append((row, span + least))
+    return rows
+
+
+def _constraint(rows: Sequence[Row], size: int) -> LinearConstraint:
+    entries = [(r, column, value) for r, (row, _) in enumerate(rows) for column, value in row.items()]
+    r, columns, values = zip(*entries, strict=True)
+    matrix = sparse.csr_array((values, (r, columns)), shape=(len(rows), size))
+    return LinearConstraint(matrix, ub=np.array([limit for _, limit in rows]))
+
+
+def _most(problem: _Problem, group: Sequence[int]) -> float:
+    """Return the integral over time of the largest gain in view, which no plan exceeds."""
+    times: Floats = np.unique([[problem.rise[i], problem.set[i]] for i in group])
+    most = np.zeros(len(times) - 1)
+    for i in group:
+        begin, end = np.searchsorted(times, [problem.rise[i], problem.set[i]])
+        most[begin:end] = np.maximum(most[begin:end], problem.gain[i])
+    return float(np.sum(most * np.diff(times)))
+
+
+def _shares(problem: _Problem, passes: Sequence[Pass], order: Sequence[int], contacts: Contacts) -> tuple[Share, ...]:
+    """Return the shares of passes in the order of rise, in the order in which the caller has given them."""
+    shares = {given: _share(problem, passes, contacts, i) for i, given in enumerate(order)}
+    return tuple(shares[given] for given in range(len(order)))
+
+
+def _share(problem: _Problem, passes: Sequence[Pass], contacts: Contacts, i: int) -> Share:
+    """Return the share of pass i, with the reason why it is not whole."""
+    rivals = sorted((j for j in problem.near[i] if j in contacts), key=lambda j: contacts[j])
+    if i not in contacts:
+        reason, by = _dropped(problem, passes, contacts, i, rivals)
+        return Share(False, math.nan, math.nan, tuple(passes[j].case for j in by), reason)
+    begin, end = contacts[i]
+    late, early, words, by = begin - problem.rise[i], problem.set[i] - end, [], []
+    before, after = _limits(problem, contacts, i, rivals, sum(contacts[j] < contacts[i] for j in rivals))
+    if before and late > EQUAL_S:
+        by += before
+        words += [f'begins {late:.1f} s late after {passes[before[0]].case}']
+    if after and early > EQUAL_S:
+        by += after
+        words += [f'ends {early:.1f} s early for {passes[after[0]].case}']
+    return Share(True, begin, end, tuple(dict.fromkeys(passes[j].case for j in by)), ', '.join(words))
+
+
+def _limits(problem: _Problem, contacts: Contacts, i: int, rivals: Sequence[int],
+            place: int) -> tuple[list[int], list[int]]:
+    """Return the rivals that limit the begin and the end of a contact of pass i between rivals[:place] and the
+    others; an empty list where its window does."""
+    begins = {j: contacts[j][1] + problem.gaps[j, i] for j in rivals[:place]}
+    ends = {j: contacts[j][0] - problem.gaps[i, j] for j in rivals[place:]}
+    return ([j for j in begins if begins[j] == max(begins.values()) and begins[j] > problem.rise[i]][:1],
+            [j for j in ends if ends[j] == min(ends.values()) and ends[j] < problem.set[i]][:1])
+
+
+def _dropped(problem: _Problem, passes: Sequence[Pass], contacts: Contacts, i: int,
+             rivals: Sequence[int]) -> tuple[str, list[int]]:
+    """Return (reason, passes to which a dropped pass lost its time)."""
+    if problem.length(i) < problem.min_pass:
+        return f'lasts {problem.length(i):.1f} s, shorter than {problem.min_pass:g} s', []
+    if problem.gain[i] <= 0.0:
+        return 'the expected loss is the whole pass', []
+    by = [j for j in rivals if contacts[j][1] + problem.gaps[j, i] > problem.rise[i]
+          and contacts[j][0] - problem.gaps[i, j] < problem.set[i]]
+    free = _free(problem, i, contacts)
+    place = max(range(len(free)), key=lambda k: free[k][1] - free[k][0])
+    if free[place][1] <= free[place][0]:
+        return 'overlaps ' + ', '.join(f'{passes[j].case} of priority {passes[j].object.priority:g}' for j in by), by
+    before, after = _limits(problem, contacts, i, rivals, place)
+    sides = [f'after {passes[j].case}' for j in before] + [f'before {passes[j].case}' for j in after]
+    return f'shorter than {problem.min_pass:g} s {" and ".join(sides)}', by
