@@ -66,6 +66,7 @@ SECTIONS = {
         Page('docs/operate/acquisition.md', 'Find, lock, lose, find again', 900),
         Page('docs/operate/sky.md', 'Satellite, sun and the air', 900),
         Page('docs/operate/tracks.md', 'A track from a file', 1300),
+        Page('docs/operate/plan.md', 'A night of passes', 800),
         Page('docs/operate/station.md', 'A permanent station', 1200),
         Page('docs/operate/recordings.md', 'Recordings', 1200),
         Page('docs/operate/faults.md', 'Inject a fault', 600),

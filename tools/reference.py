@@ -58,6 +58,7 @@ VERB_GROUPS = {
     'see what exists': ('scenarios', 'samples', 'parameters'),
     'run a scenario': ('run',),
     'operate a running antenna': ('status', 'mode', 'stop', 'drive', 'ask', 'operate', 'program', 'live', 'simulate'),
+    'plan a night of passes': ('plan', 'station'),
     'use a recording': ('verify', 'recover', 'rerun', 'report', 'replay', 'export', 'filter'),
     'compare settings': ('trials', 'recompute'),
     'design an antenna': ('new', 'tune'),

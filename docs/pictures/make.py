@@ -7,6 +7,7 @@
     python -m docs.pictures.make budget       the error budget, from docs/rows.json
     python -m docs.pictures.make loops        the position loops of an antenna from a data sheet
     python -m docs.pictures.make targets      the default filter beside tuned filters, on hard targets
+    python -m docs.pictures.make night        the chart of a night of passes
 """
 import argparse
 import contextlib
@@ -66,6 +67,10 @@ WHOLE_PASS_S = 345.0  # leo_pass from its rise until it sets
 MIN_BAR_MDEG = 0.2  # terms of the budget that are smaller in both modes have no bar
 MODES = {'program': ('program track', figures.RAW_COLOUR), 'autotrack': ('autotrack', figures.FILTERED_COLOUR)}
 
+
+NIGHT = ('--station', '47.4,8.5,500', '--from', '2019-12-10T00:00', '--horizon', '5', '--priority', 'NAVIGATION=0.2',
+         'MOLNIYA=0.1', '--window', 'STATIONARY=2019-12-10T12:00/2019-12-10T13:00')
+"""Arguments of the plan of the night of docs/operate/plan.md."""
 
 SHOWN_TARGETS, TARGET_RUNS = ('geo', 'leo', 'uav-60m', 'helicopter', 'jet', 's-motion', 'square', 'chirp'), 4
 
@@ -217,6 +222,21 @@ def make_targets(_folder):
     return make_figure(figures.Spec('target_filters', '', '', (), target_filters.figure), values, 'target_filters')
 
 
+def make_night(folder):
+    """The chart of the page of a plan."""
+    page_file = folder / 'night.html'
+    start('samples', folder).communicate()
+    start('plan', folder / 'night.tle', *NIGHT, '--html', page_file).communicate()
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path='/usr/bin/chromium',
+                                             args=['--no-sandbox', '--disable-gpu'])
+        page = browser.new_page(viewport=dict(zip(('width', 'height'), DESK)))
+        page.goto(page_file.as_uri())
+        page.locator('svg.chart').first.screenshot(path=FOLDER / 'night.png')
+        browser.close()
+    return made('night')
+
+
 def make_filter(folder):
     """The programs of the page on the library: the file of angles, then its filter."""
     blocks = re.findall(r'```python\n(.*?)```', (FOLDER.parent / 'start' / 'library.md').read_text(), re.DOTALL)
@@ -229,7 +249,7 @@ def make_filter(folder):
 
 
 PICTURES = {'page': make_page, 'ship': make_ship, 'sky': make_sky, 'demo': make_demo, 'budget': make_budget,
-            'loops': make_loops, 'filter': make_filter, 'targets': make_targets}
+            'loops': make_loops, 'filter': make_filter, 'targets': make_targets, 'night': make_night}
 
 
 def main():

@@ -21,8 +21,8 @@ from pedestal_station.night import Choice, Night, Object, Pass, Refusal, Share, 
 
 MAX_NAMED = 3  # largest number of refusals in an error
 CUT_POINTS = 1000  # number of instants among which the highest one of a chosen time is
-NO_WINDOW = 'does not set: choose its times with --window NAME=UTC/UTC'
-UNDER_WAY = 'under way at the beginning'
+NO_WINDOW = 'no --window'
+UNDER_WAY = 'under way at the start'
 
 Progress: TypeAlias = Callable[[float, str], None]  # share of the work that is done, name of the object
 Interval: TypeAlias = tuple[Seconds, Seconds]

@@ -27,6 +27,8 @@ SAMPLE_FILES = {
     'ship.csv': 'Motion of a ship as CSV, four rows a second for 150 s: roll 6 deg in 9 s, pitch 2 deg in 7 s, yaw 1 '
                 'deg in 13 s about heading 60 deg, heave 1 m.',
     'iss.tle': 'Elements of the ISS on 2019-12-09, which the scenario leo_pass also has.',
+    'night.tle': 'Made-up elements of twelve satellites on 2019-12-09 for a night of passes: nine low ones, one of a '
+                 'navigation system, one in a Molniya orbit, and a geostationary one.',
     'my_antenna.yaml': 'A scenario: another antenna that tracks the flight of uav_flyby.',
 }
 """{name of a file in the folder samples of this package: its content in a sentence}."""
@@ -52,7 +54,8 @@ def _scenarios(_options: argparse.Namespace) -> int:
 
 
 def _add_samples(parser: argparse.ArgumentParser) -> None:
-    """Writes flight.csv, ship.csv, iss.tle and my_antenna.yaml. If one of these files exists, nothing is written."""
+    """Writes flight.csv, ship.csv, iss.tle, night.tle and my_antenna.yaml. If one of these files exists, nothing is
+    written."""
     parser.add_argument('folder', nargs='?', type=pathlib.Path, default=pathlib.Path(), metavar='DIR',
                         help='output folder; default: the current folder')
 

@@ -153,7 +153,8 @@ def _write(options: argparse.Namespace, night: 'Night') -> None:
     if options.output:
         from pedestal_station.outputs import file
         file.write(options.output, night)
-    print(*filter(None, (getattr(options, name) for name in NEW_FILES)), sep='\n')
+    written = [str(path) for name in NEW_FILES if (path := getattr(options, name))]
+    print('\n'.join(written), end='\n' * bool(written))
 
 
 VERBS = {

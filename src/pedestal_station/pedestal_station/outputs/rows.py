@@ -13,6 +13,7 @@ from pedestal_station.night import Night, Pass, Share
 
 LOSS_REASONS = 'keyhole', 'blockage', 'sun', 'travel', 'limit of the elevation', 'rate of the elevation'
 WHOLE, TRIMMED, DROPPED = 'whole', 'trimmed', 'dropped'
+NO_END = 'does not set; choose its times with --window NAME=UTC/UTC'
 NUMBER_DIGITS = 6  # digits after the point of a number in a file
 
 
@@ -154,9 +155,11 @@ def _count(count: int, one: str, many: str) -> str:
 
 
 def warnings(night: Night) -> list[str]:
-    """Return a line for each object in a low orbit whose elements are old at a pass, of its worst pass."""
+    """Return a line for each object in a low orbit whose elements are old at a pass, of its worst pass, and for each
+    object that does not set."""
     worst: dict[str, Pass] = {}
     for each in sorted(night.passes, key=lambda each: abs(each.prediction.age)):
         worst[each.object.name] = each
-    texts = [(each, objects.age_warning(each.object.orbit, each.window.culmination)) for each in worst.values()]
+    texts = [(each, NO_END if each.window.endless else
+              objects.age_warning(each.object.orbit, each.window.culmination)) for each in worst.values()]
     return [f'{each.object.path}: line {each.object.line}: {each.case}: {text}' for each, text in texts if text]

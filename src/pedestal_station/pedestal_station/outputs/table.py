@@ -1,5 +1,6 @@
 """A night as a table for a terminal."""
 import math
+import textwrap
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.text_files.text_table import Cell, Column
@@ -12,6 +13,7 @@ COLUMNS: tuple[Column, ...] = ('pass', 'rises', 'sets', ('highest', '>.1f'), ('d
 [dB-Hz], age of the elements [days]."""
 OPTIONAL_COLUMNS = 'sets', 'loss', 'deg/s', 'age', 'greedy', 'C/N0'
 """Columns that a narrow terminal leaves out, the last ones first."""
+MAX_REASON_CHARS = 25  # length to which the reason of a share is cut
 
 
 def cells(night: Night) -> list[list[Cell]]:
@@ -38,7 +40,7 @@ def _part(night: Night, share: Share) -> str:
 
 def _cause(share: Share) -> str:
     """Return the first pass to which a share lost its time, and the number of the others; without one, the reason."""
-    first, *others = share.lost_to or (share.reason,)
+    first, *others = share.lost_to or (textwrap.shorten(share.reason, MAX_REASON_CHARS, placeholder=' ...'),)
     return first + (f' +{len(others)}' if others else '')
 
 
