@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from acu_tracker.program.prediction import PredictionParameters
 from pedestal_common.geometry import orbit
@@ -33,6 +34,8 @@ from tracking_receiver_sim.tracks import course, instant, lines, oem, states
 OLDEST_DAYS = PredictionParameters().oldest  # largest age of elements in a pass, unless the antenna has another [days]
 FRESH_DAYS = 3.0  # age of the elements of a low satellite up to which no warning is given [days]
 LOW_PERIOD_S = SECONDS_PER_DAY / 11.25  # longest revolution of a low satellite [s]
+SPLINE_SPAN_S, KNOT_SPACING_S = 3600.0, 20.0  # length of a spline of an ephemeris, and of each of its pieces [s]
+PROBE_COUNT = 200  # number of instants of the night at which SGP4 is tried
 DESIGNATOR_PATTERN = re.compile(r'\d{4}-\d{3}[A-Z]{1,3}')
 LINE_PATTERN = re.compile(r'line (\d+)(?:: |, )')
 NO_ELEMENTS = ('must hold a TLE (a line that begins with "1 ", then one that begins with "2 "), an OMM, or an OEM in '
@@ -60,8 +63,10 @@ class Elements(NamedTuple):
 
     def enu(self, times: Times) -> Vectors3:
         """As in night.Orbit."""
-        return orbit.enu(self.satellite, self.night.station, *orbit.julian_date(self.night.begin), times,
-                         self.night.ut1_offset)[0]
+        julian, fraction = orbit.julian_date(self.night.begin)
+        fractions = fraction + times / SECONDS_PER_DAY
+        return orbit.seen(self.satellite, self.night.station, julian, fractions,
+                          orbit.earth_fixed(julian, fractions, self.night.ut1_offset), light_time=False)
 
     def elements_age(self, t: Seconds) -> Seconds:
         """As in night.Orbit."""
@@ -75,18 +80,37 @@ class Elements(NamedTuple):
 
 
 class Ephemeris(NamedTuple):
-    """Orbit by states of a file: a night.Orbit."""
+    """Orbit by states of a file: a night.Orbit. Splines through its positions, within 0.1 m, are kept, because the
+    interpolation and the nutation of the earth take milliseconds for each state."""
     track: states.Ephemeris
     zero: Seconds       # time of the track at the beginning of the night
     station: StationParameters
+    splines: dict[int, CubicHermiteSpline]      # {number of an interval of SPLINE_SPAN_S: spline}
 
     def enu(self, times: Times) -> Vectors3:
         """As in night.Orbit."""
         t = self.zero + times
-        position, _ = course.enu(self.track, self.station, t)
+        position = np.full((len(t), 3), np.nan)
+        known = (t >= self.track.begin) & (t <= self.track.end)
         for begin, end, _ in course.gaps(self.track):
-            position[(t > begin) & (t < end)] = np.nan
+            known &= (t <= begin) | (t >= end)
+        number = np.floor(t / SPLINE_SPAN_S).astype(int)
+        for i in np.unique(number[known]).tolist():
+            if i not in self.splines:
+                self.splines[i] = self._spline(i)
+            position[known & (number == i)] = self.splines[i](t[known & (number == i)])
         return position
+
+    def _spline(self, number: int) -> CubicHermiteSpline:
+        # Knots stand at the ends of the segments and gaps too, so that no piece reaches over one of these.
+        ends = [t for each in self.track.segments for t in (each.begin, each.end)]
+        ends += [t for begin, end, _ in course.gaps(self.track) for t in (begin, end)]
+        first, last = SPLINE_SPAN_S * number - KNOT_SPACING_S, SPLINE_SPAN_S * (number + 1) + KNOT_SPACING_S
+        even = np.arange(first, last + 0.5 * KNOT_SPACING_S, KNOT_SPACING_S)
+        knots = np.union1d(even, [t for t in ends if first < t < last])
+        position, velocity = course.enu(self.track, self.station, knots)
+        finite = np.isfinite(position).all(axis=1)
+        return CubicHermiteSpline(knots[finite], position[finite], velocity[finite])
 
     def elements_age(self, t: Seconds) -> Seconds:
         """As in night.Orbit."""
@@ -236,7 +260,7 @@ def _ephemerides(path: pathlib.Path, night: Night) -> Iterator[_Set | Refusal]:
         except csv_table.TableError as error:
             yield _refusal(path, each.line, each.name, error)
             continue
-        found = Ephemeris(track, begin - track.midnight, night.station)
+        found = Ephemeris(track, begin - track.midnight, night.station, {})
         number, designator = (each.designator if each.designator.isdecimal() else '', _designator(each.designator))
         covers = f'{instant.iso(track.midnight + track.begin)} to {instant.iso(track.midnight + track.end)}'
         if found.elements_age(0.0) > 0.0 or found.elements_age(night.duration) < 0.0:
@@ -275,7 +299,8 @@ def _chosen(group: list[_Set], night: Night, oldest: Days) -> tuple[list[Object]
             nearest = min(max(0.0, -found.elements_age(0.0)), night.duration)
             if reason := age_refusal(found, nearest, oldest):
                 return [], [*refusals, chosen.refused(reason)]
-            found.enu(np.array([0.0, night.middle, night.duration]))
+            if isinstance(found, Elements):
+                found.enu(np.linspace(0.0, night.duration, PROBE_COUNT))    # raises TargetError where SGP4 fails
         except TargetError as error:
             refusals.append(chosen.refused(error))
             continue

@@ -18,9 +18,10 @@ from pedestal_common.reproducible import arctan2
 from pedestal_station.night import Orbit, Window
 
 FOLLOWED_DAYS = 1.0  # longest time before and after the night in which rise and set are searched [days]
-KINK_MARGIN_RAD = 0.35
-"""Largest distance of an object from the range of the floor at which it may cross the floor within a step [rad]: the
-elevation changes by at most 1 deg/s."""
+KINK_MARGINS_RAD = 0.1, 0.35
+"""Largest distances of an object below and above HIGH_RAD from the range of the floor at which it may cross the floor
+within a step [rad]: the elevation changes by at most 0.3 and 1 deg/s there."""
+HIGH_RAD = 0.5  # elevation from which on a low satellite moves fast [rad]
 
 
 class Horizon(NamedTuple):
@@ -74,12 +75,14 @@ def find(orbit: Orbit, horizon: Horizon, duration: Seconds) -> list[Window]:
     step = passes.SEARCH_STEP_S
     times = np.arange(-step, duration + 2.0 * step, step)
     times, heights = passes.followed(height, times, FOLLOWED_DAYS)
-    if len(horizon.elevations) > 1:
+    if len(horizon.elevations) == 1:
+        spans, peaks = passes.spans(height, times, heights)
+    else:
         times = np.union1d(times, _kinks(orbit, horizon, times))
-        heights = height(times)
-    spans = [span for span in passes.spans(height, times, heights) if span.begin < duration and span.end > 0.0]
-    peaks = passes.maxima(elevation, times, elevation(times)) if spans else times
-    return [_window(elevation, peaks, span, duration) for span in spans]
+        A, E = angles(orbit, times).T
+        spans, _ = passes.spans(height, times, E - horizon.at(A))
+        peaks = passes.maxima(elevation, times, E) if spans else times
+    return [_window(elevation, peaks, span, duration) for span in spans if span.begin < duration and span.end > 0.0]
 
 
 def _window(elevation: passes.Height, peaks: Times, span: passes.Span, duration: Seconds) -> Window:
@@ -96,8 +99,8 @@ def _kinks(orbit: Orbit, horizon: Horizon, times: Times) -> Times:
         return (azimuth - point + math.pi) % (2.0 * math.pi) - math.pi
 
     A, E = angles(orbit, times).T
-    low, high = min(horizon.elevations) - KINK_MARGIN_RAD, max(horizon.elevations) + KINK_MARGIN_RAD
-    near = (E > low) & (E < high)
+    margin = np.where(E < HIGH_RAD, *KINK_MARGINS_RAD)
+    near = (E > min(horizon.elevations) - margin) & (E < max(horizon.elevations) + margin)
     steps = np.flatnonzero(near[:-1] | near[1:])
     points = np.array(horizon.azimuths)
     before = beyond(A[steps, np.newaxis], points)

@@ -41,9 +41,11 @@ class Span(typing.NamedTuple):
     sets: bool      # False if the search ends inside the span
 
 
-def spans(height: Height, times: Times, heights: Floats) -> list[Span]:
-    """Return the spans between the first and the last of the times, which grow. heights: at the times."""
-    turns = np.concatenate((maxima(height, times, heights), maxima(lambda t: -height(t), times, -heights)))
+def spans(height: Height, times: Times, heights: Floats) -> tuple[list[Span], Times]:
+    """Return (the spans between the first and the last of the times, which grow, the maxima of the height). heights:
+    at the times."""
+    peaks = maxima(height, times, heights)
+    turns = np.concatenate((peaks, maxima(lambda t: -height(t), times, -heights)))
     at = np.concatenate((times, turns))
     order = np.argsort(at, kind='stable')
     at, above = at[order], (np.concatenate((heights, height(turns))) > 0.0)[order]
@@ -53,7 +55,7 @@ def spans(height: Height, times: Times, heights: Floats) -> list[Span]:
     ends = [at[0].item()] * up + crossings + [at[-1].item()] * down
     count = len(ends) // 2
     return [Span(begin, end, i > 0 or not up, i + 1 < count or not down)
-            for i, (begin, end) in enumerate(zip(ends[::2], ends[1::2]))]
+            for i, (begin, end) in enumerate(zip(ends[::2], ends[1::2]))], peaks
 
 
 def crossed(height: Height, low: Times, high: Times, above: Bools) -> Times:
@@ -152,7 +154,7 @@ def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.
         return None if t is None else begin + datetime.timedelta(milliseconds=round(1e3 * t))
 
     times, heights = followed(elevation, np.arange(0.0, SECONDS_PER_DAY * days, SEARCH_STEP_S), MAX_PASS_DAYS)
-    known, peaks = spans(elevation, times, heights), maxima(elevation, times, heights)
+    known, peaks = spans(elevation, times, heights)
     if not known:
         mask = f'above {least:.3g} deg ' if least else ''
         raise TargetError(f'satellite {satrec.number} does not rise {mask}within {days:g} days of '
