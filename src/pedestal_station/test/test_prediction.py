@@ -120,7 +120,7 @@ def slow(rate_deg, agility):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize('rate, agility, t, elevation', [
-    (5, 1.5, 3000.0, 84.0), (5, 5.0, 6055.0, 89.0), (10, 5.0, 9110.0, 86.0), (15, 5.0, 16442.0, 89.5),
+    (5, 1.5, 3000.0, 84.0), (5, 5.0, 12816.0, 88.5), (5, 5.0, 24540.0, 89.5), (10, 5.0, 9110.0, 86.0),
     (20, 1.5, 21941.0, 89.9), (20, 5.0, 20108.0, 88.0)])
 def test_the_announced_loss_of_a_keyhole_is_the_measured_one(rate, agility, t, elevation):
     told, found, turn = flown(t, elevation, {5: 110.0, 10: 80.0}.get(rate, 60.0), slow(rate, agility))
