@@ -242,7 +242,9 @@ def _take_receiver(state: State, constants: Constants, inputs: Inputs, outputs: 
 
 @compiled
 def _outage(state: State, constants: Constants) -> interruptions.Outage:
-    return interruptions.outage_now(state.outage, state.tracking.target.stamp, state.stamp, constants.p)
+    filtered = state.tracking.target
+    settled = target.settled(filtered, constants.p.tracker)
+    return interruptions.outage_now(state.outage, filtered.stamp, settled, state.stamp, constants.p)
 
 
 @separate

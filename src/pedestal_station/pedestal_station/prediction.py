@@ -39,14 +39,14 @@ def predict(target: Object, window: Window, antenna: Antenna, near: Radians | No
     following.follow(state[0], constants, terms, course, antenna.stow if near is None else near, ends, pieces)
     found = state[0]
     ranges = np.linalg.norm(enu, axis=1)
-    rates = np.abs(rows[:, following.AZIMUTH_RATE:]).max(axis=0)
-    rise, set_ = ends
+    peaks = np.abs(rows[:, following.AZIMUTH_RATE:]).max(axis=0).tolist()
+    rise, set_ = ends.tolist()
     limits, duration = antenna.acu.azimuth.limits, times[-1] - times[0]
     return Prediction(
         azimuth=(rise[0], set_[0]), elevation=(rise[1], set_[1]),
         travel_left=(min(rise[0] - limits.low, limits.high - rise[0]),
                      min(set_[0] - limits.low, limits.high - set_[0])),
-        turn=set_[0] - rise[0], peak_rate=(rates[0], rates[1]), peak_acceleration=(rates[2], rates[3]),
+        turn=set_[0] - rise[0], peak_rate=(peaks[0], peaks[1]), peak_acceleration=(peaks[2], peaks[3]),
         early_turn=bool(found['long_way']), losses=_losses(antenna, program, enu, rows, found, pieces),
         min_range=float(ranges.min()), cn0=antenna.cn0(ranges),
         loss_db=max(0.0, -10.0 * math.log10(max(found['received'] / duration, 1e-12))),
@@ -103,9 +103,6 @@ def _losses(antenna: Antenna, program: ProgramTrack, enu: Vectors3, rows: Floats
         own = _without(intervals, taken)
         taken += own
         losses += _grouped(reason, own, _detail(reason, antenna, rows, found))
-    if found['overtravel'] and 'travel' not in lost:
-        losses.append(Loss('travel', program.times[0], program.times[-1], 0.0,
-                           _detail('travel', antenna, rows, found)))
     return tuple(sorted(losses, key=lambda loss: loss.begin))
 
 

@@ -99,11 +99,16 @@ def reset_accepted_count(target: Target) -> None:
 
 
 @compiled
+def settled(target: Target, params: TrackerParameters) -> Bit:
+    """Return True if lock_count consecutive measurements were accepted, and the filter has converged."""
+    return target.running and target.accepted_in_a_row >= params.lock_count and target.converged
+
+
+@compiled
 def locked(target: Target, params: TrackerParameters, since_accepted: Seconds) -> Bit:
-    """Return True if autotrack can begin: lock_count consecutive measurements were accepted, the last of them is at
-    most coast_after old, and the filter has converged. since_accepted: its age, less the receiver's latency."""
-    return (target.running and target.accepted_in_a_row >= params.lock_count and target.converged
-            and since_accepted <= params.coast_after)
+    """Return True if autotrack can begin: the filter is settled, and its last accepted measurement is at most
+    coast_after old. since_accepted: its age, less the receiver's latency."""
+    return settled(target, params) and since_accepted <= params.coast_after
 
 
 @compiled

@@ -139,8 +139,10 @@ def _reference(guidance: Guidance, tracking: Tracking, constants: 'Constants', o
 @compiled
 def on_axes(guidance: Guidance, constants: 'Constants', terms: PointingModel, order: Order, program: ProgramTrack,
             t: Seconds, on_sky: Motion, encoders: Motion, level: AxisMotion) -> Motion:
-    """Return the reference of both axes at t for a target: a planned slew, else the target on its azimuth wrap.
-    on_sky, encoders: of the target; level: its azimuth on the levelled deck of the plan, encoder angle."""
+    """Return the reference of both axes at t: a planned slew, else the target on its azimuth wrap.
+
+    on_sky, encoders: deck angles and encoder angles of the target; level: its encoder azimuth on the levelled deck.
+    """
     guidance.pointing_offset = 0.0
     if planner.slewing(guidance.lookahead, t):
         motion, guidance.pointing_offset = planner.motion_at(guidance.lookahead, constants.lookahead, t, encoders,

@@ -32,7 +32,8 @@ class OutageRecord(Record):
 class Outage(NamedTuple):
     """Outage of the receiver at an instant."""
     since: Seconds      # time since the last accepted error, less the receiver's latency and the age of its errors
-    # True if `since` is longer than coast_after; autotrack then follows the prediction of the filter
+    # True if `since` is longer than coast_after; autotrack then follows the prediction of the filter. An explained
+    # outage lasts until the filter has settled again, because its rates are unknown after a long prediction
     coasting: bool
     # True if a keyhole, a turn or a hidden sector explains the outage, now or within the last coast_time
     permitted: bool
@@ -60,10 +61,12 @@ def initialise(outage: Records, resumption: Records) -> None:
 
 
 @compiled
-def outage_now(state: OutageRecord, accepted: Seconds, t: Seconds, params: 'SharedParameters') -> Outage:
-    """Return the Outage at t; accepted: stamp of the last accepted error."""
+def outage_now(state: OutageRecord, accepted: Seconds, settled: Bit, t: Seconds,
+               params: 'SharedParameters') -> Outage:
+    """Return the Outage at t; accepted: stamp of the last accepted error; settled: of the filter, see target."""
     since = t - accepted - params.receiver_latency - params.tracker.receiver.age
-    return Outage(since, since > params.tracker.coast_after, t - state.stamp <= params.tracker.coast_time)
+    permitted = t - state.stamp <= params.tracker.coast_time
+    return Outage(since, since > params.tracker.coast_after or (permitted and not settled), permitted)
 
 
 @compiled
