@@ -27,9 +27,8 @@ def random_night(seed, n, span):
     """Return (passes, changeover): priorities, losses and changeovers of any size, not even those of a metric."""
     draw = random.Random(seed)
     rises = sorted(draw.uniform(0.0, span) for _ in range(n))
-    passes = [one_pass(f'P{k}', rise, rise + draw.uniform(40.0, 800.0),
-                       draw.choice([1.0, 1.0, draw.uniform(0.1, 5.0)]), draw.choice([0.0, 0.0, draw.uniform(0.0, 60.0)]))
-              for k, rise in enumerate(rises)]
+    passes = [one_pass(f'P{k}', rise, rise + draw.uniform(40, 800), draw.choice([1.0, 1.0, draw.uniform(0.1, 5.0)]),
+                       draw.choice([0.0, draw.uniform(0.0, 60.0)])) for k, rise in enumerate(rises)]
     times = [[draw.uniform(0.0, draw.choice([60.0, 300.0])) for _ in passes] for _ in passes]
     return passes, lambda i, j: times[i][j]
 
