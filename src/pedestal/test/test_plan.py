@@ -132,6 +132,14 @@ def test_a_geostationary_satellite_has_the_times_that_the_user_chooses(planned, 
     assert code == 2 and 'the object rises and sets' in errors
 
 
+def test_objects_are_selected_by_name_by_number_and_by_a_weight_of_0(planned):
+    for words, expected in ((('--satellite', 'iss (zarya)'), {'ISS (ZARYA)'}), (('--satellite', '43013'), {'43013'}),
+                            (('--priority', '43013=0'), {'ISS (ZARYA)'}),
+                            (('--satellite', '43013', '25544', '--satellite', '25544'), {'ISS (ZARYA)', '43013'})):
+        code, found, _ = planned('low.tle', *PLACE, *words)
+        assert code == 0 and {case.rpartition('/')[0] for case in found} == expected
+
+
 @pytest.mark.every_case
 @pytest.mark.parametrize(('words', 'expected'), (
     (('--station', '91,0,0'), '--station 91,0,0: latitude_deg = 91 deg: must be -90 to 90'),
@@ -144,6 +152,7 @@ def test_a_geostationary_satellite_has_the_times_that_the_user_chooses(planned, 
     (('--horizon', 'nan'), '--horizon nan: must be'), (('--rain-margin', '-1'), '--rain-margin -1: must be 0 to 100'),
     (('--priority', 'ISS'), '--priority ISS'), (('--priority', '25544=x'), '--priority 25544=x'),
     (('--priority', '25544=-1'), '--priority 25544=-1'), (('--priority', 'IS=2'), 'no object'),
+    (('--satellite', '25545'), "--satellite 25545: no object '25545' in the files; did you mean '"),
     (('--window', 'GEO'), '--window GEO: must be NAME=UTC/UTC'),
     (('--window', '25544=2019-12-10T09:00/2019-12-10T08:00'), 'must begin before it ends, inside the night'),
     (('--window', 'GEO=2019-12-10T09:00/2019-12-10T10:00'), "no object 'GEO'"),

@@ -19,6 +19,7 @@ from pedestal_station.changeover import Changeovers
 from pedestal_station.choice import Rules
 from pedestal_station.night import Choice, Night, Object, Pass, Refusal, Share, Window
 
+MAX_PASSES = 2000  # largest number of passes
 MAX_NAMED = 3  # largest number of refusals in an error
 CUT_POINTS = 1000  # number of instants among which the highest one of a chosen time is
 NO_WINDOW = 'no --window'
@@ -36,7 +37,8 @@ class Wishes(NamedTuple):
     duration: Seconds
     horizon: Degrees | None     # None for the mask of the antenna
     antenna: Variant            # scenario of the antenna; without a source: that of the defaults
-    priorities: Sequence[str]   # texts NAME=W
+    satellites: Sequence[str]   # names or numbers, () for all objects
+    priorities: Sequence[str]   # texts NAME=W; 0 leaves an object out
     windows: Sequence[str]      # texts NAME=UTC/UTC
     rain_margin: Decibels       # loss of C/N0 by rain
     rules: Rules
@@ -50,7 +52,8 @@ def night(wishes: Wishes, progress: Progress = lambda *_: None) -> Night:
                                    used.acu.prediction.oldest)
     if not found:
         raise ValueError('; '.join([*map(refusal_text, refusals[:MAX_NAMED]), 'no object is left to plan']))
-    found = objects.weighted(found, wishes.priorities)
+    found = [each for each in objects.weighted(_selected(found, wishes.satellites), wishes.priorities)
+             if each.priority]
     chosen = _chosen(found, wishes)
     passes: list[Pass] = []
     for i, each in enumerate(found):
@@ -59,6 +62,9 @@ def night(wishes: Wishes, progress: Progress = lambda *_: None) -> Night:
             known, refused = _passes(each, wishes, chosen.get(each.name, []), used)
             passes += known
             refusals += refused
+            if len(passes) > MAX_PASSES:
+                raise ValueError(f'{len(passes)} passes of the first {i + 1} of {len(found)} objects: must be at most '
+                                 f'{MAX_PASSES}; choose objects by --satellite, or fewer --hours')
         except TargetError as error:
             refusals.append(Refusal(each.path, each.line, each.name, str(error)))
     progress(1.0, f'choice among {len(passes)} passes')
@@ -79,23 +85,35 @@ def _scenario(variant: Variant) -> scenario.Scenario:
     return scenario.parse('of the defaults', antenna.NO_SCENARIO, variant.overrides())
 
 
+def _named(found: Sequence[Object], option: str, name: str) -> Object:
+    """Return the object of a name or number. Raises ValueError."""
+    known = [each for each in found if name.strip().upper() in (each.name.upper(), each.number)]
+    if not known:
+        hint = did_you_mean(name, [text for each in found for text in (each.name, each.number)])
+        raise ValueError(f'{option}: no object {name!r:.60} in the files;{hint}'.removesuffix(';'))
+    return known[0]
+
+
+def _selected(found: Sequence[Object], names: Sequence[str]) -> Sequence[Object]:
+    """Return the objects of some names, all without names. Raises ValueError."""
+    named = (_named(found, f'--satellite {name}', name) for name in names)
+    return list({each.name: each for each in named}.values()) if names else found
+
+
 def _chosen(found: Sequence[Object], wishes: Wishes) -> dict[str, list[Interval]]:
     """Return {object: its times in order} of the texts NAME=UTC/UTC. Raises ValueError."""
     chosen: dict[str, list[Interval]] = {}
     for text in wishes.windows:
         name, _, times = text.rpartition('=')
         option, parts = f'--window {text}', times.split('/')
-        known = [each.name for each in found if name.strip().upper() in (each.name.upper(), each.number)]
         if len(parts) != 2:
             raise ValueError(f'{option}: must be NAME=UTC/UTC, for example GEO=2026-12-01T20:00/2026-12-01T21:00')
-        if not known:
-            hint = did_you_mean(name, [each.name for each in found])
-            raise ValueError(f'{option}: no object {name!r:.60} in the files;{hint}'.removesuffix(';'))
+        known = _named(found, option, name)
         begin, end = ((orbit.instant(option, part) - wishes.begin).total_seconds() for part in parts)
         if not 0.0 <= begin < end <= wishes.duration:
             raise ValueError(f'{option}: must begin before it ends, inside the night, which lasts '
                              f'{wishes.duration / 3600.0:g} h from {wishes.begin.isoformat()} on')
-        chosen.setdefault(known[0], []).append((begin, end))
+        chosen.setdefault(known.name, []).append((begin, end))
     return {name: sorted(times) for name, times in chosen.items()}
 
 

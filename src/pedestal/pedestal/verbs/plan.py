@@ -62,8 +62,10 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
 
 def _add_choice(parser: argparse.ArgumentParser) -> None:
     """Add the options of the choice among the passes."""
+    parser.add_argument('--satellite', nargs='+', action='extend', default=[], metavar='NAME', help='object to plan, '
+                        'by name or number; default: all objects of the files')
     parser.add_argument('--priority', nargs='+', action='extend', default=[], metavar='NAME=W', help='object, by name '
-                        'or number, and the weight of a second of its contact, above 0; default: 1')
+                        'or number, and the weight of a second of its contact; 0 leaves it out; default: 1')
     parser.add_argument('--window', nargs='+', action='extend', default=[], metavar='NAME=UTC/UTC', help='object that '
                         'does not set, such as a geostationary one, and a time in which to track it')
     parser.add_argument('--min-pass', type=float, metavar='S', help='shortest contact [s]; default: 60')
@@ -80,9 +82,11 @@ def _plan(options: argparse.Namespace) -> int:
     _check(options)
     from pedestal_station import planning
     from pedestal_station.outputs import rows
-    wishes = planning.Wishes(options.files, _station(options.station), *_time(options), options.horizon,
-                             arguments.variant(options), options.priority, options.window, options.rain_margin,
-                             _rules(options))
+    begin, duration = _time(options)
+    wishes = planning.Wishes(
+        paths=options.files, station=_station(options.station), begin=begin, duration=duration,
+        horizon=options.horizon, antenna=arguments.variant(options), satellites=options.satellite, priorities=options.priority,
+        windows=options.window, rain_margin=options.rain_margin, rules=_rules(options))
     with console.progress_of_share() as progress:
         night = planning.night(wishes, progress)
     for refused in night.refusals:

@@ -140,6 +140,8 @@ def decision(night: Night, share: Share) -> str:
 
 def verdict(night: Night) -> str:
     """Return the plan as a sentence, with the greedy plan and, without a proof, the bound."""
+    if not night.passes:
+        return 'No object has a pass in this time'
     counts = {name: sum(state(share) == name for share in night.exact.shares) for name in (WHOLE, TRIMMED, DROPPED)}
     shares = ', '.join(f'{count} {name}' for name, count in counts.items())
     proof = 'which is the optimum' if night.exact.optimal else (
