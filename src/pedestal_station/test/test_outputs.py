@@ -136,7 +136,7 @@ def test_the_table_fits_a_narrow_terminal_and_says_what_it_leaves_out(night, cap
     assert 'not shown for want of space' in said[80] and 'not shown' not in said[150]
     for text in ('22:41:00-22:51:40', 'ISS/1 +1', 'no window', 'whole'):
         assert text in said[80], text
-    warning, endless = rows.warnings(night)
+    endless, warning = rows.warnings(night)
     assert endless == 'x.tle: line 7: GEO/1: does not set; choose its times with --window NAME=UTC/UTC'
     assert warning.startswith('x.tle: line 3: NOAA 19/1: elements 4.0 days')
     assert '2 whole, 1 trimmed, 2 dropped' in rows.verdict(night) and 'at most 2500 s' in rows.verdict(night)

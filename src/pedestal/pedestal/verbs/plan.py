@@ -85,8 +85,8 @@ def _plan(options: argparse.Namespace) -> int:
     begin, duration = _time(options)
     wishes = planning.Wishes(
         paths=options.files, station=_station(options.station), begin=begin, duration=duration,
-        horizon=options.horizon, antenna=arguments.variant(options), satellites=options.satellite, priorities=options.priority,
-        windows=options.window, rain_margin=options.rain_margin, rules=_rules(options))
+        horizon=options.horizon, antenna=arguments.variant(options), satellites=options.satellite,
+        priorities=options.priority, windows=options.window, rain_margin=options.rain_margin, rules=_rules(options))
     with console.progress_of_share() as progress:
         night = planning.night(wishes, progress)
     for refused in night.refusals:

@@ -14,7 +14,8 @@ CSS = """
 .chart text { fill: var(--soft); font: 11px system-ui, sans-serif; } .chart .name { fill: var(--ink); }
 .chart .grid { stroke: var(--soft); stroke-opacity: .45; fill: none; }
 .chart .pass { fill: none; stroke: var(--soft); }
-.chart .taken { fill: #1f6fd1; } .chart .lost { fill: #e57a00; } .chart polyline { fill: none; stroke-width: 1.5; }
+.chart .top { fill: var(--ink); } .chart .taken { fill: #1f6fd1; } .chart .lost { fill: #e57a00; }
+.chart polyline { fill: none; stroke-width: 1.5; }
 .chart polyline.pass { stroke-dasharray: 3 2; } .chart polyline.taken { fill: none; stroke: #1f6fd1; stroke-width: 3; }
 .chart polyline.lost { fill: none; stroke: #e57a00; stroke-width: 3; }
 table.plan { font-size: .8rem; } .plan th, .plan td { padding-right: .6rem; }
@@ -76,7 +77,7 @@ def _time(night: Night, height: float) -> Iterator[str]:
 
 
 def sky(night: Night, each: Pass, share: Share) -> str:
-    """Return the sky plot of a pass: north up, east right, the zenith in the middle."""
+    """Return the sky plot of a pass: north up, east right, the zenith in the middle. A dot is the culmination."""
     parts = [f'<circle class="grid" r="{RADIUS * (90.0 - elevation) / 90.0:.1f}"/>' for elevation in (0, 30, 60)]
     parts += [f'<path class="grid" d="M{-RADIUS:g} 0H{RADIUS:g}M0 {-RADIUS:g}V{RADIUS:g}"/>']
     parts += [_text(*_place(azimuth, 6.0, 4.0), name, anchor='middle')
@@ -85,6 +86,8 @@ def sky(night: Night, each: Pass, share: Share) -> str:
     if share.taken:
         parts.append(_path('taken', each, share.begin, share.end))
     parts += [_path('lost', each, loss.begin, loss.end) for loss in each.prediction.losses]
+    [highest] = _angles(each, [each.window.culmination])
+    parts.append('<circle class="top" r="3" cx="{:.1f}" cy="{:.1f}"/>'.format(*_place(*highest)))
     for t in (each.window.rise, each.window.set):
         [[azimuth, _]] = _angles(each, [t])
         parts.append(_text(*_place(azimuth, -14.0, 4.0), f'{rows.utc(night, t):%H:%M}', anchor='middle'))

@@ -25,7 +25,8 @@ def text(night: Night, command: str) -> str:
              '<p class="soft">Frame: a pass. Blue: the part that the plan takes. Orange: a time of loss. All times '
              f'are UTC.</p><div class="wide">{charts.gantt(night)}</div>',
              '<h2 id="passes">Passes</h2>', TextTable(HEADS, map(_cells, lines)).html('plan'), '<h2 id="sky">Sky</h2>',
-             '<p class="soft">North is up, east is right, the zenith is in the middle.</p><div class="sky">',
+             '<p class="soft">North is up, east is right, the zenith is in the middle. A dot is the culmination.</p>',
+             '<div class="sky">',
              *(f'<figure>{charts.sky(night, line.each, line.share)}<figcaption>{html.escape(line.each.case)}: '
                f'{html.escape(rows.decision(night, line.share))}</figcaption></figure>' for line in lines), '</div>']
     if night.refusals:
@@ -40,11 +41,11 @@ def _cells(line: Line) -> list[Cell]:
     losses = {loss.reason: sum(other.seconds for other in prediction.losses if other.reason == loss.reason)
               for loss in prediction.losses}
     first, last = (f'{math.degrees(azimuth):.0f}' for azimuth in prediction.azimuth)
-    least, most = prediction.cn0
+    most = prediction.cn0[1]
     return [each.case, f'{rows.utc(night, each.window.rise):%d %b %H:%M:%S}',
             f'{rows.utc(night, each.window.set):%H:%M:%S}', rows.decision(night, line.share), rows.state(line.greedy),
             f'{math.degrees(each.window.max_elevation):.1f}',
             f'{first} to {last}', f'{math.degrees(prediction.peak_rate[0]):.2f}',
             ', '.join(f'{reason} {seconds:.1f} s' for reason, seconds in losses.items()) + (
                 ', early turn' if prediction.early_turn else ''),
-            '' if math.isnan(most) else f'{least:.1f} to {most:.1f}', f'{prediction.age / SECONDS_PER_DAY:.1f}']
+            '' if math.isnan(most) else f'{most:.1f}', f'{prediction.age / SECONDS_PER_DAY:.1f}']
