@@ -17,10 +17,11 @@ from pedestal_common.geometry.geodesy import STATION_NAMES, StationParameters
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import ParameterError, build
-from pedestal_common.quantities import Days, Degrees, Floats, Json, Pairs, Seconds
+from pedestal_common.quantities import Degrees, Floats, Json, Pairs, Seconds
 from pedestal_common.text_files import files
 from pedestal_station.night import Night, Object, Pass, Share
-from tracking_receiver_sim import elements as element_files
+from pedestal_station.objects import Elements
+from pedestal_station.objects import Night as Place
 from tracking_receiver_sim.params import LeoPassParameters
 
 VERSION_KEY, VERSION = 'pedestal_plan', 1
@@ -31,7 +32,6 @@ MAX_CONTACT_S = SECONDS_PER_DAY  # longest contact [s]
 MAX_NAME_CHARACTERS = 100  # largest length of the name of an object [characters]
 TRACK_ROW_INTERVAL_S, TRACK_MARGIN_S = 1.0, 10.0
 """Interval of the rows of a track, and time that it has before and after the contact [s]."""
-MAX_LOW_PERIOD_S = 7680.0  # largest period of a low orbit (LEO) [s]: 128 min
 EPOCH = datetime.datetime(1970, 1, 1)
 
 
@@ -75,38 +75,28 @@ def utc_text(utc: Seconds) -> str:
     return (EPOCH + datetime.timedelta(milliseconds=round(utc * 1e3))).isoformat(timespec='milliseconds') + 'Z'
 
 
-def satellite_number(elements: Mapping[str, str]) -> str:
-    """Return the catalogue number in elements. Raises TargetError."""
-    return _satellite(elements).number
+def orbit_of(elements: Mapping[str, str], station: StationParameters | None = None) -> Elements:
+    """Return the orbit of elements, whose times are UTC [s]. Raises TargetError."""
+    line_1, line_2, omm = (elements.get(name, '') for name in ELEMENT_NAMES)
+    values = LeoPassParameters(line_1=line_1, line_2=line_2, omm=omm)
+    return Elements(values, orbit.satellite(values), Place(station or StationParameters(), EPOCH, 0.0, 0.0))
 
 
 def epoch_of(elements: Mapping[str, str]) -> Seconds:
     """Return the UTC of the epoch of elements. Raises TargetError."""
-    satellite = _satellite(elements)
-    return seconds(orbit.calendar(satellite.jdsatepoch, satellite.jdsatepochF))
-
-
-def age(contact: Contact) -> Days:
-    """Return the time from the epoch of the elements to the begin of a contact; 0 for a track."""
-    return (contact.begin - epoch_of(contact.elements)) / SECONDS_PER_DAY if contact.elements else 0.0
-
-
-def is_low(contact: Contact) -> bool:
-    """Return True for the elements of a low orbit."""
-    return bool(contact.elements) and 120.0 * math.pi / _satellite(contact.elements).no_kozai < MAX_LOW_PERIOD_S
-
-
-def _satellite(elements: Mapping[str, str]) -> orbit.Satellite:
-    line_1, line_2, omm = (elements.get(name, '') for name in ELEMENT_NAMES)
-    return orbit.satellite(LeoPassParameters(line_1=line_1, line_2=line_2, omm=omm))
+    return -orbit_of(elements).elements_age(0.0)
 
 
 def direction(elements: Mapping[str, str], station: StationParameters, utc: Seconds) -> tuple[Degrees, Degrees]:
     """Return geometric azimuth (0 to 360) and elevation of a satellite. Raises TargetError."""
-    julian, fraction = orbit.julian_date(EPOCH + datetime.timedelta(seconds=utc))
-    angles = _angles(orbit.enu(_satellite(elements), station, julian, fraction, np.zeros(1))[0])
-    azimuth, elevation = np.degrees(angles)[0].tolist()
+    azimuth, elevation = np.degrees(_angles(orbit_of(elements, station).enu(np.array([utc]))))[0].tolist()
     return azimuth % 360.0, elevation
+
+
+def texts_of(found: Elements) -> dict[str, str]:
+    """Return the elements of an orbit as texts, {line_1, line_2 or omm: text}."""
+    return {name: text for name in ELEMENT_NAMES if (text := getattr(found.values, name))
+            and (name == 'omm') == bool(found.values.omm)}
 
 
 def _angles(enu: Floats) -> Pairs:
@@ -156,15 +146,13 @@ def _planned(each: Pass, share: Share, night: Night) -> Contact:
 
 def _prediction(planned: Object, night: Night, begin: Seconds, end: Seconds) -> tuple[dict[str, str], Track]:
     """Return (elements of an object, its track). One of them is empty."""
-    when = night.begin + datetime.timedelta(seconds=begin)
-    try:
-        found = element_files.read(planned.path, planned.number or planned.name, when).values
-    except TargetError:
-        first = begin - TRACK_MARGIN_S
-        times = first + np.arange(0.0, end + TRACK_MARGIN_S - first, TRACK_ROW_INTERVAL_S)
-        rows = np.column_stack((seconds(night.begin) + times, _angles(planned.orbit.enu(times))))
-        return {}, tuple(map(tuple, rows.tolist()))
-    return {name: value for name, value in found.items() if value}, ()
+    if isinstance(planned.orbit, Elements):
+        return texts_of(planned.orbit), ()
+    first = begin - TRACK_MARGIN_S
+    times = first + np.arange(0.0, end + TRACK_MARGIN_S - first, TRACK_ROW_INTERVAL_S)
+    rows = np.column_stack((seconds(night.begin) + times, _angles(planned.orbit.enu(times))))
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    return {}, tuple(map(tuple, rows.tolist()))
 
 
 def read(path: pathlib.Path) -> Plan:
@@ -186,9 +174,10 @@ def read(path: pathlib.Path) -> Plan:
     for i, case in enumerate(cases):
         if case in cases[:i]:
             raise PlanError(f'{path}: passes[{i}].case = {case!r}: must be unique')
+    place = _Fields(str(path), 'station.', file.get('station', dict))
+    given = {f'station.{name}': place.number(name, -1e5, 1e5) for name in STATION_NAMES}
     try:
-        station = build(StationParameters, {name: _Fields(str(path), 'station.', file.get('station', dict)).number(
-            name, -1e5, 1e5) for name in STATION_NAMES}, 'station.')
+        station = build(StationParameters, given, 'station.')
     except ParameterError as error:
         raise PlanError(f'{path}: {error}') from None
     return Plan(path, station, tuple(sorted(contacts, key=lambda each: each.begin)))

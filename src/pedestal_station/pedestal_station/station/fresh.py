@@ -5,16 +5,20 @@ written. A thread reads it, because a catalogue takes a second.
 """
 import datetime
 import pathlib
-from collections.abc import Iterable
+from collections.abc import Sequence
 from concurrent import futures
 from typing import NamedTuple
 
+from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.geometry.orbit import TargetError
-from pedestal_common.quantities import Seconds
+from pedestal_common.graph.steps import SECONDS_PER_DAY
+from pedestal_common.quantities import Days, Seconds
+from pedestal_station import objects
+from pedestal_station.outputs.file import EPOCH, texts_of
 from pedestal_station.station.sequence import Fresh
-from tracking_receiver_sim import elements
 
 LOOK_PERIOD_S = 3.0  # time between two looks at the folder [s]
+NIGHT_S = SECONDS_PER_DAY  # length of the night for which elements are read [s]
 HIDDEN_PREFIX = '.'  # of the names of files that a program has not finished
 
 
@@ -27,26 +31,26 @@ class _Version(NamedTuple):
 class Watch:
     """Watch of a folder for elements of the wanted satellites. Raises NotADirectoryError for a missing folder."""
 
-    def __init__(self, folder: pathlib.Path) -> None:
+    def __init__(self, folder: pathlib.Path, station: StationParameters, oldest: Days) -> None:
         if not folder.is_dir():
             raise NotADirectoryError(f'--elements {folder}: must be a directory that exists')
-        self._folder = folder
+        self._folder, self._antenna = folder, (station, oldest)
         self._seen: dict[pathlib.Path, _Version] = {}
         self._read: dict[pathlib.Path, tuple[_Version, frozenset[str]]] = {}
         self._worker = futures.ThreadPoolExecutor(1, 'elements')
         self._pending: futures.Future[tuple[list[Fresh], list[str]]] | None = None
         self._next = 0.0
 
-    def look(self, now: Seconds, wanted: frozenset[str], utc: datetime.datetime) -> tuple[list[Fresh], list[str]]:
+    def look(self, now: Seconds, wanted: frozenset[str], utc: Seconds) -> tuple[list[Fresh], list[str]]:
         """Return (elements that were read since the last call, lines about files that cannot be read). now: steady
-        time; wanted: catalogue numbers or names; utc: of several sets of a satellite that nearest to it is taken."""
+        time; wanted: catalogue numbers or names; utc: the begin of the night that the elements are for."""
         found: tuple[list[Fresh], list[str]] = [], []
         if self._pending is not None and self._pending.done():
             found, self._pending = self._pending.result(), None
         if self._pending is None and now >= self._next:
             self._next = now + LOOK_PERIOD_S
             if files := self._changed(wanted):
-                self._pending = self._worker.submit(read, files, wanted, utc)
+                self._pending = self._worker.submit(read, files, wanted, self._antenna, utc)
         return found
 
     def _changed(self, wanted: frozenset[str]) -> list[pathlib.Path]:
@@ -76,19 +80,16 @@ class Watch:
         self._worker.shutdown(wait=False, cancel_futures=True)
 
 
-def read(paths: Iterable[pathlib.Path], wanted: frozenset[str],
-         utc: datetime.datetime) -> tuple[list[Fresh], list[str]]:
-    """Return (elements of the wanted satellites in files, a line for each file that cannot be read)."""
-    found: list[Fresh] = []
-    refused: list[str] = []
-    for path in paths:
-        for satellite in sorted(wanted):
-            try:
-                values = elements.read(path, satellite, utc).values
-            except (TargetError, OSError) as error:
-                if 'satellites: ' not in str(error):    # else the satellite is not in the file
-                    refused.append(f'refused: {error}')
-                    break
-            else:
-                found.append(Fresh(satellite, {name: text for name, text in values.items() if text}, path.name))
-    return found, refused
+def read(paths: Sequence[pathlib.Path], wanted: frozenset[str], antenna: tuple[StationParameters, Days],
+         utc: Seconds) -> tuple[list[Fresh], list[str]]:
+    """Return (elements of the wanted satellites in files, a line for each file and wanted satellite that is refused).
+    antenna: position, and largest age of elements."""
+    begin = EPOCH + datetime.timedelta(seconds=utc)
+    try:
+        found, refused = objects.read(paths, antenna[0], begin, NIGHT_S, antenna[1])
+    except TargetError as error:
+        return [], [f'refused: {error}']
+    return ([Fresh(each.number or each.name, texts_of(each.orbit), each.path.name) for each in found
+             if (each.number or each.name) in wanted and isinstance(each.orbit, objects.Elements)],
+            [f'refused: {each.path}: line {each.line}: {each.reason}' for each in refused
+             if not each.line or each.name in wanted])

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import StationParameters
-from pedestal_common.quantities import Seconds
+from pedestal_common.quantities import Degrees, Seconds
 from pedestal_common.wire import commands
 from pedestal_common.wire.commands import Argument, Command, CommandDefinition
 from pedestal_station.outputs.file import (
@@ -13,7 +13,7 @@ from pedestal_station.outputs.file import (
     MAX_NAME_CHARACTERS,
     Contact,
     direction,
-    satellite_number,
+    orbit_of,
     seconds,
 )
 
@@ -36,6 +36,12 @@ STATION_COMMANDS = (
 """Table of the commands of the station."""
 
 
+class Antenna(NamedTuple):
+    """What the requests need of the antenna."""
+    station: StationParameters
+    azimuth: tuple[Degrees, Degrees]    # lowest and highest encoder angle
+
+
 class Request(NamedTuple):
     """A command of an operator, checked as far as that needs no state of the station."""
     command: Command
@@ -43,7 +49,7 @@ class Request(NamedTuple):
     contact: Contact | None = None  # to be inserted, without the number in its case
 
 
-def request(command: Command, station: StationParameters) -> Request:
+def request(command: Command, antenna: Antenna) -> Request:
     """Return the Request of a Command. Raises ValueError."""
     found = {name: str(value) for name, value in commands.values(STATION_COMMANDS, command).items()}
     case = found.get('case', '')
@@ -53,10 +59,10 @@ def request(command: Command, station: StationParameters) -> Request:
     if bool(case) == bool(others):
         raise ValueError('insert: must have either case, or elements with begin and end'
                          + (f'; case = {case} and {", ".join(others)} are given' if case else ''))
-    return Request(command, case, None if case else _contact(found, station))
+    return Request(command, case, None if case else _contact(found, antenna))
 
 
-def _contact(found: dict[str, str], station: StationParameters) -> Contact:
+def _contact(found: dict[str, str], antenna: Antenna) -> Contact:
     """Return the contact of the arguments of `insert`. Raises ValueError."""
     elements = {name: found[name].replace('_', ' ') if name != 'omm' else found[name]
                 for name in ELEMENT_NAMES if found[name]}
@@ -66,12 +72,14 @@ def _contact(found: dict[str, str], station: StationParameters) -> Contact:
     begin, end = times
     if not begin < end <= begin + MAX_CONTACT_S:
         raise ValueError(f'insert: end = {found["end"]}: must be after begin, at most {MAX_CONTACT_S:g} s')
-    number = satellite_number(elements)
+    number = orbit_of(elements).satellite.number
     name = found['name'] or number
     if len(name) > MAX_NAME_CHARACTERS:
         raise ValueError(f'insert: name = {name:.20}...: must be at most {MAX_NAME_CHARACTERS} characters')
-    points = [direction(elements, station, utc) for utc in (begin, 0.5 * (begin + end), end)]
+    points = [direction(elements, antenna.station, utc) for utc in (begin, 0.5 * (begin + end), end)]
     highest = max(elevation for _, elevation in points)
     if math.isnan(highest) or highest <= 0.0:
         raise ValueError(f'insert: {name} is below the horizon from {found["begin"]} to {found["end"]}')
-    return Contact(name, name, number, elements, (), begin, end, points[0], highest, INSERTED_PRIORITY, True, '')
+    middle = 0.5 * sum(antenna.azimuth)
+    point = points[0][0] + 360.0 * round((middle - points[0][0]) / 360.0), points[0][1]
+    return Contact(name, name, number, elements, (), begin, end, point, highest, INSERTED_PRIORITY, True, '')

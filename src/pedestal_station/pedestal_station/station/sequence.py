@@ -12,9 +12,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from pedestal_common.graph.modes import MODE_ROWS
+from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Days, Seconds, Value
 from pedestal_common.wire.commands import HELD_REFUSAL, Command, Reply
-from pedestal_station.outputs.file import Contact, age, epoch_of, is_low, utc_text
+from pedestal_station import objects
+from pedestal_station.outputs.file import Contact, epoch_of, orbit_of, utc_text
 from pedestal_station.station.requests import Request
 
 FOLLOWING_MODES = tuple(row.name for row in MODE_ROWS if row.follows and row.name not in ('slave', 'sun'))
@@ -25,7 +27,6 @@ FOLLOW_LEAD_S = 5.0  # time before the begin of a contact from which the antenna
 RETRY_S, SETTLING_S = 2.0, 2.0  # time until a command is repeated; time after a command until the mode is judged [s]
 MAX_ALARM_S = 5.0  # time with an alarm after which a pass fails [s]
 MAX_STOW_S = 300.0  # longest time for the stow after the last pass [s]
-MAX_LOW_AGE_DAYS = 3.0  # age of the elements of a low orbit above which the station warns [days]
 PIN_REFUSAL = 'stow pins not out'  # part of the refusal of a mode that the stow pins forbid
 UNPLANNED = 'dropped', 'skipped', 'failed'  # states of a pass that `insert` may queue
 
@@ -104,7 +105,7 @@ class Step(NamedTuple):
     replies: tuple[tuple[Command, Reply], ...]
 
 
-def begin(contacts: tuple[Contact, ...], now: Seconds, rules: Rules) -> State:
+def begin(contacts: tuple[Contact, ...], now: Seconds) -> State:
     """Return the state at the begin of a night: a pass whose time is over is skipped."""
     entries = []
     for contact in contacts:
@@ -113,7 +114,7 @@ def begin(contacts: tuple[Contact, ...], now: Seconds, rules: Rules) -> State:
         elif contact.end <= now:
             entries.append(Entry(contact, 'skipped', f'refused: its time was over at {clock(contact.end)}'))
         else:
-            entries.append(Entry(contact, 'queued', _warning(contact, rules)))
+            entries.append(Entry(contact, 'queued', _warning(contact)))
     return State(tuple(entries))
 
 
@@ -161,12 +162,19 @@ def aim_at(contact: Contact, now: Seconds) -> Aim:
     return Aim('tle', dict(contact.elements)) if contact.elements else Aim('program', {})
 
 
-def _warning(contact: Contact, rules: Rules) -> str:
-    """Return a text on the age of the elements of a contact: '' if all is well; a refusal begins with `refused`."""
-    days = abs(age(contact))
-    if days > rules.oldest:
-        return f'refused: its elements are {days:.1f} days old, must be at most {rules.oldest:g}'
-    return f'its elements are {days:.1f} days old' if days > MAX_LOW_AGE_DAYS and is_low(contact) else ''
+def _age(contact: Contact) -> Days:
+    """Return the distance of the epoch of the elements from the begin of a contact."""
+    return abs(contact.begin - epoch_of(contact.elements)) / SECONDS_PER_DAY
+
+
+def _refusal(contact: Contact, rules: Rules) -> str:
+    """Return why the elements of a contact are refused, '' if they are not."""
+    return objects.age_refusal(orbit_of(contact.elements), contact.begin, rules.oldest) if contact.elements else ''
+
+
+def _warning(contact: Contact) -> str:
+    """Return a warning about the elements of a contact, '' without one."""
+    return objects.age_warning(orbit_of(contact.elements), contact.begin) if contact.elements else ''
 
 
 @dataclasses.dataclass
@@ -227,9 +235,9 @@ class _Turn:
                         contact.elements and epoch_of(fresh.elements) > epoch_of(contact.elements)):
                     continue
                 newer = contact._replace(elements=fresh.elements)
-                self.change(contact.case, contact=newer, text=_warning(newer, self.rules))
-                self.say(f'{contact.case}: elements of {fresh.source}, {abs(age(newer)):.1f} days old at the pass, '
-                         f'in place of {abs(age(contact)):.1f}')
+                self.change(contact.case, contact=newer, text=_warning(newer))
+                self.say(f'{contact.case}: elements of {fresh.source}, {_age(newer):.1f} days old at the pass, '
+                         f'in place of {_age(contact):.1f}')
 
     def watch_control(self) -> None:
         """Wait while the control unit is silent, or another client has control. A mode that another client commands
@@ -298,8 +306,8 @@ class _Turn:
             contact = entry.contact
         if contact.end <= self.inputs.now:
             raise ValueError(f'{contact.case}: its time was over at {clock(contact.end)}')
-        if (warning := _warning(contact, self.rules)).startswith('refused: '):
-            raise ValueError(f'{contact.case}: {warning.removeprefix("refused: ")}')
+        if refusal := _refusal(contact, self.rules):
+            raise ValueError(f'{contact.case}: {refusal}')
         overlapping = [entry for entry in self.state.entries if entry.state in ('queued', 'running')
                        and entry.contact.begin < contact.end and contact.begin < entry.contact.end]
         for entry in overlapping:
@@ -309,10 +317,10 @@ class _Turn:
             cases = [entry.contact.case for entry in self.state.entries]
             number = next(k for k in range(1, len(cases) + 2) if f'{contact.name}/{k}' not in cases)
             contact = contact._replace(case=f'{contact.name}/{number}')
-            entries = (*self.state.entries, Entry(contact, 'queued', warning, inserted=True))
+            entries = (*self.state.entries, Entry(contact, 'queued', _warning(contact), inserted=True))
             self.set(entries=tuple(sorted(entries, key=lambda entry: entry.contact.begin)))
         else:
-            self.change(contact.case, state='queued', text=warning, tracked=0.0)
+            self.change(contact.case, state='queued', text=_warning(contact), tracked=0.0)
         self.set(ends=math.inf)
         self.say(f'{contact.case}: inserted by {request.command.who}, {clock(contact.begin)} to {clock(contact.end)}')
         for entry in overlapping:
@@ -355,12 +363,12 @@ class _Turn:
         while coming and not (self._obstacle or current(self.state)) and (
                 self.inputs.now >= coming.contact.begin - self.rules.lead):
             contact = coming.contact
-            if (warning := _warning(contact, self.rules)).startswith('refused: '):
-                self.close(coming, 'failed', warning)
+            if refusal := _refusal(contact, self.rules):
+                self.close(coming, 'failed', f'refused: {refusal}')
             else:
                 self.change(contact.case, state='running')
                 self.set(aim=None, refusal='')
-                elements = (f'elements of {utc_text(epoch_of(contact.elements))[:16]}, {abs(age(contact)):.1f} days '
+                elements = (f'elements of {utc_text(epoch_of(contact.elements))[:16]}, {_age(contact):.1f} days '
                             'old' if contact.elements else 'a track of the plan')
                 self.say(f'{contact.case}: begins, {clock(contact.begin)} to {clock(contact.end)}, {elements}')
             coming = upcoming(self.state)

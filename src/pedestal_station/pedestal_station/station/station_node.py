@@ -1,7 +1,6 @@
 """ROS node of the station, and the loop that runs it: messages in, a step of the sequence, commands out."""
 import collections
 import contextlib
-import datetime
 import math
 import pathlib
 import socket
@@ -20,7 +19,7 @@ from pedestal_common.quantities import Message, Seconds, Value
 from pedestal_common.wire import commands, messages
 from pedestal_common.wire.commands import Command, Reply
 from pedestal_operator.remote_node import REPLY_TIMEOUT_S, RETRY_PERIOD_S, Query, Remote, RemoteSession
-from pedestal_station.outputs.file import ELEMENT_NAMES, EPOCH, Contact, Plan, PlanError, seconds, utc_text
+from pedestal_station.outputs.file import ELEMENT_NAMES, Contact, Plan, PlanError, seconds, utc_text
 from pedestal_station.station import progress, requests, sequence
 from pedestal_station.station.fresh import Watch
 from pedestal_station.station.recordings import Recordings
@@ -36,7 +35,8 @@ PROGRAM_TOPIC, COMMAND_TOPIC, REPLY_TOPIC = 'acu/program_track', 'station/comman
 NIGHT_TOPIC, LOG_TOPIC = 'station/night', 'station/log'
 
 CONTROL_UNIT_PARAMETERS = ('graph.start', 'prediction.start_time', 'prediction.oldest', 'tracker.handover',
-                           'tracker.receiver.beamwidth', *(f'prediction.station.{name}' for name in STATION_NAMES))
+                           'tracker.receiver.beamwidth', 'azimuth.limits.low', 'azimuth.limits.high',
+                           *(f'prediction.station.{name}' for name in STATION_NAMES))
 
 
 class Options(NamedTuple):
@@ -145,10 +145,12 @@ class Station:
                        if start and graph_start else 0.0)
         self._rules = Rules(options.lead, options.gap, options.park, float(found['prediction.oldest']))
         self._file = progress.file_of(plan.path)
-        begun = sequence.begin(plan.contacts, self.now, self._rules)
+        begun = sequence.begin(plan.contacts, self.now)
         self._state = progress.resume(begun, self._file, self.now)
+        self._antenna = requests.Antenna(plan.station, (math.degrees(found['azimuth.limits.low']),
+                                                        math.degrees(found['azimuth.limits.high'])))
         self._check(found)
-        self._watch = Watch(options.elements) if options.elements else None
+        self._watch = Watch(options.elements, plan.station, self._rules.oldest) if options.elements else None
         self._recordings = Recordings(options.bags, {
             'graph.pacing': 'realtime', 'graph.start': graph_start, 'beamwidth': found['tracker.receiver.beamwidth']},
             ros_arguments)
@@ -240,7 +242,7 @@ class Station:
         if self._watch:
             wanted = frozenset(entry.contact.number or entry.contact.name for entry in self._state.entries
                                if entry.state == 'queued' and entry.contact.elements)
-            fresh, refused = self._watch.look(time.monotonic(), wanted, EPOCH + datetime.timedelta(seconds=now))
+            fresh, refused = self._watch.look(time.monotonic(), wanted, now)
             lines += refused
         received, node.received = node.received, []
         interference, node.interference = node.interference, ''
@@ -255,7 +257,7 @@ class Station:
         found = []
         for command in received:
             try:
-                found.append(requests.request(command, self._plan.station))
+                found.append(requests.request(command, self._antenna))
             except ValueError as error:
                 lines.append(f'{command} of {command.who}: refused: {error}')
                 self._node.answer(command, Reply(False, f'refused: {error}'))
