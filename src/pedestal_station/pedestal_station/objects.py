@@ -34,6 +34,7 @@ from tracking_receiver_sim.tracks import course, instant, lines, oem, states
 OLDEST_DAYS = PredictionParameters().oldest  # largest age of elements in a pass, unless the antenna has another [days]
 FRESH_DAYS = 3.0  # age of the elements of a low satellite up to which no warning is given [days]
 LOW_PERIOD_S = SECONDS_PER_DAY / 11.25  # longest revolution of a low satellite [s]
+MAX_UT1_OFFSET_S = 0.9  # largest UT1 - UTC that leap seconds allow [s]; the tables go on without them
 SPLINE_SPAN_S, KNOT_SPACING_S = 3600.0, 20.0  # length of a spline of an ephemeris, and of each of its pieces [s]
 PROBE_COUNT = 200  # number of instants of the night at which SGP4 is tried
 DESIGNATOR_PATTERN = re.compile(r'\d{4}-\d{3}[A-Z]{1,3}')
@@ -195,7 +196,7 @@ def weighted(objects: Sequence[Object], texts: Sequence[str]) -> list[Object]:
 
 def _ut1_offset(when: datetime.datetime) -> Seconds:
     time = instant.timescale().utc(when.year, when.month, when.day, when.hour, when.minute, when.second)
-    return float(time.dut1)
+    return float(np.clip(time.dut1, -MAX_UT1_OFFSET_S, MAX_UT1_OFFSET_S))
 
 
 def _files(paths: Sequence[FilePath]) -> Iterator[pathlib.Path]:

@@ -19,8 +19,8 @@ from pedestal_station.night import Orbit, Window
 
 FOLLOWED_DAYS = 1.0  # longest time before and after the night in which rise and set are searched [days]
 KINK_MARGINS_RAD = 0.1, 0.35
-"""Largest distances of an object below and above HIGH_RAD from the range of the floor at which it may cross the floor
-within a step [rad]: the elevation changes by at most 0.3 and 1 deg/s there."""
+"""Largest distances from the range of the floor at which an object may cross the floor within a step [rad], below and
+above HIGH_RAD. The elevation changes by at most 0.3 deg/s there, and 1 deg/s."""
 HIGH_RAD = 0.5  # elevation from which on a low satellite moves fast [rad]
 
 

@@ -96,11 +96,11 @@ def compare(path, kind, place, least, days, anomalies):
             np.testing.assert_allclose(ours, times[kinds == code], rtol=0.0, atol=1.0)
             if len(ours):
                 exact = sky.top(ours) if code == 1 else sky.crossing(ours, least)
-                np.testing.assert_allclose(ours, exact, rtol=0.0, atol=0.1, err_msg=f'{kind} {place} {code}')
+                np.testing.assert_allclose(ours, exact, rtol=0.0, atol=0.02, err_msg=f'{kind} {place} {code}')
                 azimuth, elevation = np.degrees(windows.angles(each.orbit, ours)).T
                 apart = (azimuth - sky.angles(ours)[0] + 180.0) % 360.0 - 180.0
-                assert np.abs(apart * np.cos(np.radians(elevation))).max() < 0.002
-                np.testing.assert_allclose(elevation, sky.angles(ours)[1], rtol=0.0, atol=0.002)
+                assert np.abs(apart * np.cos(np.radians(elevation))).max() < 0.0002
+                np.testing.assert_allclose(elevation, sky.angles(ours)[1], rtol=0.0, atol=0.0002)
         count += len(found)
     return count
 
@@ -113,7 +113,8 @@ def test_windows_agree_with_skyfield(kind, tmp_path):
 
 @pytest.mark.thorough
 def test_a_thousand_passes_agree_with_skyfield(tmp_path):
-    """The numbers of the issue, at all latitudes, over the poles and on the date line."""
+    """At all latitudes, over the poles and on the date line. What is left of the differences is the interval of the
+    search for a rise and a set, and the noise of the position at a flat maximum."""
     count = {kind: sum(compare(tmp_path / 'a.tle', kind, place, least, 4.0, KINDS[kind][-1])
                        for place, least in zip(STATIONS, itertools.cycle((0.0, 5.0, 12.0)))) for kind in KINDS}
     assert sum(count.values()) >= 1000 and min(count.values()) >= 30, count

@@ -173,8 +173,8 @@ def passes_after(satrec: Satellite, station: StationParameters, begin: datetime.
 
 
 def followed(height: Height, times: Times, most: Days) -> tuple[Times, Floats]:
-    """Return (times, heights) of times in steps of SEARCH_STEP_S, which go on before the first and after the last one
-    where the height is above 0 there: up to the first height that is not, at most for `most`, or where SGP4 fails."""
+    """Return (times, heights) of times in steps of SEARCH_STEP_S. Where the height is above 0 at the first or at the
+    last time, the times go on there until it is not, at most for `most`, or until SGP4 fails."""
     heights = height(times)
     for end, step in ((0, -SEARCH_STEP_S), (-1, SEARCH_STEP_S)):
         count, start = 0, times[end]
