@@ -27,13 +27,15 @@ class OutageRecord(Record):
     """Last explanation of an outage."""
     stamp: Seconds  # last stamp at which a keyhole, a turn or a hidden sector explained an outage
     blocked: Bit    # 1 while the target is hidden
+    slewing: Bit    # 1 while the beam slews through the keyhole
 
 
 class Outage(NamedTuple):
     """Outage of the receiver at an instant."""
     since: Seconds      # time since the last accepted error, less the receiver's latency and the age of its errors
-    # True if `since` is longer than coast_after; autotrack then follows the prediction of the filter. An explained
-    # outage lasts until the filter has settled again, because its rates are unknown after a long prediction
+    # True if `since` is longer than coast_after; autotrack then follows the rotated program, or the prediction of the
+    # filter. A slew through the keyhole coasts from its begin, because the errors at the edge of the beam mislead the
+    # filter. An explained outage lasts until the filter has settled, because a long prediction misleads it too
     coasting: bool
     # True if a keyhole, a turn or a hidden sector explains the outage, now or within the last coast_time
     permitted: bool
@@ -66,7 +68,8 @@ def outage_now(state: OutageRecord, accepted: Seconds, settled: Bit, t: Seconds,
     """Return the Outage at t; accepted: stamp of the last accepted error; settled: of the filter, see target."""
     since = t - accepted - params.receiver_latency - params.tracker.receiver.age
     permitted = t - state.stamp <= params.tracker.coast_time
-    return Outage(since, since > params.tracker.coast_after or (permitted and not settled), permitted)
+    misled = permitted and (state.slewing != 0 or not settled)
+    return Outage(since, since > params.tracker.coast_after or misled, permitted)
 
 
 @compiled
@@ -76,7 +79,7 @@ def explain_outage(state: OutageRecord, hidden: bool, slewing: bool, turning: Bi
     hidden: by a sector; slewing: through the keyhole; turning: of the azimuth to another wrap, at a limit of its
     travel.
     """
-    state.blocked = hidden
+    state.blocked, state.slewing = hidden, slewing
     if hidden or slewing or turning:
         state.stamp = t
     return Reason.BLOCKED if hidden else Reason.KEYHOLE if slewing else Reason.TURN if turning else Reason.NONE
