@@ -75,6 +75,14 @@ class _Problem(NamedTuple):
     def length(self, i: int) -> Seconds:
         return self.set[i] - self.rise[i]
 
+    def room(self, i: int) -> Seconds:
+        """Return the most that pass i may be trimmed."""
+        return self.length(i) - self.min_pass
+
+    def overlap(self, i: int, j: int) -> Seconds:
+        """Return the time by which contacts of pass i and then of pass j must be trimmed together."""
+        return self.set[i] + self.gaps[i, j] - self.rise[j]
+
     def value(self, contacts: Contacts) -> float:
         return math.fsum(self.gain[i] * (end - begin) for i, (begin, end) in contacts.items())
 
@@ -221,30 +229,45 @@ def _solve(problem: _Problem, group: Sequence[int], time_limit: Seconds) -> tupl
 
 def _rows(problem: _Problem, group: Sequence[int]) -> tuple[list[Row], int]:
     """Return (inequalities of a group, number of its variables)."""
-    n, size = len(group), 3 * len(group)
+    n = len(group)
+    z: dict[tuple[int, int], int] = {}
     rows: list[Row] = [({n + k: 1.0, 2 * n + k: 1.0, k: problem.min_pass - problem.length(i)}, 0.0)
                        for k, i in enumerate(group)]
     for b, j in enumerate(group):
         for a, i in enumerate(group[:b]):
             if (i, j) not in problem.gaps:
                 continue
-            orders = [(2 * n + first, n + second, problem.set[one] + problem.gaps[one, other] - problem.rise[other])
-                      for first, one, second, other in ((a, i, b, j), (b, j, a, i))
-                      if _possible(problem, one, other)]
-            if len(orders) < 2:     # no order, or one
-                rows += [({q: -1.0, p: -1.0, a: overlap, b: overlap}, overlap)
-                         for q, p, overlap in orders] or [({a: 1.0, b: 1.0}, 1.0)]
-                continue
-            rows += [({q: -1.0, p: -1.0, size + k: overlap}, 0.0) for k, (q, p, overlap) in enumerate(orders)]
-            rows.append(({size: -1.0, size + 1: -1.0, a: 1.0, b: 1.0}, 1.0))
-            size += 2
-    return rows + _stretches(problem, group), size
+            orders = [(first, second) for first, second in ((a, b), (b, a))
+                      if problem.overlap(group[first], group[second]) <= problem.room(i) + problem.room(j)]
+            z.update({pair: 3 * n + len(z) + k for k, pair in enumerate(orders)})
+            rows += [({2 * n + first: -1.0, n + second: -1.0,
+                       z[first, second]: problem.overlap(group[first], group[second])}, 0.0)
+                     for first, second in orders]
+            rows.append(({**{z[pair]: -1.0 for pair in orders}, a: 1.0, b: 1.0}, 1.0))
+    return rows + _stretches(problem, group) + _chains(problem, group, z), 3 * n + len(z)
 
 
-def _possible(problem: _Problem, i: int, j: int) -> bool:
-    """Return True if contacts of pass i and then of pass j fit."""
-    overlap = problem.set[i] + problem.gaps[i, j] - problem.rise[j]
-    return overlap <= problem.length(i) + problem.length(j) - 2.0 * problem.min_pass
+def _chains(problem: _Problem, group: Sequence[int], z: dict[tuple[int, int], int]) -> list[Row]:
+    """Return inequalities that shorten the search where a pass has several others beside it: a contact that ends
+    before one of them ends before all later ones, and is trimmed by the sum of the steps between them."""
+    n, rows = len(group), []
+    for k in range(n):
+        for trim, pairs in ((2 * n + k, [pair for pair in z if pair[0] == k]),
+                            (n + k, [pair for pair in z if pair[1] == k])):
+            # (overlap, part of it that this pass must give up, variable), the largest first
+            steps = sorted(((overlap, overlap - problem.room(group[a + b - k]), z[a, b]) for a, b in pairs
+                            if (overlap := problem.overlap(group[a], group[b]))), reverse=True)
+            later = [next((m for m in range(m, len(steps)) if steps[m][0] <= steps[here][1]), None)
+                     for here, m in enumerate(range(1, len(steps) + 1))]
+            rows += [({steps[here][2]: 1.0, steps[m][2]: -1.0}, 0.0) for here, m in enumerate(later) if m is not None]
+            row, here = {trim: -1.0}, 0 if steps else None
+            while here is not None:
+                m = later[here]
+                row[steps[here][2]] = max(steps[here][1], 0.0) - (max(steps[m][1], 0.0) if m is not None else 0.0)
+                here = m
+            if len(row) > 2:
+                rows.append((row, 0.0))
+    return rows
 
 
 def _stretches(problem: _Problem, group: Sequence[int]) -> list[Row]:
