@@ -10,6 +10,7 @@ import pytest
 from sgp4.io import compute_checksum
 from skyfield.api import EarthSatellite, load, wgs84
 
+from pedestal_station import planning
 from pedestal_station.outputs import file
 
 BEGIN = datetime.datetime(2019, 12, 10, 6, 0)
@@ -138,6 +139,12 @@ def test_objects_are_selected_by_name_by_number_and_by_a_weight_of_0(planned):
                             (('--satellite', '43013', '25544', '--satellite', '25544'), {'ISS (ZARYA)', '43013'})):
         code, found, _ = planned('low.tle', *PLACE, *words)
         assert code == 0 and {case.rpartition('/')[0] for case in found} == expected
+
+
+def test_more_passes_than_a_plan_holds_are_refused(pedestal, files, monkeypatch):
+    monkeypatch.setattr(planning, 'MAX_PASSES', 9)
+    code, said, errors = pedestal('plan', 'low.tle', *PLACE)
+    assert (code, said) == (2, '') and 'must be at most 9; choose objects by --satellite, or fewer --hours' in errors
 
 
 @pytest.mark.every_case

@@ -75,8 +75,9 @@ def night(wishes: Wishes, progress: Progress = lambda *_: None) -> Night:
 
 
 def refusal_text(refused: Refusal) -> str:
-    """Return a refusal as a line."""
-    return f'{refused.path}: line {refused.line}: {refused.name}: {refused.reason}'
+    """Return a refusal as a line. Line 0 stands for the whole file."""
+    place = f'line {refused.line}: {refused.name}: ' if refused.line else ''
+    return f'{refused.path}: {place}{refused.reason}'
 
 
 def _scenario(variant: Variant) -> scenario.Scenario:
