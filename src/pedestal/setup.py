@@ -12,7 +12,7 @@ setup(
         ('share/' + package_name, ['package.xml']),
     ],
     install_requires=['argcomplete', 'numpy', 'matplotlib', 'rich'],
-    extras_require={'test': ['pytest', 'nbclient', 'ipykernel']},
+    extras_require={'test': ['pytest', 'nbclient', 'ipykernel', 'icalendar']},
     python_requires='>=3.10',
     zip_safe=False,
     maintainer='pedestal maintainers',

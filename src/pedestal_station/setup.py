@@ -11,7 +11,7 @@ setup(
         ('share/' + package_name, ['package.xml']),
     ],
     install_requires=['numpy', 'scipy', 'rich'],
-    extras_require={'test': ['pytest', 'skyfield']},
+    extras_require={'test': ['pytest', 'skyfield', 'icalendar']},
     python_requires='>=3.10',
     zip_safe=False,
     maintainer='pedestal maintainers',
