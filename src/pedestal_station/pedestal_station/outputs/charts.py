@@ -103,7 +103,8 @@ def _angles(each: Pass, times: Sequence[Seconds]) -> list[tuple[Degrees, Degrees
 def _path(kind: str, each: Pass, begin: Seconds, end: Seconds) -> str:
     count = min(max(int((end - begin) / POINT_PERIOD_S), MIN_POINTS), MAX_POINTS)
     places = (_place(*angles) for angles in _angles(each, np.linspace(begin, end, count).tolist()))
-    return f'<polyline class="{kind}" points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in places)}"/>'
+    points = ' '.join(f'{x:.1f},{y:.1f}' for x, y in places if math.isfinite(x))    # an ephemeris may have gaps
+    return f'<polyline class="{kind}" points="{points}"/>'
 
 
 def _place(azimuth: Degrees, elevation: Degrees, below: float = 0.0) -> tuple[float, float]:
