@@ -59,7 +59,8 @@ def test_a_wrong_argument_is_exit_code_2(words, capsys):
 
 
 @pytest.mark.parametrize(('line', 'expected'), (
-    ('pedestal st', {'status', 'stop', 'study'}), ('pedestal run leo', {'leo_pass', 'leo_station_7m'}),
+    ('pedestal st', {'station', 'status', 'stop', 'study'}), ('pedestal run leo', {'leo_pass', 'leo_station_7m'}),
+    ('pedestal plan x.tle --scenario leo', {'leo_pass', 'leo_station_7m'}),
     ('pedestal run uav_flyby --pac', {'--pacing'}), ('pedestal drive res', {'reset_faults'}),
     ('pedestal trials x --param acu.azimuth.limits.', {f'acu.azimuth.limits.{name}=' for name in (
         'acceleration', 'braking', 'high', 'low', 'rate')})))
