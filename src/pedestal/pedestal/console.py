@@ -340,8 +340,8 @@ _COMPARISON_KEYS = 'rate', 'difference', 'gain', 'ratio', 'wins'    # of the row
 
 def show_night(night: Night) -> None:
     """Print the plan of a night as a table."""
-    from pedestal_station.outputs import table
-    left_out = _show_fitted(table.COLUMNS, table.cells(night), table.OPTIONAL_COLUMNS, table.title(night))
+    from pedestal_station.outputs import words
+    left_out = _show_fitted(words.COLUMNS, words.cells(night), words.OPTIONAL_COLUMNS, words.title(night))
     if left_out:
         print(f'not shown for want of space: {", ".join(left_out)}; a wider terminal (COLUMNS={MIN_TABLE_COLUMNS}), '
               '--csv or --html has them')

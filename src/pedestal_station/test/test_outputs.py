@@ -16,7 +16,7 @@ import pytest
 from pedestal import console
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_station.night import Choice, Loss, Night, Object, Pass, Prediction, Refusal, Share, Window
-from pedestal_station.outputs import calendar, page, rows
+from pedestal_station.outputs import calendar, page, rows, words
 
 CHROMIUM = shutil.which('chromium')
 BEGIN = datetime.datetime(2026, 11, 30, 22, 30)
@@ -136,10 +136,10 @@ def test_the_table_fits_a_narrow_terminal_and_says_what_it_leaves_out(night, cap
     assert 'not shown for want of space' in said[80] and 'not shown' not in said[150]
     for text in ('22:41:00-22:51:40', 'ISS/1 +1', 'no window', 'whole'):
         assert text in said[80], text
-    endless, warning = rows.warnings(night)
+    endless, warning = words.warnings(night)
     assert endless == 'x.tle: line 7: GEO/1: does not set; choose its times with --window NAME=UTC/UTC'
     assert warning.startswith('x.tle: line 3: NOAA 19/1: elements 4.0 days')
-    assert '2 whole, 1 trimmed, 2 dropped' in rows.verdict(night) and 'at most 2500 s' in rows.verdict(night)
+    assert '2 whole, 1 trimmed, 2 dropped' in words.verdict(night) and 'at most 2500 s' in words.verdict(night)
 
 
 class Page(html.parser.HTMLParser):

@@ -81,7 +81,7 @@ def _plan(options: argparse.Namespace) -> int:
     arguments.check_result_files(options, new=NEW_FILES)
     _check(options)
     from pedestal_station import planning
-    from pedestal_station.outputs import rows
+    from pedestal_station.outputs import words
     begin, duration = _time(options)
     wishes = planning.Wishes(
         paths=options.files, station=_station(options.station), begin=begin, duration=duration,
@@ -91,10 +91,10 @@ def _plan(options: argparse.Namespace) -> int:
         night = planning.night(wishes, progress)
     for refused in night.refusals:
         print(f'{planning.refusal_text(refused)}; left out', file=sys.stderr)
-    for warning in rows.warnings(night):
-        print(f'warning: {warning}', file=sys.stderr)
+    for line in (*words.remarks(night), *(f'warning: {warning}' for warning in words.warnings(night))):
+        print(line, file=sys.stderr)
     console.show_night(night)
-    print(rows.verdict(night))
+    print(words.verdict(night))
     _write(options, night)
     return 0
 

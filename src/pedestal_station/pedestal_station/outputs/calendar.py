@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 
 from pedestal_station.night import Night
-from pedestal_station.outputs import rows
+from pedestal_station.outputs import rows, words
 from pedestal_station.outputs.rows import Line
 
 MAX_LINE_BYTES = 75  # largest length of a line without its end (RFC 5545, 3.1) [bytes]
@@ -17,26 +17,26 @@ def text(night: Night) -> str:
     content = ['BEGIN:VCALENDAR', 'VERSION:2.0', 'PRODID:-//pedestal//plan//EN', 'CALSCALE:GREGORIAN']
     for line in rows.lines(night):
         if line.share.taken:
-            content += _event(line)
+            content += _event(night, line)
     return ''.join(f'{folded}\r\n' for each in (*content, 'END:VCALENDAR') for folded in _folded(each))
 
 
-def _event(line: Line) -> list[str]:
-    night, each, share = line.night, line.each, line.share
+def _event(night: Night, line: Line) -> list[str]:
+    each, share = line.each, line.share
     station, prediction = night.station, each.prediction
     azimuths = [math.degrees(angle) % 360.0 for angle in prediction.azimuth]
     # A plan with newer elements moves a culmination by seconds, so the identity of a pass counts whole minutes.
     identity = '-'.join((re.sub(r'\W+', '_', each.object.number or each.object.name),
-                         f'{rows.utc(night, each.window.culmination):%Y%m%dT%H%M}',
+                         f'{words.utc(night, each.window.culmination):%Y%m%dT%H%M}',
                          f'{station.latitude_deg:.4f}', f'{station.longitude_deg:.4f}'))
     notes = [f'highest {math.degrees(each.window.max_elevation):.1f} deg at '
-             f'{rows.utc(night, each.window.culmination):%H:%M:%S} UTC',
+             f'{words.utc(night, each.window.culmination):%H:%M:%S} UTC',
              f'azimuth {azimuths[0]:.0f} to {azimuths[1]:.0f} deg', f'expected loss {prediction.loss:.1f} s',
-             *([rows.decision(night, share)] if share.reason else [])]
+             *([words.decision(night, share)] if share.reason else [])]
     return ['BEGIN:VEVENT', f'UID:{identity}@pedestal', f'DTSTAMP:{night.begin:{UTC_FORM}}',
-            f'DTSTART:{rows.utc(night, share.begin):{UTC_FORM}}', f'DTEND:{rows.utc(night, share.end):{UTC_FORM}}',
+            f'DTSTART:{words.utc(night, share.begin):{UTC_FORM}}', f'DTEND:{words.utc(night, share.end):{UTC_FORM}}',
             f'SUMMARY:{_escaped(each.case)}', f'DESCRIPTION:{_escaped("; ".join(notes))}',
-            f'LOCATION:{_escaped(rows.place(night))}', f'GEO:{station.latitude_deg:.6f};{station.longitude_deg:.6f}',
+            f'LOCATION:{_escaped(words.place(night))}', f'GEO:{station.latitude_deg:.6f};{station.longitude_deg:.6f}',
             'END:VEVENT']
 
 

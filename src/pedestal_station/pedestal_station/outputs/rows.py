@@ -1,25 +1,21 @@
-"""A night as numbers: the metrics of a pass, which the JSON, the CSV and the page share, and the plan in words."""
+"""A night as numbers: the metrics of a pass, as JSON and as CSV."""
 import csv
-import datetime
 import io
 import math
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
-from pedestal_common.quantities import Json, Seconds, SingleRow
-from pedestal_station import objects
+from pedestal_common.quantities import Json, SingleRow
 from pedestal_station.night import Night, Pass, Share
+from pedestal_station.outputs import words
 
 LOSS_REASONS = 'keyhole', 'blockage', 'sun', 'travel', 'limit of the elevation', 'rate of the elevation'
-WHOLE, TRIMMED, DROPPED = 'whole', 'trimmed', 'dropped'
-NO_END = 'does not set; choose its times with --window NAME=UTC/UTC'
 NUMBER_DIGITS = 6  # digits after the point of a number in a file
 
 
 class Line(NamedTuple):
     """A pass with what the exact and the greedy plan do with it."""
-    night: Night
     each: Pass
     share: Share
     greedy: Share
@@ -74,7 +70,7 @@ METRICS = (
 def lines(night: Night) -> Iterator[Line]:
     """Yield the passes with their shares, in the order of rise."""
     for each, share, greedy in zip(night.passes, night.exact.shares, night.greedy.shares, strict=True):
-        yield Line(night, each, share, greedy)
+        yield Line(each, share, greedy)
 
 
 def number(value: float) -> float | None:
@@ -97,71 +93,13 @@ def csv_text(night: Night) -> str:
     """Return the content of --csv: a row for each pass, with its times as UTC before its metrics."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator='\n')
-    writer.writerow(['case', 'catalogue_number', 'rise_utc', 'set_utc', 'plan', 'lost_to',
+    writer.writerow(['case', 'catalogue_number', 'rise_utc', 'set_utc', 'plan', 'lost_to', 'losses',
                      *(metric.name for metric in METRICS)])
     for line in lines(night):
         numbers = (number(metric.value(line)) for metric in METRICS)
-        writer.writerow([line.each.case, line.each.object.number, iso(night, line.each.window.rise),
-                         iso(night, line.each.window.set), state(line.share), '; '.join(line.share.lost_to),
+        writer.writerow([line.each.case, line.each.object.number, words.iso(night, line.each.window.rise),
+                         words.iso(night, line.each.window.set), words.state(line.share),
+                         '; '.join(line.share.lost_to), words.losses(line.each.prediction),
                          *('' if value is None else f'{value:g}' if value % 1.0 == 0.0 else repr(value)
                            for value in numbers)])
     return stream.getvalue()
-
-
-def utc(night: Night, t: Seconds) -> datetime.datetime:
-    """Return a time of the night as UTC, to the second."""
-    return night.begin + datetime.timedelta(seconds=round(t))
-
-
-def iso(night: Night, t: Seconds) -> str:
-    """Return a time of the night as text, to the millisecond."""
-    when = night.begin + datetime.timedelta(milliseconds=round(1e3 * t))
-    return f'{when.isoformat(timespec="milliseconds")}Z'
-
-
-def place(night: Night) -> str:
-    """Return the position of the station."""
-    return night.station.text.partition(':')[0]     # without the remark on the default of a simulation
-
-
-def state(share: Share) -> str:
-    """Return what a plan does with a pass, in one word."""
-    return DROPPED if not share.taken else TRIMMED if share.reason else WHOLE
-
-
-def decision(night: Night, share: Share) -> str:
-    """Return what a plan does with a pass, and the passes to which its time is lost."""
-    text = state(share)
-    if text == TRIMMED:
-        text = f'{utc(night, share.begin):%H:%M:%S} to {utc(night, share.end):%H:%M:%S}'
-    because = ', '.join(share.lost_to) or share.reason
-    return f'{text}: {because}' if because else text
-
-
-def verdict(night: Night) -> str:
-    """Return the plan as a sentence, with the greedy plan and, without a proof, the bound."""
-    if not night.passes:
-        return 'No object has a pass in this time'
-    counts = {name: sum(state(share) == name for share in night.exact.shares) for name in (WHOLE, TRIMMED, DROPPED)}
-    shares = ', '.join(f'{count} {name}' for name, count in counts.items())
-    proof = 'which is the optimum' if night.exact.optimal else (
-        f'not proven to be the optimum, which is at most {night.exact.bound:.0f} s')
-    objects = len({each.object.name for each in night.passes})
-    return (f'{_count(len(night.passes), "pass", "passes")} of {_count(objects, "object", "objects")}: {shares}. '
-            f'Weighted contact time {night.exact.value:.0f} s, {proof}; the greedy plan has '
-            f'{night.greedy.value:.0f} s')
-
-
-def _count(count: int, one: str, many: str) -> str:
-    return f'{count} {one if count == 1 else many}'
-
-
-def warnings(night: Night) -> list[str]:
-    """Return a line for each object in a low orbit whose elements are old at a pass, of its worst pass, and for each
-    object that does not set."""
-    worst: dict[str, Pass] = {}
-    for each in sorted(night.passes, key=lambda each: abs(each.prediction.age)):
-        worst[each.object.name] = each
-    texts = [(each, NO_END if each.window.endless else
-              objects.age_warning(each.object.orbit, each.window.culmination)) for each in worst.values()]
-    return [f'{each.object.path}: line {each.object.line}: {each.case}: {text}' for each, text in texts if text]
