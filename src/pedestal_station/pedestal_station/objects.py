@@ -4,7 +4,7 @@ Of several sets of an object, in one or many files, the nearest valid one to the
 an ephemeris that covers it takes precedence over elements. Each set that was tried in vain is refused by file, line
 and reason, and the others go on.
 
-The earth turns with the UT1 of skyfield's tables, constant through the night, as it does for an OEM.
+The earth turns with the UT1 of skyfield's tables, as it does for an OEM. UT1 - UTC is constant through the night.
 """
 import collections
 import datetime
@@ -43,7 +43,7 @@ NO_ELEMENTS = ('must hold a TLE (a line that begins with "1 ", then one that beg
                'the notation KEYWORD = value')
 
 
-class Night(NamedTuple):
+class Query(NamedTuple):
     """Place and time for which objects are read."""
     station: StationParameters
     begin: datetime.datetime    # UTC
@@ -60,18 +60,18 @@ class Elements(NamedTuple):
     """Orbit by elements: a night.Orbit."""
     values: LeoPassParameters   # the TLE or the OMM
     satellite: orbit.Satellite
-    night: Night
+    query: Query
 
     def enu(self, times: Times) -> Vectors3:
         """As in night.Orbit."""
-        julian, fraction = orbit.julian_date(self.night.begin)
+        julian, fraction = orbit.julian_date(self.query.begin)
         fractions = fraction + times / SECONDS_PER_DAY
-        return orbit.seen(self.satellite, self.night.station, julian, fractions,
-                          orbit.earth_fixed(julian, fractions, self.night.ut1_offset), light_time=False)
+        return orbit.seen(self.satellite, self.query.station, julian, fractions,
+                          orbit.earth_fixed(julian, fractions, self.query.ut1_offset), light_time=False)
 
     def elements_age(self, t: Seconds) -> Seconds:
         """As in night.Orbit."""
-        julian, fraction = orbit.julian_date(self.night.begin)
+        julian, fraction = orbit.julian_date(self.query.begin)
         return SECONDS_PER_DAY * (julian - self.satellite.jdsatepoch + fraction - self.satellite.jdsatepochF) + t
 
     @property
@@ -142,17 +142,17 @@ def read(paths: Sequence[FilePath], station: StationParameters, begin: datetime.
          oldest: Days = OLDEST_DAYS) -> tuple[list[Object], list[Refusal]]:
     """Return the objects of files and of the files in folders, and what cannot be planned. begin: of the night (UTC,
     without a zone); oldest: acu.prediction.oldest. Raises TargetError for a path that does not exist."""
-    night = Night(station, begin, duration, _ut1_offset(begin + datetime.timedelta(seconds=0.5 * duration)))
+    query = Query(station, begin, duration, _ut1_offset(begin + datetime.timedelta(seconds=0.5 * duration)))
     sets, refusals = list[_Set](), list[Refusal]()
     for path in _files(paths):
-        found, refused = _read(path, night)
+        found, refused = _read(path, query)
         sets += found
         refusals += refused
         if not (found or refused):
             refusals.append(_refusal(path, 0, path.name, NO_ELEMENTS))
     objects = []
     for group in _groups(sets):
-        chosen, refused = _chosen(group, night, oldest)
+        chosen, refused = _chosen(group, query, oldest)
         objects += chosen
         refusals += refused
     return _told_apart(objects), refusals
@@ -212,7 +212,7 @@ def _files(paths: Sequence[FilePath]) -> Iterator[pathlib.Path]:
         yield from inside
 
 
-def _read(path: pathlib.Path, night: Night) -> tuple[list[_Set], list[Refusal]]:
+def _read(path: pathlib.Path, query: Query) -> tuple[list[_Set], list[Refusal]]:
     sets, refusals = list[_Set](), list[Refusal]()
     try:
         with csv_table.stream(path) as stream:
@@ -220,7 +220,7 @@ def _read(path: pathlib.Path, night: Night) -> tuple[list[_Set], list[Refusal]]:
         if '<oem' in beginning:
             raise csv_table.TableError(f'{path}: an OEM must be in the notation KEYWORD = value, not XML')
         read = _ephemerides if lines.begins_with(beginning, oem.FILE_SIGNATURE) else _elements
-        for each in read(path, night):
+        for each in read(path, query):
             if isinstance(each, _Set):
                 sets.append(each)
             else:
@@ -230,8 +230,8 @@ def _read(path: pathlib.Path, night: Night) -> tuple[list[_Set], list[Refusal]]:
     return sets, refusals
 
 
-def _elements(path: pathlib.Path, night: Night) -> Iterator[_Set | Refusal]:
-    middle = night.begin + datetime.timedelta(seconds=night.middle)
+def _elements(path: pathlib.Path, query: Query) -> Iterator[_Set | Refusal]:
+    middle = query.begin + datetime.timedelta(seconds=query.middle)
     for each in elements.satellites(path):
         if isinstance(each, csv_table.TableError):
             yield _refusal(path, 0, path.name, each)
@@ -244,16 +244,16 @@ def _elements(path: pathlib.Path, night: Night) -> Iterator[_Set | Refusal]:
             yield _refusal(path, each.line, name, error)
             continue
         yield _Set(path, each.line, name, each.number, _designator(each.designator), age,
-                   functools.partial(_built, path, each, night))
+                   functools.partial(_built, path, each, query))
 
 
-def _built(path: pathlib.Path, satellite: elements.Satellite, night: Night) -> tuple[Elements, str]:
+def _built(path: pathlib.Path, satellite: elements.Satellite, query: Query) -> tuple[Elements, str]:
     values, remark = elements.checked(path, satellite)
-    return Elements(values, orbit.satellite(values), night), remark
+    return Elements(values, orbit.satellite(values), query), remark
 
 
-def _ephemerides(path: pathlib.Path, night: Night) -> Iterator[_Set | Refusal]:
-    since_1970 = night.begin - datetime.datetime(1970, 1, 1)
+def _ephemerides(path: pathlib.Path, query: Query) -> Iterator[_Set | Refusal]:
+    since_1970 = query.begin - datetime.datetime(1970, 1, 1)
     begin = instant.of_day(since_1970.days, since_1970.seconds + 1e-6 * since_1970.microseconds)
     for each in oem.objects(str(path)):
         try:
@@ -261,15 +261,15 @@ def _ephemerides(path: pathlib.Path, night: Night) -> Iterator[_Set | Refusal]:
         except csv_table.TableError as error:
             yield _refusal(path, each.line, each.name, error)
             continue
-        found = Ephemeris(track, begin - track.midnight, night.station, {})
+        found = Ephemeris(track, begin - track.midnight, query.station, {})
         number, designator = (each.designator if each.designator.isdecimal() else '', _designator(each.designator))
         covers = f'{instant.iso(track.midnight + track.begin)} to {instant.iso(track.midnight + track.end)}'
-        if found.elements_age(0.0) > 0.0 or found.elements_age(night.duration) < 0.0:
+        if found.elements_age(0.0) > 0.0 or found.elements_age(query.duration) < 0.0:
             yield _refusal(path, each.line, each.name, f'the ephemeris is of {covers}, outside the night')
             continue
-        whole = found.elements_age(0.0) == found.elements_age(night.duration) == 0.0
+        whole = found.elements_age(0.0) == found.elements_age(query.duration) == 0.0
         remark = '' if whole else f'{path.name}: the ephemeris is of {covers}, a part of the night'
-        yield _Set(path, each.line, each.name, number, designator, abs(found.elements_age(night.middle)),
+        yield _Set(path, each.line, each.name, number, designator, abs(found.elements_age(query.middle)),
                    functools.partial(tuple[Ephemeris, str], (found, remark)))
 
 
@@ -290,18 +290,18 @@ def _groups(sets: Sequence[_Set]) -> list[list[_Set]]:
     return list(groups.values())
 
 
-def _chosen(group: list[_Set], night: Night, oldest: Days) -> tuple[list[Object], list[Refusal]]:
+def _chosen(group: list[_Set], query: Query, oldest: Days) -> tuple[list[Object], list[Refusal]]:
     """Return the object of its nearest valid set, [] without one, and the refusals of the sets tried before."""
     refusals = list[Refusal]()
     for i in sorted(range(len(group)), key=lambda i: (group[i].age, -i)):
         chosen = group[i]
         try:
             found, remark = chosen.orbit()
-            nearest = min(max(0.0, -found.elements_age(0.0)), night.duration)
+            nearest = min(max(0.0, -found.elements_age(0.0)), query.duration)
             if reason := age_refusal(found, nearest, oldest):
                 return [], [*refusals, chosen.refused(reason)]
             if isinstance(found, Elements):
-                found.enu(np.linspace(0.0, night.duration, PROBE_COUNT))    # raises TargetError where SGP4 fails
+                found.enu(np.linspace(0.0, query.duration, PROBE_COUNT))    # raises TargetError where SGP4 fails
         except TargetError as error:
             refusals.append(chosen.refused(error))
             continue

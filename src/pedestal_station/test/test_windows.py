@@ -129,7 +129,7 @@ def by_force(orbit, horizon, duration, step):
 
 
 @pytest.mark.every_case
-@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('seed', range(2))
 def test_no_gap_and_no_peak_of_a_floor_is_passed_over(seed, tmp_path):
     """Floors with gaps and walls of a degree, which an object passes in seconds."""
     rng = np.random.default_rng(seed)
@@ -140,10 +140,10 @@ def test_no_gap_and_no_peak_of_a_floor_is_passed_over(seed, tmp_path):
     points = [points[0], *(b for a, b in zip(points, points[1:]) if b[0] > a[0])]
     text = '; '.join(f'{a:.6f} {f:.6f}' for a, f in points)
     horizon = windows.Horizon.of_floor(text, 0.02)
-    [each] = read(tmp_path / 'a.tle', tle('sun-synchronous', 10.0), StationParameters(), DAY_S)
-    found = [w for w in windows.find(each.orbit, horizon, DAY_S) if w.set - w.rise > 0.1]
-    known = by_force(each.orbit, horizon, DAY_S, 0.1)
-    assert len(found) > len(windows.find(each.orbit, windows.Horizon.constant(5.73), DAY_S))    # some are cut in two
+    [each] = read(tmp_path / 'a.tle', tle('sun-synchronous', 10.0), StationParameters(), 0.5 * DAY_S)
+    found = [w for w in windows.find(each.orbit, horizon, 0.5 * DAY_S) if w.set - w.rise > 0.1]
+    known = by_force(each.orbit, horizon, 0.5 * DAY_S, 0.1)
+    assert len(found) > len(windows.find(each.orbit, windows.Horizon.constant(5.73), 0.5 * DAY_S))  # some are cut
     np.testing.assert_allclose([(w.rise, w.set) for w in found], known, rtol=0.0, atol=0.1)
     for w in found:
         inside = windows.angles(each.orbit, np.linspace(w.rise, w.set, 2000))[:, 1]

@@ -48,7 +48,7 @@ def spans(height: Height, times: Times, heights: Floats) -> tuple[list[Span], Ti
     turns = np.concatenate((peaks, maxima(lambda t: -height(t), times, -heights)))
     at = np.concatenate((times, turns))
     order = np.argsort(at, kind='stable')
-    at, above = at[order], (np.concatenate((heights, height(turns))) > 0.0)[order]
+    at, above = at[order], (np.append(heights, height(turns) if len(turns) else turns) > 0.0)[order]
     edges = np.flatnonzero(above[1:] != above[:-1])
     crossings = crossed(height, at[edges], at[edges + 1], above[edges]).tolist()
     up, down = bool(above[0]), bool(above[-1])
@@ -74,8 +74,10 @@ def maxima(height: Height, times: Times, heights: Floats) -> Times:
     """Return the times of the maxima of a height between the first and the last of the times. heights: there."""
     known = np.where(np.isnan(heights), -math.inf, heights)
     i = np.flatnonzero((known[1:-1] > known[:-2]) & (known[1:-1] >= known[2:])) + 1
+    if not len(i):
+        return times[:0]
     low, high = times[i - 1], times[i + 1]
-    while len(i) and (high - low).max() > PEAK_SPACING_S:
+    while (high - low).max() > PEAK_SPACING_S:
         at, values = _section(height, low, high)
         best = np.argmax(np.where(np.isnan(values), -math.inf, values), axis=0).clip(1, SECTION_POINTS - 2)
         low, high = _taken(at, best - 1), _taken(at, best + 1)
