@@ -248,10 +248,15 @@ def test_carrier_to_noise_of_a_link_budget_and_of_the_receiver():
     assert all(math.isnan(each) for each in silent.cn0(np.array([1e6])))
 
 
-def test_an_instant_a_ship_and_the_defaults():
-    path = Path(lambda t: np.outer(np.full(len(t), 1e6), (0.6, 0.0, 0.8)))
+def test_an_instant_a_ship_refraction_and_a_pointing_model():
+    """A target at rest at azimuth 90 deg; at an elevation of 10 deg the radio refraction of a true direction is 0.097 deg."""
+    def rest(elevation):
+        return Path(lambda t: np.outer(np.full(len(t), 1e6), (math.cos(elevation), 0.0, math.sin(elevation))))
+    path = rest(R(50.0))
     told = prediction.predict(*of(path, 5.0, 5.0), antenna.of(None, ALPS, BEGIN))
     assert told.peak_rate == (0.0, 0.0) and math.degrees(told.azimuth[0]) == pytest.approx(90.0)
+    bent = prediction.predict(*of(rest(R(10.0)), 0.0, 9.0), base(['acu.refraction.kind=radio', 'acu.pointing.p1=2']))
+    assert np.degrees((bent.azimuth[0], bent.elevation[0])) == pytest.approx([92.0, 10.0970], abs=1e-4)
     ship = antenna.of(scenario.load('ship_pass', ['ship_motion.ship.heading_deg=30']), ALPS, BEGIN)
     assert math.degrees(prediction.predict(*of(path, 0.0, 9.0), ship).azimuth[0]) == pytest.approx(60.0)
 
