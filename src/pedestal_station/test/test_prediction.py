@@ -249,11 +249,11 @@ def test_carrier_to_noise_of_a_link_budget_and_of_the_receiver():
 
 
 def test_an_instant_a_ship_refraction_and_a_pointing_model():
-    """A target at rest at azimuth 90 deg; at an elevation of 10 deg the radio refraction of a true direction is 0.097 deg."""
+    """A target at rest at azimuth 90 deg; the radio refraction at an elevation of 10 deg is 0.097 deg."""
     def rest(elevation):
         return Path(lambda t: np.outer(np.full(len(t), 1e6), (math.cos(elevation), 0.0, math.sin(elevation))))
     path = rest(R(50.0))
-    told = prediction.predict(*of(path, 5.0, 5.0), antenna.of(None, ALPS, BEGIN))
+    told = prediction.predict(*of(path, 5.0, 5.0), antenna.of(scenario.parse('defaults', antenna.NO_SCENARIO), ALPS, BEGIN))
     assert told.peak_rate == (0.0, 0.0) and math.degrees(told.azimuth[0]) == pytest.approx(90.0)
     bent = prediction.predict(*of(rest(R(10.0)), 0.0, 9.0), base(['acu.refraction.kind=radio', 'acu.pointing.p1=2']))
     assert np.degrees((bent.azimuth[0], bent.elevation[0])) == pytest.approx([92.0, 10.0970], abs=1e-4)
