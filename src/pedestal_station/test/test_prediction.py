@@ -253,7 +253,8 @@ def test_an_instant_a_ship_refraction_and_a_pointing_model():
     def rest(elevation):
         return Path(lambda t: np.outer(np.full(len(t), 1e6), (math.cos(elevation), 0.0, math.sin(elevation))))
     path = rest(R(50.0))
-    told = prediction.predict(*of(path, 5.0, 5.0), antenna.of(scenario.parse('defaults', antenna.NO_SCENARIO), ALPS, BEGIN))
+    defaults = antenna.of(scenario.parse('defaults', antenna.NO_SCENARIO), ALPS, BEGIN)
+    told = prediction.predict(*of(path, 5.0, 5.0), defaults)
     assert told.peak_rate == (0.0, 0.0) and math.degrees(told.azimuth[0]) == pytest.approx(90.0)
     bent = prediction.predict(*of(rest(R(10.0)), 0.0, 9.0), base(['acu.refraction.kind=radio', 'acu.pointing.p1=2']))
     assert np.degrees((bent.azimuth[0], bent.elevation[0])) == pytest.approx([92.0, 10.0970], abs=1e-4)
