@@ -9,7 +9,6 @@ import numpy as np
 from acu_tracker import control_unit
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.air import Air
-from pedestal_bringup.scenario import scenario
 from pedestal_bringup.scenario.link import DishParameters, LinkParameters
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_bringup.scenario.sections import ScenarioError
@@ -90,13 +89,12 @@ class Antenna:
         return level - exponent * math.log10(far / known), level - exponent * math.log10(near / known)
 
 
-def of(chosen: Scenario | None, station: StationParameters, begin: datetime.datetime, rain_margin: Decibels = 0.0,
+def of(chosen: Scenario, station: StationParameters, begin: datetime.datetime, rain_margin: Decibels = 0.0,
        sun_avoidance: Radians | None = None) -> Antenna:
-    """Return the Antenna of a scenario at a station, from a UTC on; without a scenario the one of the defaults.
+    """Return the Antenna of a scenario at a station, from a UTC on.
 
     Without a sun_avoidance the sun takes the target when it touches the beam. Raises ScenarioError for an array.
     """
-    chosen = chosen or scenario.parse('of the defaults', NO_SCENARIO)
     if chosen.header.beam:
         raise ScenarioError(f'scenario {chosen.name}: scenario.beam = true: must be false, because a plan needs a '
                             'pedestal with two axes')

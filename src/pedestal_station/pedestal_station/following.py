@@ -155,15 +155,16 @@ def _on(axis: AxisMotion, before: AxisMotion, reference: AxisMotion, step: Secon
 
 
 @compiled
-def _look(state: Followed, constants: Constants, terms: PointingModel, program: ProgramTrack, t: Seconds) -> None:
+def _look(state: Followed, constants: Constants, terms: PointingModel, program: ProgramTrack, t: Seconds,
+          wait: Seconds) -> None:
     """Look ahead if it is due. The control unit looks once a second. Here the looks become denser towards the begin of
-    a slew, and the last one is as late as that of the control unit."""
+    a slew, and the last one is as late as that of the control unit. wait: time until the azimuth cannot follow."""
     ahead = state.guidance.lookahead
     if t < state.looks or not planner.due(ahead, t):
         return
     planner.look_along_program(ahead, constants.lookahead, terms, t, state.guidance.azimuth,
                                bridge.way(state.guidance.bridge, program))
-    left = 0.4 * constants.lookahead.notice
+    left = min(0.4 * constants.lookahead.notice, wait)
     if ahead.forecast == planner.FORECAST_KEYHOLE and t < ahead.slew.t1:
         left = ahead.slew.t1 - planner.LOOK_AHEAD_PERIOD_S - t
     state.looks = t + max(0.5 * left, planner.LOOK_AHEAD_PERIOD_S)
@@ -223,8 +224,9 @@ def follow(state: Followed, constants: Constants, terms: PointingModel, course: 
     ends[0, 0], ends[0, 1] = azimuth.angle, elevation.angle
     offset = _offset(azimuth, elevation, target)
     while k < len(rows) - 1:
-        if course.ahead[k] - t <= constants.lookahead.horizon:
-            _look(state, constants, terms, program, t)
+        wait = course.ahead[k] - t
+        if wait <= constants.lookahead.horizon:
+            _look(state, constants, terms, program, t, wait)
         end, fine = _step(state, constants, course, k, t, exact)
         order = guidance.Order(Mode.PROGRAM, False, azimuth.angle, t)
         now, target = _axes(state, constants, terms, order, program, end, elevation.angle)
