@@ -29,7 +29,7 @@ from pedestal_station.night import Pass
 
 SAMPLE_S = 5.0
 """Time between samples of a pass [s]."""
-MAX_SAMPLES = 600
+MAX_SAMPLES = 1000
 """Largest number of samples of a pass."""
 SAME_RAD = 1e-3
 """Difference of the encoder angles at rise and at set from those of the orbit that counts as none [rad]."""

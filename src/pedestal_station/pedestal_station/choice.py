@@ -10,23 +10,24 @@ so that a whole pass is worth its priority times its seconds without the expecte
 sum. An endless track, such as that of a GEO, is a pass like any other: the plan gives it one contact, the most
 valuable one. For several contacts the user chooses several windows.
 
-Passes that cannot disturb each other, directly or through others, are independent problems. For each of them, HiGHS
-(scipy.optimize.milp) solves with
+Passes that cannot disturb each other, directly or through others, are independent problems. HiGHS
+(scipy.optimize.milp) solves each of them:
 
     x       1 if the pass is taken                  p, q    seconds trimmed at the begin and at the end
-    z       1 if both passes are taken in this order, only where both orders are possible
+    z_ij    1 if pass i is taken before pass j; only for orders that are possible, of passes that disturb each other
 
     maximise sum gain ((set - rise) x - p - q)
     p + q <= (set - rise - min_pass) x
-    q_i + p_j >= O_ij z_ij,  O_ij = set_i + changeover_ij - rise_j          the overlap that trims remove
     z_ij + z_ji >= x_i + x_j - 1
+    q_i + p_j >= O_ij z_ij,  O_ij = set_i + changeover_ij - rise_j          the overlap that trims remove
 
-Of two equal plans it takes the one with more contact in the earlier passes (TIE). A limit of nodes makes the plan
-repeatable; the limit of time ends a search only on a slower computer. After either limit the plan is the better one of
-HiGHS's and the greedy plan, with the bound that HiGHS has proved.
+Of two equal plans it takes the one with more contact in the earlier passes (TIE). A search that ends gives the same
+plan for the same passes. A search that the limit of time ends may find another plan on another computer: the better
+one of the plan found and the greedy plan, with the bound that HiGHS has proved. `Choice.optimal` states which it is.
 """
 import dataclasses
 import math
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple, TypeAlias
 
@@ -38,8 +39,6 @@ from pedestal_common.parameters import ParameterError, Parameters, parameter
 from pedestal_common.quantities import Floats, Seconds
 from pedestal_station.night import Choice, Pass, Share
 
-MAX_NODES = 20_000
-"""Largest number of nodes that HiGHS visits for a problem."""
 TIE = 1e-7
 """Largest relative change of a gain that prefers the earlier one of two equal passes."""
 MAX_CUT_PASSES = 12
@@ -90,6 +89,7 @@ class _Problem(NamedTuple):
 def choose(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> tuple[Choice, Choice]:
     """Return (exact plan, greedy plan). Raises ParameterError for a pass or a changeover that is not a number of its
     range."""
+    deadline = time.monotonic() + rules.time_limit
     for each in passes:
         _check(each)
     order = sorted(range(len(passes)), key=lambda i: (passes[i].window.rise, passes[i].window.set, passes[i].case))
@@ -98,11 +98,12 @@ def choose(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> tupl
     exact: Contacts = {}
     greedy: Contacts = {}
     bounds, optimal = [], True
-    groups = list(_groups(problem))
-    size = sum(len(group)**3 for group in groups)
-    for group in groups:
+    # The smaller groups come first, so that the time they leave goes to the larger ones.
+    groups = sorted(_groups(problem), key=len)
+    for k, group in enumerate(groups):
+        share = len(group)**3 / sum(len(each)**3 for each in groups[k:])
         usual = _fill(problem, _greedy_order(problem, group), {})
-        found, limit = _solve(problem, group, rules.time_limit * len(group)**3 / size)
+        found, limit = _solve(problem, group, max(0.0, deadline - time.monotonic()) * share)
         found = max(usual, found, key=problem.value)
         optimal = optimal and limit is None
         bounds.append(problem.value(found) if limit is None else limit)
@@ -214,7 +215,7 @@ def _solve(problem: _Problem, group: Sequence[int], time_limit: Seconds) -> tupl
     binary = np.ones(size)
     binary[n:3 * n] = 0.0
     result = milp(-worth, integrality=binary, bounds=Bounds(0.0, upper), constraints=_constraint(rows, size),
-                  options={'time_limit': time_limit, 'node_limit': MAX_NODES, 'mip_rel_gap': 0.0})
+                  options={'time_limit': time_limit, 'mip_rel_gap': 0.0})
     contacts: Contacts = {}
     if result.x is not None:
         x, p, q = result.x[:n], result.x[n:2 * n], result.x[2 * n:3 * n]
