@@ -29,6 +29,7 @@ from pedestal_common.quantities import Value
 from pedestal_common.text_files.text_table import TextTable
 from pedestal_common.wire.commands import Argument
 from pedestal_results import results
+from pedestal_station.station.requests import STATION_COMMANDS
 from pedestal_studies.system.faults import FAULT_EXPECTATIONS
 from pedestal_workbench.again import what_if
 from tracking_receiver_sim.tracks import files as track_files
@@ -57,7 +58,8 @@ PARAMETER_KINDS = {node: parameters_of(node) for node in (
 VERB_GROUPS = {
     'see what exists': ('scenarios', 'samples', 'parameters'),
     'run a scenario': ('run',),
-    'operate a running antenna': ('status', 'mode', 'stop', 'drive', 'ask', 'operate', 'program', 'live', 'simulate'),
+    'operate a running antenna': ('status', 'mode', 'stop', 'drive', 'ask', 'operate', 'program', 'station', 'live',
+                                  'simulate'),
     'use a recording': ('verify', 'recover', 'rerun', 'report', 'replay', 'export', 'filter'),
     'compare settings': ('trials', 'recompute'),
     'design an antenna': ('new', 'tune'),
@@ -104,6 +106,8 @@ def command_table() -> TextTable:
     rows = [(f'`{node.obeys}`', f'`{verb.name}`', ', '.join(map(_argument, verb.arguments)), verb.doc)
             for node in nodes.UNIT_NODES if node.obeys and node.name not in INJECTED_FAULTS
             for verb in node.unit_type().VERBS]
+    rows += [(f'`{nodes.row("station").obeys}`', f'`{verb.name}`', ', '.join(map(_argument, verb.arguments)), verb.doc)
+             for verb in STATION_COMMANDS]
     return TextTable(('topic', 'command', 'arguments', 'effect'), rows)
 
 
