@@ -68,6 +68,7 @@ SECTIONS = {
         Page('docs/operate/tracks.md', 'A track from a file', 1300),
         Page('docs/operate/plan.md', 'A night of passes', 800),
         Page('docs/operate/station.md', 'A permanent station', 1200),
+        Page('docs/operate/station-night.md', 'A night by itself', 800),
         Page('docs/operate/recordings.md', 'Recordings', 1200),
         Page('docs/operate/faults.md', 'Inject a fault', 600),
         Page('docs/operate/troubleshooting.md', 'Troubleshooting', 2400)),

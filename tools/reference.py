@@ -29,6 +29,7 @@ from pedestal_common.quantities import Value
 from pedestal_common.text_files.text_table import TextTable
 from pedestal_common.wire.commands import Argument
 from pedestal_results import results
+from pedestal_station.station.requests import STATION_COMMANDS
 from pedestal_studies.system.faults import FAULT_EXPECTATIONS
 from pedestal_workbench.again import what_if
 from tracking_receiver_sim.tracks import files as track_files
@@ -105,6 +106,8 @@ def command_table() -> TextTable:
     rows = [(f'`{node.obeys}`', f'`{verb.name}`', ', '.join(map(_argument, verb.arguments)), verb.doc)
             for node in nodes.UNIT_NODES if node.obeys and node.name not in INJECTED_FAULTS
             for verb in node.unit_type().VERBS]
+    rows += [(f'`{nodes.row("station").obeys}`', f'`{verb.name}`', ', '.join(map(_argument, verb.arguments)), verb.doc)
+             for verb in STATION_COMMANDS]
     return TextTable(('topic', 'command', 'arguments', 'effect'), rows)
 
 

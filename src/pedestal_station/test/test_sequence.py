@@ -36,10 +36,10 @@ class Night:
     def step(self, now, reply=None, once=None, **given):
         """Make a step at a second; given: inputs that stay; once: inputs of this step."""
         self.given |= given
-        if self.state.asked and reply is None:
-            reply = Reply(True, f'mode is {self.state.asked.verb}')
+        if self.state.pending and reply is None:
+            reply = Reply(True, f'mode is {self.state.pending.verb}')
         if reply and reply.granted:
-            self.given['mode'] = self.state.asked.verb
+            self.given['mode'] = self.state.pending.verb
         result = sequence.step(self.state, Inputs(ZERO + now, reply=reply, **{**self.given, **(once or {})}),
                                self.rules)
         self.state = result.state
@@ -107,7 +107,7 @@ def test_a_refused_mode_is_commanded_again_to_the_end_and_said_once():
     night = Night(contact('A/1', 200, 260))
     refused = Reply(False, 'refused: outside limits; mode is preset')
     for now in range(190, 262):
-        night.step(now, reply=refused if night.state.asked and night.state.asked.verb == 'tle' else None)
+        night.step(now, reply=refused if night.state.pending and night.state.pending.verb == 'tle' else None)
     assert night.commands.count('tle') > 20 and night.lines.count(f'tle: {refused.text}') == 1
     assert night.states == {'A/1': 'failed'} and night.text('A/1') == refused.text
 
@@ -148,7 +148,7 @@ def test_who_has_control_keeps_it_and_the_station_goes_on_when_it_is_free():
     night = Night(contact('A/1', 200, 260), contact('B/1', 500, 540), contact('C/1', 600, 640))
     night.until(205, 190, tracking=True)
     before = len(night.commands)
-    night.until(230, 206, holder='bert', mode='stop', tracking=False, once={'interference': 'bert commanded stop'})
+    night.until(230, 206, holder='bert', mode='stop', tracking=False)
     assert night.commands[before:] == [] and night.state.now == 'waits: control is with bert' and not night.state.held
     night.step(231, holder='')
     assert night.commands[before:] == ['tle'] and night.lines[-1] == 'goes on'
@@ -285,16 +285,18 @@ def test_a_station_that_cannot_stow_ends_and_says_so():
 
 def test_the_progress_continues_a_pass_under_way_and_keeps_what_is_over(tmp_path):
     file = progress.file_of(tmp_path / 'night.json')
-    contacts = contact('A/1', 200, 260), contact('B/1', 300, 360), contact('C/1', 500, 560), contact('D/1', 600, 660)
+    contacts = (contact('A/1', 200, 260), contact('B/1', 300, 360), contact('C/1', 500, 560),
+                contact('D/1', 600, 660), contact('E/1', 700, 760, taken=False))
     night = Night(*contacts)
     night.until(310, 190, tracking=True)
     night.ask(311, 'skip', case='D/1')
+    night.ask(311.5, 'insert', case='E/1')
     now = up(5000)
     assert night.ask(312, 'insert', **ISS, begin=utc_text(ZERO + now), end=utc_text(ZERO + now + 60)).granted
     progress.save(file, night.state)
     again = progress.resume(sequence.begin(contacts, ZERO + 320.0), file, ZERO + 320.0)
     assert {entry.contact.case: entry.state for entry in again.entries} == {
-        'A/1': 'done', 'B/1': 'running', 'C/1': 'queued', 'D/1': 'skipped', '25544/1': 'queued'}
+        'A/1': 'done', 'B/1': 'running', 'C/1': 'queued', 'D/1': 'skipped', 'E/1': 'queued', '25544/1': 'queued'}
     assert again.entries[1].tracked == pytest.approx(12.0, abs=1.5) and math.isnan(again.last)
     night.state = again
     night.until(361, 321, mode='standby')

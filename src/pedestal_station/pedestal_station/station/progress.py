@@ -59,7 +59,7 @@ def resume(state: State, path: pathlib.Path, now: Seconds) -> State:
     except PlanError:
         raise
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise PlanError(f'{path}: holds no progress of a night ({error!r:.100}); move it away to begin the plan anew'
+        raise PlanError(f'{path}: holds no progress of a night ({error!r:.100}); remove it to take all passes again'
                         ) from None
     return state._replace(entries=tuple(sorted(entries, key=lambda entry: entry.contact.begin)), held=held)
 
@@ -86,7 +86,8 @@ def _continued(entry: Entry, saved: dict[str, Json], now: Seconds) -> Entry:
     tracked, report = float(saved['tracked_s']), _text(saved['report'])
     state, text = str(saved['state']), _text(saved['text'])
     if state == 'queued':
-        return entry
+        # `insert` has queued a pass that the plan drops.
+        return entry._replace(state=state, text=text) if entry.contact.end > now else entry
     if state == 'running' and entry.contact.end <= now:
         state, text = 'failed', 'the station was off at its end'
     return entry._replace(state=state, text=text, tracked=tracked, report=report)

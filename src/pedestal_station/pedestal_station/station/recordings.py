@@ -16,6 +16,7 @@ from pedestal_common.quantities import Seconds, Value
 
 STOP_TIMEOUT_S = 20.0  # time that a recorder has to end, before it is killed [s]
 MAX_STARTS = 5  # largest number of starts of the recorder of a pass
+REPORT_NAME = 'report.html'  # file of the report in a bag
 UNSAFE_PATTERN = re.compile(r'[^\w.+-]+')  # characters of a case that its folder replaces by _
 
 
@@ -66,8 +67,7 @@ class Recordings:
                 continue
             self._recorders.remove(each)
             if each.stop is not None:
-                command = [sys.executable, '-m', 'pedestal_station.station.proof', str(each.bag)]
-                self._proofs.append(each._replace(process=self._child(command, each.bag)))
+                self._prove(each.case, each.bag)
             elif each.starts < MAX_STARTS:
                 self._recorders.append(each._replace(process=self._recorder(each.bag), starts=each.starts + 1))
                 reports.append((each.case, f'its recorder {exit_description(code)}: started again'))
@@ -79,6 +79,17 @@ class Recordings:
                 self._proofs.remove(each)
                 reports.append((each.case, self._proved(each.bag, code)))
         return reports
+
+    def prove_rest(self) -> None:
+        """Prove the bags without a report: those of a station that was killed."""
+        known = [each.bag for each in (*self._recorders, *self._proofs)]
+        for bag in sorted(path for path in self._folder.glob('*') if path.is_dir() and path not in known):
+            if self._log(bag).exists() and not (bag / REPORT_NAME).exists():
+                self._prove(bag.name, bag)
+
+    def _prove(self, case: str, bag: pathlib.Path) -> None:
+        command = [sys.executable, '-m', 'pedestal_station.station.proof', str(bag)]
+        self._proofs.append(_Recording(case, bag, self._child(command, bag), 1))
 
     def close(self) -> None:
         """End all processes in order, without further proofs."""

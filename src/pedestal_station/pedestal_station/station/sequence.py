@@ -68,7 +68,7 @@ class State(NamedTuple):
     held: str = ''                  # reason for which the station waits for `resume`; '' if it does not
     waits: str = ''                 # reason for which it waits, and then goes on by itself; '' if it does not
     aim: Aim | None = None          # mode that the control unit has accepted last from the station
-    asked: Aim | None = None        # mode without a reply yet
+    pending: Aim | None = None      # commanded mode without a reply yet
     retry: Seconds = -math.inf      # earliest time of the next command
     last: Seconds = math.nan        # time of the last step
     alarm_since: Seconds = math.inf  # begin of the present alarm
@@ -89,8 +89,8 @@ class Inputs(NamedTuple):
     elements: Mapping[str, str] = {}        # of the mode tle in the control unit
     holder: str = ''                        # other client that has control, '' for none
     alarm: str = ''                         # latched fault of the control unit or of the drive, '' for none
-    reply: Reply | None = None              # to State.asked
-    interference: str = ''                  # other client and the mode that it commanded, '' for none
+    reply: Reply | None = None              # to State.pending
+    interference: str = ''                  # what another client has done without control, '' for nothing
     requests: tuple[Request, ...] = ()
     fresh: tuple[Fresh, ...] = ()
     reports: tuple[tuple[str, str], ...] = ()   # (case, text) of each finished recording
@@ -215,16 +215,16 @@ class _Turn:
 
     def take_reply(self) -> None:
         """Take the reply of the control unit to the last command."""
-        reply, asked = self.inputs.reply, self.state.asked
-        if reply is None or asked is None:
+        reply, pending = self.inputs.reply, self.state.pending
+        if reply is None or pending is None:
             return
         if reply.granted:
-            self.set(aim=asked, asked=None, retry=self.inputs.now + SETTLING_S, refusal='')
+            self.set(aim=pending, pending=None, retry=self.inputs.now + SETTLING_S, refusal='')
             return
-        wait = 0.0 if PIN_REFUSAL in reply.text and asked.verb != 'unstow' else RETRY_S
+        wait = 0.0 if PIN_REFUSAL in reply.text and pending.verb != 'unstow' else RETRY_S
         if reply.text != self.state.refusal and HELD_REFUSAL not in reply.text:
-            self.say(f'{asked.verb}: {reply.text}')
-        self.set(aim=None, asked=None, retry=self.inputs.now + wait, refusal=reply.text)
+            self.say(f'{pending.verb}: {reply.text}')
+        self.set(aim=None, pending=None, retry=self.inputs.now + wait, refusal=reply.text)
 
     def take_fresh(self) -> None:
         """Give fresher elements to the queued passes of their satellites."""
@@ -240,15 +240,14 @@ class _Turn:
                          f'in place of {_age(contact):.1f}')
 
     def watch_control(self) -> None:
-        """Wait while the control unit is silent, or another client has control. A mode that another client commands
-        without control holds the station until `resume`."""
+        """Wait while the control unit is silent, or another client has control. An interference holds the station."""
         given = self.inputs
         waits = f'control is with {given.holder}' if given.holder else ''
         waits = waits if given.present else 'the control unit is silent'
         if waits != self.state.waits:
             self.say(f'waits: {waits}' if waits else 'goes on')
             self.set(waits=waits, aim=None)
-        if given.interference and not self.state.held and not waits:
+        if given.interference and not self.state.held:
             self.hold(given.interference)
 
     def hold(self, reason: str) -> None:
@@ -402,7 +401,7 @@ class _Turn:
     def command(self) -> Aim | None:
         """Return the next command to the control unit, None for none."""
         wanted, state = self._wanted(), self.state
-        if self._obstacle or wanted is None or state.asked or self.inputs.now < state.retry:
+        if self._obstacle or wanted is None or state.pending or self.inputs.now < state.retry:
             return None
         if state.aim == wanted and self._fits(wanted):
             return None
@@ -410,7 +409,7 @@ class _Turn:
             self.say(f'the mode is {self.inputs.progress or self.inputs.mode}: {wanted.verb} is commanded again')
         if PIN_REFUSAL in state.refusal:
             wanted = Aim('unstow', {})
-        self.set(asked=wanted, retry=math.inf)
+        self.set(pending=wanted, retry=math.inf)
         return wanted
 
     def finish(self) -> None:

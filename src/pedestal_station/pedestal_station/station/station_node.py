@@ -5,7 +5,7 @@ import math
 import pathlib
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from rclpy.parameter import parameter_value_to_python
@@ -33,9 +33,10 @@ ON_TARGET_MODES = 'autotrack', 'steptrack'  # modes in which the receiver measur
 ON_TRACK_WORDS = 'tle, on track', 'program, on track'  # progress on the target of an antenna without handover
 PROGRAM_TOPIC, COMMAND_TOPIC, REPLY_TOPIC = 'acu/program_track', 'station/command', 'station/command_result'
 NIGHT_TOPIC, LOG_TOPIC = 'station/night', 'station/log'
+DRIVE_STATE_TOPIC, EMERGENCY_STOP = 'adu/state', 'emergency stop'  # topic, and its text after an emergency stop
 
-CONTROL_UNIT_PARAMETERS = ('graph.start', 'prediction.start_time', 'prediction.oldest', 'tracker.handover',
-                           'tracker.receiver.beamwidth', 'azimuth.limits.low', 'azimuth.limits.high',
+CONTROL_UNIT_PARAMETERS = ('graph.start', 'graph.beams', 'prediction.start_time', 'prediction.oldest',
+                           'tracker.handover', 'tracker.receiver.beamwidth', 'azimuth.limits.low', 'azimuth.limits.high',
                            *(f'prediction.station.{name}' for name in STATION_NAMES))
 
 
@@ -56,7 +57,7 @@ def own_name() -> str:
 class StationNode(Remote):
     """Client of the control unit that also takes commands of operators and publishes the night."""
     holder: str             # client that has control of the antenna, '' for none
-    interference: str       # other client and the mode that it commanded, since the last step
+    interference: str       # mode of another client without control, or an emergency stop, since the last step
 
     def __init__(self, who: str, beam: str = '') -> None:
         super().__init__('station', who, 'acu', beam)
@@ -108,8 +109,17 @@ class StationNode(Remote):
             verb = command.verb.removeprefix('acu/')
             if reply.granted and verb in ('take', 'release'):
                 self.holder = command.who if verb == 'take' else ''
-            elif reply.granted and verb in MODES and command.who != self.who:
+            elif reply.granted and verb in MODES and command.who != self.who and self.holder in ('', self.who):
                 self.interference = f'{command.who} commanded {verb}'
+
+    def _text_taker(self, topic: str) -> Callable[[Message], None]:
+        take = super()._text_taker(topic)
+
+        def taken(message: Message) -> None:
+            if topic == DRIVE_STATE_TOPIC and message.data == EMERGENCY_STOP:
+                self.interference = EMERGENCY_STOP
+            take(message)
+        return taken
 
     def _take_status(self, array: Message) -> None:
         super()._take_status(array)
@@ -126,9 +136,9 @@ class StationNode(Remote):
     @property
     def alarm(self) -> str:
         """Latched fault of the control unit, or the state of a drive that is off by itself; '' for none."""
-        drive = self.texts.get('adu/state', '')
+        drive = self.texts.get(DRIVE_STATE_TOPIC, '')
         return self.diagnostics_of('acu').get('faults', '') or (
-            f'drive: {drive}' if drive.startswith(('fault', 'emergency stop')) else '')
+            f'drive: {drive}' if drive.startswith(('fault', EMERGENCY_STOP)) else '')
 
 
 class Station:
@@ -152,8 +162,8 @@ class Station:
         self._check(found)
         self._watch = Watch(options.elements, plan.station, self._rules.oldest) if options.elements else None
         self._recordings = Recordings(options.bags, {
-            'graph.pacing': 'realtime', 'graph.start': graph_start, 'beamwidth': found['tracker.receiver.beamwidth']},
-            ros_arguments)
+            'graph.pacing': 'realtime', **{name: found[name] for name in ('graph.start', 'graph.beams')},
+            'beamwidth': found['tracker.receiver.beamwidth']}, ros_arguments)
         self._request, self._asked_at, self._sent_at = '', 0.0, 0.0
         self._night = ''
 
@@ -201,6 +211,7 @@ class Station:
             while not self._state.over:
                 self.tick()
                 self._session.until(lambda: False, TICK_S)
+            self._recordings.prove_rest()
             deadline = time.monotonic() + PROOF_TIMEOUT_S
             while self._recordings.busy and time.monotonic() < deadline:
                 self._session.until(lambda: False, TICK_S)
