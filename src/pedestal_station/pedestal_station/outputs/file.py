@@ -20,8 +20,7 @@ from pedestal_common.parameters import ParameterError, build
 from pedestal_common.quantities import Degrees, Floats, Json, Pairs, Seconds
 from pedestal_common.text_files import files
 from pedestal_station.night import Night, Object, Pass, Share
-from pedestal_station.objects import Elements
-from pedestal_station.objects import Night as Place
+from pedestal_station.objects import Elements, Query
 from tracking_receiver_sim.params import LeoPassParameters
 
 VERSION_KEY, VERSION = 'pedestal_plan', 1
@@ -79,7 +78,7 @@ def orbit_of(elements: Mapping[str, str], station: StationParameters | None = No
     """Return the orbit of elements, whose times are UTC [s]. Raises TargetError."""
     line_1, line_2, omm = (elements.get(name, '') for name in ELEMENT_NAMES)
     values = LeoPassParameters(line_1=line_1, line_2=line_2, omm=omm)
-    return Elements(values, orbit.satellite(values), Place(station or StationParameters(), EPOCH, 0.0, 0.0))
+    return Elements(values, orbit.satellite(values), Query(station or StationParameters(), EPOCH, 0.0, 0.0))
 
 
 def epoch_of(elements: Mapping[str, str]) -> Seconds:
