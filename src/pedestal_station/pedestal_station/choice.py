@@ -41,10 +41,10 @@ from pedestal_station.night import Choice, Pass, Share
 
 TIE = 1e-7
 """Largest relative change of a gain that prefers the earlier one of two equal passes."""
-MAX_CUT_PASSES = 12
+MAX_CUT_PASSES = 24
 """Largest number of passes that share a stretch of time in an inequality of `_stretches`."""
-EQUAL_S = 1e-6
-"""Difference of times below which they are equal [s]: the tolerance of HiGHS."""
+EQUAL_S = 0.01
+"""Difference of times below which they are equal [s]: 1e-6, the tolerance of HiGHS for z, of an overlap of hours."""
 
 Changeover: TypeAlias = Callable[[int, int], Seconds]   # from the end of pass i to the begin of pass j
 Contact: TypeAlias = tuple[Seconds, Seconds]            # begin, end
@@ -69,7 +69,6 @@ class _Problem(NamedTuple):
     min_pass: Seconds
     gaps: dict[tuple[int, int], Seconds]    # in both orders; inf for an order that is impossible
     near: list[list[int]]       # the passes that disturb each pass
-    shortest: Seconds           # of all changeovers
 
     def length(self, i: int) -> Seconds:
         return self.set[i] - self.rise[i]
@@ -81,6 +80,12 @@ class _Problem(NamedTuple):
     def overlap(self, i: int, j: int) -> Seconds:
         """Return the time by which contacts of pass i and then of pass j must be trimmed together."""
         return self.set[i] + self.gaps[i, j] - self.rise[j]
+
+    def apart(self, i: int, j: int) -> Seconds:
+        """Return the least time between contacts of two passes."""
+        if (i, j) in self.gaps:
+            return min(self.gaps[i, j], self.gaps[j, i])
+        return max(self.rise[i], self.rise[j]) - min(self.set[i], self.set[j])
 
     def value(self, contacts: Contacts) -> float:
         return math.fsum(self.gain[i] * (end - begin) for i, (begin, end) in contacts.items())
@@ -101,7 +106,7 @@ def choose(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> tupl
     # The smaller groups come first, so that the time they leave goes to the larger ones.
     groups = sorted(_groups(problem), key=len)
     for k, group in enumerate(groups):
-        share = len(group)**3 / sum(len(each)**3 for each in groups[k:])
+        share = len(group) / sum(len(each) for each in groups[k:])
         usual = _fill(problem, _greedy_order(problem, group), {})
         found, limit = _solve(problem, group, max(0.0, deadline - time.monotonic()) * share)
         found = max(usual, found, key=problem.value)
@@ -134,18 +139,16 @@ def _gain(each: Pass) -> float:
 def _problem(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> _Problem:
     """Return the problem of passes in the order of rise."""
     problem = _Problem([each.window.rise for each in passes], [each.window.set for each in passes],
-                       [_gain(each) for each in passes], rules.min_pass, {}, [[] for _ in passes], 0.0)
-    shortest = math.inf
+                       [_gain(each) for each in passes], rules.min_pass, {}, [[] for _ in passes])
     for j in range(len(passes)):
         for i in range(j):
-            first = second = _gap(problem, passes, changeover, i, j)
+            first = _gap(problem, passes, changeover, i, j)
             if problem.set[i] + first > problem.rise[j]:
                 second = _gap(problem, passes, changeover, j, i)
                 problem.gaps.update({(i, j): first, (j, i): second})
                 problem.near[i].append(j)
                 problem.near[j].append(i)
-            shortest = min(shortest, first, second)
-    return problem._replace(shortest=shortest if math.isfinite(shortest) else 0.0)
+    return problem
 
 
 def _gap(problem: _Problem, passes: Sequence[Pass], changeover: Changeover, i: int, j: int) -> Seconds:
@@ -180,7 +183,7 @@ def _greedy_order(problem: _Problem, group: Iterable[int]) -> list[int]:
 
 
 def _fill(problem: _Problem, order: Iterable[int], contacts: Contacts) -> Contacts:
-    """Return contacts to which each pass, in order, has been added or fitted anew where it is longest."""
+    """Return contacts after each pass, in order, got the longest stretch that is free between the others."""
     contacts = dict(contacts)
     for i in order:
         known = contacts.pop(i, None)
@@ -191,8 +194,10 @@ def _fill(problem: _Problem, order: Iterable[int], contacts: Contacts) -> Contac
 
 
 def _free(problem: _Problem, i: int, contacts: Contacts, known: Contact | None = None) -> list[Contact]:
-    """Return the stretches of the window of pass i between the contacts of others, earliest first; some may end before
-    they begin. known: a contact of the pass; then the one stretch between the same contacts."""
+    """Return the stretches of the window of pass i between the contacts of others, earliest first.
+
+    Some stretches may end before they begin. known: a contact of the pass, for the one stretch in its place.
+    """
     others = sorted((j for j in problem.near[i] if j in contacts), key=lambda j: contacts[j])
     places = range(len(others) + 1)
     if known is not None:
@@ -249,23 +254,25 @@ def _rows(problem: _Problem, group: Sequence[int]) -> tuple[list[Row], int]:
 
 
 def _chains(problem: _Problem, group: Sequence[int], z: dict[tuple[int, int], int]) -> list[Row]:
-    """Return inequalities that shorten the search where a pass has several others beside it: a contact that ends
-    before one of them ends before all later ones, and is trimmed by the sum of the steps between them."""
+    """Return inequalities that shorten the search where a pass has several others beside it.
+
+    A contact that ends before one of them ends before all later ones. The steps between them sum up to its trim.
+    """
     n, rows = len(group), []
     for k in range(n):
-        for trim, pairs in ((2 * n + k, [pair for pair in z if pair[0] == k]),
-                            (n + k, [pair for pair in z if pair[1] == k])):
-            # (overlap, part of it that this pass must give up, variable), the largest first
-            steps = sorted(((overlap, overlap - problem.room(group[a + b - k]), z[a, b]) for a, b in pairs
-                            if (overlap := problem.overlap(group[a], group[b]))), reverse=True)
-            later = [next((m for m in range(m, len(steps)) if steps[m][0] <= steps[here][1]), None)
-                     for here, m in enumerate(range(1, len(steps) + 1))]
-            rows += [({steps[here][2]: 1.0, steps[m][2]: -1.0}, 0.0) for here, m in enumerate(later) if m is not None]
-            row, here = {trim: -1.0}, 0 if steps else None
-            while here is not None:
-                m = later[here]
-                row[steps[here][2]] = max(steps[here][1], 0.0) - (max(steps[m][1], 0.0) if m is not None else 0.0)
-                here = m
+        for trim, side in ((2 * n + k, 0), (n + k, 1)):
+            # (overlap, part of it that this pass must give up, z) with each other pass, the largest overlap first
+            steps = sorted(((overlap := problem.overlap(group[pair[0]], group[pair[1]]),
+                             overlap - problem.room(group[pair[1 - side]]), z[pair]) for pair in z if pair[side] == k),
+                           reverse=True)
+            later = [next((m for m in range(here + 1, len(steps)) if steps[m][0] <= steps[here][1]), len(steps))
+                     for here in range(len(steps))]
+            rows += [({steps[here][2]: 1.0, steps[m][2]: -1.0}, 0.0) for here, m in enumerate(later) if m < len(steps)]
+            row, here = {trim: -1.0}, 0
+            while here < len(steps):
+                after = steps[later[here]][1] if later[here] < len(steps) else 0.0
+                row[steps[here][2]] = max(steps[here][1], 0.0) - max(after, 0.0)
+                here = later[here]
             if len(row) > 2:
                 rows.append((row, 0.0))
     return rows
@@ -274,13 +281,16 @@ def _chains(problem: _Problem, group: Sequence[int], z: dict[tuple[int, int], in
 def _stretches(problem: _Problem, group: Sequence[int]) -> list[Row]:
     """Return inequalities that every plan meets, and that shorten the search: contacts of passes inside a stretch of
     time, with the changeovers between them, fit into it."""
-    n, least, rows = len(group), problem.shortest, []
-    for a in range(n):
+    n, rows = len(group), []
+    for a, first in enumerate(group):
         inside = sorted((problem.set[i], k) for k, i in enumerate(group[a:], a))[:MAX_CUT_PASSES]
-        for count, (end, _) in enumerate(inside, 1):
-            ks = [k for _, k in inside[:count]]
-            span = end - problem.rise[group[a]]
-            if a in ks and sum(problem.length(group[k]) + least for k in ks) > span + least:
+        ks: list[int] = []
+        least = math.inf
+        for end, k in inside:
+            least = min([least] + [problem.apart(group[k], group[other]) for other in ks])
+            ks.append(k)
+            span = end - problem.rise[first]
+            if a in ks and len(ks) > 1 and sum(problem.length(group[k]) + least for k in ks) > span + least:
                 row = {k: problem.length(group[k]) + least for k in ks}
                 row.update({n + k: -1.0 for k in ks} | {2 * n + k: -1.0 for k in ks})
                 rows.append((row, span + least))

@@ -159,7 +159,7 @@ def test_the_antenna_can_make_every_changeover_at_every_trim(axes):
     assert judged > 200
 
 
-@pytest.mark.parametrize('satellites', [12, 40])
+@pytest.mark.parametrize('satellites', [12, pytest.param(40, marks=pytest.mark.thorough)])
 def test_a_night_of_leo_satellites(satellites):
     """The antenna gets from each contact to the next one; the plan has a bound when its time is over."""
     passes = leo_night(3, satellites, 200)

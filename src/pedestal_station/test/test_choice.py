@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import linprog
 
 from pedestal_common.parameters import ParameterError
-from pedestal_station.choice import Rules, choose
+from pedestal_station.choice import EQUAL_S, Rules, choose
 from pedestal_station.night import Loss, Object, Pass, Prediction, Window
 
 RULES = Rules(min_pass=60.0, time_limit=60.0)
@@ -43,8 +43,8 @@ def check_plan(passes, changeover, choice, rules=RULES):
     taken = sorted((i for i, share in enumerate(choice.shares) if share.taken), key=lambda i: choice.shares[i].begin)
     for i in taken:
         begin, end, window = choice.shares[i].begin, choice.shares[i].end, passes[i].window
-        assert window.rise <= begin and end <= window.set and end - begin >= rules.min_pass - 1e-5
-        assert (choice.shares[i].reason == '') == (end - begin > window.set - window.rise - 1e-5)
+        assert window.rise <= begin and end <= window.set and end - begin >= rules.min_pass - EQUAL_S
+        assert (choice.shares[i].reason == '') == (end - begin > window.set - window.rise - EQUAL_S)
     for i, j in itertools.combinations(taken, 2):
         assert choice.shares[i].end + changeover(i, j) <= choice.shares[j].begin + 1e-9
     assert choice.value == pytest.approx(sum(worth(passes[i]) * (choice.shares[i].end - choice.shares[i].begin)
