@@ -24,7 +24,8 @@ BUILT_HERE := --no-build-isolation
 DEMO := bags/runs/demo
 # Graphs in realtime that are killed, frozen and cut, not beside other tests; the files that take longest come first,
 # and before them those that share one (conftest.py).
-REALTIME := test/test_live.py test/test_rotctld.py test/test_page.py test/test_operating.py test/test_supervision.py \
+REALTIME := test/test_live.py test/test_rotctld.py test/test_page.py test/test_station_night.py test/test_operating.py \
+	test/test_supervision.py \
 	test/test_realtime.py test/test_drives.py test/test_iq.py test/test_level_receiver.py test/test_ins_input.py \
 	test/test_rotator.py test/test_field.py test/test_network.py
 # Tests of laws, which lie beside their packages and start no graph. That of the compiler starts processes by the

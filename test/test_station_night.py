@@ -24,11 +24,14 @@ BEGIN = datetime.datetime(2019, 12, 10, 12, 35, 40)     # of the run: the satell
 CONTACTS = {'ISS/0': (-100.0, -40.0), 'ISS/1': (40.0, 75.0), 'ISS/2': (95.0, 140.0), 'ISS/3': (155.0, 195.0),
             'ISS/4': (205.0, 225.0)}    # the last one is dropped by the plan, and the third is of an ephemeris
 
+LINES = LeoPassParameters().line_1, LeoPassParameters().line_2
+FRESHER = f'{LINES[0][:31]}2{LINES[0][32:68]}2\n{LINES[1]}\n'    # by a millisecond
+
 
 def plan(path):
     """Write the plan of CONTACTS."""
-    place, defaults, zero = StationParameters(), LeoPassParameters(), file.seconds(BEGIN)
-    elements = {'line_1': defaults.line_1, 'line_2': defaults.line_2}
+    place, zero = StationParameters(), file.seconds(BEGIN)
+    elements = dict(zip(('line_1', 'line_2'), LINES))
     orbit, rows = file.orbit_of(elements, place), []
     for case, (begin, end) in CONTACTS.items():
         azimuth, elevation = file.direction(elements, place, zero + begin)
@@ -46,10 +49,10 @@ def plan(path):
 
 
 class Said:
-    """Lines of a process, as they come."""
+    """Lines of a process, as they come, while a client goes on hearing."""
 
-    def __init__(self, process):
-        self.process, self.lines = process, []
+    def __init__(self, process, client):
+        self.process, self.client, self.lines = process, client, []
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self):
@@ -62,7 +65,7 @@ class Said:
             assert not any(wrong in line for line in self.lines), ''.join(self.lines)
             assert time.monotonic() < deadline and self.process.poll() in (None, 0), (text, ''.join(self.lines),
                                                                                      self.process.poll())
-            time.sleep(0.05)
+            self.client.spin(0.05)
 
 
 @pytest.fixture(scope='module')
@@ -82,19 +85,22 @@ def running(start_run, patient):
 def test_a_night_is_tracked_whatever_happens_in_it(running, start_process, run_process, connect, tmp_path):
     domain, path = {'ROS_DOMAIN_ID': str(running.domain_id)}, tmp_path / 'night.json'
     plan(path)
+    (tmp_path / 'new').mkdir()
+    (tmp_path / 'new' / 'iss.tle').write_text(FRESHER)
     client = connect(running.domain_id)
 
     def pedestal(*arguments):
         return run_process([*PEDESTAL, *arguments], 60.0, **domain)
 
     def station():
-        return start_process([*PEDESTAL, 'station', '--plan', path, '--lead', '20'], **domain)
+        return start_process([*PEDESTAL, 'station', '--plan', path, '--lead', '20', '--elements', path.parent / 'new'],
+                             **domain)
 
     def now(text):
         client.until(lambda: client.heard['station/night'] and text in json.loads(
             client.heard['station/night'][-1].data)['now'], 120.0)
 
-    said = Said(station())
+    said = Said(station(), client)
     said.until('ISS/1: queued')
     assert 'ISS/0: refused: its time was over at 12:35:00' in said.lines[0]
     client.read('station/night')
@@ -111,6 +117,7 @@ def test_a_night_is_tracked_whatever_happens_in_it(running, start_process, run_p
     assert (added.returncode, added.stdout) == (0, 'station: ISS/4 is queued\n')
     other = pedestal('station', '--plan', path)
     assert other.returncode == 1 and 'another station commands this antenna' in other.stderr
+    said.until('ISS/2: elements of iss.tle, 0.8 days old at the pass, in place of 0.8')
     said.until('ISS/1: done: on the target for ')
     running.signal('acu', signal.SIGKILL)
     said.until('waits: the control unit is silent')
@@ -123,17 +130,20 @@ def test_a_night_is_tracked_whatever_happens_in_it(running, start_process, run_p
     said.until('ISS/2: done: on the target for ')
     now('tracks ISS/3')
     said.process.kill()
-    said = Said(station())
+    said = Said(station(), client)
     said.until('ISS/3: running, ')
     said.until('ISS/3: done: on the target for ')
     said.until('ISS/4: done: on the target for ')
     said.until(' stowed')
-    assert said.process.wait(240.0) == 0
+    said.until('ISS_3: ')      # the report of the part before the station was killed
+    client.until(lambda: said.process.poll() is not None)
+    client.spin(1.0)
+    assert said.process.returncode == 0
     night = json.loads(client.heard['station/night'][-1].data)
     assert {each['case']: each['state'] for each in night['passes']} == {
         'ISS/0': 'skipped', **dict.fromkeys(('ISS/1', 'ISS/2', 'ISS/3', 'ISS/4'), 'done')}
     told = '\n'.join(message.data for message in client.heard['station/log']).splitlines()
-    assert set(map(str.strip, said.lines)) <= set(told)
+    assert {line.strip() for line in said.lines} <= set(told)
     folder = tmp_path / 'night-bags'
     # The bag of ISS/3 has two parts, because the station was killed in it.
     assert sorted(path.name for path in folder.iterdir() if path.is_dir()) == ['ISS_1', 'ISS_2', 'ISS_3', 'ISS_3-2',

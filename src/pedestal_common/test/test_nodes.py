@@ -7,7 +7,8 @@ from pedestal_common.node import unit
 
 SHARED = {'clock', 'adu/state', 'ship/truth', 'ship/imu/data_raw', 'ship/imu/data', 'ins/state', 'ins/error',
           'diagnostics', 'weather/pressure', 'weather/temperature', 'weather/humidity',
-          *(f'{node}/{name}' for node in ('ship_motion', 'ins') for name in ('inject', 'injected'))}
+          *(f'{node}/{name}' for node in ('ship_motion', 'ins') for name in ('inject', 'injected')),
+          *(f'station/{name}' for name in ('command', 'command_result', 'night', 'log'))}
 
 
 def test_every_topic_is_written_by_one_node_and_every_name_is_in_the_table_of_topics():

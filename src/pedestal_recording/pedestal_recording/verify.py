@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import yaml
 
-from pedestal_common.graph import nodes
+from pedestal_common.graph import nodes, topics
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.quantities import Ints, Nanoseconds, Seconds, Stamps
 from pedestal_common.text_files import plain_yaml
@@ -220,14 +220,16 @@ def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut:
         own = topic is not None and set(topic.writers) <= set(nodes.own_rows(bag.own))
         absent = [] if stamp.size or own or _may_be_absent(bag, name) else ['no message']
         return absent + _numbering(bag.recorded(name), cut)
-    # A node outside the graph publishes samples. It may be restarted, and it may repeat a stamp.
-    problems = _order(stamp) if topic and len(topic.writers) == 1 and rate != 'sample' else []
+    # Nodes outside the graph publish samples and program tracks. A node may be restarted, and may repeat a stamp. A
+    # late recorder receives the latched tracks of several nodes in any order.
+    problems = _order(stamp) if topic and len(topic.writers) == 1 and rate not in topics.UNSTEPPED_RATES else []
     if topic and rate == 'step':
         problems += _steps(stamp, 'adu' in topic.writers, grid)
         if ours and not np.array_equal(rows.stamp, rows.log):
             problems.append(f'{np.sum(rows.stamp != rows.log)} messages with a log time that differs from their stamp')
     # The `once` topics are latched, so a restarted recorder receives their message again, in its own file.
-    elif rate == 'once' and not (not (cut or _may_be_absent(bag, name))) <= stamp.size <= len(bag.files):
+    elif rate == 'once' and (stamp.size < (not (cut or _may_be_absent(bag, name)))
+                             or stamp.size > len(bag.files) and bag.metadata.get('pacing') != 'realtime'):
         problems.append(f'{stamp.size} messages, must be 1')
     elif rate == 'second' and bag.metadata.get('pacing') == 'lockstep' and grid.period:
         problems += _seconds(bag, name, stamp, grid)

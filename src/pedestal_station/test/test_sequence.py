@@ -87,6 +87,7 @@ def test_a_night_of_two_passes_from_the_park_to_the_stow():
     assert not night.step(1165).state.over
     assert night.step(1170, progress='stowed').state.over and night.lines[-1] == 'stowed'
     assert night.state.now == 'over' and set(night.states.values()) == {'done'}
+    assert night.ask(1171, 'insert', case='A/1').text == 'refused: the night is over' and night.commands[6:] == []
 
 
 def test_an_antenna_with_a_park_waits_there_and_one_that_waits_briefly_stays():

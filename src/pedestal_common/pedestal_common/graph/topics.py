@@ -55,7 +55,7 @@ QOS_BY_RATE = {'step': Qos(latched=False, lockstep=0, written=1000, read=8, reli
                'reply': Qos(latched=False, lockstep=100, written=100, read=100, reliable=True, recorded=1000),
                'second': Qos(latched=False, lockstep=10, written=10, read=100, reliable=True, recorded=1000),
                'sample': Qos(latched=False, lockstep=10, written=10, read=10, reliable=False, recorded=1000),
-               'station': Qos(latched=True, lockstep=1, written=10, read=10, reliable=True, recorded=1000)}
+               'station': Qos(latched=True, lockstep=10, written=10, read=10, reliable=True, recorded=1000)}
 
 UNSTEPPED_RATES = 'once', 'sample'  # rates of messages that belong to no step, and that a unit takes by `decode`
 

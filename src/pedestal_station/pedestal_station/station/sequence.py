@@ -259,6 +259,8 @@ class _Turn:
         """Execute the request of an operator, and reply."""
         command = request.command
         try:
+            if self.state.over:
+                raise ValueError('the night is over')
             text = {'hold': self._hold, 'resume': self._resume, 'skip': self._skip,
                     'insert': self._insert}[command.verb](request)
             granted = True
@@ -401,7 +403,7 @@ class _Turn:
     def command(self) -> Aim | None:
         """Return the next command to the control unit, None for none."""
         wanted, state = self._wanted(), self.state
-        if self._obstacle or wanted is None or state.pending or self.inputs.now < state.retry:
+        if state.over or self._obstacle or wanted is None or state.pending or self.inputs.now < state.retry:
             return None
         if state.aim == wanted and self._fits(wanted):
             return None
@@ -414,7 +416,7 @@ class _Turn:
 
     def finish(self) -> None:
         """End the night when the antenna is stowed after the last pass."""
-        if current(self.state) or upcoming(self.state):
+        if current(self.state) or upcoming(self.state) or self.state.over:
             return
         now = self.inputs.now
         if self.state.ends == math.inf:

@@ -36,8 +36,8 @@ NIGHT_TOPIC, LOG_TOPIC = 'station/night', 'station/log'
 DRIVE_STATE_TOPIC, EMERGENCY_STOP = 'adu/state', 'emergency stop'  # topic, and its text after an emergency stop
 
 CONTROL_UNIT_PARAMETERS = ('graph.start', 'graph.beams', 'prediction.start_time', 'prediction.oldest',
-                           'tracker.handover', 'tracker.receiver.beamwidth', 'azimuth.limits.low', 'azimuth.limits.high',
-                           *(f'prediction.station.{name}' for name in STATION_NAMES))
+                           'tracker.handover', 'tracker.receiver.beamwidth', 'azimuth.limits.low',
+                           'azimuth.limits.high', *(f'prediction.station.{name}' for name in STATION_NAMES))
 
 
 class Options(NamedTuple):
@@ -207,6 +207,7 @@ class Station:
                 contact = entry.contact
                 self._say([f'{contact.case}: {entry.state}, {utc_text(contact.begin)} to {sequence.clock(contact.end)}'
                            + (f', {entry.text}' if entry.text else '')])
+        self._session.until(lambda: self._node.present(self._node.name_of('acu')), REPLY_TIMEOUT_S)
         try:
             while not self._state.over:
                 self.tick()
@@ -218,6 +219,7 @@ class Station:
                 self.tick()
         finally:
             self._recordings.close()
+            self._node.close()
             if self._watch:
                 self._watch.close()
         return not any(entry.state == 'failed' for entry in self._state.entries)
@@ -226,24 +228,33 @@ class Station:
         """Make one step of the sequence."""
         before = self._state
         refused, self._node.refused = self._node.refused, []
-        answered, lines = self._answered()
-        result = sequence.step(self._state, self._inputs(answered, lines), self._rules)
+        lines: list[str] = []
+        result = sequence.step(self._state, self._inputs(self._answered(), lines), self._rules)
         self._state = result.state
-        for what, case in result.records:
-            if what == 'begin':
-                lines.append(f'{case}: recorded in {self._recordings.begin(case)}')
-            else:
-                self._recordings.end(case)
+        lines += [self._recorded(*each) for each in result.records]
         if result.command:
             self._send(result.command)
         for command, reply in result.replies:
             self._node.answer(command, reply)
-        self._say([*refused, *lines, *result.lines])
+        if before.entries != self._state.entries or before.held != self._state.held:
+            try:
+                progress.save(self._file, self._state)
+            except OSError as error:
+                lines.append(f'the progress is not kept: {error}')
+        self._say([*refused, *result.lines, *filter(None, lines)])
         if (night := progress.night_text(self._state)) != self._night:
             self._night = night
             self._node.tell(NIGHT_TOPIC, night)
-        if before.entries != self._state.entries or before.held != self._state.held:
-            progress.save(self._file, self._state)
+
+    def _recorded(self, what: str, case: str) -> str:
+        """Begin or end a recording; return a line for the log. A full disk does not end the night."""
+        if what == 'end':
+            self._recordings.end(case)
+            return ''
+        try:
+            return f'{case}: recorded in {self._recordings.begin(case)}'
+        except OSError as error:
+            return f'{case}: not recorded: {error}'
 
     def _inputs(self, reply: Reply | None, lines: list[str]) -> Inputs:
         """Return the inputs of a step, and add lines for the log."""
@@ -281,10 +292,10 @@ class Station:
         self._request = self._node.request(aim.verb, aim.arguments)
         self._asked_at = self._sent_at = time.monotonic()
 
-    def _answered(self) -> tuple[Reply | None, list[str]]:
-        """Return (reply to the last command, [] of lines); a command without a reply is repeated, then given up."""
+    def _answered(self) -> Reply | None:
+        """Return the reply to the last command. A command without a reply is repeated, then given up."""
         if not self._request:
-            return None, []
+            return None
         reply, now = self._node.replied(self._request), time.monotonic()
         if reply is None and now - self._asked_at > REPLY_TIMEOUT_S:
             reply = Reply(False, f'no reply of the control unit within {REPLY_TIMEOUT_S:g} s')
@@ -293,7 +304,7 @@ class Station:
             self._node.repeat_request(self._request)
         if reply is not None:
             self._request = ''
-        return reply, []
+        return reply
 
     def _say(self, lines: Sequence[str]) -> None:
         """Print lines, and publish them, each with its UTC."""
