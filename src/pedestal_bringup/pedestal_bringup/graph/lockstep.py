@@ -8,6 +8,7 @@ from rclpy.executors import SingleThreadedExecutor
 from pedestal_bringup.graph.operator_node import Operator
 from pedestal_bringup.graph.processes import Graph, exit_description
 from pedestal_common.graph import nodes
+from pedestal_common.node import middleware
 from pedestal_common.quantities import Message, Seconds
 
 ACCUSATION_TIME_S = 0.5
@@ -30,7 +31,7 @@ def watch(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
         return operator.stuck(names, executor)
 
     while graph.ended().get(nodes.DRIVE_NODE) != 0:
-        executor.spin_once(timeout_sec=0.1 if sent else 0.02)
+        middleware.turn(executor, 0.1 if sent else 0.02)
         sent = sent or operator.send_to(graph.scenario.nodes, tracks)
         progress(operator.time)
         if any(code != 0 or node not in SELF_ENDING_NODES for node, code in graph.ended().items()):
