@@ -6,7 +6,6 @@ import subprocess
 
 import pytest
 from shared import PEDESTAL
-from test_how_to import Amplifiers
 
 from pedestal_bringup.graph import own_programs
 from pedestal_bringup.scenario import scenario
@@ -172,16 +171,3 @@ def test_a_program_that_does_not_fit_is_named(fault, text, tmp_path, reserve_dom
     (tmp_path / 'mine.py').write_text(UNFIT)
     code, printed, _ = run(tmp_path, reserve_domain(), 'run', 'uav_flyby', '--receiver', f'mine.py {fault}')
     assert code == 1 and text in printed and 'mine.py' in printed, printed
-
-
-@pytest.mark.thorough
-def test_a_drive_of_ones_own_in_realtime(tmp_path, reserve_domain):
-    motors = Amplifiers((0.1, 0.4))
-    motors.start()
-    code, text, path = run(tmp_path, reserve_domain(), 'run', 'uav_flyby', '--pacing', 'realtime', '--duration', '6',
-                           '--param', 'adu.period=0.02', '--drive',
-                           f'{HOW_TO / "rate_drive.py"} {motors.port} --truth')
-    recording = bags.read(path)
-    assert code == 0 and 'first lock at' in text, text
-    assert verify(recording).finished and 'adu/motor_states' not in recording.topics
-    assert recording.table('joint_states')['t'][0] >= 0.0 and recording.table('joint_states')['t'][-1] < 6.1
