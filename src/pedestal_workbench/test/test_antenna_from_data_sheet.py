@@ -245,11 +245,24 @@ def test_power_and_speed_of_a_motor_give_its_torque(pedestal, tmp_path):
 def test_a_small_dish_with_small_motors_names_a_limited_value_and_the_ratio_that_its_motors_need(pedestal):
     """J = 210 kg m2 (0.6 / 3)^5; motors of 1.372e-6 kg m2 have a fiftieth of 0.1 kg m2 at a ratio of 27."""
     given = ('--mirror', '0.6', '--motor-power', '0.05', '--motor-speed', '3000')
-    code, output, _ = pedestal('new', 'my.yaml', *given)
+    code, output, _ = pedestal('new', 'my.yaml', *given, '--ratio-azimuth', '9.6', '--ratio-elevation', '13.5')
     assert code == 0 and 'at least 0.1 in place of 0.0672' in output
     assert 'azimuth: the inertia of the load is 395 times that of its motors' in output
     assert '--ratio-azimuth 27 avoids this' in output
     assert 'race' not in pedestal('new', 'b.yaml', *given, '--ratio-azimuth', '27.1', '--ratio-elevation', '27.1')[1]
+
+
+@pytest.mark.parametrize('given, ratios, rate', [
+    (('--motor-torque', '15'), (128.0, 180.0), 70.0),                                       # half the torque
+    (('--motor-power', '2.3562', '--motor-speed', '3000'), (256.0, 360.0), 70.0),           # 7.5 Nm at twice the speed
+    (('--motor-torque', '20', '--mirror', '6'), (768.0, 1080.0), 140.0 / 12.0),             # 8 times the wind torque
+    (('--motor-torque', '15', '--ratio-azimuth', '100'), (100.0, 180.0), 0.9 * 103.67)])    # voltage at this ratio
+def test_the_ratio_follows_from_the_motor_of_the_data_sheet(pedestal, tmp_path, given, ratios, rate):
+    """Both motors hold the same wind: 2 x 30 Nm at a ratio of 64 on 3 m."""
+    assert pedestal('new', 'my.yaml', *given)[0] == 0
+    drive = scenario.load(tmp_path / 'my.yaml').node_parameters('adu')
+    assert [getattr(drive, name).gear_train.ratio for name in loops.AXES] == pytest.approx(ratios, rel=1e-3)
+    assert math.degrees(drive.azimuth.limits.rate) == pytest.approx(rate, rel=2e-3)
 
 
 @pytest.mark.parametrize('rate, said', [
