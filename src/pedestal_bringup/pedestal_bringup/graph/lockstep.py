@@ -40,7 +40,8 @@ def watch(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
         # and names the other node, which is the better error.
         silent = operator.silent(2.0 * header.deadline)
         if silent:
-            raise failure(graph, stuck_nodes, silent)
+            # A drive of the user publishes no diagnostics. No node waits for it, because its messages begin the steps.
+            raise failure(graph, stuck_nodes, nodes.DRIVE_NODE if nodes.DRIVE_NODE in graph.scenario.own else silent)
     progress(header.duration)
     if not graph.stop():     # a node did not end with exit code 0
         raise failure(graph, stuck_nodes)

@@ -61,7 +61,9 @@ def _in_lockstep(graph: Graph, operator: Operator, tracks: Mapping[str, Message]
     except KeyboardInterrupt:
         graph.stop()
         return Outcome(graph.result(nodes.DRIVE_NODE), graph.result('recorder'), stopped=True)
-    return Outcome(graph.outcome(nodes.DRIVE_NODE), graph.outcome('recorder'))
+    # A drive of the user prints no result.
+    drive = graph.result if nodes.DRIVE_NODE in graph.scenario.own else graph.outcome
+    return Outcome(drive(nodes.DRIVE_NODE), graph.outcome('recorder'))
 
 
 def _in_realtime(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
