@@ -181,8 +181,8 @@ def test_a_drive_of_ones_own_in_lockstep(tmp_path, reserve_domain):
     assert code == 0 and 'first lock at' in text and verify(recording).complete, text
     assert len(recording.rows('joint_states')) == 601
     stops = tmp_path / 'stops.py'
-    stops.write_text(drive.read_text().replace('        self.k += 1\n', '        if self.k == 400:\n            return\n'
-                                                '        self.k += 1\n'))
+    stops.write_text(drive.read_text().replace(
+        '        self.k += 1\n', '        if self.k == 400:\n            return\n        self.k += 1\n'))
     (tmp_path / 'second').mkdir()
     code, text, path = run(tmp_path / 'second', reserve_domain(), 'run', 'uav_flyby', '--duration', '3', '--drive',
                            stops, '--param', 'scenario.deadline=8')
