@@ -192,7 +192,7 @@ class Gs232(LineProtocol):
         if prompt:
             yield self._prompt(prompt[0])
             line = line[prompt.end():].strip()
-        match, second = self._POSITION.fullmatch(line), self._ELEVATION.fullmatch(line)
+        match, second = (pattern.fullmatch(line.upper()) for pattern in (self._POSITION, self._ELEVATION))
         if second and self._azimuth is not None:
             azimuth, self._azimuth, self._half = self._azimuth, None, False
             if not self.azimuth_only:
@@ -224,6 +224,7 @@ class Easycomm(LineProtocol):
     ASK, STOP, RESOLUTION = b'AZ EL \n', b'SA SE \n', 0.1
     _WORD = re.compile(rb'(AZ|EL|(?=[-+]))=?([-+]?\d+(?:[.,]\d*)?)')
     _BETWEEN_WORDS = re.compile(rb'[\s;]+|,(?=[A-Z\s+-]|$)')
+    _RADIO = re.compile(rb'\b(?:UP|DN)\d+(?:\s+[A-Z]+)?')     # frequency and kind of modulation
 
     def __init__(self, azimuth_only: bool = False) -> None:
         super().__init__(azimuth_only)
@@ -242,8 +243,8 @@ class Easycomm(LineProtocol):
 
     def answers_of(self, line: bytes) -> Iterator[Answer]:
         """Yield the position once both angles have arrived; other words, such as alarms, are refused."""
-        for word in filter(None, self._BETWEEN_WORDS.split(line)):
-            match = self._WORD.fullmatch(word)
+        for word in filter(None, self._BETWEEN_WORDS.split(self._RADIO.sub(b'', line))):
+            match = self._WORD.fullmatch(word.upper())
             if not match:
                 if word not in self.ask.split():
                     yield Refusal(f'answer {word.decode(errors="replace")!r}: must be AZaaa.a or ELeee.e')
