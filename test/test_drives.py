@@ -15,6 +15,7 @@ import canopen
 import pytest
 from shared import PEDESTAL, free_port
 from std_srvs.srv import Trigger
+from test_how_to import FILE, Amplifiers
 
 from pedestal_bringup.graph import processes
 from pedestal_bringup.graph.start import START_LEAD_TIME_S
@@ -28,6 +29,8 @@ PRIORITY = ('-p', 'graph.priority:=10')
 SOON = 40.0
 START = 180.0
 """Seconds in which both nodes have compiled their laws and the drives answer."""
+
+RATE_DRIVE = FILE.with_name('rate_drive.py')
 
 HEARTBEAT = 0.25
 STOP = 0.15
@@ -290,3 +293,17 @@ def test_pedestal_simulate_drives_serves_a_bus(start_process):
     _, said = process.communicate(timeout=SOON)
     assert process.returncode in (0, 130)
     assert f'on socketcand can0 at 127.0.0.1:{port}' in said
+
+
+@pytest.mark.thorough
+def test_a_drive_of_ones_own_in_realtime(start_run):
+    """A busy machine holds it up for a while; the control unit keeps its mode, and tracks when the drive goes on."""
+    motors = Amplifiers((0.1, 0.4))
+    motors.start()
+    run = start_run('uav_flyby', '--pacing', 'realtime', '--duration', '20', '--param', 'adu.period=0.02', '--drive',
+                    f'{RATE_DRIVE} {motors.port} --truth')
+    done = run.finish()
+    assert done.returncode == 0 and 'first lock at' in done.stdout, done
+    recording = load(run.bag)
+    assert verify(recording).finished and 'adu/motor_states' not in recording.topics
+    assert recording.table('joint_states')['t'][0] >= 0.0 and recording.table('joint_states')['t'][-1] < 20.1

@@ -6,7 +6,6 @@ import subprocess
 
 import pytest
 from shared import PEDESTAL
-from test_how_to import Amplifiers
 
 from pedestal_bringup.graph import own_programs
 from pedestal_bringup.scenario import scenario
@@ -111,8 +110,7 @@ def test_a_program_must_publish_what_the_others_wait_for(changes, topics):
     (('--receiver', 'simulated-i'), "own.receiver = 'simulated-i': must begin with FILE.py or PACKAGE/EXECUTABLE"),
     (('--receiver', 'none.py 5'), 'none.py: no such file'),
     (('--receiver', 'my_package/my_node'), 'my_package/my_node: no such executable in AMENT_PREFIX_PATH'),
-    (('--ins', 'a.py'), 'own.ins = a.py: needs ship = true'),
-    (('--drive', 'a.py'), 'own.drive = a.py: needs pacing = realtime, because a drive of the user sets the time')])
+    (('--ins', 'a.py'), 'own.ins = a.py: needs ship = true')])
 def test_a_program_that_cannot_start_is_refused(options, text, pedestal):
     code, _, errors = pedestal('run', 'uav_flyby', *options)
     assert code and errors.startswith('pedestal: error: ') and text in errors, errors
@@ -175,13 +173,19 @@ def test_a_program_that_does_not_fit_is_named(fault, text, tmp_path, reserve_dom
 
 
 @pytest.mark.thorough
-def test_a_drive_of_ones_own_in_realtime(tmp_path, reserve_domain):
-    motors = Amplifiers((0.1, 0.4))
-    motors.start()
-    code, text, path = run(tmp_path, reserve_domain(), 'run', 'uav_flyby', '--pacing', 'realtime', '--duration', '6',
-                           '--param', 'adu.period=0.02', '--drive',
-                           f'{HOW_TO / "rate_drive.py"} {motors.port} --truth')
+def test_a_drive_of_ones_own_in_lockstep(tmp_path, reserve_domain):
+    """It makes the steps: the run is complete, and the same each time. A drive that stops is named."""
+    drive = HOW_TO / 'simulated_drive.py'
+    code, text, path = run(tmp_path, reserve_domain(), 'run', 'uav_flyby', '--duration', '3', '--drive', drive)
     recording = bags.read(path)
-    assert code == 0 and 'first lock at' in text, text
-    assert verify(recording).finished and 'adu/motor_states' not in recording.topics
-    assert recording.table('joint_states')['t'][0] >= 0.0 and recording.table('joint_states')['t'][-1] < 6.1
+    assert code == 0 and 'first lock at' in text and verify(recording).complete, text
+    assert len(recording.rows('joint_states')) == 601
+    stops = tmp_path / 'stops.py'
+    stops.write_text(drive.read_text().replace(
+        '        self.k += 1\n', '        if self.k == 400:\n            return\n        self.k += 1\n'))
+    (tmp_path / 'second').mkdir()
+    code, text, path = run(tmp_path / 'second', reserve_domain(), 'run', 'uav_flyby', '--duration', '3', '--drive',
+                           stops, '--param', 'scenario.deadline=8')
+    assert code == 1 and 'adu has fallen silent' in text, text
+    again = bags.read(path).table('joint_states')['azimuth.position']
+    assert again.tolist() == recording.table('joint_states')['azimuth.position'][:len(again)].tolist()

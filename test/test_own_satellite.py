@@ -29,6 +29,17 @@ def test_passes_are_listed(capsys):
     assert [row.split()[0] for row in rows] == [str(n) for n in range(1, 1 + len(rows))] and len(rows) > 10
 
 
+def test_trials_of_a_pass_of_a_tle_file(pedestal, tmp_path):
+    """The pass of all trials is chosen once, as that of `pedestal run`; the command of a trial names it."""
+    (tmp_path / 'iss.tle').write_text(f'ISS\n{LeoPassParameters().line_1}\n{LeoPassParameters().line_2}\n')
+    given = ('trials', 'leo_pass', '--tle', 'iss.tle', '--station', '47.5,8.4,600', '--pass')
+    code, output, errors = pedestal(*given, UTC, '--runs', '1', '--duration', '2', '--workers', '1')
+    assert code == 0 and 'highest 5' in output and 'UTC on, 2 s' in output, errors
+    assert re.search(r'--duration 2.0 .*start_time=\"2019-12-10T12:3\d:\d\dZ\"', output)
+    code, _, errors = pedestal(*given, 'list')
+    assert code == 2 and '--pass list: must be next, N or a UTC; pedestal run --pass list prints' in errors
+
+
 @pytest.mark.thorough
 def test_a_short_run_of_a_pass_of_a_tle_file_is_about_its_culmination(start_run, tmp_path):
     tle = tmp_path / 'iss.tle'

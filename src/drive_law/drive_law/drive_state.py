@@ -56,7 +56,9 @@ shortest period of 1 ms.
 INITIAL_AGE_PERIODS = 1 << 40
 """Initial number of periods since the last change of the brakes: longer ago than any time of a brake or a delay."""
 
-MAX_PLAUSIBLE_INPUT = 1e6  # largest valid input [rad/s, Nm, rad/s2]. An input beyond it, infinite or NaN is invalid.
+MAX_PLAUSIBLE_INPUT = 1e9
+"""Largest valid input [rad/s, Nm, rad/s2]; an input beyond it, infinite or NaN is invalid. The torque that moves a
+dish of 25 m is above 1e6 Nm."""
 
 
 class AxisInputs(Record):

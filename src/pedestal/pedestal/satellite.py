@@ -25,6 +25,15 @@ OTHER_FORMS = {'--pass': 'next, list, or a number of the list', '--start': '+SEC
 MAX_EARLY_START_S = 3600.0  # largest time from the start of a run to the rise of its pass [s]
 
 
+class Options(typing.TypedDict, total=False):
+    """Fields of a Choice by name."""
+    tle: str | pathlib.Path | None
+    satellite: str
+    station: str | None
+    which: str | None
+    start: str | None
+
+
 class Choice(typing.NamedTuple):
     """Satellite, station and pass of the user, as the options of `pedestal run`; None or '': not chosen."""
     tle: str | pathlib.Path | None = None

@@ -5,6 +5,7 @@ import dataclasses
 import datetime
 import functools
 import pathlib
+import typing
 from collections.abc import Mapping
 
 import numpy as np
@@ -15,6 +16,11 @@ from pedestal_bringup.scenario import scenario as bringup
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.parameters import Parameters, as_dict, flatten
 from pedestal_common.quantities import Seconds
+
+if typing.TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from pedestal.satellite import Options
 
 Value = float | int | bool | str
 
@@ -29,8 +35,7 @@ def scenarios() -> dict[str, str]:
 
 
 def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None, *, duration: float | None = None,
-         seed: int | None = None, tle: str | pathlib.Path | None = None, satellite: str = '',
-         station: str | None = None, which: str | None = None, start: str | None = None) -> Scenario:
+         seed: int | None = None, **choice: Unpack[Options]) -> Scenario:
     """Return the scenario of a name or of a .yaml file.
 
     changes: {'node.key': value}. changes, duration [s] and seed replace values of the file. tle, satellite, station,
@@ -47,12 +52,12 @@ def load(source: str | pathlib.Path, changes: Mapping[str, Value] | None = None,
     ...     'tracking_receiver.target.leo_pass.start_time']     # half a minute before the culmination
     '2019-12-10T12:37:55Z'
     """
-    choice = Choice(tle, satellite, station, which, start)
-    if not choice.made:
+    own = Choice(**choice)
+    if not own.made:
         return Scenario(str(source), dict(changes or {}), duration, seed)
     texts = [files.override(name, value) for name, value in (changes or {}).items()]
     now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
-    found = chosen(bringup.draft(source), texts, choice, duration, now)
+    found = chosen(bringup.draft(source), texts, own, duration, now)
     parsed = {f'{node}.{key}': value for node, key, value in map(files.parse_override, found.changes)}
     return Scenario(str(source), parsed, found.duration, seed)
 

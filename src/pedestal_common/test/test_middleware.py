@@ -1,8 +1,11 @@
 """Quality of service by rate and role: what a stopped or slow reader can do to a writer."""
+import signal
+
 import pytest
 
 pytest.importorskip('rclpy')
 import rclpy  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.qos import (  # noqa: E402
     DurabilityPolicy,
     HistoryPolicy,
@@ -11,6 +14,7 @@ from rclpy.qos import (  # noqa: E402
     qos_check_compatible,
 )
 
+from pedestal_common import ignored_stop
 from pedestal_common.graph import topics
 from pedestal_common.node import middleware  # noqa: E402
 
@@ -66,3 +70,32 @@ def test_a_value_of_the_command_line_replaces_that_of_a_parameter_file(tmp_path,
         node.destroy_node()
     finally:
         rclpy.try_shutdown()
+
+
+@pytest.mark.parametrize('kind', ['events', 'single thread'])
+def test_a_stop_waits_for_the_end_of_a_callback(kind):
+    """Python would warn of a coroutine of rclpy that was never awaited, and rclpy of a failed callback."""
+    calls = []
+
+    def called():
+        signal.raise_signal(signal.SIGUSR1)
+        calls.append('whole')
+    before = signal.signal(signal.SIGUSR1, lambda _, frame: ignored_stop.raise_stop(KeyboardInterrupt, frame))
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    try:
+        node = rclpy.create_node('stopped', context=context)
+        executor = (middleware.make_executor if kind == 'events' else SingleThreadedExecutor)(context=context)
+        executor.add_node(node)
+        node.create_timer(0.001, called)
+        with pytest.raises(KeyboardInterrupt):
+            while True:
+                middleware.turn(executor, 1.0)
+        assert calls == ['whole']
+        with pytest.raises(KeyboardInterrupt):      # outside a turn at once
+            called()
+        assert calls == ['whole']
+        node.destroy_node()
+    finally:
+        rclpy.try_shutdown(context=context)
+        signal.signal(signal.SIGUSR1, before)

@@ -52,6 +52,10 @@ ANSWERS = [
     ('easycomm', b'AZ+010.5,EL+20.0\n', [Position(10.5, 20.0)]),
     ('easycomm', b'AZ=10.5, EL=-20,5\n', [Position(10.5, -20.5)]),
     ('gs232', b'AZ=+020  EL=-05\r\n', [Position(20.0, -5.0)]),
+    ('easycomm', b'AZ180.0 EL45.0 UP145500000 FM DN435000000 USB\n', [Position(180.0, 45.0)]),
+    ('easycomm', b'az180.0 el45.0\n', [Position(180.0, 45.0)]),
+    ('gs232', b'az=180 el=045\r\n', [Position(180.0, 45.0)]),
+    ('gs232', b'AZ=180\r\nEL=-05\r\n', [Position(180.0, -5.0)]), ('gs232', b'+0180\r+0045\r', [Position(180.0, 45.0)]),
     ('rotctld', b'12,50\n-1,25\n', [Position(12.5, -1.25)]),
     ('easycomm', b'AZ EL\r\nAZ10.0 EL20.0\r\n', [Position(10.0, 20.0)]),
 ]
@@ -69,7 +73,7 @@ def test_answers_arrive_whole_or_byte_by_byte(name, sent, expected):
 
 @pytest.mark.parametrize('name, sent', [
     ('rotctld', b'nan\n10.0\n'), ('rotctld', b'1e9\n10.0\n'), ('rotctld', b'hello\nworld\n'),
-    ('gs232', b'AZ=1  EL=006\r\n'), ('gs232', b'AZ=12  EL=006\r\n'), ('gs232', b'AZ=012\r\n'),
+    ('gs232', b'AZ=1  EL=006\r\n'), ('gs232', b'AZ=12  EL=006\r\n'),
     ('easycomm', b'10 20\n'), ('rot2prog', b'W' + bytes(10) + b' '), ('easycomm', b'AZ1.2.3 EL4\n'),
     ('easycomm', b'ALlow battery\n'),
     ('rot2prog', b'W' + bytes(9) + b'\x0a!'), ('gs232', bytes(600)), ('rotctld', b'9' * 600),
@@ -80,6 +84,17 @@ def test_bytes_that_are_no_answer_are_refused_and_the_next_answer_counts(name, s
     assert refusals and all(isinstance(answer, Refusal) and answer.reason for answer in refusals)
     good, expected = next((answer, wanted) for of, answer, wanted in ANSWERS if of == name)
     assert [type(answer) for answer in protocol.answers(good)][-1] is Position and expected
+
+
+@pytest.mark.parametrize('line', [b'AZ=012\r\n', b'+0012\r\n'])
+def test_an_azimuth_without_elevation_is_named_with_its_parameter_at_the_second_request(line):
+    """The elevation may have a line of its own. Half an answer to one request is none to the next one."""
+    protocol = protocols.PROTOCOLS['gs232']()
+    found = []
+    for _ in range(3):
+        protocol.sent(protocol.ask)
+        found.append(protocol.answers(line))
+    assert found == [[], *2 * [[Refusal(protocols.NO_ELEVATION)]]]
 
 
 @pytest.mark.parametrize('echoes', [True, False])

@@ -256,7 +256,7 @@ class RemoteSession:
 
     def spin(self, seconds: Seconds) -> None:
         """Receive messages for some seconds, or until the first callback."""
-        self._executor.spin_once(timeout_sec=seconds)
+        middleware.turn(self._executor, seconds)
 
     def until(self, condition: Callable[[], _R], seconds: Seconds) -> _R:
         """Receive messages until condition() is true, for some seconds at most. Return its last value."""

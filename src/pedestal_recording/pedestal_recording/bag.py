@@ -4,7 +4,6 @@ import copy
 import functools
 import logging
 import pathlib
-import re
 import typing
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -19,7 +18,7 @@ from pedestal_common.quantities import DType, Ints, Json, Message, Nanoseconds, 
 from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
 from pedestal_common.wire.cdr import STAMPED_TYPES
-from pedestal_recording import columns, mcap_file
+from pedestal_recording import bag_files, columns, mcap_file
 from pedestal_recording import recording as recordings
 from pedestal_recording.mcap_file import MESSAGE_HEAD, ZSTD_MAGIC, McapFile
 from pedestal_recording.mcap_file import BagError as BagError  # its users write bag.BagError
@@ -41,7 +40,6 @@ _KINDS = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcod
 Index: typing.TypeAlias = np.recarray[tuple[int], DType]    # rows of Bag.index
 Content = typing.TypeVar('Content')  # type of the values in a dictionary {topic or node: value}
 MetadataRecords = Mapping[str, Mapping[str, str]]  # metadata records of a bag, {name: {text: text}}
-_NUMBERED = re.compile(r'(.+)_(\d+)\.mcap')  # pattern of the file name NAME_0.mcap, NAME_1.mcap and so on of a bag
 
 RETIRED_PARAMETERS = {'ins': ('alignment.classical_bandwidth', 'alignment.adrc.observer', 'alignment.adrc.control',
                               'alignment.adrc.start')}
@@ -75,57 +73,11 @@ def chosen_topics(bag: 'Bag', names: Iterable[str]) -> list[str]:
 
 def load(path: str | pathlib.Path) -> 'Bag':
     """Return the Bag at a path, up to its first damage. Raises BagError if nothing is readable."""
-    opened = [McapFile(file) for file in locate(path)]
+    opened = [McapFile(file) for file in bag_files.locate(path)]
     try:
         return Bag(pathlib.Path(path), opened)
     except OSError as error:
         raise BagError(f'{path}: {mcap_file.reason(error)}') from None
-
-
-def locate(path: str | pathlib.Path) -> list[pathlib.Path]:
-    """Return the MCAP files of a bag, a directory or one file, in their order.
-
-    Each restart of the recorder begins a new file: NAME_0.mcap, NAME_1.mcap and so on. Files with other names are in
-    the order of metadata.yaml. Raises BagError for no file, for several files without an order, or for messages that
-    are compressed one by one.
-    """
-    path = pathlib.Path(path)
-    try:
-        if not path.is_dir():
-            return [path]
-        files = next(filter(None, (sorted(path.glob(form)) for form in ('*.mcap', '*.db3', '*.mcap.*', '*.db3.*'))),
-                     [])
-    except OSError as error:
-        raise BagError(f'{path}: {mcap_file.reason(error)}') from None
-    described = _described(path)
-    if str(described.get('compression_mode', '')).lower() == 'message':
-        raise compressed_messages(path, described.get('compression_format'))
-    if len(files) == 1 or files and files[0].suffix not in ('.mcap', '.db3'):
-        return files[:1]
-    numbered = [(match[1], int(match[2]), file) for file in files if (match := _NUMBERED.fullmatch(file.name))]
-    if files and len(numbered) == len(files) and len({name for name, _, _ in numbered}) == 1:
-        return [file for _, _, file in sorted(numbered)]
-    named = described.get('relative_file_paths')
-    if files and isinstance(named, list) and sorted(map(str, named)) == [file.name for file in files]:
-        return [path / name for name in named]
-    raise BagError(f'{path}: {len(files)} .mcap files in it, must be one, or NAME_0.mcap, NAME_1.mcap ... in their '
-                   'order')
-
-
-def _described(path: pathlib.Path) -> dict[str, Json]:
-    """Return the content of metadata.yaml, {} if the file is missing or unreadable."""
-    try:
-        return dict(plain_yaml.read(path / 'metadata.yaml')['rosbag2_bagfile_information'])
-    except (OSError, yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError):
-        return {}
-
-
-def compressed_messages(path: pathlib.Path, name: str | None) -> BagError:
-    """Return the BagError for a bag whose messages are compressed one by one; name: format of the compression."""
-    folder = path.parent if (path.parent / 'metadata.yaml').is_file() else path
-    return BagError(f"{path}: its messages are compressed one by one ({name}); `ros2 bag convert -i {folder} -o "
-                    "plain.yaml` decompresses them, with plain.yaml = 'output_bags: [{uri: plain, storage_id: mcap, "
-                    "all: true}]'")
 
 
 def start(metadata_records: MetadataRecords) -> Nanoseconds:
@@ -144,11 +96,6 @@ def planned_end(metadata_records: MetadataRecords) -> Nanoseconds | None:
 
 def _nanoseconds(text: str | None) -> Nanoseconds | None:
     return int(text) if text and text.isdecimal() and len(text) < 20 else None
-
-
-def foreign_encoding(file: pathlib.Path, channel: Channel) -> BagError:
-    """Return the BagError for a channel with another encoding than CDR."""
-    return BagError(f'{file}: {channel.topic} is encoded as {channel.message_encoding!r}: not a ROS 2 recording')
 
 
 class Bag:
@@ -200,7 +147,7 @@ class Bag:
             self.statistics = self._counts
         self._recorded: Index = np.concatenate(blocks).view(np.recarray)
         if self._compressed and self._compressed == len(self._recorded):
-            raise compressed_messages(self.path, 'zstd')
+            raise bag_files.compressed_messages(self.path, 'zstd')
         self._mark_other_publishers()
         self.index: Index = self._recorded[self._recorded.foreign == 0]
 
@@ -291,7 +238,7 @@ class Bag:
             self._schemas[base | record.id] = record.name
         elif isinstance(record, Channel):
             if record.message_encoding != 'cdr':
-                raise foreign_encoding(self.files[number], record)
+                raise bag_files.foreign_encoding(self.files[number], record)
             name = record.topic.lstrip('/')
             if not name.isprintable() or not name:
                 raise ValueError(f'a topic with the name {record.topic!r}')

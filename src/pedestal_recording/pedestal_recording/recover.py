@@ -17,6 +17,7 @@ from mcap.opcode import Opcode
 from pedestal_common.graph import nodes, topics
 from pedestal_common.quantities import Nanoseconds
 from pedestal_recording import bag as bags
+from pedestal_recording import bag_files
 from pedestal_recording.mcap_file import (
     END_OPCODES,
     MAGIC,
@@ -99,7 +100,7 @@ def recover(path: str | pathlib.Path, output: str | pathlib.Path | None = None) 
     Raises BagError if nothing is readable, if the old bag is being written, or if the new bag cannot be written. After
     an error, no part of the new bag remains.
     """
-    files = [McapFile(file) for file in bags.locate(path)]
+    files = [McapFile(file) for file in bag_files.locate(path)]
     if output is None:
         whole = pathlib.Path(path).absolute()
         output = whole.with_name((whole.name if whole.is_dir() else whole.stem) + '-recovered')
@@ -206,7 +207,7 @@ class _Salvage:
         elif not isinstance(record, records.Channel):
             return
         elif record.message_encoding != 'cdr':
-            raise bags.foreign_encoding(self._file.path, record)
+            raise bag_files.foreign_encoding(self._file.path, record)
         elif record.id not in self._channels and record.schema_id in self._schemas:
             channel = self._once(self._bag.add_channel, record.topic, self._schemas[record.schema_id], record.metadata)
             self._channels[record.id] = channel
@@ -284,7 +285,7 @@ class _Salvage:
         Raises BagError if all messages are compressed one by one: the new bag would not state their compression.
         """
         if self._compressed == sum(self._counts.values()):
-            raise bags.compressed_messages(self._file.path, 'zstd')
+            raise bag_files.compressed_messages(self._file.path, 'zstd')
         assert self._first is not None and self._last is not None
         ours = 'pacing' in self._metadata.get('pedestal', {})
         lost = {self._names[channel]: count for channel, count in self._lost.items() if ours and count > 0}

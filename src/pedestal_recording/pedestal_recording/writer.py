@@ -35,7 +35,8 @@ from pedestal_common.graph import nodes, topics
 from pedestal_common.quantities import Json, Nanoseconds
 from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import messages
-from pedestal_recording.bag import locate, planned_end
+from pedestal_recording.bag import planned_end
+from pedestal_recording.bag_files import locate
 from pedestal_recording.mcap_file import MESSAGE_HEAD, BagError, McapFile, frames, reason, walk
 
 TARGET_CHUNK_BYTES = 1_000_000

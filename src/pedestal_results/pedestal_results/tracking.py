@@ -367,6 +367,8 @@ def read(bag: Recording, needs_truth: bool = True) -> Tracking:
         raise ValueError(f'{bag.path}: no {missing} in the bag, so no comparison with the truth is possible')
     joints = bag.table('joint_states')
     t = joints['t']
+    if t.size < 2:
+        raise ValueError(f'{bag.path}: {t.size} steps of joint_states: must be at least 2')
     at_steps = functools.partial(recordings.at, bag, t)
     raw = np.column_stack((joints['azimuth.position'], joints['elevation.position']))
     encoders = directions.on_sky(bag, t, raw)

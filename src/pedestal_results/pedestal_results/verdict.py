@@ -117,8 +117,9 @@ def _leads_to_tracking(mode: str, handover: bool) -> bool:
 def _tracking(bag: Recording, run: Tracking) -> tuple[str, str]:
     """Return (word, sentence) on the tracking of a run, without its faults and refusals."""
     acu = recordings.parameters(bag, 'acu')
-    wanted = {acu.get('initial_mode', 'standby'), *(command.verb for _, command, _ in _replies(bag)),
-              *np.unique(run.mode[run.known_mode]).tolist()}
+    handover = acu.get('tracker.handover', True)
+    wanted = [mode for mode in (acu.get('initial_mode', 'standby'), *(command.verb for _, command, _ in _replies(bag)),
+                                *np.unique(run.mode[run.known_mode]).tolist()) if _leads_to_tracking(mode, handover)]
     shares = {mode: 100.0 * float(np.mean(run.mode == mode)) for mode in modes.MODES if (run.mode == mode).any()}
     distance = run.distance
     near = distance < 0.5 * run.beamwidth
@@ -128,10 +129,10 @@ def _tracking(bag: Recording, run: Tracking) -> tuple[str, str]:
     if by_level.any() and (near[by_level].any() or not math.isfinite(run.beamwidth)):
         whole, rest = _counted_time(bag, run)
         return TRACKED, f'tracked by its level for {run.share("steptrack"):.3g} % of {whole}{rest}'
-    if not any(_leads_to_tracking(mode, acu.get('tracker.handover', True)) for mode in wanted):
+    if not wanted:
         return NO_TARGET, _without_target(shares, acu)
     if not any(modes.MODE_ROWS[modes.MODES.index(mode)].follows for mode in shares):
-        return _never_began(bag, acu.get('initial_mode', 'standby'))
+        return _never_began(bag, wanted[0])
     return _never_tracked(bag, run, distance, near, acu)
 
 
@@ -180,7 +181,7 @@ def _without_target(shares: Mapping[str, float], acu: Mapping[str, Json]) -> str
 
 
 def _never_began(bag: Recording, mode: str) -> tuple[str, str]:
-    """Return (word, sentence) on a run that never entered a mode that follows a target; mode: the initial mode."""
+    """Return (word, sentence) on a run that never entered a mode that follows a target; mode: the first wanted one."""
     values = bag.last_values(f'{bag.beam}acu')
     reason = values.get(f'refused {mode}', '')
     if not reason or reason.startswith(WAITING_REASONS):

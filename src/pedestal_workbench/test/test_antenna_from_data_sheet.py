@@ -88,10 +88,10 @@ def test_what_ships_is_made_by_the_commands_in_its_head(pedestal, tmp_path, name
     (('--mode', '500'), '--mode = 500 Hz: must be 1 to 200, or 0 for the average'),
     (('--like', 'leo_pas'), "--like = 'leo_pas': must be one of leo_pass, geo_station, uav_flyby, ship_pass, "),
     (('--motor-torque', '0.2'), '(adu.azimuth: motor_1.resistance = 128.706 ohm: must be 0.01 to 100)'),
-    (('--motor-torque', '0.5'), '--motor-torque 0.5 Nm: must be 0.525 to 1000, with the other values'),
+    (('--motor-torque', '0.2'), '--motor-torque 0.2 Nm: must be 0.299 to 1000, or --motor-speed 1500 rpm: must be '),
     *(pytest.param(*case, marks=pytest.mark.thorough) for case in (
         (('--ratio-azimuth', '20000'), '--ratio-azimuth 20000: must be 8 to 7990, with the other values'),
-        (('--motor-torque', '1', '--inertia-azimuth', '40000'), '(adu.azimuth: the motors cannot move the axis'),
+        (('--motor-torque', '1', '--inertia-azimuth', '60000'), '(adu.azimuth: the motors cannot move the axis'),
         (('--mirror', '18', '--inertia-azimuth', '200000', '--inertia-elevation', '150000', '--motor-torque', '30',
           '--ratio-azimuth', '64', '--ratio-elevation', '90', '--rate-azimuth', '140', '--rate-elevation', '97'),
          '--inertia-azimuth 200000 kg m2: must be 0.211 to 92800, or --ratio-azimuth 64: must be 93.9 to 7990, or '),
@@ -106,7 +106,7 @@ def test_a_sheet_that_cannot_be_is_refused(pedestal, tmp_path, arguments, expect
 
 @pytest.mark.thorough
 @pytest.mark.parametrize('arguments', [
-    {'motor_torque': 0.5}, {'ratio_azimuth': 2e4}, {'motor_speed': 100.0}, {'mirror': 0.1}, {'inertia_azimuth': 1e6}])
+    {'motor_torque': 0.2}, {'ratio_azimuth': 2e4}, {'motor_speed': 100.0}, {'mirror': 0.1}, {'inertia_azimuth': 1e6}])
 def test_the_ranges_of_a_refusal_are_those_of_the_antenna(arguments):
     """An antenna can be made at both ends of each range, and not 2 % outside, except where the range of the option
     ends."""
@@ -166,7 +166,7 @@ def test_a_large_antenna_is_studied(pedestal, tmp_path):
     (('--rate-azimuth', '400'), 'azimuth', '--rate-azimuth 400: the motors reach 162 deg/s at ratio 64; '),
     (('--ratio-elevation', '300'), 'elevation', '--rate-elevation 97: the motors reach 34.6 deg/s at ratio 300; '),
     (('--inertia-azimuth', '40000'), 'azimuth',
-     '--rate-azimuth 140: the motors can stop the axis within half of its travel from 63.5 deg/s; '),
+     '--rate-azimuth 140: the motors can stop the axis within half of its travel from 6.24 deg/s; '),
     (('--mirror', '13', '--inertia-azimuth', '140000', '--ratio-azimuth', '1500', '--motor-torque', '45'), 'azimuth',
      '--rate-azimuth 7.456: the motors reach 6.92 deg/s at ratio 1500; '),
 ])
@@ -245,11 +245,24 @@ def test_power_and_speed_of_a_motor_give_its_torque(pedestal, tmp_path):
 def test_a_small_dish_with_small_motors_names_a_limited_value_and_the_ratio_that_its_motors_need(pedestal):
     """J = 210 kg m2 (0.6 / 3)^5; motors of 1.372e-6 kg m2 have a fiftieth of 0.1 kg m2 at a ratio of 27."""
     given = ('--mirror', '0.6', '--motor-power', '0.05', '--motor-speed', '3000')
-    code, output, _ = pedestal('new', 'my.yaml', *given)
+    code, output, _ = pedestal('new', 'my.yaml', *given, '--ratio-azimuth', '9.6', '--ratio-elevation', '13.5')
     assert code == 0 and 'at least 0.1 in place of 0.0672' in output
     assert 'azimuth: the inertia of the load is 395 times that of its motors' in output
     assert '--ratio-azimuth 27 avoids this' in output
     assert 'race' not in pedestal('new', 'b.yaml', *given, '--ratio-azimuth', '27.1', '--ratio-elevation', '27.1')[1]
+
+
+@pytest.mark.parametrize('given, ratios, rate', [
+    (('--motor-torque', '15'), (128.0, 180.0), 70.0),                                       # half the torque
+    (('--motor-power', '2.3562', '--motor-speed', '3000'), (256.0, 360.0), 70.0),           # 7.5 Nm at twice the speed
+    (('--motor-torque', '20', '--mirror', '6'), (768.0, 1080.0), 140.0 / 12.0),             # 8 times the wind torque
+    (('--motor-torque', '15', '--ratio-azimuth', '100'), (100.0, 180.0), 0.9 * 103.67)])    # voltage at this ratio
+def test_the_ratio_follows_from_the_motor_of_the_data_sheet(pedestal, tmp_path, given, ratios, rate):
+    """Both motors hold the same wind: 2 x 30 Nm at a ratio of 64 on 3 m."""
+    assert pedestal('new', 'my.yaml', *given)[0] == 0
+    drive = scenario.load(tmp_path / 'my.yaml').node_parameters('adu')
+    assert [getattr(drive, name).gear_train.ratio for name in loops.AXES] == pytest.approx(ratios, rel=1e-3)
+    assert math.degrees(drive.azimuth.limits.rate) == pytest.approx(rate, rel=2e-3)
 
 
 @pytest.mark.parametrize('rate, said', [
@@ -279,6 +292,13 @@ def test_an_antenna_tracks_the_target_of_each_scenario(pedestal, tmp_path, like)
     beamwidth = math.degrees(chosen.node_parameters('tracking_receiver').antenna.beamwidth)
     assert found['tracked_percent'][0] > 90.0 and found['loss_s'][0] == 0.0
     assert found['pointing_rms_deg'][0] < 0.05 * beamwidth
+
+
+def test_a_dish_of_25_m_tracks_before_its_loops_are_measured(pedestal, tmp_path):
+    """Its feed-forward of 2.2 MNm is a valid command of the drive."""
+    assert pedestal('new', 'my.yaml', '--mirror', '25', '--like', 'geo_station')[0] == 0
+    run = RecordedRun(memory_recording.record(scenario.load(tmp_path / 'my.yaml', duration=25.0))).parts['tracking']
+    assert run.lock_time < 2.0 and run.mode[-1] == 'autotrack' and run.distance[-1] < 0.05 * run.beamwidth
 
 
 @pytest.mark.parametrize('share', ('0', '0.5'))

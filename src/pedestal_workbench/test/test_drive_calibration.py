@@ -257,11 +257,13 @@ def test_wrong_options_are_refused(capfd, given, code, message):
     assert message in capfd.readouterr().err
 
 
-def test_recordings_without_the_motions_are_refused():
-    chosen = scenario.load('leo_pass', duration=5.0)
-    recording = twin.read(memory_recording.record(chosen), chosen.node_parameters('adu'))
-    with pytest.raises(ValueError, match='pieces of constant rate at .* run the motions of --plan'):
-        identified.calibrate([recording], 'leo_pass')
+def test_recordings_without_the_motions_or_without_bias_torque_are_refused():
+    for changes, end in (((), '--plan$'), (('adu.azimuth.bias.schedule=off', 'adu.elevation.bias.schedule=off'),
+                                          'teeth rattle without bias torque: add the recording with it, ')):
+        chosen = scenario.load('leo_pass', changes, duration=5.0)
+        recording = twin.read(memory_recording.record(chosen), chosen.node_parameters('adu'))
+        with pytest.raises(ValueError, match=f'azimuth: .* pieces of constant rate at .* run the motions of .*{end}'):
+            identified.calibrate([recording], 'leo_pass')
     with pytest.raises(CalibrationError, match='not enabled all the time'):
         chosen = scenario.load('leo_pass', ('adu.initially_enabled=false',), duration=2.0)
         twin.read(memory_recording.record(chosen), chosen.node_parameters('adu'))

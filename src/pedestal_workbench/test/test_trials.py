@@ -502,8 +502,18 @@ def test_the_worst_is_the_one_that_was_not_measured(tmp_path):
     assert statistics.ranking('isolation_db', values).tolist() == [1, 2, 0, 3]
 
 
-@pytest.mark.parametrize(('name', 'duration', 'size'), (
-    ('leo_pass', 28.0, 32), ('leo_pass', 100.0, 15), ('leo_pass', 600.0, 8), ('ship_pass', 20.0, 4),
-    ('ship_pass', 120.0, 1)))
-def test_a_batch_is_short_so_that_a_stop_keeps_the_rows_of_the_last_seconds(name, duration, size):
-    assert ensemble._batch_size(plan(Variant(name, duration=duration), 100)) == size
+@pytest.mark.parametrize(('name', 'times', 'sizes'), (
+    ('leo_pass', (0.7, 1.0, 12.0, 3.0), [8, 32, 32, 8, 8]), ('ship_pass', (0.1, 2.0, 2.0, 9.0), [1, 4, 4, 4, 1])))
+def test_a_batch_is_short_so_that_a_stop_keeps_the_rows_of_the_last_seconds(tmp_path, name, times, sizes):
+    """A batch should run for 3 s, by the measured times [s] of those before. Two plans advance together."""
+    plans = [plan(Variant(name, duration=20.0), runs) for runs in (60, 50)]
+    with ensemble.open_table(plans[0], tmp_path, 'one') as one, ensemble.open_table(plans[1], tmp_path, 'b') as two:
+        batches = ensemble._Batches(plans, [one, two])
+    made, ended = iter(batches), []
+    for seconds in (*times, *150 * [1.0]):
+        if next(made, None) is None:
+            break
+        ended.append(batches.ended(seconds))
+    assert [len(numbers) for _, numbers in ended][:len(sizes)] == sizes and [i for i, _ in ended][:2] == [0, 1]
+    for i, runs in enumerate((60, 50)):
+        assert [k for j, numbers in ended for k in numbers if j == i] == list(range(runs))

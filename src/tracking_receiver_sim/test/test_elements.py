@@ -110,6 +110,16 @@ def test_numbers_that_a_tle_cannot_hold(case, form, tmp_path):
     assert_same(elements.read(path, number), 'ISS (ZARYA)', number, theirs)
 
 
+def test_a_csv_may_begin_with_the_keyword_of_a_kvn(tmp_path):
+    """Programs that write all keywords of an OMM as columns begin with its version."""
+    path, fields = tmp_path / 'a.csv', {'CCSDS_OMM_VERS': '3.0', **ISS}
+    path.write_text(','.join(fields) + '\n' + ','.join(fields.values()) + '\n')
+    assert elements.read(path).values['omm'] and elements.read(path, '25544').name == elements.read(path).name
+    path.write_text(path.read_text().replace('INCLINATION', 'INCLINATION [rad]'))
+    with pytest.raises(ValueError, match=r'INCLINATION: unit \[rad\]: must be \[deg\]'):
+        elements.read(path)
+
+
 def test_a_history_of_omm_and_a_satellite_without_a_number(tmp_path):
     path = tmp_path / 'a.json'
     later = {**ISS, 'EPOCH': '2019-12-12T00:00:00'}

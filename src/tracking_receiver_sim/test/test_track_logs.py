@@ -189,6 +189,19 @@ def test_two_talkers_in_one_log(tmp_path):
     assert ' of GP (8 fixes' in read(tmp_path, rare).description
 
 
+def test_a_talker_that_changes_is_one_receiver(tmp_path):
+    """Its constellations change. The description names both; a chosen talker is taken alone."""
+    turns = nmea([gga(k, talker='GP' if k in (0, 1, 4, 5, 6) else 'GN', dilution=f'{1.0 + k % 2}') for k in range(N)])
+    got = read(tmp_path, turns)
+    assert got.altitude == pytest.approx(ALTITUDE, abs=1e-3)
+    assert got.description == ('flight.log: NMEA of GP (5 fixes, mean HDOP 1.4) and GN (3 fixes, mean HDOP 1.7), '
+                               'which take turns')
+    assert len(read(tmp_path, turns, aircraft='GP').time) == 5
+    two = nmea([gga(k, time=f'1000{k:02}.{half}0', talker=name) for k in range(N) for half, name in ((0, 'GP'),
+                                                                                                (5, 'GN'))])
+    assert len(read(tmp_path, two).time) == N
+
+
 def test_qualities_and_old_dates_are_named(tmp_path):
     """A receiver whose week counter has overflowed dates a log of 2026 in 2006; 7168 days are 1,024 weeks."""
     made_up = nmea([gga(k, quality='8' if k < 5 else '6') for k in range(N)], date='221106')

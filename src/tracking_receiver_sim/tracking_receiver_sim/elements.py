@@ -158,13 +158,13 @@ def _reader(beginning: str) -> Callable[[FilePath], Iterator[Satellite | csv_tab
         return _xml
     if beginning.startswith(('{', '[')):
         return _json
-    if lines.begins_with(beginning, 'CCSDS_OMM_VERS'):
-        return _kvn
     try:
         names = csv_table.Table('', beginning).fieldnames
     except csv_table.READ_ERRORS:
         names = ()
-    return _csv if 'EPOCH' in names else _tles
+    if 'EPOCH' in names:
+        return _csv
+    return _kvn if lines.begins_with(beginning, 'CCSDS_OMM_VERS') else _tles
 
 
 def _tles(path: FilePath) -> Iterator[Satellite | csv_table.TableError]:

@@ -38,7 +38,7 @@ class AdrcParameters(Parameters):
     bandwidth: float = parameter(60.0, 0.1, 500.0, 'rad/s', 'poles w_c of the state feedback')
     observer_bandwidth: float = parameter(100.0, 0.1, 1000.0, 'rad/s', 'poles w_o of the observer; below w_s / 3 they '
                                           'need an exact rate_bandwidth')
-    rate_bandwidth: float = parameter(176.0, 0.1, 1000.0, 'rad/s', "pole w_s of the drive's rate loop: motor K_p / J")
+    rate_bandwidth: float = parameter(176.0, 0.1, 4000.0, 'rad/s', "pole w_s of the drive's rate loop: motor K_p / J")
 
 
 @dataclasses.dataclass(frozen=True)

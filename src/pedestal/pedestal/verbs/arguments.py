@@ -12,6 +12,7 @@ from pedestal import console
 from pedestal_common.parameters import flatten, option_of
 
 if typing.TYPE_CHECKING:
+    from pedestal.satellite import Choice
     from pedestal_bringup.scenario.variant import Variant
     from pedestal_operator.remote_node import RemoteSession
     from pedestal_recording.recording import Recording
@@ -122,6 +123,25 @@ def add_elements(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--satellite',
                         default='', metavar='NAME', help='name or catalogue number of the satellite, if '
                         'the file of --tle contains several')
+
+
+def add_choice(parser: argparse.ArgumentParser, more: str = '') -> None:
+    """Add the options of `choice`. more: end of the help of --pass."""
+    add_elements(parser)
+    add_station(parser)
+    parser.add_argument('--pass', dest='which', metavar='WHICH', help='pass to track from rise to set, or about its '
+                        'culmination with a shorter --duration. next: the next pass; N: number N of the list; a UTC '
+                        'such as 2019-12-10T12:35: the pass at this UTC, from there on, or the first after it'
+                        f'{more}; default with --tle: next')
+    parser.add_argument('--start', metavar='START', help='begin of the run: a UTC, or +S for S seconds after the rise '
+                        'of the pass')
+
+
+def choice(options: argparse.Namespace) -> 'Choice':
+    """Return the satellite, station and pass of the command line. Raises ValueError for --satellite without --tle."""
+    from pedestal.satellite import Choice
+    check_elements(options)
+    return Choice(options.tle, options.satellite, options.station, options.which, options.start)
 
 
 def check_elements(options: argparse.Namespace) -> None:

@@ -37,14 +37,7 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
     console.add_all(parser)
     console.add_explain(parser)
     arguments.add_param(parser)
-    arguments.add_elements(parser)
-    arguments.add_station(parser)
-    parser.add_argument('--pass', dest='which', metavar='WHICH', help='pass to track from rise to set, or about its '
-                        'culmination with a shorter --duration. next: the next pass; N: number N of the list; a UTC '
-                        'such as 2019-12-10T12:35: the pass at this UTC, from there on, or the first after it; list: '
-                        'only print the passes; default with --tle: next')
-    parser.add_argument('--start', metavar='START', help='begin of the run: a UTC, or +S for S seconds after the rise '
-                        'of the pass')
+    arguments.add_choice(parser, '; list: only print the passes')
     arguments.add_params_file(parser)
     parser.add_argument('--drives', choices=('adu', 'simulated'), help='simulated: four simulated CiA 402 '
                         'servo drives on a CAN bus of this machine, and drive_node in place of the drive unit; needs '
@@ -52,7 +45,7 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--receiver', metavar='PROGRAM', help='ROS 2 node of yours in place of the simulated '
                         'receiver: FILE.py or PACKAGE/EXECUTABLE, in quotes with its arguments. simulated-iq: I/Q '
                         'samples by UDP, and monopulse_receiver_node, in realtime; default: value of the scenario')
-    for name, place in (('ship', 'ship and its IMU'), ('ins', 'INS'), ('drive', 'drive, in realtime')):
+    for name, place in (('ship', 'ship and its IMU'), ('ins', 'INS'), ('drive', 'drive')):
         parser.add_argument(f'--{name}', metavar='PROGRAM', help='ROS 2 node of yours, as for --receiver, in place of '
                             f'the simulated {place}')
     from pedestal_bringup.graph.operator_servers import SERVER_ADDRESS, SERVERS, port
@@ -183,12 +176,11 @@ def _chosen(options: argparse.Namespace) -> 'Scenario | None':
     equipment = [files.override(f'scenario.{name}' if name == 'drives' or value in RECEIVERS else
                                 f'scenario.own.{name}', value) for name, value in given.items()]
     changes = equipment + arguments.variant(options).overrides()
-    arguments.check_elements(options)
-    if options.tle is options.station is options.which is options.start is None:
+    choice = arguments.choice(options)
+    if not choice.made:
         return scenario.load(options.scenario, changes, options.seed, options.duration, options.pacing)
     from pedestal import satellite
     now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
-    choice = satellite.Choice(options.tle, options.satellite, options.station, options.which, options.start)
     draft = scenario.draft(options.scenario)
     if options.which == 'list':
         from pedestal_bringup.graph import operator_servers

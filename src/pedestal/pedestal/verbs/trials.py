@@ -1,6 +1,7 @@
 """Verb `trials`: many runs with varied parameters, their statistics, comparison and search."""
 import argparse
 import dataclasses
+import datetime
 import math
 import pathlib
 import re
@@ -54,6 +55,7 @@ def _add_trials(parser: argparse.ArgumentParser) -> None:
                         'scenario')
     arguments.add_param(parser)
     arguments.add_params_file(parser)
+    arguments.add_choice(parser)
     _add_questions(parser)
     arguments.add_workers(parser)
     parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='output folder; default: '
@@ -87,7 +89,25 @@ def _trials(options: argparse.Namespace) -> int:
         arguments.refuse_given(options, ('side', 'against', 'against_param', 'require', 'by'),
                                'has no effect with --solve')
     console.check_json(options.json)
+    _choose(options)
     return _solve(options) if options.solve else _compare(options)
+
+
+def _choose(options: argparse.Namespace) -> None:
+    """Put the satellite, station and pass of the options into the changes that all trials share."""
+    choice = arguments.choice(options)
+    if not choice.made:
+        return
+    if choice.which == 'list':
+        raise ValueError('--pass list: must be next, N or a UTC; pedestal run --pass list prints the passes')
+    from pedestal import satellite
+    from pedestal_bringup.scenario import scenario
+    now = datetime.datetime.now(datetime.timezone.utc).replace(tzinfo=None)
+    found = satellite.chosen(scenario.draft(options.scenario), arguments.variant(options).overrides(), choice,
+                             options.duration, now)
+    options.param, options.params_file, options.duration = found.changes, [], found.duration
+    for line in found.lines:
+        print(line)
 
 
 def _folder(options: argparse.Namespace, name: str) -> pathlib.Path:

@@ -8,6 +8,7 @@ from rclpy.executors import SingleThreadedExecutor
 from pedestal_bringup.graph.operator_node import Operator
 from pedestal_bringup.graph.processes import Graph, exit_description
 from pedestal_common.graph import nodes
+from pedestal_common.node import middleware
 from pedestal_common.quantities import Message, Seconds
 
 ACCUSATION_TIME_S = 0.5
@@ -30,7 +31,7 @@ def watch(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
         return operator.stuck(names, executor)
 
     while graph.ended().get(nodes.DRIVE_NODE) != 0:
-        executor.spin_once(timeout_sec=0.1 if sent else 0.02)
+        middleware.turn(executor, 0.1 if sent else 0.02)
         sent = sent or operator.send_to(graph.scenario.nodes, tracks)
         progress(operator.time)
         if any(code != 0 or node not in SELF_ENDING_NODES for node, code in graph.ended().items()):
@@ -39,7 +40,8 @@ def watch(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
         # and names the other node, which is the better error.
         silent = operator.silent(2.0 * header.deadline)
         if silent:
-            raise failure(graph, stuck_nodes, silent)
+            # A drive of the user publishes no diagnostics. No node waits for it, because its messages begin the steps.
+            raise failure(graph, stuck_nodes, nodes.DRIVE_NODE if nodes.DRIVE_NODE in graph.scenario.own else silent)
     progress(header.duration)
     if not graph.stop():     # a node did not end with exit code 0
         raise failure(graph, stuck_nodes)

@@ -9,6 +9,7 @@ from rclpy.task import Future
 
 from pedestal_common import parameters
 from pedestal_common.graph import domain, nodes
+from pedestal_common.node import middleware
 from pedestal_common.node.shell import Shell
 from pedestal_common.quantities import Message, Nanoseconds, Seconds
 from pedestal_common.wire import messages
@@ -102,5 +103,5 @@ class Operator(Shell):
             for node, client in clients.items():
                 if node not in calls and client.service_is_ready():
                     calls[node] = client.call_async(request)
-            executor.spin_once(timeout_sec=0.02)
+            middleware.turn(executor, 0.02)
         return {node: call.result() for node, call in calls.items() if call.done()}

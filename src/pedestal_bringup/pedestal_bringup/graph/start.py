@@ -47,7 +47,7 @@ def parameters_of_all(scenario: Scenario, bag: pathlib.Path, start: Nanoseconds,
     `graph.` that all share.
 
     changes: {node: {name: value}} that the scenario does not contain; own: graph.own. A program of the user gets only
-    the parameters `graph.`.
+    the parameters `graph.`, a drive also its period, and in lockstep the duration.
     """
     names = ','.join(dict.fromkeys(map(nodes.plain, scenario.nodes)))
     shared = {'graph.pacing': scenario.header.pacing, 'graph.nodes': names, 'graph.beams': scenario.header.graph_beams,
@@ -57,6 +57,9 @@ def parameters_of_all(scenario: Scenario, bag: pathlib.Path, start: Nanoseconds,
     # The operator runs in this process and reads no parameter file.
     sections = {node: {**({} if node in scenario.own else scenario.given(node)), **shared}
                 for node in scenario.nodes if node != 'operator'}
+    if nodes.DRIVE_NODE in scenario.own:
+        lasts = {'duration': scenario.header.duration} if scenario.header.pacing == 'lockstep' else {}
+        sections[nodes.DRIVE_NODE].update(period=scenario.node_parameters(nodes.DRIVE_NODE).period, **lasts)
     for node, values in (changes or {}).items():
         sections[node].update(values)
     sections['recorder'].update(bag=str(bag), **configuration.recorder_parameters(scenario))

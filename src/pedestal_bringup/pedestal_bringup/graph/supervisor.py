@@ -16,6 +16,7 @@ from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_common.compiled import is_compiled
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
+from pedestal_common.node import middleware
 from pedestal_common.quantities import Message, Nanoseconds, Seconds
 from pedestal_recording.verify import count
 
@@ -80,7 +81,7 @@ class Supervisor:
         executor.add_node(self._operator)
         self._operator.send(tracks)
         while self._is_running():
-            executor.spin_once(timeout_sec=0.1)
+            middleware.turn(executor, 0.1)
             progress(min(max(time.time_ns() - self._start, 0), self._end - self._start) / NS_PER_SECOND)
             self.check_processes(time.monotonic())
 

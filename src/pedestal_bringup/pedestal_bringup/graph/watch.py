@@ -61,7 +61,9 @@ def _in_lockstep(graph: Graph, operator: Operator, tracks: Mapping[str, Message]
     except KeyboardInterrupt:
         graph.stop()
         return Outcome(graph.result(nodes.DRIVE_NODE), graph.result('recorder'), stopped=True)
-    return Outcome(graph.outcome(nodes.DRIVE_NODE), graph.outcome('recorder'))
+    # A drive of the user prints no result.
+    drive = graph.result if nodes.DRIVE_NODE in graph.scenario.own else graph.outcome
+    return Outcome(drive(nodes.DRIVE_NODE), graph.outcome('recorder'))
 
 
 def _in_realtime(graph: Graph, operator: Operator, tracks: Mapping[str, Message],
@@ -125,14 +127,15 @@ def _equipment_begun(graph: Graph, operator: Operator, changes: Changes, own: st
     executor = SingleThreadedExecutor()
     executor.add_node(operator)
     # A drive node ends by itself after LATEST_START_S, with an error that names the drives.
-    chosen = chosen_start(graph, operator, executor.spin_once, part, LATEST_START_S + START_LEAD_TIME_S)
+    chosen = chosen_start(graph, operator, lambda seconds: middleware.turn(executor, seconds), part,
+                          LATEST_START_S + START_LEAD_TIME_S)
     executor.remove_node(operator)
     return chosen
 
 
-def chosen_start(graph: Graph, operator: Operator, spin: Callable[..., object], part: str,
+def chosen_start(graph: Graph, operator: Operator, spin: Callable[[Seconds], object], part: str,
                  limit: Seconds) -> Nanoseconds:
-    """Wait until the node of simulated equipment chooses time 0, and return it. spin(timeout_sec) lets the operator
+    """Wait until the node of simulated equipment chooses time 0, and return it. spin(seconds) lets the operator
     take diagnostics. Raises RuntimeError that names the node and what it awaits."""
     chooser, heard = nodes.SIMULATED_PARTS[part], ['no diagnostics']
     chosen: list[Nanoseconds] = []
@@ -144,7 +147,7 @@ def chosen_start(graph: Graph, operator: Operator, spin: Callable[..., object], 
     operator.on_diagnostics = note
     end = time.monotonic() + limit
     while not chosen:
-        spin(timeout_sec=0.1)
+        spin(0.1)
         for node, code in graph.ended().items():
             if node in (chooser, part):
                 raise RuntimeError(graph.exit_report(node, exit_description(code)))
@@ -172,7 +175,7 @@ def send_program(plan: Plan, start: Nanoseconds | None = None, ros_arguments: Se
         operator.send(tracks)
         print(f'{", ".join(tracks) or "no program track"} sent; latched for late joiners until Ctrl-C', flush=True)
         while True:
-            executor.spin_once(timeout_sec=0.2)
+            middleware.turn(executor, 0.2)
     except KeyboardInterrupt:
         return 0
     finally:

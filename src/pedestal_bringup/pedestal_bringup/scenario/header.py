@@ -49,8 +49,7 @@ class OwnParameters(parameters.Parameters):
                                     'arguments')
     ship: str = parameters.text('', 'program in the place of the ship and its IMU, likewise')
     ins: str = parameters.text('', 'program in the place of the INS, likewise')
-    drive: str = parameters.text('', 'program in the place of the drive, likewise; it sets the time, and needs '
-                                 'pacing = realtime')
+    drive: str = parameters.text('', 'program in the place of the drive, likewise; it makes the steps')
 
     def check(self) -> None:
         """Raise ParameterError for a text that names no program."""
@@ -108,8 +107,7 @@ class ScenarioParameters(parameters.Parameters):
         for option, fits, needed in (
                 ('ship', self.ship, 'ship = true'), ('ins', self.ship, 'ship = true'),
                 ('receiver', not self.iq, 'receiver = simulated'), ('receiver', self.beams == 1, 'beams = 1'),
-                ('drive', not self.servo, 'drives = adu'), ('drive', not self.beam, 'beam = false'),
-                ('drive', self.pacing == 'realtime', 'pacing = realtime, because a drive of the user sets the time')):
+                ('drive', not self.servo, 'drives = adu'), ('drive', not self.beam, 'beam = false')):
             if getattr(own, option) and not fits:
                 raise parameters.ParameterError(f'own.{option} = {getattr(own, option)}: needs {needed}')
 

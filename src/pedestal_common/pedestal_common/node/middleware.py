@@ -16,8 +16,9 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_namespace import validate_namespace
 
+from pedestal_common import ignored_stop
 from pedestal_common.graph import domain, topics
-from pedestal_common.quantities import Value
+from pedestal_common.quantities import Seconds, Value
 from pedestal_common.text_files import parameter_file, plain_yaml
 from pedestal_common.text_files.files import FilePath
 
@@ -98,6 +99,12 @@ def _as_read(path: FilePath, stated: Mapping[str, Value]) -> str:
     with open(copy, 'w', closefd=False) as stream:
         stream.write(parameter_file.dumped(sections))
     return f'/proc/self/fd/{copy}'
+
+
+def turn(executor: Executor, seconds: Seconds) -> None:
+    """Receive messages for some seconds, or until the first callback. A stop of `pedestal` follows at its end."""
+    with ignored_stop.uninterrupted():
+        executor.spin_once(timeout_sec=seconds)
 
 
 def make_executor(context: Context | None = None) -> Executor:

@@ -21,6 +21,7 @@ MIN_MOTION_SHARE = 0.05  # smallest share of its rate with which an axis is in m
 HOLD_TIME_NS = 5_000_000_000  # time after a stop for which an axis must stand
 PERSISTENCE_NS = 1_400_000_000  # shortest time for which a slow axis goes away
 MIN_EXCESS_COUNT = 2  # smallest number of measurements in a row with an excess
+GOES_ON, BEGINS, STOPS = range(3)  # goal of an axis: as before, the first after a stop, the angle of a stop
 STOP_REPEAT_NS = 1_000_000_000  # time after which an axis that still moves in a fault is stopped again
 
 
@@ -80,9 +81,10 @@ def _beyond(axis: AxisWatch, angle: Radians) -> Radians:
 
 @compiled
 def _aim(axis: AxisWatch, i: int, limits: Limits, angle: Radians, goal: Radians, stamp: Nanoseconds,
-         dt_ns: Nanoseconds, begins: bool, stops: bool) -> None:
-    """Extend the interval to a goal; an end whose set-point is no longer obeyed becomes the goal. begins: the goal is
-    the first after a stop; stops: it is a stop."""
+         dt_ns: Nanoseconds, change_of_goal: int) -> None:
+    """Extend the interval to a goal; an end whose set-point is no longer obeyed becomes the goal. change_of_goal:
+    GOES_ON, BEGINS or STOPS."""
+    begins, stops = change_of_goal == BEGINS, change_of_goal == STOPS
     reaction_ns, change, moved, dt = limits.reaction_ns, goal - axis.goal, angle - axis.last, dt_ns * 1e-9
     passes = (axis.goal - axis.last) * (goal - angle) <= 0.0 and change * moved < 0.0
     if stops or (begins or passes) and abs(moved) > MIN_MOTION_SHARE * limits.rate * dt:
@@ -133,10 +135,11 @@ def step(state: State, limits: Limits, stamp: Nanoseconds, angles: Pair, set_poi
         if state.free == 1 and held or first:
             _begin_at(axis, angles[i], stamp)
         if moving == 1:
-            _aim(axis, i, limits, angles[i], set_point[i], stamp, dt_ns, state.moving == 0, False)
+            _aim(axis, i, limits, angles[i], set_point[i], stamp, dt_ns, BEGINS if state.moving == 0 else GOES_ON)
         elif held:
             stops = state.moving == 1
-            _aim(axis, i, limits, angles[i], angles[i] if stops else axis.goal, stamp, dt_ns, False, stops)
+            _aim(axis, i, limits, angles[i], angles[i] if stops else axis.goal, stamp, dt_ns,
+                 STOPS if stops else GOES_ON)
         else:
             axis.low, axis.high = limits.low[i], limits.high[i]
             axis.reach_low = axis.reach_high = axis.low

@@ -150,12 +150,25 @@ class Rotctld(LineProtocol):
 
 class Gs232(LineProtocol):
     """Yaesu GS-232A and GS-232B, whole degrees. A set-point cannot be negative, a position can. `?>` is the answer to
-    a request that the device does not understand, and the prompt of some controllers (K3NG) behind each answer."""
+    a request that the device does not understand, and the prompt of some controllers (K3NG) behind each answer. The
+    elevation may have a line of its own."""
     ASK, STOP, RESOLUTION, RANGE = b'C2\r', b'S\r', 1.0, (0.0, 720.0)
     _ANGLE = rb'([-+]?\d{2,4}(?:[.,]\d+)?)'     # below three digits only behind a sign: a line loses bytes
     _POSITION = re.compile(rb'AZ=(?=[-+]|\d{3})' + _ANGLE + rb'(?:\s*,?\s*EL=(?=[-+]|\d{3})' + _ANGLE + rb')?|'
                            rb'([-+]0\d{3}(?:[.,]\d+)?)\s*([-+]0\d{3}(?:[.,]\d+)?)?')
+    _ELEVATION = re.compile(rb'(?:EL=)?(?=[-+]|(?<==)\d{3})' + _ANGLE)
     _PROMPT = re.compile(rb'\s*\??>')
+
+    def __init__(self, azimuth_only: bool = False) -> None:
+        super().__init__(azimuth_only)
+        self._azimuth: bytes | None = None  # of a line without elevation, until the next request
+        self._half = False      # True if an earlier request was answered without elevation
+
+    def sent(self, request: bytes) -> None:
+        """Forget half an answer to an earlier request."""
+        super().sent(request)
+        self._half |= self._azimuth is not None
+        self._azimuth = None
 
     def set_point(self, azimuth: Degrees, elevation: Degrees, pulses: Pulses | None) -> bytes:
         """Return the request to move to these angles."""
@@ -179,13 +192,19 @@ class Gs232(LineProtocol):
         if prompt:
             yield self._prompt(prompt[0])
             line = line[prompt.end():].strip()
-        match = self._POSITION.fullmatch(line)
-        if match:
+        match, second = (pattern.fullmatch(line.upper()) for pattern in (self._POSITION, self._ELEVATION))
+        if second and self._azimuth is not None:
+            azimuth, self._azimuth, self._half = self._azimuth, None, False
+            if not self.azimuth_only:
+                yield checked(azimuth, second[1])
+        elif match:
             azimuth, elevation = match[1] or match[3], match[2] or match[4]
-            if elevation is None and not self.azimuth_only:
-                yield Refusal(NO_ELEVATION)
-            else:
+            if elevation is None:
+                self._azimuth = azimuth
+            if self.azimuth_only or elevation is not None:
                 yield checked(azimuth, b'0' if self.azimuth_only else elevation)
+            elif self._half:
+                yield Refusal(NO_ELEVATION)
         elif line and not self._is_echo(line):
             yield Refusal(f'answer {line.decode(errors="replace")!r}: must be AZ=aaa EL=eee, or +0aaa+0eee')
 
@@ -205,6 +224,7 @@ class Easycomm(LineProtocol):
     ASK, STOP, RESOLUTION = b'AZ EL \n', b'SA SE \n', 0.1
     _WORD = re.compile(rb'(AZ|EL|(?=[-+]))=?([-+]?\d+(?:[.,]\d*)?)')
     _BETWEEN_WORDS = re.compile(rb'[\s;]+|,(?=[A-Z\s+-]|$)')
+    _RADIO = re.compile(rb'\b(?:UP|DN)\d+(?:\s+[A-Z]+)?')     # frequency and kind of modulation
 
     def __init__(self, azimuth_only: bool = False) -> None:
         super().__init__(azimuth_only)
@@ -223,8 +243,8 @@ class Easycomm(LineProtocol):
 
     def answers_of(self, line: bytes) -> Iterator[Answer]:
         """Yield the position once both angles have arrived; other words, such as alarms, are refused."""
-        for word in filter(None, self._BETWEEN_WORDS.split(line)):
-            match = self._WORD.fullmatch(word)
+        for word in filter(None, self._BETWEEN_WORDS.split(self._RADIO.sub(b'', line))):
+            match = self._WORD.fullmatch(word.upper())
             if not match:
                 if word not in self.ask.split():
                     yield Refusal(f'answer {word.decode(errors="replace")!r}: must be AZaaa.a or ELeee.e')

@@ -4,15 +4,18 @@ The numbers do not depend on the number of workers, nor on an interruption. A tr
 ROS, which has the same data as the lockstep recording of the trial's command. Trials ashore run side by side
 (pedestal_bringup.loop.side_by_side), trials on a ship or with an array one after the other.
 """
+import collections
 import contextlib
 import functools
+import math
 import pathlib
+import time
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from pedestal_bringup.loop import closed_loop, memory_recording, side_by_side
-from pedestal_common.quantities import Json, Records
+from pedestal_common.quantities import Json, Records, Seconds
 from pedestal_common.wire import records
 from pedestal_results import results
 from pedestal_results.recorded_run import RecordedRun
@@ -23,9 +26,9 @@ from pedestal_workbench.trials.table import Table
 
 MAX_SERIAL_TRIALS = 4  # largest number of trials in a batch, the work of one worker, that run one after the other
 
-MAX_PARALLEL_BATCH_S, MAX_SERIAL_BATCH_S = 1500.0, 150.0
-"""Largest simulated time of a batch, in both cases [s]. The rows of a batch are written at its end. These times take
-about 5 s of a core, so that a stop loses no more."""
+BATCH_S = 3.0
+"""Time for which a batch should run [s], by the measured time of the batches before. The rows of a batch are written
+at its end, so that a stop loses little, also on a busy machine."""
 
 TRIAL_RESULTS = tuple(result.name for result in results.RESULTS if result.part not in ('run', 'supervised'))
 """Names of the results of a trial: all results of `pedestal run`, except those on its processes."""
@@ -88,12 +91,46 @@ def _batch(plan: Plan) -> list[list[Json]]:
     return [values + why for values, why in zip(found, whys)]
 
 
-def _batch_size(plan: Plan) -> int:
-    chosen = plan.scenario(0)
-    parallel, duration = side_by_side.max_parallel_trials(chosen, MEASURED_TOPICS), chosen.header.duration
-    if parallel < side_by_side.MIN_PARALLEL_LOOPS:
-        return max(1, min(MAX_SERIAL_TRIALS, int(MAX_SERIAL_BATCH_S / duration)))
-    return max(side_by_side.MIN_PARALLEL_LOOPS, min(parallel, int(MAX_PARALLEL_BATCH_S / duration)))
+def _timed(plan: Plan) -> tuple[Seconds, list[list[Json]]]:
+    """Return the time that a batch took, and its rows."""
+    begun = time.monotonic()
+    rows = _batch(plan)
+    return time.monotonic() - begun, rows
+
+
+class _Batches:
+    """Iterator over the parts of plans that their tables lack: the next batch of the plan with the fewest trials, so
+    that all plans advance together."""
+
+    def __init__(self, plans: Sequence[Plan], tables: Sequence[Table]) -> None:
+        self._plans, self._next = plans, [min(len(table.rows), plan.runs) for plan, table in zip(plans, tables)]
+        most = min(side_by_side.max_parallel_trials(plan.scenario(0), MEASURED_TOPICS) for plan in plans)
+        parallel = most >= side_by_side.MIN_PARALLEL_LOOPS
+        self._least, self._most = (side_by_side.MIN_PARALLEL_LOOPS, most) if parallel else (1, MAX_SERIAL_TRIALS)
+        self._size = self._least
+        self.begun: collections.deque[tuple[int, range]] = collections.deque()     # (plan, trials) of batches at work
+        self.missing = sum(plan.runs - first for plan, first in zip(plans, self._next))
+
+    @property
+    def count(self) -> int:
+        """Largest number of batches."""
+        return -(-self.missing // self._least)
+
+    def __iter__(self) -> Iterator[Plan]:
+        while left := [i for i, plan in enumerate(self._plans) if self._next[i] < plan.runs]:
+            i = min(left, key=self._next.__getitem__)
+            numbers = range(self._next[i], min(self._next[i] + self._size, self._plans[i].runs))
+            self._next[i] = numbers.stop
+            self.begun.append((i, numbers))
+            yield self._plans[i].part(numbers)
+
+    def ended(self, seconds: Seconds) -> tuple[int, range]:
+        """Return the (plan, trials) of the oldest batch, and take the time for which it ran. A size is the least one
+        times a power of two, because the memory of a batch is used again by the next one of its size."""
+        i, numbers = self.begun.popleft()
+        fitting = min(BATCH_S / max(seconds, 1e-3) * len(numbers), self._most)
+        self._size = self._least * 2**max(int(math.log2(max(fitting, self._least) / self._least)), 0)
+        return i, numbers
 
 
 def run_missing_trials(plans: Sequence[Plan], tables: Sequence[Table], pool: monte_carlo.Pool,
@@ -101,20 +138,14 @@ def run_missing_trials(plans: Sequence[Plan], tables: Sequence[Table], pool: mon
     """Run the trials of plans that are missing in their tables, and append their rows to the tables. The batches of
     several plans alternate, so all plans advance together. progress(trials done, all trials) is called after each
     batch. Raises ValueError that names a trial."""
-    pieces = []
-    size = min(map(_batch_size, plans))
-    for first in range(0, max(plan.runs for plan in plans), size):
-        for plan, table in zip(plans, tables):
-            numbers = range(max(first, len(table.rows)), min(first + size, plan.runs))
-            if numbers:
-                pieces.append((plan, table, numbers))
-    total = sum(plan.runs for plan in plans)
-    done = total - sum(len(numbers) for *_, numbers in pieces)
+    batches, total = _Batches(plans, tables), sum(plan.runs for plan in plans)
+    done = total - batches.missing
     progress(done, total)
-    found = pool.map(_batch, [plan.part(numbers) for plan, _, numbers in pieces])
-    for (plan, table, numbers), values in zip(pieces, found):
-        table.append([[i, plan.seed + i, *(column[i] for column in plan.varied.values()), *own]
-                      for i, own in zip(numbers, values)])
+    for seconds, values in pool.each(_timed, batches, batches.count):
+        number, numbers = batches.ended(seconds)
+        plan = plans[number]
+        tables[number].append([[i, plan.seed + i, *(column[i] for column in plan.varied.values()), *own]
+                               for i, own in zip(numbers, values)])
         done += len(numbers)
         progress(done, total)
     # An earlier, longer call may have left more rows in the file than this plan has trials.

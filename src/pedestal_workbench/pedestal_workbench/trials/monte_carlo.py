@@ -83,14 +83,19 @@ class Pool:
         """Yield function(item) of each item, in their order. function: of a module, because others cannot be sent to
         workers."""
         items = list(items)
-        jobs = -1 if self.scheduler else min(self.workers, len(items) or 1)
+        for done, result in enumerate(self.each(function, items, len(items)), 1):
+            progress(done / len(items), f'{done} of {len(items)} batches')
+            yield result
+
+    def each(self, function: Callable[[_Item], _Result], items: Iterable[_Item], count: int) -> Iterator[_Result]:
+        """Yield as `map`. The workers take the next items while earlier results are yielded; count: largest
+        number of items."""
+        jobs = -1 if self.scheduler else min(self.workers, count or 1)
         options = {} if self.scheduler else {'backend': 'loky'}
         with _deferred_interrupt() if jobs > 1 else contextlib.nullcontext():
             results = joblib.Parallel(jobs, return_as='generator', **options)(map(joblib.delayed(function), items))
             self._stack.callback(results.close)
-        for done, result in enumerate(results, 1):
-            progress(done / len(items), f'{done} of {len(items)} batches')
-            yield result
+        yield from results
 
     def of_cases(self, function: Callable[[tuple[_Case, int, int]], ArrayLike], cases: Collection[_Case], runs: int,
                  size: int, progress: Progress = lambda share, text: None) -> dict[_Case, Floats]:

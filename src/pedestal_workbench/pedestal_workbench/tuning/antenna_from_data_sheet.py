@@ -181,10 +181,10 @@ def _receiver(name: str) -> TrackingReceiverParameters:
 def _scaled(given: DataSheet, sheet: DataSheet) -> list[str]:
     """Return a line for each value that the data sheet `given` lacks and `sheet` has, with its rule."""
     meta = {name: field.metadata for name, field in flatten(DataSheet)}
+    given = given.with_torque()
+    lacking = {name: given.scaled(name) for name in data_sheet.SCALED_FIELDS if is_absent(getattr(given, name))}
     rows = [(law.for_loops, option_of(name), f'{getattr(sheet, name):.4g} {meta[name]["unit"]}'.rstrip(),
-             law.text + _limited(getattr(sheet, name), sheet.scaled(name)))
-            for name, (_, law) in data_sheet.SCALED_FIELDS.items()
-            if is_absent(getattr(given, name)) and (name != 'motor_torque' or is_absent(given.motor_power))]
+             law.text + _limited(getattr(sheet, name), value)) for name, (value, law) in lacking.items()]
     axes, fields = [axis(sheet, name) for name in AXES], dict(flatten(AxisParameters))
     rows += [(rule.for_loops, rule.label, ', '.join(f'{values[rule.keys[0]]:.4g}' for values in axes)
               + f' {fields[rule.keys[0]].metadata["unit"]}', rule.text) for rule in RULES]

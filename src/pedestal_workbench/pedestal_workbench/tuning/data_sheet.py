@@ -37,21 +37,34 @@ KNOWN_MIRROR_M = DEFAULT_DIAMETER_M  # diameter of the mirror of the default ant
 class Law(NamedTuple):
     """Law by which a value follows from that of the default antenna."""
     text: str
-    share: Callable[[float], float]     # factor, from the ratio of the diameters
-    for_loops: bool                     # True if the loops depend on the value most
+    share: Callable[[float, float, float], float]   # factor, from the ratios of diameter, motor torque and motor speed
+    for_loops: bool                                 # True if the loops depend on the value most
 
 
-_INERTIA = Law('diameter^5: equal shape and material', lambda d: d**5, True)
+def _ratio_share(load: float) -> float:
+    """Return the share of the gear ratio for a share of the torque on the axis per torque of a motor, limited so that
+    a gear can have it."""
+    return min(max(load, 0.15), 100.0)
+
+
+_INERTIA = Law('diameter^5: equal shape and material', lambda d, _torque, _speed: d**5, True)
 _RATIO = Law('diameter^2 to 30 m: with the motor the wind torque, diameter^3',
-             lambda d: min(max(d**2, 0.15), 100.0), True)
-_RATE = Law('diameter^-2 above 3 m, with the gear ratio', lambda d: min(1.0, d**-2), False)
-_TORQUE = Law('diameter: with the gear ratio the wind torque, diameter^3', lambda d: max(d, 0.1), True)
+             lambda d, _torque, _speed: _ratio_share(d**2), True)
+_RATE = Law('diameter^-2 above 3 m, with the gear ratio', lambda d, _torque, _speed: min(1.0, d**-2), False)
+_TORQUE = Law('diameter: with the gear ratio the wind torque, diameter^3', lambda d, _torque, _speed: max(d, 0.1),
+              True)
+_RATIO_OF_MOTOR = Law('diameter^3 / motor torque, 0.15 to 100 times that of 3 m: the wind torque',
+                      lambda d, torque, _speed: _ratio_share(d**3 / torque), True)
+_RATE_OF_MOTOR = Law('motor speed / gear ratio, at most that of 3 m',
+                     lambda d, torque, speed: min(1.0, speed / _ratio_share(d**3 / torque)), False)
 
 SCALED_FIELDS: dict[str, tuple[float, Law]] = {
     'inertia_azimuth': (210.0, _INERTIA), 'inertia_elevation': (150.0, _INERTIA), 'ratio_azimuth': (64.0, _RATIO),
     'ratio_elevation': (90.0, _RATIO), 'motor_torque': (30.0, _TORQUE), 'rate_azimuth': (140.0, _RATE),
     'rate_elevation': (97.0, _RATE)}
 """{field that a data sheet may lack: (value of the default antenna, law)}."""
+
+LAWS_OF_MOTOR = {_RATIO: _RATIO_OF_MOTOR, _RATE: _RATE_OF_MOTOR}  # laws for a data sheet with the torque of its motors
 
 GRID_COUNT, BISECTIONS, MAX_OPTIONS = 8, 10, 3
 """Number of tried values on each side of the refused value; number of bisections of an edge; largest number of options
@@ -100,26 +113,37 @@ class DataSheet(Parameters):
     def completed(self) -> 'DataSheet':
         """Return the data sheet with a torque for its power, and with scaled values for those that it lacks. Raises
         ParameterError."""
-        sheet = self
-        limits = {name: field.metadata for name, field in flatten(DataSheet) if name in SCALED_FIELDS}
-        if not is_absent(self.motor_power):
-            speed = self.motor_speed * math.pi / 30.0
-            low, high = (limits['motor_torque'][end] for end in ('low', 'high'))
-            torque = float(f'{1e3 * self.motor_power / speed:.4g}')
-            if not low <= torque <= high:
-                raise ParameterError(f'{option_of("motor_power")} {self.motor_power:g} kW: must be '
-                                     f'{1e-3 * low * speed:.3g} to {1e-3 * high * speed:.3g} at '
-                                     f'{self.motor_speed:g} rpm, for a torque of {low:g} to {high:g} Nm')
-            sheet = dataclasses.replace(self, motor_power=NOT_GIVEN, motor_torque=torque)
+        sheet, limits = self.with_torque(), _limits()
         values: dict[str, Json] = {
-            name: min(max(self.scaled(name), limits[name]['low']), limits[name]['high'])
+            name: min(max(sheet.scaled(name)[0], limits[name]['low']), limits[name]['high'])
             for name in SCALED_FIELDS if is_absent(getattr(sheet, name))}
         return dataclasses.replace(sheet, **values)
 
-    def scaled(self, name: str) -> float:
-        """Return the value of one of SCALED_FIELDS by its law, also outside its range."""
+    def with_torque(self) -> 'DataSheet':
+        """Return the data sheet with the torque of its motors in place of their power. Raises ParameterError."""
+        if is_absent(self.motor_power):
+            return self
+        speed = self.motor_speed * math.pi / 30.0
+        low, high = (_limits()['motor_torque'][end] for end in ('low', 'high'))
+        torque = float(f'{1e3 * self.motor_power / speed:.4g}')
+        if not low <= torque <= high:
+            raise ParameterError(f'{option_of("motor_power")} {self.motor_power:g} kW: must be '
+                                 f'{1e-3 * low * speed:.3g} to {1e-3 * high * speed:.3g} at '
+                                 f'{self.motor_speed:g} rpm, for a torque of {low:g} to {high:g} Nm')
+        return dataclasses.replace(self, motor_power=NOT_GIVEN, motor_torque=torque)
+
+    def scaled(self, name: str) -> tuple[float, Law]:
+        """Return (value of one of SCALED_FIELDS, also outside its range; its law). The torque of the motors, if the
+        data sheet has it, gives the gear ratio, and a gear ratio that follows from it the rate."""
         known, law = SCALED_FIELDS[name]
-        return float(f'{known * law.share(self.mirror / KNOWN_MIRROR_M):.4g}')
+        torque, ratio = self.motor_torque, getattr(self, name.replace('rate_', 'ratio_'))
+        if is_absent(torque):
+            torque = SCALED_FIELDS['motor_torque'][0]
+        elif is_absent(ratio):
+            law = LAWS_OF_MOTOR.get(law, law)
+        shares = (self.mirror / KNOWN_MIRROR_M, torque / SCALED_FIELDS['motor_torque'][0],
+                  self.motor_speed / DataSheet.motor_speed)
+        return float(f'{known * law.share(*shares):.4g}'), law
 
     @property
     def structural_frequency(self) -> Hertz:
@@ -133,6 +157,10 @@ class DataSheet(Parameters):
     def theta(self) -> Radians:
         """Half-power beamwidth."""
         return math.radians(self.beamwidth) or DishParameters(self.mirror, self.frequency).beamwidth
+
+
+def _limits() -> dict[str, Mapping[str, Json]]:
+    return {name: field.metadata for name, field in flatten(DataSheet) if name in SCALED_FIELDS}
 
 
 def refusal(sheet: DataSheet, error: ValueError, make: Callable[[DataSheet], object]) -> ValueError:

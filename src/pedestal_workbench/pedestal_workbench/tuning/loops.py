@@ -317,7 +317,8 @@ class Loops:
                 return every, 'the drive trips'
             if not meets_margins(margins, required):
                 phase, gain = margins['phase_margin_deg'][0], margins['gain_margin_db'][0]
-                return every, f'it has {phase:.3g} deg and {gain:.3g} dB'
+                return every, ('its gain is below 1 at each measured frequency' if math.isnan(phase) else
+                               f'it has {phase:.3g} deg and {gain:.3g} dB')
             every.append(margins)
         return every, ''
 

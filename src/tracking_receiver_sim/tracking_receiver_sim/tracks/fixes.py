@@ -75,9 +75,13 @@ def read(track: TrackFileParameters, rows: Callable[[str, Log], Iterator[Fix]]) 
         aircraft.names.update(identities)
         numbers.extend((line, aircraft.number, *fix))
     table = np.array(numbers).reshape(-1, len(FIX_COLUMNS))
-    label, number = _chosen_aircraft(track, aircraft_by_identity.values(), log.receivers)
     aircraft_column = FIX_COLUMNS.index('aircraft')
-    of_aircraft = np.delete(table[table[:, aircraft_column] == number], aircraft_column, axis=1)
+    if len(log.receivers) > 1 and not track.aircraft.strip() and _take_turns(table):
+        label = f' of {" and ".join(f"{name} ({fixes})" for name, fixes in log.receivers.items())}, which take turns'
+    else:
+        label, number = _chosen_aircraft(track, aircraft_by_identity.values(), log.receivers)
+        table = table[table[:, aircraft_column] == number]
+    of_aircraft = np.delete(table, aircraft_column, axis=1)
     line, time, latitude, longitude, altitude = _without_repetitions(of_aircraft, log).T
     if len(line) < MIN_FIXES:
         reason = f': {log.nothing}' if log.nothing and not len(line) else ''
@@ -88,6 +92,20 @@ def read(track: TrackFileParameters, rows: Callable[[str, Log], Iterator[Fix]]) 
                   + ''.join(f', {remark}' for remark in log.remarks) + _passed_over(log))
     _check_order(fixes, track, log)
     return fixes
+
+
+def _take_turns(table: Floats) -> bool:
+    """Return True if no fix of a receiver lies within a usual time step of another one."""
+    receiver, time = (table[:, FIX_COLUMNS.index(name)] for name in ('aircraft', 'time'))
+    for number in np.unique(receiver):
+        own = np.sort(time[receiver == number])
+        longest = 1.5 * np.median(np.diff(own)) if len(own) > 1 else 0.0
+        bounds = np.concatenate(([-np.inf], own, [np.inf]))
+        others = time[receiver != number]
+        i = np.searchsorted(bounds, others)
+        if ((bounds[i] - bounds[i - 1] <= longest) | (bounds[i] == others)).any():
+            return False
+    return True
 
 
 def _without_repetitions(table: Floats, log: Log) -> Floats:

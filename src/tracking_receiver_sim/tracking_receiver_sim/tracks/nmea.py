@@ -3,6 +3,7 @@
 The height above the ellipsoid is altitude + geoidal separation. Text before the $ of a line and behind the checksum is
 passed over, such as the time of a logger. Cut sentences, sentences with a wrong checksum, and GGA without fix, time or
 altitude (2D) are passed over and counted. Each talker, the first two letters of a sentence, counts as a receiver.
+Talkers that take turns are one receiver, whose constellations change.
 """
 import contextlib
 import datetime

@@ -123,7 +123,9 @@ class Identified(Calibration):
         elif 'stiffness' not in found:
             missing.append('stiffness: not shown, because the torques of the motions twist the gears too little')
         if 'frequency' not in found:
-            missing.append('structure: no mode between 2 and 30 Hz shows in the torque, or a rigid twin shows it too')
+            contact = any(getattr(recording.drive, name).bias.schedule != 'off' for recording in self.recordings)
+            missing.append('structure: no mode between 2 and 30 Hz shows in the torque, or a rigid twin shows it too'
+                           + ('' if contact else twin.NO_CONTACT))
         if 'stribeck_rate' not in found:
             missing.append('static friction: not shown, because it is too small or no motion is slow enough')
         if 'eccentricity_sin' not in found:

@@ -34,6 +34,7 @@ PARAMETER_NAMES = {
 SCALED_NAMES = ('viscous', 'coulomb', 'breakaway', 'stribeck_rate', 'lash', 'stiffness', 'frequency', 'damping')
 ADDED_NAMES = ('inertia', 'dish_inertia', 'unbalance')
 """Estimates that the twin corrects by a ratio, and by a difference."""
+NO_CONTACT = '; the teeth rattle without bias torque: add the recording with it, without bias.schedule=off'
 MESH_NAMES = 'lash', 'stiffness'  # estimates of a mesh
 ROUND_COUNT, MAX_RATIO = 4, 1.6  # number of corrections, and largest ratio of a correction [-]
 PASS_COUNT = 2  # number of passes of the estimates of friction and inertia
@@ -113,7 +114,10 @@ def estimate(recordings: Sequence[DriveRecording], motions: Sequence[Motion], na
     for _ in range(PASS_COUNT):
         # At a constant rate a dish may swing for seconds, so the friction needs the inertias and the inertias need it.
         pieces = np.concatenate([constant_rates(motion, load, found) for motion, load in zip(motions, loads)])
-        found = dict(estimates.friction(pieces, gravity))
+        try:
+            found = dict(estimates.friction(pieces, gravity))
+        except ValueError as error:
+            raise ValueError(f'{name}: {error}' + ('' if in_contact else NO_CONTACT)) from None
         found |= mode.identify(in_contact or list(zip(motions, loads)), found, gravity, flexible)
     found |= estimates.lash([(motion, motion.mesh_torque(axis)) for motion, axis in zip(motions, axes)],
                             axes[0].gear_train.ratio)
