@@ -40,15 +40,14 @@ def test_cv_is_filterpys_kalman_filter():
     for y in A[1:]:
         oracle.predict()
         oracle.update(y)
-        # The stated variances grow with the mean of the last innovations: a quarter of the gain of the angle.
-        nu, S, gain = oracle.y.item(), oracle.S.item(), 0.25 * oracle.K[0, 0]
+        # The stated variances grow with the mean of the last innovations: a third of the gain of the angle.
+        nu, S, gain = oracle.y.item(), oracle.S.item(), oracle.K[0, 0] / 3.0
         trend, variance = trend + gain * (nu - trend), (1.0 - gain)**2 * variance + gain**2 * S
         # They also grow with a mean of 0.1 s that is larger than the one of white innovations, for 20 s.
         gain = T / 0.1
         short, white = short + gain * (nu - short), (1.0 - gain)**2 * white + (gain * nu)**2
         swing += T / 20.0 * (min(short**2, 10.0 * white) - 1.14 * white - swing)
-        more = max(0.5 * (trend**2 / variance - 1.0), swing / oracle.P[0, 0], 0.0)
-        factor = min(0.891 * (1.0 + more), 30.0)
+        factor = min(1.0 + max(2.0 * (trend**2 - 2.0 * variance), swing, 0.0) / oracle.P[0, 0], 30.0)
         expected.append((*oracle.x[:, 0], *np.sqrt(factor * np.diag(oracle.P)), nu**2 / S))
     for column, wanted in zip(('position', 'rate', 'position_sigma', 'rate_sigma', 'nis'), np.transpose(expected)):
         np.testing.assert_allclose(made[f'azimuth.{column}'][1:], wanted, rtol=2e-5, atol=1e-6, err_msg=column)

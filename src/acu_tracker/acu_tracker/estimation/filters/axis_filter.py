@@ -41,8 +41,14 @@ if TYPE_CHECKING:
 
 BANK_SIZE = len(COLUMN_NAMES)  # largest number of models in a bank
 
-TREND_MEMORY = 4.0
+TREND_MEMORY = 3.0
 """Memory of the mean innovation over that of the filter [-]. A short one shows a lag soon, a long one a small lag."""
+
+MIN_LAG = 2.0
+"""Largest square of the mean innovation that counts as chance, over its variance in a consistent filter [-]. What
+still exceeds it lets the mean variances of a consistent filter grow by 9 %."""
+
+LAG_GAIN = 2.0  # square of a growing lag over the square of its mean [-]
 
 SWING_TIME_S, SWING_MEMORY_S = 0.1, 20.0  # memories of the short mean, and of its square
 MIN_SWING, MAX_SWING = 1.14, 10.0
@@ -51,9 +57,6 @@ first is the mean of white innovations plus two standard deviations. With the la
 swing."""
 
 MAX_INFLATION = 30.0  # largest factor of the stated variances [-]
-CONSISTENT_INFLATION = 0.891
-"""Factor of the stated variances without a lag [-]. A consistent filter sometimes shows a lag by chance. This factor
-keeps its mean NEES."""
 
 P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index('p33')  # columns in `p`
 
@@ -265,15 +268,12 @@ def inflation(state: Filter, variance: Radians2) -> float:
     """Return the factor of the stated variances over those of the bank; variance: of the angle by the bank.
 
     The innovations of a consistent filter have mean 0. A filter that lags behind a motion has an error b, and its last
-    innovations have the mean b. The square of this mean over its variance in a consistent filter is 1 + k b^2 on
-    average; 2 / k is about the variance of the angle. The factor adds b^2 to this variance, within its limit.
+    innovations have the mean b. The factor adds b^2 to the variance, within its limit, if the mean excludes 0.
 
     A target may also swing by less than the noise of a filter that would follow it. The bank is then right not to
     follow, and the mean of b over its memory is 0. The mean square of a short mean shows this b^2: `swing`."""
-    if state.trend_variance == 0.0:
-        return 1.0
-    lag = 0.5 * (state.trend * state.trend / state.trend_variance - 1.0)
-    return min(CONSISTENT_INFLATION * (1.0 + max(lag, state.swing / variance, 0.0)), MAX_INFLATION)
+    lag = LAG_GAIN * (state.trend * state.trend - MIN_LAG * state.trend_variance)
+    return min(1.0 + max(lag, state.swing, 0.0) / variance, MAX_INFLATION)
 
 
 @compiled
@@ -434,5 +434,5 @@ def estimates(constants: Records, t: Times, y: Floats, R: Floats, y_rate: Floats
         g = expected(state)
         o.angle, o.rate, o.acceleration = g.x
         o.variance, o.covariance, o.rate_variance = variances(state, g)
-        o.inflation = inflation(state, g.P.p11)
+        o.inflation = o.variance / g.P.p11
         probabilities(state, model, o.mu)
