@@ -162,8 +162,8 @@ def within_5_hz(distance, **params):
 
 def test_coloured_noise_that_is_expected_costs_what_it_must():
     """The flyby at 500 m, noise within 5 Hz: within 5 % of the bound of a jerk that is best with white noise, half
-    of what white noise allows, and the error is what its covariance says. A filter that takes it for white takes it for
-    a swing, and states more than its error."""
+    of what white noise allows, and the error is what its covariance says. A filter that takes it for white takes it
+    for a swing, and states more than its error."""
     limit = [SIGMA / math.sqrt(bound(5e-5, bandwidth)[0, 0]) for bandwidth in (0.0, 5.0)]
     assert limit == pytest.approx([7.16, 3.36], abs=0.01)
     expected, white = (within_5_hz(500.0, bandwidth=bandwidth, kind='ca', **{'ca.noise': 7e-5})
@@ -273,8 +273,8 @@ def test_a_lag_behind_a_smooth_motion_shows_in_the_stated_covariance(distance):
 
 @pytest.mark.parametrize('frequency', [0.0, 0.5, 1.0])
 def test_a_swing_below_the_noise_shows_in_the_stated_covariance(frequency):
-    """A swing of a fifth of sigma, which the bank is right not to follow. Of a target that stands still the bank expects
-    more motion than there is, and the filter states less."""
+    """A swing of a fifth of sigma, which the bank is right not to follow. Of a target that stands still the bank
+    expects more motion than there is, and the filter states less."""
     t = T * np.arange(6000)
     angle, rate = (SIGMA / 5.0 * factor for factor in (np.sin(2.0 * np.pi * frequency * t), 2.0 * np.pi * frequency
                                                        * np.cos(2.0 * np.pi * frequency * t)))

@@ -40,8 +40,8 @@ def test_cv_is_filterpys_kalman_filter():
     for y in A[1:]:
         oracle.predict()
         oracle.update(y)
-        # The stated variances grow with the mean of the last innovations, for two thirds of the gain of the angle. They
-        # are smaller while its mean square over 20 s, or 7 / gain, is smaller than that of white innovations.
+        # The stated variances grow with the mean of the last innovations, for two thirds of the gain of the angle.
+        # They are smaller while its mean square over 20 s, or 7 / gain, is smaller than that of white innovations.
         nu, S, K = oracle.y.item(), oracle.S.item(), oracle.K[0, 0]
         trend, variance = trend + K / 1.5 * (nu - trend), (1.0 - K / 1.5)**2 * variance + (K / 1.5)**2 * S
         calm += min(T / 20.0, K / 7.0) * (trend**2 / variance - calm)

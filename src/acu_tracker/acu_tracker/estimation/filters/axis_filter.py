@@ -52,8 +52,8 @@ CALM_TIME_S, CALM_MEMORIES = 20.0, 7.0
 """Memory of `calm`: the longer of this time, and of this number of memories of the filter."""
 
 MIN_CALM = 0.5
-"""Smallest share of the variances of the bank that is stated [-]. It is the part of the variance of a rate that a model
-ca has from the noise of the measurements alone, on a target without jerk."""
+"""Smallest share of the variances of the bank that is stated [-]. It is the part of the variance of a rate that a
+model ca has from the noise of the measurements alone, on a target without jerk."""
 
 SWING_TIME_S, SWING_MEMORY_S = 0.1, 20.0  # memories of the short mean, and of its square
 MIN_SWING, MAX_SWING = 1.14, 40.0
@@ -278,9 +278,9 @@ def variances(state: Filter, gaussian: Gaussian) -> AxisVariances:
     others. The bank also expects more motion than a calm target makes, and the mean is then smaller than expected:
     `calm` is its mean square over the expected one. Only this part of the variances is stated.
 
-    A target may also swing by less than the noise of a filter that would follow it, or jump. The bank is then right not
-    to follow, and the mean of b over its memory is 0. The mean square of a short mean shows this b^2: `swing`. Because
-    such a b changes within SWING_TIME_S, the rate has the error b / SWING_TIME_S."""
+    A target may also swing by less than the noise of a filter that would follow it, or jump. The bank is then right
+    not to follow, and the mean of b over its memory is 0. The mean square of a short mean shows this b^2: `swing`.
+    Because such a b changes within SWING_TIME_S, the rate has the error b / SWING_TIME_S."""
     lag = max(state.trend * state.trend - MIN_LAG * state.trend_variance, 0.0)
     factor = min(max(min(state.calm, 1.0), MIN_CALM) + LAG_GAIN * lag / state.bank_p[P11_COLUMN], MAX_INFLATION)
     P, swing = gaussian.P, max(state.swing, 0.0)
