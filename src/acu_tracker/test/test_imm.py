@@ -55,8 +55,7 @@ def test_against_filterpy(with_rate):
         oracle.update(np.array([[y[k]], [y_rate[k]]]) if with_rate else np.array([[y[k]]]))
         np.testing.assert_allclose([out[k][name] for name in ('angle', 'rate', 'acceleration')], oracle.x[:, 0],
                                    rtol=1e-6, atol=1e-8)
-        stated = np.array([out[k][name] for name in ('variance', 'covariance', 'rate_variance')])
-        np.testing.assert_allclose(stated / out[k]['inflation'], oracle.P[(0, 0, 1), (0, 1, 1)], rtol=1e-6)
+        np.testing.assert_allclose(out[k]['of_bank'], oracle.P[(0, 0, 1), (0, 1, 1)], rtol=1e-6)
         np.testing.assert_allclose(out[k]['mu'][:3], oracle.mu, rtol=1e-6, atol=1e-9)
     # The bank has used all its models on the way.
     assert (out['mu'][:, :3].max(axis=0) > 0.5).sum() >= 2 and np.isnan(out['mu'][:, 3:]).all()

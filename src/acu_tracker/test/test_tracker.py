@@ -226,7 +226,7 @@ def test_an_error_is_compared_with_what_was_told_in_the_coast(kind, gap):
     stamp = 299 * T + gap
     angle, stated = target.outlook(stamp)[0], target.variances(gap)[0]
     variance = axis_filter.expected(target.state[0]['filter']['axis'][0]).P.p11
-    assert stated >= axis_filter.CONSISTENT_INFLATION * variance
+    assert stated >= axis_filter.MIN_CALM * variance
     outcome, azimuth = target.observe(stamp, 0.3)
     assert outcome == receiver_error.OUTCOME_ACCEPTED and azimuth.nu == pytest.approx(0.3 - angle, abs=1e-12)
     assert azimuth.S == pytest.approx(variance + SIGMA**2, rel=1e-12)

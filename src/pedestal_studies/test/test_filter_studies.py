@@ -66,12 +66,13 @@ def test_no_filter_reduces_coloured_noise_as_much(flyby):
 
 @pytest.mark.thorough
 def test_a_filter_that_expects_coloured_noise_knows_its_error_better(flyby):
-    """A filter that knows the colour of the noise is not too sure; one that takes the noise for white is."""
+    """A filter that knows the colour of the noise is not too sure. One that takes the noise for white is further off,
+    although it states a part of this as a swing."""
     for name in ('ca', 'imm'):
         expecting, not_expecting = (flyby(filter_name, 'nees_mean', 'coloured-0.03')
                                     for filter_name in (f'{name}-expecting', name))
         print(f'{name}: NEES {expecting:.2f}, noise taken for white {not_expecting:.2f}')
-        assert expecting < 2.0 < not_expecting
+        assert expecting < 2.0 and abs(math.log(expecting)) < abs(math.log(not_expecting))
     assert flyby('ca-expecting', 'reduction', 'coloured-0.03') > flyby('ca', 'reduction', 'coloured-0.03')
 
 
@@ -86,7 +87,6 @@ def test_tuned_kalman_filters_know_their_errors(flyby):
     for name in ('ca', 'singer', 'current_statistical'):
         assert flyby(name, 'nis_mean') == pytest.approx(1.0, abs=0.05)
         assert flyby(name, 'angle_over_sigma') == pytest.approx(1.0, abs=0.15)
-    assert flyby('ca', 'angle_over_sigma', 'coloured-0.03') > 1.5
     assert flyby('current_statistical-rate-0.1', 'nis_mean') == pytest.approx(2.0, abs=0.1)
 
 
@@ -195,8 +195,8 @@ def test_the_wiener_filter_is_the_steady_kalman_filter_of_its_model():
                           0.0 * t, 1.0, out)
     covariance = sigma**2 * window_filter.displacement(600, alpha) + noise**2 * np.eye(600)
     w = window_filter.wiener(600, alpha, sigma, noise)
-    assert w[0] @ covariance @ w[0] == pytest.approx(out['variance'][-1] / out['inflation'][-1], rel=0.02)
-    assert w[1] @ covariance @ w[1] == pytest.approx(out['rate_variance'][-1] / out['inflation'][-1], rel=0.02)
+    assert w[0] @ covariance @ w[0] == pytest.approx(out['of_bank'][-1, 0], rel=0.02)
+    assert w[1] @ covariance @ w[1] == pytest.approx(out['of_bank'][-1, 2], rel=0.02)
 
 
 def test_window_estimates_follow_a_line_exactly():

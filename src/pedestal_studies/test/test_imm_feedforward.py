@@ -130,8 +130,7 @@ def test_no_row_misses_its_target_but_those_that_are_said_to(result):
             assert {(f'{axis}/{name}', 'miss_rms_deg'), (f'{axis}/{name}', 'rate_noise_deg_s')} <= named.keys()
     assert sum(row['target'] is not None for row in result.rows) == 15
     assert [(row['case'], row['metric']) for row in result.rows if intervals.missed(row)] == [
-        (case, 'miss_ratio_to_kalman_cv')
-        for case in ('azimuth/drive-imm-default', 'elevation/drive-imm', 'elevation/drive-imm-default')]
+        ('elevation/drive-imm', 'miss_ratio_to_kalman_cv')]
 
 
 @pytest.mark.thorough

@@ -65,7 +65,7 @@ class ImmParameters(Parameters):
     models: str = text('cv ca', 'models in use: two or more of cv, ca, singer, current_statistical')
     rungs: int = parameter(8, 1, MAX_RUNG_COUNT, '', 'number of models ca, each with more white jerk than '
                            'the one before')
-    rung_ratio: float = parameter(4.25, 1.01, 1000.0, '', 'white jerk of a model ca over that of the one before')
+    rung_ratio: float = parameter(4.35, 1.01, 1000.0, '', 'white jerk of a model ca over that of the one before')
     dwell: float = parameter(1000.0, 1e-3, 1e6, 's', 'mean time for which one model is valid')
     cv: CvParameters = group(CvParameters, noise=1e-5 * _DEG)
     ca: CaParameters = group(CaParameters, noise=5e-4 * _DEG)

@@ -41,19 +41,26 @@ if TYPE_CHECKING:
 
 BANK_SIZE = len(COLUMN_NAMES)  # largest number of models in a bank
 
-TREND_MEMORY = 4.0
+TREND_MEMORY = 1.5
 """Memory of the mean innovation over that of the filter [-]. A short one shows a lag soon, a long one a small lag."""
 
-SWING_TIME_S, SWING_MEMORY_S = 0.1, 20.0  # memories of the short mean, and of its square
-MIN_SWING, MAX_SWING = 1.14, 10.0
-"""Smallest and largest counted square of the short mean, over the variance that white innovations give it [-]. The
-first is the mean of white innovations plus two standard deviations. With the last, one jump of the motion is no
-swing."""
+MIN_LAG, LAG_GAIN = 2.0, 2.0
+"""Largest square of the mean innovation that counts as chance, over its variance in a consistent filter; square of a
+growing lag over the square of its mean [-]."""
 
-MAX_INFLATION = 30.0  # largest factor of the stated variances [-]
-CONSISTENT_INFLATION = 0.891
-"""Factor of the stated variances without a lag [-]. A consistent filter sometimes shows a lag by chance. This factor
-keeps its mean NEES."""
+CALM_TIME_S, CALM_MEMORIES = 20.0, 7.0
+"""Memory of `calm`: the longer of this time, and of this number of memories of the filter."""
+
+MIN_CALM = 0.5
+"""Smallest share of the variances of the bank that is stated [-]. It is the part of the variance of a rate that a
+model ca has from the noise of the measurements alone, on a target without jerk."""
+
+SWING_TIME_S, SWING_MEMORY_S = 0.1, 20.0  # memories of the short mean, and of its square
+MIN_SWING, MAX_SWING = 1.14, 40.0
+"""Smallest and largest counted square of the short mean, over the variance that white innovations give it [-]. The
+first is the mean of white innovations plus two standard deviations."""
+
+MAX_INFLATION = 100.0  # largest factor of the stated variances [-]
 
 P11_COLUMN, P33_COLUMN = Symmetric._fields.index('p11'), Symmetric._fields.index('p33')  # columns in `p`
 
@@ -96,6 +103,7 @@ class Filter(Record):
     scales: Annotated[Floats, (BANK_SIZE,)]
     trend: Radians          # mean of the last innovations of the angle
     trend_variance: Radians2    # its variance in a consistent filter; 0: no innovation yet
+    calm: float             # mean square of the trend over its variance; 1 in a consistent filter [-]
     short: Radians          # mean of the innovations of the last SWING_TIME_S
     short_variance: Radians2    # its variance if the innovations are white
     swing: Radians2         # mean square of an error that swings about 0; below 0: none is seen
@@ -112,10 +120,10 @@ class Estimate(Record):
     angle: Radians
     rate: RadiansPerSecond
     acceleration: RadiansPerSecond2
-    variance: Radians2      # of the angle, with the `inflation`
-    covariance: float       # of angle and rate, with the inflation [rad2/s]
-    rate_variance: float    # with the inflation [rad2/s2]
-    inflation: float        # factor in these three [-]
+    variance: Radians2      # of the angle, as the filter states it
+    covariance: float       # of angle and rate [rad2/s]
+    rate_variance: float    # [rad2/s2]
+    of_bank: Vector3        # these three of the bank, before `variances`
     innovation: Radians     # of the angle
     rate_innovation: RadiansPerSecond
     nis: float              # normalised innovation squared [-]
@@ -184,6 +192,7 @@ def start(state: Filter, constants: Constants, y: Radians, R: Radians2, rate_sig
     _reset_acceleration_variance(state, constants)
     state.last_angle, state.correlated = y, 1
     state.trend = state.trend_variance = state.short = state.short_variance = state.swing = 0.0
+    state.calm = 1.0
 
 
 @compiled
@@ -261,26 +270,22 @@ def expected_motion(state: Filter) -> AxisMotion:
 
 
 @compiled
-def inflation(state: Filter, variance: Radians2) -> float:
-    """Return the factor of the stated variances over those of the bank; variance: of the angle by the bank.
+def variances(state: Filter, gaussian: Gaussian) -> AxisVariances:
+    """Return the variances of angle and rate that the filter states with a Gaussian of the bank.
 
     The innovations of a consistent filter have mean 0. A filter that lags behind a motion has an error b, and its last
-    innovations have the mean b. The square of this mean over its variance in a consistent filter is 1 + k b^2 on
-    average; 2 / k is about the variance of the angle. The factor adds b^2 to this variance, within its limit.
+    innovations have the mean b. Above chance, b^2 is added to the variance of the angle, and in proportion to the
+    others. The bank also expects more motion than a calm target makes, and the mean is then smaller than expected:
+    `calm` is its mean square over the expected one. Only this part of the variances is stated.
 
-    A target may also swing by less than the noise of a filter that would follow it. The bank is then right not to
-    follow, and the mean of b over its memory is 0. The mean square of a short mean shows this b^2: `swing`."""
-    if state.trend_variance == 0.0:
-        return 1.0
-    lag = 0.5 * (state.trend * state.trend / state.trend_variance - 1.0)
-    return min(CONSISTENT_INFLATION * (1.0 + max(lag, state.swing / variance, 0.0)), MAX_INFLATION)
-
-
-@compiled
-def variances(state: Filter, gaussian: Gaussian) -> AxisVariances:
-    """Return the variances of angle and rate that the filter states with a Gaussian of the bank."""
-    factor, P = inflation(state, gaussian.P.p11), gaussian.P
-    return AxisVariances(factor * P.p11, factor * P.p12, factor * P.p22)
+    A target may also swing by less than the noise of a filter that would follow it, or jump. The bank is then right
+    not to follow, and the mean of b over its memory is 0. The mean square of a short mean shows this b^2: `swing`.
+    Because such a b changes within SWING_TIME_S, the rate has the error b / SWING_TIME_S."""
+    lag = max(state.trend * state.trend - MIN_LAG * state.trend_variance, 0.0)
+    factor = min(max(min(state.calm, 1.0), MIN_CALM) + LAG_GAIN * lag / state.bank_p[P11_COLUMN], MAX_INFLATION)
+    P, swing = gaussian.P, max(state.swing, 0.0)
+    return AxisVariances(factor * P.p11 + min(swing, MAX_INFLATION * P.p11), factor * P.p12, factor * P.p22
+                         + min(swing / (SWING_TIME_S * SWING_TIME_S), MAX_INFLATION * P.p22))
 
 
 @compiled
@@ -356,9 +361,11 @@ def correct(state: Filter, constants: Constants, measurement: AxisMeasurement) -
 def _take_innovation(state: Filter, nu: Radians, S: Radians2, own: Radians2) -> None:
     """Add an innovation of the bank, of variance S, to the mean of the last ones; own: part of S by the measurement.
     The memory of this mean is TREND_MEMORY times that of the filter."""
-    gain = (1.0 - own / S) / TREND_MEMORY
+    per_memory = 1.0 - own / S
+    gain, share = per_memory / TREND_MEMORY, min(state.T / CALM_TIME_S, per_memory / CALM_MEMORIES)
     state.trend += gain * (nu - state.trend)
     state.trend_variance = (1.0 - gain) * (1.0 - gain) * state.trend_variance + gain * gain * S
+    state.calm += share * (state.trend * state.trend / state.trend_variance - state.calm)
 
 
 @compiled
@@ -434,5 +441,5 @@ def estimates(constants: Records, t: Times, y: Floats, R: Floats, y_rate: Floats
         g = expected(state)
         o.angle, o.rate, o.acceleration = g.x
         o.variance, o.covariance, o.rate_variance = variances(state, g)
-        o.inflation = inflation(state, g.P.p11)
+        o.of_bank[0], o.of_bank[1], o.of_bank[2] = g.P.p11, g.P.p12, g.P.p22
         probabilities(state, model, o.mu)
