@@ -27,7 +27,7 @@ from pedestal_studies.p003_lin_wu_zhu import feedforward_speed, imm_feedforward,
 from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import REVERSAL_S_BY_AXIS
 from pedestal_studies.p004_li_chen_wang import rate_measurement, telemetry_flight
 from pedestal_studies.profiles import PROFILES
-from pedestal_studies.system import acquisition, budget, filters
+from pedestal_studies.system import acquisition, budget, filters, target_filters
 from pedestal_workbench.trials import monte_carlo
 
 Key: TypeAlias = tuple[str, str, str]   # of a row: study, case, metric
@@ -174,7 +174,7 @@ class Numbers:
     head: tuple[str, ...]
     lines: Sequence[Line]
     optional: tuple[str, ...] = ()  # metrics that have no row in some cases
-    missing: str = ''   # cell of a metric without a row
+    missing: str = ''   # cell of a metric without a row or without a value
 
     def __call__(self, rows: Rows) -> Content:
         """Return the table. Raises KeyError for a missing row of a metric that is not optional."""
@@ -182,7 +182,10 @@ class Numbers:
         return self.head, [(*line, *[''] * (len(self.head) - len(line))) for line in lines]
 
     def _cell(self, rows: Rows, key: Key) -> str:
-        return self.missing if key[2] in self.optional and key not in rows else _spread(rows[key])
+        if key[2] in self.optional and key not in rows:
+            return self.missing
+        row = rows[key]
+        return self.missing if row['value'] is None or math.isnan(row['value']) else _spread(row)
 
 
 def claim_table(paper: str) -> Maker:
@@ -215,6 +218,14 @@ FILTER_NUMBERS = Numbers(
     [Line((name, profile), _filter_cells(f'{profile}/{name}'))
      for name in filters.SHOWN_FILTERS if name not in filters.NOISE_AWARE_FILTERS
      for profile in ((filters.RANGED_PROFILE,) if name == 'imm_ukf' else PROFILES)])
+
+TARGET_FILTER_NUMBERS = Numbers(
+    'target-filters', ('target', 'tuned, deg', 'default, deg', 'default divided by tuned',
+                       'IMM that expects manoeuvres, divided by tuned', 'current_statistical, divided by tuned'),
+    [Line((target,), [(f'{target}/tuned', 'pointing_rms_deg'), (f'{target}/default', 'pointing_rms_deg'),
+                      *((f'{target}/{name}', 'pointing_to_tuned')
+                        for name in ('default', 'manoeuvre', 'current-statistical'))])
+     for target in target_filters.TARGET_SCENARIOS], missing='lost')
 
 MANOEUVRE_NUMBERS = Numbers(
     'manoeuvre', ('filter', 'reversal', 'rate deg/s', 'acceleration deg/s2'),
@@ -455,7 +466,8 @@ TABLES: dict[str, Maker] = {  # {name of a table: function that makes it}
     **{f'budget of {mode}': budget_table(mode) for mode in budget.MODE_OVERRIDES},
     **{f'directions of {mode}': direction_table(mode) for mode in budget.MODE_OVERRIDES},
     **{f'claims of {paper}': claim_table(paper) for paper in claims.CLAIMS_BY_PAPER},
-    'filters compared': FILTER_NUMBERS, 'manoeuvre': MANOEUVRE_NUMBERS, 'feed forward': FEEDFORWARD_NUMBERS,
+    'filters compared': FILTER_NUMBERS, 'filters of targets': TARGET_FILTER_NUMBERS,
+    'manoeuvre': MANOEUVRE_NUMBERS, 'feed forward': FEEDFORWARD_NUMBERS,
     'pareto': PARETO_NUMBERS, 'flyby with a rate': FLYBY_NUMBERS, 'alignment': ALIGNMENT_NUMBERS,
     'filters of Ma 2023': FAMILY_NUMBERS, 'feed forward by speed': SPEED_NUMBERS,
     'speed of alignment': ALIGNMENT_SPEED_NUMBERS, 'acquisition': acquisition_table, 'array loops': ARRAY_NUMBERS,
@@ -465,7 +477,7 @@ TABLES: dict[str, Maker] = {  # {name of a table: function that makes it}
 
 PUBLISHED_STUDIES = tuple(dict.fromkeys((  # names of the studies whose rows are in the tables
     *(claim.study for of_paper in claims.CLAIMS_BY_PAPER.values() for claim in of_paper if claim.study),
-    'bode', 'filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration')))
+    'bode', 'filters', 'target-filters', 'pareto', 'scenarios', 'budget', 'acquisition', 'calibration')))
 
 
 def main(names: Sequence[str] = (), root: str | pathlib.Path = '.') -> int:
