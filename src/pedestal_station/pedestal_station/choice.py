@@ -91,6 +91,18 @@ class _Problem(NamedTuple):
         return math.fsum(self.gain[i] * (end - begin) for i, (begin, end) in contacts.items())
 
 
+class _Free(NamedTuple):
+    """A stretch of the window of a pass between the contacts of others. It may end before it begins."""
+    begin: Seconds
+    end: Seconds
+    before: int | None  # pass whose contact limits the begin, None for the window
+    after: int | None   # the same of the end
+
+    @property
+    def length(self) -> Seconds:
+        return self.end - self.begin
+
+
 def choose(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> tuple[Choice, Choice]:
     """Return (exact plan, greedy plan). Raises ParameterError for a pass or a changeover that is not a number of its
     range."""
@@ -187,24 +199,29 @@ def _fill(problem: _Problem, order: Iterable[int], contacts: Contacts) -> Contac
     contacts = dict(contacts)
     for i in order:
         known = contacts.pop(i, None)
-        longest = max(_free(problem, i, contacts, known), key=lambda free: free[1] - free[0])
-        if longest[1] - longest[0] >= problem.min_pass - EQUAL_S:
-            contacts[i] = longest
+        longest = max(_free(problem, i, contacts, known), key=lambda free: free.length)
+        if longest.length >= problem.min_pass - EQUAL_S:
+            contacts[i] = longest.begin, longest.end
     return contacts
 
 
-def _free(problem: _Problem, i: int, contacts: Contacts, known: Contact | None = None) -> list[Contact]:
-    """Return the stretches of the window of pass i between the contacts of others, earliest first.
-
-    Some stretches may end before they begin. known: a contact of the pass, for the one stretch in its place.
-    """
+def _free(problem: _Problem, i: int, contacts: Contacts, known: Contact | None = None) -> list[_Free]:
+    """Return the stretches of pass i, earliest first. known: a contact of the pass, for the stretch in its place."""
     others = sorted((j for j in problem.near[i] if j in contacts), key=lambda j: contacts[j])
     places = range(len(others) + 1)
     if known is not None:
         places = range(place := sum(contacts[j] < known for j in others), place + 1)
-    return [(max([problem.rise[i]] + [contacts[j][1] + problem.gaps[j, i] for j in others[:place]]),
-             min([problem.set[i]] + [contacts[j][0] - problem.gaps[i, j] for j in others[place:]]))
-            for place in places]
+    free = []
+    for place in places:
+        begin, before, end, after = problem.rise[i], None, problem.set[i], None
+        for j in others[:place]:
+            if (limit := contacts[j][1] + problem.gaps[j, i]) > begin:
+                begin, before = limit, j
+        for j in others[place:]:
+            if (limit := contacts[j][0] - problem.gaps[i, j]) < end:
+                end, after = limit, j
+        free.append(_Free(begin, end, before, after))
+    return free
 
 
 def _solve(problem: _Problem, group: Sequence[int], time_limit: Seconds) -> tuple[Contacts, float | None]:
@@ -250,32 +267,7 @@ def _rows(problem: _Problem, group: Sequence[int]) -> tuple[list[Row], int]:
                        z[first, second]: problem.overlap(group[first], group[second])}, 0.0)
                      for first, second in orders]
             rows.append(({**{z[pair]: -1.0 for pair in orders}, a: 1.0, b: 1.0}, 1.0))
-    return rows + _stretches(problem, group) + _chains(problem, group, z), 3 * n + len(z)
-
-
-def _chains(problem: _Problem, group: Sequence[int], z: dict[tuple[int, int], int]) -> list[Row]:
-    """Return inequalities that shorten the search where a pass has several others beside it.
-
-    A contact that ends before one of them ends before all later ones. The steps between them sum up to its trim.
-    """
-    n, rows = len(group), []
-    for k in range(n):
-        for trim, side in ((2 * n + k, 0), (n + k, 1)):
-            # (overlap, part of it that this pass must give up, z) with each other pass, the largest overlap first
-            steps = sorted(((overlap := problem.overlap(group[pair[0]], group[pair[1]]),
-                             overlap - problem.room(group[pair[1 - side]]), z[pair]) for pair in z if pair[side] == k),
-                           reverse=True)
-            later = [next((m for m in range(here + 1, len(steps)) if steps[m][0] <= steps[here][1]), len(steps))
-                     for here in range(len(steps))]
-            rows += [({steps[here][2]: 1.0, steps[m][2]: -1.0}, 0.0) for here, m in enumerate(later) if m < len(steps)]
-            row, here = {trim: -1.0}, 0
-            while here < len(steps):
-                after = steps[later[here]][1] if later[here] < len(steps) else 0.0
-                row[steps[here][2]] = max(steps[here][1], 0.0) - max(after, 0.0)
-                here = later[here]
-            if len(row) > 2:
-                rows.append((row, 0.0))
-    return rows
+    return rows + _stretches(problem, group), 3 * n + len(z)
 
 
 def _stretches(problem: _Problem, group: Sequence[int]) -> list[Row]:
@@ -322,45 +314,33 @@ def _shares(problem: _Problem, passes: Sequence[Pass], order: Sequence[int], con
 
 def _share(problem: _Problem, passes: Sequence[Pass], contacts: Contacts, i: int) -> Share:
     """Return the share of pass i, with the reason why it is not whole."""
-    rivals = sorted((j for j in problem.near[i] if j in contacts), key=lambda j: contacts[j])
     if i not in contacts:
-        reason, by = _dropped(problem, passes, contacts, i, rivals)
+        reason, by = _dropped(problem, passes, contacts, i)
         return Share(False, math.nan, math.nan, tuple(passes[j].case for j in by), reason)
     begin, end = contacts[i]
-    late, early, words, by = begin - problem.rise[i], problem.set[i] - end, [], []
-    before, after = _limits(problem, contacts, i, rivals, sum(contacts[j] < contacts[i] for j in rivals))
-    if before and late > EQUAL_S:
-        by += before
-        words += [f'begins {late:.1f} s late after {passes[before[0]].case}']
-    if after and early > EQUAL_S:
-        by += after
-        words += [f'ends {early:.1f} s early for {passes[after[0]].case}']
-    return Share(True, begin, end, tuple(dict.fromkeys(passes[j].case for j in by)), ', '.join(words))
+    [free] = _free(problem, i, contacts, contacts[i])
+    late, early, texts, cases = begin - problem.rise[i], problem.set[i] - end, [], []
+    if free.before is not None and late > EQUAL_S:
+        cases.append(passes[free.before].case)
+        texts.append(f'begins {late:.1f} s late after {cases[-1]}')
+    if free.after is not None and early > EQUAL_S:
+        cases.append(passes[free.after].case)
+        texts.append(f'ends {early:.1f} s early for {cases[-1]}')
+    return Share(True, begin, end, tuple(dict.fromkeys(cases)), ', '.join(texts))
 
 
-def _limits(problem: _Problem, contacts: Contacts, i: int, rivals: Sequence[int],
-            place: int) -> tuple[list[int], list[int]]:
-    """Return the rivals that limit the begin and the end of a contact of pass i between rivals[:place] and the
-    others; an empty list where its window does."""
-    begins = {j: contacts[j][1] + problem.gaps[j, i] for j in rivals[:place]}
-    ends = {j: contacts[j][0] - problem.gaps[i, j] for j in rivals[place:]}
-    return ([j for j in begins if begins[j] == max(begins.values()) and begins[j] > problem.rise[i]][:1],
-            [j for j in ends if ends[j] == min(ends.values()) and ends[j] < problem.set[i]][:1])
-
-
-def _dropped(problem: _Problem, passes: Sequence[Pass], contacts: Contacts, i: int,
-             rivals: Sequence[int]) -> tuple[str, list[int]]:
+def _dropped(problem: _Problem, passes: Sequence[Pass], contacts: Contacts, i: int) -> tuple[str, list[int]]:
     """Return (reason, passes to which a dropped pass lost its time)."""
     if problem.length(i) < problem.min_pass:
         return f'lasts {problem.length(i):.1f} s, shorter than {problem.min_pass:g} s', []
     if problem.gain[i] <= 0.0:
         return 'the expected loss is the whole pass', []
-    by = [j for j in rivals if contacts[j][1] + problem.gaps[j, i] > problem.rise[i]
-          and contacts[j][0] - problem.gaps[i, j] < problem.set[i]]
-    free = _free(problem, i, contacts)
-    place = max(range(len(free)), key=lambda k: free[k][1] - free[k][0])
-    if free[place][1] <= free[place][0]:
+    by = sorted((j for j in problem.near[i] if j in contacts
+                 and contacts[j][1] + problem.gaps[j, i] > problem.rise[i]
+                 and contacts[j][0] - problem.gaps[i, j] < problem.set[i]), key=lambda j: contacts[j])
+    longest = max(_free(problem, i, contacts), key=lambda free: free.length)
+    if longest.length <= 0.0:
         return 'overlaps ' + ', '.join(f'{passes[j].case} of priority {passes[j].object.priority:g}' for j in by), by
-    before, after = _limits(problem, contacts, i, rivals, place)
-    sides = [f'after {passes[j].case}' for j in before] + [f'before {passes[j].case}' for j in after]
+    sides = [f'{side} {passes[j].case}' for side, j in (('after', longest.before), ('before', longest.after))
+             if j is not None]
     return f'shorter than {problem.min_pass:g} s {" and ".join(sides)}', by

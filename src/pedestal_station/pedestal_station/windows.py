@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from acu_tracker.servo import travel
-from pedestal_common.geometry import passes
+from pedestal_common.geometry import orbit, passes
 from pedestal_common.quantities import Degrees, Floats, Pairs, Radians, Seconds, Times
-from pedestal_common.reproducible import arctan2
 from pedestal_station.night import Orbit, Window
 
 FOLLOWED_DAYS = 1.0  # longest time before and after the night in which rise and set are searched [days]
@@ -57,19 +56,18 @@ class Horizon(NamedTuple):
         return np.interp(azimuth, self.azimuths, self.elevations, period=2.0 * math.pi)
 
 
-def angles(orbit: Orbit, times: Times) -> Pairs:
+def angles(each: Orbit, times: Times) -> Pairs:
     """Return azimuth and elevation [rad] of an object (n, 2); NaN outside an ephemeris. Raises TargetError."""
-    east, north, up = orbit.enu(times).T
-    return np.stack((arctan2(east, north), arctan2(up, np.hypot(east, north))), axis=-1)
+    return orbit.angles(each.enu(times))
 
 
-def find(orbit: Orbit, horizon: Horizon, duration: Seconds) -> list[Window]:
+def find(each: Orbit, horizon: Horizon, duration: Seconds) -> list[Window]:
     """Return the windows of an object that are open in a night, in the order of their rise. Raises TargetError."""
     def elevation(times: Times) -> Floats:
-        return angles(orbit, times)[:, 1]
+        return angles(each, times)[:, 1]
 
     def height(times: Times) -> Floats:
-        A, E = angles(orbit, times).T
+        A, E = angles(each, times).T
         return E - horizon.at(A)
 
     step = passes.SEARCH_STEP_S
@@ -78,8 +76,8 @@ def find(orbit: Orbit, horizon: Horizon, duration: Seconds) -> list[Window]:
     if len(horizon.elevations) == 1:
         spans, peaks = passes.spans(height, times, heights)
     else:
-        times = np.union1d(times, _kinks(orbit, horizon, times))
-        A, E = angles(orbit, times).T
+        times = np.union1d(times, _kinks(each, horizon, times))
+        A, E = angles(each, times).T
         spans, _ = passes.spans(height, times, E - horizon.at(A))
         peaks = passes.maxima(elevation, times, E) if spans else times
     return [_window(elevation, peaks, span, duration) for span in spans if span.begin < duration and span.end > 0.0]
@@ -93,12 +91,12 @@ def _window(elevation: passes.Height, peaks: Times, span: passes.Span, duration:
                   not (span.rises or span.sets))
 
 
-def _kinks(orbit: Orbit, horizon: Horizon, times: Times) -> Times:
+def _kinks(each: Orbit, horizon: Horizon, times: Times) -> Times:
     """Return the times, between growing times, at which the azimuth of an object is that of a point of the horizon."""
     def beyond(azimuth: Floats, point: Floats) -> Floats:
         return (azimuth - point + math.pi) % (2.0 * math.pi) - math.pi
 
-    A, E = angles(orbit, times).T
+    A, E = angles(each, times).T
     margin = np.where(E < HIGH_RAD, *KINK_MARGINS_RAD)
     near = (E > min(horizon.elevations) - margin) & (E < max(horizon.elevations) + margin)
     steps = np.flatnonzero(near[:-1] | near[1:])
@@ -110,6 +108,6 @@ def _kinks(orbit: Orbit, horizon: Horizon, times: Times) -> Times:
     at, which = at[np.abs(before[at, which]) < 0.5 * math.pi], which[np.abs(before[at, which]) < 0.5 * math.pi]
 
     def past(t: Times) -> Floats:
-        return beyond(angles(orbit, t)[:, 0], np.tile(points[which], len(t) // max(1, len(which))))
+        return beyond(angles(each, t)[:, 0], np.tile(points[which], len(t) // max(1, len(which))))
 
     return passes.crossed(past, times[steps[at]], times[steps[at] + 1], before[at, which] > 0.0)

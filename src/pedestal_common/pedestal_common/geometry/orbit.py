@@ -185,8 +185,13 @@ def seen(satrec: Satellite, station: StationParameters, julian: float, fractions
 
 def elevations(satrec: Satellite, station: StationParameters, julian: float, fraction: float, times: Times) -> Floats:
     """Return the elevations [deg] (n,) of a satellite at a station; arguments as in `enu`."""
-    east, north, up = enu(satrec, station, julian, fraction, times)[0].T
-    return np.degrees(arctan2(up, np.hypot(east, north)))
+    return np.degrees(angles(enu(satrec, station, julian, fraction, times)[0])[:, 1])
+
+
+def angles(positions: Vectors3) -> Pairs:
+    """Return azimuth and elevation [rad] (n, 2) of positions ENU of a station."""
+    east, north, up = positions.T
+    return np.stack((arctan2(east, north), arctan2(up, np.hypot(east, north))), axis=-1)
 
 
 def calendar(julian: float, fraction: float) -> datetime.datetime:
