@@ -36,7 +36,7 @@ from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 from pedestal_common.parameters import ParameterError, Parameters, parameter
-from pedestal_common.quantities import Floats, Seconds
+from pedestal_common.quantities import Seconds
 from pedestal_station.night import Choice, Pass, Share
 
 TIE = 1e-7
@@ -246,8 +246,8 @@ def _solve(problem: _Problem, group: Sequence[int], time_limit: Seconds) -> tupl
     contacts = _fill(problem, sorted(group, key=lambda i: (i not in contacts, -problem.gain[i], i)), contacts)
     if result.status == 0:
         return contacts, None
-    proved = math.inf if result.mip_dual_bound is None else -result.mip_dual_bound
-    return contacts, min(proved, _most(problem, group))
+    everything = sum(problem.gain[i] * problem.length(i) for i in group)
+    return contacts, everything if result.mip_dual_bound is None else min(-result.mip_dual_bound, everything)
 
 
 def _rows(problem: _Problem, group: Sequence[int]) -> tuple[list[Row], int]:
@@ -294,16 +294,6 @@ def _constraint(rows: Sequence[Row], size: int) -> LinearConstraint:
     r, columns, values = zip(*entries, strict=True)
     matrix = sparse.csr_array((values, (r, columns)), shape=(len(rows), size))
     return LinearConstraint(matrix, ub=np.array([limit for _, limit in rows]))
-
-
-def _most(problem: _Problem, group: Sequence[int]) -> float:
-    """Return the integral over time of the largest gain in view, which no plan exceeds."""
-    times: Floats = np.unique([[problem.rise[i], problem.set[i]] for i in group])
-    most = np.zeros(len(times) - 1)
-    for i in group:
-        begin, end = np.searchsorted(times, [problem.rise[i], problem.set[i]])
-        most[begin:end] = np.maximum(most[begin:end], problem.gain[i])
-    return float(np.sum(most * np.diff(times)))
 
 
 def _shares(problem: _Problem, passes: Sequence[Pass], order: Sequence[int], contacts: Contacts) -> tuple[Share, ...]:

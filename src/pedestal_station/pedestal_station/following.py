@@ -202,12 +202,13 @@ def follow(state: Followed, constants: Constants, terms: PointingModel, course: 
         if not exact and not fine:      # the step is repeated in steps of the drive
             azimuth, elevation = before
             continue
-        _take(state, constants, pieces, (t, end), (offset, _offset(azimuth, elevation, target)), now,
+        before_step, offset = offset, _offset(azimuth, elevation, target)
+        _take(state, constants, pieces, (t, end), (before_step, offset), now,
               abs(azimuth.angle - now.azimuth.angle) * math.cos(elevation.angle)
               >= abs(elevation.angle - now.elevation.angle))
         azimuth_wrap.watch_turn(state.guidance.turn, azimuth.angle,
                                 (state.guidance.azimuth, target.elevation.angle), beamwidth, end)
-        offset, t = _offset(azimuth, elevation, target), end
+        t = end
         k += 1 if t >= rows[k + 1, T] else 0
     ends[1, 0], ends[1, 1] = azimuth.angle, elevation.angle
 

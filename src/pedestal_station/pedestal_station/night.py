@@ -71,12 +71,16 @@ class Window(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """A time in which the antenna cannot keep the object in its beam."""
+    """A time in which the antenna cannot keep the object in its beam. No instant is in two losses of a pass."""
     reason: str             # 'keyhole', 'blockage', 'sun', 'travel' ...
     begin: Seconds
     end: Seconds
-    seconds: Seconds        # expected loss inside it; no instant is in two losses of a pass
     detail: str = ''        # more on it, '' for nothing
+
+    @property
+    def seconds(self) -> Seconds:
+        """Duration of the loss."""
+        return self.end - self.begin
 
 
 class Prediction(NamedTuple):
@@ -130,6 +134,13 @@ class Choice(NamedTuple):
     optimal: bool
 
 
+class Line(NamedTuple):
+    """A pass with what the exact and the greedy plan do with it."""
+    each: Pass
+    share: Share
+    greedy: Share
+
+
 class Night(NamedTuple):
     """Everything that the outputs and the station need."""
     begin: datetime.datetime    # UTC
@@ -141,3 +152,8 @@ class Night(NamedTuple):
     exact: Choice
     greedy: Choice
     refusals: tuple[Refusal, ...]
+
+    @property
+    def lines(self) -> list[Line]:
+        """The passes with their shares."""
+        return list(map(Line, self.passes, self.exact.shares, self.greedy.shares))

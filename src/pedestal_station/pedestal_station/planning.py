@@ -1,5 +1,6 @@
 """The plan of a night: from files of elements to the passes, their predictions, and the choice among them."""
 import datetime
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
@@ -20,6 +21,7 @@ from pedestal_station.choice import Rules
 from pedestal_station.night import Choice, Night, Object, Pass, Refusal, Share, Window
 
 MAX_PASSES = 2000  # largest number of passes
+MAX_PRIORITY = 1e6  # largest weight of a second of contact
 MAX_NAMED = 3  # largest number of refusals in an error
 CUT_POINTS = 1000  # number of instants among which the highest one of a chosen time is
 NO_WINDOW = 'no --window'
@@ -52,7 +54,7 @@ def night(wishes: Wishes, progress: Progress = lambda *_: None) -> Night:
                                    used.acu.prediction.oldest)
     if not found:
         raise ValueError('; '.join([*map(refusal_text, refusals[:MAX_NAMED]), 'no object is left to plan']))
-    found = [each for each in objects.weighted(_selected(found, wishes.satellites), wishes.priorities)
+    found = [each for each in weighted(_selected(found, wishes.satellites), wishes.priorities)
              if each.priority]
     chosen = _chosen(found, wishes)
     passes: list[Pass] = []
@@ -93,6 +95,22 @@ def _named(found: Sequence[Object], option: str, name: str) -> Object:
         hint = did_you_mean(name, [text for each in found for text in (each.name, each.number)])
         raise ValueError(f'{option}: no object {name!r:.60} in the files;{hint}'.removesuffix(';'))
     return known[0]
+
+
+def weighted(found: Sequence[Object], texts: Sequence[str]) -> list[Object]:
+    """Return objects with the priorities of texts NAME=WEIGHT. Raises ValueError."""
+    weights: dict[str, float] = {}
+    for text in texts:
+        name, _, weight = text.rpartition('=')
+        option = f'--priority {text}'
+        known = _named(found, option, name)
+        try:
+            weights[known.name] = float(weight)
+        except ValueError:
+            weights[known.name] = math.nan
+        if not 0.0 <= weights[known.name] <= MAX_PRIORITY:
+            raise ValueError(f'{option}: weight = {weight!r:.20}: must be a number from 0 to {MAX_PRIORITY:.0f}')
+    return [each._replace(priority=weights.get(each.name, each.priority)) for each in found]
 
 
 def _selected(found: Sequence[Object], names: Sequence[str]) -> Sequence[Object]:

@@ -23,7 +23,6 @@ COARSE_STEP_S, MAX_COARSE_STEPS = 5.0, 500
 """Time between two positions from which the density of a table follows [s], and the largest number of these times."""
 ROW_ANGLE_RAD = math.radians(0.5)  # motion of the target between two rows of a table [rad]
 MIN_ROW_INTERVAL_S, MAX_ROW_INTERVAL_S = 0.5, 120.0  # limits of the time between two rows of a table [s]
-MAX_GAP_S = 60.0  # longest time on the target between two parts of one loss [s]
 
 
 def predict(target: Object, window: Window, antenna: Antenna) -> Prediction:
@@ -109,7 +108,7 @@ def _losses(orbit: Orbit, antenna: Antenna, program: ProgramTrack, rows: Floats,
     for reason, intervals in lost.items():
         own = _without(intervals, taken)
         taken += own
-        losses += _grouped(reason, own, _detail(reason, antenna, rows, found))
+        losses += [Loss(reason, begin, end, _detail(reason, antenna, rows, found)) for begin, end in own]
     return tuple(sorted(losses, key=lambda loss: loss.begin))
 
 
@@ -136,15 +135,3 @@ def _without(intervals: Iterable[Interval], taken: Iterable[Interval]) -> list[I
     for begin, end in taken:
         left = [part for a, b in left for part in ((a, min(b, begin)), (max(a, end), b)) if part[0] < part[1]]
     return left
-
-
-def _grouped(reason: str, intervals: Iterable[Interval], detail: str) -> list[Loss]:
-    """Return the losses of one reason; parts with at most MAX_GAP_S between them are one loss."""
-    losses: list[Loss] = []
-    for begin, end in sorted(intervals):
-        if losses and begin - losses[-1].end <= MAX_GAP_S:
-            last = losses.pop()
-            losses.append(Loss(reason, last.begin, end, last.seconds + end - begin, detail))
-        else:
-            losses.append(Loss(reason, begin, end, end - begin, detail))
-    return losses

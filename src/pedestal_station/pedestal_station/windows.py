@@ -17,10 +17,9 @@ from pedestal_common.quantities import Degrees, Floats, Pairs, Radians, Seconds,
 from pedestal_station.night import Orbit, Window
 
 FOLLOWED_DAYS = 1.0  # longest time before and after the night in which rise and set are searched [days]
-KINK_MARGINS_RAD = 0.1, 0.35
-"""Largest distances from the range of the floor at which an object may cross the floor within a step [rad], below and
-above HIGH_RAD. The elevation changes by at most 0.3 deg/s there, and 1 deg/s."""
-HIGH_RAD = 0.5  # elevation from which on a low satellite moves fast [rad]
+KINK_MARGIN_RAD = 0.1
+"""Distance below the lowest point of the floor within which an object may cross the floor in a step [rad]: there, the
+elevation changes by at most 0.3 deg/s."""
 
 
 class Horizon(NamedTuple):
@@ -97,8 +96,7 @@ def _kinks(each: Orbit, horizon: Horizon, times: Times) -> Times:
         return (azimuth - point + math.pi) % (2.0 * math.pi) - math.pi
 
     A, E = angles(each, times).T
-    margin = np.where(E < HIGH_RAD, *KINK_MARGINS_RAD)
-    near = (E > min(horizon.elevations) - margin) & (E < max(horizon.elevations) + margin)
+    near = E > min(horizon.elevations) - KINK_MARGIN_RAD
     steps = np.flatnonzero(near[:-1] | near[1:])
     points = np.array(horizon.azimuths)
     before = beyond(A[steps, np.newaxis], points)

@@ -2,23 +2,16 @@
 import csv
 import io
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import NamedTuple
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Json, SingleRow
-from pedestal_station.night import Night, Pass, Share
+from pedestal_station.night import Line, Night
 from pedestal_station.outputs import words
 
 LOSS_REASONS = 'keyhole', 'blockage', 'sun', 'travel', 'limit of the elevation', 'rate of the elevation'
 NUMBER_DIGITS = 6  # digits after the point of a number in a file
-
-
-class Line(NamedTuple):
-    """A pass with what the exact and the greedy plan do with it."""
-    each: Pass
-    share: Share
-    greedy: Share
 
 
 class Metric(NamedTuple):
@@ -67,12 +60,6 @@ METRICS = (
     Metric('max_cn0_dbhz', 'dB-Hz', lambda line: line.each.prediction.cn0[1]))
 
 
-def lines(night: Night) -> Iterator[Line]:
-    """Yield the passes with their shares, in the order of rise."""
-    for each, share, greedy in zip(night.passes, night.exact.shares, night.greedy.shares, strict=True):
-        yield Line(each, share, greedy)
-
-
 def number(value: float) -> float | None:
     """Return a number of a file: rounded, None for NaN."""
     return round(float(value), NUMBER_DIGITS) if math.isfinite(value) else None
@@ -81,7 +68,7 @@ def number(value: float) -> float | None:
 def json_content(night: Night) -> dict[str, Json]:
     """Return the content of --json."""
     found = [SingleRow(case=line.each.case, metric=metric.name, value=number(metric.value(line)), unit=metric.unit,
-                       paper=None, target=None) for line in lines(night) for metric in METRICS]
+                       paper=None, target=None) for line in night.lines for metric in METRICS]
     plan = {name: number(getattr(night.exact, name)) for name in ('value', 'bound')}
     return {'name': 'plan', 'rows': found,
             'plan': {**plan, 'optimal': night.exact.optimal, 'greedy_value': number(night.greedy.value)},
@@ -95,7 +82,7 @@ def csv_text(night: Night) -> str:
     writer = csv.writer(stream, lineterminator='\n')
     writer.writerow(['case', 'catalogue_number', 'rise_utc', 'set_utc', 'plan', 'lost_to', 'losses',
                      *(metric.name for metric in METRICS)])
-    for line in lines(night):
+    for line in night.lines:
         numbers = (number(metric.value(line)) for metric in METRICS)
         writer.writerow([line.each.case, line.each.object.number, words.iso(night, line.each.window.rise),
                          words.iso(night, line.each.window.set), words.state(line.share),
