@@ -49,8 +49,7 @@ class Course(NamedTuple):
 class Followed(Record):
     """State of a pass that is followed, and its sums."""
     guidance: guidance.Guidance
-    begun: Seconds      # begin of the last slew
-    slews: int          # number of slews through a keyhole
+    begun: Seconds      # begin of the last slew through a keyhole, -inf before the first one
     long_way: Bit       # 1 if one turns opposite to the target
     overtravel: Bit     # 1 if no azimuth wrap holds the pass
     received: Seconds   # integral of the received power over that on the axis of the beam
@@ -222,7 +221,7 @@ def _take(state: Followed, constants: Constants, pieces: Floats, times: tuple[Se
     ahead, half = state.guidance.lookahead, 0.5 * beamwidth
     slewing = planner.slewing(ahead, end)
     if slewing and ahead.slew.t1 != state.begun:
-        state.begun, state.slews = ahead.slew.t1, state.slews + 1
+        state.begun = ahead.slew.t1
         state.long_way |= ahead.slew.long_way
     power = 0.5 * (sum_pattern(first / beamwidth)**2 + sum_pattern(last / beamwidth)**2)
     state.received += power * (end - t)

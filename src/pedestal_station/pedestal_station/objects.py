@@ -63,10 +63,8 @@ class Elements(NamedTuple):
 
     def enu(self, times: Times) -> Vectors3:
         """As in night.Orbit."""
-        julian, fraction = orbit.julian_date(self.query.begin)
-        fractions = fraction + times / SECONDS_PER_DAY
-        return orbit.seen(self.satellite, self.query.station, julian, fractions,
-                          orbit.earth_fixed(julian, fractions, self.query.ut1_offset), light_time=False)
+        return orbit.enu(self.satellite, self.query.station, *orbit.julian_date(self.query.begin), times,
+                         self.query.ut1_offset)[0]
 
     def elements_age(self, t: Seconds) -> Seconds:
         """As in night.Orbit."""

@@ -114,14 +114,25 @@ def _losses(orbit: Orbit, antenna: Antenna, program: ProgramTrack, rows: Floats,
 
 def _detail(reason: str, antenna: Antenna, rows: Floats, found: Records) -> str:
     """Return more on a loss; '' if there is nothing to say."""
-    if reason == 'keyhole' and found['slews']:
+    if reason == 'keyhole' and math.isfinite(found['begun']):
         way = 'clockwise' if found['guidance']['lookahead']['slew']['peak'] > 0.0 else 'counter-clockwise'
         return f'the azimuth slews {way}, {"against" if found["long_way"] else "as"} the target'
     if reason == 'travel' and found['overtravel']:
-        limits = antenna.acu.azimuth.limits
-        return (f'no turn fits: the pass needs {math.degrees(np.ptp(np.unwrap(rows[:, following.AZIMUTH]))):.0f} deg '
-                f'between {math.degrees(limits.low):.0f} and {math.degrees(limits.high):.0f} deg')
+        return _travel_text(antenna, np.unwrap(rows[:, following.AZIMUTH]))
     return ''
+
+
+def _travel_text(antenna: Antenna, azimuth: Floats) -> str:
+    """Return the sentence on a pass that no turn holds: the travel that it needs from its rise on, and the largest one
+    that there is from an azimuth of the rise."""
+    limits = antenna.acu.azimuth.limits
+    below, above = azimuth[0] - azimuth.min(), azimuth.max() - azimuth[0]
+    # start: least azimuth of the rise inside the limits
+    start = limits.low + (azimuth[0] - limits.low) % (2.0 * math.pi)
+    starts = [start + 2.0 * math.pi * i for i in range(5) if start + 2.0 * math.pi * i <= limits.high]
+    there = [limits.high - each if above > below else each - limits.low for each in starts]
+    return (f'no turn fits: the pass needs {math.degrees(max(above, below)):.0f} deg, '
+            f'{math.degrees(max(there, default=0.0)):.0f} are there')
 
 
 def _above(height: passes.Height, times: Times) -> list[Interval]:
