@@ -37,7 +37,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from pedestal_common.parameters import ParameterError, Parameters, parameter
 from pedestal_common.quantities import Seconds
-from pedestal_station.night import Choice, Pass, Share
+from pedestal_station.night import Choice, Interval, Pass, Share
 
 TIE = 1e-7
 """Largest relative change of a gain that prefers the earlier one of two equal passes."""
@@ -47,8 +47,7 @@ EQUAL_S = 0.01
 """Difference of times below which they are equal [s]: 1e-6, the tolerance of HiGHS for z, of an overlap of hours."""
 
 Changeover: TypeAlias = Callable[[int, int], Seconds]   # from the end of pass i to the begin of pass j
-Contact: TypeAlias = tuple[Seconds, Seconds]            # begin, end
-Contacts: TypeAlias = dict[int, Contact]                # of the taken passes
+Contacts: TypeAlias = dict[int, Interval]               # of the taken passes
 Row: TypeAlias = tuple[dict[int, float], float]         # sum of coefficient times variable is at most a limit
 
 
@@ -119,7 +118,8 @@ def choose(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> tupl
     groups = sorted(_groups(problem), key=len)
     for k, group in enumerate(groups):
         share = len(group) / sum(len(each) for each in groups[k:])
-        usual = _fill(problem, _greedy_order(problem, group), {})
+        # From the most to the least valuable second, then the longer ones, then the earlier ones.
+        usual = _fill(problem, sorted(group, key=lambda i: (-problem.gain[i], -problem.length(i), i)), {})
         found, limit = _solve(problem, group, max(0.0, deadline - time.monotonic()) * share)
         found = max(usual, found, key=problem.value)
         optimal = optimal and limit is None
@@ -165,14 +165,11 @@ def _problem(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> _P
 
 def _gap(problem: _Problem, passes: Sequence[Pass], changeover: Changeover, i: int, j: int) -> Seconds:
     """Return the changeover from pass i to pass j; inf if no two contacts fit in this order."""
-    room = problem.set[j] - problem.rise[i] - 2.0 * problem.min_pass
-    if room < 0.0 or min(problem.length(i), problem.length(j)) < problem.min_pass:
-        return math.inf
     gap = changeover(i, j)
     if not gap >= 0.0:
         raise ParameterError(f'{passes[i].case} to {passes[j].case}: changeover = {gap:g}: must be a number at least '
                              f'0 s')
-    return gap if gap <= room else math.inf
+    return gap if gap <= problem.set[j] - problem.rise[i] - 2.0 * problem.min_pass else math.inf
 
 
 def _groups(problem: _Problem) -> Iterator[list[int]]:
@@ -189,11 +186,6 @@ def _groups(problem: _Problem) -> Iterator[list[int]]:
             yield sorted(group)
 
 
-def _greedy_order(problem: _Problem, group: Iterable[int]) -> list[int]:
-    """Return the passes from the most to the least valuable second, then the longer ones, then the earlier ones."""
-    return sorted(group, key=lambda i: (-problem.gain[i], -problem.length(i), i))
-
-
 def _fill(problem: _Problem, order: Iterable[int], contacts: Contacts) -> Contacts:
     """Return contacts after each pass, in order, got the longest stretch that is free between the others."""
     contacts = dict(contacts)
@@ -205,7 +197,7 @@ def _fill(problem: _Problem, order: Iterable[int], contacts: Contacts) -> Contac
     return contacts
 
 
-def _free(problem: _Problem, i: int, contacts: Contacts, known: Contact | None = None) -> list[_Free]:
+def _free(problem: _Problem, i: int, contacts: Contacts, known: Interval | None = None) -> list[_Free]:
     """Return the stretches of pass i, earliest first. known: a contact of the pass, for the stretch in its place."""
     others = sorted((j for j in problem.near[i] if j in contacts), key=lambda j: contacts[j])
     places = range(len(others) + 1)

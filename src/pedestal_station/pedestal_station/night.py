@@ -13,7 +13,7 @@ All times are seconds from the beginning of the night, which is a UTC.
 """
 import datetime
 import pathlib
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.quantities import (
@@ -28,6 +28,8 @@ from pedestal_common.quantities import (
     Times,
     Vectors3,
 )
+
+Interval: TypeAlias = tuple[Seconds, Seconds]   # begin, end
 
 
 class Orbit(Protocol):

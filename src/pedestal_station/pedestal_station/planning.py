@@ -18,7 +18,7 @@ from pedestal_station import antenna, choice, objects, prediction, windows
 from pedestal_station.antenna import Antenna
 from pedestal_station.changeover import Changeovers
 from pedestal_station.choice import Rules
-from pedestal_station.night import Choice, Night, Object, Pass, Refusal, Share, Window
+from pedestal_station.night import Choice, Interval, Night, Object, Pass, Refusal, Share, Window
 
 MAX_PASSES = 2000  # largest number of passes
 MAX_PRIORITY = 1e6  # largest weight of a second of contact
@@ -28,7 +28,6 @@ NO_WINDOW = 'no --window'
 UNDER_WAY = 'under way at the start'
 
 Progress: TypeAlias = Callable[[float, str], None]  # share of the work that is done, name of the object
-Interval: TypeAlias = tuple[Seconds, Seconds]
 
 
 class Wishes(NamedTuple):

@@ -5,7 +5,6 @@ lost has one reason: a hidden sector before the sun, and the sun before the limi
 """
 import math
 from collections.abc import Iterable
-from typing import TypeAlias
 
 import numpy as np
 
@@ -15,9 +14,7 @@ from pedestal_common.geometry import passes
 from pedestal_common.quantities import Floats, Records, Seconds, Times, Vectors3
 from pedestal_station import following
 from pedestal_station.antenna import Antenna
-from pedestal_station.night import Loss, Object, Orbit, Prediction, Window
-
-Interval: TypeAlias = tuple[Seconds, Seconds]
+from pedestal_station.night import Interval, Loss, Object, Orbit, Prediction, Window
 
 COARSE_STEP_S, MAX_COARSE_STEPS = 5.0, 500
 """Time between two positions from which the density of a table follows [s], and the largest number of these times."""

@@ -50,8 +50,6 @@ class Horizon(NamedTuple):
 
     def at(self, azimuth: Floats) -> Floats:
         """Return the least elevations [rad] at azimuths [rad]."""
-        if len(self.elevations) == 1:
-            return np.full(len(azimuth), self.elevations[0])
         return np.interp(azimuth, self.azimuths, self.elevations, period=2.0 * math.pi)
 
 

@@ -62,7 +62,7 @@ METRICS = (
 
 def number(value: float) -> float | None:
     """Return a number of a file: rounded, None for NaN."""
-    return round(float(value), NUMBER_DIGITS) if math.isfinite(value) else None
+    return round(value, NUMBER_DIGITS) if math.isfinite(value) else None
 
 
 def json_content(night: Night) -> dict[str, Json]:
@@ -83,10 +83,8 @@ def csv_text(night: Night) -> str:
     writer.writerow(['case', 'catalogue_number', 'rise_utc', 'set_utc', 'plan', 'lost_to', 'losses',
                      *(metric.name for metric in METRICS)])
     for line in night.lines:
-        numbers = (number(metric.value(line)) for metric in METRICS)
         writer.writerow([line.each.case, line.each.object.number, words.iso(night, line.each.window.rise),
                          words.iso(night, line.each.window.set), words.state(line.share),
                          '; '.join(line.share.lost_to), words.losses(line.each.prediction),
-                         *('' if value is None else f'{value:g}' if value % 1.0 == 0.0 else repr(value)
-                           for value in numbers)])
+                         *(number(metric.value(line)) for metric in METRICS)])
     return stream.getvalue()
