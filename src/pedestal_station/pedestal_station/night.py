@@ -12,6 +12,7 @@ Each module of the package makes one of these, or reads them:
 All times are seconds from the beginning of the night, which is a UTC.
 """
 import datetime
+import math
 import pathlib
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -103,7 +104,7 @@ class Prediction(NamedTuple):
     @property
     def loss(self) -> Seconds:
         """Expected loss of the whole pass."""
-        return sum(each.seconds for each in self.losses)
+        return math.fsum(each.seconds for each in self.losses)
 
 
 class Pass(NamedTuple):

@@ -69,14 +69,11 @@ def find(each: Orbit, horizon: Horizon, duration: Seconds) -> list[Window]:
 
     step = passes.SEARCH_STEP_S
     times = np.arange(-step, duration + 2.0 * step, step)
-    times, heights = passes.followed(height, times, FOLLOWED_DAYS)
-    if len(horizon.elevations) == 1:
-        spans, peaks = passes.spans(height, times, heights)
-    else:
-        times = np.union1d(times, _kinks(each, horizon, times))
-        A, E = angles(each, times).T
-        spans, _ = passes.spans(height, times, E - horizon.at(A))
-        peaks = passes.maxima(elevation, times, E) if spans else times
+    times, _ = passes.followed(height, times, FOLLOWED_DAYS)
+    times = np.union1d(times, _kinks(each, horizon, times))
+    A, E = angles(each, times).T
+    spans, _ = passes.spans(height, times, E - horizon.at(A))
+    peaks = passes.maxima(elevation, times, E)
     return [_window(elevation, peaks, span, duration) for span in spans if span.begin < duration and span.end > 0.0]
 
 

@@ -22,7 +22,7 @@ class Metric(NamedTuple):
 
 
 def _seconds(reason: str) -> Callable[[Line], float]:
-    return lambda line: sum(loss.seconds for loss in line.each.prediction.losses if loss.reason == reason)
+    return lambda line: math.fsum(loss.seconds for loss in line.each.prediction.losses if loss.reason == reason)
 
 
 def _degrees(name: str, axis: int) -> Callable[[Line], float]:
