@@ -22,8 +22,9 @@ Passes that cannot disturb each other, directly or through others, are independe
     q_i + p_j >= O_ij z_ij,  O_ij = set_i + changeover_ij - rise_j          the overlap that trims remove
 
 Of two equal plans it takes the one with more contact in the earlier passes (TIE), if their difference is above the
-tolerances of HiGHS. A search that ends gives the same plan for the same passes. A search that the limit of time ends may find another plan on another computer: the better
-one of the plan found and the greedy plan, with the bound that HiGHS has proved. `Choice.optimal` states which it is.
+tolerances of HiGHS. A search that ends gives the same plan for the same passes. A search that the limit of time ends
+may find another plan on another computer: the better one of the plan found and the greedy plan, with the bound that
+HiGHS has proved. `Choice.optimal` states which it is.
 """
 import dataclasses
 import math
