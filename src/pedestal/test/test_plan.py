@@ -133,12 +133,14 @@ def test_a_geostationary_satellite_has_the_times_that_the_user_chooses(planned, 
     assert code == 2 and 'the object rises and sets' in errors
 
 
-def test_objects_are_selected_by_name_by_number_and_by_a_weight_of_0(planned):
+def test_objects_are_selected_by_name_by_number_and_by_a_weight_of_0(planned, pedestal):
     for words, expected in ((('--satellite', 'iss (zarya)'), {'ISS (ZARYA)'}), (('--satellite', '43013'), {'43013'}),
                             (('--priority', '43013=0'), {'ISS (ZARYA)'}),
                             (('--satellite', '43013', '25544', '--satellite', '25544'), {'ISS (ZARYA)', '43013'})):
         code, found, _ = planned('low.tle', *PLACE, *words)
         assert code == 0 and {case.rpartition('/')[0] for case in found} == expected
+    code, _, errors = pedestal('plan', 'low.tle', *PLACE, '--priority', '43013=0', '25544=0')
+    assert code == 2 and '--priority: the weight of every object is 0; no object is left to plan' in errors
 
 
 def test_more_passes_than_a_plan_holds_are_refused(pedestal, files, monkeypatch):

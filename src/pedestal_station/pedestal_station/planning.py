@@ -54,6 +54,8 @@ def night(wishes: Wishes, progress: Progress = lambda *_: None) -> Night:
         raise ValueError('; '.join([*map(refusal_text, refusals[:MAX_NAMED]), 'no object is left to plan']))
     found = [each for each in objects.weighted(_selected(found, wishes.satellites), wishes.priorities)
              if each.priority]
+    if not found:
+        raise ValueError('--priority: the weight of every object is 0; no object is left to plan')
     chosen = _chosen(found, wishes)
     passes: list[Pass] = []
     for i, each in enumerate(found):

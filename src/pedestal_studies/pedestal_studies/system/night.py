@@ -1,8 +1,8 @@
 """A night of passes in the closed loop: what a plan announces for each taken pass, against what the antenna loses.
 
 Twelve satellites over one station on a slow pedestal with a hidden sector. Each contact of the exact plan runs as
-`pedestal station` takes it: the axes slew from the end of the contact before to the begin of this one, follow the
-elements 5 s before it, and the control unit changes to autotrack by its own rules. A wait of more than 240 s between
+`pedestal station` takes it. The axes slew from the end of the contact before to the begin of this one, and follow the
+elements from 5 s before it. The control unit changes to autotrack by its own rules. A wait of more than 240 s between
 two contacts is skipped, and the axes then stand at the begin. A case is NAME/K, `NAME/K, N s` for the N s about the
 culmination of a longer contact, and `night` for all of them.
 
