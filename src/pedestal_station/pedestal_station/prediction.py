@@ -11,7 +11,7 @@ import numpy as np
 from acu_tracker.guidance import guidance
 from acu_tracker.program.program_track import ProgramTrack
 from pedestal_common.geometry import passes
-from pedestal_common.quantities import Floats, Records, Seconds, Times, Vectors3
+from pedestal_common.quantities import Floats, Radians, Records, Seconds, Times, Vectors3
 from pedestal_station import following
 from pedestal_station.antenna import Antenna
 from pedestal_station.night import Interval, Loss, Object, Orbit, Prediction, Window
@@ -22,8 +22,9 @@ ROW_ANGLE_RAD = math.radians(0.5)  # motion of the target between two rows of a 
 MIN_ROW_INTERVAL_S, MAX_ROW_INTERVAL_S = 0.5, 120.0  # limits of the time between two rows of a table [s]
 
 
-def predict(target: Object, window: Window, antenna: Antenna) -> Prediction:
-    """Return the Prediction of a pass. The turn is the one that is chosen from the stow. Raises TargetError."""
+def predict(target: Object, window: Window, antenna: Antenna, near: Radians | None = None) -> Prediction:
+    """Return the Prediction of a pass. near: azimuth (encoder angle) before the pass, from which the control unit
+    chooses the turn; None: the antenna is stowed. Raises TargetError."""
     times, enu = _table(target.orbit, window.rise, window.set)
     program = ProgramTrack(times, np.ascontiguousarray(antenna.deck_angles(times, enu)))
     constants, terms = antenna.constants[0], antenna.terms[0]
@@ -31,7 +32,8 @@ def predict(target: Object, window: Window, antenna: Antenna) -> Prediction:
     following.survey(program, terms, rows)
     state, ends, pieces = _initial(antenna), np.zeros((2, 2)), np.zeros((following.MAX_PIECES, 3))
     course = following.Course(program, rows, _ahead(rows, antenna))
-    following.follow(state[0], constants, terms, course, antenna.acu.azimuth.stow, ends, pieces)
+    near = antenna.acu.azimuth.stow if near is None else near
+    following.follow(state[0], constants, terms, course, near, ends, pieces)
     found = state[0]
     ranges = np.linalg.norm(enu, axis=1)
     peaks = np.abs(rows[:, following.AZIMUTH_RATE:]).max(axis=0).tolist()
