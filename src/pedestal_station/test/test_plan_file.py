@@ -10,10 +10,12 @@ from pedestal_station import objects
 from pedestal_station.night import Choice, Night, Object, Pass, Prediction, Share, Window
 from pedestal_station.outputs import file
 from pedestal_station.station import fresh
+from pedestal_station.station.requests import Antenna
 from tracking_receiver_sim.params import LeoPassParameters
 
 BEGIN = datetime.datetime(2019, 12, 10, 12, 0)
 STATION = StationParameters()
+ANTENNA = Antenna(STATION, (-270.0, 270.0), 14.0)
 DEFAULT = LeoPassParameters()
 TLE = f'ISS\n{DEFAULT.line_1}\n{DEFAULT.line_2}\n'
 
@@ -114,7 +116,7 @@ def test_a_missing_plan_is_named(tmp_path):
 
 def test_only_quiet_files_of_elements_are_read(tmp_path):
     """A file counts in the second look at which it is the same; a hidden one and one of other satellites never."""
-    watch = fresh.Watch(tmp_path, STATION, 14.0)
+    watch = fresh.Watch(tmp_path, ANTENNA)
     wanted, utc, now = frozenset(('25544',)), file.seconds(BEGIN), 0.0
 
     def looked():
@@ -141,4 +143,4 @@ def test_only_quiet_files_of_elements_are_read(tmp_path):
     assert [line.startswith(f'refused: {tmp_path / "broken.tle"}') for line in looked()[1]] == [True]
     watch.close()
     with pytest.raises(NotADirectoryError, match='must be a directory'):
-        fresh.Watch(tmp_path / 'none', STATION, 14.0)
+        fresh.Watch(tmp_path / 'none', ANTENNA)

@@ -15,8 +15,8 @@ from tracking_receiver_sim.params import LeoPassParameters
 DEFAULT = LeoPassParameters()
 ISS = {'line_1': DEFAULT.line_1, 'line_2': DEFAULT.line_2}
 ZERO = epoch_of(ISS) + 43200.0      # UTC of second 0 of these tests
-ANTENNA = requests.Antenna(StationParameters(), (-270.0, 270.0))
-RULES = Rules(lead=120.0, gap=600.0, park='', oldest=14.0)
+ANTENNA = requests.Antenna(StationParameters(), (-270.0, 270.0), 14.0)
+RULES = Rules(lead=120.0, gap=600.0, park='')
 
 
 def contact(case, begin, end, taken=True, elements=ISS, track=()):
@@ -28,7 +28,7 @@ class Night:
     """A night under test. Its control unit grants every command, unless a step gives another reply."""
 
     def __init__(self, *contacts, now=0.0, rules=RULES):
-        self.state = sequence.PassSequence(contacts, rules, ZERO + now)
+        self.state = sequence.PassSequence(contacts, rules, ANTENNA, ZERO + now)
         self.given = {'present': True, 'mode': 'standby', 'elements': ISS}
         self.lines, self.commands, self.records = [], [], []
 
@@ -53,8 +53,7 @@ class Night:
 
     def ask(self, now, verb, **arguments):
         """The reply to a command of anna."""
-        found = requests.request(Command(verb, 'anna', '1', arguments), ANTENNA)
-        [(_, reply)] = self.step(now, once={'requests': (found,)}).replies
+        [(_, reply)] = self.step(now, once={'commands': [Command(verb, 'anna', '1', arguments)]}).replies
         return reply
 
     @property
@@ -297,7 +296,7 @@ def test_the_progress_continues_a_pass_under_way_and_keeps_what_is_over(tmp_path
     now = up(5000)
     assert night.ask(312, 'insert', **ISS, begin=utc_text(ZERO + now), end=utc_text(ZERO + now + 60)).granted
     progress.save(file, night.state)
-    again = sequence.PassSequence(contacts, RULES, ZERO + 320.0)
+    again = sequence.PassSequence(contacts, RULES, ANTENNA, ZERO + 320.0)
     progress.resume(again, file, ZERO + 320.0)
     assert {entry.contact.case: entry.state for entry in again.entries} == {
         'A/1': 'done', 'B/1': 'running', 'C/1': 'queued', 'D/1': 'skipped', 'E/1': 'queued', '25544/1': 'queued'}
@@ -305,7 +304,7 @@ def test_the_progress_continues_a_pass_under_way_and_keeps_what_is_over(tmp_path
     night.state = again
     night.until(361, 321, mode='standby')
     assert night.states['B/1'] == 'done' and night.records[-2:] == [('begin', 'B/1'), ('end', 'B/1')]
-    late = sequence.PassSequence(contacts, RULES, ZERO + 400.0)
+    late = sequence.PassSequence(contacts, RULES, ANTENNA, ZERO + 400.0)
     progress.resume(late, file, ZERO + 400.0)
     assert late.entries[1].state == 'failed' and late.entries[1].text == 'the station was off at its end'
     file.write_text('{"pedestal_station": 1')

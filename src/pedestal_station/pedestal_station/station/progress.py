@@ -19,10 +19,11 @@ MAX_SHIFT_S = 60.0  # largest shift of the begin of a pass between two plans tha
 
 def night_text(sequence: PassSequence) -> str:
     """Return the JSON of `station/night`."""
-    return json.dumps({'passes': [
+    passes = [
         {'case': entry.contact.case, 'begin': entry.contact.begin, 'end': entry.contact.end,
          'max_elevation_deg': round(entry.contact.max_elevation, 2), 'state': entry.state,
-         'text': '; '.join(filter(None, (entry.text, entry.report)))} for entry in sequence.entries], 'now': sequence.now})
+         'text': '; '.join(filter(None, (entry.text, entry.report)))} for entry in sequence.entries]
+    return json.dumps({'passes': passes, 'now': sequence.now})
 
 
 def file_of(plan: pathlib.Path) -> pathlib.Path:

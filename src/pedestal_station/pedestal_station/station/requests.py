@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import StationParameters
-from pedestal_common.quantities import Degrees, Seconds
+from pedestal_common.quantities import Days, Degrees, Seconds
 from pedestal_common.wire import commands
 from pedestal_common.wire.commands import Argument, Command, CommandDefinition
 from pedestal_station.outputs.file import (
@@ -37,9 +37,10 @@ STATION_COMMANDS = (
 
 
 class Antenna(NamedTuple):
-    """What the requests need of the antenna."""
+    """What the station needs of the parameters of the control unit."""
     station: StationParameters
     azimuth: tuple[Degrees, Degrees]    # lowest and highest encoder angle
+    oldest: Days                        # largest age of elements
 
 
 class Request(NamedTuple):

@@ -8,7 +8,7 @@ autotrack by the rules of the control unit. All times are UTC.
 """
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from pedestal_common.graph.modes import MODE_ROWS
@@ -17,7 +17,7 @@ from pedestal_common.quantities import Days, Seconds
 from pedestal_common.wire.commands import HELD_REFUSAL, Command, Reply
 from pedestal_station import objects
 from pedestal_station.outputs.file import MAX_PASSES, Contact, epoch_of, orbit_of, utc_text
-from pedestal_station.station.requests import Request
+from pedestal_station.station.requests import Antenna, Request, request
 
 FOLLOWING_MODES = tuple(row.name for row in MODE_ROWS if row.follows and row.name not in ('slave', 'sun'))
 """Modes of a pass: those in which the control unit follows the target of the elements."""
@@ -32,11 +32,10 @@ UNPLANNED = 'dropped', 'skipped', 'failed'  # states of a pass that `insert` may
 
 
 class Rules(NamedTuple):
-    """Settings of the station."""
+    """Options of the station."""
     lead: Seconds       # time before a contact from which the antenna points to its begin: for slew and setup
     gap: Seconds        # shortest wait in which the antenna is parked
     park: str           # stored preset at which it waits; '': stow
-    oldest: Days        # largest age of elements, that of the control unit
 
 
 @dataclasses.dataclass
@@ -78,9 +77,9 @@ class Inputs(NamedTuple):
     alarm: str = ''                         # latched fault of the control unit or of the drive, '' for none
     reply: Reply | None = None              # to the command of the last step
     interference: str = ''                  # what another client has done without control, '' for nothing
-    requests: tuple[Request, ...] = ()
-    fresh: tuple[Fresh, ...] = ()
-    reports: tuple[tuple[str, str], ...] = ()   # (case, text) of each finished recording
+    commands: Sequence[Command] = ()        # of operators
+    fresh: Sequence[Fresh] = ()
+    reports: Sequence[tuple[str, str]] = () # (case, text) of each finished recording
 
 
 class Step(NamedTuple):
@@ -100,9 +99,9 @@ def _age(contact: Contact) -> Days:
     return abs(contact.begin - epoch_of(contact.elements)) / SECONDS_PER_DAY
 
 
-def _refusal(contact: Contact, rules: Rules) -> str:
+def _refusal(contact: Contact, oldest: Days) -> str:
     """Return why the elements of a contact are refused, '' if they are not."""
-    return objects.age_refusal(orbit_of(contact.elements), contact.begin, rules.oldest) if contact.elements else ''
+    return objects.age_refusal(orbit_of(contact.elements), contact.begin, oldest) if contact.elements else ''
 
 
 def _warning(contact: Contact) -> str:
@@ -125,9 +124,9 @@ class PassSequence:
     _recording = ''         # case of the pass that is recorded
     _ends = math.inf        # latest end of the station, after the last pass
 
-    def __init__(self, contacts: Iterable[Contact], rules: Rules, now: Seconds) -> None:
+    def __init__(self, contacts: Iterable[Contact], rules: Rules, antenna: Antenna, now: Seconds) -> None:
         """Queue the passes of a plan, and skip those whose time is over."""
-        self.rules = rules
+        self.rules, self.antenna = rules, antenna
         self.entries = [
             Entry(contact, 'dropped', contact.reason) if not contact.taken
             else Entry(contact, 'skipped', f'refused: its time was over at {clock(contact.end)}')
@@ -145,8 +144,8 @@ class PassSequence:
                 entry.report = report if entry.contact.case == case else entry.report
             self._lines.append(f'{case}: {report}')
         self._watch_control()
-        for request in inputs.requests:
-            self._answer(request)
+        for command in inputs.commands:
+            self._answer(command)
         self._watch_pass()
         self._begin_pass()
         self.pending = self._command()
@@ -204,38 +203,37 @@ class PassSequence:
         self.held, self._aim = reason, None
         self._lines.append(f'holds until `resume`: {reason}')
 
-    def _answer(self, request: Request) -> None:
-        """Execute the request of an operator, and reply."""
-        command = request.command
+    def _answer(self, command: Command) -> None:
+        """Execute the command of an operator, and reply."""
         try:
             if self.over:
                 raise ValueError('the night is over')
             reply = Reply(True, {'hold': self._hold, 'resume': self._resume, 'skip': self._skip,
-                                 'insert': self._insert}[command.verb](request))
+                                 'insert': self._insert}[command.verb](request(command, self.antenna)))
         except ValueError as error:
             reply = Reply(False, f'refused: {error}')
             self._lines.append(f'{command} of {command.who}: {reply.text}')
         self._replies.append((command, reply))
 
-    def _hold(self, request: Request) -> str:
+    def _hold(self, given: Request) -> str:
         if self.held:
             raise ValueError(f'the station holds already: {self.held}')
-        reason = request.command.arguments.get('reason', '')
-        self._wait_for_resume(f'{request.command.who}{f": {reason}" if reason else ""}')
+        reason = given.command.arguments.get('reason', '')
+        self._wait_for_resume(f'{given.command.who}{f": {reason}" if reason else ""}')
         return 'the station holds'
 
-    def _resume(self, request: Request) -> str:
+    def _resume(self, given: Request) -> str:
         if not self.held:
             raise ValueError('the station does not hold')
         self.held, self._aim, self._retry = '', None, self._given.now
-        self._lines.append(f'resumes: {request.command.who}')
+        self._lines.append(f'resumes: {given.command.who}')
         return 'the station goes on'
 
-    def _skip(self, request: Request) -> str:
-        entry = self._named(request.case) if request.case else self._first('running') or self._first('queued')
+    def _skip(self, given: Request) -> str:
+        entry = self._named(given.case) if given.case else self.first('running') or self.first('queued')
         if entry is None or entry.state not in ('queued', 'running'):
-            raise ValueError(f'case = {request.case}: is {entry.state}' if entry else 'no pass is queued')
-        self._close(entry, 'skipped', f'by {request.command.who}')
+            raise ValueError(f'case = {given.case}: is {entry.state}' if entry else 'no pass is queued')
+        self._close(entry, 'skipped', f'by {given.command.who}')
         return f'{entry.contact.case} is skipped'
 
     def _named(self, case: str) -> Entry:
@@ -246,14 +244,14 @@ class PassSequence:
         cases = ', '.join(entry.contact.case for entry in self.entries)
         raise ValueError(f'case = {case}: must be one of {cases}')
 
-    def _insert(self, request: Request) -> str:
-        entry = self._named(request.case) if request.contact is None else self._new(request.contact)
+    def _insert(self, given: Request) -> str:
+        entry = self._named(given.case) if given.contact is None else self._new(given.contact)
         contact = entry.contact
         if entry.state not in UNPLANNED:
-            raise ValueError(f'case = {request.case}: is {entry.state}')
+            raise ValueError(f'case = {given.case}: is {entry.state}')
         if contact.end <= self._given.now:
             raise ValueError(f'{contact.case}: its time was over at {clock(contact.end)}')
-        if refusal := _refusal(contact, self.rules):
+        if refusal := _refusal(contact, self.antenna.oldest):
             raise ValueError(f'{contact.case}: {refusal}')
         overlapping = [other for other in self.entries if other.state in ('queued', 'running')
                        and other.contact.begin < contact.end and contact.begin < other.contact.end]
@@ -261,9 +259,9 @@ class PassSequence:
             if other.state == 'running':
                 raise ValueError(f'{contact.case} overlaps {other.contact.case}, which is under way; skip that first')
         entry.state, entry.text, entry.tracked, self._ends = 'queued', _warning(contact), 0.0, math.inf
-        if request.contact is not None:
+        if given.contact is not None:
             self.entries = sorted((*self.entries, entry), key=lambda each: each.contact.begin)
-        self._lines.append(f'{contact.case}: inserted by {request.command.who}, {clock(contact.begin)} to '
+        self._lines.append(f'{contact.case}: inserted by {given.command.who}, {clock(contact.begin)} to '
                            f'{clock(contact.end)}')
         for other in overlapping:
             self._close(other, 'dropped', f'lost to {contact.case}')
@@ -284,7 +282,7 @@ class PassSequence:
         for waiting in self.entries:
             if waiting.state == 'queued' and waiting.contact.end <= now:
                 self._close(waiting, 'skipped', f'its time went by: {self._obstacle or "the station was off"}')
-        entry = self._first('running')
+        entry = self.first('running')
         if entry is None:
             return
         contact, passed = entry.contact, now - self._last
@@ -309,24 +307,24 @@ class PassSequence:
         """Begin the next pass at its time, unless the station waits. Old elements end it at once. Begin its recording
         shortly before its contact."""
         now = self._given.now
-        while (coming := self._first('queued')) and not (self._obstacle or self._first('running')) and (
+        while (coming := self.first('queued')) and not (self._obstacle or self.first('running')) and (
                 now >= coming.contact.begin - self.rules.lead):
             contact = coming.contact
-            if refusal := _refusal(contact, self.rules):
+            if refusal := _refusal(contact, self.antenna.oldest):
                 self._close(coming, 'failed', f'refused: {refusal}')
                 continue
             coming.state, self._aim, self._refusal = 'running', None, ''
             elements = (f'elements of {utc_text(epoch_of(contact.elements))[:16]}, {_age(contact):.1f} days '
                         'old' if contact.elements else 'a track of the plan')
             self._lines.append(f'{contact.case}: begins, {clock(contact.begin)} to {clock(contact.end)}, {elements}')
-        entry = self._first('running')
+        entry = self.first('running')
         if entry and not self._recording and now >= entry.contact.begin - RECORD_LEAD_S:
             self._recording = entry.contact.case
             self._records.append(('begin', self._recording))
 
     def _wanted(self) -> Aim | None:
         """Return the mode that the antenna should have; None if any mode will do."""
-        entry, coming, now = self._first('running'), self._first('queued'), self._given.now
+        entry, coming, now = self.first('running'), self.first('queued'), self._given.now
         if entry and now < entry.contact.begin - FOLLOW_LEAD_S:
             azimuth, elevation = map(math.radians, entry.contact.point)
             return Aim('preset', {'azimuth': azimuth, 'elevation': elevation})
@@ -358,7 +356,7 @@ class PassSequence:
 
     def _finish(self) -> None:
         """End the night when the antenna is stowed after the last pass."""
-        if self._first('running') or self._first('queued') or self.over:
+        if self.first('running') or self.first('queued') or self.over:
             return
         now = self._given.now
         if self._ends == math.inf:
@@ -366,13 +364,14 @@ class PassSequence:
             self._lines.append('all passes are over: stows')
         stowed = self._aim == STOW and self._given.progress == 'stowed'
         if stowed or now >= self._ends:
-            self._lines.append('stowed' if stowed else f'not stowed: {self._obstacle or self._refusal or "no arrival"}')
             self.over = True
+            why = self._obstacle or self._refusal or 'no arrival'
+            self._lines.append('stowed' if stowed else f'not stowed: {why}')
 
     @property
     def now(self) -> str:
         """What the station does, in one line."""
-        entry, coming = self._first('running'), self._first('queued')
+        entry, coming = self.first('running'), self.first('queued')
         if self.held:
             return f'holds until `resume`: {self.held}'
         if self._waits:
@@ -386,6 +385,6 @@ class PassSequence:
             return f'next: {coming.contact.case} at {clock(coming.contact.begin)}'
         return 'over' if self.over else 'all passes are over: stows'
 
-    def _first(self, state: str) -> Entry | None:
+    def first(self, state: str) -> Entry | None:
         """Return the first pass in a state."""
         return next((entry for entry in self.entries if entry.state == state), None)
