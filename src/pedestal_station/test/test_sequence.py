@@ -20,8 +20,8 @@ RULES = Rules(lead=120.0, gap=600.0, park='')
 
 
 def contact(case, begin, end, taken=True, elements=ISS, track=()):
-    return Contact(case, case.partition('/')[0], '25544', elements, track, ZERO + begin, ZERO + end, (10.0, 20.0),
-                   50.0, 1.0, taken, '' if taken else 'lost to B/1')
+    return Contact(case, case.partition('/')[0], '25544', elements, track, ZERO + begin, ZERO + end, 10.0,
+                   20.0, 50.0, 1.0, taken, '' if taken else 'lost to B/1')
 
 
 class Night:
@@ -195,6 +195,7 @@ def test_an_operator_skips_the_pass_under_way_the_next_or_a_named_one():
     assert night.ask(198, 'skip', case='C/1').text == 'refused: case = C/1: is skipped'
     assert night.ask(199, 'skip', case='D/1').text == 'refused: case = D/1: must be one of A/1, B/1, C/1'
     assert night.ask(200, 'skip').text == 'B/1 is skipped'
+    assert "unknown command 'jump'" in night.ask(200, 'jump').text
     assert night.ask(201, 'skip').text == 'refused: no pass is queued' and night.text('B/1') == 'by anna'
 
 
@@ -225,7 +226,7 @@ def test_a_pass_of_other_elements_is_inserted_at_a_turn_within_the_travel():
     times = {name: utc_text(ZERO + when) for name, when in (('begin', now), ('end', now + 60))}
     assert night.ask(10, 'insert', **ISS, **times, name='STATION').text == 'STATION/1 is queued'
     entry = night.state.entries[-1]
-    assert entry.inserted and entry.contact.number == '25544' and -180.0 <= entry.contact.point[0] <= 180.0
+    assert entry.inserted and entry.contact.number == '25544' and -180.0 <= entry.contact.azimuth_deg <= 180.0
     assert night.ask(11, 'insert', **ISS, **times).text == '25544/1 is queued'      # in place of the first
     assert night.states['STATION/1'] == 'dropped'
 
@@ -238,7 +239,7 @@ def test_a_pass_of_other_elements_is_inserted_at_a_turn_within_the_travel():
     ({**ISS, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-09T00:00:00'}, 'must be after begin'),
     ({**ISS, 'line_1': 'x' * 69, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-10T00:01:00'}, 'TLE line 1'),
     ({**ISS, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-10T00:01:00'}, 'is below the horizon from'),
-    ({**ISS, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-10T00:01:00', 'name': 'x' * 101}, 'at most 100'),
+    ({**ISS, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-10T00:01:00', 'name': 'x' * 101}, '1 to 100'),
     ({'colour': 'red'}, "unknown argument 'colour'")])
 def test_what_cannot_be_inserted_is_refused_by_name(arguments, reason):
     with pytest.raises((ValueError, TargetError), match=reason.replace('(', r'\(')):

@@ -21,7 +21,7 @@ def night_text(sequence: PassSequence) -> str:
     """Return the JSON of `station/night`."""
     passes = [
         {'case': entry.contact.case, 'begin': entry.contact.begin, 'end': entry.contact.end,
-         'max_elevation_deg': round(entry.contact.max_elevation, 2), 'state': entry.state,
+         'max_elevation_deg': round(entry.contact.max_elevation_deg, 2), 'state': entry.state,
          'text': '; '.join(filter(None, (entry.text, entry.report)))} for entry in sequence.entries]
     return json.dumps({'passes': passes, 'now': sequence.now})
 
@@ -52,7 +52,7 @@ def resume(sequence: PassSequence, path: pathlib.Path, now: Seconds) -> None:
         for saved in content['passes']:
             case = _text(saved['case'])
             if case not in known and 'inserted' in saved:
-                kept = contact(str(path), f'{case}.inserted.', saved['inserted'])
+                kept = contact(path, f'{case}.inserted', saved['inserted'])
                 known[case] = Entry(kept, 'skipped', 'its time went by: the station was off', inserted=True)
             if case in known:
                 _continue(known[case], saved, now)

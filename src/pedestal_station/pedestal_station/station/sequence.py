@@ -181,9 +181,9 @@ class PassSequence:
         """Give fresher elements to the queued passes of their satellite."""
         for entry in self.entries:
             old = entry.contact
-            if entry.state == 'queued' and (old.number or old.name) == fresh.satellite and old.elements and (
+            if entry.state == 'queued' and old.satellite == fresh.satellite and old.elements and (
                     epoch_of(fresh.elements) > epoch_of(old.elements)):
-                entry.contact = old._replace(elements=fresh.elements)
+                entry.contact = dataclasses.replace(old, elements=fresh.elements)
                 entry.text = _warning(entry.contact)
                 self._lines.append(f'{old.case}: elements of {fresh.source}, {_age(entry.contact):.1f} days old at '
                                    f'the pass, in place of {_age(old):.1f}')
@@ -208,8 +208,9 @@ class PassSequence:
         try:
             if self.over:
                 raise ValueError('the night is over')
+            given = request(command, self.antenna)
             reply = Reply(True, {'hold': self._hold, 'resume': self._resume, 'skip': self._skip,
-                                 'insert': self._insert}[command.verb](request(command, self.antenna)))
+                                 'insert': self._insert}[command.verb](given))
         except ValueError as error:
             reply = Reply(False, f'refused: {error}')
             self._lines.append(f'{command} of {command.who}: {reply.text}')
@@ -272,8 +273,8 @@ class PassSequence:
         if len(self.entries) >= MAX_PASSES:
             raise ValueError(f'the station has {len(self.entries)} passes, must be at most {MAX_PASSES}')
         cases = {entry.contact.case for entry in self.entries}
-        number = next(k for k in range(1, len(cases) + 2) if f'{contact.name}/{k}' not in cases)
-        return Entry(contact._replace(case=f'{contact.name}/{number}'), 'dropped', inserted=True)
+        number = next(k for k in range(1, len(cases) + 2) if f'{contact.object}/{k}' not in cases)
+        return Entry(dataclasses.replace(contact, case=f'{contact.object}/{number}'), 'dropped', inserted=True)
 
     def _watch_pass(self) -> None:
         """Count the time on the target, and end a pass at its end or after an alarm. Skip queued passes whose time is
@@ -326,7 +327,7 @@ class PassSequence:
         """Return the mode that the antenna should have; None if any mode will do."""
         entry, coming, now = self.first('running'), self.first('queued'), self._given.now
         if entry and now < entry.contact.begin - FOLLOW_LEAD_S:
-            azimuth, elevation = map(math.radians, entry.contact.point)
+            azimuth, elevation = map(math.radians, (entry.contact.azimuth_deg, entry.contact.elevation_deg))
             return Aim('preset', {'azimuth': azimuth, 'elevation': elevation})
         if entry:
             return Aim('tle', dict(entry.contact.elements)) if entry.contact.elements else Aim('program', {})

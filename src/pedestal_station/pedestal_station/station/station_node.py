@@ -232,8 +232,8 @@ class Station:
 
     def _wanted(self) -> frozenset[str]:
         """Return the satellites whose elements may still be replaced."""
-        return frozenset(entry.contact.number or entry.contact.name for entry in self._passes.entries
-                         if entry.state == 'queued' and entry.contact.elements)
+        return frozenset(entry.contact.satellite for entry in self._passes.entries if entry.state == 'queued'
+                         and entry.contact.elements)
 
     def _inputs(self, fresh: Sequence[Fresh], reports: Sequence[tuple[str, str]]) -> Inputs:
         node = self._node
