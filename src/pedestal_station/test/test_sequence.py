@@ -7,7 +7,7 @@ import pytest
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.wire.commands import Command, Reply
-from pedestal_station.outputs.file import Contact, epoch_of, orbit_of, utc_text
+from pedestal_station.outputs.file import MAX_PASSES, Contact, epoch_of, orbit_of, utc_text
 from pedestal_station.station import progress, requests, sequence
 from pedestal_station.station.sequence import Aim, Fresh, Inputs, Rules
 from tracking_receiver_sim.params import LeoPassParameters
@@ -229,6 +229,8 @@ def test_a_pass_of_other_elements_is_inserted_at_a_turn_within_the_travel():
     assert entry.inserted and entry.contact.number == '25544' and -180.0 <= entry.contact.azimuth_deg <= 180.0
     assert night.ask(11, 'insert', **ISS, **times).text == '25544/1 is queued'      # in place of the first
     assert night.states['STATION/1'] == 'dropped'
+    night.state.entries *= MAX_PASSES
+    assert 'passes, must be at most 5000' in night.ask(12, 'insert', **ISS, **times).text
 
 
 @pytest.mark.parametrize('arguments, reason', [

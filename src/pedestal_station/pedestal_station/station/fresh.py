@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from concurrent import futures
 from typing import TypeAlias
 
-from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Seconds
 from pedestal_station import objects
@@ -34,7 +33,8 @@ class Watch:
             raise NotADirectoryError(f'--elements {folder}: must be a directory that exists')
         self._folder, self._antenna = folder, antenna
         self._seen: dict[pathlib.Path, _Version] = {}
-        self._read: dict[pathlib.Path, tuple[_Version, frozenset[str]]] = {}
+        self._read: dict[pathlib.Path, _Version] = {}
+        self._wanted = frozenset[str]()     # of the files that were read
         self._worker = futures.ThreadPoolExecutor(1, 'elements')
         self._pending: futures.Future[tuple[list[Fresh], list[str]]] | None = None
         self._next = 0.0
@@ -59,12 +59,10 @@ class Watch:
                 if not path.name.startswith(HIDDEN_PREFIX) and path.is_file():
                     info = path.stat()
                     versions[path] = info.st_mtime_ns, info.st_size
-        quiet = [path for path, version in versions.items() if self._seen.get(path) == version
-                 and self._read.get(path) != (version, wanted)]
-        self._seen = versions
-        self._read = {path: read for path, read in self._read.items() if path in versions} | {
-            path: (versions[path], wanted) for path in quiet}
-        return quiet
+        quiet = {path: version for path, version in versions.items() if self._seen.get(path) == version}
+        known = self._read if wanted <= self._wanted else {}
+        self._seen, self._read, self._wanted = versions, quiet, wanted
+        return [path for path, version in quiet.items() if known.get(path) != version]
 
     def close(self) -> None:
         """End without waiting for a file."""
@@ -75,12 +73,15 @@ def read(paths: Sequence[pathlib.Path], wanted: frozenset[str], antenna: Antenna
          utc: Seconds) -> tuple[list[Fresh], list[str]]:
     """Return (elements of the wanted satellites in files, a line for each file and wanted satellite that is refused).
     """
-    begin = EPOCH + datetime.timedelta(seconds=utc)
-    try:
-        found, refused = objects.read(paths, antenna.station, begin, NIGHT_S, antenna.oldest)
-    except TargetError as error:
-        return [], [f'refused: {error}']
-    return ([Fresh(each.number or each.name, texts_of(each.orbit), each.path.name) for each in found
-             if (each.number or each.name) in wanted and isinstance(each.orbit, objects.Elements)],
-            [f'refused: {each.path}: line {each.line}: {each.reason}' for each in refused
-             if not each.line or each.name in wanted])
+    begin, fresh, lines = EPOCH + datetime.timedelta(seconds=utc), list[Fresh](), list[str]()
+    for path in paths:
+        try:
+            found, refused = objects.read([path], antenna.station, begin, NIGHT_S, antenna.oldest)
+        except Exception as error:      # no file of another program may end the night
+            lines.append(f'refused: {path}: {error}')
+            continue
+        fresh += [Fresh(each.number or each.name, texts_of(each.orbit), path.name) for each in found
+                  if (each.number or each.name) in wanted and isinstance(each.orbit, objects.Elements)]
+        lines += [f'refused: {each.path}: line {each.line}: {each.reason}' for each in refused
+                  if not each.line or each.name in wanted]
+    return fresh, lines

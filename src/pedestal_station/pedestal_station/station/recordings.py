@@ -1,5 +1,6 @@
 """Recordings of a night: for each pass a recorder as a child process, and after it the proof, a process of its own
 that verifies the bag and writes its report. One proof runs at a time, so that it takes little from the antenna."""
+import contextlib
 import dataclasses
 import itertools
 import math
@@ -73,8 +74,11 @@ class Recordings:
             found.append((proof.case, f'{proof.bag}: {_proved(proof.bag, code)}'))
         if self._unproved and not self._proof:
             case, bag = self._unproved.pop(0)
-            self._proof = _Recording(case, bag, _child([sys.executable, '-m', __name__, str(bag)], bag),
-                                     time.monotonic() + PROOF_TIMEOUT_S)
+            try:
+                process = _child([sys.executable, '-m', __name__, str(bag)], bag)
+                self._proof = _Recording(case, bag, process, time.monotonic() + PROOF_TIMEOUT_S)
+            except OSError as error:
+                found.append((case, f'{bag}: no report: {error}'))
         return found
 
     def _watched(self, each: _Recording) -> str:
@@ -82,13 +86,15 @@ class Recordings:
         code = _ended(each)
         if code is None:
             return ''
+        died = f'its recorder {exit_description(code)}'
         if each.stop == math.inf and each.starts < MAX_STARTS:
-            each.process, each.starts = self._recorder(each.bag), each.starts + 1
-            return f'its recorder {exit_description(code)}: started again'
+            each.starts += 1
+            with contextlib.suppress(OSError):      # the next look tries again
+                each.process = self._recorder(each.bag)
+            return f'{died}: starts again'
         self._recorders.remove(each)
         self._unproved.append((each.case, each.bag))
-        return '' if each.stop < math.inf else (f'its recorder {exit_description(code)}: not recorded any more, '
-                                                f'{_log(each.bag)}')
+        return '' if each.stop < math.inf else f'{died}: not recorded any more, {_log(each.bag)}'
 
     def prove_rest(self) -> None:
         """Prove the bags without a report: those of a station that was killed."""
@@ -131,8 +137,10 @@ def _ended(each: _Recording) -> int | None:
 
 def _proved(bag: pathlib.Path, code: int) -> str:
     """Return the last line of a proof, by its exit code."""
-    lines = _log(bag).read_text(errors='replace').splitlines()
-    return lines[-1] if lines and code == 0 else f'no report: the process {exit_description(code)}, {_log(bag)}'
+    with contextlib.suppress(OSError, IndexError):
+        if code == 0:
+            return _log(bag).read_text(errors='replace').splitlines()[-1]
+    return f'no report: the process {exit_description(code)}, {_log(bag)}'
 
 
 def prove(bag: pathlib.Path) -> str:

@@ -28,6 +28,7 @@ RETRY_S, SETTLING_S = 2.0, 2.0  # time until a command is repeated; time after a
 MAX_ALARM_S = 5.0  # time with an alarm after which a pass fails [s]
 MAX_STOW_S = 300.0  # longest time for the stow after the last pass [s]
 PIN_REFUSAL = 'stow pins not out'  # part of the refusal of a mode that the stow pins forbid
+MAX_NAMED_PASSES = 20  # largest number of passes that a refusal names
 UNPLANNED = 'dropped', 'skipped', 'failed'  # states of a pass that `insert` may queue
 
 
@@ -242,8 +243,9 @@ class PassSequence:
         for entry in self.entries:
             if entry.contact.case == case:
                 return entry
-        cases = ', '.join(entry.contact.case for entry in self.entries)
-        raise ValueError(f'case = {case}: must be one of {cases}')
+        cases = [entry.contact.case for entry in self.entries]
+        more = ' ...' if len(cases) > MAX_NAMED_PASSES else ''
+        raise ValueError(f'case = {case}: must be one of {", ".join(cases[:MAX_NAMED_PASSES])}{more}')
 
     def _insert(self, given: Request) -> str:
         entry = self._named(given.case) if given.contact is None else self._new(given.contact)

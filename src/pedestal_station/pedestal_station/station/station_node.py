@@ -26,7 +26,7 @@ from pedestal_station.station.requests import Antenna
 from pedestal_station.station.sequence import Aim, Fresh, Inputs, PassSequence, Rules, Step, clock
 
 TICK_S = 0.2  # time between two steps of the sequence [s]
-MAX_KEPT_REPLIES = 100  # largest number of replies that are repeated
+MAX_KEPT_COMMANDS = 100  # largest number of commands without a reply, and of replies that are repeated
 MAX_PLACE_DIFFERENCE_DEG = 0.01  # between the positions of the plan and of the control unit [deg]
 COMMAND_TIMEOUT_S = 2.5  # longest wait for the reply of the control unit, in which the station answers nobody [s]
 SAVE_PERIOD_S = 10.0  # longest time between two writes of the progress [s]
@@ -66,19 +66,20 @@ class StationNode(Remote):
         try:
             command = commands.of_message(status)
         except ValueError as error:
-            self.refused.append(f'{COMMAND_TOPIC} refused: {error}')
+            if len(self.refused) < MAX_KEPT_COMMANDS:
+                self.refused.append(f'{COMMAND_TOPIC} refused: {error}')
             return
         answer = self._answers.get((command.who, command.number)) if command.number else None
         if answer is not None:
             self._write[REPLY_TOPIC](messages.serialize(answer))
-        elif command not in self.received:
+        elif command not in self.received and len(self.received) < MAX_KEPT_COMMANDS:
             self.received.append(command)
 
     def answer(self, command: Command, reply: Reply) -> None:
         """Publish the reply to a command."""
         message = commands.reply_message(command, reply)
         self._answers[command.who, command.number] = message
-        while len(self._answers) > MAX_KEPT_REPLIES:
+        while len(self._answers) > MAX_KEPT_COMMANDS:
             self._answers.popitem(last=False)
         self._write[REPLY_TOPIC](messages.serialize(message))
 
