@@ -69,6 +69,15 @@ def test_what_is_written_is_read(night, tmp_path):
     assert iss.azimuth_deg - 300.0 == pytest.approx((azimuth - first + 180.0) % 360.0 - 180.0, abs=0.01)
 
 
+def test_a_satellite_that_stays_in_view_for_days_can_be_planned(night, tmp_path):
+    first, dropped, moon = night.passes
+    long = dropped._replace(window=dropped.window._replace(set=250000.0))
+    file.write(tmp_path / 'night.json', night._replace(passes=(first, long, moon)))
+    assert file.read(tmp_path / 'night.json').contacts[1].end == file.seconds(BEGIN) + 250000.0
+    with pytest.raises(file.PlanError, match='5001 passes, must be at most 5000'):
+        file.write(tmp_path / 'many.json', night._replace(passes=(first,) * 5001))
+
+
 @pytest.mark.parametrize('place, value, reason', [
     (('pedestal_plan',), 2, 'pedestal_plan = 2: must be 1'),
     (('passes',), [], 'passes: 0 passes, must be 1 to 5000'),
@@ -90,7 +99,8 @@ def test_what_is_written_is_read(night, tmp_path):
     (('station', 'height'), None, 'station.height = None')])
 def test_a_broken_plan_is_refused_by_file_field_and_reason(night, tmp_path, place, value, reason):
     path = tmp_path / 'night.json'
-    content = json.loads(file.content(night))
+    file.write(path, night)
+    content = json.loads(path.read_text())
     where = content
     for key in place[:-1]:
         where = where[key]

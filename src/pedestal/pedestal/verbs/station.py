@@ -58,7 +58,7 @@ def _station(options: argparse.Namespace) -> int:
     rules = sequence.Rules(options.lead, options.gap, options.park)
     ros_arguments = arguments.ros_arguments(options)
     node = station_node.StationNode
-    with RemoteSession(lambda: node(station_node.own_name(), options.beam), ros_arguments) as session:
+    with RemoteSession(lambda: node(options.beam), ros_arguments) as session:
         session.wait_for_node(options.timeout)
         assert isinstance(session.remote, node)
         station = station_node.Station(session, session.remote, plan, rules, options.elements)

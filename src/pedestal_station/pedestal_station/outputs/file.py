@@ -28,7 +28,7 @@ VERSION_KEY, VERSION = 'pedestal_plan', 1
 ELEMENT_NAMES = 'line_1', 'line_2', 'omm'
 MAX_PLAN_BYTES = 50_000_000  # largest size of a plan file [bytes]
 MAX_PASSES = 5000  # largest number of passes in a plan file
-MAX_CONTACT_S = SECONDS_PER_DAY  # longest contact [s]
+MAX_CONTACT_S = 33 * SECONDS_PER_DAY  # longest contact: the longest night of a plan, with the days beside it [s]
 MAX_NAME_CHARACTERS = 100  # largest length of the name of an object [characters]
 TRACK_ROW_INTERVAL_S, TRACK_MARGIN_S = 1.0, 10.0
 """Interval of the rows of a track, and time that it has before and after the contact [s]."""
@@ -126,18 +126,15 @@ def _angles(enu: Floats) -> Pairs:
 
 
 def write(path: pathlib.Path, night: Night) -> None:
-    """Write the plan file of a Night. Raises OSError, TargetError."""
-    path.write_text(content(night), encoding='utf-8')
-
-
-def content(night: Night) -> str:
-    """Return the content of the plan file of a Night: all its passes, also those that its exact plan drops. Raises
-    TargetError."""
+    """Write the plan file of a Night: all its passes, also those that its exact plan drops. Raises OSError,
+    TargetError, PlanError for more passes than `read` accepts."""
+    if len(night.passes) > MAX_PASSES:
+        raise PlanError(f'{path}: {len(night.passes)} passes, must be at most {MAX_PASSES}')
     contacts = [_planned(each, share, night) for each, share in zip(night.passes, night.exact.shares)]
-    return json.dumps({VERSION_KEY: VERSION, 'begin': utc_text(seconds(night.begin)), 'duration_s': night.duration,
-                       'station': {name: getattr(night.station, name) for name in STATION_NAMES},
-                       'horizon_deg': night.horizon, 'scenario': night.scenario,
-                       'passes': [row(contact) for contact in contacts]}, indent=1) + '\n'
+    content = {VERSION_KEY: VERSION, 'begin': utc_text(seconds(night.begin)), 'duration_s': night.duration,
+               'station': {name: getattr(night.station, name) for name in STATION_NAMES},
+               'horizon_deg': night.horizon, 'scenario': night.scenario, 'passes': list(map(row, contacts))}
+    path.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
 
 
 def row(contact: Contact) -> dict[str, Json]:

@@ -17,7 +17,7 @@ from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.quantities import Message, Seconds, Value
 from pedestal_common.wire import commands, messages
 from pedestal_common.wire.commands import Command, Reply
-from pedestal_operator.remote_node import REPLY_TIMEOUT_S, Query, Remote, RemoteSession
+from pedestal_operator.remote_node import REPLY_TIMEOUT_S, Remote, RemoteSession
 from pedestal_station.outputs.file import ELEMENT_NAMES, Contact, Plan, PlanError, seconds, utc_text
 from pedestal_station.station import progress
 from pedestal_station.station.fresh import Watch
@@ -42,18 +42,13 @@ CONTROL_UNIT_PARAMETERS = ('graph.start', 'graph.beams', 'prediction.start_time'
                            'azimuth.limits.high', *(f'prediction.station.{name}' for name in STATION_NAMES))
 
 
-def own_name() -> str:
-    """Return the name of the station as a client, which no operator has."""
-    return f'station@{socket.gethostname()}'
-
-
 class StationNode(Remote):
     """Client of the control unit that also takes commands of operators and publishes the night."""
     holder: str             # client that has control of the antenna, '' for none
     interference: str       # mode of another client without control, or an emergency stop, since the last step
 
-    def __init__(self, who: str, beam: str = '') -> None:
-        super().__init__('station', who, 'acu', beam)
+    def __init__(self, beam: str = '') -> None:
+        super().__init__('station', f'station@{socket.gethostname()}', 'acu', beam)     # a name that no operator has
         self.holder = self.interference = ''
         self.received: list[Command] = []
         self.refused: list[str] = []
@@ -170,14 +165,11 @@ class Station:
 
     def _parameters(self) -> dict[str, Value]:
         """Return the parameters of the control unit. Raises GraphError."""
-        from rcl_interfaces.srv import GetParameters
-        node = self._node
-        query = Query(node.create_client(GetParameters, f'{node.beam}acu/get_parameters'), CONTROL_UNIT_PARAMETERS,
-                      parameter_value_to_python)
+        query = self._node.query(CONTROL_UNIT_PARAMETERS, parameter_value_to_python)
         self._session.until(query.answered, REPLY_TIMEOUT_S)
         if not query.values:
             raise GraphError(f'the control unit does not state its parameters within {REPLY_TIMEOUT_S:g} s')
-        if node.get_node_names().count('station') > 1:
+        if self._node.get_node_names().count('station') > 1:
             raise GraphError('another station commands this antenna')
         return dict(zip(CONTROL_UNIT_PARAMETERS, query.values))
 
