@@ -58,7 +58,7 @@ def test_what_is_written_is_read(night, tmp_path):
                                                                        'begins late, lost to MOON/1')
     assert (dropped.taken, dropped.begin - utc, dropped.reason) == (False, 2100.0, 'lost to ISS/1')
     assert iss.elements == {'line_1': DEFAULT.line_1, 'line_2': DEFAULT.line_2} and iss.track == ()
-    assert moon.elements == {} and moon.priority == 2.0 and moon.number == ''
+    assert moon.elements == {} and moon.number == ''
     assert moon.track[0][0] - utc == 0.0 and moon.track[-1][0] - utc >= 90.0
     assert moon.track[10][1] == pytest.approx(np.radians(9.0), abs=1e-6)
     assert (moon.azimuth_deg, moon.elevation_deg) == pytest.approx((300.0, np.degrees(np.arctan(0.5))))
@@ -90,7 +90,6 @@ def test_a_satellite_that_stays_in_view_for_days_can_be_planned(night, tmp_path)
     (('passes', 0, 'azimuth_deg'), 'north', "passes[0].azimuth_deg = 'north': must be a number, in deg"),
     (('passes', 0, 'elevation_deg'), float('nan'), 'passes[0].elevation_deg = nan: must be -90 to 180'),
     (('passes', 0, 'taken'), 1, 'passes[0].taken = 1: must be true or false'),
-    (('passes', 0, 'priority'), -1.0, 'passes[0].priority = -1: must be 0 to 1e+06'),
     (('passes', 0, 'elements'), {'line_1': 'x'}, 'passes[0].elements = '),
     (('passes', 0, 'elements'), {'tle': 'x'}, 'tle: must be line_1 and line_2, or omm'),
     (('passes', 0, 'elements'), {}, 'passes[0].track = []: must be two or more rows'),

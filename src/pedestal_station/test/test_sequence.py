@@ -21,7 +21,7 @@ RULES = Rules(lead=120.0, gap=600.0, park='')
 
 def contact(case, begin, end, taken=True, elements=ISS, track=()):
     return Contact(case, case.partition('/')[0], '25544', elements, track, ZERO + begin, ZERO + end, 10.0,
-                   20.0, 50.0, 1.0, taken, '' if taken else 'lost to B/1')
+                   20.0, 50.0, taken, '' if taken else 'lost to B/1')
 
 
 class Night:

@@ -56,7 +56,6 @@ class Contact(Parameters):
     azimuth_deg: Degrees = parameter(0.0, -1080.0, 1080.0, 'deg', 'encoder angle at the begin')
     elevation_deg: Degrees = parameter(0.0, -90.0, 180.0, 'deg', 'encoder angle at the begin')
     max_elevation_deg: Degrees = parameter(0.0, -90.0, 90.0, 'deg', 'largest elevation')
-    priority: float = parameter(1.0, 0.0, 1e6, '', 'weight of a second of contact')
     taken: bool = flag(True, 'false for a pass that the plan drops')
     reason: str = text('', 'reason for which it is dropped or shortened')
 
@@ -157,7 +156,7 @@ def _planned(each: Pass, share: Share, night: Night) -> Contact:
     utc = seconds(night.begin)
     return Contact(each.case, each.object.name, each.object.number, elements, track, utc + begin, utc + end,
                    math.degrees(azimuth), math.degrees(angles[-1, 1]), math.degrees(each.window.max_elevation),
-                   each.object.priority, share.taken, reason)
+                   share.taken, reason)
 
 
 def _prediction(planned: Object, night: Night, begin: Seconds, end: Seconds) -> tuple[dict[str, str], Track]:

@@ -8,8 +8,6 @@ from pedestal_common.wire import commands
 from pedestal_common.wire.commands import Argument, Command, CommandDefinition
 from pedestal_station.outputs.file import ELEMENT_NAMES, Contact, direction, orbit_of, seconds
 
-INSERTED_PRIORITY = 1.0  # weight of a second of contact of an inserted pass
-
 _CASE = Argument('case', 'name of the pass in the plan, NAME/K', default='')
 
 STATION_COMMANDS = (
@@ -65,7 +63,7 @@ def _contact(found: dict[str, str], antenna: Antenna) -> Contact:
     points = [direction(elements, antenna.station, utc) for utc in (begin, 0.5 * (begin + end), end)]
     (azimuth, elevation), highest = points[0], max(elevation for _, elevation in points)
     azimuth += 360.0 * round((0.5 * sum(antenna.azimuth) - azimuth) / 360.0)
-    contact = Contact(name, name, number, elements, (), begin, end, azimuth, elevation, highest, INSERTED_PRIORITY)
+    contact = Contact(name, name, number, elements, (), begin, end, azimuth, elevation, highest)
     if highest <= 0.0:
         raise ValueError(f'insert: {name} is below the horizon from {found["begin"]} to {found["end"]}')
     return contact

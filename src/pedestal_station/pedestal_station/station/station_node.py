@@ -28,7 +28,7 @@ from pedestal_station.station.sequence import Aim, Fresh, Inputs, PassSequence, 
 TICK_S = 0.2  # time between two steps of the sequence [s]
 MAX_KEPT_COMMANDS = 100  # largest number of commands without a reply, and of replies that are repeated
 MAX_PLACE_DIFFERENCE_DEG = 0.01  # between the positions of the plan and of the control unit [deg]
-COMMAND_TIMEOUT_S = 2.5  # longest wait for the reply of the control unit, in which the station answers nobody [s]
+COMMAND_TIMEOUT_S = 2.5  # longest wait for the reply of the control unit; other commands wait meanwhile [s]
 SAVE_PERIOD_S = 10.0  # longest time between two writes of the progress [s]
 ON_TARGET_MODES = 'autotrack', 'steptrack'  # modes in which the receiver measures the target
 ON_TRACK_WORDS = 'tle, on track', 'program, on track'  # progress on the target of an antenna without handover
