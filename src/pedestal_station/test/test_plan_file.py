@@ -86,15 +86,16 @@ def test_a_satellite_that_stays_in_view_for_days_can_be_planned(night, tmp_path)
     (('passes', 0, 'case'), '', "passes[0].case = '': must be 1 to 100 printable characters"),
     (('passes', 1, 'case'), 'ISS/1', "passes[1].case = 'ISS/1': must be unique"),
     (('passes', 0, 'begin'), 'soon', "passes[0].begin = 'soon': must be UTC"),
-    (('passes', 0, 'end'), '2019-12-10T00:00:00Z', "passes[0].end = '2019-12-10T00:00:00Z': must be after begin"),
+    (('passes', 0, 'end'), '2019-12-10T00:00:00Z', 'passes[0].end = 2019-12-10T00:00:00.000Z: must be after begin'),
     (('passes', 0, 'azimuth_deg'), 'north', "passes[0].azimuth_deg = 'north': must be a number, in deg"),
-    (('passes', 0, 'elevation_deg'), float('nan'), 'passes[0].elevation_deg = nan: must be -90 to 180'),
+    (('passes', 0, 'elevation_deg'), float('nan'), 'passes[0].elevation_deg = nan deg: must be -90 to 180'),
     (('passes', 0, 'taken'), 1, 'passes[0].taken = 1: must be true or false'),
     (('passes', 0, 'elements'), {'line_1': 'x'}, 'passes[0].elements = '),
     (('passes', 0, 'elements'), {'tle': 'x'}, 'tle: must be line_1 and line_2, or omm'),
     (('passes', 0, 'elements'), {}, 'passes[0].track = []: must be two or more rows'),
     (('passes', 2, 'track'), [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 'passes[2].track = '),
     (('station', 'latitude_deg'), 91.0, 'latitude_deg = 91'),
+    (('station', 'height'), 10 ** 400, 'station.height = 1000'),
     (('station', 'height'), None, 'station.height = None')])
 def test_a_broken_plan_is_refused_by_file_field_and_reason(night, tmp_path, place, value, reason):
     path = tmp_path / 'night.json'

@@ -237,6 +237,7 @@ def test_a_pass_of_other_elements_is_inserted_at_a_turn_within_the_travel():
     ({}, 'must have either case, or elements'),
     ({'case': 'A/1', 'begin': '2019-12-10T00:00:00'}, 'case = A/1 and begin are given'),
     ({'line_1': 'x', 'begin': 'now', 'end': 'now'}, 'elements = line_1: must be line_1 and line_2, or omm'),
+    ({**ISS, 'begin': '0001-01-01T00:00:00+23:00', 'end': 'x'}, "begin = '0001-01-01"),
     ({**ISS, 'begin': 'soon', 'end': 'x'}, "begin = 'soon': must be UTC"),
     ({**ISS, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-09T00:00:00'}, 'must be after begin'),
     ({**ISS, 'line_1': 'x' * 69, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-10T00:01:00'}, 'TLE line 1'),

@@ -67,7 +67,8 @@ class Contact(Parameters):
                 raise ParameterError(f'{name} = {value!r:.60}: must be {least} to {MAX_NAME_CHARACTERS} printable '
                                      'characters')
         if not self.begin < self.end <= self.begin + MAX_CONTACT_S:
-            raise ParameterError(f'end = {utc_text(self.end)}: must be after begin, at most {MAX_CONTACT_S:g} s')
+            raise ParameterError(f'end = {utc_text(self.end)}: must be after begin, at most '
+                                 f'{MAX_CONTACT_S / SECONDS_PER_DAY:g} days')
         if self.elements:
             epoch_of(self.elements)
 
@@ -219,7 +220,7 @@ def contact(path: pathlib.Path, place: str, given: Json) -> Contact:
         track = () if elements else _track(given.get('track'), begin, end)
         return Contact(**{**{field.name: given.get(field.name) for field in dataclasses.fields(Contact)},
                           'begin': begin, 'end': end, 'elements': elements, 'track': track})
-    except (ParameterError, TargetError, OverflowError) as error:
+    except (ParameterError, TargetError) as error:
         raise PlanError(f'{path}: {place}.{error}') from None
 
 
@@ -228,7 +229,7 @@ def _track(given: Json, begin: Seconds, end: Seconds) -> Track:
     try:
         rows = np.array(given, float).reshape(-1, 3)
         valid = len(rows) > 1 and np.isfinite(rows).all() and (np.diff(rows[:, 0]) > 0.0).all()
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         valid = False
     if not (valid and rows[0, 0] <= begin and rows[-1, 0] >= end):
         raise ParameterError(f'track = {given!r:.60}: must be two or more rows [UTC s, azimuth deg, elevation deg] in '

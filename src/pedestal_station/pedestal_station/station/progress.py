@@ -62,7 +62,7 @@ def resume(sequence: PassSequence, path: pathlib.Path, now: Seconds) -> None:
         pass
     except PlanError:
         raise
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise PlanError(f'{path}: holds no progress of a night ({error!r:.100}); remove it to take all passes again'
                         ) from None
 
