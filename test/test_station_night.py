@@ -43,7 +43,7 @@ def plan(path):
                               np.arctan2(up, np.hypot(east, north)).tolist()))
         rows.append(file.row(file.Contact(
             case, 'ISS', '25544', {} if track else elements, track, zero + begin, zero + end,
-            ((azimuth + 180.0) % 360.0 - 180.0, elevation), 53.7, 1.0, case != 'ISS/4', 'not wanted')))
+            (azimuth + 180.0) % 360.0 - 180.0, elevation, 53.7, case != 'ISS/4', 'not wanted')))
     path.write_text(json.dumps({'pedestal_plan': 1, 'passes': rows,
                                 'station': {name: getattr(place, name) for name in STATION_NAMES}}))
 

@@ -213,9 +213,9 @@ def instant(name: str, text: str) -> datetime.datetime:
     leap = LEAP_SECOND_PATTERN.sub(r'\g<1>59', text)
     try:
         when = datetime.datetime.fromisoformat(leap.replace('Z', '+00:00')) + datetime.timedelta(seconds=leap != text)
-    except ValueError:
+        return when if when.tzinfo is None else when.astimezone(datetime.timezone.utc).replace(tzinfo=None)
+    except (ValueError, OverflowError):
         raise TargetError(f'{name} = {text!r}: must be UTC as ISO 8601, for example 2019-12-10T06:00:00') from None
-    return when if when.tzinfo is None else when.astimezone(datetime.timezone.utc).replace(tzinfo=None)
 
 
 def iso(julian: float, fraction: float) -> str:

@@ -106,7 +106,7 @@ def contacts() -> list[Contact]:
     start, free = (used.acu.azimuth.stow, used.acu.elevation.stow), -math.inf
     for each in planned:
         found, share = passes[each.case]
-        point = math.radians(each.point[0]), math.radians(each.point[1])
+        point = math.radians(each.azimuth_deg), math.radians(each.elevation_deg)
         assert isinstance(found.object.orbit, Elements)
         flown = prediction.predict(found.object, found.window._replace(rise=share.begin, set=share.end), used,
                                    point[0])
