@@ -90,6 +90,12 @@ def test_a_target_that_reverses_is_no_reversed_slope(name):
         assert done['acu/mode'][-1] == Mode.AUTOTRACK and not state['tracking']['divergence']['diverged']
 
 
+@pytest.mark.thorough
+@pytest.mark.parametrize('offset, seed', [(-0.6, 1), (-0.6, 2), (0.5, 2), (-0.1, 1)])
+def test_a_satellite_that_is_late_is_no_wrong_slope(offset, seed):
+    assert run(f'scenario.program.time_offset={offset}', seed=seed)['acu/mode'][-1] == Mode.AUTOTRACK
+
+
 @pytest.mark.parametrize('wrong', ['slope_factor=2', 'cross_coupling=0.4', 'slope_factor=0.5', 'phase_error=0.8'])
 def test_errors_that_are_merely_wrong_are_tracked(wrong):
     done = run(f'tracking_receiver.antenna.{wrong}')
