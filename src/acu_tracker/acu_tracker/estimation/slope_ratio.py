@@ -1,6 +1,6 @@
 """Wrong slope of the receiver, against the program: a sum of likelihood ratios.
 
-WrongSlope of `monitors` must find the motion of the target in the errors. Where a program gives the motion, the
+WrongSlope of `monitors` must find the motion of the target in the errors. Where a program tells the motion, the
 direction of the target less that of the program is almost a straight line, also if the program is late or has an
 offset. Then the small motion of the beam about this line shows the slope, before the beam is off the target.
 
