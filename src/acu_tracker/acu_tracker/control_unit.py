@@ -237,8 +237,7 @@ def _take_receiver(state: State, constants: Constants, inputs: Inputs, outputs: 
     judged = not guidance.held(state.guidance, constants, state.stamp)
     return receiver_error.take_error(state.tracking, constants, inputs, outputs, at, restart_gap,
                                      mode == Mode.AUTOTRACK and judged,
-                                     interruptions.axes_follow_commands(state.supervision) and judged,
-                                     way.program)
+                                     interruptions.axes_follow_commands(state.supervision) and judged)
 
 
 @compiled

@@ -8,7 +8,6 @@ from scipy.signal import lfilter
 from acu_tracker import signals
 from acu_tracker.estimation import monitors
 from acu_tracker.geometry.vector import Vector, turn
-from acu_tracker.program.program_track import NO_TRACK
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry.line_of_sight import ASHORE_ATTITUDE as BOW_NORTH
 
@@ -29,7 +28,7 @@ def alarms(state, beam, errors):
     found = False
     for k in range(len(beam)):
         found |= monitors.take_slope(state, T * k, monitors.slope_beam(ASHORE, beam[k, 0], beam[k, 1]),
-                                     (errors[k, 0], errors[k, 1]), SIGMA**2, GAP, NO_TRACK, 0.0)
+                                     (errors[k, 0], errors[k, 1]), SIGMA**2, GAP)
     return found
 
 
@@ -38,7 +37,7 @@ def first(state, angles, errors, t=None, sigma=SIGMA):
     elevation of the beam [rad]; errors (n, 2) [rad]."""
     t = T * np.arange(len(errors)) if t is None else t
     return next((k for k, (at, e) in enumerate(zip(angles, errors)) if monitors.take_slope(
-        state, t[k], monitors.slope_beam(ASHORE, *at), tuple(e), sigma**2, GAP, NO_TRACK, 0.0)), None)
+        state, t[k], monitors.slope_beam(ASHORE, *at), tuple(e), sigma**2, GAP)), None)
 
 
 FIRST_VERDICT = monitors.MIN_BLOCK_COUNT * monitors.BLOCK_ERROR_COUNT
@@ -179,9 +178,9 @@ def test_noise_and_a_beam_that_shakes_are_no_wrong_slope_in_an_hour(state, jitte
 def test_it_begins_anew_after_a_gap_and_leaves_old_errors_alone(state):
     beam = monitors.Beam(Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0))
     for k in range(50):
-        monitors.take_slope(state, T * k, beam, (1e-3 * (-1)**(k // 4), 0.0), SIGMA**2, GAP, NO_TRACK, 0.0)
+        monitors.take_slope(state, T * k, beam, (1e-3 * (-1)**(k // 4), 0.0), SIGMA**2, GAP)
     before = state.copy()
-    monitors.take_slope(state, T * 49, beam, (1.0, 1.0), SIGMA**2, GAP, NO_TRACK, 0.0)
+    monitors.take_slope(state, T * 49, beam, (1.0, 1.0), SIGMA**2, GAP)
     assert state == before and monitors.roughnesses(state, 0)[0] > 0.1
-    monitors.take_slope(state, T * 49 + 1.01 * GAP, beam, (1.0, 1.0), SIGMA**2, GAP, NO_TRACK, 0.0)
+    monitors.take_slope(state, T * 49 + 1.01 * GAP, beam, (1.0, 1.0), SIGMA**2, GAP)
     assert (state['n'], state['count']) == (0, 1) and monitors.roughnesses(state, 2) == (0.0, 0.0)

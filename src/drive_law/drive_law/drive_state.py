@@ -56,9 +56,9 @@ shortest period of 1 ms.
 INITIAL_AGE_PERIODS = 1 << 40
 """Initial number of periods since the last change of the brakes: longer ago than any time of a brake or a delay."""
 
-MAX_PLAUSIBLE_INPUT = 1e9
-"""Largest valid input [rad/s, Nm, rad/s2]; an input beyond it, infinite or NaN is invalid. The torque that moves a
-dish of 25 m is above 1e6 Nm."""
+MAX_PLAUSIBLE_INPUT, MAX_PLAUSIBLE_TORQUE_NM = 1e6, 1e9
+"""Largest valid input [rad/s, rad/s2], and torque; an input beyond it, infinite or NaN is invalid. The torque that
+moves a dish of 25 m is above 1e6 Nm."""
 
 
 class AxisInputs(Record):
@@ -278,8 +278,8 @@ def plausible(x: float) -> bool:
 def receive_command(state: State, inputs: Inputs, disturbance_valid: bool) -> bool:
     """Put the command of step k into the ring. Return True if command and disturbance are valid."""
     slot = state.k % COMMAND_RING_SIZE
-    valid = (disturbance_valid and plausible(inputs.azimuth.rate) and plausible(inputs.azimuth.torque)
-             and plausible(inputs.elevation.rate) and plausible(inputs.elevation.torque))
+    valid = (disturbance_valid and plausible(inputs.azimuth.rate) and plausible(inputs.elevation.rate)
+             and max(abs(inputs.azimuth.torque), abs(inputs.elevation.torque)) <= MAX_PLAUSIBLE_TORQUE_NM)
     state.enable[slot] = 1 if valid and inputs.enable == 1 else 0
     if valid:
         state.rate[slot, 0], state.rate[slot, 1] = inputs.azimuth.rate, inputs.elevation.rate

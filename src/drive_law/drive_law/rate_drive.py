@@ -190,9 +190,9 @@ class RateDrive(Unit):
         if outputs['emergency'] or self.tripped:
             return Diagnosis(LEVEL_ERROR, self.condition, values)
         if invalid:
-            largest = f'{drive_state.MAX_PLAUSIBLE_INPUT:g}'
-            return Diagnosis(LEVEL_ERROR, f'{invalid} holds NaN or infinity, or is not within +-{largest}: stopping',
-                             values)
+            rate, torque = drive_state.MAX_PLAUSIBLE_INPUT, drive_state.MAX_PLAUSIBLE_TORQUE_NM
+            return Diagnosis(LEVEL_ERROR, f'{invalid} holds NaN or infinity, or is not within +-{rate:g} rad/s or '
+                             f'+-{torque:g} Nm: stopping', values)
         if link['stale']:
             return Diagnosis(LEVEL_ERROR, f'no new {RATE_COMMAND_TOPIC} for {link["timeout"] / 1e9:g} s: stopping',
                              values)

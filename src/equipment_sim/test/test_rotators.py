@@ -178,8 +178,10 @@ def test_other_pulses_of_a_device_trip_the_drive_and_its_reset_adopts_them():
 ])
 def test_an_answer_that_cannot_be_used_is_refused_by_name_before_any_motion(protocol, habits, reason):
     line = Line('device', functools.partial(PROTOCOLS[protocol], False), 0.2, 0.05)
-    with pytest.raises(OSError, match='no position'):
-        line.ask(Terminal(protocol, Axes(6.0, 0.0, build(Habits, habits))))
+    terminal = Terminal(protocol, Axes(6.0, 0.0, build(Habits, habits)))
+    for _ in range(2):      # the elevation of the first answer may have a line of its own
+        with pytest.raises(OSError, match='no position'):
+            line.ask(terminal)
     assert reason in line.fault
 
 

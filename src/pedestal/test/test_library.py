@@ -12,9 +12,10 @@ import nbclient
 import nbformat
 import numpy as np
 import pytest
+import typing_extensions
 
 import pedestal
-from pedestal import recording
+from pedestal import recording, satellite
 from pedestal_common.graph import topics
 from pedestal_recording import bag
 from pedestal_results import results
@@ -38,7 +39,8 @@ def test_every_public_name_has_an_example_and_types():
         thing = getattr(pedestal, name)
         assert thing.__doc__
         if not isinstance(thing, type):
-            hints = typing.get_type_hints(thing, {**vars(sys.modules[thing.__module__]), 'Trials': pedestal.Trials})
+            hints = typing.get_type_hints(thing, {**vars(sys.modules[thing.__module__]), 'Trials': pedestal.Trials,
+                                                  'Unpack': typing_extensions.Unpack, 'Options': satellite.Options})
             assert 'return' in hints, name
             assert name == 'read_bag' or any(test.examples for test in finder.find(thing)), name
 

@@ -133,12 +133,14 @@ def test_a_geostationary_satellite_has_the_times_that_the_user_chooses(planned, 
     assert code == 2 and 'the object rises and sets' in errors
 
 
-def test_objects_are_selected_by_name_by_number_and_by_a_weight_of_0(planned):
+def test_objects_are_selected_by_name_by_number_and_by_a_weight_of_0(planned, pedestal):
     for words, expected in ((('--satellite', 'iss (zarya)'), {'ISS (ZARYA)'}), (('--satellite', '43013'), {'43013'}),
                             (('--priority', '43013=0'), {'ISS (ZARYA)'}),
                             (('--satellite', '43013', '25544', '--satellite', '25544'), {'ISS (ZARYA)', '43013'})):
         code, found, _ = planned('low.tle', *PLACE, *words)
         assert code == 0 and {case.rpartition('/')[0] for case in found} == expected
+    code, _, errors = pedestal('plan', 'low.tle', *PLACE, '--priority', '43013=0', '25544=0')
+    assert code == 2 and '--priority: the weight of every object is 0; no object is left to plan' in errors
 
 
 def test_more_passes_than_a_plan_holds_are_refused(pedestal, files, monkeypatch):
@@ -189,3 +191,13 @@ def test_a_station_at_the_pole_or_on_the_date_line_has_passes(one, other, planne
     assert any(case.startswith('43013/') for case in found[0])
     assert [(case, pytest.approx(values['rise_s'], abs=1e-3)) for case, values in found[0].items()] == [
         (case, values['rise_s']) for case, values in found[1].items()]
+
+
+def test_a_contact_leaves_out_a_loss_at_an_end_of_its_pass(planned):
+    """A sector hides the west up to 30 deg: passes begin or end behind it."""
+    code, found, _ = planned('low.tle', *PLACE, '--satellite', '25544', '--param', 'acu.blockage=3.3 6.1 0.5')
+    seen = [each for each in found.values() if each['taken'] and each['loss_s']]
+    assert code == 0 and seen
+    for each in seen:
+        assert each['begin_s'] == pytest.approx(each['rise_s']) or each['end_s'] == pytest.approx(each['set_s'])
+        assert each['end_s'] - each['begin_s'] == pytest.approx(each['set_s'] - each['rise_s'] - each['loss_s'])

@@ -148,7 +148,7 @@ def _check_field(field: Field, name: str, value: object) -> None:
         if field.type is int and not isinstance(value, int):
             raise ParameterError(f'{name} = {value!r}: must be a whole number')
         absent = is_absent(value) and is_absent(field.default)
-        if not absent and not (math.isfinite(value) and meta['low'] <= value <= meta['high']):
+        if not absent and not (meta['low'] <= value <= meta['high'] and math.isfinite(value)):
             given, low, high = (number_text(number) for number in (value, meta['low'], meta['high']))
             unit = f' {meta["unit"]}'.rstrip()
             raise ParameterError(f'{name} = {given}{unit}: must be {low} to {high}')
@@ -232,8 +232,9 @@ def _check_names(known: Mapping[str, Field], values: Iterable[str]) -> None:
 
 
 def typed(field: Field, value: 'Value') -> 'Value':
-    """Return the value of a field; a whole number for a field of type float is returned as a float."""
-    return float(value) if field.type is float and type(value) is int else value
+    """Return the value of a field; a whole number in the range of a field of type float is returned as a float."""
+    is_whole = field.type is float and type(value) is int
+    return float(value) if is_whole and field.metadata['low'] <= value <= field.metadata['high'] else value
 
 
 def _replace(instance: _P, values: 'Mapping[str, Value]', prefix: str) -> _P:

@@ -94,6 +94,10 @@ def user() -> str:
     return f'{name}@{socket.gethostname()}'
 
 
+def _double(value: ParameterValue) -> float:
+    return value.double_value
+
+
 class Remote(Shell, Antenna):
     """Client of a graph."""
     who: str                        # name of the person or program in the next commands
@@ -198,21 +202,16 @@ class Remote(Shell, Antenna):
         """Return True if a topic has a publisher, or had one."""
         return name in self.arrivals or self.count_publishers(self._link(name)[1]) > 0
 
-    def query(self, names: Sequence[str]) -> 'Query':
-        """Return a Query for numeric parameters of the commanded node."""
-        return Query(self.create_client(GetParameters, f'{self.beam}{self.node.name}/get_parameters'), names)
-
-
-def _double(value: ParameterValue) -> float:
-    return value.double_value
+    def query(self, names: Sequence[str], read: Callable[[ParameterValue], object] = _double) -> 'Query':
+        """Return a Query for parameters of the commanded node."""
+        return Query(self.create_client(GetParameters, f'{self.beam}{self.node.name}/get_parameters'), names, read)
 
 
 class Query:
     """Request for parameters of a node. read: function that returns the content of a ParameterValue."""
     values: list[Any] | None    # as `read` returns them; None before the reply of the node
 
-    def __init__(self, client: Client, names: Sequence[str],
-                 read: Callable[[ParameterValue], object] = _double) -> None:
+    def __init__(self, client: Client, names: Sequence[str], read: Callable[[ParameterValue], object]) -> None:
         self._client, self._request, self._read = client, GetParameters.Request(names=names), read
         self._request_time = -math.inf
         self.values = None
@@ -289,8 +288,7 @@ class RemoteSession:
         """Return what this client speaks to: the domain, the scenario, and the time since which it runs. A graph that
         was started by hand has no scenario. A graph in lockstep has no time."""
         remote = self.remote
-        query = Query(remote.create_client(GetParameters, f'{remote.beam}{remote.node.name}/get_parameters'),
-                      GRAPH_PARAMETERS, lambda value: value.string_value or value.integer_value)
+        query = remote.query(GRAPH_PARAMETERS, lambda value: value.string_value or value.integer_value)
         self.until(query.answered, GRAPH_REPLY_TIMEOUT_S)
         found = {'domain': str(remote.context.get_domain_id())}
         if query.values:

@@ -9,6 +9,7 @@ import numpy as np
 from acu_tracker import control_unit
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.air import Air
+from acu_tracker.search import judgement
 from pedestal_bringup.scenario.link import DishParameters, LinkParameters
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_bringup.scenario.sections import ScenarioError
@@ -16,8 +17,7 @@ from pedestal_common.geometry import bodies, orbit, pointing_model
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import is_absent
-from pedestal_common.quantities import DecibelHertz, Decibels, Floats, Pairs, Radians, Records, Times, Vectors3
-from pedestal_common.reproducible import arctan2
+from pedestal_common.quantities import DecibelHertz, Decibels, Meters, Pairs, Radians, Records, Times, Vectors3
 from tracking_receiver_sim.params import ReceiverParameters
 
 SUN_RADIUS_RAD = math.radians(0.27)  # apparent radius of the sun, at radio frequencies at least this [rad]
@@ -53,21 +53,9 @@ class Antenna:
         pointing_model.put(made[0], self.acu.pointing.terms)
         return made
 
-    @property
-    def beamwidth(self) -> Radians:
-        """Half-power beamwidth."""
-        return self.acu.tracker.receiver.beamwidth
-
-    @property
-    def stow(self) -> Radians:
-        """Azimuth at which the antenna is parked, encoder angle."""
-        return self.acu.azimuth.stow
-
     def deck_angles(self, times: Times, enu: Vectors3) -> Pairs:
         """Return azimuth and apparent elevation (n, 2) on the deck of positions ENU [m]."""
-        east, north, up = enu.T
-        angles = np.column_stack((arctan2(east, north), arctan2(up, np.hypot(east, north))))
-        return Air(self.acu.refraction).raised(times, angles) - (self.heading, 0.0)
+        return Air(self.acu.refraction).raised(times, orbit.angles(enu)) - (self.heading, 0.0)
 
     def sun(self, times: Times) -> Vectors3:
         """Return the unit vectors ENU to the sun at seconds of the night."""
@@ -76,31 +64,24 @@ class Antenna:
         seen = bodies.seen('sun', self.station, julian, fractions, orbit.earth_fixed(julian, fractions))
         return seen / np.linalg.norm(seen, axis=1)[:, np.newaxis]
 
-    def cn0(self, ranges: Floats) -> tuple[DecibelHertz, DecibelHertz]:
-        """Return the least and the largest expected C/N0 over ranges [m]: of the link budget, without an EIRP that of
-        the simulated receiver; NaN without both."""
-        far, near = float(np.max(ranges)), float(np.min(ranges))
+    def cn0(self, distance: Meters) -> DecibelHertz:
+        """Return the expected C/N0 at a range: of the link budget, without an EIRP that of the simulated receiver; NaN
+        without both."""
         if not is_absent(self.link.eirp):
-            return self.link.cn0(self.dish, far) - self.rain_margin, self.link.cn0(self.dish, near) - self.rain_margin
-        if self.receiver is None:
-            return math.nan, math.nan
-        known, exponent = self.receiver.reference_range, 10.0 * self.receiver.range_exponent
-        level = self.receiver.cn0_dbhz - self.rain_margin
-        return level - exponent * math.log10(far / known), level - exponent * math.log10(near / known)
+            return self.link.cn0(self.dish, distance) - self.rain_margin
+        known = self.receiver
+        return math.nan if known is None else judgement.expected_level(
+            known.cn0_dbhz, known.reference_range, known.range_exponent, distance) - self.rain_margin
 
 
-def of(chosen: Scenario, station: StationParameters, begin: datetime.datetime, rain_margin: Decibels = 0.0,
-       sun_avoidance: Radians | None = None) -> Antenna:
-    """Return the Antenna of a scenario at a station, from a UTC on.
-
-    Without a sun_avoidance the sun takes the target when it touches the beam. Raises ScenarioError for an array.
-    """
+def of(chosen: Scenario, station: StationParameters, begin: datetime.datetime,
+       rain_margin: Decibels = 0.0) -> Antenna:
+    """Return the Antenna of a scenario at a station, from a UTC on. The sun takes the target when it touches the beam.
+    Raises ScenarioError for an array."""
     if chosen.header.beam:
         raise ScenarioError(f'scenario {chosen.name}: scenario.beam = true: must be false, because a plan needs a '
                             'pedestal with two axes')
     acu, receiver = chosen.node_parameters('acu'), chosen.node_parameters('tracking_receiver')
     heading = math.radians(chosen.node_parameters('ship_motion').ship.heading_deg) if chosen.header.ship else 0.0
-    if sun_avoidance is None:
-        sun_avoidance = 0.5 * acu.tracker.receiver.beamwidth + SUN_RADIUS_RAD
     return Antenna(acu, None if chosen.header.iq else receiver.receiver, chosen.header.dish, chosen.header.link,
-                   heading, station, begin, rain_margin, sun_avoidance)
+                   heading, station, begin, rain_margin, 0.5 * acu.tracker.receiver.beamwidth + SUN_RADIUS_RAD)

@@ -21,18 +21,18 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy import ndimage
 
 from acu_tracker.servo.params import ShaperParameters
-from pedestal_common.quantities import Bools, BothAxes, Floats, Seconds, Times
+from pedestal_common.quantities import BothAxes, Floats, Seconds, Times
+from pedestal_station import windows
 from pedestal_station.choice import Rules
 from pedestal_station.night import Pass
 
-SAMPLE_S = 5.0
-"""Time between samples of a pass [s]."""
-MAX_SAMPLES = 1000
-"""Largest number of samples of a pass."""
+SAMPLE_S, MAX_SAMPLES = 5.0, 1000  # time between samples of a pass [s], and their largest number
 SAME_RAD = 1e-3
 """Difference of the encoder angles at rise and at set from those of the orbit that counts as none [rad]."""
+NEIGHBOURS = np.ones((3, 3))  # cells around a cell of a table
 
 
 class _Track(NamedTuple):
@@ -80,7 +80,9 @@ class Changeovers:
             return float(needed[-1, 0])
         if not fits.any():
             return math.inf
-        return float(needed[_border(fits)].max())
+        # The cells beside the border of those that fit, on both of its sides.
+        border = ndimage.binary_dilation(fits, NEIGHBOURS) & ~ndimage.binary_erosion(fits, NEIGHBOURS, border_value=1)
+        return float(needed[border].max())
 
     def slews(self, ends: _Track, begins: _Track) -> Floats:
         """Return the times from each sample of a track to each of another one (n, m) [s]."""
@@ -107,8 +109,8 @@ def slew_time(D: Floats, v1: Floats, v2: Floats, shaper: ShaperParameters) -> Fl
 def _track(each: Pass) -> _Track:
     rise, set_ = each.window.rise, each.window.set
     times = np.linspace(rise, set_, 2 + min(int((set_ - rise) / SAMPLE_S), MAX_SAMPLES))
-    east, north, up = each.object.orbit.enu(times).T
-    sky = np.stack([np.unwrap(np.arctan2(east, north)), np.arctan2(up, np.hypot(east, north))])
+    azimuth, elevation = windows.angles(each.object.orbit, times).T
+    sky = np.stack([np.unwrap(azimuth), elevation])
     encoders = np.array([each.prediction.azimuth, each.prediction.elevation])
     offsets = encoders - sky[:, [0, -1]]
     if np.ptp(offsets, axis=1).max() <= SAME_RAD:
@@ -121,12 +123,3 @@ def _cut(track: _Track, begin: Seconds, end: Seconds) -> _Track:
     first = max(int(np.searchsorted(track.times, begin, 'right')) - 1, 0)
     last = int(np.searchsorted(track.times, end, 'left')) + 1
     return _Track(track.times[first:last], track.angles[..., first:last], track.rates[..., first:last])
-
-
-def _border(fits: Bools) -> Bools:
-    """Return True at the corners of the cells of a table in which a value changes, and at the cells beside them."""
-    padded = np.pad(fits, 1, mode='edge')
-    shape = fits.shape
-    around = np.stack([padded[r:r + shape[0], c:c + shape[1]] for r in range(3) for c in range(3)])
-    border: Bools = np.logical_and(around.any(axis=0), ~around.all(axis=0))
-    return border

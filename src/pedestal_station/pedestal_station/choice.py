@@ -21,9 +21,10 @@ Passes that cannot disturb each other, directly or through others, are independe
     z_ij + z_ji >= x_i + x_j - 1
     q_i + p_j >= O_ij z_ij,  O_ij = set_i + changeover_ij - rise_j          the overlap that trims remove
 
-Of two equal plans it takes the one with more contact in the earlier passes (TIE). A search that ends gives the same
-plan for the same passes. A search that the limit of time ends may find another plan on another computer: the better
-one of the plan found and the greedy plan, with the bound that HiGHS has proved. `Choice.optimal` states which it is.
+Of two equal plans it takes the one with more contact in the earlier passes (TIE), if their difference is above the
+tolerances of HiGHS. A search that ends gives the same plan for the same passes. A search that the limit of time ends
+may find another plan on another computer: the better one of the plan found and the greedy plan, with the bound that
+HiGHS has proved. `Choice.optimal` states which it is.
 """
 import dataclasses
 import math
@@ -36,8 +37,8 @@ from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 from pedestal_common.parameters import ParameterError, Parameters, parameter
-from pedestal_common.quantities import Floats, Seconds
-from pedestal_station.night import Choice, Pass, Share
+from pedestal_common.quantities import Seconds
+from pedestal_station.night import Choice, Interval, Pass, Share
 
 TIE = 1e-7
 """Largest relative change of a gain that prefers the earlier one of two equal passes."""
@@ -47,8 +48,7 @@ EQUAL_S = 0.01
 """Difference of times below which they are equal [s]: 1e-6, the tolerance of HiGHS for z, of an overlap of hours."""
 
 Changeover: TypeAlias = Callable[[int, int], Seconds]   # from the end of pass i to the begin of pass j
-Contact: TypeAlias = tuple[Seconds, Seconds]            # begin, end
-Contacts: TypeAlias = dict[int, Contact]                # of the taken passes
+Contacts: TypeAlias = dict[int, Interval]               # of the taken passes
 Row: TypeAlias = tuple[dict[int, float], float]         # sum of coefficient times variable is at most a limit
 
 
@@ -91,6 +91,18 @@ class _Problem(NamedTuple):
         return math.fsum(self.gain[i] * (end - begin) for i, (begin, end) in contacts.items())
 
 
+class _Free(NamedTuple):
+    """A stretch of the window of a pass between the contacts of others. It may end before it begins."""
+    begin: Seconds
+    end: Seconds
+    before: int | None  # pass whose contact limits the begin, None for the window
+    after: int | None   # the same of the end
+
+    @property
+    def length(self) -> Seconds:
+        return self.end - self.begin
+
+
 def choose(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> tuple[Choice, Choice]:
     """Return (exact plan, greedy plan). Raises ParameterError for a pass or a changeover that is not a number of its
     range."""
@@ -107,7 +119,8 @@ def choose(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> tupl
     groups = sorted(_groups(problem), key=len)
     for k, group in enumerate(groups):
         share = len(group) / sum(len(each) for each in groups[k:])
-        usual = _fill(problem, _greedy_order(problem, group), {})
+        # From the most to the least valuable second, then the longer ones, then the earlier ones.
+        usual = _fill(problem, sorted(group, key=lambda i: (-problem.gain[i], -problem.length(i), i)), {})
         found, limit = _solve(problem, group, max(0.0, deadline - time.monotonic()) * share)
         found = max(usual, found, key=problem.value)
         optimal = optimal and limit is None
@@ -153,14 +166,11 @@ def _problem(passes: Sequence[Pass], changeover: Changeover, rules: Rules) -> _P
 
 def _gap(problem: _Problem, passes: Sequence[Pass], changeover: Changeover, i: int, j: int) -> Seconds:
     """Return the changeover from pass i to pass j; inf if no two contacts fit in this order."""
-    room = problem.set[j] - problem.rise[i] - 2.0 * problem.min_pass
-    if room < 0.0 or min(problem.length(i), problem.length(j)) < problem.min_pass:
-        return math.inf
     gap = changeover(i, j)
     if not gap >= 0.0:
         raise ParameterError(f'{passes[i].case} to {passes[j].case}: changeover = {gap:g}: must be a number at least '
                              f'0 s')
-    return gap if gap <= room else math.inf
+    return gap if gap <= problem.set[j] - problem.rise[i] - 2.0 * problem.min_pass else math.inf
 
 
 def _groups(problem: _Problem) -> Iterator[list[int]]:
@@ -177,34 +187,34 @@ def _groups(problem: _Problem) -> Iterator[list[int]]:
             yield sorted(group)
 
 
-def _greedy_order(problem: _Problem, group: Iterable[int]) -> list[int]:
-    """Return the passes from the most to the least valuable second, then the longer ones, then the earlier ones."""
-    return sorted(group, key=lambda i: (-problem.gain[i], -problem.length(i), i))
-
-
 def _fill(problem: _Problem, order: Iterable[int], contacts: Contacts) -> Contacts:
     """Return contacts after each pass, in order, got the longest stretch that is free between the others."""
     contacts = dict(contacts)
     for i in order:
         known = contacts.pop(i, None)
-        longest = max(_free(problem, i, contacts, known), key=lambda free: free[1] - free[0])
-        if longest[1] - longest[0] >= problem.min_pass - EQUAL_S:
-            contacts[i] = longest
+        longest = max(_free(problem, i, contacts, known), key=lambda free: free.length)
+        if longest.length >= problem.min_pass - EQUAL_S:
+            contacts[i] = longest.begin, longest.end
     return contacts
 
 
-def _free(problem: _Problem, i: int, contacts: Contacts, known: Contact | None = None) -> list[Contact]:
-    """Return the stretches of the window of pass i between the contacts of others, earliest first.
-
-    Some stretches may end before they begin. known: a contact of the pass, for the one stretch in its place.
-    """
+def _free(problem: _Problem, i: int, contacts: Contacts, known: Interval | None = None) -> list[_Free]:
+    """Return the stretches of pass i, earliest first. known: a contact of the pass, for the stretch in its place."""
     others = sorted((j for j in problem.near[i] if j in contacts), key=lambda j: contacts[j])
     places = range(len(others) + 1)
     if known is not None:
         places = range(place := sum(contacts[j] < known for j in others), place + 1)
-    return [(max([problem.rise[i]] + [contacts[j][1] + problem.gaps[j, i] for j in others[:place]]),
-             min([problem.set[i]] + [contacts[j][0] - problem.gaps[i, j] for j in others[place:]]))
-            for place in places]
+    free = []
+    for place in places:
+        begin, before, end, after = problem.rise[i], None, problem.set[i], None
+        for j in others[:place]:
+            if (limit := contacts[j][1] + problem.gaps[j, i]) > begin:
+                begin, before = limit, j
+        for j in others[place:]:
+            if (limit := contacts[j][0] - problem.gaps[i, j]) < end:
+                end, after = limit, j
+        free.append(_Free(begin, end, before, after))
+    return free
 
 
 def _solve(problem: _Problem, group: Sequence[int], time_limit: Seconds) -> tuple[Contacts, float | None]:
@@ -229,8 +239,8 @@ def _solve(problem: _Problem, group: Sequence[int], time_limit: Seconds) -> tupl
     contacts = _fill(problem, sorted(group, key=lambda i: (i not in contacts, -problem.gain[i], i)), contacts)
     if result.status == 0:
         return contacts, None
-    proved = math.inf if result.mip_dual_bound is None else -result.mip_dual_bound
-    return contacts, min(proved, _most(problem, group))
+    everything = sum(problem.gain[i] * problem.length(i) for i in group)
+    return contacts, everything if result.mip_dual_bound is None else min(-result.mip_dual_bound, everything)
 
 
 def _rows(problem: _Problem, group: Sequence[int]) -> tuple[list[Row], int]:
@@ -250,32 +260,7 @@ def _rows(problem: _Problem, group: Sequence[int]) -> tuple[list[Row], int]:
                        z[first, second]: problem.overlap(group[first], group[second])}, 0.0)
                      for first, second in orders]
             rows.append(({**{z[pair]: -1.0 for pair in orders}, a: 1.0, b: 1.0}, 1.0))
-    return rows + _stretches(problem, group) + _chains(problem, group, z), 3 * n + len(z)
-
-
-def _chains(problem: _Problem, group: Sequence[int], z: dict[tuple[int, int], int]) -> list[Row]:
-    """Return inequalities that shorten the search where a pass has several others beside it.
-
-    A contact that ends before one of them ends before all later ones. The steps between them sum up to its trim.
-    """
-    n, rows = len(group), []
-    for k in range(n):
-        for trim, side in ((2 * n + k, 0), (n + k, 1)):
-            # (overlap, part of it that this pass must give up, z) with each other pass, the largest overlap first
-            steps = sorted(((overlap := problem.overlap(group[pair[0]], group[pair[1]]),
-                             overlap - problem.room(group[pair[1 - side]]), z[pair]) for pair in z if pair[side] == k),
-                           reverse=True)
-            later = [next((m for m in range(here + 1, len(steps)) if steps[m][0] <= steps[here][1]), len(steps))
-                     for here in range(len(steps))]
-            rows += [({steps[here][2]: 1.0, steps[m][2]: -1.0}, 0.0) for here, m in enumerate(later) if m < len(steps)]
-            row, here = {trim: -1.0}, 0
-            while here < len(steps):
-                after = steps[later[here]][1] if later[here] < len(steps) else 0.0
-                row[steps[here][2]] = max(steps[here][1], 0.0) - max(after, 0.0)
-                here = later[here]
-            if len(row) > 2:
-                rows.append((row, 0.0))
-    return rows
+    return rows + _stretches(problem, group), 3 * n + len(z)
 
 
 def _stretches(problem: _Problem, group: Sequence[int]) -> list[Row]:
@@ -304,16 +289,6 @@ def _constraint(rows: Sequence[Row], size: int) -> LinearConstraint:
     return LinearConstraint(matrix, ub=np.array([limit for _, limit in rows]))
 
 
-def _most(problem: _Problem, group: Sequence[int]) -> float:
-    """Return the integral over time of the largest gain in view, which no plan exceeds."""
-    times: Floats = np.unique([[problem.rise[i], problem.set[i]] for i in group])
-    most = np.zeros(len(times) - 1)
-    for i in group:
-        begin, end = np.searchsorted(times, [problem.rise[i], problem.set[i]])
-        most[begin:end] = np.maximum(most[begin:end], problem.gain[i])
-    return float(np.sum(most * np.diff(times)))
-
-
 def _shares(problem: _Problem, passes: Sequence[Pass], order: Sequence[int], contacts: Contacts) -> tuple[Share, ...]:
     """Return the shares of passes in the order of rise, in the order in which the caller has given them."""
     shares = {given: _share(problem, passes, contacts, i) for i, given in enumerate(order)}
@@ -322,45 +297,33 @@ def _shares(problem: _Problem, passes: Sequence[Pass], order: Sequence[int], con
 
 def _share(problem: _Problem, passes: Sequence[Pass], contacts: Contacts, i: int) -> Share:
     """Return the share of pass i, with the reason why it is not whole."""
-    rivals = sorted((j for j in problem.near[i] if j in contacts), key=lambda j: contacts[j])
     if i not in contacts:
-        reason, by = _dropped(problem, passes, contacts, i, rivals)
+        reason, by = _dropped(problem, passes, contacts, i)
         return Share(False, math.nan, math.nan, tuple(passes[j].case for j in by), reason)
     begin, end = contacts[i]
-    late, early, words, by = begin - problem.rise[i], problem.set[i] - end, [], []
-    before, after = _limits(problem, contacts, i, rivals, sum(contacts[j] < contacts[i] for j in rivals))
-    if before and late > EQUAL_S:
-        by += before
-        words += [f'begins {late:.1f} s late after {passes[before[0]].case}']
-    if after and early > EQUAL_S:
-        by += after
-        words += [f'ends {early:.1f} s early for {passes[after[0]].case}']
-    return Share(True, begin, end, tuple(dict.fromkeys(passes[j].case for j in by)), ', '.join(words))
+    [free] = _free(problem, i, contacts, contacts[i])
+    late, early, texts, cases = begin - problem.rise[i], problem.set[i] - end, [], []
+    if free.before is not None and late > EQUAL_S:
+        cases.append(passes[free.before].case)
+        texts.append(f'begins {late:.1f} s late after {cases[-1]}')
+    if free.after is not None and early > EQUAL_S:
+        cases.append(passes[free.after].case)
+        texts.append(f'ends {early:.1f} s early for {cases[-1]}')
+    return Share(True, begin, end, tuple(dict.fromkeys(cases)), ', '.join(texts))
 
 
-def _limits(problem: _Problem, contacts: Contacts, i: int, rivals: Sequence[int],
-            place: int) -> tuple[list[int], list[int]]:
-    """Return the rivals that limit the begin and the end of a contact of pass i between rivals[:place] and the
-    others; an empty list where its window does."""
-    begins = {j: contacts[j][1] + problem.gaps[j, i] for j in rivals[:place]}
-    ends = {j: contacts[j][0] - problem.gaps[i, j] for j in rivals[place:]}
-    return ([j for j in begins if begins[j] == max(begins.values()) and begins[j] > problem.rise[i]][:1],
-            [j for j in ends if ends[j] == min(ends.values()) and ends[j] < problem.set[i]][:1])
-
-
-def _dropped(problem: _Problem, passes: Sequence[Pass], contacts: Contacts, i: int,
-             rivals: Sequence[int]) -> tuple[str, list[int]]:
+def _dropped(problem: _Problem, passes: Sequence[Pass], contacts: Contacts, i: int) -> tuple[str, list[int]]:
     """Return (reason, passes to which a dropped pass lost its time)."""
     if problem.length(i) < problem.min_pass:
         return f'lasts {problem.length(i):.1f} s, shorter than {problem.min_pass:g} s', []
     if problem.gain[i] <= 0.0:
         return 'the expected loss is the whole pass', []
-    by = [j for j in rivals if contacts[j][1] + problem.gaps[j, i] > problem.rise[i]
-          and contacts[j][0] - problem.gaps[i, j] < problem.set[i]]
-    free = _free(problem, i, contacts)
-    place = max(range(len(free)), key=lambda k: free[k][1] - free[k][0])
-    if free[place][1] <= free[place][0]:
+    by = sorted((j for j in problem.near[i] if j in contacts
+                 and contacts[j][1] + problem.gaps[j, i] > problem.rise[i]
+                 and contacts[j][0] - problem.gaps[i, j] < problem.set[i]), key=lambda j: contacts[j])
+    longest = max(_free(problem, i, contacts), key=lambda free: free.length)
+    if longest.length <= 0.0:
         return 'overlaps ' + ', '.join(f'{passes[j].case} of priority {passes[j].object.priority:g}' for j in by), by
-    before, after = _limits(problem, contacts, i, rivals, place)
-    sides = [f'after {passes[j].case}' for j in before] + [f'before {passes[j].case}' for j in after]
+    sides = [f'{side} {passes[j].case}' for side, j in (('after', longest.before), ('before', longest.after))
+             if j is not None]
     return f'shorter than {problem.min_pass:g} s {" and ".join(sides)}', by

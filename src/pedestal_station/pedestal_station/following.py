@@ -28,7 +28,6 @@ from receiver_law.monopulse import sum_pattern
 MAX_PIECES = 64  # largest number of pieces of time that are kept
 MAX_AZIMUTH_STEP_RAD = 0.02  # largest motion of the target between two rows, on a circle of the zenith distance [rad]
 MIN_STEP_S = 1e-3  # least time between two rows [s]
-EDGE_BISECTIONS = 20  # number of bisections of the edge of a sector
 MAX_JUMP_RAD = 1e-3  # largest difference from a reference at which an axis counts as on it [rad]
 
 COLUMN_COUNT = 7
@@ -50,9 +49,7 @@ class Course(NamedTuple):
 class Followed(Record):
     """State of a pass that is followed, and its sums."""
     guidance: guidance.Guidance
-    looks: Seconds      # time of the next look-ahead
-    begun: Seconds      # begin of the last slew
-    slews: int          # number of slews through a keyhole
+    begun: Seconds      # begin of the last slew through a keyhole, -inf before the first one
     long_way: Bit       # 1 if one turns opposite to the target
     overtravel: Bit     # 1 if no azimuth wrap holds the pass
     received: Seconds   # integral of the received power over that on the axis of the beam
@@ -89,33 +86,11 @@ def survey(program: ProgramTrack, terms: PointingModel, rows: Floats) -> int:
 
 
 @compiled
-def hidden(program: ProgramTrack, times: Times, sectors: Vectors3, pieces: Pairs) -> int:
-    """Fill pieces with begin and end of each time in which a sector hides the target; return their number. times: of
-    the survey."""
-    count, before = 0, False
+def hidden(program: ProgramTrack, sectors: Vectors3, times: Times, heights: Floats) -> None:
+    """Fill heights at times of the program: 1 where a sector hides the target, else -1."""
     for i in range(len(times)):
-        now = _blocked(program, sectors, times[i])
-        if now != before:
-            early, late = times[max(i - 1, 0)], times[i]
-            for _ in range(EDGE_BISECTIONS):
-                middle = 0.5 * (early + late)
-                if _blocked(program, sectors, middle) == now:
-                    late = middle
-                else:
-                    early = middle
-            if now and count < len(pieces):
-                pieces[count, 0], pieces[count, 1] = late, times[-1]
-                count += 1
-            elif not now:
-                pieces[count - 1, 1] = late
-        before = now
-    return count
-
-
-@compiled
-def _blocked(program: ProgramTrack, sectors: Vectors3, t: Seconds) -> bool:
-    motion = program_track.motion_at(program, t)
-    return blockage.blocked(sectors, motion.azimuth.angle, motion.elevation.angle)
+        motion = program_track.motion_at(program, times[i])
+        heights[i] = 1.0 if blockage.blocked(sectors, motion.azimuth.angle, motion.elevation.angle) else -1.0
 
 
 @compiled
@@ -152,22 +127,6 @@ def _on(axis: AxisMotion, before: AxisMotion, reference: AxisMotion, step: Secon
     """Return True if an axis that was at `before` a step ago reaches its reference at that rate."""
     expected = before.angle + 0.5 * step * (before.rate + reference.rate)
     return abs(reference.angle - axis.angle) < MAX_JUMP_RAD and abs(reference.angle - expected) < MAX_JUMP_RAD
-
-
-@compiled
-def _look(state: Followed, constants: Constants, terms: PointingModel, program: ProgramTrack, t: Seconds,
-          wait: Seconds) -> None:
-    """Look ahead if it is due. The control unit looks once a second. Here the looks become denser towards the begin of
-    a slew, and the last one is as late as that of the control unit. wait: time until the azimuth cannot follow."""
-    ahead = state.guidance.lookahead
-    if t < state.looks or not planner.due(ahead, t):
-        return
-    planner.look_along_program(ahead, constants.lookahead, terms, t, state.guidance.azimuth,
-                               bridge.way(state.guidance.bridge, program))
-    left = min(0.4 * constants.lookahead.notice, wait)
-    if ahead.forecast == planner.FORECAST_KEYHOLE and t < ahead.slew.t1:
-        left = ahead.slew.t1 - planner.LOOK_AHEAD_PERIOD_S - t
-    state.looks = t + max(0.5 * left, planner.LOOK_AHEAD_PERIOD_S)
 
 
 @compiled
@@ -224,9 +183,10 @@ def follow(state: Followed, constants: Constants, terms: PointingModel, course: 
     ends[0, 0], ends[0, 1] = azimuth.angle, elevation.angle
     offset = _offset(azimuth, elevation, target)
     while k < len(rows) - 1:
-        wait = course.ahead[k] - t
-        if wait <= constants.lookahead.horizon:
-            _look(state, constants, terms, program, t, wait)
+        ahead = state.guidance.lookahead
+        if course.ahead[k] - t <= constants.lookahead.horizon and planner.due(ahead, t):
+            planner.look_along_program(ahead, constants.lookahead, terms, t, state.guidance.azimuth,
+                                       bridge.way(state.guidance.bridge, program))
         end, fine = _step(state, constants, course, k, t, exact)
         order = guidance.Order(Mode.PROGRAM, False, azimuth.angle, t)
         now, target = _axes(state, constants, terms, order, program, end, elevation.angle)
@@ -241,12 +201,13 @@ def follow(state: Followed, constants: Constants, terms: PointingModel, course: 
         if not exact and not fine:      # the step is repeated in steps of the drive
             azimuth, elevation = before
             continue
-        _take(state, constants, pieces, (t, end), (offset, _offset(azimuth, elevation, target)), now,
+        before_step, offset = offset, _offset(azimuth, elevation, target)
+        _take(state, constants, pieces, (t, end), (before_step, offset), now,
               abs(azimuth.angle - now.azimuth.angle) * math.cos(elevation.angle)
               >= abs(elevation.angle - now.elevation.angle))
         azimuth_wrap.watch_turn(state.guidance.turn, azimuth.angle,
                                 (state.guidance.azimuth, target.elevation.angle), beamwidth, end)
-        offset, t = _offset(azimuth, elevation, target), end
+        t = end
         k += 1 if t >= rows[k + 1, T] else 0
     ends[1, 0], ends[1, 1] = azimuth.angle, elevation.angle
 
@@ -260,7 +221,7 @@ def _take(state: Followed, constants: Constants, pieces: Floats, times: tuple[Se
     ahead, half = state.guidance.lookahead, 0.5 * beamwidth
     slewing = planner.slewing(ahead, end)
     if slewing and ahead.slew.t1 != state.begun:
-        state.begun, state.slews = ahead.slew.t1, state.slews + 1
+        state.begun = ahead.slew.t1
         state.long_way |= ahead.slew.long_way
     power = 0.5 * (sum_pattern(first / beamwidth)**2 + sum_pattern(last / beamwidth)**2)
     state.received += power * (end - t)

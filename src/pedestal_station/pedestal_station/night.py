@@ -12,8 +12,9 @@ Each module of the package makes one of these, or reads them:
 All times are seconds from the beginning of the night, which is a UTC.
 """
 import datetime
+import math
 import pathlib
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.quantities import (
@@ -28,6 +29,8 @@ from pedestal_common.quantities import (
     Times,
     Vectors3,
 )
+
+Interval: TypeAlias = tuple[Seconds, Seconds]   # begin, end
 
 
 class Orbit(Protocol):
@@ -71,12 +74,16 @@ class Window(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """A time in which the antenna cannot keep the object in its beam."""
+    """A time in which the antenna cannot keep the object in its beam. No instant is in two losses of a pass."""
     reason: str             # 'keyhole', 'blockage', 'sun', 'travel' ...
     begin: Seconds
     end: Seconds
-    seconds: Seconds        # expected loss inside it; no instant is in two losses of a pass
     detail: str = ''        # more on it, '' for nothing
+
+    @property
+    def seconds(self) -> Seconds:
+        """Duration of the loss."""
+        return self.end - self.begin
 
 
 class Prediction(NamedTuple):
@@ -97,7 +104,7 @@ class Prediction(NamedTuple):
     @property
     def loss(self) -> Seconds:
         """Expected loss of the whole pass."""
-        return sum(each.seconds for each in self.losses)
+        return math.fsum(each.seconds for each in self.losses)
 
 
 class Pass(NamedTuple):
@@ -130,6 +137,13 @@ class Choice(NamedTuple):
     optimal: bool
 
 
+class Line(NamedTuple):
+    """A pass with what the exact and the greedy plan do with it."""
+    each: Pass
+    share: Share
+    greedy: Share
+
+
 class Night(NamedTuple):
     """Everything that the outputs and the station need."""
     begin: datetime.datetime    # UTC
@@ -141,3 +155,8 @@ class Night(NamedTuple):
     exact: Choice
     greedy: Choice
     refusals: tuple[Refusal, ...]
+
+    @property
+    def lines(self) -> list[Line]:
+        """The passes with their shares."""
+        return list(map(Line, self.passes, self.exact.shares, self.greedy.shares))

@@ -22,7 +22,6 @@ from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
-from pedestal_common.parameters import did_you_mean
 from pedestal_common.quantities import Days, Seconds, Times, Vectors3
 from pedestal_common.text_files import csv_table, files
 from pedestal_common.text_files.files import FilePath
@@ -37,7 +36,7 @@ LOW_PERIOD_S = SECONDS_PER_DAY / 11.25  # longest revolution of a low satellite 
 MAX_UT1_OFFSET_S = 0.9  # largest UT1 - UTC that leap seconds allow [s]; the tables go on without them
 SPLINE_SPAN_S, KNOT_SPACING_S = 3600.0, 20.0  # length of a spline of an ephemeris, and of each of its pieces [s]
 PROBE_COUNT = 200  # number of instants of the night at which SGP4 is tried
-DESIGNATOR_PATTERN = re.compile(r'\d{4}-\d{3}[A-Z]{1,3}')
+DESIGNATOR_PATTERN = re.compile(r'(\d{4}-\d{3})-?([A-Z]{1,3})')
 LINE_PATTERN = re.compile(r'line (\d+)(?:: |, )')
 NO_ELEMENTS = ('must hold a TLE (a line that begins with "1 ", then one that begins with "2 "), an OMM, or an OEM in '
                'the notation KEYWORD = value')
@@ -64,10 +63,8 @@ class Elements(NamedTuple):
 
     def enu(self, times: Times) -> Vectors3:
         """As in night.Orbit."""
-        julian, fraction = orbit.julian_date(self.query.begin)
-        fractions = fraction + times / SECONDS_PER_DAY
-        return orbit.seen(self.satellite, self.query.station, julian, fractions,
-                          orbit.earth_fixed(julian, fractions, self.query.ut1_offset), light_time=False)
+        return orbit.enu(self.satellite, self.query.station, *orbit.julian_date(self.query.begin), times,
+                         self.query.ut1_offset)[0]
 
     def elements_age(self, t: Seconds) -> Seconds:
         """As in night.Orbit."""
@@ -117,11 +114,6 @@ class Ephemeris(NamedTuple):
         """As in night.Orbit."""
         return self.zero + t - min(max(self.zero + t, self.track.begin), self.track.end)
 
-    @property
-    def low(self) -> bool:
-        """False: an ephemeris does not age."""
-        return False
-
 
 class _Set(NamedTuple):
     """A set of elements of an object, or its ephemeris."""
@@ -143,19 +135,13 @@ def read(paths: Sequence[FilePath], station: StationParameters, begin: datetime.
     """Return the objects of files and of the files in folders, and what cannot be planned. begin: of the night (UTC,
     without a zone); oldest: acu.prediction.oldest. Raises TargetError for a path that does not exist."""
     query = Query(station, begin, duration, _ut1_offset(begin + datetime.timedelta(seconds=0.5 * duration)))
-    sets, refusals = list[_Set](), list[Refusal]()
+    found: list[_Set | Object | Refusal] = []
     for path in _files(paths):
-        found, refused = _read(path, query)
-        sets += found
-        refusals += refused
-        if not (found or refused):
-            refusals.append(_refusal(path, 0, path.name, NO_ELEMENTS))
-    objects = []
-    for group in _groups(sets):
-        chosen, refused = _chosen(group, query, oldest)
-        objects += chosen
-        refusals += refused
-    return _told_apart(objects), refusals
+        found += list(_read(path, query)) or [_refusal(path, 0, path.name, NO_ELEMENTS)]
+    for group in _groups([each for each in found if isinstance(each, _Set)]):
+        found += _chosen(group, query, oldest)
+    return (_told_apart([each for each in found if isinstance(each, Object)]),
+            [each for each in found if isinstance(each, Refusal)])
 
 
 def age_refusal(orbit_of: Orbit, t: Seconds, oldest: Days = OLDEST_DAYS) -> str:
@@ -173,25 +159,6 @@ def age_warning(orbit_of: Orbit, t: Seconds) -> str:
     if not getattr(orbit_of, 'low', False) or abs(age) <= FRESH_DAYS:
         return ''
     return f'elements {abs(age):.1f} days from the pass, above {FRESH_DAYS:g} days for a low satellite'
-
-
-def weighted(objects: Sequence[Object], texts: Sequence[str]) -> list[Object]:
-    """Return objects with the priorities of texts 'NAME=WEIGHT'; NAME: name or number. Raises TargetError."""
-    weights: dict[str, float] = {}
-    for text in texts:
-        name, _, weight = text.rpartition('=')
-        known = [each.name for each in objects if name.strip().upper() in (each.name.upper(), each.number)]
-        if not known:
-            hint = did_you_mean(name, [each.name for each in objects])
-            raise TargetError(f'--priority {text}: no object {name!r:.60} in the files;{hint}'.removesuffix(';'))
-        try:
-            value = float(weight)
-        except ValueError:
-            value = np.nan
-        if not 0.0 <= value <= 1e6:
-            raise TargetError(f'--priority {text}: weight = {weight!r:.20}: must be a number from 0 to 1000000')
-        weights.update(dict.fromkeys(known, value))
-    return [each._replace(priority=weights.get(each.name, each.priority)) for each in objects]
 
 
 def _ut1_offset(when: datetime.datetime) -> Seconds:
@@ -212,22 +179,15 @@ def _files(paths: Sequence[FilePath]) -> Iterator[pathlib.Path]:
         yield from inside
 
 
-def _read(path: pathlib.Path, query: Query) -> tuple[list[_Set], list[Refusal]]:
-    sets, refusals = list[_Set](), list[Refusal]()
+def _read(path: pathlib.Path, query: Query) -> Iterator[_Set | Refusal]:
     try:
         with csv_table.stream(path) as stream:
             beginning = files.beginning(stream.read(elements.FORMAT_PROBE_BYTES)).lstrip()
         if '<oem' in beginning:
             raise csv_table.TableError(f'{path}: an OEM must be in the notation KEYWORD = value, not XML')
-        read = _ephemerides if lines.begins_with(beginning, oem.FILE_SIGNATURE) else _elements
-        for each in read(path, query):
-            if isinstance(each, _Set):
-                sets.append(each)
-            else:
-                refusals.append(each)
+        yield from (_ephemerides if lines.begins_with(beginning, oem.FILE_SIGNATURE) else _elements)(path, query)
     except csv_table.TableError as error:
-        refusals.append(_refusal(path, 0, path.name, error))
-    return sets, refusals
+        yield _refusal(path, 0, path.name, error)
 
 
 def _elements(path: pathlib.Path, query: Query) -> Iterator[_Set | Refusal]:
@@ -275,9 +235,8 @@ def _ephemerides(path: pathlib.Path, query: Query) -> Iterator[_Set | Refusal]:
 
 def _designator(text: str) -> str:
     """Return an international designator in one form, '' for another text."""
-    text = text.strip().upper()
-    text = re.sub(r'(\d{4}-\d{3})-?([A-Z]*)', r'\1\2', text)
-    return text if DESIGNATOR_PATTERN.fullmatch(text) else ''
+    match = DESIGNATOR_PATTERN.fullmatch(text.strip().upper())
+    return ''.join(match.groups()) if match else ''
 
 
 def _groups(sets: Sequence[_Set]) -> list[list[_Set]]:
@@ -290,27 +249,27 @@ def _groups(sets: Sequence[_Set]) -> list[list[_Set]]:
     return list(groups.values())
 
 
-def _chosen(group: list[_Set], query: Query, oldest: Days) -> tuple[list[Object], list[Refusal]]:
-    """Return the object of its nearest valid set, [] without one, and the refusals of the sets tried before."""
-    refusals = list[Refusal]()
+def _chosen(group: list[_Set], query: Query, oldest: Days) -> Iterator[Object | Refusal]:
+    """Yield the refusals of the sets that are tried, then the object of its nearest valid set, if any."""
     for i in sorted(range(len(group)), key=lambda i: (group[i].age, -i)):
         chosen = group[i]
         try:
             found, remark = chosen.orbit()
             nearest = min(max(0.0, -found.elements_age(0.0)), query.duration)
             if reason := age_refusal(found, nearest, oldest):
-                return [], [*refusals, chosen.refused(reason)]
+                yield chosen.refused(reason)
+                return
             if isinstance(found, Elements):
                 found.enu(np.linspace(0.0, query.duration, PROBE_COUNT))    # raises TargetError where SGP4 fails
         except TargetError as error:
-            refusals.append(chosen.refused(error))
+            yield chosen.refused(error)
             continue
         if len(group) > 1:
             several = f'{len(group)} sets of elements; taken: {chosen.path.name}, line {chosen.line}'
             remark = '; '.join(filter(None, (several, remark)))
         number = next((each.number for each in (chosen, *group) if each.number), '')
-        return [Object(chosen.name or number, number, chosen.path, chosen.line, found, 1.0, remark)], refusals
-    return [], refusals
+        yield Object(chosen.name or number, number, chosen.path, chosen.line, found, 1.0, remark)
+        return
 
 
 def _told_apart(objects: Sequence[Object]) -> list[Object]:

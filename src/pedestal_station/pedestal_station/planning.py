@@ -1,5 +1,6 @@
 """The plan of a night: from files of elements to the passes, their predictions, and the choice among them."""
 import datetime
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
@@ -17,16 +18,18 @@ from pedestal_station import antenna, choice, objects, prediction, windows
 from pedestal_station.antenna import Antenna
 from pedestal_station.changeover import Changeovers
 from pedestal_station.choice import Rules
-from pedestal_station.night import Choice, Night, Object, Pass, Refusal, Share, Window
+from pedestal_station.night import Choice, Interval, Night, Object, Pass, Refusal, Share, Window
 
 MAX_PASSES = 2000  # largest number of passes
+MAX_PRIORITY = 1e6  # largest weight of a second of contact
 MAX_NAMED = 3  # largest number of refusals in an error
 CUT_POINTS = 1000  # number of instants among which the highest one of a chosen time is
 NO_WINDOW = 'no --window'
 UNDER_WAY = 'under way at the start'
+WITHOUT_LOSS = 'without the loss at an end'
+EQUAL_S = 1e-3  # difference of times below which they are equal [s]
 
 Progress: TypeAlias = Callable[[float, str], None]  # share of the work that is done, name of the object
-Interval: TypeAlias = tuple[Seconds, Seconds]
 
 
 class Wishes(NamedTuple):
@@ -52,8 +55,10 @@ def night(wishes: Wishes, progress: Progress = lambda *_: None) -> Night:
                                    used.acu.prediction.oldest)
     if not found:
         raise ValueError('; '.join([*map(refusal_text, refusals[:MAX_NAMED]), 'no object is left to plan']))
-    found = [each for each in objects.weighted(_selected(found, wishes.satellites), wishes.priorities)
+    found = [each for each in weighted(_selected(found, wishes.satellites), wishes.priorities)
              if each.priority]
+    if not found:
+        raise ValueError('--priority: the weight of every object is 0; no object is left to plan')
     chosen = _chosen(found, wishes)
     passes: list[Pass] = []
     for i, each in enumerate(found):
@@ -93,6 +98,22 @@ def _named(found: Sequence[Object], option: str, name: str) -> Object:
         hint = did_you_mean(name, [text for each in found for text in (each.name, each.number)])
         raise ValueError(f'{option}: no object {name!r:.60} in the files;{hint}'.removesuffix(';'))
     return known[0]
+
+
+def weighted(found: Sequence[Object], texts: Sequence[str]) -> list[Object]:
+    """Return objects with the priorities of texts NAME=WEIGHT. Raises ValueError."""
+    weights: dict[str, float] = {}
+    for text in texts:
+        name, _, weight = text.rpartition('=')
+        option = f'--priority {text}'
+        known = _named(found, option, name)
+        try:
+            weights[known.name] = float(weight)
+        except ValueError:
+            weights[known.name] = math.nan
+        if not 0.0 <= weights[known.name] <= MAX_PRIORITY:
+            raise ValueError(f'{option}: weight = {weight!r:.20}: must be a number from 0 to {MAX_PRIORITY:.0f}')
+    return [each._replace(priority=weights.get(each.name, each.priority)) for each in found]
 
 
 def _selected(found: Sequence[Object], names: Sequence[str]) -> Sequence[Object]:
@@ -147,22 +168,40 @@ def _cut(each: Object, begin: Seconds, end: Seconds) -> Window:
 
 
 def _choices(passes: Sequence[Pass], used: Antenna, rules: Rules) -> tuple[Choice, Choice]:
-    """Return the exact and the greedy plan. An endless track is left out, and a pass under way has only its rest."""
+    """Return the exact and the greedy plan. An endless track is left out. Of a pass under way only the rest can be
+    taken, and of a pass with a loss at its begin or end only the part without it."""
     places = [i for i, each in enumerate(passes) if not each.window.endless]
     rest = [passes[i] for i in places]
     for i, each in enumerate(rest):
-        if each.window.rise < 0.0:
-            window = each.window._replace(rise=0.0)
-            rest[i] = each._replace(window=window, prediction=prediction.predict(each.object, window, used))
+        window = _usable(each)
+        if window != each.window:
+            near = each.prediction.azimuth[0] if each.window.rise >= 0.0 else None
+            rest[i] = each._replace(window=window, prediction=prediction.predict(each.object, window, used, near))
     axes = used.acu.azimuth.shaper, used.acu.elevation.shaper
     exact, greedy = choice.choose(rest, Changeovers(rest, axes, rules), rules)
     return _whole(exact, passes, places), _whole(greedy, passes, places)
+
+
+def _usable(each: Pass) -> Window:
+    """Return the window of a pass from the begin of the night on, without the losses at its begin and at its end; with
+    them if nothing else remains."""
+    rise, set_ = begin, end = max(each.window.rise, 0.0), each.window.set
+    for loss in each.prediction.losses:
+        if loss.begin <= rise + EQUAL_S:
+            rise = max(rise, loss.end)
+        if loss.end >= set_ - EQUAL_S:
+            set_ = min(set_, loss.begin)
+    return each.window._replace(rise=rise, set=set_) if rise < set_ else each.window._replace(rise=begin, set=end)
 
 
 def _whole(plan: Choice, passes: Sequence[Pass], places: Sequence[int]) -> Choice:
     """Return a plan with the passes that took no part in it; places: of those that did."""
     shares = [Share(False, np.nan, np.nan, (), NO_WINDOW)] * len(passes)
     for i, share in zip(places, plan.shares, strict=True):
-        late = share.taken and passes[i].window.rise < 0.0 and not share.reason
-        shares[i] = share._replace(reason=UNDER_WAY) if late else share
+        window = passes[i].window
+        if share.taken and not share.reason:
+            reason = UNDER_WAY if window.rise < 0.0 else '' if share.begin - window.rise < EQUAL_S > (
+                window.set - share.end) else WITHOUT_LOSS
+            share = share._replace(reason=reason)
+        shares[i] = share
     return plan._replace(shares=tuple(shares))

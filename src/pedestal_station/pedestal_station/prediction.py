@@ -5,25 +5,21 @@ lost has one reason: a hidden sector before the sun, and the sun before the limi
 """
 import math
 from collections.abc import Iterable
-from typing import TypeAlias
 
 import numpy as np
 
 from acu_tracker.guidance import guidance
 from acu_tracker.program.program_track import ProgramTrack
-from pedestal_common.quantities import Bools, Floats, Radians, Records, Seconds, Times, Vectors3
+from pedestal_common.geometry import passes
+from pedestal_common.quantities import Floats, Radians, Records, Seconds, Times, Vectors3
 from pedestal_station import following
 from pedestal_station.antenna import Antenna
-from pedestal_station.night import Loss, Object, Orbit, Prediction, Window
-
-Interval: TypeAlias = tuple[Seconds, Seconds]
+from pedestal_station.night import Interval, Loss, Object, Orbit, Prediction, Window
 
 COARSE_STEP_S, MAX_COARSE_STEPS = 5.0, 500
 """Time between two positions from which the density of a table follows [s], and the largest number of these times."""
 ROW_ANGLE_RAD = math.radians(0.5)  # motion of the target between two rows of a table [rad]
 MIN_ROW_INTERVAL_S, MAX_ROW_INTERVAL_S = 0.5, 120.0  # limits of the time between two rows of a table [s]
-SUN_STEP_S = 30.0  # time between two computed directions of the sun [s]; it moves by 0.13 deg
-MAX_GAP_S = 60.0  # longest time on the target between two parts of one loss [s]
 
 
 def predict(target: Object, window: Window, antenna: Antenna, near: Radians | None = None) -> Prediction:
@@ -36,7 +32,8 @@ def predict(target: Object, window: Window, antenna: Antenna, near: Radians | No
     following.survey(program, terms, rows)
     state, ends, pieces = _initial(antenna), np.zeros((2, 2)), np.zeros((following.MAX_PIECES, 3))
     course = following.Course(program, rows, _ahead(rows, antenna))
-    following.follow(state[0], constants, terms, course, antenna.stow if near is None else near, ends, pieces)
+    near = antenna.acu.azimuth.stow if near is None else near
+    following.follow(state[0], constants, terms, course, near, ends, pieces)
     found = state[0]
     ranges = np.linalg.norm(enu, axis=1)
     peaks = np.abs(rows[:, following.AZIMUTH_RATE:]).max(axis=0).tolist()
@@ -47,8 +44,8 @@ def predict(target: Object, window: Window, antenna: Antenna, near: Radians | No
         travel_left=(min(rise[0] - limits.low, limits.high - rise[0]),
                      min(set_[0] - limits.low, limits.high - set_[0])),
         turn=set_[0] - rise[0], peak_rate=(peaks[0], peaks[1]), peak_acceleration=(peaks[2], peaks[3]),
-        early_turn=bool(found['long_way']), losses=_losses(antenna, program, enu, rows, found, pieces),
-        min_range=float(ranges.min()), cn0=antenna.cn0(ranges),
+        early_turn=bool(found['long_way']), losses=_losses(target.orbit, antenna, program, rows, found, pieces),
+        min_range=float(ranges.min()), cn0=(antenna.cn0(float(ranges.max())), antenna.cn0(float(ranges.min()))),
         loss_db=max(0.0, -10.0 * math.log10(max(found['received'] / duration, 1e-12))),
         age=target.orbit.elements_age(window.culmination))
 
@@ -74,7 +71,7 @@ def _table(orbit: Orbit, begin: Seconds, end: Seconds) -> tuple[Times, Vectors3]
 def _initial(antenna: Antenna) -> Records:
     state = following.Followed.zeros()
     guidance.initialise(state['guidance'], (antenna.acu.azimuth.preset, antenna.acu.elevation.preset))
-    state['looks'] = state['begun'] = -math.inf
+    state['begun'] = -math.inf
     return state
 
 
@@ -87,14 +84,22 @@ def _ahead(rows: Floats, antenna: Antenna) -> Times:
     return np.ascontiguousarray(np.minimum.accumulate(times[::-1])[::-1])
 
 
-def _losses(antenna: Antenna, program: ProgramTrack, enu: Vectors3, rows: Floats, found: Records,
+def _losses(orbit: Orbit, antenna: Antenna, program: ProgramTrack, rows: Floats, found: Records,
             pieces: Floats) -> tuple[Loss, ...]:
     """Return the losses of a pass in the order of their begin. No instant is in two of them."""
-    blocked, sectors = np.zeros((following.MAX_PIECES, 2)), antenna.constants['lookahead']['sectors'][0]
-    count = (following.hidden(program, np.ascontiguousarray(rows[:, following.T]), sectors, blocked)
-             if np.isfinite(sectors).any() else 0)
-    lost = {'blockage': [(begin, end) for begin, end in blocked[:count].tolist()],
-            'sun': _in_sun(antenna, program.times, enu)}
+    def behind_sector(times: Times) -> Floats:
+        heights = np.empty_like(times)
+        following.hidden(program, antenna.constants['lookahead']['sectors'][0], times, heights)
+        return heights
+
+    def in_sun(times: Times) -> Floats:
+        enu = orbit.enu(times)
+        unit = enu / np.linalg.norm(enu, axis=1)[:, np.newaxis]
+        half = 0.5 * np.linalg.norm(unit - antenna.sun(times), axis=1)
+        return antenna.sun_avoidance - 2.0 * np.arcsin(np.minimum(half, 1.0))
+
+    lost = {'blockage': _above(behind_sector, np.ascontiguousarray(rows[:, following.T])),
+            'sun': _above(in_sun, program.times)}
     for begin, end, reason in pieces[:int(found['count'])].tolist():
         lost.setdefault(following.LOST_TEXTS[int(reason)], []).append((begin, end))
     losses: list[Loss] = []
@@ -102,13 +107,13 @@ def _losses(antenna: Antenna, program: ProgramTrack, enu: Vectors3, rows: Floats
     for reason, intervals in lost.items():
         own = _without(intervals, taken)
         taken += own
-        losses += _grouped(reason, own, _detail(reason, antenna, rows, found))
+        losses += [Loss(reason, begin, end, _detail(reason, antenna, rows, found)) for begin, end in own]
     return tuple(sorted(losses, key=lambda loss: loss.begin))
 
 
 def _detail(reason: str, antenna: Antenna, rows: Floats, found: Records) -> str:
     """Return more on a loss; '' if there is nothing to say."""
-    if reason == 'keyhole' and found['slews']:
+    if reason == 'keyhole' and math.isfinite(found['begun']):
         way = 'clockwise' if found['guidance']['lookahead']['slew']['peak'] > 0.0 else 'counter-clockwise'
         return f'the azimuth slews {way}, {"against" if found["long_way"] else "as"} the target'
     if reason == 'travel' and found['overtravel']:
@@ -129,24 +134,9 @@ def _travel_text(antenna: Antenna, azimuth: Floats) -> str:
             f'{math.degrees(max(there, default=0.0)):.0f} are there')
 
 
-def _in_sun(antenna: Antenna, times: Times, enu: Vectors3) -> list[Interval]:
-    """Return the times in which the sun is within the avoidance angle of the target."""
-    count = max(math.ceil((times[-1] - times[0]) / SUN_STEP_S), 1)
-    nodes = np.linspace(times[0], times[-1], count + 1)
-    sun = np.column_stack([np.interp(times, nodes, column) for column in antenna.sun(nodes).T])
-    unit = enu / np.linalg.norm(enu, axis=1)[:, np.newaxis]
-    angle = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(unit - sun, axis=1), 0.0, 1.0))
-    return _below(times, angle - antenna.sun_avoidance)
-
-
-def _below(times: Times, values: Floats) -> list[Interval]:
-    """Return the times in which values are below 0, on straight lines between them."""
-    inside: Bools = values < 0.0
-    edges = np.flatnonzero(inside[1:] != inside[:-1])
-    share = values[edges] / (values[edges] - values[edges + 1])
-    at = list(times[edges] + share * (times[edges + 1] - times[edges]))
-    at = [*([float(times[0])] if inside[0] else []), *at, *([float(times[-1])] if inside[-1] else [])]
-    return [(float(begin), float(end)) for begin, end in zip(at[::2], at[1::2])]
+def _above(height: passes.Height, times: Times) -> list[Interval]:
+    """Return the times in which a height is above 0."""
+    return [(span.begin, span.end) for span in passes.spans(height, times, height(times))[0]]
 
 
 def _without(intervals: Iterable[Interval], taken: Iterable[Interval]) -> list[Interval]:
@@ -155,15 +145,3 @@ def _without(intervals: Iterable[Interval], taken: Iterable[Interval]) -> list[I
     for begin, end in taken:
         left = [part for a, b in left for part in ((a, min(b, begin)), (max(a, end), b)) if part[0] < part[1]]
     return left
-
-
-def _grouped(reason: str, intervals: Iterable[Interval], detail: str) -> list[Loss]:
-    """Return the losses of one reason; parts with at most MAX_GAP_S between them are one loss."""
-    losses: list[Loss] = []
-    for begin, end in sorted(intervals):
-        if losses and begin - losses[-1].end <= MAX_GAP_S:
-            last = losses.pop()
-            losses.append(Loss(reason, last.begin, end, last.seconds + end - begin, detail))
-        else:
-            losses.append(Loss(reason, begin, end, end - begin, detail))
-    return losses

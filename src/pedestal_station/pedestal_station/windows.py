@@ -12,16 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from acu_tracker.servo import travel
-from pedestal_common.geometry import passes
+from pedestal_common.geometry import orbit, passes
 from pedestal_common.quantities import Degrees, Floats, Pairs, Radians, Seconds, Times
-from pedestal_common.reproducible import arctan2
 from pedestal_station.night import Orbit, Window
 
 FOLLOWED_DAYS = 1.0  # longest time before and after the night in which rise and set are searched [days]
-KINK_MARGINS_RAD = 0.1, 0.35
-"""Largest distances from the range of the floor at which an object may cross the floor within a step [rad], below and
-above HIGH_RAD. The elevation changes by at most 0.3 deg/s there, and 1 deg/s."""
-HIGH_RAD = 0.5  # elevation from which on a low satellite moves fast [rad]
+KINK_MARGIN_RAD = 0.1
+"""Distance below the lowest point of the floor within which an object may cross the floor in a step [rad]: there, the
+elevation changes by at most 0.3 deg/s."""
 
 
 class Horizon(NamedTuple):
@@ -52,36 +50,30 @@ class Horizon(NamedTuple):
 
     def at(self, azimuth: Floats) -> Floats:
         """Return the least elevations [rad] at azimuths [rad]."""
-        if len(self.elevations) == 1:
-            return np.full(len(azimuth), self.elevations[0])
         return np.interp(azimuth, self.azimuths, self.elevations, period=2.0 * math.pi)
 
 
-def angles(orbit: Orbit, times: Times) -> Pairs:
+def angles(each: Orbit, times: Times) -> Pairs:
     """Return azimuth and elevation [rad] of an object (n, 2); NaN outside an ephemeris. Raises TargetError."""
-    east, north, up = orbit.enu(times).T
-    return np.stack((arctan2(east, north), arctan2(up, np.hypot(east, north))), axis=-1)
+    return orbit.angles(each.enu(times))
 
 
-def find(orbit: Orbit, horizon: Horizon, duration: Seconds) -> list[Window]:
+def find(each: Orbit, horizon: Horizon, duration: Seconds) -> list[Window]:
     """Return the windows of an object that are open in a night, in the order of their rise. Raises TargetError."""
     def elevation(times: Times) -> Floats:
-        return angles(orbit, times)[:, 1]
+        return angles(each, times)[:, 1]
 
     def height(times: Times) -> Floats:
-        A, E = angles(orbit, times).T
+        A, E = angles(each, times).T
         return E - horizon.at(A)
 
     step = passes.SEARCH_STEP_S
     times = np.arange(-step, duration + 2.0 * step, step)
-    times, heights = passes.followed(height, times, FOLLOWED_DAYS)
-    if len(horizon.elevations) == 1:
-        spans, peaks = passes.spans(height, times, heights)
-    else:
-        times = np.union1d(times, _kinks(orbit, horizon, times))
-        A, E = angles(orbit, times).T
-        spans, _ = passes.spans(height, times, E - horizon.at(A))
-        peaks = passes.maxima(elevation, times, E) if spans else times
+    times, _ = passes.followed(height, times, FOLLOWED_DAYS)
+    times = np.union1d(times, _kinks(each, horizon, times))
+    A, E = angles(each, times).T
+    spans, _ = passes.spans(height, times, E - horizon.at(A))
+    peaks = passes.maxima(elevation, times, E)
     return [_window(elevation, peaks, span, duration) for span in spans if span.begin < duration and span.end > 0.0]
 
 
@@ -93,14 +85,13 @@ def _window(elevation: passes.Height, peaks: Times, span: passes.Span, duration:
                   not (span.rises or span.sets))
 
 
-def _kinks(orbit: Orbit, horizon: Horizon, times: Times) -> Times:
+def _kinks(each: Orbit, horizon: Horizon, times: Times) -> Times:
     """Return the times, between growing times, at which the azimuth of an object is that of a point of the horizon."""
     def beyond(azimuth: Floats, point: Floats) -> Floats:
         return (azimuth - point + math.pi) % (2.0 * math.pi) - math.pi
 
-    A, E = angles(orbit, times).T
-    margin = np.where(E < HIGH_RAD, *KINK_MARGINS_RAD)
-    near = (E > min(horizon.elevations) - margin) & (E < max(horizon.elevations) + margin)
+    A, E = angles(each, times).T
+    near = E > min(horizon.elevations) - KINK_MARGIN_RAD
     steps = np.flatnonzero(near[:-1] | near[1:])
     points = np.array(horizon.azimuths)
     before = beyond(A[steps, np.newaxis], points)
@@ -110,6 +101,6 @@ def _kinks(orbit: Orbit, horizon: Horizon, times: Times) -> Times:
     at, which = at[np.abs(before[at, which]) < 0.5 * math.pi], which[np.abs(before[at, which]) < 0.5 * math.pi]
 
     def past(t: Times) -> Floats:
-        return beyond(angles(orbit, t)[:, 0], np.tile(points[which], len(t) // max(1, len(which))))
+        return beyond(angles(each, t)[:, 0], np.tile(points[which], len(t) // max(1, len(which))))
 
     return passes.crossed(past, times[steps[at]], times[steps[at] + 1], before[at, which] > 0.0)

@@ -17,7 +17,7 @@ RULES = Rules(min_pass=60.0, time_limit=60.0)
 
 def one_pass(name, rise, set_, priority=1.0, loss=0.0):
     window = Window(rise, (rise,), rise, set_, 1.0, False)
-    losses = (Loss('keyhole', rise, set_, loss),)
+    losses = (Loss('keyhole', rise, rise + loss),)
     prediction = Prediction((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), 0.0, (0.0, 0.0), (0.0, 0.0), False, losses, 0.0,
                             (0.0, 0.0), 0.0, 0.0)
     return Pass(Object(name, '', pathlib.Path('file'), 1, None, priority), 1, window, prediction)

@@ -11,7 +11,7 @@ from sgp4.io import compute_checksum
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.geometry.orbit import TargetError
-from pedestal_station import objects, windows
+from pedestal_station import objects, planning, windows
 from tracking_receiver_sim.params import LeoPassParameters
 
 DAY_S = 86400.0
@@ -98,10 +98,10 @@ def test_a_folder_of_tles_with_names_alpha_5_and_no_names(tmp_path):
     assert [each.name for each in found] == ['ISS (ZARYA)', '270001', 'VANGUARD 5', 'VANGUARD 6']
     assert [(each.path.name, each.line) for each in found] == [('a.tle', 2), ('a.tle', 4), ('a.tle', 7), ('b.json', 1)]
     assert refused.path.name == 'readme.md' and refused.reason.startswith('must hold a TLE')
-    assert [each.priority for each in objects.weighted(found, ['vanguard 6=3', '270001=0'])] == [1.0, 0.0, 1.0, 3.0]
+    assert [each.priority for each in planning.weighted(found, ['vanguard 6=3', '270001=0'])] == [1.0, 0.0, 1.0, 3.0]
     for text, message in (('FOO=1', "no object 'FOO'"), ('270001=-1', "weight = '-1': must be a number from 0 to")):
-        with pytest.raises(TargetError, match=message):
-            objects.weighted(found, [text])
+        with pytest.raises(ValueError, match=message):
+            planning.weighted(found, [text])
 
 
 @pytest.mark.parametrize('day, taken', [(2, '336.5'), (10, '343.69339541'), (20, '354.25')])

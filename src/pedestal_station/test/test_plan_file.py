@@ -10,10 +10,12 @@ from pedestal_station import objects
 from pedestal_station.night import Choice, Night, Object, Pass, Prediction, Share, Window
 from pedestal_station.outputs import file
 from pedestal_station.station import fresh
+from pedestal_station.station.requests import Antenna
 from tracking_receiver_sim.params import LeoPassParameters
 
 BEGIN = datetime.datetime(2019, 12, 10, 12, 0)
 STATION = StationParameters()
+ANTENNA = Antenna(STATION, (-270.0, 270.0), 14.0)
 DEFAULT = LeoPassParameters()
 TLE = f'ISS\n{DEFAULT.line_1}\n{DEFAULT.line_2}\n'
 
@@ -56,15 +58,24 @@ def test_what_is_written_is_read(night, tmp_path):
                                                                        'begins late, lost to MOON/1')
     assert (dropped.taken, dropped.begin - utc, dropped.reason) == (False, 2100.0, 'lost to ISS/1')
     assert iss.elements == {'line_1': DEFAULT.line_1, 'line_2': DEFAULT.line_2} and iss.track == ()
-    assert moon.elements == {} and moon.priority == 2.0 and moon.number == ''
+    assert moon.elements == {} and moon.number == ''
     assert moon.track[0][0] - utc == 0.0 and moon.track[-1][0] - utc >= 90.0
     assert moon.track[10][1] == pytest.approx(np.radians(9.0), abs=1e-6)
-    assert moon.point == pytest.approx((300.0, np.degrees(np.arctan(0.5))))
+    assert (moon.azimuth_deg, moon.elevation_deg) == pytest.approx((300.0, np.degrees(np.arctan(0.5))))
     # the turn of the prediction, and the sky of the elements
     azimuth, elevation = file.direction(iss.elements, STATION, iss.begin)
     first, _ = file.direction(iss.elements, STATION, utc + 2100.0)
-    assert iss.point[1] == pytest.approx(elevation, abs=0.01)
-    assert iss.point[0] - 300.0 == pytest.approx((azimuth - first + 180.0) % 360.0 - 180.0, abs=0.01)
+    assert iss.elevation_deg == pytest.approx(elevation, abs=0.01)
+    assert iss.azimuth_deg - 300.0 == pytest.approx((azimuth - first + 180.0) % 360.0 - 180.0, abs=0.01)
+
+
+def test_a_satellite_that_stays_in_view_for_days_can_be_planned(night, tmp_path):
+    first, dropped, moon = night.passes
+    long = dropped._replace(window=dropped.window._replace(set=250000.0))
+    file.write(tmp_path / 'night.json', night._replace(passes=(first, long, moon)))
+    assert file.read(tmp_path / 'night.json').contacts[1].end == file.seconds(BEGIN) + 250000.0
+    with pytest.raises(file.PlanError, match='5001 passes, must be at most 5000'):
+        file.write(tmp_path / 'many.json', night._replace(passes=(first,) * 5001))
 
 
 @pytest.mark.parametrize('place, value, reason', [
@@ -75,20 +86,21 @@ def test_what_is_written_is_read(night, tmp_path):
     (('passes', 0, 'case'), '', "passes[0].case = '': must be 1 to 100 printable characters"),
     (('passes', 1, 'case'), 'ISS/1', "passes[1].case = 'ISS/1': must be unique"),
     (('passes', 0, 'begin'), 'soon', "passes[0].begin = 'soon': must be UTC"),
-    (('passes', 0, 'end'), '2019-12-10T00:00:00Z', "passes[0].end = '2019-12-10T00:00:00Z': must be after begin"),
-    (('passes', 0, 'azimuth_deg'), 'north', "passes[0].azimuth_deg = 'north': must be -1080 to 1080"),
-    (('passes', 0, 'elevation_deg'), float('nan'), 'passes[0].elevation_deg = nan: must be -90 to 180'),
+    (('passes', 0, 'end'), '2019-12-10T00:00:00Z', 'passes[0].end = 2019-12-10T00:00:00.000Z: must be after begin'),
+    (('passes', 0, 'azimuth_deg'), 'north', "passes[0].azimuth_deg = 'north': must be a number, in deg"),
+    (('passes', 0, 'elevation_deg'), float('nan'), 'passes[0].elevation_deg = nan deg: must be -90 to 180'),
     (('passes', 0, 'taken'), 1, 'passes[0].taken = 1: must be true or false'),
-    (('passes', 0, 'priority'), -1.0, 'passes[0].priority = -1.0: must be 0 to 1e+06'),
     (('passes', 0, 'elements'), {'line_1': 'x'}, 'passes[0].elements = '),
     (('passes', 0, 'elements'), {'tle': 'x'}, 'tle: must be line_1 and line_2, or omm'),
-    (('passes', 0, 'elements'), {}, 'passes[0].track is missing: must be two or more rows'),
+    (('passes', 0, 'elements'), {}, 'passes[0].track = []: must be two or more rows'),
     (('passes', 2, 'track'), [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 'passes[2].track = '),
     (('station', 'latitude_deg'), 91.0, 'latitude_deg = 91'),
+    (('station', 'height'), 10 ** 400, 'station.height = 1000'),
     (('station', 'height'), None, 'station.height = None')])
 def test_a_broken_plan_is_refused_by_file_field_and_reason(night, tmp_path, place, value, reason):
     path = tmp_path / 'night.json'
-    content = json.loads(file.text(night))
+    file.write(path, night)
+    content = json.loads(path.read_text())
     where = content
     for key in place[:-1]:
         where = where[key]
@@ -114,7 +126,7 @@ def test_a_missing_plan_is_named(tmp_path):
 
 def test_only_quiet_files_of_elements_are_read(tmp_path):
     """A file counts in the second look at which it is the same; a hidden one and one of other satellites never."""
-    watch = fresh.Watch(tmp_path, STATION, 14.0)
+    watch = fresh.Watch(tmp_path, ANTENNA)
     wanted, utc, now = frozenset(('25544',)), file.seconds(BEGIN), 0.0
 
     def looked():
@@ -141,4 +153,4 @@ def test_only_quiet_files_of_elements_are_read(tmp_path):
     assert [line.startswith(f'refused: {tmp_path / "broken.tle"}') for line in looked()[1]] == [True]
     watch.close()
     with pytest.raises(NotADirectoryError, match='must be a directory'):
-        fresh.Watch(tmp_path / 'none', STATION, 14.0)
+        fresh.Watch(tmp_path / 'none', ANTENNA)

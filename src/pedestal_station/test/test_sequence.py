@@ -1,6 +1,5 @@
 """The sequence of a night, step by step: every branch of the state machine, without ROS and without a clock."""
 import json
-import math
 
 import numpy as np
 import pytest
@@ -8,7 +7,7 @@ import pytest
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.wire.commands import Command, Reply
-from pedestal_station.outputs.file import Contact, epoch_of, orbit_of, utc_text
+from pedestal_station.outputs.file import MAX_PASSES, Contact, epoch_of, orbit_of, utc_text
 from pedestal_station.station import progress, requests, sequence
 from pedestal_station.station.sequence import Aim, Fresh, Inputs, Rules
 from tracking_receiver_sim.params import LeoPassParameters
@@ -16,20 +15,20 @@ from tracking_receiver_sim.params import LeoPassParameters
 DEFAULT = LeoPassParameters()
 ISS = {'line_1': DEFAULT.line_1, 'line_2': DEFAULT.line_2}
 ZERO = epoch_of(ISS) + 43200.0      # UTC of second 0 of these tests
-ANTENNA = requests.Antenna(StationParameters(), (-270.0, 270.0))
-RULES = Rules(lead=120.0, gap=600.0, park='', oldest=14.0)
+ANTENNA = requests.Antenna(StationParameters(), (-270.0, 270.0), 14.0)
+RULES = Rules(lead=120.0, gap=600.0, park='')
 
 
 def contact(case, begin, end, taken=True, elements=ISS, track=()):
-    return Contact(case, case.partition('/')[0], '25544', elements, track, ZERO + begin, ZERO + end, (10.0, 20.0),
-                   50.0, 1.0, taken, '' if taken else 'lost to B/1')
+    return Contact(case, case.partition('/')[0], '25544', elements, track, ZERO + begin, ZERO + end, 10.0,
+                   20.0, 50.0, taken, '' if taken else 'lost to B/1')
 
 
 class Night:
     """A night under test. Its control unit grants every command, unless a step gives another reply."""
 
     def __init__(self, *contacts, now=0.0, rules=RULES):
-        self.state, self.rules = sequence.begin(contacts, ZERO + now), rules
+        self.state = sequence.PassSequence(contacts, rules, ANTENNA, ZERO + now)
         self.given = {'present': True, 'mode': 'standby', 'elements': ISS}
         self.lines, self.commands, self.records = [], [], []
 
@@ -40,12 +39,10 @@ class Night:
             reply = Reply(True, f'mode is {self.state.pending.verb}')
         if reply and reply.granted:
             self.given['mode'] = self.state.pending.verb
-        result = sequence.step(self.state, Inputs(ZERO + now, reply=reply, **{**self.given, **(once or {})}),
-                               self.rules)
-        self.state = result.state
+        result = self.state.step(Inputs(ZERO + now, reply=reply, **{**self.given, **(once or {})}))
         self.lines += result.lines
         self.records += result.records
-        self.commands += [result.command.verb] if result.command else []
+        self.commands += [self.state.pending.verb] if self.state.pending else []
         return result
 
     def until(self, end, begin, **given):
@@ -56,8 +53,7 @@ class Night:
 
     def ask(self, now, verb, **arguments):
         """The reply to a command of anna."""
-        found = requests.request(Command(verb, 'anna', '1', arguments), ANTENNA)
-        [(_, reply)] = self.step(now, once={'requests': (found,)}).replies
+        [(_, reply)] = self.step(now, once={'commands': [Command(verb, 'anna', '1', arguments)]}).replies
         return reply
 
     @property
@@ -84,15 +80,17 @@ def test_a_night_of_two_passes_from_the_park_to_the_stow():
     assert night.text('A/1') == 'on the target for 60 of 60 s'
     night.until(1160, 1061, tracking=True)
     assert night.commands[3:] == ['preset', 'tle', 'stow'] and night.records[2:] == [('begin', 'B/1'), ('end', 'B/1')]
-    assert not night.step(1165).state.over
-    assert night.step(1170, progress='stowed').state.over and night.lines[-1] == 'stowed'
+    night.step(1165)
+    assert not night.state.over
+    night.step(1170, progress='stowed')
+    assert night.state.over and night.lines[-1] == 'stowed'
     assert night.state.now == 'over' and set(night.states.values()) == {'done'}
     assert night.ask(1171, 'insert', case='A/1').text == 'refused: the night is over' and night.commands[6:] == []
 
 
 def test_an_antenna_with_a_park_waits_there_and_one_that_waits_briefly_stays():
     night = Night(contact('A/1', 1000, 1060), rules=RULES._replace(park='zenith'))
-    assert night.step(0).command == Aim('preset', {'point': 'zenith'})
+    assert night.step(0) and night.state.pending == Aim('preset', {'point': 'zenith'})
     night = Night(contact('A/1', 500, 560))
     night.until(379, 0)
     assert night.commands == []
@@ -183,8 +181,10 @@ def test_a_mode_of_another_client_holds_the_station_until_resume():
 
 def test_a_silent_control_unit_is_awaited():
     night = Night(contact('A/1', 200, 260))
-    assert night.step(190, present=False).command is None and night.lines == ['waits: the control unit is silent']
-    assert night.step(191, present=True).command.verb == 'preset'
+    night.step(190, present=False)
+    assert night.state.pending is None and night.lines == ['waits: the control unit is silent']
+    night.step(191, present=True)
+    assert night.commands[-1] == 'preset'
 
 
 def test_an_operator_skips_the_pass_under_way_the_next_or_a_named_one():
@@ -195,6 +195,7 @@ def test_an_operator_skips_the_pass_under_way_the_next_or_a_named_one():
     assert night.ask(198, 'skip', case='C/1').text == 'refused: case = C/1: is skipped'
     assert night.ask(199, 'skip', case='D/1').text == 'refused: case = D/1: must be one of A/1, B/1, C/1'
     assert night.ask(200, 'skip').text == 'B/1 is skipped'
+    assert "unknown command 'jump'" in night.ask(200, 'jump').text
     assert night.ask(201, 'skip').text == 'refused: no pass is queued' and night.text('B/1') == 'by anna'
 
 
@@ -225,20 +226,23 @@ def test_a_pass_of_other_elements_is_inserted_at_a_turn_within_the_travel():
     times = {name: utc_text(ZERO + when) for name, when in (('begin', now), ('end', now + 60))}
     assert night.ask(10, 'insert', **ISS, **times, name='STATION').text == 'STATION/1 is queued'
     entry = night.state.entries[-1]
-    assert entry.inserted and entry.contact.number == '25544' and -180.0 <= entry.contact.point[0] <= 180.0
+    assert entry.inserted and entry.contact.number == '25544' and -180.0 <= entry.contact.azimuth_deg <= 180.0
     assert night.ask(11, 'insert', **ISS, **times).text == '25544/1 is queued'      # in place of the first
     assert night.states['STATION/1'] == 'dropped'
+    night.state.entries *= MAX_PASSES
+    assert 'passes, must be at most 5000' in night.ask(12, 'insert', **ISS, **times).text
 
 
 @pytest.mark.parametrize('arguments, reason', [
     ({}, 'must have either case, or elements'),
     ({'case': 'A/1', 'begin': '2019-12-10T00:00:00'}, 'case = A/1 and begin are given'),
     ({'line_1': 'x', 'begin': 'now', 'end': 'now'}, 'elements = line_1: must be line_1 and line_2, or omm'),
+    ({**ISS, 'begin': '0001-01-01T00:00:00+23:00', 'end': 'x'}, "begin = '0001-01-01"),
     ({**ISS, 'begin': 'soon', 'end': 'x'}, "begin = 'soon': must be UTC"),
     ({**ISS, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-09T00:00:00'}, 'must be after begin'),
     ({**ISS, 'line_1': 'x' * 69, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-10T00:01:00'}, 'TLE line 1'),
     ({**ISS, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-10T00:01:00'}, 'is below the horizon from'),
-    ({**ISS, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-10T00:01:00', 'name': 'x' * 101}, 'at most 100'),
+    ({**ISS, 'begin': '2019-12-10T00:00:00', 'end': '2019-12-10T00:01:00', 'name': 'x' * 101}, '1 to 100'),
     ({'colour': 'red'}, "unknown argument 'colour'")])
 def test_what_cannot_be_inserted_is_refused_by_name(arguments, reason):
     with pytest.raises((ValueError, TargetError), match=reason.replace('(', r'\(')):
@@ -281,7 +285,8 @@ def test_a_station_that_cannot_stow_ends_and_says_so():
     night = Night(contact('A/1', 100, 160))
     night.until(160, 90)
     night.until(165, 161, holder='bert')
-    assert night.step(480).state.over and night.lines[-1] == 'not stowed: control is with bert'
+    night.step(480)
+    assert night.state.over and night.lines[-1] == 'not stowed: control is with bert'
 
 
 def test_the_progress_continues_a_pass_under_way_and_keeps_what_is_over(tmp_path):
@@ -295,14 +300,16 @@ def test_the_progress_continues_a_pass_under_way_and_keeps_what_is_over(tmp_path
     now = up(5000)
     assert night.ask(312, 'insert', **ISS, begin=utc_text(ZERO + now), end=utc_text(ZERO + now + 60)).granted
     progress.save(file, night.state)
-    again = progress.resume(sequence.begin(contacts, ZERO + 320.0), file, ZERO + 320.0)
+    again = sequence.PassSequence(contacts, RULES, ANTENNA, ZERO + 320.0)
+    progress.resume(again, file, ZERO + 320.0)
     assert {entry.contact.case: entry.state for entry in again.entries} == {
         'A/1': 'done', 'B/1': 'running', 'C/1': 'queued', 'D/1': 'skipped', 'E/1': 'queued', '25544/1': 'queued'}
-    assert again.entries[1].tracked == pytest.approx(12.0, abs=1.5) and math.isnan(again.last)
+    assert again.entries[1].tracked == pytest.approx(12.0, abs=1.5)
     night.state = again
     night.until(361, 321, mode='standby')
     assert night.states['B/1'] == 'done' and night.records[-2:] == [('begin', 'B/1'), ('end', 'B/1')]
-    late = progress.resume(sequence.begin(contacts, ZERO + 400.0), file, ZERO + 400.0)
+    late = sequence.PassSequence(contacts, RULES, ANTENNA, ZERO + 400.0)
+    progress.resume(late, file, ZERO + 400.0)
     assert late.entries[1].state == 'failed' and late.entries[1].text == 'the station was off at its end'
     file.write_text('{"pedestal_station": 1')
     with pytest.raises(ValueError, match='holds no progress of a night'):

@@ -16,8 +16,8 @@ STUDIES = {  # {folder: its modules that are studies}; a name has hyphens for th
     'p002_jia': ('phased_array',),
     'p003_lin_wu_zhu': ('feedforward_speed', 'imm_feedforward', 'manoeuvre', 'pareto'),
     'p004_li_chen_wang': ('rate_measurement', 'telemetry_flight'),
-    'system': ('acquisition', 'budget', 'calibration', 'consistency', 'faults', 'filters', 'scenarios',
-               'structure', 'target_filters', 'wrong_slope')}
+    'system': ('acquisition', 'budget', 'calibration', 'consistency', 'faults', 'filters', 'night',
+               'scenarios', 'structure', 'target_filters', 'wrong_slope')}
 
 _STUDY_MODULES = {module.replace('_', '-'): f'{folder}.{module}'
                   for folder, modules in STUDIES.items() for module in modules}

@@ -50,21 +50,16 @@ fast as the beam.
 The comparison is a likelihood ratio of hypotheses (Willsky, A survey of design methods for failure detection in
 dynamic systems, Automatica 12 (1976) 601). The directions are those in the earth frame, because the motion of the deck
 has no effect there. `pedestal study wrong-slope` compares the time of the alarm with the time of a test that knows the
-direction of the target. Where the antenna has a program, `slope_ratio` is sooner, with the same blocks.
+direction of the target.
 """
 import math
 from typing import Annotated, NamedTuple
 
-from acu_tracker.estimation import slope_ratio
 from acu_tracker.estimation.filters.measurement import Innovation, Measurement
 from acu_tracker.geometry.history import Pointing
 from acu_tracker.geometry.vector import Rotation, Vector, dot, rotated
-from acu_tracker.modes import Reason
-from acu_tracker.program import program_track
-from acu_tracker.program.program_track import ProgramTrack
 from acu_tracker.signals import Inputs
 from pedestal_common.compiled import compiled
-from pedestal_common.geometry.line_of_sight import earth_direction
 from pedestal_common.quantities import Bit, Floats, Pair, Radians, Radians2, Seconds, Vector3
 from pedestal_common.record import Record
 
@@ -189,7 +184,6 @@ class WrongSlope(Record):
     error_square: Pair      # means of b_x^2, b_e^2 [-]
     product: Pair           # means of a_x b_x, a_e b_e [-]
     turn: float             # Im C: mean of a_x b_e - a_e b_x [-]
-    ratio: slope_ratio.SlopeRatio   # the test against the program
 
 
 BLOCK_ERROR_COUNT = 4
@@ -260,7 +254,6 @@ def _clear_slope(state: WrongSlope) -> None:
     state.error_square[:] = 0.0
     state.product[:] = 0.0
     state.turn = 0.0
-    slope_ratio.restart(state.ratio)
 
 
 @compiled
@@ -300,23 +293,7 @@ def _take_block(state: WrongSlope, t: Seconds, beam: Beam) -> None:
             state.error_square[i] += (b[i] * b[i] / sigma2 - state.error_square[i]) / SLOPE_BLOCK_COUNT
             state.product[i] += (a[i] * b[i] / sigma2 - state.product[i]) / SLOPE_BLOCK_COUNT
         state.turn += ((a[0] * b[1] - a[1] * b[0]) / sigma2 - state.turn) / SLOPE_BLOCK_COUNT
-
-
-@compiled
-def _take_program(state: WrongSlope, t: Seconds, beam: Beam, program: ProgramTrack, walk: float) -> bool:
-    """Test the block that ends at t with the beam against the program; return True if the slope is wrong."""
-    n, sigma2 = BLOCK_ERROR_COUNT, state.variance / (BLOCK_ERROR_COUNT * BLOCK_ERROR_COUNT)
-    if program_track.status(program, t) != Reason.NONE or walk > slope_ratio.MAX_WALK * sigma2:
-        slope_ratio.restart(state.ratio)
-        return False
-    azimuth, elevation = program_track.motion_at(program, t)
-    x, y, z = earth_direction(azimuth.angle, elevation.angle)
-    if math.hypot(azimuth.acceleration * math.hypot(x, y), elevation.acceleration) > slope_ratio.MAX_ACCELERATION:
-        slope_ratio.restart(state.ratio)
-        return False
-    s = state.sum
-    return slope_ratio.take(state.ratio, t, Vector(s[0] / n - x, s[1] / n - y, s[2] / n - z),
-                            Vector(s[3] / n, s[4] / n, s[5] / n), beam.across, beam.up, sigma2)
+    _clear_block(state)
 
 
 @compiled
@@ -343,10 +320,9 @@ def score(state: WrongSlope, hypothesis: int) -> float:
 
 @compiled
 def take_slope(state: WrongSlope, t: Seconds, beam: Beam, error: tuple[Radians, Radians], variance: Radians2,
-               gap: Seconds, program: ProgramTrack, walk: float) -> bool:
+               gap: Seconds) -> bool:
     """Take an error (cross-elevation, elevation) of a variance, measured at t with the beam; return True if it ends a
-    block and the slope is wrong. The test begins again after the time `gap` without errors. walk: growth of the
-    variance of the beam's measured direction by errors of the attitude [rad2/s]."""
+    block and the slope is wrong. The test begins again after the time `gap` without errors."""
     T = t - state.stamp
     if T <= 0.0:
         return False
@@ -363,7 +339,5 @@ def take_slope(state: WrongSlope, t: Seconds, beam: Beam, error: tuple[Radians, 
     if state.count < BLOCK_ERROR_COUNT:
         return False
     _take_block(state, t, beam)
-    wrong = _take_program(state, t, beam, program, walk)
-    _clear_block(state)
-    return wrong or (state.n >= MIN_BLOCK_COUNT
-                     and max(score(state, 0), score(state, 1), score(state, 2)) > WRONG_SLOPE_MARGIN)
+    return (state.n >= MIN_BLOCK_COUNT
+            and max(score(state, 0), score(state, 1), score(state, 2)) > WRONG_SLOPE_MARGIN)

@@ -29,7 +29,6 @@ from acu_tracker.geometry.frames import Attitude
 from acu_tracker.geometry.history import Pointing
 from acu_tracker.geometry.vector import ZERO_VECTOR, Rotation, Vector, rotated, rotation
 from acu_tracker.pointing import model
-from acu_tracker.program.program_track import ProgramTrack
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry import line_of_sight as pointing
@@ -106,12 +105,12 @@ def _wrong_level(encoders: history.Encoders, inputs: Inputs) -> int:
 
 @compiled
 def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, outputs: Outputs, at: Pointing,
-               restart_gap: Seconds, closed: bool, follows: bool, program: ProgramTrack) -> int:
+               restart_gap: Seconds, closed: bool, follows: bool) -> int:
     """Filter an error of the receiver and run the monitors. Return a flag if the error is not accepted, else 0.
 
     at: the beam when the error was measured; restart_gap: time without accepted errors after which the filter
     restarts; closed: the loop is closed on the errors (autotrack); follows: the axes follow their commands. While a
-    limit holds the beam off the target, both are False. program: where the target is expected.
+    limit holds the beam off the target, both are False.
     """
     receiver, params = constants.p.tracker.receiver, constants.p.tracker
     measured = pointing.displaced(at.A, at.E, inputs.cross_elevation, inputs.elevation)
@@ -126,7 +125,7 @@ def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, out
     if outcome != OUTCOME_NOISY and follows:
         monitors.take_divergence(tracking.divergence, innovation)
     if closed and known and monitors.shows_slope(inputs, receiver.beamwidth):
-        _watch_slope(tracking, params, inputs, at, deck.mat, program)
+        _watch_slope(tracking, params, inputs, at, deck.mat)
     return _write_innovation(outputs, outcome, innovation)
 
 
@@ -291,16 +290,12 @@ def _follow_with_frame(state: Target, constants: target.Constants) -> None:
 
 @compiled
 def _watch_slope(tracking: 'Tracking', params: TrackerParameters, inputs: Inputs, at: Pointing,
-                 mat_ed: Rotation, program: ProgramTrack) -> None:
+                 mat_ed: Rotation) -> None:
     """Test the slope with an error and its beam; latch the divergence if the slope is wrong."""
     error, beam = (inputs.cross_elevation, inputs.elevation), monitors.slope_beam(mat_ed, at.A, at.E)
     variance = error_variance(inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz, params.receiver)
-    walk = 0.0
-    if tracking.attitude.stabilised:
-        _, (tilt, heading) = attitude.expected_error(tracking.attitude.error, params.attitude)
-        walk = tilt + heading * (beam.u.x * beam.u.x + beam.u.y * beam.u.y)
     if monitors.take_slope(tracking.wrong_slope, inputs.error_stamp - params.receiver.age, beam, error, variance,
-                           params.coast_after, program, walk):
+                           params.coast_after):
         monitors.latch_divergence(tracking.divergence)
 
 

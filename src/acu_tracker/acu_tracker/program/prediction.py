@@ -26,8 +26,7 @@ from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph import topics
 from pedestal_common.graph.steps import NS_PER_SECOND, SECONDS_PER_DAY
 from pedestal_common.parameters import ParameterError, Parameters, flag, group, parameter, text
-from pedestal_common.quantities import Floats, Nanoseconds, Pairs, Seconds, Times, Vectors3
-from pedestal_common.reproducible import arctan2
+from pedestal_common.quantities import Floats, Nanoseconds, Pairs, Seconds, Times
 
 TABLE_ROW_COUNT = 2400  # number of rows of a table
 TABLE_LEAD_TIME_S = 10.0  # time before the present at which a table begins [s]
@@ -196,14 +195,14 @@ class Predictor:
         assert self._satellite is not None      # the caller has elements
         julian, fraction = self._julian(0.0)
         fractions = fraction + times / SECONDS_PER_DAY
-        return _angles(orbit.seen(self._satellite, self.parameters.station, julian, fractions,
+        return orbit.angles(orbit.seen(self._satellite, self.parameters.station, julian, fractions,
                                   self._to_fixed(julian, fractions), self.parameters.light_time))
 
     def _sun_angles(self, times: Times) -> Pairs:
         """Return azimuth and true elevation [rad] of the sun at stamps."""
         julian, fraction = self._julian(0.0)
         fractions = fraction + times / SECONDS_PER_DAY
-        return _angles(bodies.seen('sun', self.parameters.station, julian, fractions,
+        return orbit.angles(bodies.seen('sun', self.parameters.station, julian, fractions,
                                    self._to_fixed(julian, fractions)))
 
     def sun_angles(self, times: Times) -> Pairs:
@@ -237,8 +236,3 @@ class Predictor:
             return math.nan
         i = rises[0]
         return times[i] - RISE_SEARCH_STEP_S * elevation[i] / (elevation[i + 1] - elevation[i])
-
-
-def _angles(enu: Vectors3) -> Pairs:
-    east, north, up = enu.T
-    return np.stack((arctan2(east, north), arctan2(up, np.hypot(east, north))), axis=-1)

@@ -186,12 +186,17 @@ def add_remote(parser: argparse.ArgumentParser, commands: bool = True) -> None:
                         'its reply [s]; default: 5')
 
 
-def remote(options: argparse.Namespace, node: str = 'acu') -> 'RemoteSession':
-    """Return the session of a client node that sends commands to a node, by the options of add_remote."""
+def check_beam(options: argparse.Namespace) -> None:
+    """Raise ValueError if --beam names no beam."""
     from pedestal_common.graph import nodes
-    from pedestal_operator.remote_node import Remote, RemoteSession, user
     if options.beam and options.beam + '/' not in nodes.prefixes(nodes.MAX_BEAMS):
         raise ValueError(f'--beam {options.beam}: must be beam_1 to beam_{nodes.MAX_BEAMS}')
+
+
+def remote(options: argparse.Namespace, node: str = 'acu') -> 'RemoteSession':
+    """Return the session of a client node that sends commands to a node, by the options of add_remote."""
+    from pedestal_operator.remote_node import Remote, RemoteSession, user
+    check_beam(options)
     return RemoteSession(lambda: Remote(f'terminal_{os.getpid()}', options.who or user(), node, options.beam),
                          ros_arguments(options))
 

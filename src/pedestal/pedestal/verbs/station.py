@@ -35,7 +35,7 @@ def _add_station(parser: argparse.ArgumentParser) -> None:
                         f'antenna is parked [s]; default: {DEFAULT_GAP_S:g}')
     parser.add_argument('--park', default='', metavar='POINT', help='stored preset at which the antenna waits '
                         '(parameter acu.points); default: stow')
-    arguments.add_remote(parser)
+    arguments.add_remote(parser, commands=False)
 
 
 _add_station.__doc__ = f"""{inspect.getdoc(_add_station)}
@@ -48,20 +48,21 @@ _add_station.__doc__ = f"""{inspect.getdoc(_add_station)}
 def _station(options: argparse.Namespace) -> int:
     from pedestal_operator.remote_node import RemoteSession
     from pedestal_station.outputs import file
-    from pedestal_station.station import station_node
+    from pedestal_station.station import sequence, station_node
     for name, high in (('lead', MAX_LEAD_S), ('gap', MAX_GAP_S)):
         if not 0.0 <= getattr(options, name) <= high:
             raise ValueError(f'--{name} {getattr(options, name):g}: must be in 0 to {high:g} s')
+    arguments.check_beam(options)
     plan = file.read(options.plan)
     bags = options.bags or options.plan.with_name(f'{options.plan.stem}-bags')
-    given = station_node.Options(bags, options.lead, options.gap, options.park, options.elements)
+    rules = sequence.Rules(options.lead, options.gap, options.park)
     ros_arguments = arguments.ros_arguments(options)
     node = station_node.StationNode
-    with RemoteSession(lambda: node(options.who or station_node.own_name(), options.beam), ros_arguments) as session:
+    with RemoteSession(lambda: node(options.beam), ros_arguments) as session:
         session.wait_for_node(options.timeout)
         assert isinstance(session.remote, node)
-        station = station_node.Station(session, session.remote, plan, given, ros_arguments)
-        return 0 if station.run() else console.EXIT_FAILED_RUN
+        station = station_node.Station(session, session.remote, plan, rules, options.elements)
+        return 0 if station.run(bags, ros_arguments) else console.EXIT_FAILED_RUN
 
 
 VERBS = {'station': Verb(_add_station, _station)}

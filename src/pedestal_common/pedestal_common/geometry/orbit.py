@@ -185,8 +185,13 @@ def seen(satrec: Satellite, station: StationParameters, julian: float, fractions
 
 def elevations(satrec: Satellite, station: StationParameters, julian: float, fraction: float, times: Times) -> Floats:
     """Return the elevations [deg] (n,) of a satellite at a station; arguments as in `enu`."""
-    east, north, up = enu(satrec, station, julian, fraction, times)[0].T
-    return np.degrees(arctan2(up, np.hypot(east, north)))
+    return np.degrees(angles(enu(satrec, station, julian, fraction, times)[0])[:, 1])
+
+
+def angles(positions: Vectors3) -> Pairs:
+    """Return azimuth and elevation [rad] (n, 2) of positions ENU of a station."""
+    east, north, up = positions.T
+    return np.stack((arctan2(east, north), arctan2(up, np.hypot(east, north))), axis=-1)
 
 
 def calendar(julian: float, fraction: float) -> datetime.datetime:
@@ -208,9 +213,9 @@ def instant(name: str, text: str) -> datetime.datetime:
     leap = LEAP_SECOND_PATTERN.sub(r'\g<1>59', text)
     try:
         when = datetime.datetime.fromisoformat(leap.replace('Z', '+00:00')) + datetime.timedelta(seconds=leap != text)
-    except ValueError:
+        return when if when.tzinfo is None else when.astimezone(datetime.timezone.utc).replace(tzinfo=None)
+    except (ValueError, OverflowError):
         raise TargetError(f'{name} = {text!r}: must be UTC as ISO 8601, for example 2019-12-10T06:00:00') from None
-    return when if when.tzinfo is None else when.astimezone(datetime.timezone.utc).replace(tzinfo=None)
 
 
 def iso(julian: float, fraction: float) -> str:

@@ -4,9 +4,8 @@ import math
 import re
 from collections.abc import Iterator
 
-from pedestal_station.night import Night
-from pedestal_station.outputs import rows, words
-from pedestal_station.outputs.rows import Line
+from pedestal_station.night import Line, Night
+from pedestal_station.outputs import words
 
 MAX_LINE_BYTES = 75  # largest length of a line without its end (RFC 5545, 3.1) [bytes]
 UTC_FORM = '%Y%m%dT%H%M%SZ'
@@ -15,7 +14,7 @@ UTC_FORM = '%Y%m%dT%H%M%SZ'
 def text(night: Night) -> str:
     """Return the calendar with an event for each taken pass."""
     content = ['BEGIN:VCALENDAR', 'VERSION:2.0', 'PRODID:-//pedestal//plan//EN', 'CALSCALE:GREGORIAN']
-    for line in rows.lines(night):
+    for line in night.lines:
         if line.share.taken:
             content += _event(night, line)
     return ''.join(f'{folded}\r\n' for each in (*content, 'END:VCALENDAR') for folded in _folded(each))

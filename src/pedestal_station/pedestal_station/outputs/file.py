@@ -3,6 +3,7 @@
 An object with elements (TLE or OMM) is followed in the mode `tle`. An object of an ephemeris has a track instead, and
 is followed in the mode `program`.
 """
+import dataclasses
 import datetime
 import json
 import math
@@ -16,7 +17,7 @@ from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import STATION_NAMES, StationParameters
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
-from pedestal_common.parameters import ParameterError, build
+from pedestal_common.parameters import ParameterError, Parameters, as_dict, build, flag, parameter, text
 from pedestal_common.quantities import Degrees, Floats, Json, Pairs, Seconds
 from pedestal_common.text_files import files
 from pedestal_station.night import Night, Object, Pass, Share
@@ -27,7 +28,7 @@ VERSION_KEY, VERSION = 'pedestal_plan', 1
 ELEMENT_NAMES = 'line_1', 'line_2', 'omm'
 MAX_PLAN_BYTES = 50_000_000  # largest size of a plan file [bytes]
 MAX_PASSES = 5000  # largest number of passes in a plan file
-MAX_CONTACT_S = SECONDS_PER_DAY  # longest contact [s]
+MAX_CONTACT_S = 33 * SECONDS_PER_DAY  # longest contact: the longest night of a plan, with the days beside it [s]
 MAX_NAME_CHARACTERS = 100  # largest length of the name of an object [characters]
 TRACK_ROW_INTERVAL_S, TRACK_MARGIN_S = 1.0, 10.0
 """Interval of the rows of a track, and time that it has before and after the contact [s]."""
@@ -41,20 +42,40 @@ class PlanError(ValueError):
     """Error of a plan file: one line that names the file, the field, the value and the allowed range."""
 
 
-class Contact(NamedTuple):
-    """A pass of a plan file: the time in which the station tracks it, and what the antenna needs for that."""
-    case: str                       # NAME/K
-    name: str                       # of the object
-    number: str                     # catalogue number, '' without one
-    elements: Mapping[str, str]     # {line_1, line_2 or omm: text}, {} for an object with a track
-    track: Track                    # () with elements
-    begin: Seconds                  # UTC
-    end: Seconds                    # UTC
-    point: tuple[Degrees, Degrees]  # encoder angles at the begin
-    max_elevation: Degrees
-    priority: float
-    taken: bool                     # False for a pass that the plan drops
-    reason: str                     # why it is dropped or shortened
+@dataclasses.dataclass(frozen=True)
+class Contact(Parameters):
+    """A pass of a plan file: the time in which the station tracks it, and what the antenna needs for that. The fields
+    of its object of JSON have the same names; there the times are ISO 8601, and the angles of the track degrees."""
+    case: str = text('', 'NAME/K')
+    object: str = text('', 'name of the object')
+    number: str = text('', 'catalogue number, empty without one')
+    elements: Mapping[str, str] = dataclasses.field(default_factory=dict)   # empty for an object with a track
+    track: Track = ()       # empty with elements
+    begin: Seconds = parameter(0.0, 0.0, 1e10, 's', 'begin of the contact, UTC')
+    end: Seconds = parameter(1.0, 0.0, 1e10, 's', 'end of the contact, UTC')
+    azimuth_deg: Degrees = parameter(0.0, -1080.0, 1080.0, 'deg', 'encoder angle at the begin')
+    elevation_deg: Degrees = parameter(0.0, -90.0, 180.0, 'deg', 'encoder angle at the begin')
+    max_elevation_deg: Degrees = parameter(0.0, -90.0, 90.0, 'deg', 'largest elevation')
+    taken: bool = flag(True, 'false for a pass that the plan drops')
+    reason: str = text('', 'reason for which it is dropped or shortened')
+
+    def check(self) -> None:
+        """Check the names, the length of the contact, and the elements."""
+        for name, least in (('case', 1), ('object', 1), ('number', 0)):
+            value = getattr(self, name)
+            if not (value.isprintable() and least <= len(value) <= MAX_NAME_CHARACTERS):
+                raise ParameterError(f'{name} = {value!r:.60}: must be {least} to {MAX_NAME_CHARACTERS} printable '
+                                     'characters')
+        if not self.begin < self.end <= self.begin + MAX_CONTACT_S:
+            raise ParameterError(f'end = {utc_text(self.end)}: must be after begin, at most '
+                                 f'{MAX_CONTACT_S / SECONDS_PER_DAY:g} days')
+        if self.elements:
+            epoch_of(self.elements)
+
+    @property
+    def satellite(self) -> str:
+        """Catalogue number, else the name."""
+        return self.number or self.object
 
 
 class Plan(NamedTuple):
@@ -76,6 +97,8 @@ def utc_text(utc: Seconds) -> str:
 
 def orbit_of(elements: Mapping[str, str], station: StationParameters | None = None) -> Elements:
     """Return the orbit of elements, whose times are UTC [s]. Raises TargetError."""
+    if set(elements) not in ({'line_1', 'line_2'}, {'omm'}):
+        raise TargetError(f'elements = {", ".join(elements) or "none"}: must be line_1 and line_2, or omm')
     line_1, line_2, omm = (elements.get(name, '') for name in ELEMENT_NAMES)
     values = LeoPassParameters(line_1=line_1, line_2=line_2, omm=omm)
     return Elements(values, orbit.satellite(values), Query(station or StationParameters(), EPOCH, 0.0, 0.0))
@@ -103,29 +126,23 @@ def _angles(enu: Floats) -> Pairs:
 
 
 def write(path: pathlib.Path, night: Night) -> None:
-    """Write the plan file of a Night. Raises OSError, TargetError."""
-    path.write_text(text(night), encoding='utf-8')
-
-
-def text(night: Night) -> str:
-    """Return the content of the plan file of a Night: all its passes, also those that its exact plan drops. Raises
-    TargetError."""
+    """Write the plan file of a Night: all its passes, also those that its exact plan drops. Raises OSError,
+    TargetError, PlanError for more passes than `read` accepts."""
+    if len(night.passes) > MAX_PASSES:
+        raise PlanError(f'{path}: {len(night.passes)} passes, must be at most {MAX_PASSES}')
     contacts = [_planned(each, share, night) for each, share in zip(night.passes, night.exact.shares)]
-    return json.dumps({VERSION_KEY: VERSION, 'begin': utc_text(seconds(night.begin)), 'duration_s': night.duration,
-                       'station': {name: getattr(night.station, name) for name in STATION_NAMES},
-                       'horizon_deg': night.horizon, 'scenario': night.scenario,
-                       'passes': [row(contact) for contact in contacts]}, indent=1) + '\n'
+    content = {VERSION_KEY: VERSION, 'begin': utc_text(seconds(night.begin)), 'duration_s': night.duration,
+               'station': {name: getattr(night.station, name) for name in STATION_NAMES},
+               'horizon_deg': night.horizon, 'scenario': night.scenario, 'passes': list(map(row, contacts))}
+    path.write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
 
 
 def row(contact: Contact) -> dict[str, Json]:
     """Return the object of JSON of a contact."""
-    track = [[utc, math.degrees(azimuth), math.degrees(elevation)] for utc, azimuth, elevation in contact.track]
-    return {'case': contact.case, 'object': contact.name, 'number': contact.number,
-            **({'elements': dict(contact.elements)} if contact.elements else {'track': np.round(track, 6).tolist()}),
-            'begin': utc_text(contact.begin), 'end': utc_text(contact.end),
-            'azimuth_deg': contact.point[0], 'elevation_deg': contact.point[1],
-            'max_elevation_deg': contact.max_elevation, 'priority': contact.priority, 'taken': contact.taken,
-            'reason': contact.reason}
+    track = [[utc, round(math.degrees(azimuth), 6), round(math.degrees(elevation), 6)]
+             for utc, azimuth, elevation in contact.track]
+    return {**as_dict(contact), 'elements': dict(contact.elements), 'track': track,
+            'begin': utc_text(contact.begin), 'end': utc_text(contact.end)}
 
 
 def _planned(each: Pass, share: Share, night: Night) -> Contact:
@@ -139,8 +156,8 @@ def _planned(each: Pass, share: Share, night: Night) -> Contact:
     elements, track = _prediction(each.object, night, begin, end)
     utc = seconds(night.begin)
     return Contact(each.case, each.object.name, each.object.number, elements, track, utc + begin, utc + end,
-                   (math.degrees(azimuth), math.degrees(angles[-1, 1])), math.degrees(each.window.max_elevation),
-                   each.object.priority, share.taken, reason)
+                   math.degrees(azimuth), math.degrees(angles[-1, 1]), math.degrees(each.window.max_elevation),
+                   share.taken, reason)
 
 
 def _prediction(planned: Object, night: Night, begin: Seconds, end: Seconds) -> tuple[dict[str, str], Track]:
@@ -157,108 +174,65 @@ def _prediction(planned: Object, night: Night, begin: Seconds, end: Seconds) -> 
 def read(path: pathlib.Path) -> Plan:
     """Return the content of a plan file. Raises PlanError, which names file, field, value and range."""
     try:
-        content = json.loads(files.read_text(path, MAX_PLAN_BYTES))
+        found = json.loads(files.read_text(path, MAX_PLAN_BYTES))
     except OSError as error:
         raise PlanError(f'{path}: {error.strerror}') from None
     except (ValueError, RecursionError) as error:
         raise PlanError(f'{path}: must be a plan of `pedestal plan --output`, JSON: {error!s:.100}') from None
-    file = _Fields(str(path), '', content)
-    if file.get(VERSION_KEY, int) != VERSION:
-        raise file.error(VERSION_KEY, f'must be {VERSION}, the version of plans that this program reads')
-    rows = file.get('passes', list)
-    if not 1 <= len(rows) <= MAX_PASSES:
-        raise PlanError(f'{path}: passes: {len(rows)} passes, must be 1 to {MAX_PASSES}')
-    contacts = [contact(str(path), f'passes[{i}].', found) for i, found in enumerate(rows)]
-    cases = [each.case for each in contacts]
-    for i, case in enumerate(cases):
-        if case in cases[:i]:
-            raise PlanError(f'{path}: passes[{i}].case = {case!r}: must be unique')
-    place = _Fields(str(path), 'station.', file.get('station', dict))
-    given = {f'station.{name}': place.number(name, -1e5, 1e5) for name in STATION_NAMES}
     try:
-        station = build(StationParameters, given, 'station.')
+        if _typed('content', found, dict).get(VERSION_KEY) != VERSION:
+            raise ParameterError(f'{VERSION_KEY} = {found.get(VERSION_KEY)!r:.60}: must be {VERSION}, the version of '
+                                 'plans that this program reads')
+        rows = _typed('passes', found.get('passes'), list)
+        if not 1 <= len(rows) <= MAX_PASSES:
+            raise ParameterError(f'passes: {len(rows)} passes, must be 1 to {MAX_PASSES}')
+        place = _typed('station', found.get('station'), dict)
+        station = build(StationParameters, {f'station.{name}': place.get(name) for name in STATION_NAMES}, 'station.')
     except ParameterError as error:
         raise PlanError(f'{path}: {error}') from None
+    contacts = [contact(path, f'passes[{i}]', each) for i, each in enumerate(rows)]
+    cases: set[str] = set()
+    for i, each in enumerate(contacts):
+        if each.case in cases:
+            raise PlanError(f'{path}: passes[{i}].case = {each.case!r}: must be unique')
+        cases.add(each.case)
     return Plan(path, station, tuple(sorted(contacts, key=lambda each: each.begin)))
 
 
-class _Fields:
-    """Object of the file, whose fields are read with a check."""
-
-    def __init__(self, path: str, place: str, content: Json) -> None:
-        if not isinstance(content, dict):
-            raise PlanError(f'{path}: {place.rstrip(".") or "content"} = {content!r:.40}: must be an object of JSON')
-        self.path, self.place, self._content = path, place, content
-
-    def error(self, name: str, must: str) -> PlanError:
-        """Return the error of a field."""
-        found = f' = {self._content[name]!r:.60}' if name in self._content else ' is missing'
-        return PlanError(f'{self.path}: {self.place}{name}{found}: {must}')
-
-    def get(self, name: str, kind: type, default: Json = None) -> Json:
-        """Return a field of a type of JSON. Raises PlanError."""
-        value = self._content.get(name, default)
-        if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
-            raise self.error(name, f'must be {_KIND_NAMES[kind]}')
-        return value
-
-    def number(self, name: str, low: float, high: float) -> float:
-        """Return a number in a range. Raises PlanError."""
-        value = self._content.get(name)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-            raise self.error(name, f'must be {low:g} to {high:g}')
-        return float(value)
-
-    def name(self, name: str, default: str | None = None) -> str:
-        """Return a short printable text. Raises PlanError."""
-        value: str = self.get(name, str, default)
-        if not (value.isprintable() and len(value) <= MAX_NAME_CHARACTERS and (value or default is not None)):
-            raise self.error(name, f'must be 1 to {MAX_NAME_CHARACTERS} printable characters')
-        return value
-
-    def utc(self, name: str) -> Seconds:
-        """Return a UTC. Raises PlanError."""
-        try:
-            return seconds(orbit.instant(name, self.get(name, str)))
-        except (TargetError, OverflowError):
-            raise self.error(name, 'must be UTC as ISO 8601, for example 2019-12-10T06:00:00') from None
+_KIND_NAMES: dict[type, str] = {str: 'text', list: 'a list', dict: 'an object of JSON'}
 
 
-_KIND_NAMES = {str: 'a text', int: 'a whole number', list: 'a list', dict: 'an object of JSON', bool: 'true or false'}
+def _typed(name: str, value: Json, kind: type) -> Json:
+    """Return a value of a type of JSON. Raises ParameterError."""
+    if not isinstance(value, kind):
+        raise ParameterError(f'{name} = {value!r:.60}: must be {_KIND_NAMES[kind]}')
+    return value
 
 
-def contact(path: str, place: str, content: Json) -> Contact:
+def contact(path: pathlib.Path, place: str, given: Json) -> Contact:
     """Return the contact of an object of JSON, see `row`. path, place: its file and its place there, for the error.
     Raises PlanError."""
-    fields = _Fields(path, place, content)
-    begin, end = fields.utc('begin'), fields.utc('end')
-    if not begin < end <= begin + MAX_CONTACT_S:
-        raise fields.error('end', f'must be after begin, at most {MAX_CONTACT_S:g} s')
-    found = fields.get('elements', dict, {})
-    track = _track(fields, begin, end) if not found else ()
+    if not isinstance(given, dict):
+        raise PlanError(f'{path}: {place} = {given!r:.40}: must be an object of JSON')
     try:
-        elements = {str(name): str(value) for name, value in found.items()}
-        if elements:
-            if set(elements) - set(ELEMENT_NAMES):
-                raise TargetError(f'{", ".join(elements)}: must be line_1 and line_2, or omm')
-            epoch_of(elements)
-    except TargetError as error:
-        raise fields.error('elements', str(error)) from None
-    return Contact(fields.name('case'), fields.name('object'), fields.name('number', ''), elements, track, begin, end,
-                   (fields.number('azimuth_deg', -1080.0, 1080.0), fields.number('elevation_deg', -90.0, 180.0)),
-                   fields.number('max_elevation_deg', -90.0, 90.0), fields.number('priority', 0.0, 1e6),
-                   fields.get('taken', bool), fields.get('reason', str, ''))
+        begin, end = (seconds(orbit.instant(name, _typed(name, given.get(name), str))) for name in ('begin', 'end'))
+        elements = _typed('elements', given.get('elements', {}), dict)
+        track = () if elements else _track(given.get('track'), begin, end)
+        return Contact(**{**{field.name: given.get(field.name) for field in dataclasses.fields(Contact)},
+                          'begin': begin, 'end': end, 'elements': elements, 'track': track})
+    except (ParameterError, TargetError) as error:
+        raise PlanError(f'{path}: {place}.{error}') from None
 
 
-def _track(fields: _Fields, begin: Seconds, end: Seconds) -> Track:
-    given = fields.get('track', list, [])
+def _track(given: Json, begin: Seconds, end: Seconds) -> Track:
+    """Return the rows of a track. Raises ParameterError."""
     try:
         rows = np.array(given, float).reshape(-1, 3)
         valid = len(rows) > 1 and np.isfinite(rows).all() and (np.diff(rows[:, 0]) > 0.0).all()
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         valid = False
     if not (valid and rows[0, 0] <= begin and rows[-1, 0] >= end):
-        raise fields.error('track', 'must be two or more rows [UTC s, azimuth deg, elevation deg] in the order of '
-                           'time, from the begin to the end, if there are no elements')
+        raise ParameterError(f'track = {given!r:.60}: must be two or more rows [UTC s, azimuth deg, elevation deg] in '
+                             'the order of time, from the begin to the end, if there are no elements')
     rows[:, 1:] = np.radians(rows[:, 1:])
     return tuple(map(tuple, rows.tolist()))

@@ -6,13 +6,12 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from pedestal_common.graph.steps import SECONDS_PER_DAY
-from pedestal_common.quantities import Degrees, Seconds
-from pedestal_common.text_files.text_table import Cell, Column, TextTable
+from pedestal_common.quantities import Degrees, Seconds, Times
+from pedestal_common.text_files.text_table import TextTable
 from pedestal_results.report import elements
+from pedestal_station import windows
 from pedestal_station.night import Night, Pass, Share
-from pedestal_station.outputs import rows, words
-from pedestal_station.outputs.rows import Line
+from pedestal_station.outputs import words
 
 CSS = """
 .chart text { fill: var(--soft); font: 11px system-ui, sans-serif; } .chart .name { fill: var(--ink); }
@@ -22,8 +21,7 @@ CSS = """
 .chart polyline { fill: none; stroke-width: 1.5; }
 .chart polyline.pass { stroke-dasharray: 3 2; } .chart polyline.taken { fill: none; stroke: #1f6fd1; stroke-width: 3; }
 .chart polyline.lost { fill: none; stroke: #e57a00; stroke-width: 3; }
-table.plan { font-size: .8rem; } .plan th, .plan td { padding-right: .6rem; }
-.plan td { white-space: nowrap; } .plan :is(td:nth-child(4), td:nth-child(9)) { white-space: normal; min-width: 8rem; }
+table.plan { font-size: .8rem; } .plan th, .plan td { padding-right: .6rem; } .plan td { white-space: nowrap; }
 @media print { table.plan { font-size: .6rem; } }
 .sky { display: grid; grid-template-columns: repeat(auto-fill, minmax(13rem, 1fr)); gap: 1rem; }
 .sky figure { margin: 0; } .sky figure svg { min-width: 0; }
@@ -36,45 +34,30 @@ MAX_TICKS = 13  # largest number of marks of the time
 RADIUS = 100.0  # of the horizon in a sky plot [px]
 POINT_PERIOD_S, MIN_POINTS, MAX_POINTS = 10.0, 24, 120
 """Time between two points of a path, and the numbers of points that it has."""
-HEADS: tuple[Column, ...] = ('pass', 'rise', 'set', 'plan', 'greedy plan', 'highest [deg]', 'azimuth [deg]',
-                             'rate [deg/s]', 'loss', 'C/N0 [dB-Hz]', 'age [d]')
 
 
 def text(night: Night, command: str) -> str:
     """Return the page; command: command line that makes it."""
-    title = f'Plan of {night.duration / 3600.0:g} h from {night.begin:%Y-%m-%d %H:%M:%S} UTC'
-    about = [['made by', command], ['station', words.place(night)], ['antenna', night.scenario],
-             ['horizon', 'mask of the antenna' if night.horizon is None else f'{night.horizon:g} deg']]
-    lines = list(rows.lines(night))
+    title = f'Plan from {night.begin:%Y-%m-%d %H:%M:%S} UTC'
     parts = [f'<h1>{html.escape(title)}</h1>', f'<p class="verdict">{html.escape(words.verdict(night))}.</p>',
              *(f'<p class="bad">{html.escape(warning)}.</p>' for warning in words.warnings(night)),
              *(f'<p class="soft">{html.escape(remark)}.</p>' for remark in words.remarks(night)),
-             TextTable(('', ''), about).html('meta'), '<h2 id="night">Night</h2>',
+             TextTable(('', ''), [['night', words.title(night)], ['made by', command]]).html('meta'),
+             '<h2 id="night">Night</h2>',
              '<p class="soft">Frame: a pass. Blue: the part that the plan takes. Orange: a time of loss. All times '
              f'are UTC.</p><div class="wide">{_gantt(night)}</div>',
-             '<h2 id="passes">Passes</h2>', TextTable(HEADS, (_cells(night, line) for line in lines)).html('plan'),
+             '<h2 id="passes">Passes</h2>', TextTable(words.COLUMNS, words.cells(night)).html('plan'),
+             '<p class="soft">Highest elevation [deg], largest rate of the azimuth, expected loss [s], largest C/N0 '
+             '[dB-Hz], age of the elements [days].</p>',
              '<h2 id="sky">Sky</h2>',
              '<p class="soft">North is up, east is right, the zenith is in the middle. A dot is the culmination.</p>',
              '<div class="sky">',
-             *(f'<figure>{_sky(night, line.each, line.share)}<figcaption>{html.escape(line.each.case)}: '
-               f'{html.escape(words.decision(night, line.share))}</figcaption></figure>' for line in lines), '</div>']
+             *(f'<figure>{_sky(night, each, share)}<figcaption>{html.escape(_caption(night, each, share))}'
+               '</figcaption></figure>' for each, share, _ in night.lines), '</div>']
     if night.refusals:
         parts += ['<h2 id="refused">Refused</h2>', TextTable(('file', 'line', 'object', 'reason'), [
             [str(each.path), str(each.line), each.name, each.reason] for each in night.refusals]).html()]
     return elements.page(title, parts, CSS)
-
-
-def _cells(night: Night, line: Line) -> list[Cell]:
-    """Return the row of a pass; --csv and --json have all its numbers."""
-    each, prediction = line.each, line.each.prediction
-    first, last = (f'{math.degrees(azimuth):.0f}' for azimuth in prediction.azimuth)
-    most = prediction.cn0[1]
-    return [each.case, f'{words.utc(night, each.window.rise):%d %b %H:%M:%S}',
-            f'{words.utc(night, each.window.set):%H:%M:%S}', words.decision(night, line.share),
-            words.state(line.greedy), f'{math.degrees(each.window.max_elevation):.1f}',
-            f'{first} to {last}', f'{math.degrees(prediction.peak_rate[0]):.2f}',
-            words.losses(prediction),
-            '' if math.isnan(most) else f'{most:.1f}', f'{prediction.age / SECONDS_PER_DAY:.1f}']
 
 
 def _gantt(night: Night) -> str:
@@ -100,6 +83,10 @@ def _gantt(night: Night) -> str:
         parts += [bar('lost', row, loss.begin, loss.end, 7.0) for loss in each.prediction.losses]
         parts.append(bar('pass', row, each.window.rise, each.window.set, 2.0, _title(night, each, share)))
     return _svg((0, 0, WIDTH, height), f'Gantt chart of {len(night.passes)} passes', parts)
+
+
+def _caption(night: Night, each: Pass, share: Share) -> str:
+    return '; '.join(filter(None, (f'{each.case}: {words.decision(night, share)}', words.losses(each.prediction))))
 
 
 def _title(night: Night, each: Pass, share: Share) -> str:
@@ -130,23 +117,22 @@ def _sky(night: Night, each: Pass, share: Share) -> str:
     if share.taken:
         parts.append(_path('taken', each, share.begin, share.end))
     parts += [_path('lost', each, loss.begin, loss.end) for loss in each.prediction.losses]
-    [highest] = _angles(each, [each.window.culmination])
+    ends = each.window.rise, each.window.set
+    (rise, _), (set_, _), highest = _angles(each, [*ends, each.window.culmination])
     parts.append('<circle class="top" r="3" cx="{:.1f}" cy="{:.1f}"/>'.format(*_place(*highest)))
-    for t in (each.window.rise, each.window.set):
-        [[azimuth, _]] = _angles(each, [t])
-        parts.append(_text(*_place(azimuth, -14.0, 4.0), f'{words.utc(night, t):%H:%M}', anchor='middle'))
+    parts += [_text(*_place(azimuth, -14.0, 4.0), f'{words.utc(night, t):%H:%M}', anchor='middle')
+              for azimuth, t in zip((rise, set_), ends)]
     return _svg((-135, -125, 270, 250), f'Sky plot of {_title(night, each, share)}', parts)
 
 
-def _angles(each: Pass, times: Sequence[Seconds]) -> list[tuple[Degrees, Degrees]]:
-    east, north, up = each.object.orbit.enu(np.array(times)).T
-    azimuth, elevation = np.arctan2(east, north), np.arctan2(up, np.hypot(east, north))
-    return list(zip(np.degrees(azimuth).tolist(), np.degrees(elevation).tolist()))
+def _angles(each: Pass, times: Sequence[Seconds] | Times) -> list[list[Degrees]]:
+    angles: list[list[Degrees]] = np.degrees(windows.angles(each.object.orbit, np.array(times))).tolist()
+    return angles
 
 
 def _path(kind: str, each: Pass, begin: Seconds, end: Seconds) -> str:
     count = min(max(int((end - begin) / POINT_PERIOD_S), MIN_POINTS), MAX_POINTS)
-    places = (_place(*angles) for angles in _angles(each, np.linspace(begin, end, count).tolist()))
+    places = (_place(*angles) for angles in _angles(each, np.linspace(begin, end, count)))
     points = ' '.join(f'{x:.1f},{y:.1f}' for x, y in places if math.isfinite(x))    # an ephemeris may have gaps
     return f'<polyline class="{kind}" points="{points}"/>'
 

@@ -2,23 +2,16 @@
 import csv
 import io
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import NamedTuple
 
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Json, SingleRow
-from pedestal_station.night import Night, Pass, Share
+from pedestal_station.night import Line, Night
 from pedestal_station.outputs import words
 
 LOSS_REASONS = 'keyhole', 'blockage', 'sun', 'travel', 'limit of the elevation', 'rate of the elevation'
 NUMBER_DIGITS = 6  # digits after the point of a number in a file
-
-
-class Line(NamedTuple):
-    """A pass with what the exact and the greedy plan do with it."""
-    each: Pass
-    share: Share
-    greedy: Share
 
 
 class Metric(NamedTuple):
@@ -29,7 +22,7 @@ class Metric(NamedTuple):
 
 
 def _seconds(reason: str) -> Callable[[Line], float]:
-    return lambda line: sum(loss.seconds for loss in line.each.prediction.losses if loss.reason == reason)
+    return lambda line: math.fsum(loss.seconds for loss in line.each.prediction.losses if loss.reason == reason)
 
 
 def _degrees(name: str, axis: int) -> Callable[[Line], float]:
@@ -67,21 +60,15 @@ METRICS = (
     Metric('max_cn0_dbhz', 'dB-Hz', lambda line: line.each.prediction.cn0[1]))
 
 
-def lines(night: Night) -> Iterator[Line]:
-    """Yield the passes with their shares, in the order of rise."""
-    for each, share, greedy in zip(night.passes, night.exact.shares, night.greedy.shares, strict=True):
-        yield Line(each, share, greedy)
-
-
 def number(value: float) -> float | None:
     """Return a number of a file: rounded, None for NaN."""
-    return round(float(value), NUMBER_DIGITS) if math.isfinite(value) else None
+    return round(value, NUMBER_DIGITS) if math.isfinite(value) else None
 
 
 def json_content(night: Night) -> dict[str, Json]:
     """Return the content of --json."""
     found = [SingleRow(case=line.each.case, metric=metric.name, value=number(metric.value(line)), unit=metric.unit,
-                       paper=None, target=None) for line in lines(night) for metric in METRICS]
+                       paper=None, target=None) for line in night.lines for metric in METRICS]
     plan = {name: number(getattr(night.exact, name)) for name in ('value', 'bound')}
     return {'name': 'plan', 'rows': found,
             'plan': {**plan, 'optimal': night.exact.optimal, 'greedy_value': number(night.greedy.value)},
@@ -95,11 +82,9 @@ def csv_text(night: Night) -> str:
     writer = csv.writer(stream, lineterminator='\n')
     writer.writerow(['case', 'catalogue_number', 'rise_utc', 'set_utc', 'plan', 'lost_to', 'losses',
                      *(metric.name for metric in METRICS)])
-    for line in lines(night):
-        numbers = (number(metric.value(line)) for metric in METRICS)
+    for line in night.lines:
         writer.writerow([line.each.case, line.each.object.number, words.iso(night, line.each.window.rise),
                          words.iso(night, line.each.window.set), words.state(line.share),
                          '; '.join(line.share.lost_to), words.losses(line.each.prediction),
-                         *('' if value is None else f'{value:g}' if value % 1.0 == 0.0 else repr(value)
-                           for value in numbers)])
+                         *(number(metric.value(line)) for metric in METRICS)])
     return stream.getvalue()

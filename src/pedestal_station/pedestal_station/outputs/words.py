@@ -41,19 +41,24 @@ def state(share: Share) -> str:
     return DROPPED if not share.taken else TRIMMED if share.reason else WHOLE
 
 
+def part(night: Night, share: Share) -> str:
+    """Return the part of a pass that a plan takes: a word, or the times of a trimmed pass."""
+    text = state(share)
+    return f'{utc(night, share.begin):%H:%M:%S}-{utc(night, share.end):%H:%M:%S}' if text == TRIMMED else text
+
+
 def decision(night: Night, share: Share) -> str:
     """Return what a plan does with a pass, and the passes to which its time is lost."""
-    text = state(share)
-    if text == TRIMMED:
-        text = f'{utc(night, share.begin):%H:%M:%S} to {utc(night, share.end):%H:%M:%S}'
-    because = ', '.join(share.lost_to) or share.reason
-    return f'{text}: {because}' if because else text
+    return ': '.join(filter(None, (part(night, share), ', '.join(share.lost_to) or share.reason)))
 
 
 def losses(prediction: Prediction) -> str:
-    """Return the losses of a pass with their reasons; '' without a loss."""
-    return '; '.join(f'{loss.reason} {loss.seconds:.1f} s' + (f' ({loss.detail})' if loss.detail else '')
-                     for loss in prediction.losses)
+    """Return the losses of a pass, added up by reason; '' without a loss."""
+    seconds: dict[str, Seconds] = {}
+    for loss in prediction.losses:
+        seconds[loss.reason] = seconds.get(loss.reason, 0.0) + loss.seconds
+    details = {loss.reason: f' ({loss.detail})' for loss in prediction.losses if loss.detail}
+    return '; '.join(f'{reason} {lost:.1f} s{details.get(reason, "")}' for reason, lost in seconds.items())
 
 
 def verdict(night: Night) -> str:
@@ -64,14 +69,10 @@ def verdict(night: Night) -> str:
     shares = ', '.join(f'{count} {name}' for name, count in counts.items())
     proof = 'which is the optimum' if night.exact.optimal else (
         f'not proven to be the optimum, which is at most {night.exact.bound:.0f} s')
-    objects = len({each.object.name for each in night.passes})
-    return (f'{_count(len(night.passes), "pass", "passes")} of {_count(objects, "object", "objects")}: {shares}. '
+    passes, objects = len(night.passes), len({each.object.name for each in night.passes})
+    return (f'{passes} pass{"es" * (passes > 1)} of {objects} object{"s" * (objects > 1)}: {shares}. '
             f'Weighted contact time {night.exact.value:.0f} s, {proof}; the greedy plan has '
             f'{night.greedy.value:.0f} s')
-
-
-def _count(count: int, one: str, many: str) -> str:
-    return f'{count} {one if count == 1 else many}'
 
 
 def warnings(night: Night) -> list[str]:
@@ -94,21 +95,14 @@ def cells(night: Night) -> list[list[Cell]]:
     times = [t for each in night.passes for t in (each.window.rise, each.window.set)]
     day = '%d ' if max(times, default=0.0) - min(times, default=0.0) > SECONDS_PER_DAY else ''
     found: list[list[Cell]] = []
-    for each, share, greedy in zip(night.passes, night.exact.shares, night.greedy.shares, strict=True):
+    for each, share, greedy in night.lines:
         window, prediction = each.window, each.prediction
         cn0 = prediction.cn0[1]
         found.append([each.case, f'{utc(night, window.rise):{day}%H:%M:%S}',
                       f'{utc(night, window.set):{day}%H:%M:%S}', math.degrees(window.max_elevation),
                       math.degrees(prediction.peak_rate[0]), prediction.loss, '' if math.isnan(cn0) else cn0,
-                      prediction.age / SECONDS_PER_DAY, state(greedy), _part(night, share), _cause(share)])
+                      prediction.age / SECONDS_PER_DAY, state(greedy), part(night, share), _cause(share)])
     return found
-
-
-def _part(night: Night, share: Share) -> str:
-    """Return the part of a pass that the plan takes."""
-    if state(share) != TRIMMED:
-        return state(share)
-    return f'{utc(night, share.begin):%H:%M:%S}-{utc(night, share.end):%H:%M:%S}'
 
 
 def _cause(share: Share) -> str:

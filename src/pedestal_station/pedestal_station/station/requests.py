@@ -1,23 +1,12 @@
 """Commands of an operator to the station on `station/command`: their table, and what each of them requests."""
-import math
 from typing import NamedTuple
 
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import StationParameters
-from pedestal_common.quantities import Degrees, Seconds
+from pedestal_common.quantities import Days, Degrees, Seconds
 from pedestal_common.wire import commands
 from pedestal_common.wire.commands import Argument, Command, CommandDefinition
-from pedestal_station.outputs.file import (
-    ELEMENT_NAMES,
-    MAX_CONTACT_S,
-    MAX_NAME_CHARACTERS,
-    Contact,
-    direction,
-    orbit_of,
-    seconds,
-)
-
-INSERTED_PRIORITY = 1.0  # weight of a second of contact of an inserted pass
+from pedestal_station.outputs.file import ELEMENT_NAMES, Contact, direction, orbit_of, seconds
 
 _CASE = Argument('case', 'name of the pass in the plan, NAME/K', default='')
 
@@ -37,9 +26,10 @@ STATION_COMMANDS = (
 
 
 class Antenna(NamedTuple):
-    """What the requests need of the antenna."""
+    """What the station needs of the parameters of the control unit."""
     station: StationParameters
     azimuth: tuple[Degrees, Degrees]    # lowest and highest encoder angle
+    oldest: Days                        # largest age of elements
 
 
 class Request(NamedTuple):
@@ -66,20 +56,14 @@ def _contact(found: dict[str, str], antenna: Antenna) -> Contact:
     """Return the contact of the arguments of `insert`. Raises ValueError."""
     elements = {name: found[name].replace('_', ' ') if name != 'omm' else found[name]
                 for name in ELEMENT_NAMES if found[name]}
-    if set(elements) not in ({'line_1', 'line_2'}, {'omm'}):
-        raise ValueError(f'insert: elements = {", ".join(elements) or "none"}: must be line_1 and line_2, or omm')
-    times: list[Seconds] = [seconds(orbit.instant(name, found[name])) for name in ('begin', 'end')]
-    begin, end = times
-    if not begin < end <= begin + MAX_CONTACT_S:
-        raise ValueError(f'insert: end = {found["end"]}: must be after begin, at most {MAX_CONTACT_S:g} s')
     number = orbit_of(elements).satellite.number
     name = found['name'] or number
-    if len(name) > MAX_NAME_CHARACTERS:
-        raise ValueError(f'insert: name = {name:.20}...: must be at most {MAX_NAME_CHARACTERS} characters')
+    times: list[Seconds] = [seconds(orbit.instant(name, found[name])) for name in ('begin', 'end')]
+    begin, end = times
     points = [direction(elements, antenna.station, utc) for utc in (begin, 0.5 * (begin + end), end)]
-    highest = max(elevation for _, elevation in points)
-    if math.isnan(highest) or highest <= 0.0:
+    (azimuth, elevation), highest = points[0], max(elevation for _, elevation in points)
+    azimuth += 360.0 * round((0.5 * sum(antenna.azimuth) - azimuth) / 360.0)
+    contact = Contact(name, name, number, elements, (), begin, end, azimuth, elevation, highest)
+    if highest <= 0.0:
         raise ValueError(f'insert: {name} is below the horizon from {found["begin"]} to {found["end"]}')
-    middle = 0.5 * sum(antenna.azimuth)
-    point = points[0][0] + 360.0 * round((middle - points[0][0]) / 360.0), points[0][1]
-    return Contact(name, name, number, elements, (), begin, end, point, highest, INSERTED_PRIORITY, True, '')
+    return contact

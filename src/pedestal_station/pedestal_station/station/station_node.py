@@ -6,7 +6,6 @@ import pathlib
 import socket
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 from rclpy.parameter import parameter_value_to_python
 
@@ -18,21 +17,24 @@ from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.quantities import Message, Seconds, Value
 from pedestal_common.wire import commands, messages
 from pedestal_common.wire.commands import Command, Reply
-from pedestal_operator.remote_node import REPLY_TIMEOUT_S, RETRY_PERIOD_S, Query, Remote, RemoteSession
+from pedestal_operator.remote_node import REPLY_TIMEOUT_S, Remote, RemoteSession
 from pedestal_station.outputs.file import ELEMENT_NAMES, Contact, Plan, PlanError, seconds, utc_text
-from pedestal_station.station import progress, requests, sequence
+from pedestal_station.station import progress
 from pedestal_station.station.fresh import Watch
-from pedestal_station.station.recordings import Recordings
-from pedestal_station.station.sequence import Aim, Inputs, Rules
+from pedestal_station.station.recordings import PROOF_TIMEOUT_S, Recordings
+from pedestal_station.station.requests import Antenna
+from pedestal_station.station.sequence import Aim, Fresh, Inputs, PassSequence, Rules, Step, clock
 
 TICK_S = 0.2  # time between two steps of the sequence [s]
-MAX_KEPT_REPLIES = 100  # largest number of replies that are repeated
+MAX_KEPT_COMMANDS = 100  # largest number of commands without a reply, and of replies that are repeated
 MAX_PLACE_DIFFERENCE_DEG = 0.01  # between the positions of the plan and of the control unit [deg]
-PROOF_TIMEOUT_S = 300.0  # longest wait for the reports at the end [s]
+COMMAND_TIMEOUT_S = 2.5  # longest wait for the reply of the control unit; other commands wait meanwhile [s]
+SAVE_PERIOD_S = 10.0  # longest time between two writes of the progress [s]
 ON_TARGET_MODES = 'autotrack', 'steptrack'  # modes in which the receiver measures the target
 ON_TRACK_WORDS = 'tle, on track', 'program, on track'  # progress on the target of an antenna without handover
 PROGRAM_TOPIC, COMMAND_TOPIC, REPLY_TOPIC = 'acu/program_track', 'station/command', 'station/command_result'
 NIGHT_TOPIC, LOG_TOPIC = 'station/night', 'station/log'
+TO_COME = 'queued', 'running'  # states of a pass that the station will take
 DRIVE_STATE_TOPIC, EMERGENCY_STOP = 'adu/state', 'emergency stop'  # topic, and its text after an emergency stop
 
 CONTROL_UNIT_PARAMETERS = ('graph.start', 'graph.beams', 'prediction.start_time', 'prediction.oldest',
@@ -40,27 +42,13 @@ CONTROL_UNIT_PARAMETERS = ('graph.start', 'graph.beams', 'prediction.start_time'
                            'azimuth.limits.high', *(f'prediction.station.{name}' for name in STATION_NAMES))
 
 
-class Options(NamedTuple):
-    """Options of the station."""
-    bags: pathlib.Path          # folder of the recordings
-    lead: Seconds               # see Rules
-    gap: Seconds                # see Rules
-    park: str                   # see Rules
-    elements: pathlib.Path | None       # watched folder
-
-
-def own_name() -> str:
-    """Return the name of the station as a client, which no operator has."""
-    return f'station@{socket.gethostname()}'
-
-
 class StationNode(Remote):
     """Client of the control unit that also takes commands of operators and publishes the night."""
     holder: str             # client that has control of the antenna, '' for none
     interference: str       # mode of another client without control, or an emergency stop, since the last step
 
-    def __init__(self, who: str, beam: str = '') -> None:
-        super().__init__('station', who, 'acu', beam)
+    def __init__(self, beam: str = '') -> None:
+        super().__init__('station', f'station@{socket.gethostname()}', 'acu', beam)     # a name that no operator has
         self.holder = self.interference = ''
         self.received: list[Command] = []
         self.refused: list[str] = []
@@ -73,19 +61,20 @@ class StationNode(Remote):
         try:
             command = commands.of_message(status)
         except ValueError as error:
-            self.refused.append(f'{COMMAND_TOPIC} refused: {error}')
+            if len(self.refused) < MAX_KEPT_COMMANDS:
+                self.refused.append(f'{COMMAND_TOPIC} refused: {error}')
             return
         answer = self._answers.get((command.who, command.number)) if command.number else None
         if answer is not None:
             self._write[REPLY_TOPIC](messages.serialize(answer))
-        elif command not in self.received:
+        elif command not in self.received and len(self.received) < MAX_KEPT_COMMANDS:
             self.received.append(command)
 
     def answer(self, command: Command, reply: Reply) -> None:
         """Publish the reply to a command."""
         message = commands.reply_message(command, reply)
         self._answers[command.who, command.number] = message
-        while len(self._answers) > MAX_KEPT_REPLIES:
+        while len(self._answers) > MAX_KEPT_COMMANDS:
             self._answers.popitem(last=False)
         self._write[REPLY_TOPIC](messages.serialize(message))
 
@@ -144,28 +133,30 @@ class StationNode(Remote):
 class Station:
     """The station in its loop."""
 
-    def __init__(self, session: RemoteSession, node: StationNode, plan: Plan, options: Options,
-                 ros_arguments: Sequence[str] = ()) -> None:
-        """Raises GraphError without a control unit, PlanError for a plan that is over or that is for another place."""
-        self._session, self._node, self._plan = session, node, plan
-        found = self._parameters()
-        self._handover = bool(found['tracker.handover'])
+    def __init__(self, session: RemoteSession, node: StationNode, plan: Plan, rules: Rules,
+                 elements: pathlib.Path | None) -> None:
+        """Name the passes. elements: folder to watch. Raises GraphError without a control unit, PlanError for a plan
+        that is over or that is for another place."""
+        self._session, self._node = session, node
+        self._found = found = self._parameters()
         start, graph_start = str(found['prediction.start_time']), int(found['graph.start'])
         self._ahead = (seconds(orbit.instant('prediction.start_time', start)) - graph_start / NS_PER_SECOND
                        if start and graph_start else 0.0)
-        self._rules = Rules(options.lead, options.gap, options.park, float(found['prediction.oldest']))
+        low, high = (math.degrees(found[f'azimuth.limits.{end}']) for end in ('low', 'high'))
+        antenna = Antenna(plan.station, (low, high), float(found['prediction.oldest']))
+        self._check_place(plan)
+        self._passes = PassSequence(plan.contacts, rules, antenna, self.now)
         self._file = progress.file_of(plan.path)
-        begun = sequence.begin(plan.contacts, self.now)
-        self._state = progress.resume(begun, self._file, self.now)
-        self._antenna = requests.Antenna(plan.station, (math.degrees(found['azimuth.limits.low']),
-                                                        math.degrees(found['azimuth.limits.high'])))
-        self._check(found)
-        self._watch = Watch(options.elements, plan.station, self._rules.oldest) if options.elements else None
-        self._recordings = Recordings(options.bags, {
-            'graph.pacing': 'realtime', **{name: found[name] for name in ('graph.start', 'graph.beams')},
-            'beamwidth': found['tracker.receiver.beamwidth']}, ros_arguments)
-        self._request, self._asked_at, self._sent_at = '', 0.0, 0.0
-        self._night = ''
+        progress.resume(self._passes, self._file, self.now)
+        self._watch = Watch(elements, antenna) if elements else None
+        self._reply: Reply | None = None
+        self._saved_at, self._doing = -math.inf, ''
+        self._say([f'{each.contact.case}: {each.text}' if each.state == 'skipped' else
+                   f'{each.contact.case}: {each.state}, {utc_text(each.contact.begin)} to {clock(each.contact.end)}'
+                   + (f', {each.text}' if each.text else '') for each in self._passes.entries
+                   if each.state in TO_COME or each.text.startswith('refused: ')])
+        if not any(each.state in TO_COME for each in self._passes.entries):
+            raise PlanError(f'{plan.path}: all its passes are over at {utc_text(self.now)}')
 
     @property
     def now(self) -> Seconds:
@@ -174,137 +165,102 @@ class Station:
 
     def _parameters(self) -> dict[str, Value]:
         """Return the parameters of the control unit. Raises GraphError."""
-        from rcl_interfaces.srv import GetParameters
-        node = self._node
-        query = Query(node.create_client(GetParameters, f'{node.beam}acu/get_parameters'), CONTROL_UNIT_PARAMETERS,
-                      parameter_value_to_python)
+        query = self._node.query(CONTROL_UNIT_PARAMETERS, parameter_value_to_python)
         self._session.until(query.answered, REPLY_TIMEOUT_S)
         if not query.values:
             raise GraphError(f'the control unit does not state its parameters within {REPLY_TIMEOUT_S:g} s')
-        if self._session.remote.get_node_names().count('station') > 1:
+        if self._node.get_node_names().count('station') > 1:
             raise GraphError('another station commands this antenna')
         return dict(zip(CONTROL_UNIT_PARAMETERS, query.values))
 
-    def _check(self, found: dict[str, Value]) -> None:
-        """Name the passes that are over. Raises PlanError if all are, or if the plan is for another place."""
-        place = [float(found[f'prediction.station.{name}']) for name in STATION_NAMES]
+    def _check_place(self, plan: Plan) -> None:
+        place = [float(self._found[f'prediction.station.{name}']) for name in STATION_NAMES]
         if any(map(math.isnan, place)):
             raise PlanError('the control unit has no position: set `acu.prediction.station.*`')
-        planned = [getattr(self._plan.station, name) for name in STATION_NAMES]
+        planned = [getattr(plan.station, name) for name in STATION_NAMES]
         if any(abs((a - b + 180.0) % 360.0 - 180.0) > MAX_PLACE_DIFFERENCE_DEG for a, b in zip(place[:2], planned)):
-            raise PlanError(f'{self._plan.path}: station = {planned}: must be the position of the '
-                            f'control unit, {place}')
-        for entry in self._state.entries:
-            if entry.text.startswith('refused: ') and entry.state == 'skipped':
-                self._say([f'{entry.contact.case}: {entry.text}'])
-        if not any(entry.state in ('queued', 'running') for entry in self._state.entries):
-            raise PlanError(f'{self._plan.path}: all its passes are over at {utc_text(self.now)}')
+            raise PlanError(f'{plan.path}: station = {planned}: must be the position of the control unit, {place}')
 
-    def run(self) -> bool:
-        """Run until the last pass is over and its report is written. Return True if no pass has failed."""
-        for entry in self._state.entries:
-            if entry.state in ('queued', 'running'):
-                contact = entry.contact
-                self._say([f'{contact.case}: {entry.state}, {utc_text(contact.begin)} to {sequence.clock(contact.end)}'
-                           + (f', {entry.text}' if entry.text else '')])
+    def run(self, bags: pathlib.Path, ros_arguments: Sequence[str] = ()) -> bool:
+        """Run until the last pass is over and its report is written. Return True if no pass has failed. bags: folder
+        of the recordings."""
+        found = self._found
+        recordings = Recordings(bags, {'graph.pacing': 'realtime', 'beamwidth': found['tracker.receiver.beamwidth'],
+                                       **{name: found[name] for name in ('graph.start', 'graph.beams')}},
+                                ros_arguments)
         self._session.until(lambda: self._node.present(self._node.name_of('acu')), REPLY_TIMEOUT_S)
         try:
-            while not self._state.over:
-                self.tick()
-                self._session.until(lambda: False, TICK_S)
-            self._recordings.prove_rest()
+            while not self._passes.over:
+                self.tick(recordings)
+            recordings.prove_rest()
             deadline = time.monotonic() + PROOF_TIMEOUT_S
-            while self._recordings.busy and time.monotonic() < deadline:
-                self._session.until(lambda: False, TICK_S)
-                self.tick()
+            while recordings.busy and time.monotonic() < deadline:
+                self.tick(recordings)
         finally:
-            self._recordings.close()
+            recordings.close()
             self._node.close()
             if self._watch:
                 self._watch.close()
-        return not any(entry.state == 'failed' for entry in self._state.entries)
+        return not any(entry.state == 'failed' for entry in self._passes.entries)
 
-    def tick(self) -> None:
-        """Make one step of the sequence."""
-        before = self._state
-        refused, self._node.refused = self._node.refused, []
-        lines: list[str] = []
-        result = sequence.step(self._state, self._inputs(self._answered(), lines), self._rules)
-        self._state = result.state
-        lines += [self._recorded(*each) for each in result.records]
-        if result.command:
-            self._send(result.command)
-        for command, reply in result.replies:
-            self._node.answer(command, reply)
-        if before.entries != self._state.entries or before.held != self._state.held:
+    def tick(self, recordings: Recordings) -> None:
+        """Make one step of the sequence, and wait for the next."""
+        fresh, refused = self._watch.look(time.monotonic(), self._wanted(), self.now) if self._watch else ([], [])
+        step = self._passes.step(self._inputs(fresh, recordings.poll()))
+        step.lines[:0] = [*refused, *self._node.refused]
+        self._node.refused = []
+        for what, case in step.records:
+            if what == 'end':
+                recordings.end(case)
+                continue
             try:
-                progress.save(self._file, self._state)
-            except OSError as error:
-                lines.append(f'the progress is not kept: {error}')
-        self._say([*refused, *result.lines, *filter(None, lines)])
-        if (night := progress.night_text(self._state)) != self._night:
-            self._night = night
-            self._node.tell(NIGHT_TOPIC, night)
+                step.lines.append(f'{case}: recorded in {recordings.begin(case)}')
+            except OSError as error:    # a full disk does not end the night
+                step.lines.append(f'{case}: not recorded: {error}')
+        for command, reply in step.replies:
+            self._node.answer(command, reply)
+        self._publish(step)
+        self._reply = self._execute(self._passes.pending) if self._passes.pending else None
+        self._session.until(lambda: False, TICK_S)
 
-    def _recorded(self, what: str, case: str) -> str:
-        """Begin or end a recording; return a line for the log. A full disk does not end the night."""
-        if what == 'end':
-            self._recordings.end(case)
-            return ''
-        try:
-            return f'{case}: recorded in {self._recordings.begin(case)}'
-        except OSError as error:
-            return f'{case}: not recorded: {error}'
+    def _wanted(self) -> frozenset[str]:
+        """Return the satellites whose elements may still be replaced."""
+        return frozenset(entry.contact.satellite for entry in self._passes.entries if entry.state == 'queued'
+                         and entry.contact.elements)
 
-    def _inputs(self, reply: Reply | None, lines: list[str]) -> Inputs:
-        """Return the inputs of a step, and add lines for the log."""
-        node, now = self._node, self.now
+    def _inputs(self, fresh: Sequence[Fresh], reports: Sequence[tuple[str, str]]) -> Inputs:
+        node = self._node
         found = node.diagnostics_of('acu')
-        fresh: Sequence[sequence.Fresh] = ()
-        if self._watch:
-            wanted = frozenset(entry.contact.number or entry.contact.name for entry in self._state.entries
-                               if entry.state == 'queued' and entry.contact.elements)
-            fresh, refused = self._watch.look(time.monotonic(), wanted, now)
-            lines += refused
         received, node.received = node.received, []
         interference, node.interference = node.interference, ''
-        return Inputs(now, node.present(node.name_of('acu')), node.texts.get('acu/mode', ''),
-                      found.get('progress', ''), node.tracking(self._handover),
+        return Inputs(self.now, node.present(node.name_of('acu')), node.texts.get('acu/mode', ''),
+                      found.get('progress', ''), node.tracking(bool(self._found['tracker.handover'])),
                       {name: found[name] for name in ELEMENT_NAMES if name in found},
-                      node.holder if node.holder != node.who else '', node.alarm, reply, interference,
-                      tuple(self._decoded(received, lines)), tuple(fresh), tuple(self._recordings.poll()))
+                      node.holder if node.holder != node.who else '', node.alarm, self._reply, interference,
+                      received, fresh, reports)
 
-    def _decoded(self, received: Sequence[Command], lines: list[str]) -> list[requests.Request]:
-        """Return the requests of commands; refuse the others."""
-        found = []
-        for command in received:
+    def _publish(self, step: Step) -> None:
+        """Keep the progress, state each decision, and publish the night where it has changed."""
+        if step.lines or time.monotonic() - self._saved_at > SAVE_PERIOD_S:
+            self._saved_at = time.monotonic()
             try:
-                found.append(requests.request(command, self._antenna))
-            except ValueError as error:
-                lines.append(f'{command} of {command.who}: refused: {error}')
-                self._node.answer(command, Reply(False, f'refused: {error}'))
-        return found
+                progress.save(self._file, self._passes)
+            except OSError as error:
+                step.lines.append(f'the progress is not kept: {error}')
+        self._say(step.lines)
+        if step.lines or self._passes.now != self._doing:
+            self._doing = self._passes.now
+            self._node.tell(NIGHT_TOPIC, progress.night_text(self._passes))
 
-    def _send(self, aim: Aim) -> None:
-        entry = sequence.current(self._state)
+    def _execute(self, aim: Aim) -> Reply:
+        """Send a command to the control unit, and return its reply."""
+        entry = self._passes.first('running')
         if aim.verb == 'program' and entry:
             self._node.send_track(entry.contact, self._ahead)
-        self._request = self._node.request(aim.verb, aim.arguments)
-        self._asked_at = self._sent_at = time.monotonic()
-
-    def _answered(self) -> Reply | None:
-        """Return the reply to the last command. A command without a reply is repeated, then given up."""
-        if not self._request:
-            return None
-        reply, now = self._node.replied(self._request), time.monotonic()
-        if reply is None and now - self._asked_at > REPLY_TIMEOUT_S:
-            reply = Reply(False, f'no reply of the control unit within {REPLY_TIMEOUT_S:g} s')
-        elif reply is None and now - self._sent_at > RETRY_PERIOD_S:
-            self._sent_at = now
-            self._node.repeat_request(self._request)
-        if reply is not None:
-            self._request = ''
-        return reply
+        try:
+            return self._session.request(aim.verb, aim.arguments, COMMAND_TIMEOUT_S)
+        except GraphError as error:
+            return Reply(False, str(error))
 
     def _say(self, lines: Sequence[str]) -> None:
         """Print lines, and publish them, each with its UTC."""
@@ -313,5 +269,3 @@ class Station:
             with contextlib.suppress(OSError):      # a closed terminal does not end the night
                 print(*stamped, sep='\n', flush=True)
             self._node.tell(LOG_TOPIC, '\n'.join(stamped))
-
-

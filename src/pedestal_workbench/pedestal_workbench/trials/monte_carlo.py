@@ -30,7 +30,7 @@ if typing.TYPE_CHECKING:
 
 PACKAGES = ('pedestal_common', 'receiver_law', 'drive_law', 'ship_motion_sim', 'tracking_receiver_sim', 'acu_tracker',
             'adu_drive', 'pedestal_hardware', 'equipment_sim', 'pedestal_bringup', 'pedestal_results',
-            'pedestal_workbench', 'pedestal_studies')
+            'pedestal_workbench', 'pedestal_station', 'pedestal_studies')
 """Packages with laws, or with code that calls laws in trials and studies."""
 
 SCHEDULER_TIMEOUT_S = 10.0  # longest wait for the Dask scheduler, and for its first worker [s]
