@@ -48,7 +48,7 @@ SECTIONS = {
              'the table of the values that only the owner of an antenna knows'),
         Page('docs/hardware/servo-drives.md', 'Servo drives', 1600,
              'the objects on the bus and ten steps of a power-up stand nowhere else'),
-        Page('docs/hardware/your-drive.md', 'Your own drive', 600),
+        Page('docs/hardware/your-drive.md', 'Your own drive', 600, 'drives in realtime and in lockstep'),
         Page('docs/hardware/rotators.md', 'Rotators', 800),
         Page('docs/hardware/receiver.md', 'Your receiver', 1000,
              'receivers of angle errors and of a level alone, and the lines of four devices'),

@@ -279,7 +279,8 @@ def receive_command(state: State, inputs: Inputs, disturbance_valid: bool) -> bo
     """Put the command of step k into the ring. Return True if command and disturbance are valid."""
     slot = state.k % COMMAND_RING_SIZE
     valid = (disturbance_valid and plausible(inputs.azimuth.rate) and plausible(inputs.elevation.rate)
-             and max(abs(inputs.azimuth.torque), abs(inputs.elevation.torque)) <= MAX_PLAUSIBLE_TORQUE_NM)
+             and abs(inputs.azimuth.torque) <= MAX_PLAUSIBLE_TORQUE_NM
+             and abs(inputs.elevation.torque) <= MAX_PLAUSIBLE_TORQUE_NM)
     state.enable[slot] = 1 if valid and inputs.enable == 1 else 0
     if valid:
         state.rate[slot, 0], state.rate[slot, 1] = inputs.azimuth.rate, inputs.elevation.rate

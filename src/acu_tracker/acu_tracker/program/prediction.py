@@ -196,14 +196,14 @@ class Predictor:
         julian, fraction = self._julian(0.0)
         fractions = fraction + times / SECONDS_PER_DAY
         return orbit.angles(orbit.seen(self._satellite, self.parameters.station, julian, fractions,
-                                  self._to_fixed(julian, fractions), self.parameters.light_time))
+                                        self._to_fixed(julian, fractions), self.parameters.light_time))
 
     def _sun_angles(self, times: Times) -> Pairs:
         """Return azimuth and true elevation [rad] of the sun at stamps."""
         julian, fraction = self._julian(0.0)
         fractions = fraction + times / SECONDS_PER_DAY
         return orbit.angles(bodies.seen('sun', self.parameters.station, julian, fractions,
-                                   self._to_fixed(julian, fractions)))
+                                        self._to_fixed(julian, fractions)))
 
     def sun_angles(self, times: Times) -> Pairs:
         """Return azimuth and apparent elevation [rad] of the sun at stamps."""

@@ -1,5 +1,6 @@
 """The table of filter kinds, which the parameter acu.AXIS.filter.kind selects. A kind makes the bank of an axis."""
 import functools
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from acu_tracker.estimation.filters import kalman, motion_models
 from acu_tracker.estimation.filters.motion_models import MODEL_NAMES, MODEL_ROWS
+from pedestal_common import reproducible
 from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import Floats, Records, Seconds, Xyz
 
@@ -64,8 +66,8 @@ def _bank_of_several(params: 'FilterParameters') -> Bank:
     models = [motion_models.ladder(imm.ca, imm.rungs, imm.rung_ratio) if name == 'ca'
               else motion_models.constants(name, getattr(imm, name)) for name in named_models(imm.models)]
     factor = 1.0 if imm.rungs == 1 else imm.rung_ratio**ARRIVAL_EXPONENT
-    arrival = factor**np.arange(sum(map(len, models)))
-    return Bank(np.concatenate(models), imm.dwell, arrival / arrival.sum())
+    arrival = reproducible.power(factor, np.arange(sum(map(len, models))))
+    return Bank(np.concatenate(models), imm.dwell, arrival / math.fsum(arrival))
 
 
 FILTER_KINDS = {
