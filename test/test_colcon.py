@@ -14,7 +14,7 @@ EXECUTABLES = {
     'tracking_receiver_sim': ['tracking_receiver_node'],
     'acu_tracker': ['acu_node'],
     'adu_drive': ['adu_node', 'beam_steering_node'],
-    'pedestal_recording': ['recorder_node'],
+    'pedestal_recording': ['pass_recorder_node', 'recorder_node'],
     'pedestal_hardware': ['drive_node', 'ins_input_node', 'level_receiver_node', 'monopulse_receiver_node',
                           'rotator_node'],
     'equipment_sim': ['iq_node', 'simulated_drives_node'],
