@@ -67,7 +67,7 @@ def decode(drive_inputs: drive_unit.Inputs, link: rate_drive.Link, dropped: Bit,
 def record_invalid_topic(drive_inputs: drive_unit.Inputs, link: rate_drive.Link) -> None:
     """Store the topic of an invalid input."""
     deck = drive_inputs.base_acceleration
-    valid = max(abs(deck[0]), abs(deck[1]), abs(deck[2])) <= drive_state.MAX_PLAUSIBLE_INPUT
+    valid = drive_state.plausible(deck[0]) and drive_state.plausible(deck[1]) and drive_state.plausible(deck[2])
     link.invalid = rate_drive.INVALID_COMMAND if valid else rate_drive.INVALID_TRUTH
 
 

@@ -6,8 +6,8 @@ import numba
 import numpy as np
 import pytest
 
-from adu_drive import drive_unit
-from drive_law import faults
+from adu_drive import drive_unit, unit
+from drive_law import faults, rate_drive
 from drive_law.axis_params import AxisParameters, BiasParameters, LimitParameters
 from drive_law.params import AduParameters, GustParameters, WindParameters
 from pedestal_common.geometry.line_of_sight import direction
@@ -153,6 +153,15 @@ def test_switches_stand_behind_the_way_in_which_the_axis_stops():
 
 def test_rate_command_is_limited(drive):
     assert drive().run(0.6, azimuth=1e5).log['azimuth']['load_velocity'][-1] == pytest.approx(2.45, abs=5e-3)
+
+
+@pytest.mark.parametrize('i', range(3))
+@pytest.mark.parametrize('value', [math.nan, -math.inf, 1e300])
+def test_an_unbelievable_ship_is_named_and_not_the_command(i, value):
+    inputs, link = drive_unit.Inputs.zeros(), rate_drive.Link.zeros()
+    inputs['base_acceleration'][0, i] = value
+    unit.record_invalid_topic(inputs[0], link[0])
+    assert link['invalid'] == rate_drive.INVALID_TRUTH
 
 
 @pytest.mark.parametrize('name, field', [('azimuth', 'rate'), ('elevation', 'torque'), ('base_acceleration', 2)])

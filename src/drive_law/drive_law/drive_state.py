@@ -275,12 +275,17 @@ def plausible(x: float) -> bool:
 
 
 @compiled
+def plausible_torque(x: NewtonMeters) -> bool:
+    """Return True if a torque is valid, as MAX_PLAUSIBLE_TORQUE_NM states; NaN is invalid."""
+    return abs(x) <= MAX_PLAUSIBLE_TORQUE_NM
+
+
+@compiled
 def receive_command(state: State, inputs: Inputs, disturbance_valid: bool) -> bool:
     """Put the command of step k into the ring. Return True if command and disturbance are valid."""
     slot = state.k % COMMAND_RING_SIZE
-    valid = (disturbance_valid and plausible(inputs.azimuth.rate) and plausible(inputs.elevation.rate)
-             and abs(inputs.azimuth.torque) <= MAX_PLAUSIBLE_TORQUE_NM
-             and abs(inputs.elevation.torque) <= MAX_PLAUSIBLE_TORQUE_NM)
+    valid = (disturbance_valid and plausible(inputs.azimuth.rate) and plausible_torque(inputs.azimuth.torque)
+             and plausible(inputs.elevation.rate) and plausible_torque(inputs.elevation.torque))
     state.enable[slot] = 1 if valid and inputs.enable == 1 else 0
     if valid:
         state.rate[slot, 0], state.rate[slot, 1] = inputs.azimuth.rate, inputs.elevation.rate
