@@ -8,7 +8,7 @@ from pedestal_common.parameters import ParameterError
 from pedestal_common.wire.commands import Command, values
 
 MILLISECOND = 1_000_000
-DIMENSIONLESS = ('seed', 'teeth', 'factor')   # arguments that are a count or a ratio
+DIMENSIONLESS_NAMES = ('seed', 'teeth', 'factor')   # arguments that are a count or a ratio
 ALL = [(node, fault) for node, faults in table.INJECTED_FAULTS.items() for fault in faults]
 
 
@@ -17,7 +17,7 @@ def test_a_row_can_be_asked_for_with_its_defaults_and_with_every_bound(node, fau
     assert fault.doc and fault.arguments[-1].name == 'duration'
     given = values(table.INJECT_COMMANDS[node], Command(fault.name))
     for argument in fault.arguments:
-        assert argument.doc and (argument.unit or argument.options or argument.name in DIMENSIONLESS)
+        assert argument.doc and (argument.unit or argument.options or argument.name in DIMENSIONLESS_NAMES)
         bounds = argument.options or (argument.low, argument.high)
         assert given[argument.name] in bounds or argument.low <= given[argument.name] <= argument.high
         for bound in bounds:

@@ -32,7 +32,7 @@ from pedestal_station.night import Pass
 SAMPLE_S, MAX_SAMPLES = 5.0, 1000  # time between samples of a pass [s], and their largest number
 SAME_RAD = 1e-3
 """Difference of the encoder angles at rise and at set from those of the orbit that counts as none [rad]."""
-NEIGHBOURS = np.ones((3, 3))  # cells around a cell of a table
+NEIGHBOUR_CELLS = np.ones((3, 3))  # cells around a cell of a table
 
 
 class _Track(NamedTuple):
@@ -81,7 +81,8 @@ class Changeovers:
         if not fits.any():
             return math.inf
         # The cells beside the border of those that fit, on both of its sides.
-        border = ndimage.binary_dilation(fits, NEIGHBOURS) & ~ndimage.binary_erosion(fits, NEIGHBOURS, border_value=1)
+        inner = ndimage.binary_erosion(fits, NEIGHBOUR_CELLS, border_value=1)
+        border = ndimage.binary_dilation(fits, NEIGHBOUR_CELLS) & ~inner
         return float(needed[border].max())
 
     def slews(self, ends: _Track, begins: _Track) -> Floats:

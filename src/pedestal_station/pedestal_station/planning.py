@@ -59,12 +59,12 @@ def night(wishes: Wishes, progress: Progress = lambda *_: None) -> Night:
              if each.priority]
     if not found:
         raise ValueError('--priority: the weight of every object is 0; no object is left to plan')
-    chosen = _chosen(found, wishes)
+    chosen, horizon = _chosen(found, wishes), _horizon(wishes, used)
     passes: list[Pass] = []
     for i, each in enumerate(found):
         progress(i / len(found), each.name)
         try:
-            known, refused = _passes(each, wishes, chosen.get(each.name, []), used)
+            known, refused = _passes(each, horizon, wishes.duration, chosen.get(each.name, []), used)
             passes += known
             refusals += refused
             if len(passes) > MAX_PASSES:
@@ -139,13 +139,18 @@ def _chosen(found: Sequence[Object], wishes: Wishes) -> dict[str, list[Interval]
     return {name: sorted(times) for name, times in chosen.items()}
 
 
-def _passes(each: Object, wishes: Wishes, chosen: Sequence[Interval],
+def _horizon(wishes: Wishes, used: Antenna) -> windows.Horizon:
+    """Return the horizon of the user, else that of the antenna."""
+    if wishes.horizon is not None:
+        return windows.Horizon.constant(wishes.horizon)
+    return windows.Horizon.of_floor(used.acu.floor, used.acu.elevation.limits.low)
+
+
+def _passes(each: Object, horizon: windows.Horizon, duration: Seconds, chosen: Sequence[Interval],
             used: Antenna) -> tuple[list[Pass], list[Refusal]]:
     """Return the passes of an object, and the refusals of those with old elements. chosen: its times, [] for all
     passes. Raises ValueError for chosen times of an object that sets."""
-    horizon = (windows.Horizon.of_floor(used.acu.floor, used.acu.elevation.limits.low) if wishes.horizon is None
-               else windows.Horizon.constant(wishes.horizon))
-    known = windows.find(each.orbit, horizon, wishes.duration)
+    known = windows.find(each.orbit, horizon, duration)
     if chosen and not any(window.endless for window in known):
         course = 'rises and sets' if known else 'stays below the horizon'
         raise ValueError(f'--window {each.name}: the object {course}; must be one that does not set')

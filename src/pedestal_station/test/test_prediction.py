@@ -103,11 +103,11 @@ def flown(t, elevation, duration, changes, name='leo_pass'):
                            for name in ('latitude', 'longitude')),
                f'tracking_receiver.target.leo_pass.start_time={start.isoformat()}Z']
     known = antenna.of(scenario.load(name, changes), station, start)
-    told = prediction.predict(*of(Elements(ISS, station, start), 0.0, duration), known)
+    announced = prediction.predict(*of(Elements(ISS, station, start), 0.0, duration), known)
     run = RecordedRun(memory_recording.record(scenario.load(
-        name, [*changes, f'adu.initial_azimuth={told.azimuth[0]}',
-               f'adu.initial_elevation={told.elevation[0]}'], duration=duration)))
-    return (told, {name: value for name, (value, _) in results.measured(run.parts).items()},
+        name, [*changes, f'adu.initial_azimuth={announced.azimuth[0]}',
+               f'adu.initial_elevation={announced.elevation[0]}'], duration=duration)))
+    return (announced, {name: value for name, (value, _) in results.measured(run.parts).items()},
             run.tracking.encoders[-1, 0] - run.tracking.encoders[0, 0])
 
 
@@ -124,12 +124,12 @@ def slow(rate_deg, agility):
     (5, 1.5, 3000.0, 84.0), (5, 5.0, 12816.0, 88.5), (5, 5.0, 24540.0, 89.5), (10, 5.0, 9110.0, 86.0),
     (20, 1.5, 21941.0, 89.9), (20, 5.0, 20108.0, 88.0)])
 def test_the_announced_loss_of_a_keyhole_is_the_measured_one(rate, agility, t, elevation):
-    told, found, turn = flown(t, elevation, {5: 110.0, 10: 80.0}.get(rate, 60.0), slow(rate, agility))
-    assert told.loss == pytest.approx(found['loss_s'], rel=0.02, abs=0.1)
-    assert told.turn == pytest.approx(turn, abs=1e-3)
-    assert told.peak_rate[0] > math.radians(1.05 * rate)
-    assert [loss.reason for loss in told.losses] == ['keyhole'] * (told.loss > 0.0)
-    assert (told.loss_db > 0.1) == (told.loss > 0.0)
+    announced, found, turn = flown(t, elevation, {5: 110.0, 10: 80.0}.get(rate, 60.0), slow(rate, agility))
+    assert announced.loss == pytest.approx(found['loss_s'], rel=0.02, abs=0.1)
+    assert announced.turn == pytest.approx(turn, abs=1e-3)
+    assert announced.peak_rate[0] > math.radians(1.05 * rate)
+    assert [loss.reason for loss in announced.losses] == ['keyhole'] * (announced.loss > 0.0)
+    assert (announced.loss_db > 0.1) == (announced.loss > 0.0)
 
 
 R = math.radians
@@ -138,8 +138,8 @@ R = math.radians
 @pytest.mark.thorough
 def test_the_keyhole_of_a_narrow_beam():
     """The errors at the edge of the beam of 0.35 deg, at the begin of the slew, do not mislead the antenna."""
-    told, found, _ = flown(7931.0, 88.5, 90.0, [], 'leo_station_7m')
-    assert told.loss == pytest.approx(found['loss_s'], abs=0.1) and told.loss > 10.0
+    announced, found, _ = flown(7931.0, 88.5, 90.0, [], 'leo_station_7m')
+    assert announced.loss == pytest.approx(found['loss_s'], abs=0.1) and announced.loss > 10.0
 
 
 @pytest.mark.thorough
@@ -149,12 +149,12 @@ def test_the_keyhole_of_a_narrow_beam():
     # The pass fits on no turn, but a slew against the target takes the axis to another one.
     ([f'acu.azimuth.limits.low={R(-200)}', f'acu.azimuth.limits.high={R(200)}', *slow(6, 20.0)], 87.0, ['keyhole'])])
 def test_the_turn_is_the_one_that_the_control_unit_takes(changes, elevation, reasons):
-    told, found, turn = flown(6055.0, elevation, 400.0, changes)
-    assert [loss.reason for loss in told.losses] == reasons
-    assert told.loss == pytest.approx(found['loss_s'], abs=0.1) and told.loss > 20.0
-    assert told.turn == pytest.approx(turn, abs=1e-3) and turn * told.turn > 0.0
+    announced, found, turn = flown(6055.0, elevation, 400.0, changes)
+    assert [loss.reason for loss in announced.losses] == reasons
+    assert announced.loss == pytest.approx(found['loss_s'], abs=0.1) and announced.loss > 20.0
+    assert announced.turn == pytest.approx(turn, abs=1e-3) and turn * announced.turn > 0.0
     if reasons == ['travel']:
-        assert told.losses[0].detail == 'no turn fits: the pass needs 173 deg, 141 are there'
+        assert announced.losses[0].detail == 'no turn fits: the pass needs 173 deg, 141 are there'
 
 
 @pytest.mark.every_case
@@ -170,19 +170,19 @@ def test_rates_and_turn_are_those_of_the_orbit(elements, station, begin, end):
         search = np.arange(0.0, 86400.0, 10.0)
         top = search[np.argmax(elevations(path, search))]
         begin, end = top - 250.0, top + 250.0
-    told = prediction.predict(*of(path, begin, end), base(['acu.azimuth.limits.high=9.0'], station))
+    announced = prediction.predict(*of(path, begin, end), base(['acu.azimuth.limits.high=9.0'], station))
     times = np.linspace(begin, end, 40001)
     h = times[1] - times[0]
     A, E = azimuths(path, times), elevations(path, times)
     for axis, angle in enumerate((A, E)):
         rate, acceleration = np.abs(np.diff(angle)) / h, np.abs(np.diff(angle, 2)) / h**2
-        assert told.peak_rate[axis] == pytest.approx(rate.max(), rel=2e-3)
-        assert told.peak_acceleration[axis] == pytest.approx(acceleration.max(), rel=0.02, abs=1e-9)
-    assert told.turn == pytest.approx(A[-1] - A[0], abs=1e-6)
-    assert told.elevation == pytest.approx((E[0], E[-1]), abs=1e-9)
-    assert (np.mod(told.azimuth, 2 * np.pi)) == pytest.approx(np.mod([A[0], A[-1]], 2 * np.pi), abs=1e-6)
-    assert told.min_range == pytest.approx(np.linalg.norm(path.enu(times), axis=1).min(), rel=1e-4)
-    assert told.age == of(path, begin, end)[1].culmination and told.loss == told.loss_db == 0.0
+        assert announced.peak_rate[axis] == pytest.approx(rate.max(), rel=2e-3)
+        assert announced.peak_acceleration[axis] == pytest.approx(acceleration.max(), rel=0.02, abs=1e-9)
+    assert announced.turn == pytest.approx(A[-1] - A[0], abs=1e-6)
+    assert announced.elevation == pytest.approx((E[0], E[-1]), abs=1e-9)
+    assert (np.mod(announced.azimuth, 2 * np.pi)) == pytest.approx(np.mod([A[0], A[-1]], 2 * np.pi), abs=1e-6)
+    assert announced.min_range == pytest.approx(np.linalg.norm(path.enu(times), axis=1).min(), rel=1e-4)
+    assert announced.age == of(path, begin, end)[1].culmination and announced.loss == announced.loss_db == 0.0
 
 
 @pytest.mark.parametrize('sweep, stow, begins', [(50.0, 0.0, -160.0), (50.0, 150.0, 200.0), (100.0, 150.0, -160.0)])
@@ -191,9 +191,10 @@ def test_the_turn_holds_the_pass_and_is_near_the_stow(sweep, stow, begins):
     def enu(t):
         A = np.radians(200.0 + sweep * t / 300.0)
         return 1e6 * np.column_stack((np.sin(A), np.cos(A), np.full(len(t), 0.5)))
-    told = prediction.predict(*of(Path(enu), 0.0, 300.0), base([f'acu.azimuth.stow={R(stow)}']))
-    assert np.degrees(told.azimuth) == pytest.approx([begins, begins + sweep], abs=1e-3)
-    assert np.degrees(told.travel_left) == pytest.approx([270.0 - abs(begins), 270.0 - abs(begins + sweep)], abs=1e-3)
+    announced = prediction.predict(*of(Path(enu), 0.0, 300.0), base([f'acu.azimuth.stow={R(stow)}']))
+    assert np.degrees(announced.azimuth) == pytest.approx([begins, begins + sweep], abs=1e-3)
+    assert np.degrees(announced.travel_left) == pytest.approx([270.0 - abs(begins), 270.0 - abs(begins + sweep)],
+                                                              abs=1e-3)
 
 
 def test_a_hidden_sector_the_sun_and_the_elevation_limit_take_each_instant_once():
@@ -206,10 +207,10 @@ def test_a_hidden_sector_the_sun_and_the_elevation_limit_take_each_instant_once(
     assert hidden.loss == pytest.approx(200.0, abs=1e-3)
     # The beam of 1 deg stays at 40 deg, and loses the target half a degree above.
     limited = base([f'acu.elevation.limits.high={R(40)}', 'acu.elevation.stow=0.5'])
-    told = prediction.predict(*known, limited)
+    announced = prediction.predict(*known, limited)
     half = math.degrees(0.5 * limited.acu.tracker.receiver.beamwidth)
-    assert [loss.reason for loss in told.losses] == ['limit of the elevation']
-    assert told.loss == pytest.approx(200.0 - 10.0 * half, abs=0.05) and told.loss_db > 1.0
+    assert [loss.reason for loss in announced.losses] == ['limit of the elevation']
+    assert announced.loss == pytest.approx(200.0 - 10.0 * half, abs=0.05) and announced.loss_db > 1.0
     both = prediction.predict(*known, base([f'acu.elevation.limits.high={R(40)}', 'acu.elevation.stow=0.5',
                                             f'acu.blockage={R(80)} {R(100)} {R(50)}']))
     assert both.loss == pytest.approx(600.0, abs=1e-3)
@@ -254,8 +255,8 @@ def test_an_instant_a_ship_refraction_and_a_pointing_model():
         return Path(lambda t: np.outer(np.full(len(t), 1e6), (math.cos(elevation), 0.0, math.sin(elevation))))
     path = rest(R(50.0))
     defaults = antenna.of(scenario.parse('defaults', antenna.NO_SCENARIO), ALPS, BEGIN)
-    told = prediction.predict(*of(path, 5.0, 5.0), defaults)
-    assert told.peak_rate == (0.0, 0.0) and math.degrees(told.azimuth[0]) == pytest.approx(90.0)
+    announced = prediction.predict(*of(path, 5.0, 5.0), defaults)
+    assert announced.peak_rate == (0.0, 0.0) and math.degrees(announced.azimuth[0]) == pytest.approx(90.0)
     bent = prediction.predict(*of(rest(R(10.0)), 0.0, 9.0), base(['acu.refraction.kind=radio', 'acu.pointing.p1=2']))
     assert np.degrees((bent.azimuth[0], bent.elevation[0])) == pytest.approx([92.0, 10.0970], abs=1e-4)
     ship = antenna.of(scenario.load('ship_pass', ['ship_motion.ship.heading_deg=30']), ALPS, BEGIN)

@@ -59,9 +59,9 @@ def test_every_case_is_a_scenario():
                                          ('stunt-plane/sign-cross-elevation', 5), ('leo/turn-120', 5)])
 def test_a_wrong_slope_is_an_alarm_before_the_beam_is_half_a_beamwidth_off(case, least):
     """In at least this many of six runs; on a target that turns as hard as a quadcopter many come too late."""
-    told = [np.isfinite(steps) and error < 0.5
-            for steps, error in (study.measured(case, number)[[ALARM, -2]] for number in range(6))]
-    assert sum(told) >= least
+    in_time = [np.isfinite(steps) and error < 0.5
+               for steps, error in (study.measured(case, number)[[ALARM, -2]] for number in range(6))]
+    assert sum(in_time) >= least
 
 
 @pytest.mark.thorough

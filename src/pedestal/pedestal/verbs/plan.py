@@ -23,7 +23,6 @@ HORIZON_LIMITS_DEG = -5.0, 89.0  # of --horizon [deg]
 MAX_RAIN_MARGIN_DB = 100.0  # largest --rain-margin [dB]
 
 
-
 def _add_plan(parser: argparse.ArgumentParser) -> None:
     """Predicts every pass of the objects on this pedestal: rates, turn of the azimuth, keyhole, blockage, sun, link,
     expected loss. Then chooses the passes with the largest weighted contact time, and states to which pass each

@@ -59,6 +59,9 @@ QOS_BY_RATE = {'step': Qos(latched=False, lockstep=0, written=1000, read=8, reli
 
 UNSTEPPED_RATES = 'once', 'sample'  # rates of messages that belong to no step, and that a unit takes by `decode`
 
+PASS_STATES = 'queued', 'running', 'done', 'failed', 'skipped', 'dropped'
+"""States of a pass of the station."""
+
 STATION_RATE = 'station'
 """Rate of the messages of the station, a program beside the graph: on change, latched."""
 
@@ -213,8 +216,8 @@ TOPICS = (
           'every command that the station accepted or refused, as on `acu/command_result`'),
     Topic('station/night', 'std_msgs/msg/String', STATION_RATE,
           'the night, as JSON: `now` (what the station does) and `passes`, each with `case`, `begin` and `end` of its '
-          'contact (UTC [s]), `max_elevation_deg`, `state` (`queued`, `running`, `done`, `failed`, `skipped` or '
-          '`dropped`) and `text`'),
+          'contact (UTC [s]), `max_elevation_deg`, '
+          f'`state` ({", ".join(f"`{state}`" for state in PASS_STATES[:-1])} or `{PASS_STATES[-1]}`) and `text`'),
     Topic('station/log', 'std_msgs/msg/String', STATION_RATE,
           'decisions of the station: a line for each, with its UTC'),
     Topic('diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', 'second', 'state of each node'),

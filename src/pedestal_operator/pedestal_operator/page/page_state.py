@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from pedestal_common.geometry import pointing_report
 from pedestal_common.geometry.geodesy import STATION_NAMES, GivenStation
 from pedestal_common.graph import nodes, topics
+from pedestal_common.graph.topics import PASS_STATES
 from pedestal_common.parameters import NOT_GIVEN
 from pedestal_common.quantities import Degrees, Json, Seconds
 from pedestal_operator import state
@@ -18,7 +19,6 @@ ATTITUDE_TOPIC = 'ship/imu/data'
 EXTRA_NUMBER_TOPICS = (MOTOR_STATES_TOPIC, ATTITUDE_TOPIC)
 
 NIGHT_TOPIC = 'station/night'
-PASS_STATES = 'queued', 'running', 'done', 'failed', 'skipped', 'dropped'
 TEXT_TOPIC_BY_NAME = {'keyhole': 'acu/keyhole', 'blockage': 'acu/blockage'}  # {name on the page: topic of the text}
 
 ELEMENT_PARAMETERS = 'line_1', 'line_2', 'omm'

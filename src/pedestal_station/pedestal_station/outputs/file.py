@@ -18,9 +18,10 @@ from pedestal_common.geometry.geodesy import STATION_NAMES, StationParameters
 from pedestal_common.geometry.orbit import TargetError
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.parameters import ParameterError, Parameters, as_dict, build, flag, parameter, text
-from pedestal_common.quantities import Degrees, Floats, Json, Pairs, Seconds
+from pedestal_common.quantities import Degrees, Json, Seconds
 from pedestal_common.text_files import files
-from pedestal_station.night import Night, Object, Pass, Share
+from pedestal_station import windows
+from pedestal_station.night import Line, Night, Object
 from pedestal_station.objects import Elements, Query
 from tracking_receiver_sim.params import LeoPassParameters
 
@@ -32,8 +33,7 @@ MAX_CONTACT_S = 33 * SECONDS_PER_DAY  # longest contact: the longest night of a 
 MAX_NAME_CHARACTERS = 100  # largest length of the name of an object [characters]
 TRACK_ROW_INTERVAL_S, TRACK_MARGIN_S = 1.0, 10.0
 """Interval of the rows of a track, and time that it has before and after the contact [s]."""
-EPOCH = datetime.datetime(1970, 1, 1)
-
+UNIX_EPOCH = datetime.datetime(1970, 1, 1)
 
 Track: TypeAlias = tuple[tuple[float, float, float], ...]   # rows (UTC [s], azimuth, elevation [rad])
 
@@ -87,12 +87,12 @@ class Plan(NamedTuple):
 
 def seconds(when: datetime.datetime) -> Seconds:
     """Return a naive UTC in seconds since 1970."""
-    return (when - EPOCH).total_seconds()
+    return (when - UNIX_EPOCH).total_seconds()
 
 
 def utc_text(utc: Seconds) -> str:
     """Return a UTC as ISO 8601 text, to the millisecond."""
-    return (EPOCH + datetime.timedelta(milliseconds=round(utc * 1e3))).isoformat(timespec='milliseconds') + 'Z'
+    return (UNIX_EPOCH + datetime.timedelta(milliseconds=round(utc * 1e3))).isoformat(timespec='milliseconds') + 'Z'
 
 
 def orbit_of(elements: Mapping[str, str], station: StationParameters | None = None) -> Elements:
@@ -101,7 +101,7 @@ def orbit_of(elements: Mapping[str, str], station: StationParameters | None = No
         raise TargetError(f'elements = {", ".join(elements) or "none"}: must be line_1 and line_2, or omm')
     line_1, line_2, omm = (elements.get(name, '') for name in ELEMENT_NAMES)
     values = LeoPassParameters(line_1=line_1, line_2=line_2, omm=omm)
-    return Elements(values, orbit.satellite(values), Query(station or StationParameters(), EPOCH, 0.0, 0.0))
+    return Elements(values, orbit.satellite(values), Query(station or StationParameters(), UNIX_EPOCH, 0.0, 0.0))
 
 
 def epoch_of(elements: Mapping[str, str]) -> Seconds:
@@ -111,7 +111,7 @@ def epoch_of(elements: Mapping[str, str]) -> Seconds:
 
 def direction(elements: Mapping[str, str], station: StationParameters, utc: Seconds) -> tuple[Degrees, Degrees]:
     """Return geometric azimuth (0 to 360) and elevation of a satellite. Raises TargetError."""
-    azimuth, elevation = np.degrees(_angles(orbit_of(elements, station).enu(np.array([utc]))))[0].tolist()
+    azimuth, elevation = np.degrees(windows.angles(orbit_of(elements, station), np.array([utc])))[0].tolist()
     return azimuth % 360.0, elevation
 
 
@@ -121,16 +121,12 @@ def texts_of(found: Elements) -> dict[str, str]:
             and (name == 'omm') == bool(found.values.omm)}
 
 
-def _angles(enu: Floats) -> Pairs:
-    return np.stack((np.arctan2(enu[:, 0], enu[:, 1]), np.arctan2(enu[:, 2], np.hypot(enu[:, 0], enu[:, 1]))), axis=-1)
-
-
 def write(path: pathlib.Path, night: Night) -> None:
     """Write the plan file of a Night: all its passes, also those that its exact plan drops. Raises OSError,
     TargetError, PlanError for more passes than `read` accepts."""
     if len(night.passes) > MAX_PASSES:
         raise PlanError(f'{path}: {len(night.passes)} passes, must be at most {MAX_PASSES}')
-    contacts = [_planned(each, share, night) for each, share in zip(night.passes, night.exact.shares)]
+    contacts = [_planned(line, night) for line in night.lines]
     content = {VERSION_KEY: VERSION, 'begin': utc_text(seconds(night.begin)), 'duration_s': night.duration,
                'station': {name: getattr(night.station, name) for name in STATION_NAMES},
                'horizon_deg': night.horizon, 'scenario': night.scenario, 'passes': list(map(row, contacts))}
@@ -145,12 +141,12 @@ def row(contact: Contact) -> dict[str, Json]:
             'begin': utc_text(contact.begin), 'end': utc_text(contact.end)}
 
 
-def _planned(each: Pass, share: Share, night: Night) -> Contact:
-    """Return the contact of a pass. The times of a dropped pass are its rise and set. share: its times count from the
-    begin of the night."""
+def _planned(line: Line, night: Night) -> Contact:
+    """Return the contact of a pass. The times of a dropped pass are its rise and set."""
+    each, share = line.each, line.share
     begin, end = (share.begin, share.end) if share.taken else (each.window.rise, each.window.set)
     times = np.append(np.arange(each.window.rise, begin, TRACK_ROW_INTERVAL_S), begin)
-    angles = _angles(each.object.orbit.enu(times))
+    angles = windows.angles(each.object.orbit, times)
     azimuth = each.prediction.azimuth[0] + float(np.diff(np.unwrap(angles[:, 0])).sum())
     reason = ', '.join(filter(None, (share.reason, f'lost to {", ".join(share.lost_to)}' if share.lost_to else '')))
     elements, track = _prediction(each.object, night, begin, end)
@@ -166,7 +162,7 @@ def _prediction(planned: Object, night: Night, begin: Seconds, end: Seconds) -> 
         return texts_of(planned.orbit), ()
     first = begin - TRACK_MARGIN_S
     times = first + np.arange(0.0, end + TRACK_MARGIN_S - first, TRACK_ROW_INTERVAL_S)
-    rows = np.column_stack((seconds(night.begin) + times, _angles(planned.orbit.enu(times))))
+    rows = np.column_stack((seconds(night.begin) + times, windows.angles(planned.orbit, times)))
     rows = rows[np.isfinite(rows).all(axis=1)]
     return {}, tuple(map(tuple, rows.tolist()))
 

@@ -76,7 +76,7 @@ def _gantt(night: Night) -> str:
         left, right = (NAME_WIDTH + scale * min(max(t, 0.0), night.duration) for t in (begin, end))
         return _rectangle(kind, left, (row + 1) * ROW_HEIGHT + inset, max(right - left, MIN_BAR_WIDTH),
                           ROW_HEIGHT - 2.0 * inset, title)
-    for each, share in zip(night.passes, night.exact.shares, strict=True):
+    for each, share, _ in night.lines:
         row = names.index(each.object.name) + 1
         if share.taken:
             parts += [bar('taken', place, share.begin, share.end, 4.0) for place in (0, row)]

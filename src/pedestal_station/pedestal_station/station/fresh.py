@@ -13,14 +13,13 @@ from typing import TypeAlias
 from pedestal_common.graph.steps import SECONDS_PER_DAY
 from pedestal_common.quantities import Seconds
 from pedestal_station import objects
-from pedestal_station.outputs.file import EPOCH, texts_of
+from pedestal_station.outputs.file import UNIX_EPOCH, texts_of
 from pedestal_station.station.requests import Antenna
 from pedestal_station.station.sequence import Fresh
 
 LOOK_PERIOD_S = 3.0  # time between two looks at the folder [s]
 NIGHT_S = SECONDS_PER_DAY  # length of the night for which elements are read [s]
 HIDDEN_PREFIX = '.'  # of the names of files that a program has not finished
-
 
 _Version: TypeAlias = tuple[int, int]   # of a file: time of its last change [ns], size [bytes]
 
@@ -73,7 +72,7 @@ def read(paths: Sequence[pathlib.Path], wanted: frozenset[str], antenna: Antenna
          utc: Seconds) -> tuple[list[Fresh], list[str]]:
     """Return (elements of the wanted satellites in files, a line for each file and wanted satellite that is refused).
     """
-    begin, fresh, lines = EPOCH + datetime.timedelta(seconds=utc), list[Fresh](), list[str]()
+    begin, fresh, lines = UNIX_EPOCH + datetime.timedelta(seconds=utc), list[Fresh](), list[str]()
     for path in paths:
         try:
             found, refused = objects.read([path], antenna.station, begin, NIGHT_S, antenna.oldest)

@@ -5,6 +5,7 @@ import os
 import pathlib
 
 from pedestal_common.geometry import orbit
+from pedestal_common.graph.topics import PASS_STATES
 from pedestal_common.quantities import Json, Seconds
 from pedestal_common.text_files import files
 from pedestal_station.outputs.file import PlanError, contact, row, seconds, utc_text
@@ -12,7 +13,6 @@ from pedestal_station.station.sequence import Entry, PassSequence
 
 SUFFIX = '.progress'  # of the file beside the plan
 VERSION_KEY, VERSION = 'pedestal_station', 1
-STATES = 'queued', 'running', 'done', 'failed', 'skipped', 'dropped'
 MAX_PROGRESS_BYTES = 50_000_000  # largest size of the file [bytes]
 MAX_SHIFT_S = 60.0  # largest shift of the begin of a pass between two plans that still counts as the same pass [s]
 
@@ -76,8 +76,8 @@ def _text(value: Json) -> str:
 def _continue(entry: Entry, saved: dict[str, Json], now: Seconds) -> None:
     """Give an entry its progress. Another pass of the same name is left as it is."""
     state, text, begin = saved['state'], _text(saved['text']), entry.contact.begin
-    if state not in STATES:
-        raise ValueError(f'state = {state!r:.20}: must be one of {", ".join(STATES)}')
+    if state not in PASS_STATES:
+        raise ValueError(f'state = {state!r:.20}: must be one of {", ".join(PASS_STATES)}')
     over = entry.contact.end <= now
     if (abs(begin - seconds(orbit.instant('begin', _text(saved['begin'])))) > MAX_SHIFT_S
             or state == 'queued' and over):

@@ -7,6 +7,7 @@ import socket
 import time
 from collections.abc import Callable, Sequence
 
+import numpy as np
 from rclpy.parameter import parameter_value_to_python
 
 from pedestal_bringup.scenario.program import program_message
@@ -84,7 +85,6 @@ class StationNode(Remote):
 
     def send_track(self, contact: Contact, ahead: Seconds) -> None:
         """Publish the track of a contact. ahead: UTC of the sky minus that of the graph."""
-        import numpy as np
         rows = np.array(contact.track)
         track = program_message(rows[:, 0] - rows[0, 0], rows[:, 1:])
         messages.put_stamp(track.header.stamp, round((rows[0, 0] - ahead) * NS_PER_SECOND))
