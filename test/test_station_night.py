@@ -112,7 +112,9 @@ def test_a_night_is_tracked_whatever_happens_in_it(running, start_process, run_p
     wrong = pedestal('ask', 'insert', 'case=ISS/9', '--node', 'station')
     assert (wrong.returncode, wrong.stdout) == (
         1, 'station: refused: case = ISS/9: must be one of ISS/0, ISS/1, ISS/2, ISS/3, ISS/4\n'), wrong.stderr
+    assert ', scenario leo_pass, since ' in wrong.stderr      # the graph beside which the station runs
     assert "unknown command 'jump'" in pedestal('ask', 'jump', '--node', 'station').stdout
+    assert 'gust is a command of adu: add --node adu' in pedestal('ask', 'gust').stderr
     added = pedestal('ask', 'insert', 'case=ISS/4', '--node', 'station')
     assert (added.returncode, added.stdout) == (0, 'station: ISS/4 is queued\n')
     other = pedestal('station', '--plan', path)

@@ -146,7 +146,7 @@ def remarks(params: 'AcuParameters') -> list[str]:
     for name in AXES:
         axis, rungs = getattr(params, name), rungs_with_margin(params, name)
         if rungs < axis.filter.imm.rungs:
-            limited.append(f'{name} {max(1, rungs)} of {axis.filter.imm.rungs} (structure of '
+            limited.append(f'{max(1, rungs)} of its {axis.filter.imm.rungs} models ca in {name} (structure of '
                            f'{axis.structure.frequency:g} Hz)')
         if rungs == 0:
             none.append(name)
@@ -154,4 +154,4 @@ def remarks(params: 'AcuParameters') -> list[str]:
         return []
     why = (f'{" and ".join(none)} may swing with any of them; run `pedestal tune --loops`' if none else
            'a faster model would swing the structure')
-    return [f'models ca of the filter in use: {", ".join(limited)}; {why}']
+    return [f'the filter uses {" and ".join(limited)}; {why}']

@@ -116,7 +116,8 @@ def test_the_control_unit_begins_and_goes_on_with_these_models():
 def test_one_line_says_what_is_limited():
     assert parameters(8.0, 0.0).remarks() == parameters(30.0, 0.5).remarks() == []
     [line] = parameters(8.0, 0.5).remarks()
-    assert line == (f'models ca of the filter in use: azimuth {rungs(8.0, 0.5)} of 8 (structure of 8 Hz), elevation '
-                    f'{rungs(8.0, 0.5)} of 8 (structure of 8 Hz); a faster model would swing the structure')
+    assert line == (f'the filter uses {rungs(8.0, 0.5)} of its 8 models ca in azimuth (structure of 8 Hz) and '
+                    f'{rungs(8.0, 0.5)} of its 8 models ca in elevation (structure of 8 Hz); a faster model would '
+                    'swing the structure')
     [line] = parameters(3.0, 0.5).remarks()
     assert line.endswith('azimuth and elevation may swing with any of them; run `pedestal tune --loops`')

@@ -306,7 +306,7 @@ def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None =
     if others:
         left_out += _show_compared(others, metrics[0] if metrics else '')
     if left_out:
-        print(f'not shown for want of space: {", ".join(dict.fromkeys(left_out))}; a wider terminal '
+        print(f'not shown for lack of space: {", ".join(dict.fromkeys(left_out))}; a wider terminal '
               f'(COLUMNS={MIN_TABLE_COLUMNS}) or --json has them')
 
 
@@ -343,7 +343,7 @@ def show_night(night: Night) -> None:
     from pedestal_station.outputs import words
     left_out = _show_fitted(words.COLUMNS, words.cells(night), words.OPTIONAL_COLUMNS, words.title(night))
     if left_out:
-        print(f'not shown for want of space: {", ".join(left_out)}; a wider terminal (COLUMNS={MIN_TABLE_COLUMNS}), '
+        print(f'not shown for lack of space: {", ".join(left_out)}; a wider terminal (COLUMNS={MIN_TABLE_COLUMNS}), '
               '--csv or --html has them')
 
 

@@ -1,6 +1,7 @@
 """Data of a device: the connection in a thread of its own, the frames of its bytes, and what is dropped of them."""
 import collections
 import errno
+import os
 import re
 import socket
 import threading
@@ -41,7 +42,9 @@ class Connection:
             try:
                 self.serve()
             except (OSError, ValueError) as error:     # SerialException is an OSError
-                self.silence = f'{self.url}: {error}'
+                # The text of a SerialException with a number repeats number and path.
+                number = error.errno if isinstance(error, OSError) else None
+                self.silence = f'{self.url}: {os.strerror(number) if number and number > 0 else error}'
                 self.ended.wait(RETRY_PERIOD_S)
 
 

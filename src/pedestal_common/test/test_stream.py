@@ -1,4 +1,5 @@
 """Splitter, Connection and the ring of compiled laws."""
+import errno
 import threading
 from typing import Annotated
 
@@ -31,23 +32,25 @@ def test_an_overlong_frame_is_told_once_and_kept_out_of_memory(pieces):
 class Failing(stream.Connection):
     """A device that vanishes each time."""
 
-    def __init__(self):
+    def __init__(self, *reason):
         super().__init__('device', 'test')
-        self.served = threading.Semaphore(0)
+        self.served, self.reason = threading.Semaphore(0), reason
 
     def serve(self):
         self.served.release()
-        raise OSError('vanished')
+        raise OSError(*self.reason)
 
 
-def test_a_connection_is_opened_again_until_its_end(monkeypatch):
+@pytest.mark.parametrize(('reason', 'said'), ((('vanished',), 'vanished'), (
+    (errno.ENOENT, 'could not open device: [Errno 2] No such file or directory'), 'No such file or directory')))
+def test_a_connection_is_opened_again_until_its_end(monkeypatch, reason, said):
     monkeypatch.setattr(stream, 'RETRY_PERIOD_S', 0.01)
-    device = Failing()
+    device = Failing(*reason)
     assert device.silence == 'device: not connected so far'
     device.end(1.0)             # before its start
-    device = Failing()
+    device = Failing(*reason)
     device.start()
-    assert all(device.served.acquire(timeout=10.0) for _ in range(3)) and device.silence == 'device: vanished'
+    assert all(device.served.acquire(timeout=10.0) for _ in range(3)) and device.silence == f'device: {said}'
     device.end(10.0)
     assert not device._thread.is_alive()
 

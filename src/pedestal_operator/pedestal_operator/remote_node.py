@@ -202,9 +202,11 @@ class Remote(Shell, Antenna):
         """Return True if a topic has a publisher, or had one."""
         return name in self.arrivals or self.count_publishers(self._link(name)[1]) > 0
 
-    def query(self, names: Sequence[str], read: Callable[[ParameterValue], object] = _double) -> 'Query':
-        """Return a Query for parameters of the commanded node."""
-        return Query(self.create_client(GetParameters, f'{self.beam}{self.node.name}/get_parameters'), names, read)
+    def query(self, names: Sequence[str], read: Callable[[ParameterValue], object] = _double,
+              node: str = '') -> 'Query':
+        """Return a Query for parameters of a node; node: name, '' for the commanded node."""
+        service = f'{self.beam}{node or self.node.name}/get_parameters'
+        return Query(self.create_client(GetParameters, service), names, read)
 
 
 class Query:
@@ -286,14 +288,16 @@ class RemoteSession:
 
     def graph(self) -> dict[str, str]:
         """Return what this client speaks to: the domain, the scenario, and the time since which it runs. A graph that
-        was started by hand has no scenario. A graph in lockstep has no time."""
+        was started by hand has no scenario. A graph in lockstep has no time. A program beside the graph has neither,
+        so the control unit is queried in its place."""
         remote = self.remote
-        query = remote.query(GRAPH_PARAMETERS, lambda value: value.string_value or value.integer_value)
+        query = remote.query(GRAPH_PARAMETERS, lambda value: value.string_value or value.integer_value,
+                             '' if remote.node.program else 'acu')
         self.until(query.answered, GRAPH_REPLY_TIMEOUT_S)
         found = {'domain': str(remote.context.get_domain_id())}
         if query.values:
             scenario, start = query.values
-            found['scenario'] = scenario or 'none, started by hand'
+            found |= {'scenario': scenario} if scenario else {'started': 'by hand'}
             if start:
                 since = datetime.datetime.fromtimestamp(start * 1e-9, datetime.timezone.utc)
                 found['since'] = f'{since:%Y-%m-%d %H:%M:%S} UTC'

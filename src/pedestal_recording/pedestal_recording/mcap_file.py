@@ -121,7 +121,7 @@ def unpacked(chunk: records.Chunk) -> bytes:
     try:
         data = _UNPACK[chunk.compression](chunk.data, size)
     except KeyError:
-        raise ValueError(f'a chunk compressed by {chunk.compression!r}') from None
+        raise ValueError(f'a chunk compressed by {chunk.compression!r}, must be zstd, lz4 or none') from None
     except (zstandard.ZstdError, RuntimeError, EOFError):  # lz4 raises RuntimeError
         raise ValueError('a corrupted chunk') from None
     if len(data) != size:

@@ -55,7 +55,7 @@ ERROR_MATRIX_NAMES = ('xx', 'xe'), ('ex', 'ee')
 def _true_error(direction: Pairs, relative: Vectors3, attitude: Quaternions, error: Pairs) -> None:
     """Fill error (cross-elevation, elevation) [rad]: target minus direction.
 
-    direction: deck angles [rad]; relative: ENU [m] from the antenna to the target; attitude: of the deck, true.
+    direction: deck angles [rad]; relative: ENU [m] from the antenna to the target; attitude: that of the deck, true.
     """
     mat_ed = np.empty((3, 3))
     for k in range(len(direction)):
@@ -344,7 +344,7 @@ def _lever_arm(bag: Recording, attitude: Quaternions) -> Vectors3:
 def _arriving(bag: Recording, relative: Vectors3, velocity: Vectors3) -> Vectors3:
     """Return the vector ENU [m] from the antenna to the apparent position, shifted by refraction and light time.
 
-    relative: vector to the true position, ENU [m]; velocity: of the target, ENU [m/s].
+    relative: vector to the true position, ENU [m]; velocity: velocity of the target, ENU [m/s].
     """
     of_receiver = recordings.parameters(bag, 'tracking_receiver')
     given = {key: value for key, value in of_receiver.items() if key in ('path.refractivity', 'path.light_time')}
@@ -439,7 +439,7 @@ def stretches(flags: Bools) -> list[tuple[int, int]]:
 
 
 def settled(inside: Bools, t: Times) -> Bools:
-    """Return the rows of `inside` without the first HANDOVER_SETTLING_S of each stretch; t: of the rows."""
+    """Return the rows of `inside` without the first HANDOVER_SETTLING_S of each stretch; t: times of the rows."""
     mask = np.zeros(t.size, bool)
     for first, last in stretches(inside):
         mask[first:last] = t[first:last] >= t[first] + HANDOVER_SETTLING_S

@@ -96,7 +96,7 @@ def hidden(program: ProgramTrack, sectors: Vectors3, times: Times, heights: Floa
 @compiled
 def _axes(state: Followed, constants: Constants, terms: PointingModel, order: guidance.Order, program: ProgramTrack,
           t: Seconds, elevation: Radians) -> tuple[Axes, Motion]:
-    """Return (references at t, encoder angles of the target on any wrap); elevation: of the axis."""
+    """Return (references at t, encoder angles of the target on any wrap); elevation: that of the axis."""
     on_sky = program_track.motion_at(program, t)
     encoders, _ = model.to_encoders(terms, on_sky)
     motion = guidance.on_axes(state.guidance, constants, terms, order, program, t, on_sky, encoders, encoders.azimuth)

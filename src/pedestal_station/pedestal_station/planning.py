@@ -76,7 +76,7 @@ def night(wishes: Wishes, progress: Progress = lambda *_: None) -> Night:
     passes.sort(key=lambda each: (each.window.rise, each.case))
     exact, greedy = _choices(passes, used, wishes.rules)
     return Night(wishes.begin, wishes.duration, wishes.station, wishes.horizon,
-                 wishes.antenna.source or 'the defaults', tuple(passes), exact, greedy, tuple(refusals))
+                 wishes.antenna.source or 'default parameters', tuple(passes), exact, greedy, tuple(refusals))
 
 
 def refusal_text(refused: Refusal) -> str:

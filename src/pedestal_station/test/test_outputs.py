@@ -133,7 +133,7 @@ def test_the_table_fits_a_narrow_terminal_and_says_what_it_leaves_out(night, cap
         console.show_night(short)
         said[width] = capsys.readouterr().out
         assert max(len(line) for line in said[width].splitlines()[1:] if 'not shown' not in line) <= width
-    assert 'not shown for want of space' in said[80] and 'not shown' not in said[150]
+    assert 'not shown for lack of space' in said[80] and 'not shown' not in said[150]
     for text in ('22:41:00-22:51:40', 'ISS/1 +1', 'no window', 'whole'):
         assert text in said[80], text
     endless, warning = words.warnings(night)

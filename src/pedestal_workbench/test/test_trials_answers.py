@@ -105,7 +105,7 @@ def test_a_table_fits_the_terminal_and_says_what_it_leaves_out(pedestal, monkeyp
     tables = [line for line in said.splitlines() if line.startswith(' ') and 'pedestal run' not in line]
     assert max(map(len, tables)) <= int(columns) and any('95 % interval' in line for line in tables)
     assert any(' median ' in line for line in tables) == shown
-    assert ('not shown for want of space: ' in said and 'COLUMNS=150' in said) != shown
+    assert ('not shown for lack of space: ' in said and 'COLUMNS=150' in said) != shown
 
 
 def test_a_program_track_is_ranked_by_its_own_pointing(pedestal):

@@ -180,7 +180,7 @@ def _source(guidance: Guidance, tracking: Tracking, constants: 'Constants', mode
 @compiled
 def _wrapped(guidance: Guidance, params: 'AxisParameters', order: Order, program: ProgramTrack, t: Seconds,
              azimuth: AxisMotion) -> AxisMotion:
-    """Return the motion of the azimuth on an azimuth wrap inside the limits; azimuth: of the target on any wrap.
+    """Return the motion of the azimuth on an azimuth wrap inside the limits; azimuth: angle of the target on any wrap.
 
     When a program begins, the function chooses a wrap that holds the whole program. A later change of the wrap is a
     turn of the axis. An electronic beam changes the wrap at once and makes no turn.

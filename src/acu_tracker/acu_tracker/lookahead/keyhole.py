@@ -93,7 +93,7 @@ def _fit(slew: Slew, passage: Passage, turn: float, t1: Seconds) -> bool:
 
 @compiled
 def _unwrap(slew: Slew, path: Path, azimuth: Radians) -> None:
-    """Put a fitted slew on the azimuth wrap of the axis; azimuth: of the axis at the first row of the path."""
+    """Put a fitted slew on the azimuth wrap of the axis; azimuth: angle of the axis at the first row of the path."""
     first = path.rows[int((slew.t1 - path.t0) / path.h), paths.AZIMUTH_COLUMN]
     revolutions = math.floor((azimuth - path.rows[0, paths.AZIMUTH_COLUMN]) / (2.0 * math.pi) + 0.5)
     start = 2.0 * math.pi * revolutions + first + wrap(slew.azimuth1 - first)

@@ -69,7 +69,7 @@ def to_encoders(path: Path, model: pointing_model.PointingModel) -> None:
 
 @compiled
 def complete(path: Path, travel: Travel) -> None:
-    """Write the azimuth columns; travel: of the azimuth from the end of the path to that of the program."""
+    """Write the azimuth columns; travel: turn of the azimuth from the end of the path to that of the program."""
     rows, n = path.rows, len(path.rows)
     before = math.atan2(-rows[0, 1], rows[0, 0])
     rows[0, AZIMUTH_COLUMN] = before

@@ -215,8 +215,8 @@ def _begin(planner: Planner, constants: Constants, t: Seconds) -> paths.Path:
 @compiled
 def _search(planner: Planner, constants: Constants, model: pointing_model.PointingModel, path: paths.Path, count: int,
             azimuth: Radians, travel: Travel) -> None:
-    """Search the first `count` rows of a Path for a keyhole and hidden sectors; travel: of the azimuth after these
-    rows. A plan is announced when its slew begins within `notice`. A keyhole without a fitting azimuth wrap is
+    """Search the first `count` rows of a Path for a keyhole and hidden sectors; travel: that of the azimuth after
+    these rows. A plan is announced when its slew begins within `notice`. A keyhole without a fitting azimuth wrap is
     forecast at once, except if there is a plan whose slew has not begun."""
     if count < MIN_PATH_ROW_COUNT:
         return

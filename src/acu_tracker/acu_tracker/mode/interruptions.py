@@ -65,7 +65,7 @@ def initialise(outage: Records, resumption: Records) -> None:
 @compiled
 def outage_now(state: OutageRecord, accepted: Seconds, settled: Bit, t: Seconds,
                params: 'SharedParameters') -> Outage:
-    """Return the Outage at t; accepted: stamp of the last accepted error; settled: of the filter, see target."""
+    """Return the Outage at t; accepted: stamp of the last accepted error; settled: see target."""
     since = t - accepted - params.receiver_latency - params.tracker.receiver.age
     permitted = t - state.stamp <= params.tracker.coast_time
     misled = permitted and (state.slewing != 0 or not settled)
@@ -76,8 +76,8 @@ def outage_now(state: OutageRecord, accepted: Seconds, settled: Bit, t: Seconds,
 def explain_outage(state: OutageRecord, hidden: bool, slewing: bool, turning: Bit, t: Seconds) -> int:
     """Return the reason why the receiver may be without signal at t, or NONE.
 
-    hidden: by a sector; slewing: through the keyhole; turning: of the azimuth to another wrap, at a limit of its
-    travel.
+    hidden: True behind a hidden sector; slewing: True in a slew through the keyhole; turning: True while the azimuth
+    turns to another wrap, at a limit of its travel.
     """
     state.blocked, state.slewing = hidden, slewing
     if hidden or slewing or turning:

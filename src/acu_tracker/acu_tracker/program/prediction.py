@@ -210,7 +210,7 @@ class Predictor:
         return self.air.raised(times, self._sun_angles(times))
 
     def _table(self, angles_at: Callable[[Times], Pairs], stamp: Seconds, interval: Seconds) -> Predicted:
-        """Return the Predicted for a stamp; angles_at: azimuth and true elevation; interval: of the rows."""
+        """Return the Predicted for a stamp; angles_at: azimuth and true elevation; interval: time between rows."""
         times = np.floor(stamp) - TABLE_LEAD_TIME_S + interval * np.arange(TABLE_ROW_COUNT)
         try:
             angles = angles_at(times)

@@ -15,7 +15,7 @@ class Sink(Protocol):
     refused: int    # number of transmissions that were lost
 
     def send(self, samples: Samples, first: int, utc: Nanoseconds, /) -> None:
-        """Send samples. first: number of the first one; utc: of the first one."""
+        """Send samples. first, utc: number and time of the first one."""
 
     def close(self) -> None:
         """End the sink."""

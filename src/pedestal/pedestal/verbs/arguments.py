@@ -281,6 +281,6 @@ def check_new_file(option: str, path: pathlib.Path | None) -> None:
     if str(path) == '-':
         raise ValueError(f'{option} -: must be the name of a file; only --json writes to standard output')
     if path.exists():
-        raise ValueError(f'{option} {path}: exists already; the file is not overwritten')
+        raise ValueError(f'{option} {path}: exists already; the file is not overwritten, so give another name')
     if not path.parent.is_dir():
         raise ValueError(f'{option} {path}: must be a file in a directory that exists')

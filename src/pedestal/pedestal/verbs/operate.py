@@ -56,7 +56,7 @@ def _status(options: argparse.Namespace) -> int:
     table += [{'case': 'alarm', 'metric': name, 'value': text, 'unit': ''} for name, text in reports]
     console.write_json(options.json, {'name': 'status', 'rows': table})
     for row in rows:
-        print(f'{row.group:10} {row.name:22} {row.text:>14} {row.unit}'.rstrip())
+        print(f'{row.group:10} {row.name:22} {row.text or "none":>14} {row.unit}'.rstrip())
     for name, text in reports:
         print(f'alarm      {name}: {text}')
     return 1 if reports else 0
@@ -248,10 +248,19 @@ def send_command(options: argparse.Namespace, verb: str, given: Mapping[str, str
             reply = session.hold_jog(verb, given, hold)
         row = next((row for row in MODE_ROWS if reply.text == f'mode is {row.name}'), None)
         print(f'{node}: mode is {row.going}' if row and row.going else f'{node}: {reply.text}', flush=True)
+        if not reply.granted and (others := _other_nodes(node, verb)):
+            print(f'{verb} is a command of {" and ".join(others)}: add --node {others[0]}', file=sys.stderr)
         _name_graph(session)
         if reply.granted and row and wait is not None:
             return _await_arrival(session, row, wait)
     return 0 if reply.granted else 1
+
+
+def _other_nodes(node: str, verb: str) -> list[str]:
+    """Return the nodes that take a command which a node does not know."""
+    from pedestal_common.injection.table import INJECT_COMMANDS
+    takers = [name for name, rows in INJECT_COMMANDS.items() if verb in (row.name for row in rows)]
+    return [] if node in takers else takers
 
 
 def _await_arrival(session: 'RemoteSession', row: ModeRow, seconds: float) -> int:

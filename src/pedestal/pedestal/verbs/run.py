@@ -148,8 +148,8 @@ def _disturbed(chosen: 'Scenario', outcome: 'Outcome', recording: 'Bag') -> bool
     planned = chosen.header.duration / chosen.node_parameters(nodes.DRIVE_NODE).period
     reasons = [check.ending] if check.aborted else []
     if outcome.losses > MAX_LOST_STEP_SHARE * planned:
-        reasons.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than '
-                       f'{MAX_LOST_STEP_SHARE:.0%}, outside announced restarts: {_cure(chosen.header.priority)}')
+        reasons.append(f'the drive lost {outcome.losses} of {planned:.0f} steps, more than {MAX_LOST_STEP_SHARE:.0%}'
+                       f'{", without those of restarts" if outcome.restarts else ""}: {_cure(chosen.header.priority)}')
     for reason in reasons:
         print(f'pedestal: {reason}', file=sys.stderr)
     return bool(reasons)

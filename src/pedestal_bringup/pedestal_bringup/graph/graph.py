@@ -44,7 +44,7 @@ def run(plan: 'Plan', bag: pathlib.Path, progress: AbstractContextManager[Callab
     with domain.of_run(), Graph(plan.scenario, bag, servers) as graph:
         graph.start_servers()
         if servers:
-            print(f'the servers are usable as soon as the antenna runs, in {START_LEAD_TIME_S:g} s at the soonest',
+            print(f'the servers answer once the antenna runs, in {START_LEAD_TIME_S:g} s at the earliest',
                   flush=True)
         # This import loads rclpy, which starts threads. Because a copy of this process would lack these threads, Graph
         # has made the processes of the nodes before the import (see the module child).

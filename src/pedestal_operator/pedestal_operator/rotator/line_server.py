@@ -92,7 +92,7 @@ AnyClient = TypeVar('AnyClient', bound=Client)
 
 class LineServer(Generic[AnyClient]):
     """Clients of one TCP port, and of a serial device ('': none). Raises OSError. kind: start of the names of the
-    clients; most: largest number of clients; longest: of a line [bytes]."""
+    clients; most: largest number of clients; longest: longest line [bytes]."""
     clients: list[AnyClient]
     refused_count: int
 

@@ -113,6 +113,6 @@ def _cause(share: Share) -> str:
 
 def title(night: Night) -> str:
     """Return the line above the table."""
-    horizon = 'mask of the antenna' if night.horizon is None else f'horizon {night.horizon:g} deg'
+    horizon = 'horizon: mask of the antenna' if night.horizon is None else f'horizon {night.horizon:g} deg'
     return (f'{night.duration / 3600.0:g} h from {night.begin:%Y-%m-%d %H:%M:%S} UTC at {place(night)}; '
-            f'{horizon}; antenna of {night.scenario}')
+            f'{horizon}; antenna: {night.scenario}')

@@ -334,7 +334,8 @@ def graph_error(case: str, quiet: bool = False, seed: int | None = None) -> Pair
 
 
 def graph_rows(jitters: Mapping[str, list[Degrees]]) -> list[Line]:
-    """Return the rows of GRAPH_CASES, over both axes and both ends of the intervals; jitters: of the elevation."""
+    """Return the rows of GRAPH_CASES, over both axes and both ends of the intervals; jitters: those of
+    the elevation."""
     rows: list[Line] = []
     for case in GRAPH_CASES:
         quiet = closed_loop.Loop(graph_case(case, quiet=True).load()).run()

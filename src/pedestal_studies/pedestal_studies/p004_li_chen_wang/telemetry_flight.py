@@ -150,7 +150,8 @@ def figures() -> Drawings:
 
 
 def axis_figure(axis: str, first_number: int) -> Figure:
-    """Draw angle, a part of it, rate and acceleration of one flight; first_number: of the paper's four figures."""
+    """Draw one flight in four panels: angle, a part of it, rate and acceleration; first_number: that of
+    the paper's figure in the first panel."""
     figure, axes = fig.new_panels(4, height=9.0)
     t, target = flight()
     measured, filtered = flight_record(axis, run=0)

@@ -112,7 +112,7 @@ class FedRecording:
         return np.append(self.output(answer).stamps, AFTER_LAST_STAMP)[after]
 
     def commands(self, topic: str, stamps: Stamps) -> dict[int, list[commands.Command]]:
-        """Return the commands in a topic of replies, by step; stamps: of the steps. Raises ValueError. Because the
+        """Return the commands in a topic of replies, by step; stamps: those of the steps. Raises ValueError. As the
         unit makes the commands of schedules by itself, from its parameters, these are left out."""
         found: dict[int, list[commands.Command]] = {}
         rows = np.searchsorted(stamps, self.steps(topic)).tolist() if self.has(topic) else ()
@@ -126,7 +126,7 @@ class FedRecording:
         return found
 
     def states(self, topic: str, stamps: Stamps) -> dict[int, str]:
-        """Return {step: text} of the changes of a recorded acu/mode or adu/state; stamps: of the steps."""
+        """Return {step: text} of the changes of a recorded acu/mode or adu/state; stamps: stamps of the steps."""
         if not self.has(topic):
             return {}
         output = self.output(topic)

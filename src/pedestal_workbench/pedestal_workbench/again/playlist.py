@@ -36,8 +36,8 @@ def latched(graph: Mapping[str, Link], name: str) -> bool:
 
 
 def selected_topics(bag: bags.Bag, input_nodes: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return the topics in names, without names the inputs of input_nodes that none of these nodes publishes, and
-    without both all topics.
+    """Return the topics to replay: those of `names`, or else the inputs of `input_nodes` that none of these nodes
+    publishes, or else all.
 
     Raises ValueError for an unknown node, BagError for a topic or all inputs of a node that are not in the bag.
     """

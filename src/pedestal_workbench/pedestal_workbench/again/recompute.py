@@ -212,7 +212,7 @@ def file_parameters(path: str | pathlib.Path, beam: str = '') -> Values:
 
 
 def overrides(texts: Iterable[str], names: Sequence[str]) -> dict[str, dict[str, Json]]:
-    """Return the parameters in texts node.key=value; names: of the recomputed nodes. The name of a single node may be
+    """Return the parameters in texts node.key=value; names: the recomputed nodes. The name of a single node may be
     left out. Raises ValueError."""
     found: dict[str, dict[str, Json]] = {}
     for text in texts:

@@ -330,7 +330,7 @@ def _check(options: TuneOptions, is_bag: bool, file: pathlib.Path) -> None:
     if options.runs is not None and options.runs < 1:
         raise ValueError(f'--runs {options.runs}: must be at least 1')
     if file.exists():
-        raise ValueError(f'--output {file} exists already; the file is not overwritten')
+        raise ValueError(f'--output {file} exists already; the file is not overwritten, so give another name')
     if not file.parent.is_dir():
         raise ValueError(f'--output {file}: must be a file in a directory that exists')
 

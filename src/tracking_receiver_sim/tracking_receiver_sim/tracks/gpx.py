@@ -85,7 +85,7 @@ class _Points:
         self.declared = encoding or ''
 
     def encoding(self) -> str:
-        """Return the encoding of the file, as a part of an error."""
+        """Return the encoding of the file in parentheses, for the end of an error message."""
         return f' (encoding {self.declared or "UTF-8":.40})'
 
     def doctype(self, *_: object) -> None:

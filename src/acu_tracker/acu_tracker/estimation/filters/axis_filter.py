@@ -131,7 +131,7 @@ class Estimate(Record):
 
 
 def constants(params: 'FilterParameters', noise_bandwidth: Hertz = 0.0) -> Records:
-    """Return the constants (1,); noise_bandwidth: of the measured angle, 0: white noise."""
+    """Return the constants (1,); noise_bandwidth: that of the measured angle, 0 for white noise."""
     c, bank = Constants.zeros(), FILTER_KINDS[params.kind].bank(params)
     c['count'] = len(bank.models)
     c['models'][0, :len(bank.models)] = bank.models

@@ -91,7 +91,8 @@ def constants(name: str, params: Parameters, **changes: float) -> Records:
 
 
 def ladder(params: 'CaParameters', rungs: int, ratio: float) -> Records:
-    """Return the constants (rungs,) of models ca, the first with `params`; ratio: of the noise of successive rungs."""
+    """Return the constants (rungs,) of models ca, the first with `params`; ratio: noise of a rung over that of
+    the one before."""
     m = np.concatenate([constants('ca', dataclasses.replace(params, noise=params.noise * ratio**rung))
                         for rung in range(rungs)])
     m['column'][1:] = len(MODEL_NAMES) + np.arange(rungs - 1)
