@@ -40,6 +40,13 @@ def test_every_link_and_anchor_exists(path):
     assert broken == []
 
 
+def test_the_map_of_the_book_links_to_every_page():
+    """Except to itself, README.md, the notebooks (the library links to them), and pages that the book makes."""
+    linked = {pages.resolved('docs/index.md', target)[0] for target in pages.links(TEXTS['docs/index.md'])}
+    apart = {'README.md', 'docs/index.md', *pages.BUILT_PAGES}
+    assert {page.path for page in pages.PAGES if page.path.endswith('.md')} - apart <= {str(path) for path in linked}
+
+
 def test_the_navigation_has_every_page_in_the_order_of_the_table(tmp_path):
     places = [place for page in pages.PAGES if (place := pages.book_path(page.path))]
     for place in places:

@@ -81,7 +81,7 @@ SECTIONS = {
     'Develop': (
         Page('CONTRIBUTING.md', 'Contributing', 1100, 'the rules of code and language in full'),
         Page('docs/develop/extending.md', 'Extend the system', 1000),
-        Page('docs/develop/decisions.md', 'Decisions', 1000, 'eleven decisions, not nine'),
+        Page('docs/develop/decisions.md', 'Decisions', 1000, 'fourteen decisions, not nine'),
         Page('CHANGELOG.md', 'Changes', None)),
     'Reference': (
         Page('docs/reference/commands.md', 'Commands', None),

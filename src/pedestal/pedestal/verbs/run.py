@@ -16,7 +16,7 @@ if typing.TYPE_CHECKING:
     from pedestal_bringup.scenario.scenario import Scenario
     from pedestal_recording.bag import Bag
 
-MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a realtime run, outside announced restarts
+MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a realtime run, without those of restarts
 
 
 def _add_run(parser: argparse.ArgumentParser) -> None:

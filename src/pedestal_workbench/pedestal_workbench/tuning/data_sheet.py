@@ -89,7 +89,7 @@ class DataSheet(Parameters):
     motor_torque: float = parameter(NOT_GIVEN, 0.1, 1000.0, 'Nm',
                                     'rated torque of one motor; the peak torque is set to three times this torque')
     motor_power: float = parameter(NOT_GIVEN, 1e-3, 1000.0, 'kW', 'rated power of one motor, which gives its rated '
-                                   'torque at motor_speed')
+                                   'torque at --motor-speed')
     motor_speed: float = parameter(1500.0, 100.0, 10000.0, 'rpm', 'rated speed of a motor')
     lash: float = parameter(1.0, 0.0, 50.0, 'mrad', 'lash of one gear mesh, referred to the load axis')
     rate_azimuth: float = parameter(NOT_GIVEN, 0.6, 1000.0, 'deg/s', 'largest rate of azimuth')
