@@ -26,7 +26,7 @@ from pedestal_common.graph import nodes
 
 
 def operator(context, scenario):
-    """Return the process that sends the program track, in the namespace of the nodes. context: of the launch;
+    """Return the process that sends the program track, in the namespace of the nodes. context: that of the launch;
     scenario: path of the scenario file."""
     namespace = context.launch_configurations.get('ros_namespace', '')
     remapped = ['--ros-args', '-r', f'__ns:=/{namespace.strip("/")}'] if namespace else []
@@ -36,7 +36,7 @@ def operator(context, scenario):
 
 def start(context):
     """Return the nodes of the scenario, with the parameters that `pedestal run` would give them, the sender of the
-    program track, and the servers. context: of the launch."""
+    program track, and the servers. context: that of the launch."""
     given = {argument.name: LaunchConfiguration(argument.name).perform(context)
              for argument in launch_arguments.ARGUMENTS}
     chosen = launch_arguments.load_scenario(given)

@@ -89,7 +89,8 @@ def lugre(z: Radians, v: RadiansPerSecond, T_c: NewtonMeters, T_sc: NewtonMeters
 
     The step is implicit in z with one division, because the explicit form is stiff (sigma_0 |v| / g). T_c: Coulomb
     torque; T_sc = T_s - T_c; T_s: breakaway torque; per_v2 = 1 / v_s^2; v_s: Stribeck rate; h: sub-step; h_sigma_0 =
-    h sigma_0; sigma_1_h = sigma_1 / h; sigma_0 [Nm/rad], sigma_1 [Nms/rad]: of the bristles.
+    h sigma_0; sigma_1_h = sigma_1 / h; sigma_0 [Nm/rad], sigma_1 [Nms/rad]: stiffness and damping
+    of the bristles.
 
     Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Automatic Control 40 (1995) 419.
     """
@@ -122,7 +123,8 @@ def swing(dish: Radians, omega_dish: RadiansPerSecond, theta: Radians, omega: Ra
           k: float, c: float, h: Seconds, h_J: float) -> tuple[Radians, RadiansPerSecond, NewtonMeters]:
     """Return angle and rate of the dish one sub-step h later, and its torque on the base.
 
-    theta, omega: of the base; torque: on the dish; k, c: see `spring_and_damper`; h_J = h / inertia of the dish.
+    theta, omega: angle and rate of the base; torque: on the dish; k, c: see `spring_and_damper`;
+    h_J = h / inertia of the dish.
     """
     twist = k * (dish - theta) + c * (omega_dish - omega)
     omega_dish += h_J * (torque - twist)

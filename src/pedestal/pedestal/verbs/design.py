@@ -64,7 +64,8 @@ def _samples(options: argparse.Namespace) -> int:
     options.folder.mkdir(parents=True, exist_ok=True)
     for name in SAMPLE_FILES:
         if (options.folder / name).exists():
-            raise FileExistsError(f'{options.folder / name} already exists and is not overwritten')
+            raise FileExistsError(f'{options.folder / name} already exists and is not overwritten, so give another '
+                                  'folder')
     for name in SAMPLE_FILES:
         (options.folder / name).write_bytes((importlib.resources.files('pedestal') / 'samples' / name).read_bytes())
     console.show_list((str(options.folder / name), text) for name, text in SAMPLE_FILES.items())
@@ -94,7 +95,7 @@ def _new(options: argparse.Namespace) -> int:
     if options.file.suffix not in ('.yaml', '.yml'):
         raise ValueError(f'{options.file}: must end in .yaml or .yml')
     if options.file.exists():
-        raise FileExistsError(f'{options.file} already exists and is not overwritten')
+        raise FileExistsError(f'{options.file} already exists and is not overwritten, so give another name')
     try:
         sheet = DataSheet(**{name: getattr(options, name) for name, _ in parameters.flatten(DataSheet)})
     except parameters.ParameterError as error:

@@ -16,8 +16,8 @@ DEFAULT_DEADLINE_S = 60.0  # longest wait of a replay for a subscriber or an ans
 
 
 def _add_verify(parser: argparse.ArgumentParser) -> None:
-    """Exit code 1, with a list of the gaps, for an incomplete recording. `pedestal recover` repairs that of a killed
-    run.
+    """Exit code 1, with a list of the gaps, for an incomplete recording. `pedestal recover` repairs the recording of
+    a killed run.
 
         pedestal verify my_bag
     """

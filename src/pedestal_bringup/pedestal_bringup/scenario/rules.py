@@ -207,7 +207,7 @@ def share(name: str, sections: Sections, header: ScenarioParameters, seed: int |
 
 def _share_scan(name: str, receiver: 'MonopulseParameters', latency: Seconds, values: dict[str, Value]) -> None:
     """Give the section `acu` the parameters that follow from a feed with one output: the noise of its errors, and the
-    time between them. latency: of the errors. Raises ScenarioError for a scan that is too slow."""
+    time between them. latency: age of the errors. Raises ScenarioError for a scan that is too slow."""
     # Imported late, because their laws take half a second to import.
     from acu_tracker.geometry.history import MAX_DELAY_STEPS
     from pedestal_hardware.monopulse import feed

@@ -43,7 +43,7 @@ def displacement(n: int, alpha: float) -> Floats:
 @functools.lru_cache(maxsize=8)
 def wiener(n: int, alpha: float, sigma: RadiansPerSecond2, noise: Radians) -> Floats:
     """Return the weights (2, n) of angle and rate [1/s], newest first, of the Wiener filter over n measurements; alpha
-    [1/s], sigma: of the acceleration."""
+    [1/s], sigma: those of the acceleration."""
     B = polynomial(n, degree=1)
     scaled = solve(sigma**2 * displacement(n, alpha) + noise**2 * np.eye(n), B, assume_a='pos')
     return np.linalg.solve(B.T @ scaled, scaled.T)

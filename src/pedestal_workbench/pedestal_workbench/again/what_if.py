@@ -120,7 +120,7 @@ def _ripple(t: Times, values: Floats, common: Times) -> Floats:
 
 @dataclasses.dataclass
 class TruthComparison:
-    """Estimate of an ACU, and pointing of the recorded antenna, against the recorded truth. run: of its Overlay."""
+    """Estimate of an ACU, and pointing of the recorded antenna, against the recorded truth. run: see Overlay."""
     acu: RecomputedAcu
     run: tracking.Tracking
 

@@ -72,7 +72,7 @@ def segment(path: str, first_line: int, table: Floats, frame: str, method: str, 
             begin: Seconds | None = None, end: Seconds | None = None) -> Segment:
     """Return a Segment of a table (n, 8) of line, t, x, y, z [m], vx, vy, vz [m/s]; (n, 5) without velocities.
 
-    first_line: of the segment; method, degree: '' and None if not given. Raises TableError.
+    first_line: that of the segment; method, degree: '' and None if not given. Raises TableError.
     """
     if not len(table):
         raise csv_table.TableError(f'{path}: line {first_line}: the segment that begins here has no state')

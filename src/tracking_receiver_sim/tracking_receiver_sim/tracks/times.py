@@ -37,7 +37,7 @@ class Times:
     last: Seconds | None        # time of the last row
 
     def __init__(self, table: csv_table.Table, wanted: columns.Quantity, unit: str = '') -> None:
-        """Find the column. Raises TableError. unit: of its values; '': that which its name states."""
+        """Find the column. Raises TableError. unit: unit of its values; '': the one that its name states."""
         self.table, self.date, self.dated = table, _date(table.fieldnames, wanted), None
         unit = units.UTC if self.date else unit
         column = table.column(wanted, without=self.date)
