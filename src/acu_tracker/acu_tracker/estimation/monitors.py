@@ -19,7 +19,7 @@ follows the manoeuvres of its target badly: both means are then large, while a d
 largest recent value counts, because after the beam has left the target the errors are only noise.
 
 No mean counts the errors after a gap longer than `coast_after`, until one of them is accepted. Their innovations show
-how far the target has turned in the gap, in which the loop was not closed on errors.
+how far the target has turned in the gap, in which the loop was not closed on errors. Then n and g begin again.
 
 Roughness: errors that are only noise change far more from one to the next than the model expects. The mean q of both
 axes is 1 for white noise of the variance R by the model of the receiver:
@@ -110,6 +110,12 @@ target."""
 def restart_divergence(state: Divergence) -> None:
     """Set means and growth to 1 when a mode begins."""
     state.m = state.n = state.N = state.g = 1.0
+
+
+@compiled
+def restart_growth(state: Divergence) -> None:
+    """Set the short mean and the growth to 1 after a gap."""
+    state.n = state.g = 1.0
 
 
 @compiled

@@ -122,6 +122,8 @@ def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, out
         # gap: time without errors before this one and the gated ones before it.
         gap = measurement.stamp - tracking.target.stamp - tracking.target.gated_in_a_row * constants.p.period
         counts = follows and gap <= params.coast_after
+        if gap > params.coast_after:
+            monitors.restart_growth(tracking.divergence)
         outcome, innovation = gate(tracking.target, params, constants.target, measurement, restart_gap)
         if outcome != OUTCOME_STALE:
             _follow_with_frame(tracking.target, constants.target)
