@@ -144,3 +144,25 @@ def test_brakes_that_drag_on_a_slew_are_told(onset):
         *TO_270_DEG, f'adu.inject={onset} brake_stuck axis=azimuth state=on'], duration=1.3))
     loop.run()
     assert 'azimuth brake not released' in raised(loop.units['acu'])
+
+
+DRAG = ['acu.initial_mode=preset', 'acu.azimuth.preset=4.0', 'adu.initial_azimuth=0.0', 'adu.initial_elevation=0.7',
+        'acu.azimuth.shaper.rate=0.1']
+
+
+@pytest.mark.parametrize(('brake', 'expected'), ((28.6, True), (18.7, False)))
+def test_brakes_that_drag_with_61_times_the_friction_are_told(brake, expected):
+    """The brakes of both motors hold 128 Nm of load torque per Nm: 61 and 40 times the friction of 60 Nm."""
+    loop = closed_loop.Loop(scenario.load('leo_pass', [
+        *DRAG, *(f'adu.azimuth.motor_{i}.brake={brake}' for i in (1, 2)),
+        'adu.inject=1 brake_stuck axis=azimuth state=on'], duration=13.0))
+    loop.run()
+    assert ('azimuth brake not released' in raised(loop.units['acu'])) == expected
+
+
+@pytest.mark.parametrize(('name', 'rate'), (('leo_pass', 0.002), ('station_real', 0.002), ('station_real', 0.1)))
+def test_an_axis_that_loses_its_commands_on_a_ramp_is_told(name, rate):
+    loop = closed_loop.Loop(scenario.load(name, [*DRAG[:-1], f'acu.azimuth.shaper.rate={rate}',
+                                                 'adu.inject=3 drop duration=5'], duration=8.0))
+    loop.run()
+    assert raised(loop.units['acu']) == {'azimuth following error'}

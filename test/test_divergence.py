@@ -106,6 +106,34 @@ def test_a_gust_of_4000_nm_on_both_axes_is_no_end_of_autotrack():
     assert done['acu/mode'][-1] == Mode.AUTOTRACK and off(done)[-200:].max() < 0.02
 
 
+@pytest.mark.parametrize('depth', [20, 30, 60])
+def test_a_fade_of_a_target_that_is_tracked_is_no_divergence(depth):
+    """The noise grows before the published C/N0 falls."""
+    fades = '; '.join(f'{at} fade depth={depth} duration=1' for at in range(4, 16, 2))
+    loop = closed_loop.Loop(scenario.load('station_real', [f'tracking_receiver.inject={fades}'], seed=1,
+                                          duration=17.0))
+    done = loop.run()
+    assert done['acu/mode'][-1] == Mode.AUTOTRACK and loop.units['acu'].faults == ()
+    assert off(done)[done.t > 4.0].max() < 0.1
+
+
+TURNING = ['acu.elevation.preset=0.6', 'adu.initial_elevation=0.6', 'adu.initial_azimuth=0',
+           'tracking_receiver.target.kind=sine', 'tracking_receiver.target.angle.azimuth_amplitude=0.1',
+           'tracking_receiver.target.angle.elevation_amplitude=0', 'tracking_receiver.target.angle.frequency=0.1',
+           'scenario.program.azimuth_offset=0', 'scenario.program.elevation_offset=0', 'adu.mount.tilt_forward=7e-4']
+
+
+@pytest.mark.parametrize('kind', ['current_statistical', 'cv'])
+def test_a_target_that_turns_in_a_fade_is_no_divergence(kind):
+    """The filter has no model of the turn. The first errors after the fade differ from its prediction."""
+    fades = '; '.join(f'{at + 0.231} fade depth=60 duration=0.6' for at in range(8, 23, 4))
+    loop = closed_loop.Loop(scenario.load('uav_flyby', [
+        *TURNING, *(f'acu.{axis}.filter.kind={kind}' for axis in ('azimuth', 'elevation')),
+        f'tracking_receiver.inject={fades}'], seed=1, duration=24.0))
+    loop.run()
+    assert loop.units['acu'].faults == ()
+
+
 @pytest.mark.parametrize('delay', [0.07, 0.1])
 def test_the_loop_is_slowed_with_a_command_that_comes_late(delay):
     done = run(f'adu.transport_delay={delay}')

@@ -108,6 +108,23 @@ def test_who_does_not_obey_is_told_from_then_on_by_smaller_commands():
     assert not detectors.immobile(d, -0.001, -0.003, -0.01)
 
 
+def test_restarts_of_the_reference_do_not_hide_that_an_axis_stands():
+    """Each restart removes 0.5 mrad; a quarter of a beamwidth is 4.4 mrad."""
+    d, beamwidth = detector(), 0.0175
+    for restarts in range(1, 12):
+        assert detectors.immobile(d, 0.0, 0.006, 0.006)
+        detectors.following_error(d, detectors.hide_error(d, 5e-4, T), beamwidth)
+        assert not detectors.immobile(d, 0.0, 0.0, 0.0)
+        behind = detectors.following_error(d, detectors.hide_error(d, 0.0, T), beamwidth)
+        assert behind == (restarts * 5e-4 > 0.25 * beamwidth)
+    assert not detectors.immobile(d, 0.003, 0.003, 0.003)
+    assert detectors.hide_error(d, 0.0, T) == 0.0
+    d['hidden'] = 1e-3
+    for _ in range(round(detectors.HIDDEN_ERROR_TIME_CONSTANT_S / T)):
+        hidden = detectors.hide_error(d, 0.0, T)
+    assert hidden == pytest.approx(1e-3 / math.e, rel=1e-2)
+
+
 @pytest.mark.parametrize(('dy', 'high', 'low', 'expected'), (
     (0.1, 0.0, -0.1, True), (-0.1, 0.1, 0.0, True), (0.1, 0.1, 0.0, False), (0.1, 0.0, 0.0, False),
     (0.01, 0.0, -0.1, False), (-0.1, 0.1, -0.1, False)))
@@ -203,6 +220,21 @@ def test_an_axis_whose_brakes_drag_is_found_also_where_it_turns_back():
     assert found[80:].all() and not found[:40].any()
     found = not_released(d, np.zeros(60), np.zeros(60), 0.0, 0.0)
     assert not found[-1] and not not_released(d, [np.nan], [0.0], 0.0, 0.0).any()
+
+
+@pytest.mark.parametrize(('ratio', 'expected'), ((61.0, True), (45.0, False)))
+def test_brakes_that_drag_below_what_a_gust_can_do_are_found_after_10_s(ratio, expected):
+    rates = np.full(2400, 0.05)
+    found = not_released(detector(), ratio * FORWARD.friction * np.sign(rates), rates, 0.05, 0.05)
+    assert found[-1] == expected and not found[:2000].any()
+    rates = 0.1 * np.sin(2.0 * np.pi * T * np.arange(3000) / 6.0)
+    found = not_released(detector(), ratio * FORWARD.friction * np.clip(300.0 * rates, -1.0, 1.0), rates, 0.1, -0.1)
+    assert found[-200:].any() == expected and not found[:2000].any()
+
+
+def test_a_wind_of_that_torque_helps_an_axis_that_turns_back():
+    rates = 0.1 * np.sin(2.0 * np.pi * T * np.arange(8000) / 6.0)
+    assert not not_released(detector(), np.full(8000, 61.0 * FORWARD.friction), rates, 0.1, -0.1).any()
 
 
 @pytest.mark.parametrize(('torque', 'command', 'expected'), (

@@ -6,12 +6,27 @@ import pytest
 from scipy.signal import lfilter
 
 from acu_tracker.estimation import monitors
-from acu_tracker.estimation.filters.measurement import NO_INNOVATION, AxisInnovation, Innovation
+from acu_tracker.estimation.filters.measurement import (
+    NO_INNOVATION,
+    AxisInnovation,
+    AxisMeasurement,
+    Innovation,
+    Measurement,
+)
 
 
 def innovation(chi_square):
     axis = AxisInnovation(math.sqrt(chi_square), 1.0, chi_square, math.nan, math.nan)
     return Innovation((axis, axis), math.nan, math.nan)
+
+
+R = 0.5
+"""Variance of an error, of an innovation with the variance 1."""
+
+
+def take(state, innovation, q=1.0):
+    axis = AxisMeasurement(0.0, R, math.nan, math.nan)
+    monitors.take_divergence(state, innovation, Measurement(0.0, (axis, axis), math.nan, math.nan), q)
 
 
 @pytest.fixture
@@ -26,26 +41,47 @@ def test_mean(state):
     a = 1.0 / monitors.DIVERGENCE_ERROR_COUNT
     expected, _ = lfilter([a], [1.0, a - 1.0], np.minimum(x, monitors.MAX_COUNTED_ERROR), zi=[1.0 - a])
     for value, mean in zip(x, expected):
-        monitors.take_divergence(state, innovation(value))
-        monitors.take_divergence(state, NO_INNOVATION)
+        take(state, innovation(value))
+        take(state, NO_INNOVATION)
         assert state['m'] == pytest.approx(mean, rel=1e-12)
 
 
 def test_a_burst_of_interference_is_not_held_against_the_filter(state):
     for _ in range(20):
-        monitors.take_divergence(state, innovation(1e6))
+        take(state, innovation(1e6))
     assert not monitors.diverges(state, False)
 
 
-@pytest.mark.parametrize('without_signal, errors', [(False, 74), (True, 10)])
+@pytest.mark.parametrize('without_signal, errors', [(False, 74), (True, 4)])
 def test_it_stays_until_it_is_reset(state, without_signal, errors):
-    """m = 1 + 11.5 (1 - 0.99^n) passes 7 with the 74th error that counts 12.5, and 2 with the 10th."""
+    """m = 1 + 11.5 (1 - 0.99^k) passes 7 with the 74th error that counts 12.5. The growth is 1.81 with the 4th:
+    1 + 11.5 (1 - 0.98^k) over 1 + 11.5 (1 - 0.999^k)."""
     for _ in range(errors):
         assert not monitors.diverges(state, without_signal)
-        monitors.take_divergence(state, innovation(100.0))
+        take(state, innovation(100.0))
     assert monitors.diverges(state, without_signal) and not state['diverged']
     monitors.latch_divergence(state)
     monitors.restart_divergence(state)
     assert not monitors.diverges(state, without_signal) and state['diverged'] and state['m'] == 1.0
     monitors.release_divergence(state)
     assert not state['diverged']
+
+
+@pytest.mark.parametrize('noise, known, lost', [(1.0, 1.0, False), (8.0, 8.0, False), (8.0, 1.0, True)])
+def test_noise_that_the_roughness_shows_is_no_divergence(state, noise, known, lost):
+    """White innovations of the variance S + (noise - 1) R, while the roughness q is `known`."""
+    chi_squares = (1.0 + (noise - 1.0) * R) * np.random.default_rng(2).chisquare(1, 300)
+    for value in chi_squares:
+        take(state, innovation(value), known)
+    assert monitors.diverges(state, True) == lost and not monitors.diverges(state, False)
+
+
+@pytest.mark.parametrize('usual, lost', [(1.0, True), (3.0, False)])
+def test_a_filter_that_follows_badly_since_long_has_not_diverged(state, usual, lost):
+    """The innovations are `usual` for 10 s, then 4.5 times their variance for 0.25 s; a growth decays in 0.5 s."""
+    for value in [usual] * 2000 + [4.5] * 50:
+        take(state, innovation(value))
+    assert monitors.diverges(state, True) == lost
+    for _ in range(500):
+        take(state, innovation(usual))
+    assert not monitors.diverges(state, True)

@@ -92,10 +92,11 @@ def _of_motors(axis: detectors.AxisDetectors, i: int, inputs: Inputs, envelope: 
 @compiled
 def _of_loop(axis: detectors.AxisDetectors, i: int, e: Radians, outputs: Outputs, facts: Facts) -> int:
     """Return the bits of the alarms of axis i that follow from its following error e and its limits."""
-    # The following error does not count while the command is limited in rate or acceleration.
+    # The following error does not count while the command is limited in rate or acceleration; its hidden part does.
     limited = outputs.rate_limited[i] or outputs.acceleration_limited[i]
+    total = detectors.hide_error(axis, e, facts.dt) + (0.0 if limited else e)
     bits = Bit.AZIMUTH_AT_LIMIT * (outputs.angle_limited[i] != 0)
-    bits |= Bit.AZIMUTH_FOLLOWING_ERROR * detectors.following_error(axis, 0.0 if limited else e, facts.beamwidth)
+    bits |= Bit.AZIMUTH_FOLLOWING_ERROR * detectors.following_error(axis, total, facts.beamwidth)
     bits |= Bit.AZIMUTH_OSCILLATION * detectors.oscillation(axis, e, facts.dt)
     return bits << i
 

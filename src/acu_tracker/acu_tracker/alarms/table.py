@@ -88,7 +88,7 @@ ALARM_ROWS = (
     Alarm('* brake not released', 'high', 0.3, 1.0, False, (),
           'the motors push against a brake or an obstacle: their mean torque is above 50 times the Coulomb friction '
           '(`feedforward.friction`). For half a second the axis has stood in spite of its command, or has moved only '
-          'with 80 times the friction. Torque against a gust does not count',
+          'with 80 times the friction, or for 10 s with 50 times the friction. Torque against a gust does not count',
           'go to standby; inspect the brakes; check for an obstacle that blocks the axis', 'moving'),
     Alarm('* immobile', 'high', 0.3, 1.0, False,
           ('drive silent', 'drive frozen', '* brake not released', '* motor lost'),
@@ -115,7 +115,8 @@ ALARM_ROWS = (
     Alarm('* following error', 'medium', 1.0, 1.0, False,
           ('drive silent', 'time jump', 'drive frozen', '* motor lost', '* encoder jump', '* encoder stuck',
            '* encoder disagreement', '* brake not released', '* immobile', '* runaway', '* oscillation'),
-          'the axis is more than a quarter of a beamwidth off its reference, and its command is not limited',
+          'the axis is more than a quarter of a beamwidth off its reference, and its command is not limited. The '
+          'errors of an axis that stands in spite of its commands add up',
           'check wind, motors and friction; choose a slower motion', 'moving'),
     Alarm('* at limit', 'low', 1.0, 1.0, False, (),
           'the reference is beyond the limits of the axis or below the floor; the axis holds at the limit',
@@ -131,9 +132,9 @@ ALARM_ROWS = (
           ('INS lost', '* encoder jump', '* encoder stuck', '* encoder disagreement', '* immobile',
            '* following error'),
           'the estimate departs from the target. In autotrack the mean of the last 100 squared innovations, divided '
-          'by their variance, exceeds 7 (2 at a loss of signal), or the receiver errors move with the beam '
-          'as with a reversed sign or turned axes. The ACU enters `program`, or `standby` without a program, and '
-          'refuses autotrack until a reset of the alarm',
+          'by their variance, exceeds 7, or at a loss of signal the mean of the last 50 exceeds 1.75 times that of '
+          'the last 1000, or the receiver errors move with the beam as with a reversed sign or turned axes. The ACU '
+          'enters `program`, or `standby` without a program, and refuses autotrack until a reset of the alarm',
           "check slope, phase and sign of the receiver's error signals; then reset the alarm"),
     Alarm('signal lost', 'medium', 0.5, 1.0, False,
           ('emergency stop', 'drive silent', 'time jump', 'receiver silent', 'INS lost', 'INS jump', 'receiver noisy',

@@ -6,8 +6,20 @@ innovations nu of both angles are as large as the filter expects by their varian
     m = mean over the last errors of (nu_A^2 / S_A + nu_E^2 / S_E) / 2
 
 An error signal with the wrong sign, with rotated axes or with a gain three times too high drives the antenna away from
-its target. Then m becomes large before the beam leaves the target, and it is still large when the signal is lost. In
-this case autotrack must not coast on the wrong estimate.
+its target. Then m becomes large before the beam leaves the target. If the signal is lost before m is large enough,
+autotrack must not coast on the wrong estimate. A shorter mean n and a longer mean N tell such a loss from a fade:
+
+    n, N = means over the last errors of (nu_A^2 / V_A + nu_E^2 / V_E) / 2,    V = S + max(q - 1, 0) R
+    growth g = largest recent n / max(N, 1)
+
+The second term of V is noise that the model of the receiver does not contain, with q and R of the roughness below.
+In a fade the noise of the errors grows before the published C/N0 falls, and without this term the noise would look
+like a divergence. An estimate that moves away does so smoothly, with a q near 1. The ratio to N excuses a filter that
+follows the manoeuvres of its target badly: both means are then large, while a divergence takes less time than N. The
+largest recent value counts, because after the beam has left the target the errors are only noise.
+
+No mean counts the errors after a gap longer than `coast_after`, until one of them is accepted. Their innovations show
+how far the target has turned in the gap, in which the loop was not closed on errors. Then n and g begin again.
 
 Roughness: errors that are only noise change far more from one to the next than the model expects. The mean q of both
 axes is 1 for white noise of the variance R by the model of the receiver:
@@ -67,6 +79,9 @@ from pedestal_common.record import Record
 class Divergence(Record):
     """State of the detection."""
     m: float        # the mean [-]
+    n: float        # the shorter mean, without unknown noise [-]
+    N: float        # the longer mean, without unknown noise [-]
+    g: float        # the growth [-]
     diverged: Bit   # 1 from the detection of a divergence until its reset
 
 
@@ -80,28 +95,50 @@ DIVERGENCE_LIMIT = 7.0
 """Largest m of a filter that still follows its target [-]. A filter without an acceleration state reaches 6.1 on a
 target that reverses its motion, and keeps it in the beam."""
 
-COASTING_DIVERGENCE_LIMIT = 2.0  # largest m [-] with which the filter may coast after a loss without a known cause
+SHORT_ERROR_COUNT, LONG_ERROR_COUNT = 50, 1000
+"""Numbers of errors in n and N: 0.25 s and 5 s. Most divergences take 0.2 to 1 s."""
+
+GROWTH_ERROR_COUNT = 100  # number of errors in which the part of g above 1 decays: those between divergence and loss
+
+COASTING_GROWTH_LIMIT = 1.75
+"""Largest g [-] with which the filter may coast after a loss without a known cause. In closed loops g was at least 2.0
+at a loss by wrong errors, and at most 1.5 at a fade of 15 to 60 dB, also with filters that cannot follow their
+target."""
 
 
 @compiled
 def restart_divergence(state: Divergence) -> None:
-    """Set m to 1 when a mode begins."""
-    state.m = 1.0
+    """Set means and growth to 1 when a mode begins."""
+    state.m = state.n = state.N = state.g = 1.0
 
 
 @compiled
-def take_divergence(state: Divergence, innovation: Innovation) -> None:
-    """Add the innovation of an error to the mean m; an innovation of NaN is ignored."""
-    # The comparison of x with itself is False for NaN.
-    x = 0.5 * (innovation.axis[0].chi_square + innovation.axis[1].chi_square)
-    if x == x:
+def restart_growth(state: Divergence) -> None:
+    """Set the short mean and the growth to 1 after a gap."""
+    state.n = state.g = 1.0
+
+
+@compiled
+def take_divergence(state: Divergence, innovation: Innovation, measurement: Measurement, q: float) -> None:
+    """Add the innovation of a measurement to the means; an innovation of NaN is ignored. q: roughness."""
+    # x, y: share of the innovation in m, and in n and N.
+    x = y = 0.0
+    for i in range(2):
+        axis = innovation.axis[i]
+        x += 0.5 * axis.chi_square
+        y += 0.5 * axis.nu * axis.nu / (axis.S + max(q - 1.0, 0.0) * measurement.axis[i].variance)
+    if x == x:  # not NaN
+        y = min(y, MAX_COUNTED_ERROR)
         state.m += (min(x, MAX_COUNTED_ERROR) - state.m) / DIVERGENCE_ERROR_COUNT
+        state.n += (y - state.n) / SHORT_ERROR_COUNT
+        state.N += (y - state.N) / LONG_ERROR_COUNT
+        state.g = max(state.n / max(state.N, 1.0), state.g + (1.0 - state.g) / GROWTH_ERROR_COUNT)
 
 
 @compiled
 def diverges(state: Divergence, without_signal: Bit) -> bool:
     """Return True if the filter has diverged; without_signal: it coasts without a known cause of the loss."""
-    return state.m > (COASTING_DIVERGENCE_LIMIT if without_signal else DIVERGENCE_LIMIT)
+    return state.m > DIVERGENCE_LIMIT or without_signal != 0 and state.g > COASTING_GROWTH_LIMIT
 
 
 @compiled

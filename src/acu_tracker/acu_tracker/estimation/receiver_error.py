@@ -118,12 +118,17 @@ def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, out
     outcome, innovation = OUTCOME_NO_ATTITUDE, NO_INNOVATION
     known, deck = attitude.at(tracking.attitude, constants.p, inputs.error_stamp - receiver.age)
     if known:
-        outcome, innovation = gate(tracking.target, params, constants.target,
-                                   _measure(tracking, constants, inputs, at, measured, deck), restart_gap)
+        measurement = _measure(tracking, constants, inputs, at, measured, deck)
+        # gap: time without errors before this one and the gated ones before it.
+        gap = measurement.stamp - tracking.target.stamp - tracking.target.gated_in_a_row * constants.p.period
+        counts = follows and gap <= params.coast_after
+        if gap > params.coast_after:
+            monitors.restart_growth(tracking.divergence)
+        outcome, innovation = gate(tracking.target, params, constants.target, measurement, restart_gap)
         if outcome != OUTCOME_STALE:
             _follow_with_frame(tracking.target, constants.target)
-    if outcome != OUTCOME_NOISY and follows:
-        monitors.take_divergence(tracking.divergence, innovation)
+        if outcome != OUTCOME_NOISY and counts:
+            monitors.take_divergence(tracking.divergence, innovation, measurement, tracking.target.roughness.q)
     if closed and known and monitors.shows_slope(inputs, receiver.beamwidth):
         _watch_slope(tracking, params, inputs, at, deck.mat)
     return _write_innovation(outputs, outcome, innovation)
