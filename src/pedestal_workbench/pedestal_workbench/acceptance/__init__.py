@@ -1,0 +1,13 @@
+"""Acceptance of an antenna: a specification is measured, requirement by requirement, and becomes a report to be signed.
+
+    specification   what the contract requires: a method with its arguments, a limit, repetitions, a confidence
+    procedures      the table of the methods: what each excites and measures, its unit and its arguments
+    exercise        what a method makes the antenna do, and the recording of it
+    motions         exercises of the methods, made for the limits of an antenna
+    measures        numbers from the recording of an exercise
+    in_loop         performs an exercise in the closed loop, in memory
+    on_graph        performs an exercise on nodes, through acu/command, as an operator does
+    sequence        all requirements in order; continues where it stopped
+    judgement       value, uncertainty and verdict of a requirement
+    document        report: HTML, PDF, JSON, JUnit XML
+"""

@@ -1,0 +1,87 @@
+"""Exercise: what a method of acceptance makes the antenna do, and what is known after it was performed.
+
+A performer makes an exercise in the closed loop (in_loop) or on nodes (on_graph). Both execute the same commands, and
+both return a recording with the same topics, so that every measure is the same law for both.
+"""
+import dataclasses
+import pathlib
+from collections.abc import Mapping
+from typing import NamedTuple, Protocol
+
+from acu_tracker.params import AcuParameters
+from drive_law.params import AduParameters
+from pedestal_common.quantities import Degrees, DegreesPerSecond, Json, Pairs, Radians, Seconds, Times
+from pedestal_recording.recording import Recording
+
+
+class Antenna(NamedTuple):
+    """What methods need to know of an antenna."""
+    acu: AcuParameters
+    adu: AduParameters | None       # None: the drive is not simulated, and its parameters are unknown
+    beamwidth: Radians
+    period: Seconds                 # of a step
+
+
+class Action(NamedTuple):
+    """Command to a node during an exercise."""
+    at: Seconds     # since the begin of the exercise
+    node: str       # which executes it: acu; adu for a request of the drive; a node of injection.table for a fault
+    command: str    # text 'COMMAND name=value ...'
+
+
+class Track(NamedTuple):
+    """Program track, which the performer loads before the first action."""
+    t: Times        # since the begin of the exercise
+    angles: Pairs   # earth azimuth and elevation [rad]
+
+
+class Span(NamedTuple):
+    """Safe envelope of an axis."""
+    low: Degrees
+    high: Degrees
+    rate: DegreesPerSecond      # largest absolute rate
+
+
+@dataclasses.dataclass(frozen=True)
+class Exercise:
+    """What a method makes the antenna do."""
+    duration: Seconds
+    envelope: tuple[Span, Span]                     # of azimuth and elevation, encoder angles; outside it: stop
+    actions: tuple[Action, ...] = ()                # in order of their times
+    start: tuple[Radians, Radians] | None = None    # encoder angles at which the antenna rests before; None: the
+                                                    # antenna follows the target of its scenario from the begin
+    track: Track | None = None
+    changes: Mapping[str, Json] = dataclasses.field(default_factory=dict)   # {'node.key': value} of simulated nodes
+    alarms: tuple[str, ...] = ()                    # names of alarms that belong to it; any other ends the sequence
+
+
+class Executed(NamedTuple):
+    """An action with its outcome."""
+    t: Seconds      # time of its execution, since the begin
+    action: Action
+    granted: bool
+    reply: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Performed:
+    """A performed exercise."""
+    antenna: Antenna
+    exercise: Exercise
+    recording: Recording
+    begin: Seconds                  # stamp of the begin, in the time of the recording
+    executed: tuple[Executed, ...]
+    bag: pathlib.Path | None = None     # None: in memory
+
+
+class Performer(Protocol):
+    """Makes exercises with one antenna."""
+    antenna: Antenna
+
+    def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
+        """Make an exercise. name: of its recording. Raises StoppedError."""
+
+
+class StoppedError(Exception):
+    """The antenna was stopped: by an alarm, outside the envelope, by an operator, or because a node is silent. The
+    text states the reason."""
