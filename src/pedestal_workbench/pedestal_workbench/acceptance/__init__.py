@@ -1,7 +1,7 @@
-"""Acceptance of an antenna: a specification is measured, requirement by requirement, and becomes a report to be signed.
+"""Acceptance: a specification is measured, requirement by requirement, and becomes a report that is signed.
 
     specification   what the contract requires: a method with its arguments, a limit, repetitions, a confidence
-    procedures      the table of the methods: what each excites and measures, its unit and its arguments
+    methods      the table of the methods: what each excites and measures, its unit and its arguments
     exercise        what a method makes the antenna do, and the recording of it
     motions         exercises of the methods, made for the limits of an antenna
     measures        numbers from the recording of an exercise

@@ -2,14 +2,14 @@
 from typing import NamedTuple
 
 from pedestal_results.intervals import Target
-from pedestal_workbench.acceptance.procedures import Arguments, Procedure
+from pedestal_workbench.acceptance.methods import Arguments, Method
 
 
 class Requirement(NamedTuple):
     """A requirement of a specification."""
     name: str               # unique in the specification
-    procedure: Procedure
-    arguments: Arguments    # of the procedure, checked, with defaults
+    method: Method
+    arguments: Arguments    # of the method, checked, with defaults
     limit: Target
     repetitions: int
     confidence: float       # level of the interval of the value [-]

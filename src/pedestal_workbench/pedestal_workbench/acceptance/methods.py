@@ -14,8 +14,8 @@ class Measured(NamedTuple):
     uncertainty: float      # half width of its interval of 95 % from this exercise alone, 0 if not known
 
 
-class Procedure(NamedTuple):
-    """Row of PROCEDURES: a method of acceptance."""
+class Method(NamedTuple):
+    """Row of METHODS: a method of acceptance."""
     name: str
     doc: str                            # what it excites and what it measures, in one sentence
     unit: str                           # of the measured value
@@ -26,4 +26,4 @@ class Procedure(NamedTuple):
     simulated: bool = False             # needs a simulated node, into which faults can be injected
 
 
-PROCEDURES: tuple[Procedure, ...] = ()
+METHODS: tuple[Method, ...] = ()
