@@ -1,10 +1,9 @@
 """Acceptance: a specification is measured, requirement by requirement, and becomes a report that is signed.
 
     specification   what the contract requires: a method with its arguments, a limit, repetitions, a confidence
-    methods      the table of the methods: what each excites and measures, its unit and its arguments
+    methods         the table of the methods: what each excites and measures, its unit and its arguments
     exercise        what a method makes the antenna do, and the recording of it
-    motions         exercises of the methods, made for the limits of an antenna
-    measures        numbers from the recording of an exercise
+    servo, margins, tracking, safety    methods by subject: their exercises, and their numbers from recordings
     in_loop         performs an exercise in the closed loop, in memory
     on_graph        performs an exercise on nodes, through acu/command, as an operator does
     sequence        all requirements in order; continues where it stopped

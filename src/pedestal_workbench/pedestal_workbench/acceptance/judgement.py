@@ -1,7 +1,7 @@
 """Judgement of a requirement: value, uncertainty and verdict."""
 from typing import NamedTuple
 
-from pedestal_workbench.acceptance.methods import Measured
+from pedestal_workbench.acceptance.method import Measured
 
 PASSED, INCONCLUSIVE, FAILED = 1.0, 0.5, 0.0    # verdicts, as in the rows of --json
 

@@ -2,7 +2,7 @@
 from typing import NamedTuple
 
 from pedestal_results.intervals import Target
-from pedestal_workbench.acceptance.methods import Arguments, Method
+from pedestal_workbench.acceptance.method import Arguments, Method
 
 
 class Requirement(NamedTuple):
