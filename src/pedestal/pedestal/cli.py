@@ -33,6 +33,7 @@ VERBS = {
     'ask': ('operate', 'send a command to a running node'),
     'operate': ('operate', 'operate a running antenna by hand on this terminal'),
     'station': ('station', 'take the passes of a plan on a running antenna, one after another'),
+    'acceptance': ('acceptance', 'test an antenna against a specification, and write the report of its acceptance'),
     'live': ('operate', 'show a running graph in Foxglove or Lichtblick'),
     'program': ('operate', 'send a table of times and angles (program track) of a scenario to a running ACU'),
     'plan': ('plan', 'plan a night of passes: which satellites the antenna tracks, when, and what it will lose'),
