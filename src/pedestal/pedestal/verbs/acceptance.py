@@ -1,5 +1,6 @@
 """Verb `acceptance`: an antenna is measured against a specification, and its report is written."""
 import argparse
+import contextlib
 import datetime
 import inspect
 import pathlib
@@ -12,6 +13,8 @@ from pedestal.verbs import arguments
 from pedestal.verbs.arguments import Verb
 
 if typing.TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from pedestal_workbench.acceptance.exercise import Exercise, Performer
     from pedestal_workbench.acceptance.sequence import Kept
     from pedestal_workbench.acceptance.specification import Specification
@@ -64,39 +67,42 @@ def _acceptance(options: argparse.Namespace) -> int:
     spec = specification.read(options.specification)
     spec = spec._replace(tester=options.tester or spec.tester)
     folder = options.output or pathlib.Path(f'acceptance-{options.specification.stem}')
-    performer = _performer(options, folder)
-    _confirm(options, spec, spec.exercises(performer.antenna))
-    folder.mkdir(parents=True, exist_ok=True)
     results: list[Kept] = []
     stopped, code = '', console.EXIT_ERROR
-    with console.progress_of_share() as progress:
-        def report(kept: 'Kept') -> None:
-            results.append(kept)
-            progress(len(results) / len(spec.requirements), kept.name)
-            print(document.line(spec, kept))
-        try:
-            sequence.run(spec, performer, folder, options.seed, report)
-        except StoppedError as error:
-            stopped = str(error)
-        except KeyboardInterrupt:
-            stopped, code = 'by an operator', stop.STOP_EXIT_CODE
-    made = datetime.datetime.now(datetime.timezone.utc)
-    acceptance = document.Acceptance(spec, results, performer.antenna, _source(options), options.command, made,
-                                     stopped)
-    for path in document.write(acceptance, folder):
-        print(path)
-    console.write_json(options.json, document.json_content(acceptance))
-    print(acceptance.verdict)
+    with _performer(options, folder) as performer:
+        _confirm(options, spec, spec.exercises(performer.antenna))
+        with console.progress_of_share() as progress:
+            def report(kept: 'Kept') -> None:
+                results.append(kept)
+                progress(len(results) / len(spec.requirements), kept.name)
+                print(document.line(spec, kept))
+            try:
+                sequence.run(spec, performer, folder, options.seed, report)
+            except StoppedError as error:
+                stopped = str(error)
+            except KeyboardInterrupt:
+                stopped, code = 'an operator stopped it', stop.STOP_EXIT_CODE
+    now = datetime.datetime.now(datetime.timezone.utc)
+    found = document.Acceptance(spec, results, performer.antenna, _source(options), options.command, now, stopped)
+    print(*document.write(found, folder), sep='\n')
+    console.write_json(options.json, document.json_content(found))
+    print(found.verdict)
     if stopped:
         print(f'pedestal: stopped: {stopped}; the same command continues the sequence', file=sys.stderr)
         return code
-    return 0 if acceptance.passed else console.EXIT_FAILED_RUN
+    return 0 if found.passed else console.EXIT_FAILED_RUN
 
 
-def _performer(options: argparse.Namespace, folder: pathlib.Path) -> 'Performer':
-    """Return the performer of the options."""
-    from pedestal_workbench.acceptance.in_loop import InLoop
-    return InLoop(arguments.variant(options))
+def _performer(options: argparse.Namespace, folder: pathlib.Path) -> 'AbstractContextManager[Performer]':
+    """Return the performer of the options as a context."""
+    from pedestal_workbench.acceptance import in_loop
+    if options.closed_loop:
+        return contextlib.nullcontext(in_loop.InLoop(arguments.variant(options)))
+    if options.scenario:
+        from pedestal_workbench.acceptance.own_graph import OwnGraph
+        return OwnGraph(arguments.variant(options), folder)
+    from pedestal_workbench.acceptance.running_graph import RunningGraph
+    return RunningGraph(folder)
 
 
 def _source(options: argparse.Namespace) -> str:
