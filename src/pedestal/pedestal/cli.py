@@ -23,7 +23,7 @@ if typing.TYPE_CHECKING:
 VERBS = {
     'run': ('run', 'run a scenario as separate nodes and record it'),
     'scenarios': ('design', 'list the scenarios that come with this package'),
-    'samples': ('design', 'write sample files: a flight log, a ship log, a satellite, an antenna'),
+    'samples': ('design', 'write sample files: flight, ship, satellites, an antenna, specifications of acceptance'),
     'new': ('design', 'write a scenario of your own antenna from the numbers of its data sheet'),
     'parameters': ('design', 'list the parameters of a node: default, range, unit, meaning'),
     'status': ('operate', 'print the state of a running antenna'),

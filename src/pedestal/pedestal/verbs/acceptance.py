@@ -131,7 +131,8 @@ def _confirm(options: argparse.Namespace, spec: 'Specification', exercises: 'Seq
         return
     if not sys.stdin.isatty():
         raise ValueError('--yes: must be given without a terminal, to confirm the motions above')
-    if input('Move the antenna as stated? yes or no: ').strip().lower() != 'yes':
+    print('Move the antenna as stated? yes or no: ', end='', flush=True)
+    if sys.stdin.readline().strip().lower() != 'yes':
         raise ValueError('the motions were not confirmed; nothing has moved')
 
 

@@ -3,6 +3,7 @@ import collections
 import dataclasses
 import hashlib
 import html
+import json
 import math
 import pathlib
 import tempfile
@@ -94,7 +95,7 @@ def verdict(kept: Kept | None) -> str:
 def measured(requirement: Requirement, kept: Kept | None) -> tuple[str, str, str]:
     """Return value, uncertainty and limit of a requirement in words."""
     def text(number: str) -> str:
-        return f'{number} {requirement.method.unit}'.rstrip()
+        return f'{number} {requirement.method.unit}'.removesuffix(' 1').rstrip()
     limit = text(requirement.limit.text)
     if kept is None:
         return '', '', limit
@@ -304,11 +305,11 @@ def pdf(content: Sequence[Block], title: str, made: datetime) -> bytes:
 
 
 def write(acceptance: Acceptance, folder: pathlib.Path) -> list[pathlib.Path]:
-    """Write report.html, report.pdf and report.xml into a folder, and return their paths."""
+    """Write the report into a folder as HTML, PDF, JSON and JUnit XML, and return the paths."""
     title = acceptance.specification.title
     content = list(blocks(acceptance, folder / 'signals'))
     written = {'report.html': page(content, title).encode(), 'report.pdf': pdf(content, title, acceptance.made),
-               'report.xml': junit(acceptance)}
+               'report.json': json.dumps(json_content(acceptance), indent=1).encode(), 'report.xml': junit(acceptance)}
     for name, data in written.items():
         (folder / name).write_bytes(data)
     return [folder / name for name in written]

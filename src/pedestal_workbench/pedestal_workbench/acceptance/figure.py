@@ -41,9 +41,10 @@ def draw(shown: Shown) -> Figure:
     drawn, panels = figures.new_panels(1, 1 + signal, height=HEIGHT_INCH, x=('repetition', 'time [s]')[:1 + signal],
                                        y=shown.requirement.method.unit)
     axes = panels[0, 0]
-    values, own = zip(*judged.repetitions) if count else ((), ())
-    axes.errorbar(range(1, count + 1), values, own, fmt='o', color=figures.FILTERED_COLOUR, capsize=3.0)
-    if math.isfinite(judged.uncertainty):
+    known = [(i, *one) for i, one in enumerate(judged.repetitions, start=1) if all(map(math.isfinite, one))]
+    if known:
+        axes.errorbar(*zip(*known), fmt='o', color=figures.FILTERED_COLOUR, capsize=3.0)
+    if math.isfinite(judged.value):
         axes.axhspan(judged.value - judged.uncertainty, judged.value + judged.uncertainty,
                      color=figures.FILTERED_COLOUR, alpha=0.15, linewidth=0.0)
     for end in filter(math.isfinite, ends(shown.requirement.limit)):
