@@ -21,7 +21,7 @@ from pedestal_common.graph import domain, nodes
 from pedestal_common.graph.steps import GraphError
 from pedestal_common.node import middleware
 from pedestal_common.node.shell import Shell
-from pedestal_common.quantities import Message, Seconds
+from pedestal_common.quantities import Message, Nanoseconds, Seconds
 from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import HELD_REFUSAL, Command, Reply
 from pedestal_operator.antenna import POINTING_TOPIC, Antenna
@@ -83,6 +83,7 @@ GRAPH_PARAMETERS = 'graph.scenario', 'graph.start'  # of every node, which name 
 GRAPH_REPLY_TIMEOUT_S = 1.0     # longest wait for them [s]
 
 _R = TypeVar('_R')
+_S = TypeVar('_S', bound='RemoteSession')
 
 
 def user() -> str:
@@ -103,6 +104,7 @@ class Remote(Shell, Antenna):
     who: str                        # name of the person or program in the next commands
     node: nodes.Node                # which receives the commands
     arrivals: dict[str, Seconds]    # {topic or node: time of its last message, monotonic clock}
+    stamps: dict[str, Nanoseconds]  # {topic of numbers: stamp of its last message}
 
     def __init__(self, name: str, who: str, node: str = 'acu', beam: str = '',
                  parameters_type: type[parameters.Parameters] = parameters.Parameters) -> None:
@@ -110,7 +112,7 @@ class Remote(Shell, Antenna):
         self.links = nodes.links(nodes.MAX_BEAMS if beam else 0)
         self.beam = f'{beam}/' if beam else ''
         self.who, self.node = who, nodes.row(node)
-        self.numbers, self.texts, self.status, self.arrivals, self.alarms = {}, {}, {}, {}, []
+        self.numbers, self.texts, self.status, self.arrivals, self.alarms, self.stamps = {}, {}, {}, {}, [], {}
         self._requests = Requests(f'{os.getpid()}.{time.time_ns()}')
         for topic in NUMBER_TOPICS:
             self.subscribe_numbers(topic)
@@ -127,9 +129,14 @@ class Remote(Shell, Antenna):
         """Subscribe to a further topic of numbers."""
         decoder = records.Decoder(topic, records.empty(records.of(topic), 1))
 
-        def take(message: Sequence[float], _: bool) -> None:
-            self.numbers[topic], self.arrivals[topic] = message, time.monotonic()
-        self.reader(topic, decoder.decoded, take)
+        def decode(data: bytes) -> tuple[Nanoseconds, records.Decoded]:
+            message = decoder.decoded(data)
+            return message[0], message
+
+        def take(message: records.Decoded, _: bool) -> None:
+            self.stamps[topic], self.numbers[topic] = message
+            self.arrivals[topic] = time.monotonic()
+        self.reader(topic, decode, take)
 
     def _text_taker(self, topic: str) -> Callable[[Message], None]:
         def take(message: Message) -> None:
@@ -202,9 +209,11 @@ class Remote(Shell, Antenna):
         """Return True if a topic has a publisher, or had one."""
         return name in self.arrivals or self.count_publishers(self._link(name)[1]) > 0
 
-    def query(self, names: Sequence[str], read: Callable[[ParameterValue], object] = _double) -> 'Query':
-        """Return a Query for parameters of the commanded node."""
-        return Query(self.create_client(GetParameters, f'{self.beam}{self.node.name}/get_parameters'), names, read)
+    def query(self, names: Sequence[str], read: Callable[[ParameterValue], object] = _double,
+              node: str = '') -> 'Query':
+        """Return a Query for parameters of a node; '': of the commanded node."""
+        name = node or f'{self.beam}{self.node.name}'
+        return Query(self.create_client(GetParameters, f'{name}/get_parameters'), names, read)
 
 
 class Query:
@@ -241,7 +250,7 @@ class RemoteSession:
         """Keep the function that makes the Remote, and the arguments for ROS 2."""
         self._make, self._arguments = make, arguments
 
-    def __enter__(self) -> 'RemoteSession':
+    def __enter__(self: _S) -> _S:
         middleware.initialise(self._arguments)
         self.remote = self._make()
         self._executor = middleware.make_executor()

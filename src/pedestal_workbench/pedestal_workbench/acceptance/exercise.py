@@ -78,6 +78,9 @@ class Performer(Protocol):
     """Makes exercises with one antenna."""
     antenna: Antenna
 
+    def check(self, exercise: Exercise) -> None:
+        """Raise ValueError for an exercise that it cannot make, before anything moves."""
+
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise. name: of its recording. Raises StoppedError."""
 

@@ -23,11 +23,13 @@ def antenna(scenario: Scenario) -> Antenna:
 
 
 def changes(exercise: Exercise) -> dict[str, Json]:
-    """Return {'node.key': value} of a simulated run for an exercise. An exercise with a start begins at rest there."""
-    if exercise.start is None:
-        return dict(exercise.changes)
-    return {**{f'adu.initial_{axis}': angle for axis, angle in zip(AXES, exercise.start)},
-            'acu.initial_mode': 'stop', 'acu.tracker.handover': False, **exercise.changes}
+    """Return {'node.key': value} of a simulated run for an exercise. An exercise with a start begins at rest there. A
+    track replaces that of the scenario."""
+    found: dict[str, Json] = {'scenario.program.source': 'none'} if exercise.track else {}
+    if exercise.start is not None:
+        found |= {f'adu.initial_{axis}': angle for axis, angle in zip(AXES, exercise.start)}
+        found |= {'acu.initial_mode': 'stop', 'acu.tracker.handover': False}
+    return {**found, **exercise.changes}
 
 
 class InLoop:
@@ -36,6 +38,10 @@ class InLoop:
     def __init__(self, variant: Variant) -> None:
         self._variant = variant
         self.antenna = antenna(variant.load())
+
+    def check(self, exercise: Exercise) -> None:
+        """Raise ValueError for an exercise that no run of the variant can make."""
+        self._variant.with_(changes(exercise), duration=exercise.duration).load()
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from time 0 of a run."""
