@@ -4,13 +4,24 @@ A performer makes an exercise in the closed loop (in_loop) or on nodes (on_graph
 both return a recording with the same topics, so that every measure is the same law for both.
 """
 import dataclasses
+import math
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple, Protocol
 
 from acu_tracker.params import AcuParameters
 from drive_law.params import AduParameters
-from pedestal_common.quantities import Degrees, DegreesPerSecond, Json, Pairs, Radians, Seconds, Times
+from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import (
+    Degrees,
+    DegreesPerSecond,
+    Json,
+    Pairs,
+    Radians,
+    RadiansPerSecond,
+    Seconds,
+    Times,
+)
 from pedestal_recording.recording import Recording
 
 
@@ -20,6 +31,7 @@ class Antenna(NamedTuple):
     adu: AduParameters | None       # None: the drive is not simulated, and its parameters are unknown
     beamwidth: Radians
     period: Seconds                 # of a step
+    simulated: tuple[str, ...] = ()     # its nodes that are simulated, into which faults can be injected
 
 
 class Action(NamedTuple):
@@ -53,6 +65,18 @@ class Exercise:
     track: Track | None = None
     changes: Mapping[str, Json] = dataclasses.field(default_factory=dict)   # {'node.key': value} of simulated nodes
     alarms: tuple[str, ...] = ()                    # names of alarms that belong to it; any other ends the sequence
+
+    def breach(self, angles: Iterable[Radians], rates: Iterable[RadiansPerSecond], alarms: Iterable[str]) -> str:
+        """Return the reason why the antenna must stop, '' for none. angles, rates: of the encoders, NaN if unknown;
+        alarms: names of the listed alarms."""
+        foreign = [name for name in alarms if name not in self.alarms]
+        reasons = [f'alarm {", ".join(foreign)}'] if foreign else []
+        for axis, span, angle, rate in zip(AXES, self.envelope, map(math.degrees, angles), map(math.degrees, rates)):
+            if angle < span.low or angle > span.high:
+                reasons.append(f'{axis} {angle:.3f} deg is outside {span.low:.3f} to {span.high:.3f} deg')
+            if abs(rate) > span.rate:
+                reasons.append(f'{axis} turns at {rate:.3f} deg/s, must be at most {span.rate:.3f} deg/s')
+        return '; '.join(reasons)
 
 
 class Executed(NamedTuple):
