@@ -12,7 +12,7 @@ from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.graph.topics import AXES
 from pedestal_common.injection.table import INJECTED_FAULTS
-from pedestal_common.quantities import Json
+from pedestal_common.quantities import Json, Seconds
 from pedestal_common.wire.commands import parsed
 from pedestal_workbench.acceptance.exercise import Antenna, Executed, Exercise, Performed, StoppedError
 
@@ -37,6 +37,12 @@ def changes(exercise: Exercise) -> dict[str, Json]:
     return {**found, **exercise.changes}
 
 
+def run_of(exercise: Exercise, variant: Variant, period: Seconds, seed: int = 1) -> Variant:
+    """Return the variant whose run makes an exercise, in whole steps."""
+    duration = math.ceil(exercise.duration / period - 1e-6) * period
+    return variant.with_(changes(exercise), seed=seed, duration=duration)
+
+
 class InLoop:
     """Performer in the closed loop of a variant of a scenario."""
 
@@ -46,12 +52,11 @@ class InLoop:
 
     def check(self, exercise: Exercise) -> None:
         """Raise ValueError for an exercise that no run of the variant can make."""
-        self._variant.with_(changes(exercise), duration=exercise.duration).load()
+        run_of(exercise, self._variant, self.antenna.period).load()
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from time 0 of a run."""
-        duration = math.ceil(exercise.duration / self.antenna.period - 1e-6) * self.antenna.period
-        scenario = self._variant.with_(changes(exercise), seed=seed, duration=duration).load()
+        scenario = run_of(exercise, self._variant, self.antenna.period, seed).load()
         loop = Loop(scenario)
         if exercise.track:
             loop.tracks['acu/program_track'] = program_message(*exercise.track)

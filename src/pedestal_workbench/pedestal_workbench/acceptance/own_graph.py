@@ -42,7 +42,7 @@ class OwnGraph:
         self._changed(exercise, 1).load(_pacing(exercise))
 
     def _changed(self, exercise: Exercise, seed: int) -> Variant:
-        return self._variant.with_(in_loop.changes(exercise), seed=seed, duration=exercise.duration)
+        return in_loop.run_of(exercise, self._variant, self.antenna.period, seed)
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from time 0 of a run. Raises StoppedError."""
