@@ -63,7 +63,7 @@ def folder(whole, tmp_path_factory):
     folder = tmp_path_factory.mktemp('report')
     (folder / 'signals').mkdir()
     t = np.linspace(0.0, 5.0, 50)
-    np.savetxt(folder / 'signals' / 'slew rate.csv', np.column_stack((t, np.sin(t), 0.0 * t)), delimiter=',',
+    np.savetxt(folder / 'signals' / 'slew_rate.csv', np.column_stack((t, np.sin(t), 0.0 * t)), delimiter=',',
                header=','.join(figure.HEADER), comments='')
     document.write(whole, folder)
     return folder

@@ -77,10 +77,12 @@ def test_every_key_is_read(read):
     ('repetitions: 3', 'repetitions: true', ('repetitions = True', 'whole number')),
     ('confidence: 0.9', 'confidence: 95', ('confidence = 95', '0.5 to 0.999')),
     ('confidence: 0.9', 'confidence: .nan', ('confidence = nan', '0.5 to 0.999')),
-    ('name: settling', 'name: ../../settling', ("'../../settling'", 'letters')),
-    ('name: settling', 'name: ""', ("name = ''", 'letters')),
-    ('name: settling', f'name: {"a" * 61}', ('name = ', '60 letters')),
+    ('name: settling', 'name: [a]', ("name = ['a']", 'must be a text')),
+    ('name: settling', 'name: ""', ("name = ''", 'must be a text')),
+    ('name: settling', 'name: "a\\0b"', ('name = ', 'must be a text')),
+    ('name: settling', f'name: {"a" * 61}', ('name = ', '1 to 60 characters')),
     ('name: slope', 'name: Settling', ("'Settling'", 'given twice')),
+    ('name: slope', 'name: SETTLING', ("'SETTLING'", 'given twice')),
     ('title: Acceptance', 'titel: Acceptance', ("unknown key 'titel'", "did you mean 'title'?")),
     ('title: Acceptance\n', '', ('title is missing',)),
     ('title: Acceptance', 'title: "a\\nb"', ('title', 'one line')),
@@ -155,3 +157,11 @@ def test_an_exercise_stays_within_the_travel_of_its_antenna():
                 low, high = (math.degrees(end) for end in (axis.low, axis.high))
                 assert low - 5.0 <= span.low < span.high <= high + 5.0, method.name
                 assert 0.0 < span.rate <= 1.5 * math.degrees(axis.rate), method.name
+
+
+@pytest.mark.parametrize('name, file_name', [
+    ('ramp, 0.1 deg/s', 'ramp,_0.1_deg_s'), ('../../etc/passwd', '__.._etc_passwd'), ('-rf *', '_rf_'),
+    ('Überschwingen', 'Überschwingen')])
+def test_files_have_names_without_harm(read, name, file_name):
+    found = read(WHOLE.replace('name: settling', f"name: '{name}'")).requirements[0]
+    assert (found.name, found.file_name) == (name, file_name)

@@ -181,7 +181,7 @@ def blocks(acceptance: Acceptance, signals: pathlib.Path) -> Iterator[Block]:
     for i, (requirement, kept) in numbered:
         if kept:
             yield Block('figure', (figures.Spec(f'requirement-{i}', f'{i}  {requirement.name}', '', (), figure.draw),
-                                   figure.Shown(requirement, kept.judged, signals / f'{requirement.name}.csv')))
+                                   figure.Shown(requirement, kept.judged, signals / f'{requirement.file_name}.csv')))
     yield Block('h2', 'Recordings')
     yield Block('line', TextTable(('requirement', 'recording', 'SHA-256'), [
         (kept.name, *bag) for kept in acceptance.kept for bag in kept.bags]))

@@ -76,7 +76,7 @@ def _result(requirement: Requirement, exercise: Exercise, performances: '_Perfor
             bags += [(str(file.relative_to(folder.resolve())), files.sha256(file))
                      for file in bag_files.locate(performed.bag.resolve())]
         if i == 0:
-            figure.keep_signal(performed, folder / SIGNALS_FOLDER / f'{requirement.name}.csv')
+            figure.keep_signal(performed, folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
         try:
             measured.append(requirement.method.measure(performed, requirement.arguments))
         except ValueError as error:
@@ -98,7 +98,7 @@ class _Performances:
         made = self._made.setdefault(key, [])
         for i in range(requirement.repetitions):
             if i == len(made):
-                name = f'{requirement.name}-{i + 1}'
+                name = f'{requirement.file_name}-{i + 1}'
                 _set_aside(self._folder, name)
                 made.append(self._performer.perform(name, exercise, self._seed + SEED_STEP * i))
             yield made[i]

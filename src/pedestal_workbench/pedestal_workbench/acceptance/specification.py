@@ -24,7 +24,7 @@ REQUIREMENT_KEYS = 'name', 'method', 'arguments', 'limit', 'unit', 'repetitions'
 NEEDED_KEYS = 'name', 'method', 'limit', 'unit'
 MAX_REQUIREMENTS, MAX_NAME_CHARS, MAX_TEXT_CHARS = 200, 60, 500     # of a file, of a name, of a text of the header
 REPETITION_LIMITS, CONFIDENCE_LIMITS = (1, 100), (0.5, 0.999)
-NAME_PATTERN = re.compile(r'\w(?:[\w .,()+-]*[\w.,()+-])?')    # of a requirement, which is also the name of its files
+NO_FILE_PATTERN = re.compile(r'[^\w.,()+-]+|^[.-]+')     # parts of the name of a requirement that no file has
 _NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
 LIMIT_PATTERN = re.compile(rf'(?:<=|>=|<|>) {_NUMBER}|{_NUMBER} (?:\+-|to) {_NUMBER}')
 LIMIT_WORDS = {'<=': ('<=', '<', '+-', 'to'), '>=': ('>=', '>', '+-', 'to'), '+-': ('+-', 'to')}
@@ -39,6 +39,11 @@ class Requirement(NamedTuple):
     limit: Target
     repetitions: int
     confidence: float       # level of the interval of the value [-]
+
+    @property
+    def file_name(self) -> str:
+        """Name of its files, without an ending."""
+        return NO_FILE_PATTERN.sub('_', self.name)
 
     def exercise(self, antenna: Antenna) -> Exercise:
         """Return the exercise with an antenna. Raises ValueError for what the antenna cannot do."""
@@ -86,10 +91,9 @@ def read(path: FilePath) -> Specification:
     for number, entry in enumerate(entries if isinstance(entries, list) else (), start=1):
         try:
             requirement = _requirement(entry)
-            # Because files have the names of requirements, the case makes no difference.
-            if requirement.name.casefold() in requirements:
+            # Because files have these names, the case and the kinds of blanks make no difference.
+            if requirements.setdefault(requirement.file_name.casefold(), requirement) is not requirement:
                 raise ValueError('the name is given twice; must be unique')
-            requirements[requirement.name.casefold()] = requirement
         except ValueError as error:
             named = f' {_short(entry["name"])}' if isinstance(entry, dict) and 'name' in entry else ''
             problems.append(f'requirement {number}{named}: {error}')
@@ -130,9 +134,8 @@ def _requirement(entry: Json) -> Requirement:
         raise ValueError(f'{_short(entry)}: must hold the keys {", ".join(NEEDED_KEYS)}')
     _check_keys(entry, REQUIREMENT_KEYS, NEEDED_KEYS)
     name, word, given = entry['name'], entry['method'], entry.get('arguments', {})
-    if not isinstance(name, str) or len(name) > MAX_NAME_CHARS or not NAME_PATTERN.fullmatch(name):
-        raise ValueError(f'name = {_short(name)}: must be 1 to {MAX_NAME_CHARS} letters, digits, blanks or .,()+-_, '
-                         'with a letter or digit first')
+    if not isinstance(name, str) or not (1 <= len(name) <= MAX_NAME_CHARS and name.isprintable()):
+        raise ValueError(f'name = {_short(name)}: must be a text of 1 to {MAX_NAME_CHARS} characters')
     if word not in list(METHOD_BY_NAME):
         hint = did_you_mean(str(word)[:MAX_NAME_CHARS], METHOD_BY_NAME)
         raise ValueError(f'method = {_short(word)}: unknown;{hint} must be one of {", ".join(METHOD_BY_NAME)}')
