@@ -114,7 +114,7 @@ def _source(options: argparse.Namespace) -> str:
 
 
 def _confirm(options: argparse.Namespace, spec: 'Specification', exercises: 'Sequence[Exercise]') -> None:
-    """Print what the antenna will do. Raises ValueError if nobody confirms it."""
+    """Print what the antenna will do. Raises ValueError without a confirmation."""
     from pedestal_common.text_files.text_table import Cell, TextTable
     rows: list[list[Cell]] = []
     whole = 0.0

@@ -42,7 +42,6 @@ FONT, TEXT_PT, TITLE_PT, TABLE_PT = 'DejaVu', 9.0, 15.0, 6.5    # of the PDF; th
 FIGURE_MM, GAP_MM, SIGNATURE_MM, BOTTOM_MM = (134.0, 39.8), 6.0, 14.0, 15.0
 """Size of a figure, height of a gap and of a signature, margin at the bottom of a page."""
 MIN_SECTION_MM = 65.0   # a section with less space left begins on the next page
-MAX_COLUMN_CHARS = 72   # width of a column above which its texts are wrapped
 LINE_GREY, LINE_MM = 170, 0.1   # colour and width of the lines of tables
 
 
@@ -103,7 +102,7 @@ def measured(requirement: Requirement, kept: Kept | None) -> tuple[str, str, str
     if math.isnan(value):
         return f'not measured: {kept.judged.reason}'.rstrip(': '), '', limit
     return ('never' if math.isinf(value) else text(intervals.number(value)),
-            text(f'{uncertainty:.2g}') if uncertainty else 'not known', limit)
+            text(intervals.number(float(f'{uncertainty:.2g}'))) if uncertainty else 'not known', limit)
 
 
 def line(acceptance: Specification, kept: Kept) -> str:
@@ -173,7 +172,7 @@ def blocks(acceptance: Acceptance, signals: pathlib.Path) -> Iterator[Block]:
     yield Block('h2', 'Methods')
     yield Block('line', TextTable(
         ('', 'requirement', 'method', 'arguments', ('repetitions', '>'), ('confidence', '>'), 'begun (UTC)'),
-        [(str(i), requirement.name, f'{requirement.method.name}: {requirement.method.doc}',
+        [(str(i), requirement.name, f'{requirement.method.name}: {requirement.method.doc}'.replace('`', ''),
           ', '.join(f'{name} {value}' for name, value in requirement.arguments.items()), str(requirement.repetitions),
           f'{100.0 * requirement.confidence:g} %', kept.begun if kept else '')
          for i, (requirement, kept) in numbered]))
@@ -263,13 +262,20 @@ class _Pdf(FPDF):
         self.ln(GAP_MM / 3.0)
 
     def write_table(self, kind: str, table: TextTable) -> None:
-        """Write a table. The width of a column follows from its longest text."""
+        """Write a table. A narrow column is as wide as its texts; the wide ones share the rest of the page."""
         headed = any(table.heads)
         texts = [table.heads, *table.rows] if headed else table.rows
-        widths = [min(max(len(part) for text in column for part in text.split('\n')), MAX_COLUMN_CHARS) + 2
-                  for column in zip(*texts)]
+        self.set_font(FONT, 'B', TABLE_PT)      # of the heads, which is the wider one
+        widths = [max(map(self.get_string_width, column)) + GAP_MM / 2.0 for column in zip(*texts)]
+        rest, widest = self.epw, self.epw
+        for i, width in enumerate(sorted(widths)):
+            widest = rest / (len(widths) - i)
+            if width > widest:
+                break
+            rest -= width
         self.set_font(FONT, size=TABLE_PT)
-        with self.table(col_widths=widths, first_row_as_headings=headed, borders_layout='HORIZONTAL_LINES',
+        with self.table(col_widths=[min(width, widest) for width in widths], first_row_as_headings=headed,
+                        borders_layout='HORIZONTAL_LINES',
                         text_align=tuple('RIGHT' if right else 'LEFT' for right in table.right),
                         line_height=1.4 * self.font_size) as made:
             for i, row in enumerate(texts):
