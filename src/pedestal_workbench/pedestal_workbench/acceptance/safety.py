@@ -178,15 +178,16 @@ def _emergency(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 
 def _stopping(performed: Performed, arguments: Arguments) -> tuple[Seconds, Degrees]:
-    """Return time and angle from the emergency stop to the standstill of the axis."""
-    begin, axis = granted(performed, DRIVE_NODE, EMERGENCY_STOP), arguments['axis']
-    joints = performed.recording.table('joint_states')
-    during = (joints['t'] >= begin) & (joints['t'] < begin + REST_TIME_S)
-    t, rate, angle = (joints[name][during] for name in ('t', f'{axis}.velocity', f'{axis}.position'))
+    """Return time and angle from the emergency stop to the standstill of the axis. The angle counts from the step
+    before the request, which acts within a step."""
+    begin, joints = granted(performed, DRIVE_NODE, EMERGENCY_STOP), performed.recording.table('joint_states')
+    during = (joints['t'] > begin - 1.5 * performed.antenna.period) & (joints['t'] < begin + REST_TIME_S)
+    t, rate, angle = (joints[name][during] for name in ('t', *(f'{arguments["axis"]}.{part}'
+                                                               for part in ('velocity', 'position'))))
     moving = np.flatnonzero(np.abs(rate) > STANDSTILL_SHARE * abs(rate[0]))
     if moving[-1] == t.size - 1:
         return math.inf, math.inf
-    return float(t[moving[-1] + 1] - begin), math.degrees(abs(angle[-1] - angle[0]))
+    return float(t[moving[-1] + 1] - begin), math.degrees(np.abs(angle - angle[0]).max())
 
 
 def _emergency_time(performed: Performed, arguments: Arguments) -> Measured:

@@ -6,7 +6,7 @@ The argument `target` is `own`, the target of the scenario as it is, or a simula
     pass        a satellite that culminates in the middle of the exercise
     manoeuvre   moves as a sine about this place on both axes, with the argument acceleration
 
-The program track of a simulated target has no error, and the signal level does not depend on the range.
+The program track of a simulated target has no error. The level of beacon and manoeuvre does not depend on the range.
 """
 import dataclasses
 import math
@@ -34,7 +34,7 @@ ACTION_TIME_S = 10.0    # time of the first action in autotrack [s]
 MANOEUVRE_FREQUENCY_HZ = 0.05   # frequency of the manoeuvre [Hz]
 TARGET_RANGE_M = 3.6e7  # range of beacon and manoeuvre [m]; from a ship under way, it hides the motion of the ship
 POINT_TIME_S, CIRCLE_POINTS = 2.5, 8        # time at each offset about the beacon [s]; points of the circle
-CROSS_BEAMWIDTHS = (0.1, -0.1, 0.3, -0.3)   # offsets about the beacon on each axis [beamwidths]
+CROSS_BEAMWIDTHS = (0.2, -0.2, 0.1, -0.1)   # offsets about the beacon on each axis [beamwidths]
 CROSS_TALK = 'cross-talk'
 CHANNELS = {'cross-elevation': (0, 0), 'elevation': (1, 1), CROSS_TALK: (0, 1)}     # row and column of the slopes
 NEVER = Measured(math.inf, 0.0)     # time until an event that does not come
@@ -100,7 +100,6 @@ def simulated(antenna: Antenna, arguments: Arguments) -> Changes:
     if RECEIVER not in antenna.simulated:
         raise ValueError(f'target = {target}: must be own, because this antenna has no simulated target')
     found: Changes = {f'scenario.program.{name}_offset': 0.0 for name in ('time', *AXES)}
-    found[f'{RECEIVER}.receiver.range_exponent'] = 0.0
     of_target = f'{RECEIVER}.target'
     if target == 'pass':
         return {**found, f'{of_target}.kind': 'leo_pass', f'{of_target}.leo_pass.start_time': ''}
@@ -108,8 +107,8 @@ def simulated(antenna: Antenna, arguments: Arguments) -> Changes:
     for axis, angle in zip(AXES, place(antenna, arguments)):
         found |= {f'{of_target}.angle.{axis}': angle, f'{of_target}.angle.{axis}_amplitude': amplitude,
                   f'adu.initial_{axis}': angle}
-    return {**found, f'{of_target}.kind': 'sine', f'{of_target}.angle.range': TARGET_RANGE_M,
-            f'{of_target}.angle.frequency': MANOEUVRE_FREQUENCY_HZ}
+    return {**found, f'{RECEIVER}.receiver.range_exponent': 0.0, f'{of_target}.kind': 'sine',
+            f'{of_target}.angle.range': TARGET_RANGE_M, f'{of_target}.angle.frequency': MANOEUVRE_FREQUENCY_HZ}
 
 
 def _follow(antenna: Antenna, arguments: Arguments, *actions: Action, handover: bool = True) -> Exercise:
@@ -244,9 +243,9 @@ METHODS = (
            _acquisition, _acquisition_time),
     Method('fade_recovery', 'let the signal fade in autotrack: time after the fade to autotrack with a locked '
            'receiver', 's', '<=',
-           (*_TRACKED, Argument('fade', 'duration of the fade', 0.1, 60.0, 's', default=2.0),
-            Argument('depth', 'loss of level in the fade', 0.0, 200.0, 'dB', default=30.0)), _fade, _fade_recovery,
-           True),
+           (_target('own', 'pass', 'beacon'), *_TRACKED[1:],
+            Argument('fade', 'duration of the fade', 0.1, 60.0, 's', default=2.0),
+            Argument('depth', 'loss of level', 0.0, 200.0, 'dB', default=30.0)), _fade, _fade_recovery, True),
     Method('receiver_slope', 'point beside a beacon by `preset`: slope of a receiver channel or larger cross-talk, as '
            'corrected by the control unit', '1', '+-',
            (_target('beacon', 'own'), *_PLACE,
