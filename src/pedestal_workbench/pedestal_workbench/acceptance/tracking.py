@@ -9,14 +9,14 @@ The argument `target` is `own`, the target of the scenario as it is, or a simula
 The program track of a simulated target has no error. The level of beacon and manoeuvre does not depend on the range.
 """
 import dataclasses
+import itertools
 import math
-from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
 
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Bools, Json, Pairs, Radians, Seconds
+from pedestal_common.quantities import Bools, Json, Pairs, Radians, Seconds, Times
 from pedestal_common.wire.commands import Argument
 from pedestal_results import intervals, tracking
 from pedestal_results.recorded_run import RecordedRun
@@ -86,9 +86,8 @@ def _amplitude(antenna: Antenna, arguments: Arguments) -> Radians:
     if acceleration > largest:
         raise ValueError(f'acceleration = {arguments["acceleration"]} deg/s2: must be at most '
                          f'{math.degrees(largest):.4g} deg/s2, which both axes can follow')
-    for axis in AXES:
-        for side in (-1.0, 1.0):
-            inside(antenna, 'acceleration', axis, float(arguments[axis]) + side * math.degrees(acceleration / w**2))
+    for axis, sign in itertools.product(AXES, (-1.0, 1.0)):
+        inside(antenna, 'acceleration', axis, float(arguments[axis]) + sign * math.degrees(acceleration / w**2))
     return acceleration / w**2
 
 
@@ -196,20 +195,21 @@ def _pointing_offset(performed: Performed, _: Arguments) -> Measured:
     return Measured(size, 0.5 * math.hypot(x * (x_high - x_low), y * (y_high - y_low)) / size)
 
 
-def _until(performed: Performed, begin: Seconds, met: Callable[[tracking.Tracking], Bools]) -> Measured:
-    """Return the time from `begin` to the first step that meets a condition."""
-    run = RecordedRun(performed.recording).evaluated
-    times = run.t[(run.t >= begin) & met(run)]
+def first(performed: Performed, begin: Seconds, t: Times, met: Bools) -> Measured:
+    """Return the time from `begin` to the first of the times t that meets a condition."""
+    times = t[(t >= begin) & met]
     return Measured(float(times[0]) - begin, performed.antenna.period) if times.size else NEVER
 
 
 def _acquisition_time(performed: Performed, _: Arguments) -> Measured:
-    return _until(performed, granted(performed, 'acu', 'program'), lambda run: run.mode == 'autotrack')
+    run = RecordedRun(performed.recording).evaluated
+    return first(performed, granted(performed, 'acu', 'program'), run.t, run.mode == 'autotrack')
 
 
 def _fade_recovery(performed: Performed, arguments: Arguments) -> Measured:
-    end = granted(performed, RECEIVER, 'fade') + float(arguments['fade'])
-    return _until(performed, end, lambda run: (run.mode == 'autotrack') & np.isfinite(run.measured[:, 0]))
+    run, end = RecordedRun(performed.recording).evaluated, float(arguments['fade'])
+    return first(performed, granted(performed, RECEIVER, 'fade') + end, run.t,
+                 (run.mode == 'autotrack') & np.isfinite(run.measured[:, 0]))
 
 
 def _slopes(performed: Performed) -> matrix.RealSlopes:
