@@ -18,14 +18,14 @@ from acu_tracker.mode.stow import MAX_REST_RATE_RAD_S
 from acu_tracker.servo.travel import braking_distance
 from pedestal_common.graph.nodes import DRIVE_NODE
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Bools, Degrees, Floats, Radians, Seconds, Times
+from pedestal_common.quantities import Degrees, Floats, Radians, Seconds, Times
 from pedestal_common.wire.commands import Argument
 from pedestal_recording import recording as recordings
 from pedestal_results import tracking
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
 from pedestal_workbench.acceptance.method import Arguments, Measured, Method
-from pedestal_workbench.acceptance.tracking import NEVER, granted, inside, travel
+from pedestal_workbench.acceptance.tracking import NEVER, first, granted, inside, travel
 
 BEGIN_TIME_S, REST_TIME_S = 1.0, 3.0    # time of the first command, and time until an axis has come to rest [s]
 LARGEST_OVERSHOOT_DEG = 1.0     # angle beyond a limit of travel at which the exercise is stopped [deg]
@@ -50,10 +50,8 @@ FAULTS = {
         'tracking_receiver': ('freeze', 'nan', 'fade', 'wrong_slope', 'phase_180', 'bias', 'noise'),
         'ship_motion': ('nan',),
         'ins': ('freeze', 'nan', 'noise', 'ins_jump', 'bias')}.items() for name in names}}
-"""{'NODE.FAULT': modes in which it has an effect} of the faults that an acceptance provokes."""
-
-UNREPORTED_FAULTS = 'adu.noise', 'tracking_receiver.bias', 'tracking_receiver.noise', 'ins.bias'
-"""Faults among them of which no report is expected."""
+"""{'NODE.FAULT': modes in which it has an effect} of the faults that an acceptance provokes. Noise and bias have no
+report except that of adu.bias and ins.noise; fault_error is for them."""
 
 
 def _middle(antenna: Antenna) -> list[Radians]:
@@ -100,13 +98,7 @@ def _limit_return(performed: Performed, arguments: Arguments) -> Measured:
     rates = [done for done in performed.executed if done.action.command.startswith('rate ')]
     opposite = next(done for done in rates if done.action.command != rates[0].action.command)
     t, beyond = _beyond(performed, arguments)
-    return _first(t, beyond < -RETURN_DEG, performed.begin + opposite.t, performed.antenna.period)
-
-
-def _first(t: Times, met: Bools, begin: Seconds, period: Seconds) -> Measured:
-    """Return the time from `begin` to the first of the times t that meets a condition."""
-    times = t[(t >= begin) & met]
-    return Measured(float(times[0]) - begin, period) if times.size else NEVER
+    return first(performed, performed.begin + opposite.t, t, beyond < -RETURN_DEG)
 
 
 def _stow(antenna: Antenna, arguments: Arguments) -> Exercise:
@@ -136,8 +128,8 @@ def _pins(performed: Performed, command: str, state: str) -> Measured:
     """Return the time from a command until both pins have a state."""
     states = performed.recording.table('adu/stow_pins')
     wanted = ', '.join(f'{axis} {state}' for axis in AXES)
-    return _first(np.array(states['t']), np.array([text == wanted for text in states['data']]),
-                  granted(performed, 'acu', command), performed.antenna.period)
+    return first(performed, granted(performed, 'acu', command), np.array(states['t']),
+                 np.array([text == wanted for text in states['data']]))
 
 
 def _stow_time(performed: Performed, _: Arguments) -> Measured:
@@ -178,15 +170,16 @@ def _emergency(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 
 def _stopping(performed: Performed, arguments: Arguments) -> tuple[Seconds, Degrees]:
-    """Return time and angle from the emergency stop to the standstill of the axis."""
-    begin, axis = granted(performed, DRIVE_NODE, EMERGENCY_STOP), arguments['axis']
-    joints = performed.recording.table('joint_states')
-    during = (joints['t'] >= begin) & (joints['t'] < begin + REST_TIME_S)
-    t, rate, angle = (joints[name][during] for name in ('t', f'{axis}.velocity', f'{axis}.position'))
+    """Return time and angle from the emergency stop to the standstill of the axis. The angle counts from the step
+    before the request, which acts within a step."""
+    begin, joints = granted(performed, DRIVE_NODE, EMERGENCY_STOP), performed.recording.table('joint_states')
+    during = (joints['t'] > begin - 1.5 * performed.antenna.period) & (joints['t'] < begin + REST_TIME_S)
+    t, rate, angle = (joints[name][during] for name in ('t', *(f'{arguments["axis"]}.{part}'
+                                                               for part in ('velocity', 'position'))))
     moving = np.flatnonzero(np.abs(rate) > STANDSTILL_SHARE * abs(rate[0]))
     if moving[-1] == t.size - 1:
         return math.inf, math.inf
-    return float(t[moving[-1] + 1] - begin), math.degrees(abs(angle[-1] - angle[0]))
+    return float(t[moving[-1] + 1] - begin), math.degrees(np.abs(angle - angle[0]).max())
 
 
 def _emergency_time(performed: Performed, arguments: Arguments) -> Measured:
@@ -222,12 +215,6 @@ def _faulty(antenna: Antenna, arguments: Arguments) -> Exercise:
     return Exercise(finish, (spans[0], spans[1]), tuple(actions), (azimuth, elevation), alarms=ALARM_NAMES)
 
 
-def _reported(antenna: Antenna, arguments: Arguments) -> Exercise:
-    if arguments['fault'] in UNREPORTED_FAULTS:
-        raise ValueError(f'fault = {arguments["fault"]}: must be one with a report; fault_error has it')
-    return _faulty(antenna, arguments)
-
-
 def _onset(performed: Performed, arguments: Arguments) -> Seconds:
     """Return the time of the fault. Raises ValueError where the antenna was not in its mode then."""
     node, _, fault = str(arguments['fault']).partition('.')
@@ -245,8 +232,7 @@ def _fault_report(performed: Performed, arguments: Arguments) -> Measured:
     end = begin + float(arguments['duration']) + RECOVERY_TIME_S
     times = np.sort(np.concatenate([recording.table(topic)['t'] for topic in REPORT_TOPICS
                                     if topic in recording.topics]))
-    times = times[(times >= begin) & (times < end)]
-    return Measured(float(times[0]) - begin, performed.antenna.period) if times.size else NEVER
+    return first(performed, begin, times, times < end)
 
 
 def _fault_error(performed: Performed, arguments: Arguments) -> Measured:
@@ -284,6 +270,6 @@ METHODS = (
     Method('emergency_stop_angle', 'request an emergency stop at the largest rate: angle to standstill', 'deg', '<=',
            (_AXIS,), _emergency, _emergency_angle),
     Method('fault_report', 'inject a fault: time to the first alarm, or to a change of the mode or of the state of '
-           'the drive', 's', '<=', _FAULT, _reported, _fault_report, True),
+           'the drive', 's', '<=', _FAULT, _faulty, _fault_report, True),
     Method('fault_error', 'inject a fault: largest error until the mode ends, towards the target in autotrack, else '
            'following error', 'deg', '<=', _FAULT, _faulty, _fault_error, True))

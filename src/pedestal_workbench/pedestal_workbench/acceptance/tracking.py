@@ -6,17 +6,17 @@ The argument `target` is `own`, the target of the scenario as it is, or a simula
     pass        a satellite that culminates in the middle of the exercise
     manoeuvre   moves as a sine about this place on both axes, with the argument acceleration
 
-The program track of a simulated target has no error, and the signal level does not depend on the range.
+The program track of a simulated target has no error. The level of beacon and manoeuvre does not depend on the range.
 """
 import dataclasses
+import itertools
 import math
-from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
 
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Bools, Json, Pairs, Radians, Seconds
+from pedestal_common.quantities import Bools, Json, Pairs, Radians, Seconds, Times
 from pedestal_common.wire.commands import Argument
 from pedestal_results import intervals, tracking
 from pedestal_results.recorded_run import RecordedRun
@@ -34,7 +34,7 @@ ACTION_TIME_S = 10.0    # time of the first action in autotrack [s]
 MANOEUVRE_FREQUENCY_HZ = 0.05   # frequency of the manoeuvre [Hz]
 TARGET_RANGE_M = 3.6e7  # range of beacon and manoeuvre [m]; from a ship under way, it hides the motion of the ship
 POINT_TIME_S, CIRCLE_POINTS = 2.5, 8        # time at each offset about the beacon [s]; points of the circle
-CROSS_BEAMWIDTHS = (0.1, -0.1, 0.3, -0.3)   # offsets about the beacon on each axis [beamwidths]
+CROSS_BEAMWIDTHS = (0.2, -0.2, 0.1, -0.1)   # offsets about the beacon on each axis [beamwidths]
 CROSS_TALK = 'cross-talk'
 CHANNELS = {'cross-elevation': (0, 0), 'elevation': (1, 1), CROSS_TALK: (0, 1)}     # row and column of the slopes
 NEVER = Measured(math.inf, 0.0)     # time until an event that does not come
@@ -86,9 +86,8 @@ def _amplitude(antenna: Antenna, arguments: Arguments) -> Radians:
     if acceleration > largest:
         raise ValueError(f'acceleration = {arguments["acceleration"]} deg/s2: must be at most '
                          f'{math.degrees(largest):.4g} deg/s2, which both axes can follow')
-    for axis in AXES:
-        for side in (-1.0, 1.0):
-            inside(antenna, 'acceleration', axis, float(arguments[axis]) + side * math.degrees(acceleration / w**2))
+    for axis, sign in itertools.product(AXES, (-1.0, 1.0)):
+        inside(antenna, 'acceleration', axis, float(arguments[axis]) + sign * math.degrees(acceleration / w**2))
     return acceleration / w**2
 
 
@@ -100,7 +99,6 @@ def simulated(antenna: Antenna, arguments: Arguments) -> Changes:
     if RECEIVER not in antenna.simulated:
         raise ValueError(f'target = {target}: must be own, because this antenna has no simulated target')
     found: Changes = {f'scenario.program.{name}_offset': 0.0 for name in ('time', *AXES)}
-    found[f'{RECEIVER}.receiver.range_exponent'] = 0.0
     of_target = f'{RECEIVER}.target'
     if target == 'pass':
         return {**found, f'{of_target}.kind': 'leo_pass', f'{of_target}.leo_pass.start_time': ''}
@@ -108,8 +106,8 @@ def simulated(antenna: Antenna, arguments: Arguments) -> Changes:
     for axis, angle in zip(AXES, place(antenna, arguments)):
         found |= {f'{of_target}.angle.{axis}': angle, f'{of_target}.angle.{axis}_amplitude': amplitude,
                   f'adu.initial_{axis}': angle}
-    return {**found, f'{of_target}.kind': 'sine', f'{of_target}.angle.range': TARGET_RANGE_M,
-            f'{of_target}.angle.frequency': MANOEUVRE_FREQUENCY_HZ}
+    return {**found, f'{RECEIVER}.receiver.range_exponent': 0.0, f'{of_target}.kind': 'sine',
+            f'{of_target}.angle.range': TARGET_RANGE_M, f'{of_target}.angle.frequency': MANOEUVRE_FREQUENCY_HZ}
 
 
 def _follow(antenna: Antenna, arguments: Arguments, *actions: Action, handover: bool = True) -> Exercise:
@@ -197,20 +195,21 @@ def _pointing_offset(performed: Performed, _: Arguments) -> Measured:
     return Measured(size, 0.5 * math.hypot(x * (x_high - x_low), y * (y_high - y_low)) / size)
 
 
-def _until(performed: Performed, begin: Seconds, met: Callable[[tracking.Tracking], Bools]) -> Measured:
-    """Return the time from `begin` to the first step that meets a condition."""
-    run = RecordedRun(performed.recording).evaluated
-    times = run.t[(run.t >= begin) & met(run)]
+def first(performed: Performed, begin: Seconds, t: Times, met: Bools) -> Measured:
+    """Return the time from `begin` to the first of the times t that meets a condition."""
+    times = t[(t >= begin) & met]
     return Measured(float(times[0]) - begin, performed.antenna.period) if times.size else NEVER
 
 
 def _acquisition_time(performed: Performed, _: Arguments) -> Measured:
-    return _until(performed, granted(performed, 'acu', 'program'), lambda run: run.mode == 'autotrack')
+    run = RecordedRun(performed.recording).evaluated
+    return first(performed, granted(performed, 'acu', 'program'), run.t, run.mode == 'autotrack')
 
 
 def _fade_recovery(performed: Performed, arguments: Arguments) -> Measured:
-    end = granted(performed, RECEIVER, 'fade') + float(arguments['fade'])
-    return _until(performed, end, lambda run: (run.mode == 'autotrack') & np.isfinite(run.measured[:, 0]))
+    run, end = RecordedRun(performed.recording).evaluated, float(arguments['fade'])
+    return first(performed, granted(performed, RECEIVER, 'fade') + end, run.t,
+                 (run.mode == 'autotrack') & np.isfinite(run.measured[:, 0]))
 
 
 def _slopes(performed: Performed) -> matrix.RealSlopes:
@@ -244,9 +243,9 @@ METHODS = (
            _acquisition, _acquisition_time),
     Method('fade_recovery', 'let the signal fade in autotrack: time after the fade to autotrack with a locked '
            'receiver', 's', '<=',
-           (*_TRACKED, Argument('fade', 'duration of the fade', 0.1, 60.0, 's', default=2.0),
-            Argument('depth', 'loss of level in the fade', 0.0, 200.0, 'dB', default=30.0)), _fade, _fade_recovery,
-           True),
+           (_target('own', 'pass', 'beacon'), *_TRACKED[1:],
+            Argument('fade', 'duration of the fade', 0.1, 60.0, 's', default=2.0),
+            Argument('depth', 'loss of level', 0.0, 200.0, 'dB', default=30.0)), _fade, _fade_recovery, True),
     Method('receiver_slope', 'point beside a beacon by `preset`: slope of a receiver channel or larger cross-talk, as '
            'corrected by the control unit', '1', '+-',
            (_target('beacon', 'own'), *_PLACE,
