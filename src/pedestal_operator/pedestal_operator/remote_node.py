@@ -7,12 +7,13 @@ import math
 import os
 import socket
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
+from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
@@ -21,7 +22,7 @@ from pedestal_common.graph import domain, nodes
 from pedestal_common.graph.steps import GraphError
 from pedestal_common.node import middleware
 from pedestal_common.node.shell import Shell
-from pedestal_common.quantities import Message, Nanoseconds, Seconds
+from pedestal_common.quantities import Message, Nanoseconds, Seconds, Value
 from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import HELD_REFUSAL, Command, Reply
 from pedestal_operator.antenna import POINTING_TOPIC, Antenna
@@ -307,6 +308,17 @@ class RemoteSession:
                 since = datetime.datetime.fromtimestamp(start * 1e-9, datetime.timezone.utc)
                 found['since'] = f'{since:%Y-%m-%d %H:%M:%S} UTC'
         return found
+
+    def parameters(self, names: Iterable[str], node: str = '') -> dict[str, Value]:
+        """Return {name: value} of parameters of a node; '': of the commanded node. Raises GraphError without a reply.
+        """
+        names = list(names)
+        query = self.remote.query(names, parameter_value_to_python, node)
+        self.until(query.answered, REPLY_TIMEOUT_S)
+        if not query.values:
+            raise GraphError(f'{node or self.remote.node.name} does not state its parameters within '
+                             f'{REPLY_TIMEOUT_S:g} s')
+        return dict(zip(names, query.values))
 
     def request(self, verb: str, arguments: Mapping[str, object] | None = None,
                 seconds: Seconds = REPLY_TIMEOUT_S) -> Reply:

@@ -8,7 +8,6 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
-from rclpy.parameter import parameter_value_to_python
 
 from pedestal_bringup.scenario.program import program_message
 from pedestal_common.geometry import orbit
@@ -136,13 +135,10 @@ class Station:
 
     def _parameters(self) -> dict[str, Value]:
         """Return the parameters of the control unit. Raises GraphError."""
-        query = self._node.query(CONTROL_UNIT_PARAMETERS, parameter_value_to_python)
-        self._session.until(query.answered, REPLY_TIMEOUT_S)
-        if not query.values:
-            raise GraphError(f'the control unit does not state its parameters within {REPLY_TIMEOUT_S:g} s')
+        found = self._session.parameters(CONTROL_UNIT_PARAMETERS)
         if self._node.get_node_names().count('station') > 1:
             raise GraphError('another station commands this antenna')
-        return dict(zip(CONTROL_UNIT_PARAMETERS, query.values))
+        return found
 
     def _check_place(self, plan: Plan) -> None:
         place = [float(self._found[f'prediction.station.{name}']) for name in STATION_NAMES]

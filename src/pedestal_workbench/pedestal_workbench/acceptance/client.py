@@ -16,7 +16,7 @@ from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_common.wire import commands, messages
 from pedestal_operator.commander import Commander
 from pedestal_operator.remote_node import RemoteSession, user
-from pedestal_operator.state import alarm_reports
+from pedestal_operator.state import PAST_STATES, alarm
 from pedestal_recording.recording import Recording, holds, replies
 from pedestal_workbench.acceptance.exercise import Action, Executed, Exercise, StoppedError, Track
 from pedestal_workbench.acceptance.in_loop import CLIENT
@@ -56,6 +56,11 @@ class Client(Commander):
         """Stamp of the last joint_states, -1 before the first."""
         return self.stamps.get(JOINTS_TOPIC, -1)
 
+    @property
+    def reaches_acu(self) -> bool:
+        """True while the control unit receives its commands."""
+        return self.publishers_by_link[self._link(self.node.obeys)[0]].get_subscription_count() > 0
+
     def send(self, action: Action) -> Sent:
         """Send the command of an action, without waiting for its reply."""
         command = commands.parsed(action.command)
@@ -78,7 +83,8 @@ class Client(Commander):
         scheduled = self.interference.startswith(f'{commands.SCHEDULE_CLIENT} ')
         if self.interference and not scheduled and self.interference not in exercise.alarms:
             return self.interference
-        unexpected = [f'alarm {name}: {text}' for name, text in alarm_reports(self) if name not in exercise.alarms]
+        unexpected = [f'alarm {each["name"]}: {each["detail"] or each["meaning"]}' for each in map(alarm, self.alarms)
+                      if each['state'] not in PAST_STATES and each['name'] not in exercise.alarms]
         return self._outside(exercise) or '; '.join(unexpected)
 
     def _outside(self, exercise: Exercise) -> str:
@@ -106,8 +112,6 @@ class ClientSession(RemoteSession):
         stopped for another reason, None after the end of the graph. Raises StoppedError, after it has stopped the
         antenna."""
         client, due, sent = self.remote, list(exercise.actions), list[Sent]()
-        if exercise.track:
-            client.send_track(exercise.track, begin)
         while (reason := left()) == '' and client.stamp < begin + round(exercise.duration * NS_PER_SECOND):
             self.spin(TURN_S)
             elapsed = client.stamp - begin
@@ -130,9 +134,12 @@ class ClientSession(RemoteSession):
         self.until(lambda: self.remote.replied(number), STOP_TIMEOUT_S)
 
 
-def outcomes(sent: Sequence[Sent], recording: Recording, begin: Seconds) -> tuple[Executed, ...]:
+def outcomes(exercise: Exercise, sent: Sequence[Sent], recording: Recording, begin: Seconds) -> tuple[Executed, ...]:
     """Return the actions with their outcomes as recorded. A service of the drive has no number: the recorded replies
-    to a service are in the order of its requests. begin: in the time of the recording."""
+    to a service are in the order of its requests. begin: in the time of the recording. Raises StoppedError for an
+    action without an outcome."""
+    for late in exercise.actions[len(sent):]:
+        raise StoppedError(f'{late.command} was not sent within the exercise: this computer is too busy')
     found: dict[str, tuple[Seconds, commands.Reply]] = {}
     services: dict[str, list[tuple[Seconds, commands.Reply]]] = defaultdict(list)
     for topic in {nodes.row(each.action.node).replies for each in sent}:
@@ -143,7 +150,8 @@ def outcomes(sent: Sequence[Sent], recording: Recording, begin: Seconds) -> tupl
     made = []
     for action, number in sent:
         of_service = services[commands.parsed(action.command).verb]
-        t, reply = found.get(number) or (of_service.pop(0) if of_service else (
-            begin + action.at, commands.Reply(False, 'no reply')))
+        if number not in found and not of_service:
+            raise StoppedError(f'{action.node} did not reply to {action.command}')
+        t, reply = found[number] if number in found else of_service.pop(0)
         made.append(Executed(t - begin, action, *reply))
     return tuple(made)

@@ -12,7 +12,6 @@ from pedestal_common.graph import domain
 from pedestal_common.graph.steps import GraphError
 from pedestal_common.injection import table
 from pedestal_common.quantities import Nanoseconds
-from pedestal_operator.remote_node import REPLY_TIMEOUT_S
 from pedestal_recording.bag import read
 from pedestal_recording.recording import Decoded
 from pedestal_workbench.acceptance import client, in_loop
@@ -46,19 +45,20 @@ class OwnGraph:
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from time 0 of a run. Raises StoppedError."""
-        bag, pacing = self._folder / name, _pacing(exercise)
-        arguments = [*self._changed(exercise, seed).arguments(), '--bag', str(bag), '--pacing', pacing]
+        bag = self._folder / name
+        arguments = [*self._changed(exercise, seed).arguments(), '--bag', str(bag), '--pacing', _pacing(exercise)]
         with domain.of_child(), _run(arguments, bag) as run:
             with ClientSession(Client, []) as session:
                 try:
-                    sent = session.conduct(exercise, _connected(session, run, pacing), lambda: _left(run))
+                    sent = session.conduct(exercise, _begun(session, run, exercise), lambda: _left(run))
                 except GraphError as error:     # the run has ended early, which explains more
                     raise StoppedError(f'{error}{_ending(run, bag)}') from None
                 session.until(lambda: run.poll() is not None, END_TIMEOUT_S)
         if run.returncode not in JUDGED_EXIT_CODES:
             raise StoppedError(f'the run ended early{_ending(run, bag)}')
         recording = Decoded(read(bag))
-        return Performed(self.antenna, exercise, recording, 0.0, client.outcomes(sent, recording, 0.0), bag)
+        return Performed(self.antenna, exercise, recording, 0.0, client.outcomes(exercise, sent, recording, 0.0),
+                         bag)
 
 
 def _pacing(exercise: Exercise) -> str:
@@ -81,20 +81,24 @@ def _run(arguments: list[str], bag: pathlib.Path) -> Iterator[Child]:
             pass_recorder.end(run, END_TIMEOUT_S)
 
 
-def _connected(session: ClientSession, run: Child, pacing: str) -> Nanoseconds:
-    """Wait for the graph of a run, take control, and return the stamp of its time 0. Raises GraphError, StoppedError.
+def _begun(session: ClientSession, run: Child, exercise: Exercise) -> Nanoseconds:
+    """Wait for the begin of a run, take control, load the track, and return the stamp of time 0. Raises GraphError.
+
+    A run in lockstep does not wait for this client: a wait for a reply would delay the first actions. Time 0 of a run
+    in realtime is seconds after the start of its nodes.
     """
-    remote = session.remote
-    session.until(lambda: run.poll() is not None or remote.count_subscribers(remote.node.obeys), START_TIMEOUT_S)
-    session.wait_for_node(REPLY_TIMEOUT_S if run.poll() is None else 0.0)
-    session.take_control()
-    if pacing == 'lockstep':
+    remote, lockstep = session.remote, _pacing(exercise) == 'lockstep'
+    if exercise.track and lockstep:
+        remote.send_track(exercise.track, 0)    # latched: the control unit receives it before the first step
+    session.until(lambda: run.poll() is not None or remote.reaches_acu and (remote.stamp >= 0 or not lockstep),
+                  START_TIMEOUT_S)
+    remote.request('take')
+    if lockstep or run.poll() is not None:
         return 0
-    start = remote.query(['graph.start'], lambda value: value.integer_value)
-    session.until(start.answered, REPLY_TIMEOUT_S)
-    if not start.values:
-        raise GraphError('the control unit does not state its parameters')
-    return start.values[0]
+    start: Nanoseconds = session.parameters(['graph.start'])['graph.start']
+    if exercise.track:
+        remote.send_track(exercise.track, start)
+    return start
 
 
 def _left(run: Child) -> str | None:

@@ -5,10 +5,9 @@ import dataclasses
 import math
 import pathlib
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
-from rclpy.parameter import parameter_value_to_python
 
 from acu_tracker.params import AcuParameters
 from drive_law.params import AduNodeParameters
@@ -21,7 +20,7 @@ from pedestal_common.graph import nodes
 from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Json, Radians, Seconds
+from pedestal_common.quantities import Radians, Seconds
 from pedestal_operator.commander import DRIVE_STATE_TOPIC
 from pedestal_operator.remote_node import REPLY_TIMEOUT_S
 from pedestal_recording.bag import read
@@ -54,15 +53,15 @@ class RunningGraph:
         self._session.__enter__()
         try:
             self._session.wait_for_node()
-            self._graph = self._queried('acu', GRAPH_KEYS)
+            self._graph = self._session.parameters(GRAPH_KEYS)
             if self._graph['graph.pacing'] == 'lockstep':
                 raise GraphError('the running graph is in lockstep, which no recorder can join; --scenario starts a '
                                  'graph for each exercise')
             if not self._session.until(lambda: not self._silent(), START_TIMEOUT_S):
                 raise GraphError(self._silent())
-            acu = parameters.build(AcuParameters, self._queried('acu', parameters.defaults(AcuParameters)))
-            adu = parameters.build(AduNodeParameters, self._queried(
-                nodes.DRIVE_NODE, parameters.defaults(AduNodeParameters))) if self._graph['graph.simulated'] else None
+            acu = parameters.build(AcuParameters, self._session.parameters(parameters.defaults(AcuParameters)))
+            adu = parameters.build(AduNodeParameters, self._session.parameters(
+                parameters.defaults(AduNodeParameters), nodes.DRIVE_NODE)) if self._graph['graph.simulated'] else None
             self.antenna = Antenna(acu, adu, acu.tracker.receiver.beamwidth, acu.period)
             self._session.take_control()
         except BaseException:
@@ -76,14 +75,6 @@ class RunningGraph:
             self._session.stop_antenna()
             self._session.request('release')
         self._session.__exit__()
-
-    def _queried(self, node: str, names: Iterable[str]) -> dict[str, Json]:
-        """Return {name: value} of parameters of a node. Raises GraphError."""
-        query = self._session.remote.query(list(names), parameter_value_to_python, node)
-        self._session.until(query.answered, REPLY_TIMEOUT_S)
-        if not query.values:
-            raise GraphError(f'{node} does not state its parameters within {REPLY_TIMEOUT_S:g} s')
-        return dict(zip(names, query.values))
 
     def check(self, exercise: Exercise) -> None:
         """Raise ValueError for an exercise that the running graph cannot make."""
@@ -102,13 +93,18 @@ class RunningGraph:
                 begin = session.remote.stamp + round(LEAD_S * NS_PER_SECOND)
                 if exercise.start is None:
                     self._follow()
+                if exercise.track:
+                    session.remote.send_track(exercise.track, begin)
                 sent = session.conduct(exercise, begin, lambda: self._silent(recorder))
+        except GraphError as error:
+            raise StoppedError(str(error)) from None
         finally:
             with uninterrupted(), contextlib.suppress(GraphError):
                 self._restore(exercise)
         recording = Decoded(read(bag))
         time_0 = (begin - recording.start) / NS_PER_SECOND
-        return Performed(self.antenna, exercise, recording, time_0, client.outcomes(sent, recording, time_0), bag)
+        executed = client.outcomes(exercise, sent, recording, time_0)
+        return Performed(self.antenna, exercise, recording, time_0, executed, bag)
 
     def _silent(self, recorder: Child | None = None) -> str:
         """Return which node is silent or which process has ended, '' for none."""
@@ -134,11 +130,14 @@ class RunningGraph:
         self._wait(exercise, self._command('stop'), WAY_MARGIN_S)
 
     def _follow(self) -> str:
-        """Command a mode that leads to the target, and return the mode."""
-        for mode in TARGET_MODES[:-1]:
-            with contextlib.suppress(StoppedError):
+        """Command a mode that leads to the target, and return the mode. Raises StoppedError without such a mode."""
+        refusals = []
+        for mode in TARGET_MODES:
+            try:
                 return self._command(mode)
-        return self._command(TARGET_MODES[-1])
+            except StoppedError as error:
+                refusals.append(str(error))
+        raise StoppedError(f'the antenna has no target: {"; ".join(refusals)}')
 
     def _command(self, mode: str, arguments: dict[str, Radians] | None = None) -> str:
         """Command a mode and return it. Raises StoppedError for a refusal."""
