@@ -1,4 +1,5 @@
 """The verb `acceptance` in the closed loop: what it prints, asks, writes and returns."""
+import importlib.resources
 import io
 import json
 import subprocess
@@ -6,6 +7,9 @@ import sys
 import xml.etree.ElementTree as ElementTree
 
 import pytest
+
+from pedestal_bringup.scenario.variant import Variant
+from pedestal_workbench.acceptance import in_loop, specification
 
 SCENARIO = '--scenario', 'uav_tracker_3m', '--closed-loop'
 TITLE = 'title: Acceptance\ntester: A. Smith\nrequirements:\n'
@@ -114,7 +118,6 @@ def test_a_sequence_that_is_stopped_is_exit_code_1_with_a_report(accept, tmp_pat
 
 
 def test_an_operator_stops_the_sequence(accept, tmp_path, monkeypatch):
-    from pedestal_workbench.acceptance import in_loop
     made = in_loop.InLoop.perform
 
     def perform(self, name, exercise, seed):
@@ -128,3 +131,26 @@ def test_an_operator_stops_the_sequence(accept, tmp_path, monkeypatch):
     code, said, _ = accept(TITLE + STEP + SLEW, '--yes')
     assert code == 0
     assert 'interrupted, continued at' in (tmp_path / 'acceptance-spec' / 'report.html').read_text()
+
+
+@pytest.mark.parametrize('name, scenario', [
+    ('acceptance', 'uav_tracker_3m'), ('acceptance_uav_tracker_3m', 'uav_tracker_3m'),
+    ('acceptance_station_real', 'station_real')])
+def test_a_sample_fits_its_antenna(name, scenario):
+    path = importlib.resources.files('pedestal') / 'samples' / f'{name}.yaml'
+    spec = specification.read(path)
+    assert len(spec.exercises(in_loop.antenna(Variant(scenario).load()))) >= (5 if name == 'acceptance' else 30)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize('scenario', ['uav_tracker_3m', 'station_real'])
+def test_an_antenna_passes_its_sample(pedestal, scenario):
+    path = importlib.resources.files('pedestal') / 'samples' / f'acceptance_{scenario}.yaml'
+    code, said, _ = pedestal('acceptance', path, '--scenario', scenario, '--closed-loop', '--yes')
+    assert code == 0, said
+
+
+def test_the_commented_sample_is_passed(pedestal):
+    path = importlib.resources.files('pedestal') / 'samples' / 'acceptance.yaml'
+    code, said, _ = pedestal('acceptance', path, *SCENARIO, '--yes')
+    assert code == 0, said
