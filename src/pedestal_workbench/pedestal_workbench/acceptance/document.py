@@ -316,6 +316,7 @@ def write(acceptance: Acceptance, folder: pathlib.Path) -> list[pathlib.Path]:
     content = list(blocks(acceptance, folder / 'signals'))
     written = {'report.html': page(content, title).encode(), 'report.pdf': pdf(content, title, acceptance.made),
                'report.json': json.dumps(json_content(acceptance), indent=1).encode(), 'report.xml': junit(acceptance)}
+    folder.mkdir(parents=True, exist_ok=True)
     for name, data in written.items():
         (folder / name).write_bytes(data)
     return [folder / name for name in written]
