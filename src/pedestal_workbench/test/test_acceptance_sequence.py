@@ -15,7 +15,7 @@ from pedestal_workbench.acceptance.judgement import INCONCLUSIVE, PASSED
 from pedestal_workbench.acceptance.method import Measured, Method
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
-SPAN = Span(-20.0, 60.0, 30.0)
+SPAN = Span(-20.0, 60.0, 60.0)
 
 
 def step(antenna, arguments):

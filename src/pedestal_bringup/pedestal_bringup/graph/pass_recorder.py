@@ -1,5 +1,6 @@
 """Recorder of a part of a run in realtime: a process beside the recorder of the graph, with a log beside its bag."""
 import contextlib
+import itertools
 import pathlib
 import signal
 import subprocess
@@ -35,6 +36,14 @@ def end(process: Child, seconds: Seconds) -> None:
         process.wait(seconds)
     process.kill()
     process.wait()
+
+
+def set_aside(bag: pathlib.Path, word: str) -> None:
+    """Rename a bag that shall not be used, and its logs, to NAME.WORD-1, NAME.WORD-2 and so on."""
+    for path in [bag.with_name(bag.name + suffix) for suffix in ('', '.log', '.logs')]:
+        if path.exists():
+            names = (path.with_name(f'{path.name}.{word}-{number}') for number in itertools.count(1))
+            path.rename(next(name for name in names if not name.exists()))
 
 
 def log_of(bag: pathlib.Path) -> pathlib.Path:

@@ -51,6 +51,11 @@ class Client(Commander):
         self._send_track = self.writer(TRACK_TOPIC)
         self.connect_drive()
 
+    def subscribe_numbers(self, topic: str) -> None:
+        """Subscribe to the only topic of every step that it needs, so that it keeps up with a graph in lockstep."""
+        if topic == JOINTS_TOPIC:
+            super().subscribe_numbers(topic)
+
     @property
     def stamp(self) -> Nanoseconds:
         """Stamp of the last joint_states, -1 before the first."""

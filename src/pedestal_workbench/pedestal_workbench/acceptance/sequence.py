@@ -12,6 +12,7 @@ import pathlib
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
+from pedestal_bringup.graph import pass_recorder
 from pedestal_common.quantities import Json
 from pedestal_common.text_files import files
 from pedestal_recording import bag_files
@@ -99,7 +100,7 @@ class _Performances:
         for i in range(requirement.repetitions):
             if i == len(made):
                 name = f'{requirement.file_name}-{i + 1}'
-                _set_aside(self._folder, name)
+                pass_recorder.set_aside(self._folder / name, 'interrupted')
                 made.append(self._performer.perform(name, exercise, self._seed + SEED_STEP * i))
             yield made[i]
         if key not in self._left:
@@ -111,13 +112,6 @@ def _key(exercise: Exercise) -> str:
     track = exercise.track and [exercise.track.t.tolist(), exercise.track.angles.tolist()]
     return json.dumps([exercise.duration, exercise.envelope, exercise.actions, exercise.start, track,
                        dict(exercise.changes), exercise.alarms], sort_keys=True)
-
-
-def _set_aside(folder: pathlib.Path, name: str) -> None:
-    """Rename what an interrupted session has left of a recording, with its logs."""
-    for path in [path for path in folder.glob(f'{name}*') if path.name in (name, f'{name}.log', f'{name}.logs')]:
-        number = next(n for n in range(1, 10**6) if not (folder / f'{path.name}.interrupted-{n}').exists())
-        path.rename(folder / f'{path.name}.interrupted-{number}')
 
 
 @contextlib.contextmanager
