@@ -418,7 +418,7 @@ def _supervise(state: State, constants: Constants, inputs: Inputs, outputs: Outp
     rests = stow.commands_no_motion(state.stow, constants, inputs, state.mode.now)
     mode = Mode.STANDBY if rests else state.mode.now
     conditions.take(state.supervision, mode, inputs, outputs, constants.axis, state.unasked, facts)
-    if state.excitation.count > 0:
-        excitation.watch(state.excitation, state.supervision.alarms)
+    if state.excitation.count > 0 and annunciator.raised_after(state.supervision.alarms, state.excitation.begin):
+        excitation.end(state.excitation)
     # A new revision makes the unit publish the list of alarms.
     outputs.alarms = state.supervision.alarms.revision

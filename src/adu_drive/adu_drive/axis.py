@@ -223,8 +223,8 @@ def initial_state(p: AxisParameters, theta: Radians, external: NewtonMeters) -> 
 
 @inlined
 def _encoder_angle(theta: Radians, omega: RadiansPerSecond, errors: EncoderErrors) -> Radians:
-    """Return the angle that a load encoder measures: its disc is mounted off the centre (error once per turn), its
-    signal is interpolated between two lines of the disc, and its angle is old. omega: rate of the axis."""
+    """Return the angle that a load encoder measures: its disc is mounted off the centre (error once per turn), and its
+    signal is interpolated between two lines of the disc. Its angle is old by `age`; omega: rate of the axis."""
     if errors.exact:
         return theta
     theta -= errors.age * omega

@@ -1,13 +1,12 @@
 """Excitation: a multisine that is added to the rate command of one axis, to measure its position loop.
 
-The command `excite` starts it between two steps. Because it is added behind the controller and its limits, the
-recorded rate command is the signal after the point of the addition, and the rate command less the multisine is the
-signal that returned through the loop (pedestal_workbench.tuning.frequency_response). It ends after its duration, with
-any other mode, command of a mode, alarm or silence, and at a limit of the angle.
+The command `excite` starts it between two steps. The multisine is added behind the controller and its limits. The
+recorded rate command is therefore the signal after the point of the addition. The rate command less the multisine is
+the signal that returned through the loop (pedestal_workbench.tuning.frequency_response). The excitation ends after its
+duration, with any other mode, command of a mode, alarm or silence, and at a limit of the angle.
 """
 from typing import TYPE_CHECKING, Annotated
 
-from acu_tracker.alarms.annunciator import ALARM_COUNT, AlarmList
 from pedestal_common import multisine
 from pedestal_common.compiled import compiled
 from pedestal_common.multisine import Sweep
@@ -70,10 +69,3 @@ def add(excitation: Excitation, outputs: 'Outputs', limit: RadiansPerSecond, t: 
                                                    (t - excitation.begin) / excitation.period)
     outputs.rate[i] = min(max(outputs.rate[i] + added, -limit), limit)
 
-
-@compiled
-def watch(excitation: Excitation, alarms: AlarmList) -> None:
-    """End the excitation if an alarm was raised after its begin."""
-    for i in range(ALARM_COUNT):
-        if alarms.alarm[i].raised > excitation.begin:
-            excitation.count = 0

@@ -22,8 +22,12 @@ from pedestal_workbench.acceptance.method import Arguments, Measured, Method
 from pedestal_workbench.tuning import frequency_response
 from pedestal_workbench.tuning.frequency_response import Response
 
-SWEEP = Sweep(period=8.0, lowest=0.25, highest=95.0, points=MAX_SINES, dropped=1, kept=5, peak=0.012)
-SPARE_S = 2.0           # time of the excitation before the settling [s]
+SWEEP = Sweep(period=8.0, lowest=0.25, highest=95.0, points=MAX_SINES, dropped=1, kept=6, peak=0.012)
+SPARE_S = 2.0           # time of the excitation around dropped and kept periods [s]
+RATE_RAD_S, MIN_PERIODS, QUIET_RATIO = 0.025, 3, 5.0
+"""Largest constant rate [rad/s], at which a bad tooth meets few of the periods. Least number of used periods, and
+their largest distance from the median of all periods over the least distance [-]."""
+FRICTION_SHARE = 0.002  # share of a value by which it depends on the constant rate, by the friction [-]
 MIN_CORRELATION = 0.3   # least correlation of the command and the multisine [-]
 MIN_NOTCH_DB, MAX_NOISE = 3.0, 0.1      # least depth of a notch [dB], largest noise of its frequencies over |L| [-]
 
@@ -33,7 +37,7 @@ def _sweep(antenna: Antenna, arguments: Arguments) -> tuple[Sweep, RadiansPerSec
     axis, drive = servo.plan(antenna, arguments), servo.drive_of(antenna, str(arguments['axis']))
     limits = getattr(antenna.acu, axis.name).limits
     time = SPARE_S + (SWEEP.dropped + SWEEP.kept) * SWEEP.period
-    rate = min(frequency_response.moving_rate(axis.number, axis.rate), axis.travel / (time + 2.0))
+    rate = min(RATE_RAD_S, frequency_response.RATE_SHARE * axis.rate, axis.travel / (time + 2.0))
     sweep = frequency_response.in_contact(drive, SWEEP, antenna.period)
     largest = min(sweep.peak, frequency_response.PEAK_SHARE * rate, MAX_PEAK_RAD_S, MAX_PEAK_SHARE * limits.rate)
     return dataclasses.replace(sweep, peak=largest), rate
@@ -52,43 +56,50 @@ def _exercise(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 
 def _signals(performed: Performed, arguments: Arguments) -> tuple[Sweep, Floats, Floats]:
-    """Return (multisine, rate command, record of the multisine) of the kept periods. Raises ValueError."""
+    """Return (multisine, rate command (periods, n), one period of the multisine (n,)) of the quiet periods. Raises
+    ValueError."""
     sweep, _ = _sweep(performed.antenna, arguments)
     name, bag, n = str(arguments['axis']), performed.recording, round(sweep.period / performed.antenna.period)
     if missing := recordings.missing(bag, 'joint_states', 'acu/rate_command'):
         raise ValueError(f'the recording holds no {missing}')
     t = bag.table('joint_states')['t']
-    first = int(np.searchsorted(t, performed.begin + servo.executed_at(performed, 1) + SPARE_S
+    first = int(np.searchsorted(t, performed.begin + servo.executed_at(performed, 1) + 0.5 * SPARE_S
                                 + sweep.dropped * sweep.period))
     kept = slice(first, first + sweep.kept * n)
     command = recordings.at(bag, t, 'acu/rate_command', [f'{name}.velocity'])[kept, 0]
     if len(command) < sweep.kept * n or not np.isfinite(command).all():
         raise ValueError('the recording does not hold every step of the multisine')
-    once = sweep.once(performed.antenna.period)
-    mean = command.reshape(sweep.kept, n).mean(axis=0)
-    U, D = (np.fft.rfft(x) for x in (mean, once))
-    chosen = np.zeros(len(U))
-    chosen[sweep.bins()] = 1.0
-    correlation = np.fft.irfft(chosen * U * D.conj(), n) / (np.abs(chosen * U) @ np.abs(D)) * 0.5 * n
-    shift = int(np.argmax(correlation))
-    if correlation[shift] < MIN_CORRELATION:
-        raise ValueError(f'the rate command holds no multisine: its correlation is {correlation[shift]:.2g}, must be '
-                         f'at least {MIN_CORRELATION:g}')
-    return sweep, command, np.tile(np.roll(once, shift), sweep.kept)
+    rows, bins = command.reshape(sweep.kept, n), sweep.bins()
+    U = np.fft.rfft(rows, axis=1)[:, bins]
+    usual = np.median(U.real, axis=0) + 1j * np.median(U.imag, axis=0)
+    apart = np.median(np.abs(U - usual) / np.abs(usual), axis=1)
+    quiet = np.sort(np.argsort(apart)[:max(MIN_PERIODS, int((apart < QUIET_RATIO * apart.min()).sum()))])
+    once, correlation = sweep.once(performed.antenna.period), np.zeros(n // 2 + 1, complex)
+    D = np.fft.rfft(once)[bins]
+    correlation[bins] = usual * D.conj() / max(np.abs(usual) @ np.abs(D), 1e-300)
+    found = np.fft.irfft(correlation, n) * 0.5 * n
+    if not found.max() > MIN_CORRELATION:
+        raise ValueError(f'the rate command holds no multisine: its correlation is {found.max():.2g}, must be above '
+                         f'{MIN_CORRELATION:g}')
+    return dataclasses.replace(sweep, dropped=0, kept=len(quiet)), rows[quiet], np.roll(once, int(np.argmax(found)))
+
+
+def _response(sweep: Sweep, sent: Floats, added: Floats) -> Response:
+    """Return the open loop; sent (periods, n): rate command; added (n,): multisine."""
+    return frequency_response.response(sweep, sent.ravel(), (added - sent).ravel())
 
 
 def _measured(performed: Performed, arguments: Arguments, statistic: Callable[[Response], float]) -> Measured:
-    """Return a statistic of the open loop, with the jackknife over the periods."""
+    """Return a statistic of the open loop, with the jackknife over the periods, and FRICTION_SHARE."""
     sweep, sent, added = _signals(performed, arguments)
-    rows = list(np.stack((sent.reshape(sweep.kept, -1), (added - sent).reshape(sweep.kept, -1)), axis=1))
 
-    def of(kept: list[Floats]) -> float:
-        part = dataclasses.replace(sweep, dropped=0, kept=len(kept))
-        value = statistic(frequency_response.response(part, *np.concatenate(kept, axis=1)))
+    def of(rows: list[Floats]) -> float:
+        value = statistic(_response(dataclasses.replace(sweep, kept=len(rows)), np.array(rows), added))
         if not math.isfinite(value):
             raise ValueError(f'the band from {sweep.lowest:g} to {sweep.highest:g} Hz does not show this value')
         return value
-    return Measured(of(rows), servo.half_width(pseudo_values(rows, of)))
+    value, rows = of(list(sent)), list(sent)
+    return Measured(value, math.hypot(servo.half_width(pseudo_values(rows, of)), FRICTION_SHARE * value))
 
 
 def _margin(metric: str) -> Callable[[Performed, Arguments], Measured]:
@@ -98,8 +109,7 @@ def _margin(metric: str) -> Callable[[Performed, Arguments], Measured]:
 
 def _resonance(performed: Performed, arguments: Arguments) -> Measured:
     """Return the lowest frequency at which the open loop has a notch, the highest one for none."""
-    sweep, sent, added = _signals(performed, arguments)
-    response = frequency_response.response(dataclasses.replace(sweep, dropped=0), sent, added - sent)
+    response = _response(*_signals(performed, arguments))
     known = response.deviation < MAX_NOISE
     f = response.frequency[known]
     level = 20.0 * np.log10(np.abs(response.open_loop[known]) * f)

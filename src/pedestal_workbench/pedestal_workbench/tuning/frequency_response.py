@@ -211,7 +211,7 @@ def position(variant: Variant, axes: Collection[str] = AXES, sweep: Sweep = POSI
     variant, rates = _at_rates(variant)
     loop = closed_loop.Loop(variant.with_(duration=(sweep.dropped + sweep.kept) * sweep.period).load())
     added = np.zeros((loop.steps, 2))
-    # Only the asked axes are excited, because the axes of a mount whose inertia varies act on each other.
+    # Because the axes of a mount with varying inertia act on each other, no other axis is excited.
     for i in (AXES.index(name) for name in axes):
         added[:-1, i] = _at_most(sweep, *rates).signal(loop.period_ns * 1e-9)
     commanded = loop.run(added)['acu/rate_command']['velocity']
