@@ -5,7 +5,9 @@
     exercise        what a method makes the antenna do, and the recording of it
     servo, margins, tracking, safety    methods by subject: their exercises, and their numbers from recordings
     in_loop         performs an exercise in the closed loop, in memory
-    on_graph        performs an exercise on nodes, through acu/command, as an operator does
+    client          commands an exercise on nodes, through acu/command, as an operator does
+    own_graph       performs an exercise on a simulated graph that it starts
+    running_graph   performs an exercise on the running graph, simulated or real
     sequence        all requirements in order; continues where it stopped
     judgement       value, uncertainty and verdict of a requirement
     document        report: HTML, PDF, JSON, JUnit XML

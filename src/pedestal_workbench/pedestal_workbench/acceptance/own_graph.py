@@ -45,8 +45,7 @@ class OwnGraph:
         return in_loop.run_of(exercise, self._variant, self.antenna.period, seed)
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
-        """Make an exercise from time 0 of a run. A run on a busy computer, whose commands came too late, is made again.
-        Raises StoppedError."""
+        """Make an exercise from time 0 of a run. A run with late commands is made again. Raises StoppedError."""
         for _ in range(MAX_RUNS):
             performed = self._run_once(self._folder / name, exercise, seed)
             late = max((executed.t - executed.action.at for executed in performed.executed), default=0.0)
@@ -69,8 +68,8 @@ class OwnGraph:
         if run.returncode not in JUDGED_EXIT_CODES:
             raise StoppedError(f'the run ended early{_ending(run, bag)}')
         recording = Decoded(read(bag))
-        return Performed(self.antenna, exercise, recording, 0.0, client.outcomes(exercise, sent, recording, 0.0),
-                         bag)
+        executed = client.outcomes(exercise, sent, recording, 0.0)
+        return Performed(self.antenna, exercise, recording, 0.0, executed, bag)
 
 
 def _pacing(exercise: Exercise) -> str:
