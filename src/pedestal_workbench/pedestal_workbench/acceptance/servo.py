@@ -11,16 +11,7 @@ import numpy as np
 
 from drive_law.axis_params import AxisParameters
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import (
-    Bools,
-    Degrees,
-    Floats,
-    Radians,
-    RadiansPerSecond,
-    RadiansPerSecond2,
-    Seconds,
-    Times,
-)
+from pedestal_common.quantities import Bools, Degrees, Floats, Radians, RadiansPerSecond, Seconds, Times
 from pedestal_common.wire.commands import Argument
 from pedestal_recording import recording as recordings
 from pedestal_results import metrics, tracking
@@ -43,9 +34,9 @@ class Plan(NamedTuple):
     name: str
     number: int             # of the axis in AXES
     travel: Radians         # that an exercise may use
-    place: tuple[Radians, Radians]      # of the exercises, of both axes
-    rate: RadiansPerSecond              # largest of the shaper
-    acceleration: RadiansPerSecond2     # largest of the shaper
+    place: tuple[Radians, Radians]  # of the exercises, of both axes
+    rate: RadiansPerSecond  # largest of the shaper
+    acceleration: float     # largest of the shaper [rad/s2]
 
     def preset(self, at: Seconds, angle: Radians, rate: RadiansPerSecond = 0.0, time: Seconds = 1.0) -> Action:
         """Return the command to go to an angle, and on from there at a rate for a time."""
@@ -119,7 +110,6 @@ class Followed(NamedTuple):
     angle: Floats   # of the load encoder
     error: Floats   # reference minus angle
     resolution: Degrees     # of the encoder, 0 if not known
-    step: Seconds   # period of the steps
 
     @property
     def rate(self) -> Floats:
@@ -149,7 +139,7 @@ def followed(performed: Performed, arguments: Arguments) -> Followed:
         raise ValueError(f'the recording holds only {known.sum()} steps of the exercise')
     drive: AxisParameters | None = getattr(performed.antenna.adu, name, None)
     return Followed(t[known], angle[known], (reference - angle)[known],
-                    360.0 / 2**drive.encoder.load_bits if drive else 0.0, performed.antenna.period)
+                    360.0 / 2**drive.encoder.load_bits if drive else 0.0)
 
 
 def executed_at(performed: Performed, number: int) -> Seconds:
@@ -217,7 +207,7 @@ def _acceleration(performed: Performed, arguments: Arguments) -> Measured:
         rises.append(_crossing(motion.t, rate, 0.9 * top) - _crossing(motion.t, rate, 0.1 * top))
         values.append(0.8 * top / rises[-1])
     value = float(np.mean(values))
-    return Measured(value, max(0.5 * float(np.ptp(values)), value * 0.5 * motion.step / min(rises)))
+    return Measured(value, max(0.5 * float(np.ptp(values)), value * 0.5 * performed.antenna.period / min(rises)))
 
 
 def _brake(antenna: Antenna, arguments: Arguments) -> Exercise:
@@ -235,7 +225,7 @@ def _braking_distance(performed: Performed, arguments: Arguments) -> Measured:
     if rate < 0.9 * full:
         raise ValueError(f'the axis stops from {rate:.4g} deg/s, must be from {full:.4g} deg/s')
     way = motion.angle[motion.t > motion.t[-1] - 0.5].mean() - np.interp(at, motion.t, motion.angle)
-    return Measured(float(abs(way)), 0.5 * rate * motion.step)
+    return Measured(float(abs(way)), 0.5 * rate * performed.antenna.period)
 
 
 # Errors of motions.
