@@ -70,3 +70,14 @@ def test_a_track_is_refused_before_a_node_starts(name, refused):
 @pytest.mark.parametrize('name', ELEMENTS)
 def test_elements_are_refused_before_a_node_starts(name, refused):
     refused(f'elements: {name}')
+
+
+@pytest.mark.parametrize('name', hostile_files.YAML)
+def test_a_specification_of_acceptance_is_refused(name, tmp_path):
+    from pedestal_workbench.acceptance import specification
+    path = hostile_files.YAML[name](hostile_files.Files(tmp_path, None))
+    with pytest.raises(ValueError) as error:
+        specification.read(path)
+    lines = str(error.value).splitlines()
+    assert len(lines) < 20 and all(line.startswith(f'{path}: ') and len(line) < 1000 for line in lines)
+    assert str(error.value).replace('\n', '').isprintable()

@@ -5,6 +5,7 @@ import math
 import pathlib
 import sys
 
+import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from shared import PEDESTAL
@@ -366,6 +367,20 @@ def test_what_was_asked_for_is_found_and_asked_for_again(requested, pedestal):
     assert f'{len(requests)} requests repeated' in said
     table = bags.read(path).table(topic)
     assert [text for text, t in zip(table['data'], table['t']) if t > 1.9][:len(states)] == states
+
+
+@pytest.mark.thorough
+def test_an_excitation_comes_out_the_same_to_the_last_bit(start_run, pedestal):
+    """The command adds a multisine for 1 s, as the control unit of the graph did."""
+    run = start_run('leo_pass', '--pacing', 'lockstep', '--duration', '6', '--param', 'acu.tracker.lock_count=20',
+                    '--param', 'acu.commands=3 stop; 4 excite axis=azimuth peak=0.02 duration=1')
+    run.finish()
+    table = bags.read(run.bag).table('acu/rate_command')
+    during, later = (table['azimuth.velocity'][(table['t'] > begin) & (table['t'] < begin + 0.9)]
+                     for begin in (4.05, 5.1))
+    assert np.ptp(during) > 0.015 > 10.0 * np.ptp(later)
+    code, said, _ = pedestal(run.bag, *EXACT)
+    assert code == 0, said
 
 
 @pytest.mark.thorough

@@ -31,6 +31,7 @@ from pedestal_common.wire.commands import Argument
 from pedestal_results import results
 from pedestal_station.station.requests import STATION_COMMANDS
 from pedestal_studies.system.faults import FAULT_EXPECTATIONS
+from pedestal_workbench.acceptance.methods import METHODS
 from pedestal_workbench.again import what_if
 from tracking_receiver_sim.tracks import files as track_files
 from tracking_receiver_sim.tracks import tables as flight_tables
@@ -59,6 +60,7 @@ VERB_GROUPS = {
     'see what exists': ('scenarios', 'samples', 'parameters'),
     'run a scenario': ('run',),
     'operate a running antenna': ('status', 'mode', 'stop', 'drive', 'ask', 'operate', 'program', 'live', 'simulate'),
+    'accept an antenna': ('acceptance',),
     'plan a night of passes': ('plan', 'station'),
     'use a recording': ('verify', 'recover', 'rerun', 'report', 'replay', 'export', 'filter'),
     'compare settings': ('trials', 'recompute'),
@@ -126,9 +128,16 @@ def injection_table() -> TextTable:
 
 
 def _defaulted(argument: Argument) -> str:
-    """Return the text of an argument of a fault: its name, default, range, unit and meaning."""
+    """Return the text of an argument of a fault or of a method: its name, default, range, unit and meaning."""
     text = f'{argument.name} = {argument.default}' if argument.options else f'{argument.name} = {argument.default:g}'
     return f'`{text}` ({argument.range} {argument.unit}; {argument.doc})'.replace(' ;', ';')
+
+
+def method_table() -> TextTable:
+    """Return the table of the methods of acceptance."""
+    rows = [(f'`{method.name}`', method.doc, method.unit, method.better, ', '.join(map(_defaulted, method.arguments)),
+             'simulated' if method.simulated else 'any') for method in METHODS]
+    return TextTable(('method', 'exercise and measured value', 'unit', 'limit', 'arguments', 'equipment'), rows)
 
 
 def expectation_table(node: str) -> TextTable:
@@ -259,7 +268,7 @@ Maker = Callable[[], TextTable]
 REFERENCE_TABLES: Mapping[str, Maker] = {
     'verbs': verb_table, 'nodes': node_table, 'studies': study_table, 'scenarios': scenario_table,
     'topics': topic_table, 'services': service_table, 'modes': mode_table, 'commands': command_table,
-    'faults that can be injected': injection_table,
+    'faults that can be injected': injection_table, 'methods of acceptance': method_table,
     **{f'expected of faults of {node}': functools.partial(expectation_table, node) for node in INJECTED_FAULTS},
     'filter kinds': filter_table, 'drive faults': fault_table, 'alarms': alarm_table, 'results': result_table,
     'exit codes': exit_code_table, 'recomputed results': lambda: result_table(what_if.COMPARISON_RESULTS),

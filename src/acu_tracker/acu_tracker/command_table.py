@@ -7,6 +7,7 @@ from acu_tracker.alarms.annunciator import MAX_SHELVING_TIME_S
 from acu_tracker.guidance import manual
 from acu_tracker.modes import FALLBACK_MODES
 from acu_tracker.pointing.params import PointingParameters
+from acu_tracker.servo import excitation
 from pedestal_common.graph.modes import MODE_ROWS, MODES
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import ParameterError, as_dict, flatten
@@ -69,6 +70,15 @@ ACU_COMMANDS = (
         *_of_axes('offset of the angle', -1.0, 1.0, 'rad', 0.0))),
     CommandDefinition('pointing', 'take another pointing model, gradually; terms that are not given are 0',
                       _MODEL_ARGUMENTS),
+    CommandDefinition('excite', 'add a multisine to the rate command of an axis, to measure its position loop; only '
+                      f'in the modes {", ".join(excitation.EXCITED_MODES)}; ended by any mode, alarm or limit', (
+        Argument('axis', 'excited axis', options=AXES),
+        Argument('peak', 'peak of the multisine', 1e-6, excitation.MAX_PEAK_RAD_S, 'rad/s'),
+        Argument('duration', 'duration', 1.0, excitation.MAX_DURATION_S, 's'),
+        Argument('lowest', 'lowest frequency', 0.02, 500.0, 'Hz', default=0.25),
+        Argument('highest', 'highest frequency', 0.02, 500.0, 'Hz', default=90.0),
+        Argument('points', 'number of frequencies', 2.0, excitation.MAX_SINES, default=100.0),
+        Argument('period', 'time after which the multisine repeats', 1.0, excitation.MAX_PERIOD_S, 's', default=8.0))),
     CommandDefinition('take', 'take control; other clients can then send only `stop` and `standby`', (
         Argument('role', 'role of the client; a supervisor takes control from any holder; a program takes it from '
                  'another client, or in a pass, only after `allow`', options=CONTROL_ROLES, default='operator'),)),

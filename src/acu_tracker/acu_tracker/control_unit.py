@@ -22,7 +22,7 @@ from acu_tracker.pointing import model
 from acu_tracker.program import bridge, program_track
 from acu_tracker.program.program_track import ProgramTrack
 from acu_tracker.search import acquisition
-from acu_tracker.servo import axes, controllers, drive_watch, position_loop, travel
+from acu_tracker.servo import axes, controllers, drive_watch, excitation, position_loop, travel
 from acu_tracker.servo.position_loop import Instants
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled, separate
@@ -42,6 +42,7 @@ class State(Record):
     outage: interruptions.OutageRecord
     guidance: guidance.Guidance
     axis: BothAxes[position_loop.AxisLoop]
+    excitation: excitation.Excitation
     unasked: drive_watch.Envelope
     frozen: drive_watch.Frozen
     supervision: conditions.Supervision
@@ -169,6 +170,8 @@ def step(state: State, constants: Constants, inputs: Inputs, outputs: Outputs,
         # The axes have stopped. After a short silence the mode continues from their actual angles.
         modes.continue_in(state.mode, interruptions.mode_after(state.resumption, state.mode.now, state.stamp,
                                                                inputs.stamp, constants.p.resume_time))
+    if silence:
+        excitation.end(state.excitation)
     state.stamp = inputs.stamp
     flags = _observe(state, constants, inputs, outputs, program_track.of_mode(all_tables, state.mode.table), silence)
     # The axes have rested if they had no motion command before this step, or after a gap between the steps.
@@ -262,6 +265,8 @@ def _change(state: State, constants: Constants, inputs: Inputs, outputs: Outputs
     outputs.locked = now.conditions.lock == Reason.NONE
     result = modes.change(state.mode, now, request)
     mode = state.mode.now
+    if result == modes.REQUEST_ACCEPTED or mode != before:
+        excitation.end(state.excitation)
     if result == modes.REQUEST_ACCEPTED and modes.FOLLOWS_TABLE[mode]:
         # After this, autotrack needs lock_count new measurements to begin.
         target.reset_accepted_count(state.tracking.target)
@@ -355,6 +360,8 @@ def _move(state: State, constants: Constants, inputs: Inputs, outputs: Outputs, 
         deck_rates = tracking.deck_rates(state.tracking, constants, t, actual.azimuth.angle, actual.elevation.angle)
         beam = axes.BeamInputs(state.tracking.error, deck_rates, mode == Mode.AUTOTRACK)
         axes.follow(state.axis, constants, inputs, outputs, motion, now, beam)
+        if state.excitation.count > 0:
+            excitation.add(state.excitation, outputs, constants.axis[state.excitation.axis].p.limits.rate, t)
         modes.mark_started(state.mode)
         if mode != Mode.STOW or not constants.p.stow_pins:
             modes.watch_arrival(state.mode, axes.distance(constants, inputs, motion, mode))
@@ -411,5 +418,7 @@ def _supervise(state: State, constants: Constants, inputs: Inputs, outputs: Outp
     rests = stow.commands_no_motion(state.stow, constants, inputs, state.mode.now)
     mode = Mode.STANDBY if rests else state.mode.now
     conditions.take(state.supervision, mode, inputs, outputs, constants.axis, state.unasked, facts)
+    if state.excitation.count > 0 and annunciator.raised_after(state.supervision.alarms, state.excitation.begin):
+        excitation.end(state.excitation)
     # A new revision makes the unit publish the list of alarms.
     outputs.alarms = state.supervision.alarms.revision

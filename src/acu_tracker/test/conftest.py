@@ -5,15 +5,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acu_tracker import control_unit, signals
+from acu_tracker import control_unit, modes, signals
 from acu_tracker.modes import REASONS
 from acu_tracker.params import AcuParameters
 from acu_tracker.program.program_track import NO_TRACK, ProgramTrack, Tables
 from acu_tracker.signals import INVALID_INPUTS
+from acu_tracker.unit import Acu
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight, pointing_model
+from pedestal_common.graph import nodes
 from pedestal_common.graph.modes import MODES
 from pedestal_common.parameters import as_dict, build
+from pedestal_common.wire.commands import Command
 
 ASHORE = Rotation.from_quat(line_of_sight.ASHORE_ATTITUDE)
 
@@ -152,6 +155,35 @@ class Leaning(Rig):
         return super().error(t, self.beam(angle))
 
 
+class Axes:
+    """An Acu on ideal axes, without a target: the unit as a node runs it."""
+
+    def __init__(self, **parameters):
+        self.unit = Acu(build(AcuParameters, parameters), nodes.row('acu').reads[:2])
+        self.k, self.angle, self.rate = 0, np.array([0.3, 0.6]), np.zeros(2)
+        self.angles, self.rates = [], []
+
+    def ask(self, verb, **arguments):
+        return self.unit.command(Command(verb, 'test', '1', {name: str(value) for name, value in arguments.items()}))
+
+    def run(self, seconds):
+        for _ in range(round(seconds / Rig.T)):
+            inputs, outputs = self.unit.inputs, self.unit.outputs
+            inputs['joint_states']['stamp'] = self.k * 5_000_000
+            inputs['joint_states']['position'], inputs['joint_states']['velocity'] = self.angle, self.rate
+            self.unit.step(np.array([self.k * 5_000_000]), inputs, outputs)
+            self.rate = outputs['acu/rate_command']['velocity'][0].copy()
+            self.angle = self.angle + Rig.T * self.rate
+            self.k += 1
+            self.angles.append(self.angle)
+            self.rates.append(self.rate)
+        return self
+
+    @property
+    def mode(self):
+        return modes.MODES[self.unit.parts['outputs']['mode']]
+
+
 @pytest.fixture(name='Rig')
 def rig():
     return Rig
@@ -160,3 +192,8 @@ def rig():
 @pytest.fixture(name='Leaning')
 def leaning():
     return Leaning
+
+
+@pytest.fixture(name='Axes')
+def axes_of_the_unit():
+    return Axes

@@ -3,52 +3,19 @@
 import numpy as np
 import pytest
 
-from acu_tracker import modes
 from acu_tracker.alarms.table import ALARM_NAMES
 from acu_tracker.guidance import manual
 from acu_tracker.operating.commands import Authority
 from acu_tracker.params import AcuParameters
-from acu_tracker.unit import Acu
-from pedestal_common.graph import nodes
 from pedestal_common.parameters import ParameterError, build
 from pedestal_common.wire import messages
 from pedestal_common.wire.commands import Command
 
 T = 0.005
-STEP_NS = 5_000_000
-
-
-class Axes:
-    """An Acu on ideal axes, without a target: the unit as a node runs it."""
-
-    def __init__(self, **parameters):
-        self.unit = Acu(build(AcuParameters, parameters), nodes.row('acu').reads[:2])
-        self.k, self.angle, self.rate = 0, np.array([0.3, 0.6]), np.zeros(2)
-        self.angles, self.rates = [], []
-
-    def ask(self, verb, **arguments):
-        return self.unit.command(Command(verb, 'test', '1', {name: str(value) for name, value in arguments.items()}))
-
-    def run(self, seconds):
-        for _ in range(round(seconds / T)):
-            inputs, outputs = self.unit.inputs, self.unit.outputs
-            inputs['joint_states']['stamp'] = self.k * STEP_NS
-            inputs['joint_states']['position'], inputs['joint_states']['velocity'] = self.angle, self.rate
-            self.unit.step(np.array([self.k * STEP_NS]), inputs, outputs)
-            self.rate = outputs['acu/rate_command']['velocity'][0].copy()
-            self.angle = self.angle + T * self.rate
-            self.k += 1
-            self.angles.append(self.angle)
-            self.rates.append(self.rate)
-        return self
-
-    @property
-    def mode(self):
-        return modes.MODES[self.unit.parts['outputs']['mode']]
 
 
 @pytest.fixture
-def axes():
+def axes(Axes):
     return Axes().run(0.1)
 
 
@@ -111,7 +78,7 @@ def test_what_is_refused_changes_nothing(axes):
     assert axes.mode == 'preset' and axes.angle == pytest.approx([0.5, 0.9], abs=1e-4)
 
 
-def test_named_points():
+def test_named_points(Axes):
     axes = Axes(points='home 0.2 0.5; up 0.0 1.5').run(0.1)
     assert axes.ask('preset', point='up').granted
     axes.run(4.0)
@@ -132,7 +99,7 @@ def test_an_offset_shifts_the_program_as_it_runs(axes):
     assert axes.angle == pytest.approx(np.array([0.31, 0.6]) + 0.005 * (axes.k * T - 4.0), abs=1e-4)
 
 
-def test_one_holder_at_a_time():
+def test_one_holder_at_a_time(Axes):
     axes = Axes().run(0.1)
     ask = axes.unit.command
     assert ask(Command('preset', 'anna')).granted                                     # nobody is in control
@@ -149,7 +116,7 @@ def test_one_holder_at_a_time():
     assert ask(Command('release', 'carl')).granted and ask(Command('preset', 'bert')).granted
 
 
-def test_a_program_takes_the_antenna_from_a_pass_only_if_an_operator_has_allowed_it():
+def test_a_program_takes_the_antenna_from_a_pass_only_if_an_operator_has_allowed_it(Axes):
     axes = Axes(**{'prediction.station.latitude_deg': 39.742476, 'prediction.station.longitude_deg': -105.1786,
                    'prediction.station.height': 1830.0, 'prediction.start_time': '2003-10-17T19:30:30'}).run(0.1)
     ask, program = axes.unit.command, 'rotctld 4533 from 127.0.0.1:40000'
@@ -185,7 +152,7 @@ def test_nobody_without_a_name_takes_control():
         Authority().take('', 'operator', 'standby', 0)
 
 
-def test_the_ramp_of_a_jog_keeps_the_shapers_acceleration():
+def test_the_ramp_of_a_jog_keeps_the_shapers_acceleration(Axes):
     p = build(AcuParameters, {}).azimuth
     axes = Axes().run(0.1)
     axes.ask('rate', azimuth=0.5)
@@ -210,7 +177,7 @@ def raised(axes):
     return {name for name in names if name.startswith('program')}
 
 
-def test_a_program_in_segments_goes_on_and_what_is_wrong_with_it_has_a_name():
+def test_a_program_in_segments_goes_on_and_what_is_wrong_with_it_has_a_name(Axes):
     axes = Axes().run(0.1)
     axes.unit.decode('acu/program_track', segment(2, 3, 0.3))
     assert axes.ask('program').text == 'refused: before program track; mode is standby'
@@ -233,7 +200,7 @@ def test_a_program_in_segments_goes_on_and_what_is_wrong_with_it_has_a_name():
     assert axes.unit.diagnose().message == 'standby (after program track)' and 'program ended' in raised(axes)
 
 
-def test_the_own_prediction_is_another_table_with_its_offset():
+def test_the_own_prediction_is_another_table_with_its_offset(Axes):
     """The sun of NREL/TP-560-34302, see test_prediction."""
     axes = Axes(**{'prediction.start_time': '2003-10-17T19:30:30', 'prediction.station.latitude_deg': 39.742476,
                    'prediction.station.longitude_deg': -105.1786, 'prediction.station.height': 1830.14}).run(0.1)
@@ -249,7 +216,7 @@ def test_the_own_prediction_is_another_table_with_its_offset():
 
 
 @pytest.mark.parametrize(('rate', 'floor'), ((-0.3, '-1 0.5; 1 0.5'), (0.3, '-1 -0.5; 0.5 -0.5; 0.6 1.2; 1 1.2')))
-def test_a_jog_against_the_floor_has_no_dead_time_on_the_way_back(rate, floor):
+def test_a_jog_against_the_floor_has_no_dead_time_on_the_way_back(rate, floor, Axes):
     axis = 'elevation' if rate < 0.0 else 'azimuth'
     i, axes = int(rate < 0.0), Axes(floor=floor, **{'elevation.limits.high': 1.1, 'elevation.stow': 1.0}).run(0.1)
     for _ in range(10):

@@ -43,6 +43,7 @@ class EncoderErrors(Record):
     cos: Radians
     interpolation: Radians  # amplitude
     lines: float            # number of lines of the disc
+    age: Seconds            # of the angle
 
 
 class MotorConstants(axis_control.MotorConstants, motors.Constants):
@@ -172,9 +173,9 @@ def constants(p: AxisParameters, h: Seconds, varying: bool = False,
     J_base = p.load.inertia - J_dish
     _, _, buffer = p.limits.switches
     encoder = EncoderErrors.of(
-        exact=error.zero == error.eccentricity_sin == error.eccentricity_cos == error.interpolation == 0.0,
+        exact=not any((error.zero, error.eccentricity_sin, error.eccentricity_cos, error.interpolation, error.age)),
         zero=error.zero, sin=error.eccentricity_sin, cos=error.eccentricity_cos, interpolation=error.interpolation,
-        lines=error.lines)
+        lines=error.lines, age=error.age)
     return Constants.of(**axis_control.constants(p, period), motor_1=_motor_constants(p.motor_1, p, h, period),
                         motor_2=_motor_constants(p.motor_2, p, h, period), k=g.stiffness, c=g.damping,
                         half_lash=0.5 * g.lash, pinion_ratio=g.pinion_ratio,
@@ -221,11 +222,12 @@ def initial_state(p: AxisParameters, theta: Radians, external: NewtonMeters) -> 
 
 
 @inlined
-def _encoder_angle(theta: Radians, errors: EncoderErrors) -> Radians:
+def _encoder_angle(theta: Radians, omega: RadiansPerSecond, errors: EncoderErrors) -> Radians:
     """Return the angle that a load encoder measures: its disc is mounted off the centre (error once per turn), and its
-    signal is interpolated between two lines of the disc."""
+    signal is interpolated between two lines of the disc. Its angle is old by `age`; omega: rate of the axis."""
     if errors.exact:
         return theta
+    theta -= errors.age * omega
     return (theta + errors.zero + errors.sin * math.sin(theta) + errors.cos * math.cos(theta)
             + errors.interpolation * math.sin(errors.lines * theta))
 
@@ -234,7 +236,8 @@ def _encoder_angle(theta: Radians, errors: EncoderErrors) -> Radians:
 def _load_counts(axis: State, constants: Constants) -> float:
     if axis.stuck:
         return axis.reading
-    return axis_control.counts(_encoder_angle(axis.theta, constants.encoder), constants.per_rad) + axis.jump
+    angle = _encoder_angle(axis.theta, axis.omega, constants.encoder)
+    return axis_control.counts(angle, constants.per_rad) + axis.jump
 
 
 @inlined

@@ -210,6 +210,7 @@ class EncoderErrorParameters(Parameters):
                                         'offset of the disc divided by its radius')
     interpolation: float = parameter(0.0, 0.0, 1e-3, 'rad', 'amplitude of the interpolation error, once per line')
     lines: int = parameter(16384, 1, 1_000_000, '', 'lines of the disc per turn')
+    age: float = parameter(0.0, 0.0, 0.05, 's', 'age of the angle, for an encoder that is slow')
 
 
 @dataclasses.dataclass(frozen=True)

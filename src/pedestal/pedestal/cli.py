@@ -23,7 +23,7 @@ if typing.TYPE_CHECKING:
 VERBS = {
     'run': ('run', 'run a scenario as separate nodes and record it'),
     'scenarios': ('design', 'list the scenarios that come with this package'),
-    'samples': ('design', 'write sample files: a flight log, a ship log, a satellite, an antenna'),
+    'samples': ('design', 'write sample files: flight, ship, satellites, an antenna, specifications of acceptance'),
     'new': ('design', 'write a scenario of your own antenna from the numbers of its data sheet'),
     'parameters': ('design', 'list the parameters of a node: default, range, unit, meaning'),
     'status': ('operate', 'print the state of a running antenna'),
@@ -33,6 +33,7 @@ VERBS = {
     'ask': ('operate', 'send a command to a running node'),
     'operate': ('operate', 'operate a running antenna by hand on this terminal'),
     'station': ('station', 'take the passes of a plan on a running antenna, one after another'),
+    'acceptance': ('acceptance', 'test an antenna against a specification, and write the report of its acceptance'),
     'live': ('operate', 'show a running graph in Foxglove or Lichtblick'),
     'program': ('operate', 'send a table of times and angles (program track) of a scenario to a running ACU'),
     'plan': ('plan', 'plan a night of passes: which satellites the antenna tracks, when, and what it will lose'),

@@ -11,7 +11,8 @@ from pedestal_bringup.scenario import scenario
 from pedestal_workbench.trials import ensemble
 
 CHANGES = (
-    (), ('adu.azimuth.load.inertia=170', 'adu.transport_delay=0.003'),
+    (), ('adu.azimuth.load.inertia=170', 'adu.transport_delay=0.003',
+         'acu.commands=1 stop; 1.5 excite axis=azimuth peak=0.02 duration=1'),
     ('adu.azimuth.structure.inertia_share=0.3', 'adu.elevation.structure.inertia_share=0.2'),
     ('adu.wind.azimuth=300', 'adu.wind.elevation=-200', 'adu.wind.gust.kind=davenport'),
     ('adu.wind.field.speed=12', 'adu.mount.tilt_forward=1e-3', 'adu.azimuth.speed_loop.structure=independent'),
@@ -19,8 +20,8 @@ CHANGES = (
     ('adu.wind.gust.kind=step', 'adu.wind.gust.azimuth=9000', 'adu.wind.gust.start=0.5'),
     ('adu.azimuth.speed_loop.disturbance_observer=400', 'acu.azimuth.filter.kind=ca', 'adu.initially_enabled=false'),
     ('adu.azimuth.faults.overspeed=0.01', 'acu.commands=1 stop; 2 autotrack'))
-"""Of the trials: load, delay, structure, wind, loops, bodies that turn, a drive on its brakes, two that trip (a gust
-takes all torque; a low limit)."""
+"""Of the trials: load, delay, excitation, structure, wind, loops, bodies that turn, a drive on its brakes, two that
+trip (a gust takes all torque; a low limit)."""
 
 
 def loops():
@@ -52,6 +53,7 @@ def test_every_trial_is_what_it_is_alone():
 
 
 @pytest.mark.parametrize('change', ['adu.azimuth.gear_train.runout=1e-5', 'adu.elevation.encoder.error.zero=1e-5',
+                                    'adu.azimuth.encoder.error.age=1e-3',
                                     'adu.inject=1 gust torque=100', 'scenario.ship=true', 'adu.period=0.01'])
 def test_what_does_not_fit_runs_alone(fitting, change):
     """One trial that is of another kind is enough."""

@@ -24,6 +24,7 @@ Degrees: TypeAlias = Annotated[float, 'deg']
 Seconds: TypeAlias = Annotated[float, 's']
 Nanoseconds: TypeAlias = Annotated[int, 'ns']       # since the Unix epoch or the start of a run: a stamp; or a time
 Hertz: TypeAlias = Annotated[float, 'Hz']
+DegreesPerSecond: TypeAlias = Annotated[float, 'deg/s']
 RadiansPerSample: TypeAlias = Annotated[float, 'rad']
 Meters: TypeAlias = Annotated[float, 'm']
 MetersPerSecond: TypeAlias = Annotated[float, 'm/s']

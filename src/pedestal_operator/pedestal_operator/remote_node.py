@@ -7,12 +7,13 @@ import math
 import os
 import socket
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
+from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
@@ -21,7 +22,7 @@ from pedestal_common.graph import domain, nodes
 from pedestal_common.graph.steps import GraphError
 from pedestal_common.node import middleware
 from pedestal_common.node.shell import Shell
-from pedestal_common.quantities import Message, Seconds
+from pedestal_common.quantities import Message, Nanoseconds, Seconds, Value
 from pedestal_common.wire import commands, messages, records
 from pedestal_common.wire.commands import HELD_REFUSAL, Command, Reply
 from pedestal_operator.antenna import POINTING_TOPIC, Antenna
@@ -83,6 +84,7 @@ GRAPH_PARAMETERS = 'graph.scenario', 'graph.start'  # of every node, which name 
 GRAPH_REPLY_TIMEOUT_S = 1.0     # longest wait for them [s]
 
 _R = TypeVar('_R')
+_S = TypeVar('_S', bound='RemoteSession')
 
 
 def user() -> str:
@@ -103,6 +105,7 @@ class Remote(Shell, Antenna):
     who: str                        # name of the person or program in the next commands
     node: nodes.Node                # which receives the commands
     arrivals: dict[str, Seconds]    # {topic or node: time of its last message, monotonic clock}
+    stamps: dict[str, Nanoseconds]  # {topic of numbers: stamp of its last message}
 
     def __init__(self, name: str, who: str, node: str = 'acu', beam: str = '',
                  parameters_type: type[parameters.Parameters] = parameters.Parameters) -> None:
@@ -110,7 +113,7 @@ class Remote(Shell, Antenna):
         self.links = nodes.links(nodes.MAX_BEAMS if beam else 0)
         self.beam = f'{beam}/' if beam else ''
         self.who, self.node = who, nodes.row(node)
-        self.numbers, self.texts, self.status, self.arrivals, self.alarms = {}, {}, {}, {}, []
+        self.numbers, self.texts, self.status, self.arrivals, self.alarms, self.stamps = {}, {}, {}, {}, [], {}
         self._requests = Requests(f'{os.getpid()}.{time.time_ns()}')
         for topic in NUMBER_TOPICS:
             self.subscribe_numbers(topic)
@@ -127,9 +130,14 @@ class Remote(Shell, Antenna):
         """Subscribe to a further topic of numbers."""
         decoder = records.Decoder(topic, records.empty(records.of(topic), 1))
 
-        def take(message: Sequence[float], _: bool) -> None:
-            self.numbers[topic], self.arrivals[topic] = message, time.monotonic()
-        self.reader(topic, decoder.decoded, take)
+        def decode(data: bytes) -> tuple[Nanoseconds, records.Decoded]:
+            message = decoder.decoded(data)
+            return message[0], message
+
+        def take(message: records.Decoded, _: bool) -> None:
+            self.stamps[topic], self.numbers[topic] = message
+            self.arrivals[topic] = time.monotonic()
+        self.reader(topic, decode, take)
 
     def _text_taker(self, topic: str) -> Callable[[Message], None]:
         def take(message: Message) -> None:
@@ -204,9 +212,9 @@ class Remote(Shell, Antenna):
 
     def query(self, names: Sequence[str], read: Callable[[ParameterValue], object] = _double,
               node: str = '') -> 'Query':
-        """Return a Query for parameters of a node; node: name, '' for the commanded node."""
-        service = f'{self.beam}{node or self.node.name}/get_parameters'
-        return Query(self.create_client(GetParameters, service), names, read)
+        """Return a Query for parameters of a node; '': of the commanded node."""
+        name = node or f'{self.beam}{self.node.name}'
+        return Query(self.create_client(GetParameters, f'{name}/get_parameters'), names, read)
 
 
 class Query:
@@ -243,7 +251,7 @@ class RemoteSession:
         """Keep the function that makes the Remote, and the arguments for ROS 2."""
         self._make, self._arguments = make, arguments
 
-    def __enter__(self) -> 'RemoteSession':
+    def __enter__(self: _S) -> _S:
         middleware.initialise(self._arguments)
         self.remote = self._make()
         self._executor = middleware.make_executor()
@@ -292,7 +300,7 @@ class RemoteSession:
         so the control unit is queried in its place."""
         remote = self.remote
         query = remote.query(GRAPH_PARAMETERS, lambda value: value.string_value or value.integer_value,
-                             '' if remote.node.program else 'acu')
+                             '' if remote.node.program else f'{remote.beam}acu')
         self.until(query.answered, GRAPH_REPLY_TIMEOUT_S)
         found = {'domain': str(remote.context.get_domain_id())}
         if query.values:
@@ -302,6 +310,17 @@ class RemoteSession:
                 since = datetime.datetime.fromtimestamp(start * 1e-9, datetime.timezone.utc)
                 found['since'] = f'{since:%Y-%m-%d %H:%M:%S} UTC'
         return found
+
+    def parameters(self, names: Iterable[str], node: str = '') -> dict[str, Value]:
+        """Return {name: value} of parameters of a node; '': of the commanded node. Raises GraphError without a reply.
+        """
+        names = list(names)
+        query = self.remote.query(names, parameter_value_to_python, node)
+        self.until(query.answered, REPLY_TIMEOUT_S)
+        if not query.values:
+            raise GraphError(f'{node or self.remote.node.name} does not state its parameters within '
+                             f'{REPLY_TIMEOUT_S:g} s')
+        return dict(zip(names, query.values))
 
     def request(self, verb: str, arguments: Mapping[str, object] | None = None,
                 seconds: Seconds = REPLY_TIMEOUT_S) -> Reply:

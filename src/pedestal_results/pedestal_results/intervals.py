@@ -14,13 +14,13 @@ _P = TypeVar('_P')      # part of the runs
 CONFIDENCE_LEVEL = 0.95  # confidence level of the interval of a mean [-]
 
 
-def interval(values: ArrayLike) -> Estimate:
+def interval(values: ArrayLike, level: float = CONFIDENCE_LEVEL) -> Estimate:
     """Return the Estimate of the mean of a result in n independent runs.
 
         low, high = mean -+ t_(n-1) s / sqrt(n)
 
         s         standard deviation of the values
-        t_(n-1)   quantile of Student's t with n - 1 degrees of freedom, for CONFIDENCE_LEVEL
+        t_(n-1)   quantile of Student's t with n - 1 degrees of freedom, for the confidence level
 
     All are NaN if a value is not finite; low and high of one run are NaN.
     """
@@ -28,7 +28,7 @@ def interval(values: ArrayLike) -> Estimate:
     n, mean = len(values), float(np.mean(values))
     if n < 2:
         return mean, math.nan, math.nan
-    half = float(stdtrit(n - 1, 0.5 * (1.0 + CONFIDENCE_LEVEL)) * np.std(values, ddof=1) / math.sqrt(n))
+    half = float(stdtrit(n - 1, 0.5 * (1.0 + level)) * np.std(values, ddof=1) / math.sqrt(n))
     return mean, mean - half, mean + half
 
 

@@ -15,6 +15,7 @@ import pytest
 from drive_law.params import AduParameters
 from pedestal_bringup.scenario import files, scenario
 from pedestal_bringup.scenario.variant import Variant
+from pedestal_common.multisine import Sweep
 from pedestal_common.parameters import as_dict, build
 from pedestal_results import tracking
 from pedestal_studies.p000_ma import bode
@@ -307,7 +308,7 @@ def test_margins_of_a_known_loop():
 
 def test_response_of_a_known_filter_and_its_deviation():
     """0.5 y' + 0.25 in front of white noise: the deviation is the distance of the measured points."""
-    sweep = frequency.Sweep(1.0, 1.0, 400.0, 60, 1, 8, 1.0)
+    sweep = Sweep(1.0, 1.0, 400.0, 60, 1, 8, 1.0)
     x = sweep.signal(1e-3)
     assert np.abs(x).max() == pytest.approx(1.0)
     y = np.zeros(len(x))

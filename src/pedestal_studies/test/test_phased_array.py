@@ -7,8 +7,7 @@ import pytest
 from scipy import linalg
 
 from acu_tracker.estimation.filters.kalman import benedict_bordner
-from pedestal_results import intervals, tracking
-from pedestal_studies import metrics
+from pedestal_results import intervals, metrics, tracking
 from pedestal_studies.p002_jia import compared_loops, phased_array
 from pedestal_studies.p002_jia.angle_loop import (
     GRID_STEP_S,

@@ -6,8 +6,7 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are
 
 from acu_tracker.estimation.filters import axis_filter
-from pedestal_results import intervals
-from pedestal_studies import metrics
+from pedestal_results import intervals, metrics
 from pedestal_studies.p004_li_chen_wang import rate_measurement as study
 from pedestal_studies.result import save
 

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pedestal_results import intervals, tracking
-from pedestal_studies import metrics
+from pedestal_results import intervals, metrics, tracking
 from pedestal_studies.p001_zhou_yang_qin import alignment
 
 T = np.arange(0.0, 3.0, 1e-4)

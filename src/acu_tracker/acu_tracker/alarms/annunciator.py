@@ -174,6 +174,15 @@ def persisting_alarm(alarms: AlarmList, without: int) -> int:
 
 
 @compiled
+def raised_after(alarms: AlarmList, t: Seconds) -> bool:
+    """Return True if an alarm was raised after t."""
+    for i in range(ALARM_COUNT):
+        if alarms.alarm[i].raised > t:
+            return True
+    return False
+
+
+@compiled
 def set_condition(alarms: AlarmList, i: int, there: bool, t: Seconds) -> None:
     """Set the condition of an alarm at t without its delays; there: True if the condition is present."""
     alarms.alarm[i].active = there

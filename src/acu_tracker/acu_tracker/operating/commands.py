@@ -13,9 +13,11 @@ from acu_tracker.command_table import Arguments, points
 from acu_tracker.geometry import direction
 from acu_tracker.guidance import manual
 from acu_tracker.operating import refusals
+from acu_tracker.servo import excitation, position_loop
 from acu_tracker.unit_law import DRIVE_STATE_TOPIC
 from pedestal_common.graph.modes import MODE_ROWS, MODES
 from pedestal_common.graph.topics import AXES
+from pedestal_common.multisine import Sweep
 from pedestal_common.parameters import did_you_mean
 from pedestal_common.quantities import AnyRecord, Nanoseconds, Radians, RadiansPerSecond, Seconds
 from pedestal_common.wire.commands import ASK_REFUSAL, HELD_REFUSAL, Command, Reply, program_of
@@ -266,6 +268,24 @@ def _replace_model(unit: 'Acu', command: Command, arguments: Arguments) -> Reply
     return unit.model.replace(unit.parts['state']['tracking']['pointing'], arguments, unit.now, unit.utc)
 
 
+def _excite(unit: 'Acu', _: Command, arguments: Arguments) -> Reply:
+    state, name, peak = unit.parts['state'], arguments['axis'], arguments['peak']
+    axis, mode = getattr(unit.parameters, name), MODES[unit.parts['outputs']['mode']]
+    if mode not in excitation.EXCITED_MODES or axis.controller == position_loop.CONTROLLERS[-1]:
+        return Reply(False, f'refused: mode is {mode}, must be one of {", ".join(excitation.EXCITED_MODES)}, and the '
+                     'axis must have motors')
+    if state['excitation']['count']:
+        return Reply(False, 'refused: an excitation is running; a mode ends it')
+    if peak > excitation.MAX_PEAK_SHARE * axis.limits.rate:
+        raise ValueError(f'excite: peak = {peak:g} rad/s: must be at most {excitation.MAX_PEAK_SHARE:g} of '
+                         f'{name}.limits.rate, {excitation.MAX_PEAK_SHARE * axis.limits.rate:g} rad/s')
+    period, lowest, highest, points = (arguments[key] for key in ('period', 'lowest', 'highest', 'points'))
+    sweep = Sweep(period, lowest, highest, round(points), 0, 1, peak)
+    excitation.begin(state['excitation'], AXES.index(name), sweep, unit.parameters.period, arguments['duration'],
+                     float(state['stamp']))
+    return Reply(True, f'{name} is excited with {peak:g} rad/s for {arguments["duration"]:g} s')
+
+
 def _command_alarm(unit: 'Acu', command: Command, arguments: Arguments) -> Reply:
     return getattr(unit.desk, command.verb)(unit.parts['state'], *arguments.values())
 
@@ -278,6 +298,7 @@ EXECUTORS: dict[str, Executor] = {      # by verb of command_table.ACU_COMMANDS
     'fallback': _choose_fallback,
     'offset': _shift_tables,
     'pointing': _replace_model,
+    'excite': _excite,
     'take': lambda unit, command, arguments: unit.authority.take(
         command.who, arguments['role'], MODES[unit.parts['outputs']['mode']], unit.now),
     'allow': lambda unit, command, arguments: unit.authority.allow(arguments['client']),

@@ -96,6 +96,8 @@ def _values(unit: 'Acu', invalid: tuple[str, ...]) -> list[tuple[str, str]]:
                for i, axis in enumerate(topics.AXES)]
     for axis, innovation, nis in zip(topics.AXES, outputs['innovation'], outputs['nis']):
         values += [(f'{axis} innovation_deg', f'{math.degrees(innovation):.4g}'), (f'{axis} nis', f'{nis:.4g}')]
+    if state['excitation']['count']:
+        values.append(('excited', topics.AXES[state['excitation']['axis']]))
     pointing = state['tracking']['pointing']
     if title := unit.model.title(pointing):
         if pointing['changing']:

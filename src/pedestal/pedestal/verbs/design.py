@@ -30,6 +30,9 @@ SAMPLE_FILES = {
     'night.tle': 'Made-up elements of twelve satellites on 2019-12-09 for a night of passes: nine low ones, one of a '
                  'navigation system, one in a Molniya orbit, and a geostationary one.',
     'my_antenna.yaml': 'A scenario: another antenna that tracks the flight of uav_flyby.',
+    'acceptance.yaml': 'A specification of acceptance that explains all its keys, for the scenario uav_tracker_3m.',
+    'acceptance_station_real.yaml': 'A whole specification of acceptance, for the scenario station_real.',
+    'acceptance_uav_tracker_3m.yaml': 'A whole specification of acceptance, for the scenario uav_tracker_3m.',
 }
 """{name of a file in the folder samples of this package: its content in a sentence}."""
 
@@ -54,8 +57,8 @@ def _scenarios(_options: argparse.Namespace) -> int:
 
 
 def _add_samples(parser: argparse.ArgumentParser) -> None:
-    """Writes flight.csv, ship.csv, iss.tle, night.tle and my_antenna.yaml. If one of these files exists, nothing is
-    written."""
+    """Writes flight.csv, ship.csv, iss.tle, night.tle, my_antenna.yaml, and three specifications of acceptance. If one
+    of these files exists, nothing is written."""
     parser.add_argument('folder', nargs='?', type=pathlib.Path, default=pathlib.Path(), metavar='DIR',
                         help='output folder; default: the current folder')
 

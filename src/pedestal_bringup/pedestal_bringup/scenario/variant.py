@@ -40,10 +40,14 @@ class Variant:
         """Return the checked scenario. Raises ValueError."""
         return scenario.checked(self.draft(), self.seed, self.duration, pacing)
 
-    def command(self) -> str:
-        """Return the command line that runs this variant with separate nodes."""
+    def arguments(self) -> list[str]:
+        """Return the arguments of the verb `run` for this variant."""
         seed = [] if self.seed is None else ['--seed', str(self.seed)]
         duration = [] if self.duration is None else ['--duration', repr(self.duration)]
         given = [part for file in self.files for part in ('--params-file', str(file))]
         changed = [part for change in self.changes for part in ('--param', change)]
-        return shlex.join(['pedestal', 'run', self.source, *seed, *duration, *given, *changed])
+        return [self.source, *seed, *duration, *given, *changed]
+
+    def command(self) -> str:
+        """Return the command line that runs this variant with separate nodes."""
+        return shlex.join(['pedestal', 'run', *self.arguments()])

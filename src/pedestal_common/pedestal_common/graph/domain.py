@@ -51,20 +51,36 @@ def of_run() -> Iterator[int]:
     Raises GraphError if another run holds the domain, ValueError for a domain that is no number of DDS. The DDS
     profile is also set here, because the programs of the user do not set it.
     """
-    set_defaults()
     before = os.environ.get(VARIABLE)
-    with _reserved(before) as domain_id:
-        os.environ[VARIABLE] = str(domain_id)
+    with _reserved(before) as domain_id, _given(domain_id):
         if not before and domain_id != DEFAULT_DOMAIN:
             print(f'this run has {VARIABLE} {domain_id}, because another run has {DEFAULT_DOMAIN}; commands to it: '
                   f'{VARIABLE}={domain_id} pedestal status', flush=True)
-        try:
-            yield domain_id
-        finally:
-            if before is None:
-                del os.environ[VARIABLE]
-            else:
-                os.environ[VARIABLE] = before
+        yield domain_id
+
+
+@contextlib.contextmanager
+def of_child() -> Iterator[int]:
+    """Give this process and its children the domain of a run that a child will start, as a context. The run reserves
+    the domain itself. The domain is chosen, and errors are raised, as in `of_run`."""
+    with _reserved(os.environ.get(VARIABLE)) as domain_id:
+        pass
+    with _given(domain_id):
+        yield domain_id
+
+
+@contextlib.contextmanager
+def _given(domain_id: int) -> Iterator[None]:
+    set_defaults()
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = str(domain_id)
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[VARIABLE]
+        else:
+            os.environ[VARIABLE] = before
 
 
 @contextlib.contextmanager

@@ -62,6 +62,22 @@ def read_text(path: FilePath, largest: int) -> str:
         return stream.read(largest + 1).decode()
 
 
+def replace_text(path: FilePath, text: str) -> None:
+    """Replace a file by one with a text, in one operation. After a loss of power the file is the old or the new one.
+    Raises OSError."""
+    new = f'{os.fspath(path)}.new'
+    with open(new, 'w', encoding='utf-8') as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+    os.replace(new, path)
+    folder = os.open(os.path.dirname(os.path.abspath(path)), os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
 def sha256(path: FilePath) -> str:
     """Return the SHA-256 of a file, read in pieces. Raises OSError."""
     digest = hashlib.sha256()

@@ -1,7 +1,7 @@
 """Subject of a recording in words, for the head of its report: target, date, station, changed parameters."""
 import datetime
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from pedestal_common import parameters
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import StationParameters
 from pedestal_common.graph import nodes
-from pedestal_common.quantities import Seconds
+from pedestal_common.quantities import Seconds, Value
 from pedestal_recording import recording as recordings
 from pedestal_recording.bag import Bag
 from pedestal_results import directions
@@ -48,16 +48,17 @@ def _utc(seconds: Seconds) -> str:
 
 def changed_parameters(bag: Bag) -> list[list[str]]:
     """Return rows [node.parameter, value, default, unit] of the recorded parameters that differ from the defaults."""
-    rows = []
-    for name, values in bag.configuration['parameters'].items():
-        if nodes.plain(name) not in nodes.NODE_NAMES:
-            continue
-        kind = nodes.row(name, bag.beams > 0, bag.servo).parameters_type()
-        defaults, units = parameters.defaults(kind), {key: field.metadata.get('unit', '')
-                                                      for key, field in parameters.flatten(kind)}
-        rows += [[f'{name}.{key}', _shown(value), _shown(defaults[key]), units[key]] for key, value in values.items()
-                 if key in defaults and value != defaults[key] and not parameters.is_absent(value)]
-    return rows
+    return [row for name, values in bag.configuration['parameters'].items() if nodes.plain(name) in nodes.NODE_NAMES
+            for row in changed(name, nodes.row(name, bag.beams > 0, bag.servo).parameters_type(), values)]
+
+
+def changed(node: str, kind: type[parameters.Parameters], values: Mapping[str, Value]) -> list[list[str]]:
+    """Return rows [node.parameter, value, default, unit] of {dotted name: value}, for those that differ from the
+    defaults of a parameter dataclass."""
+    defaults, fields = parameters.defaults(kind), dict(parameters.flatten(kind))
+    return [[f'{node}.{key}', _shown(value), _shown(defaults[key]), fields[key].metadata.get('unit', '')]
+            for key, value in values.items()
+            if key in defaults and value != defaults[key] and not parameters.is_absent(value)]
 
 
 def _shown(value: object) -> str:

@@ -12,9 +12,10 @@ import sys
 import time
 from collections.abc import Iterable, Mapping
 
+from pedestal_bringup.graph import pass_recorder
 from pedestal_bringup.graph.child import Child
+from pedestal_bringup.graph.pass_recorder import log_of
 from pedestal_bringup.graph.processes import exit_description
-from pedestal_common.node import run
 from pedestal_common.quantities import Seconds, Value
 
 STOP_TIMEOUT_S = 20.0  # time that a recorder has to end, before it is killed [s]
@@ -54,7 +55,7 @@ class Recordings:
         name = UNSAFE_PATTERN.sub('_', case)
         self._folder.mkdir(parents=True, exist_ok=True)
         names = itertools.chain([name], (f'{name}-{k}' for k in itertools.count(2)))
-        bag = next(bag for bag in map(self._folder.joinpath, names) if not (bag.exists() or _log(bag).exists()))
+        bag = next(bag for bag in map(self._folder.joinpath, names) if not (bag.exists() or log_of(bag).exists()))
         self._recorders.append(_Recording(case, bag, self._recorder(bag)))
         return bag
 
@@ -75,7 +76,7 @@ class Recordings:
         if self._unproved and not self._proof:
             case, bag = self._unproved.pop(0)
             try:
-                process = _child([sys.executable, '-m', __name__, str(bag)], bag)
+                process = pass_recorder.logged_child([sys.executable, '-m', __name__, str(bag)], bag)
                 self._proof = _Recording(case, bag, process, time.monotonic() + PROOF_TIMEOUT_S)
             except OSError as error:
                 found.append((case, f'{bag}: no report: {error}'))
@@ -94,13 +95,13 @@ class Recordings:
             return f'{died}: starts again'
         self._recorders.remove(each)
         self._unproved.append((each.case, each.bag))
-        return '' if each.stop < math.inf else f'{died}: not recorded any more, {_log(each.bag)}'
+        return '' if each.stop < math.inf else f'{died}: not recorded any more, {log_of(each.bag)}'
 
     def prove_rest(self) -> None:
         """Prove the bags without a report: those of a station that was killed."""
         known = [bag for _, bag in self._unproved] + [each.bag for each in (*self._recorders, self._proof) if each]
         self._unproved += [(bag.name, bag) for bag in sorted(self._folder.glob('*')) if bag.is_dir()
-                           and bag not in known and _log(bag).exists() and not (bag / REPORT_NAME).exists()]
+                           and bag not in known and log_of(bag).exists() and not (bag / REPORT_NAME).exists()]
 
     def close(self) -> None:
         """End all processes in order, without further proofs."""
@@ -112,20 +113,7 @@ class Recordings:
             time.sleep(0.01)
 
     def _recorder(self, bag: pathlib.Path) -> Child:
-        values = [f'{name}:={value}' for name, value in {'bag': bag, **self._parameters}.items()]
-        return _child(run.command('pass_recorder_node', *(self._arguments or ('--ros-args',)),
-                                  *(word for value in values for word in ('-p', value))), bag)
-
-
-def _child(command: list[str], bag: pathlib.Path) -> Child:
-    with open(_log(bag), 'ab') as output:
-        process = Child(command, output.fileno(), None)
-    process.begin()
-    return process
-
-
-def _log(bag: pathlib.Path) -> pathlib.Path:
-    return bag.with_name(bag.name + '.log')
+        return pass_recorder.start(bag, self._parameters, self._arguments)
 
 
 def _ended(each: _Recording) -> int | None:
@@ -139,8 +127,8 @@ def _proved(bag: pathlib.Path, code: int) -> str:
     """Return the last line of a proof, by its exit code."""
     with contextlib.suppress(OSError, IndexError):
         if code == 0:
-            return _log(bag).read_text(errors='replace').splitlines()[-1]
-    return f'no report: the process {exit_description(code)}, {_log(bag)}'
+            return log_of(bag).read_text(errors='replace').splitlines()[-1]
+    return f'no report: the process {exit_description(code)}, {log_of(bag)}'
 
 
 def prove(bag: pathlib.Path) -> str:

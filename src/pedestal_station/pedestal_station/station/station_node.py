@@ -5,20 +5,19 @@ import math
 import pathlib
 import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from rclpy.parameter import parameter_value_to_python
 
 from pedestal_bringup.scenario.program import program_message
 from pedestal_common.geometry import orbit
 from pedestal_common.geometry.geodesy import STATION_NAMES
-from pedestal_common.graph.modes import MODES
 from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.quantities import Message, Seconds, Value
 from pedestal_common.wire import commands, messages
 from pedestal_common.wire.commands import Command, Reply
-from pedestal_operator.remote_node import REPLY_TIMEOUT_S, Remote, RemoteSession
+from pedestal_operator.commander import DRIVE_STATE_TOPIC, EMERGENCY_STOP, Commander
+from pedestal_operator.remote_node import REPLY_TIMEOUT_S, RemoteSession
 from pedestal_station.outputs.file import ELEMENT_NAMES, Contact, Plan, PlanError, seconds, utc_text
 from pedestal_station.station import progress
 from pedestal_station.station.fresh import Watch
@@ -36,21 +35,17 @@ ON_TRACK_WORDS = 'tle, on track', 'program, on track'  # progress on the target 
 PROGRAM_TOPIC, COMMAND_TOPIC, REPLY_TOPIC = 'acu/program_track', 'station/command', 'station/command_result'
 NIGHT_TOPIC, LOG_TOPIC = 'station/night', 'station/log'
 TO_COME = 'queued', 'running'  # states of a pass that the station will take
-DRIVE_STATE_TOPIC, EMERGENCY_STOP = 'adu/state', 'emergency stop'  # topic, and its text after an emergency stop
 
 CONTROL_UNIT_PARAMETERS = ('graph.start', 'graph.beams', 'prediction.start_time', 'prediction.oldest',
                            'tracker.handover', 'tracker.receiver.beamwidth', 'azimuth.limits.low',
                            'azimuth.limits.high', *(f'prediction.station.{name}' for name in STATION_NAMES))
 
 
-class StationNode(Remote):
+class StationNode(Commander):
     """Client of the control unit that also takes commands of operators and publishes the night."""
-    holder: str             # client that has control of the antenna, '' for none
-    interference: str       # mode of another client without control, or an emergency stop, since the last step
 
     def __init__(self, beam: str = '') -> None:
         super().__init__('station', f'station@{socket.gethostname()}', 'acu', beam)     # a name that no operator has
-        self.holder = self.interference = ''
         self.received: list[Command] = []
         self.refused: list[str] = []
         self._answers: collections.OrderedDict[tuple[str, str], Message] = collections.OrderedDict()
@@ -89,31 +84,6 @@ class StationNode(Remote):
         track = program_message(rows[:, 0] - rows[0, 0], rows[:, 1:])
         messages.put_stamp(track.header.stamp, round((rows[0, 0] - ahead) * NS_PER_SECOND))
         self._write[PROGRAM_TOPIC](messages.serialize(track))
-
-    def _take_reply(self, status: Message) -> None:
-        """Take the replies of the control unit, also those to others: who has control, and who commanded a mode."""
-        super()._take_reply(status)
-        with contextlib.suppress(ValueError):
-            command, reply = commands.of_reply(status)
-            verb = command.verb.removeprefix('acu/')
-            if reply.granted and verb in ('take', 'release'):
-                self.holder = command.who if verb == 'take' else ''
-            elif reply.granted and verb in MODES and command.who != self.who and self.holder in ('', self.who):
-                self.interference = f'{command.who} commanded {verb}'
-
-    def _text_taker(self, topic: str) -> Callable[[Message], None]:
-        take = super()._text_taker(topic)
-
-        def taken(message: Message) -> None:
-            if topic == DRIVE_STATE_TOPIC and message.data == EMERGENCY_STOP:
-                self.interference = EMERGENCY_STOP
-            take(message)
-        return taken
-
-    def _take_status(self, array: Message) -> None:
-        super()._take_status(array)
-        if any(status.name == self.name_of('acu') for status in array.status):
-            self.holder = self.diagnostics_of('acu').get('control', '')
 
     def tracking(self, handover: bool) -> bool:
         """Return True while the target is measured, or is followed by an antenna without handover to the receiver."""
@@ -165,13 +135,10 @@ class Station:
 
     def _parameters(self) -> dict[str, Value]:
         """Return the parameters of the control unit. Raises GraphError."""
-        query = self._node.query(CONTROL_UNIT_PARAMETERS, parameter_value_to_python)
-        self._session.until(query.answered, REPLY_TIMEOUT_S)
-        if not query.values:
-            raise GraphError(f'the control unit does not state its parameters within {REPLY_TIMEOUT_S:g} s')
+        found = self._session.parameters(CONTROL_UNIT_PARAMETERS)
         if self._node.get_node_names().count('station') > 1:
             raise GraphError('another station commands this antenna')
-        return dict(zip(CONTROL_UNIT_PARAMETERS, query.values))
+        return found
 
     def _check_place(self, plan: Plan) -> None:
         place = [float(self._found[f'prediction.station.{name}']) for name in STATION_NAMES]

@@ -17,10 +17,9 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.loop.closed_loop import Run
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.quantities import Floats, Json, NewtonMeters, Radians, RadiansPerSecond, Row, Seconds, Times
-from pedestal_results import tracking
+from pedestal_results import metrics, tracking
 from pedestal_results.intervals import row
 from pedestal_results.report import figures as fig
-from pedestal_studies import metrics
 from pedestal_studies.p000_ma import servo
 from pedestal_studies.p000_ma.servo import Runs
 from pedestal_studies.result import Drawings, Metrics, Result, draw_torques, legend

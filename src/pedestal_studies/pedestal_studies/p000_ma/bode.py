@@ -20,6 +20,7 @@ from acu_tracker.params import AcuParameters
 from drive_law.params import AduParameters
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph.topics import AXES
+from pedestal_common.multisine import Sweep
 from pedestal_common.quantities import Complexes, Floats, Json, Row
 from pedestal_results.intervals import row
 from pedestal_results.report import figures as fig
@@ -89,7 +90,7 @@ def without_gain_margin(responses: Mapping[str, Response]) -> list[str]:
                                           if math.isnan(frequency.margins(measured)['gain_margin_db'][0])])
 
 
-def position(loop: str, sweep: frequency.Sweep = frequency.POSITION_SWEEP) -> dict[str, Response]:
+def position(loop: str, sweep: Sweep = frequency.POSITION_SWEEP) -> dict[str, Response]:
     """Return {'position/AXIS/LOOP': response} of one of LOOP_CASES."""
     variant, axes = LOOP_CASES[loop]
     return {f'{name}/{loop}': found for name, found in frequency.position(variant, axes, sweep).items()}

@@ -13,10 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pedestal_common.quantities import Floats, Seconds
-from pedestal_results import tracking
+from pedestal_results import metrics, tracking
 from pedestal_results.intervals import row
 from pedestal_results.report import figures as fig
-from pedestal_studies import metrics
 from pedestal_studies.p001_zhou_yang_qin import aligned_runs, alignment
 from pedestal_studies.p001_zhou_yang_qin.aligned_runs import (
     EVALUATION_PERIOD_S,

@@ -14,7 +14,7 @@ from pedestal_common.quantities import (
     Seconds,
     Times,
 )
-from pedestal_studies.metrics import peak
+from pedestal_results.metrics import peak
 from pedestal_studies.p002_jia.angle_loop import (
     GRID_STEP_S,
     FilterLoop,

@@ -26,8 +26,8 @@ from pedestal_common.quantities import (
     Pairs,
 )
 from pedestal_results.intervals import row
+from pedestal_results.metrics import crossings, overshoot_percent, peak
 from pedestal_results.tracking import interval_start_error, rms
-from pedestal_studies.metrics import crossings, overshoot_percent, peak
 from pedestal_studies.p002_jia import figures
 from pedestal_studies.p002_jia.angle_loop import (
     GRID_STEP_S,

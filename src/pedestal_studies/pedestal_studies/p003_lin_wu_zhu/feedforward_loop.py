@@ -34,8 +34,8 @@ from pedestal_common.quantities import (
     Vectors3,
 )
 from pedestal_common.record import Record
-from pedestal_results import tracking
-from pedestal_studies import ensemble, metrics, profiles
+from pedestal_results import metrics, tracking
+from pedestal_studies import ensemble, profiles
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.profiles import S_MOTION_RATE_RAD_S, S_MOTION_STROKE_RAD
 from pedestal_workbench.trials import monte_carlo

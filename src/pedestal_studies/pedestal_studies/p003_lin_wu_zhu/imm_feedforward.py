@@ -22,10 +22,10 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.parameters import as_dict
 from pedestal_common.quantities import Bools, Degrees, Floats, Pairs, RadiansPerSecond, Row, Times, Vectors3
-from pedestal_results import tracking
+from pedestal_results import metrics, tracking
 from pedestal_results.intervals import row
 from pedestal_results.report import figures as fig
-from pedestal_studies import metrics, profiles
+from pedestal_studies import profiles
 from pedestal_studies.ensemble import MEASUREMENT_PERIOD_S as T
 from pedestal_studies.p003_lin_wu_zhu import feedforward_loop
 from pedestal_studies.p003_lin_wu_zhu.feedforward_loop import (

@@ -22,6 +22,7 @@ from collections.abc import Collection, Iterable, Sequence
 from typing import TypeAlias
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from adu_drive import axis, drive_unit
 from drive_law.axis_params import SPEED_LOOP_PERIOD_S, AxisParameters
@@ -30,12 +31,12 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.compiled import compiled
 from pedestal_common.graph.topics import AXES
+from pedestal_common.multisine import Sweep
 from pedestal_common.quantities import (
     AnyRecord,
     Complexes,
     Floats,
     Hertz,
-    Ints,
     Pairs,
     RadiansPerSecond,
     Seconds,
@@ -55,37 +56,10 @@ of the measurement [-]."""
 SUB_STEP_COUNT = 10  # number of plant steps in a current period while the current and the speed loop are measured
 
 
+NOISE_RATIO, NEIGHBOUR_COUNT, MIN_DISTURBED = 3.0, 15, 0.02
+"""Of a disturbed frequency: least deviation over that of its neighbours [-], their number, least deviation [-]."""
+
 Margins: TypeAlias = dict[str, tuple[float, str]]  # {metric of a loop: (value, unit)}, see `margins`
-
-
-@dataclasses.dataclass(frozen=True)
-class Sweep:
-    """A multisine: the sum of sines that is added to a loop."""
-    period: Seconds     # time after which the sum repeats; each sine has a whole number of periods in it
-    lowest: Hertz       # lowest frequency
-    highest: Hertz      # highest frequency
-    points: int         # number of frequencies, logarithmically spaced
-    dropped: int        # number of periods for settling
-    kept: int           # number of measured periods
-    peak: float         # largest value of the sum, in the unit of the signal of the loop
-
-    def bins(self) -> Ints:
-        """Return the frequencies as integer multiples of 1 / period [-]."""
-        return np.unique(np.round(np.geomspace(self.lowest, self.highest, self.points) * self.period).astype(int))
-
-    def frequencies(self) -> Floats:
-        """Return the frequencies of the sines [Hz]: `points` of them, fewer if several round to one frequency."""
-        return self.bins() / self.period
-
-    def signal(self, step: Seconds) -> Floats:
-        """Return the whole record (n,) with one value per step. All sines have equal amplitudes. The phases of
-        Schroeder (IEEE Trans. Information Theory 16 (1970) 85) keep the peak of the sum low."""
-        n = round(self.period / step)
-        k = np.arange(len(self.bins()))
-        spectrum = np.zeros(n // 2 + 1, complex)
-        spectrum[self.bins()] = np.exp(-1j * math.pi * k * (k + 1) / len(k))
-        one = np.fft.irfft(spectrum, n)
-        return np.tile(self.peak / np.abs(one).max() * one, self.dropped + self.kept)
 
 
 CURRENT_SWEEP = Sweep(period=0.1, lowest=10.0, highest=4000.0, points=60, dropped=5, kept=5, peak=1.5)  # peak in A
@@ -152,7 +126,8 @@ def _inner_loops(state: AnyRecord, constants: AnyRecord, substeps: int, rate: Fl
                 axis.plant_step(state, constants, 0.0)
 
 
-def _rate(index: int, *largest: RadiansPerSecond) -> RadiansPerSecond:
+def moving_rate(index: int, *largest: RadiansPerSecond) -> RadiansPerSecond:
+    """Return the rate of the axis `index` during a measurement; largest: rates of the axis."""
     return min(SWEEP_RATES_RAD_S[index], RATE_SHARE * min(largest))
 
 
@@ -169,7 +144,7 @@ def _run_inner(drive: AduParameters, index: int, rate: Floats, current: Floats) 
 def current(drive: AduParameters, sweep: Sweep = CURRENT_SWEEP) -> dict[str, Response]:
     """Return {'current/MOTOR': response} of the current loops of both azimuth motors."""
     added = sweep.signal(axis.CURRENT_LOOP_PERIOD_S)
-    rate = np.full(len(added) // axis.CURRENT_LOOP_STEP_COUNT, _rate(0, drive.azimuth.limits.rate))
+    rate = np.full(len(added) // axis.CURRENT_LOOP_STEP_COUNT, moving_rate(0, drive.azimuth.limits.rate))
     _, wanted, made = _run_inner(drive, 0, rate, added)
     return {f'current/{motor}': response(sweep, wanted[:, j] - made[:, j], made[:, j])
             for j, motor in enumerate(MOTOR_FIELDS)}
@@ -179,7 +154,7 @@ def speed(drive: AduParameters, sweep: Sweep = SPEED_SWEEP, axes: Iterable[str] 
     """Return {'speed/AXIS': response} of the speed loops of some axes."""
     responses = {}
     for i, name in ((AXES.index(name), name) for name in axes):
-        rate = _rate(i, getattr(drive, name).limits.rate)
+        rate = moving_rate(i, getattr(drive, name).limits.rate)
         command = rate + _at_most(sweep, rate).signal(SPEED_LOOP_PERIOD_S)
         measured, _, _ = _run_inner(drive, i, command, np.zeros(len(command) * axis.CURRENT_LOOP_STEP_COUNT))
         responses[f'speed/{name}'] = dataclasses.replace(response(sweep, command - measured, measured),
@@ -195,6 +170,15 @@ def free_frequency(axis_parameters: AxisParameters) -> Hertz:
 
 def _at_most(sweep: Sweep, *rates: RadiansPerSecond) -> Sweep:
     return dataclasses.replace(sweep, peak=min(sweep.peak, PEAK_SHARE * min(rates)))
+
+
+def in_contact(axis: AxisParameters, sweep: Sweep, period: Seconds) -> Sweep:
+    """Return a sweep with limited peak and frequency; period: sampling period of the loop. To keep the teeth in
+    contact, the torque of the sweep stays below half of the bias torque. The highest frequency stays below half of
+    the sampling rate."""
+    peak = 0.5 * axis.bias.torque / max(axis.speed_loop.proportional * axis.gear_train.ratio, 1e-9)
+    return dataclasses.replace(sweep, peak=min(sweep.peak, peak or sweep.peak),
+                               highest=min(sweep.highest, 0.475 / period))
 
 
 MOVING_PARAMETERS = {
@@ -216,8 +200,8 @@ def _at_rates(variant: Variant) -> tuple[Variant, list[RadiansPerSecond]]:
     """Return (variant whose target moves at the rates of the measurement, these rates of both axes)."""
     loaded = variant.load()
     drive, acu = (loaded.node_parameters(node) for node in ('adu', 'acu'))
-    rates = [_rate(i, getattr(drive, name).limits.rate, getattr(acu, name).limits.rate,
-                   getattr(acu, name).shaper.rate) for i, name in enumerate(AXES)]
+    rates = [moving_rate(i, getattr(drive, name).limits.rate, getattr(acu, name).limits.rate,
+                         getattr(acu, name).shaper.rate) for i, name in enumerate(AXES)]
     moved = {f'tracking_receiver.target.angle.{name}_rate': rate for name, rate in zip(AXES, rates)}
     return variant.with_(moved), rates
 
@@ -227,10 +211,21 @@ def position(variant: Variant, axes: Collection[str] = AXES, sweep: Sweep = POSI
     variant, rates = _at_rates(variant)
     loop = closed_loop.Loop(variant.with_(duration=(sweep.dropped + sweep.kept) * sweep.period).load())
     added = np.zeros((loop.steps, 2))
-    added[:-1] = _at_most(sweep, *rates).signal(loop.period_ns * 1e-9)[:, np.newaxis]
+    # Because the axes of a mount with varying inertia act on each other, no other axis is excited.
+    for i in (AXES.index(name) for name in axes):
+        added[:-1, i] = _at_most(sweep, *rates).signal(loop.period_ns * 1e-9)
     commanded = loop.run(added)['acu/rate_command']['velocity']
     return {f'position/{name}': response(sweep, (commanded + added)[:-1, i], -commanded[:-1, i])
             for i, name in enumerate(AXES) if name in axes}
+
+
+def undisturbed(measured: Response) -> Response:
+    """Return a response without the frequencies at which a tooth or a pole of the motors disturbs the moving axis:
+    their deviation is large, and NOISE_RATIO times that of their neighbours."""
+    noise = measured.deviation
+    disturbed = (noise > MIN_DISTURBED) & (noise > NOISE_RATIO * median_filter(noise, NEIGHBOUR_COUNT))
+    return dataclasses.replace(measured, frequency=measured.frequency[~disturbed],
+                               open_loop=measured.open_loop[~disturbed], deviation=noise[~disturbed])
 
 
 def _crossings(f: Floats, y: Floats, angle: Floats) -> tuple[Floats, Floats]:
@@ -251,7 +246,7 @@ def without_gain_margin(names: Sequence[str]) -> list[str]:
 
 
 def margins(measured: Response) -> Margins:
-    """Return the metrics of a response; NaN if the measured band has no such frequency.
+    """Return the metrics of an undisturbed response; NaN if the measured band has no such frequency.
 
     crossover_hz       first frequency from `lowest` on at which the open loop |L| falls below 1
     phase_margin_deg   smallest phase shift, of either sign, that moves a point with |L| = 1 to -1
@@ -259,6 +254,7 @@ def margins(measured: Response) -> Margins:
     bandwidth_hz       first frequency at which the closed loop |T| falls below -3 dB
     peak_db            largest |T|
     """
+    measured = undisturbed(measured)
     f, L, T = measured.frequency, measured.open_loop, np.abs(measured.closed_loop)
     gain, from_minus_one = np.log(np.abs(L)), np.angle(-L)
     crossover, margin = _crossings(f, gain, from_minus_one)

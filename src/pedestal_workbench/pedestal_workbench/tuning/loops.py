@@ -51,7 +51,6 @@ from pedestal_common.quantities import (
     Radians,
     RadiansPerSecond,
     RadiansPerSecond2,
-    Seconds,
 )
 from pedestal_common.text_files import parameter_file
 from pedestal_common.text_files.text_table import TextTable
@@ -273,14 +272,6 @@ class Loops:
                             f'adu.{name}.structure.frequency': _allowed('structure.frequency', corner[1] * plant.mode)}
         return frequency.moving(self.variant).with_({**self.gains, **changed, **STILL_AIR_PARAMETERS})
 
-    def _sweep(self, axis: AxisParameters, sweep: frequency.Sweep, period: Seconds) -> frequency.Sweep:
-        """Return a sweep with limited peak and frequency; period: sampling period of the loop. To keep the teeth in
-        contact, the torque of the sweep stays below half of the bias torque. The highest frequency stays below half of
-        the sampling rate."""
-        peak = 0.5 * axis.bias.torque / max(axis.speed_loop.proportional * axis.gear_train.ratio, 1e-9)
-        return dataclasses.replace(sweep, peak=min(sweep.peak, peak or sweep.peak),
-                                   highest=min(sweep.highest, 0.475 / period))
-
     def response(self, loop: str, name: str, corner: tuple[float, float] = (1.0, 1.0)) -> frequency.Response | None:
         """Return the response of a loop (current, speed, position) of the axis `name` with the present gains, None if
         the drive trips. corner: factors of the plant, see PLANT_CORNERS. For the current loop it is the response of
@@ -296,8 +287,9 @@ class Loops:
             return min(motors.values(), key=lambda response: frequency.margins(response)['phase_margin_deg'][0])
         if loop == 'speed':
             sweep = frequency.FLEXIBLE_SPEED_SWEEP if self.plants[name].mode else frequency.SPEED_SWEEP
-            return frequency.speed(drive, self._sweep(axis, sweep, SPEED_LOOP_PERIOD_S), (name,))[f'speed/{name}']
-        sweep = self._sweep(axis, frequency.POSITION_SWEEP, drive.period)
+            sweep = frequency.in_contact(axis, sweep, SPEED_LOOP_PERIOD_S)
+            return frequency.speed(drive, sweep, (name,))[f'speed/{name}']
+        sweep = frequency.in_contact(axis, frequency.POSITION_SWEEP, drive.period)
         found = frequency.position(variant, (name,), sweep)[f'position/{name}']
         # A tripped drive returns no signal.
         return found if np.isfinite(found.open_loop).all() and found.open_loop.all() else None

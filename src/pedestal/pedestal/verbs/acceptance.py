@@ -1,0 +1,139 @@
+"""Verb `acceptance`: an antenna is measured against a specification, and its report is written."""
+import argparse
+import contextlib
+import datetime
+import inspect
+import pathlib
+import sys
+import typing
+from collections.abc import Sequence
+
+from pedestal import console, stop
+from pedestal.verbs import arguments
+from pedestal.verbs.arguments import Verb
+
+if typing.TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    from pedestal_workbench.acceptance.exercise import Exercise, Performer
+    from pedestal_workbench.acceptance.sequence import Kept
+    from pedestal_workbench.acceptance.specification import Specification
+
+
+def _add_acceptance(parser: argparse.ArgumentParser) -> None:
+    """Makes the exercise of each requirement of a specification on the running graph, measures it, judges it, and
+    writes report.html, report.pdf, report.json and report.xml (JUnit). `pedestal samples` writes a specification that
+    explains its keys. What the antenna will do is printed and confirmed first. An alarm, an antenna outside of the
+    stated envelope, or an operator ends the sequence in a stop. The same command continues it.
+
+        pedestal acceptance acceptance.yaml --tester "A. Smith"
+        pedestal acceptance acceptance.yaml --scenario station_real --yes --json -
+
+    Exit codes:
+    """
+    parser.add_argument('specification', type=pathlib.Path, metavar='SPECIFICATION.yaml', help='file with the '
+                        'requirements')
+    action = parser.add_argument('--scenario', metavar='NAME', help='scenario (name or .yaml file) whose simulated '
+                                 'graph is started and tested; default: the running graph')
+    vars(action)['completer'] = arguments.scenarios_and_files
+    parser.add_argument('--closed-loop', action='store_true', help='scenario in one process, in memory, without '
+                        'nodes and without recordings; needs --scenario')
+    parser.add_argument('--seed', type=int, default=1, metavar='N', help='first seed of the noises of a scenario; '
+                        'default: 1')
+    arguments.add_param(parser)
+    arguments.add_params_file(parser)
+    parser.add_argument('--yes', action='store_true', help='confirmation of the motions, for use without a terminal')
+    parser.add_argument('--output', type=pathlib.Path, metavar='DIR', help='folder of the report and the recordings; '
+                        'default: acceptance- and the name of the specification')
+    parser.add_argument('--tester', default='', metavar='NAME', help='name of the person who tests, for the report; '
+                        'default: that of the specification')
+    console.add_json(parser)
+
+
+_add_acceptance.__doc__ = f"""{inspect.getdoc(_add_acceptance)}
+  0: all requirements are passed.
+  {console.EXIT_ERROR}: the sequence did not come to its end; the last line states the reason.
+  {console.EXIT_WRONG_COMMAND}: the specification cannot be used, or the motions were not confirmed. Nothing has moved.
+  {console.EXIT_FAILED_RUN}: a requirement is failed or inconclusive.
+  {console.EXIT_STOPPED}: an operator stopped the sequence."""
+
+
+def _acceptance(options: argparse.Namespace) -> int:
+    from pedestal_workbench.acceptance import document, sequence, specification
+    from pedestal_workbench.acceptance.exercise import StoppedError
+    if not options.scenario:
+        arguments.refuse_given(options, ('closed_loop', 'param', 'params_file'), 'needs --scenario')
+    console.check_json(options.json)
+    spec = specification.read(options.specification)
+    spec = spec._replace(tester=options.tester or spec.tester)
+    folder = options.output or pathlib.Path(f'acceptance-{options.specification.stem}')
+    results: list[Kept] = []
+    stopped, code = '', console.EXIT_ERROR
+    with _performer(options, folder) as performer:
+        _confirm(options, spec, spec.exercises(performer.antenna))
+        with console.progress_of_share() as progress:
+            def report(kept: 'Kept') -> None:
+                results.append(kept)
+                progress(len(results) / len(spec.requirements), kept.name)
+                print(document.line(spec, kept))
+            try:
+                sequence.run(spec, performer, folder, options.seed, report)
+            except StoppedError as error:
+                stopped = str(error)
+            except KeyboardInterrupt:
+                stopped, code = 'an operator stopped it', stop.STOP_EXIT_CODE
+    now = datetime.datetime.now(datetime.timezone.utc)
+    found = document.Acceptance(spec, results, performer.antenna, _source(options), options.command, now, stopped)
+    print(*document.write(found, folder), sep='\n')
+    console.write_json(options.json, document.json_content(found))
+    print(found.verdict)
+    if stopped:
+        print(f'pedestal: stopped: {stopped}; the same command continues the sequence', file=sys.stderr)
+        return code
+    return 0 if found.passed else console.EXIT_FAILED_RUN
+
+
+def _performer(options: argparse.Namespace, folder: pathlib.Path) -> 'AbstractContextManager[Performer]':
+    """Return the performer of the options as a context."""
+    from pedestal_workbench.acceptance import in_loop
+    if options.closed_loop:
+        return contextlib.nullcontext(in_loop.InLoop(arguments.variant(options)))
+    if options.scenario:
+        from pedestal_workbench.acceptance.own_graph import OwnGraph
+        return OwnGraph(arguments.variant(options), folder)
+    from pedestal_workbench.acceptance.running_graph import RunningGraph
+    return RunningGraph(folder)
+
+
+def _source(options: argparse.Namespace) -> str:
+    """Return what is tested, in words."""
+    if not options.scenario:
+        return 'the running graph'
+    how = 'in the closed loop' if options.closed_loop else 'as nodes'
+    return f'scenario {options.scenario} {how}, seed {options.seed}'
+
+
+def _confirm(options: argparse.Namespace, spec: 'Specification', exercises: 'Sequence[Exercise]') -> None:
+    """Print what the antenna will do. Raises ValueError without a confirmation."""
+    from pedestal_common.text_files.text_table import Cell, TextTable
+    rows: list[list[Cell]] = []
+    whole = 0.0
+    for requirement, exercise in zip(spec.requirements, exercises):
+        spans = [f'{span.low:.4g} to {span.high:.4g}' for span in exercise.envelope]
+        rows.append([requirement.name, *spans, *(span.rate for span in exercise.envelope), exercise.duration,
+                     requirement.repetitions])
+        whole += exercise.duration * requirement.repetitions
+    heads = ('requirement', ('azimuth [deg]', '>'), ('elevation [deg]', '>'), ('azimuth rate [deg/s]', '>.3g'),
+             ('elevation rate [deg/s]', '>.3g'), ('time [s]', '>.0f'), ('repetitions', '>.0f'))
+    print('The antenna will move within:', *TextTable(heads, rows).lines(),
+          f'Time of all exercises: {whole / 60.0:.0f} minutes, without the motions to their begins.', sep='\n')
+    if options.yes:
+        return
+    if not sys.stdin.isatty():
+        raise ValueError('--yes: must be given without a terminal, to confirm the motions above')
+    print('Move the antenna as stated? yes or no: ', end='', flush=True)
+    if sys.stdin.readline().strip().lower() != 'yes':
+        raise ValueError('the motions were not confirmed; nothing has moved')
+
+
+VERBS = {'acceptance': Verb(_add_acceptance, _acceptance)}

@@ -1,0 +1,114 @@
+"""Exercise: what a method of acceptance makes the antenna do, and what is known after it was performed.
+
+A performer makes an exercise in the closed loop (in_loop) or on nodes (on_graph). Both execute the same commands, and
+both return a recording with the same topics, so that every measure is the same law for both.
+"""
+import dataclasses
+import math
+import pathlib
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple, Protocol
+
+from acu_tracker.params import AcuParameters
+from drive_law.params import AduParameters
+from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import (
+    Degrees,
+    DegreesPerSecond,
+    Json,
+    Pairs,
+    Radians,
+    RadiansPerSecond,
+    Seconds,
+    Times,
+)
+from pedestal_recording.recording import Recording
+
+
+class Antenna(NamedTuple):
+    """What methods need to know of an antenna."""
+    acu: AcuParameters
+    adu: AduParameters | None       # None: the drive is not simulated, and its parameters are unknown
+    beamwidth: Radians
+    period: Seconds                 # of a step
+    simulated: tuple[str, ...] = ()     # its nodes that are simulated, into which faults can be injected
+
+
+class Action(NamedTuple):
+    """Command to a node during an exercise."""
+    at: Seconds     # since the begin of the exercise
+    node: str       # which executes it: acu; adu for a request of the drive; a node of injection.table for a fault
+    command: str    # text 'COMMAND name=value ...'
+
+
+class Track(NamedTuple):
+    """Program track, which the performer loads before the first action."""
+    t: Times        # since the begin of the exercise
+    angles: Pairs   # earth azimuth and elevation [rad]
+
+
+class Span(NamedTuple):
+    """Safe envelope of an axis."""
+    low: Degrees
+    high: Degrees
+    rate: DegreesPerSecond      # largest absolute rate
+
+
+@dataclasses.dataclass(frozen=True)
+class Exercise:
+    """What a method makes the antenna do."""
+    duration: Seconds
+    envelope: tuple[Span, Span]                     # of azimuth and elevation, encoder angles; outside it: stop
+    actions: tuple[Action, ...] = ()                # in order of their times
+    start: tuple[Radians, Radians] | None = None    # encoder angles at which the antenna rests before; None: the
+                                                    # antenna follows the target of its scenario from the begin
+    track: Track | None = None
+    changes: Mapping[str, Json] = dataclasses.field(default_factory=dict)   # {'node.key': value} of simulated nodes
+    alarms: tuple[str, ...] = ()                    # names of alarms that belong to it; any other ends the sequence
+
+    def breach(self, angles: Iterable[Radians], rates: Iterable[RadiansPerSecond], alarms: Iterable[str]) -> str:
+        """Return the reason why the antenna must stop, '' for none. angles, rates: of the encoders, NaN if unknown;
+        alarms: names of the listed alarms."""
+        foreign = [name for name in alarms if name not in self.alarms]
+        reasons = [f'alarm {", ".join(foreign)}'] if foreign else []
+        for axis, span, angle, rate in zip(AXES, self.envelope, map(math.degrees, angles), map(math.degrees, rates)):
+            if angle < span.low or angle > span.high:
+                reasons.append(f'{axis} {angle:.3f} deg is outside {span.low:.3f} to {span.high:.3f} deg')
+            if abs(rate) > span.rate:
+                reasons.append(f'{axis} turns at {rate:.3f} deg/s, must be at most {span.rate:.3f} deg/s')
+        return '; '.join(reasons)
+
+
+class Executed(NamedTuple):
+    """An action with its outcome."""
+    t: Seconds      # time of its execution, since the begin
+    action: Action
+    granted: bool
+    reply: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Performed:
+    """A performed exercise."""
+    antenna: Antenna
+    exercise: Exercise
+    recording: Recording
+    begin: Seconds                  # stamp of the begin, in the time of the recording
+    executed: tuple[Executed, ...]
+    bag: pathlib.Path | None = None     # None: in memory
+
+
+class Performer(Protocol):
+    """Makes exercises with one antenna."""
+    antenna: Antenna
+
+    def check(self, exercise: Exercise) -> None:
+        """Raise ValueError for an exercise that it cannot make, before anything moves."""
+
+    def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
+        """Make an exercise. name: of its recording. Raises StoppedError."""
+
+
+class StoppedError(Exception):
+    """The antenna was stopped: by an alarm, outside the envelope, by an operator, or because a node is silent. The
+    text states the reason."""

@@ -1,0 +1,275 @@
+"""Methods of safety: limits of travel, stow, emergency stop, and the reports of injected faults.
+
+The faults of the methods are FAULTS. An acceptance leaves these faults out:
+
+    drop (except of the drive), clock_step, delay   would stop a lockstep graph; nan stands for missing messages
+    adu.delay       can make the position loop unstable
+    adu.pin_stuck   has an effect in stow only, and leaves a pin half in
+    adu.gust, adu.lost_tooth    belong to the methods of the servo: gust, lash
+    ship_motion.freeze, bias, noise    have an effect only on an INS that navigates with the data of the IMU
+"""
+import math
+
+import numpy as np
+
+from acu_tracker.alarms.table import ALARM_NAMES
+from acu_tracker.guidance.manual import ACCELERATION_SHARE, RATE_REQUEST_TIMEOUT_S
+from acu_tracker.mode.stow import MAX_REST_RATE_RAD_S
+from acu_tracker.servo.travel import braking_distance
+from pedestal_common.graph.nodes import DRIVE_NODE
+from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Degrees, Floats, Radians, Seconds, Times
+from pedestal_common.wire.commands import Argument
+from pedestal_recording import recording as recordings
+from pedestal_results import tracking
+from pedestal_results.recorded_run import RecordedRun
+from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
+from pedestal_workbench.acceptance.method import Arguments, Measured, Method
+from pedestal_workbench.acceptance.tracking import NEVER, first, granted, inside, travel
+
+BEGIN_TIME_S, REST_TIME_S = 1.0, 3.0    # time of the first command, and time until an axis has come to rest [s]
+LARGEST_OVERSHOOT_DEG = 1.0     # angle beyond a limit of travel at which the exercise is stopped [deg]
+BEYOND_RAD = 0.1                # angle of the refused preset beyond the limit [rad]
+CRUISE_TIME_S = 0.5             # time at the largest rate before a limit or an emergency stop [s]
+EMERGENCY_STOP, RESET_FAULTS = 'adu/emergency_stop', 'adu/reset_faults'     # requests of the drive
+RETURN_DEG = 1.0                # way back from a limit after which the axis has returned [deg]
+STANDSTILL_SHARE = 0.02         # rate below which an axis stands after an emergency stop, over its rate before [-]
+FAULT_TIME_S, RECOVERY_TIME_S = 10.0, 5.0   # time of the begin of a fault, and time after its end [s]
+ENVELOPE_DEG = 10.0             # of a fault outside autotrack, about the motion [deg]
+TRAVEL_SHARE = 0.8              # largest share of the travel that an emergency stop uses [-]
+RAMP_DEG_S = 1.0                # rate of the azimuth in the mode `ramp` of a fault [deg/s]
+REPORT_TOPICS = 'acu/alarms', 'acu/mode', 'adu/state'   # whose changes report a fault
+TARGET_MODES = 'autotrack', 'program', 'tle', 'search', 'acquire'   # modes with an error towards the target
+
+ANY_MODE = 'preset', 'ramp', 'autotrack'
+MOVING, TRACKING = ANY_MODE[1:], ANY_MODE[2:]
+FAULTS = {
+    **dict.fromkeys(('adu.motor_loss', 'adu.encoder_jump', 'adu.bias', 'adu.nan', 'adu.noise'), ANY_MODE),
+    **dict.fromkeys(('adu.encoder_stuck', 'adu.brake_stuck', 'adu.drop', 'adu.freeze'), MOVING),
+    **{f'{node}.{name}': TRACKING for node, names in {
+        'tracking_receiver': ('freeze', 'nan', 'fade', 'wrong_slope', 'phase_180', 'bias', 'noise'),
+        'ship_motion': ('nan',),
+        'ins': ('freeze', 'nan', 'noise', 'ins_jump', 'bias')}.items() for name in names}}
+"""{'NODE.FAULT': modes in which it has an effect} of the faults that an acceptance provokes. Noise and bias have no
+report except that of adu.bias and ins.noise; fault_error is for them."""
+
+
+def _middle(antenna: Antenna) -> list[Radians]:
+    return [0.5 * (limits.low + limits.high) for limits in (antenna.acu.azimuth.limits, antenna.acu.elevation.limits)]
+
+
+def _limit(antenna: Antenna, arguments: Arguments) -> Exercise:
+    """Return the exercise that drives an axis into a limit, first by a refused preset, and then by rate. The opposite
+    rate brings the axis back."""
+    axis, sign = str(arguments['axis']), 1.0 if arguments['side'] == 'high' else -1.0
+    i, of_axis = AXES.index(axis), getattr(antenna.acu, axis)
+    end, rate = of_axis.limits.high if sign > 0.0 else of_axis.limits.low, of_axis.shaper.rate
+    rise = rate / (ACCELERATION_SHARE * of_axis.shaper.acceleration)
+    way = min(rate * (0.5 * rise + CRUISE_TIME_S) + braking_distance(rate, of_axis.limits.deceleration,
+                                                                     antenna.acu.reaction),
+              0.5 * (of_axis.limits.high - of_axis.limits.low))
+    start = _middle(antenna)
+    start[i] = end - sign * way
+    back = 2.0 * BEGIN_TIME_S + rise + way / rate + REST_TIME_S
+    finish = back + rise + CRUISE_TIME_S
+    actions = [Action(BEGIN_TIME_S, 'acu', f'preset {axis}={end + sign * BEYOND_RAD:.6f}'),
+               *(Action(t, 'acu', f'rate {axis}={(sign if t < back else -sign) * rate:.6f}')
+                 for t in np.arange(2.0 * BEGIN_TIME_S, finish, 0.5 * RATE_REQUEST_TIMEOUT_S).tolist()),
+               Action(finish, 'acu', 'stop')]
+    spans = list(travel(antenna))
+    spans[i] = spans[i]._replace(low=spans[i].low - LARGEST_OVERSHOOT_DEG, high=spans[i].high + LARGEST_OVERSHOOT_DEG)
+    return Exercise(finish + REST_TIME_S, (spans[0], spans[1]), tuple(actions), (start[0], start[1]),
+                    alarms=(f'{axis} at limit',))
+
+
+def _beyond(performed: Performed, arguments: Arguments) -> tuple[Times, Floats]:
+    """Return (times, angles beyond the limit [deg])."""
+    joints, axis = performed.recording.table('joint_states'), str(arguments['axis'])
+    limits = getattr(performed.antenna.acu, axis).limits
+    angle = joints[f'{axis}.position']
+    return joints['t'], np.degrees(angle - limits.high if arguments['side'] == 'high' else limits.low - angle)
+
+
+def _limit_overshoot(performed: Performed, arguments: Arguments) -> Measured:
+    return Measured(float(_beyond(performed, arguments)[1].max()), 0.0)
+
+
+def _limit_return(performed: Performed, arguments: Arguments) -> Measured:
+    rates = [done for done in performed.executed if done.action.command.startswith('rate ')]
+    opposite = next(done for done in rates if done.action.command != rates[0].action.command)
+    t, beyond = _beyond(performed, arguments)
+    return first(performed, performed.begin + opposite.t, t, beyond < -RETURN_DEG)
+
+
+def _stow(antenna: Antenna, arguments: Arguments) -> Exercise:
+    """Return the exercise that stows the antenna from a distance, and unstows it."""
+    start, slew = [], 0.0
+    for axis, middle in zip(AXES, _middle(antenna)):
+        of_axis = getattr(antenna.acu, axis)
+        way = math.copysign(math.radians(float(arguments['distance'])), middle - of_axis.stow)
+        start.append(inside(antenna, 'distance', axis, math.degrees(of_axis.stow + way)))
+        slew = max(slew, abs(way) / of_axis.shaper.rate + 2.0 * of_axis.shaper.rate / of_axis.shaper.acceleration)
+    pins = {'adu.stow_pins': True, **{f'adu.pins.{axis}': getattr(antenna.acu, axis).stow for axis in AXES}}
+    if arguments['pins'] == 'simulated' and DRIVE_NODE not in antenna.simulated:
+        raise ValueError('pins = simulated: must be own, because this antenna has no simulated drive')
+    unstow = BEGIN_TIME_S + slew + REST_TIME_S + antenna.acu.stow_timeout
+    return Exercise(unstow + antenna.acu.stow_timeout, travel(antenna),
+                    (Action(BEGIN_TIME_S, 'acu', 'stow'), Action(unstow, 'acu', 'unstow')), (start[0], start[1]),
+                    changes=pins if arguments['pins'] == 'simulated' else {})
+
+
+def _unstow(antenna: Antenna, arguments: Arguments) -> Exercise:
+    if arguments['pins'] == 'own' and not antenna.acu.stow_pins:
+        raise ValueError('unstow_time: must have stow pins; this antenna has none (acu.stow_pins)')
+    return _stow(antenna, arguments)
+
+
+def _pins(performed: Performed, command: str, state: str) -> Measured:
+    """Return the time from a command until both pins have a state."""
+    states = performed.recording.table('adu/stow_pins')
+    wanted = ', '.join(f'{axis} {state}' for axis in AXES)
+    return first(performed, granted(performed, 'acu', command), np.array(states['t']),
+                 np.array([text == wanted for text in states['data']]))
+
+
+def _stow_time(performed: Performed, _: Arguments) -> Measured:
+    """Return the time from `stow` until the pins are in or, without pins, until the axes rest at their stow angles."""
+    if 'adu/stow_pins' in performed.recording.topics:
+        return _pins(performed, 'stow', 'in')
+    begin, acu = granted(performed, 'acu', 'stow'), performed.antenna.acu
+    joints = performed.recording.table('joint_states')
+    outside = np.logical_or.reduce([
+        (np.abs(joints[f'{axis}.position'] - getattr(acu, axis).stow) > acu.stow_window)
+        | (np.abs(joints[f'{axis}.velocity']) > MAX_REST_RATE_RAD_S) for axis in AXES])
+    if outside[-1]:
+        return NEVER
+    return Measured(float(joints['t'][outside & (joints['t'] >= begin)][-1]) - begin, performed.antenna.period)
+
+
+def _unstow_time(performed: Performed, _: Arguments) -> Measured:
+    return _pins(performed, 'unstow', 'out')
+
+
+def _emergency(antenna: Antenna, arguments: Arguments) -> Exercise:
+    """Return the exercise of an emergency stop of an axis at its largest rate, in the middle of its travel."""
+    axis = str(arguments['axis'])
+    of_axis, i, start = getattr(antenna.acu, axis), AXES.index(axis), _middle(antenna)
+    rate, way = of_axis.shaper.rate, TRAVEL_SHARE * (of_axis.limits.high - of_axis.limits.low)
+    rise = rate / of_axis.shaper.acceleration
+    if rate * (1.5 * rise + CRUISE_TIME_S) > way:
+        raise ValueError(f'axis = {axis}: its travel is too short to reach its largest rate, must be at least '
+                         f'{math.degrees(rate * (1.5 * rise + CRUISE_TIME_S) / TRAVEL_SHARE):.4g} deg')
+    start[i] -= 0.5 * way
+    goal = start[i] + way
+    stop = BEGIN_TIME_S + rise + CRUISE_TIME_S
+    actions = (Action(BEGIN_TIME_S, 'acu', f'preset {axis}={goal:.6f} {AXES[1 - i]}={start[1 - i]:.6f}'),
+               Action(stop, DRIVE_NODE, EMERGENCY_STOP), Action(stop + REST_TIME_S, DRIVE_NODE, RESET_FAULTS),
+               Action(stop + 2.0 * REST_TIME_S, 'acu', 'stop'))
+    return Exercise(stop + 3.0 * REST_TIME_S, travel(antenna), actions, (start[0], start[1]),
+                    alarms=('emergency stop', f'{axis} following error'))
+
+
+def _stopping(performed: Performed, arguments: Arguments) -> tuple[Seconds, Degrees]:
+    """Return time and angle from the emergency stop to the standstill of the axis. The angle counts from the step
+    before the request, which acts within a step."""
+    begin, joints = granted(performed, DRIVE_NODE, EMERGENCY_STOP), performed.recording.table('joint_states')
+    during = (joints['t'] > begin - 1.5 * performed.antenna.period) & (joints['t'] < begin + REST_TIME_S)
+    t, rate, angle = (joints[name][during] for name in ('t', *(f'{arguments["axis"]}.{part}'
+                                                               for part in ('velocity', 'position'))))
+    moving = np.flatnonzero(np.abs(rate) > STANDSTILL_SHARE * abs(rate[0]))
+    if moving[-1] == t.size - 1:
+        return math.inf, math.inf
+    return float(t[moving[-1] + 1] - begin), math.degrees(np.abs(angle - angle[0]).max())
+
+
+def _emergency_time(performed: Performed, arguments: Arguments) -> Measured:
+    return Measured(_stopping(performed, arguments)[0], performed.antenna.period)
+
+
+def _emergency_angle(performed: Performed, arguments: Arguments) -> Measured:
+    return Measured(_stopping(performed, arguments)[1], 0.0)
+
+
+def _faulty(antenna: Antenna, arguments: Arguments) -> Exercise:
+    """Return the exercise of a fault in a mode. Raises ValueError for a fault that it cannot provoke."""
+    (node, _, fault), mode = str(arguments['fault']).partition('.'), str(arguments['mode'])
+    if node not in antenna.simulated:
+        raise ValueError(f'fault = {node}.{fault}: must be of a simulated node, which are '
+                         f'{", ".join(antenna.simulated) or "none"}')
+    if mode not in (modes := FAULTS[f'{node}.{fault}']):
+        raise ValueError(f'mode = {mode}: must be one of {", ".join(modes)}, in which {node}.{fault} has an effect')
+    end = FAULT_TIME_S + float(arguments['duration'])
+    actions = [Action(FAULT_TIME_S, node, f'{fault} duration={arguments["duration"]}'),
+               *(Action(end + RECOVERY_TIME_S, *command) for command in (
+                   (DRIVE_NODE, RESET_FAULTS), ('acu', 'reset'), ('acu', 'stop')))]
+    finish = end + 2.0 * RECOVERY_TIME_S
+    if mode == 'autotrack':
+        return Exercise(finish, travel(antenna), tuple(actions), alarms=ALARM_NAMES)
+    azimuth, elevation = start = _middle(antenna)
+    rate = RAMP_DEG_S if mode == 'ramp' else 0.0
+    actions.insert(0, Action(BEGIN_TIME_S, 'acu', f'preset azimuth={azimuth:.6f} elevation={elevation:.6f} '
+                             f'azimuth_rate={math.radians(rate):.6f} moves={finish:g}'))
+    spans = [span._replace(low=math.degrees(angle) - ENVELOPE_DEG, high=math.degrees(angle) + ENVELOPE_DEG)
+             for span, angle in zip(travel(antenna), start)]
+    spans[0] = spans[0]._replace(high=spans[0].high + rate * finish)
+    return Exercise(finish, (spans[0], spans[1]), tuple(actions), (azimuth, elevation), alarms=ALARM_NAMES)
+
+
+def _onset(performed: Performed, arguments: Arguments) -> Seconds:
+    """Return the time of the fault. Raises ValueError where the antenna was not in its mode then."""
+    node, _, fault = str(arguments['fault']).partition('.')
+    begin = granted(performed, node, fault)
+    mode = recordings.modes(performed.recording, np.array([begin - performed.antenna.period]))[0]
+    wanted = 'autotrack' if arguments['mode'] == 'autotrack' else 'preset'
+    if mode != wanted:
+        raise ValueError(f'mode at the fault = {mode}: must be {wanted}')
+    return begin
+
+
+def _fault_report(performed: Performed, arguments: Arguments) -> Measured:
+    """Return the time from the fault to the first change of a topic of REPORT_TOPICS before the recovery."""
+    begin, recording = _onset(performed, arguments), performed.recording
+    end = begin + float(arguments['duration']) + RECOVERY_TIME_S
+    times = np.sort(np.concatenate([recording.table(topic)['t'] for topic in REPORT_TOPICS
+                                    if topic in recording.topics]))
+    return first(performed, begin, times, times < end)
+
+
+def _fault_error(performed: Performed, arguments: Arguments) -> Measured:
+    """Return the largest error from the fault until the mode is left, or until the recovery."""
+    begin, run = _onset(performed, arguments), RecordedRun(performed.recording).evaluated
+    end = begin + float(arguments['duration']) + RECOVERY_TIME_S
+    towards = arguments['mode'] == 'autotrack'
+    left = run.t[(run.t > begin) & ~np.isin(run.mode, TARGET_MODES if towards else ('preset',))]
+    during = (run.t >= begin) & (run.t < min([end, *left]))
+    errors = run.following
+    if towards:
+        errors = tracking.DEG_PER_RAD * (run.error if np.isfinite(run.error).any() else run.measured)
+    known = np.nan_to_num(errors[during])   # no error counts where the fault ends the mode at once
+    return Measured(float(np.hypot(*known.T).max(initial=0.0)), 0.0)
+
+
+_AXIS = Argument('axis', 'axis that moves', options=AXES, default=AXES[0])
+_LIMIT = (_AXIS, Argument('side', 'end of its travel', options=('low', 'high'), default='high'))
+_STOW = (Argument('distance', 'distance of the start from the stow angle, each axis', 0.0, 90.0, 'deg', default=10.0),
+         Argument('pins', 'stow pins; own: as the drive has', options=('own', 'simulated'), default='own'))
+_FAULT = (Argument('fault', 'node and fault', options=tuple(FAULTS), default='adu.drop'),
+          Argument('mode', 'mode at the fault; ramp: preset at a rate', options=ANY_MODE, default='autotrack'),
+          Argument('duration', 'duration of the fault', 0.1, 60.0, 's', default=5.0))
+METHODS = (
+    Method('limit_overshoot', 'command a preset beyond a limit of travel, then the largest rate into it: largest '
+           'angle beyond the limit', 'deg', '<=', _LIMIT, _limit, _limit_overshoot),
+    Method('limit_return', f'as limit_overshoot, then the opposite rate: time until {RETURN_DEG:g} deg inside', 's',
+           '<=', _LIMIT, _limit, _limit_return),
+    Method('stow_time', 'command `stow`: time until the pins are in or, without pins, until the axes rest', 's', '<=',
+           _STOW, _stow, _stow_time),
+    Method('unstow_time', 'as stow_time, then `unstow`: time until the pins are out', 's', '<=', _STOW, _unstow,
+           _unstow_time),
+    Method('emergency_stop_time', 'request an emergency stop at the largest rate: time to standstill', 's', '<=',
+           (_AXIS,), _emergency, _emergency_time),
+    Method('emergency_stop_angle', 'request an emergency stop at the largest rate: angle to standstill', 'deg', '<=',
+           (_AXIS,), _emergency, _emergency_angle),
+    Method('fault_report', 'inject a fault: time to the first alarm, or to a change of the mode or of the state of '
+           'the drive', 's', '<=', _FAULT, _faulty, _fault_report, True),
+    Method('fault_error', 'inject a fault: largest error until the mode ends, towards the target in autotrack, else '
+           'following error', 'deg', '<=', _FAULT, _faulty, _fault_error, True))

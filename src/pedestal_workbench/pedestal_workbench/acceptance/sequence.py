@@ -1,0 +1,162 @@
+"""Sequence of an acceptance: each requirement is performed, measured, judged and kept, in the order of the file.
+
+The file results.json in the folder of the acceptance keeps each result as soon as it is known. A sequence that was
+interrupted, also by a loss of power, continues there with the first requirement without a result.
+"""
+import contextlib
+import datetime
+import fcntl
+import hashlib
+import json
+import pathlib
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+from pedestal_bringup.graph import pass_recorder
+from pedestal_common.quantities import Json
+from pedestal_common.text_files import files
+from pedestal_recording import bag_files
+from pedestal_workbench.acceptance import figure
+from pedestal_workbench.acceptance.exercise import Exercise, Performed, Performer
+from pedestal_workbench.acceptance.judgement import Judged, judged
+from pedestal_workbench.acceptance.method import Measured
+from pedestal_workbench.acceptance.specification import Requirement, Specification
+
+RESULTS_FILE, LOCK_FILE, SIGNALS_FOLDER = 'results.json', 'results.lock', 'signals'  # in the folder of the acceptance
+MAX_RESULTS_BYTES = 50_000_000  # largest size of the file of results [bytes]
+SEED_STEP = 1000  # between the seeds of repetitions, so that sequences with neighbouring seeds share no noise
+
+
+class Kept(NamedTuple):
+    """Result of a requirement, as the folder of the acceptance keeps it."""
+    name: str                               # of the requirement
+    judged: Judged
+    bags: tuple[tuple[str, str], ...]       # (path in the folder, sha256) of the files of its recordings
+    begun: str                              # UTC
+    session: int                            # number of the run of the verb that measured it, from 1 on
+
+
+def run(specification: Specification, performer: Performer, folder: pathlib.Path, seed: int,
+        report: Callable[[Kept], None]) -> list[Kept]:
+    """Perform the requirements without a result in the folder, and return all results. Requirements with the same
+    exercise share its recordings. report: called with each result, also with those of earlier sessions.
+
+    Raises ValueError before anything moves, for exercises that cannot be made and for the folder of another
+    specification; StoppedError if the antenna was stopped.
+    """
+    exercises = specification.exercises(performer.antenna)
+    for requirement, exercise in zip(specification.requirements, exercises):
+        try:
+            performer.check(exercise)
+        except ValueError as error:
+            raise ValueError(f'requirement {requirement.name!r}: {error}') from None
+    folder.mkdir(parents=True, exist_ok=True)
+    with _locked(folder):
+        results = _Results(folder, specification)
+        for kept in results.kept:
+            report(kept)
+        names = [kept.name for kept in results.kept]
+        left = [(requirement, exercise) for requirement, exercise in zip(specification.requirements, exercises)
+                if requirement.name not in names]
+        performances = _Performances(performer, folder, seed, [exercise for _, exercise in left])
+        for requirement, exercise in left:
+            results.keep(_result(requirement, exercise, performances, folder, results.session))
+            report(results.kept[-1])
+    return results.kept
+
+
+def _result(requirement: Requirement, exercise: Exercise, performances: '_Performances', folder: pathlib.Path,
+            session: int) -> Kept:
+    """Perform, measure and judge a requirement."""
+    begun = f'{datetime.datetime.now(datetime.timezone.utc):%Y-%m-%dT%H:%M:%SZ}'
+    measured: list[Measured] = []
+    bags: list[tuple[str, str]] = []
+    reason = ''
+    for i, performed in enumerate(performances.of(requirement, exercise)):
+        if performed.bag is not None:
+            bags += [(str(file.relative_to(folder.resolve())), files.sha256(file))
+                     for file in bag_files.locate(performed.bag.resolve())]
+        if i == 0:
+            figure.keep_signal(performed, folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
+        try:
+            measured.append(requirement.method.measure(performed, requirement.arguments))
+        except ValueError as error:
+            reason = str(error)
+    return Kept(requirement.name, judged(requirement, measured, reason), tuple(bags), begun, session)
+
+
+class _Performances:
+    """Performances of a run of the sequence, each kept until the last requirement with its exercise is measured."""
+
+    def __init__(self, performer: Performer, folder: pathlib.Path, seed: int, exercises: Sequence[Exercise]) -> None:
+        self._performer, self._folder, self._seed = performer, folder, seed
+        self._left = list(map(_key, exercises))     # of the requirements that are not measured yet
+        self._made: dict[str, list[Performed]] = {}
+
+    def of(self, requirement: Requirement, exercise: Exercise) -> Iterator[Performed]:
+        """Yield a performance for each repetition of the next requirement."""
+        key = self._left.pop(0)
+        made = self._made.setdefault(key, [])
+        for i in range(requirement.repetitions):
+            if i == len(made):
+                name = f'{requirement.file_name}-{i + 1}'
+                pass_recorder.set_aside(self._folder / name, 'interrupted')
+                made.append(self._performer.perform(name, exercise, self._seed + SEED_STEP * i))
+            yield made[i]
+        if key not in self._left:
+            del self._made[key]
+
+
+def _key(exercise: Exercise) -> str:
+    """Return a text that equal exercises have in common."""
+    track = exercise.track and [exercise.track.t.tolist(), exercise.track.angles.tolist()]
+    return json.dumps([exercise.duration, exercise.envelope, exercise.actions, exercise.start, track,
+                       dict(exercise.changes), exercise.alarms], sort_keys=True)
+
+
+@contextlib.contextmanager
+def _locked(folder: pathlib.Path) -> Iterator[None]:
+    """Lock a folder as a context. Raises ValueError while another process has it."""
+    with open(folder / LOCK_FILE, 'w') as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ValueError(f'{folder}: another acceptance is using this folder') from None
+        yield
+
+
+class _Results:
+    """Results in a folder. Raises ValueError for a broken file, and for that of another specification."""
+    kept: list[Kept]
+
+    def __init__(self, folder: pathlib.Path, specification: Specification) -> None:
+        self._file, self.kept, before = folder / RESULTS_FILE, [], 0
+        self._sha256 = hashlib.sha256(specification.text.encode()).hexdigest()
+        if self._file.exists():
+            try:
+                content = json.loads(files.read_text(self._file, MAX_RESULTS_BYTES))
+                of_these, before = content['specification_sha256'] == self._sha256, content['session']
+                self.kept = list(map(_kept, content['results']))
+            except (ValueError, KeyError, TypeError) as error:
+                raise ValueError(f'{self._file}: is no file of results: {error!r}') from None
+            if not of_these:
+                raise ValueError(f'{self._file}: holds results of another specification; choose a new folder')
+        self.session = before + 1
+        self._write()
+
+    def keep(self, kept: Kept) -> None:
+        """Add a result, and write the file."""
+        self.kept.append(kept)
+        self._write()
+
+    def _write(self) -> None:
+        results = [{**kept._asdict(), 'judged': kept.judged._asdict()} for kept in self.kept]
+        files.replace_text(self._file, json.dumps({'specification_sha256': self._sha256, 'session': self.session,
+                                                   'results': results}, indent=1) + '\n')
+
+
+def _kept(content: dict[str, Json]) -> Kept:
+    found = content['judged']
+    repetitions = tuple(Measured(*one) for one in found['repetitions'])
+    return Kept(**{**content, 'judged': Judged(**{**found, 'repetitions': repetitions}),
+                   'bags': tuple(map(tuple, content['bags']))})

@@ -1,0 +1,183 @@
+"""Report of an acceptance: the same content on the page and in the PDF, the rows of --json, JUnit read back."""
+import datetime
+import html
+import json
+import math
+import re
+import xml.etree.ElementTree as ElementTree
+import zlib
+
+import numpy as np
+import pytest
+
+from pedestal_bringup.scenario.variant import Variant
+from pedestal_results.intervals import Target
+from pedestal_workbench.acceptance import document, figure, in_loop
+from pedestal_workbench.acceptance.judgement import judged
+from pedestal_workbench.acceptance.method import Measured
+from pedestal_workbench.acceptance.methods import METHOD_BY_NAME
+from pedestal_workbench.acceptance.sequence import Kept
+from pedestal_workbench.acceptance.specification import Requirement, Specification
+
+DIGEST = 'dae21ce247d6975e14b4750aeafc499dd34b7558b5d8f4ee483c1175c94c9275'
+MADE = datetime.datetime(2026, 11, 30, 12, 0, 0, tzinfo=datetime.timezone.utc)
+STOPPED = 'alarm azimuth drive fault'
+
+
+def requirement(name, method, limit, repetitions=1):
+    found = METHOD_BY_NAME[method]
+    return Requirement(name, found, {one.name: one.default for one in found.arguments}, Target.parse(limit),
+                       repetitions, 0.95)
+
+
+REQUIREMENTS = (requirement('slew rate', 'slew_rate', '>= 20', 3), requirement('settling', 'step_settling', '<= 1.5'),
+                requirement('slope <&> "x"', 'receiver_slope', '1 +- 0.1'),
+                requirement('lash', 'lash', '0.01 to 0.05'), requirement('creep', 'creep_rms', '<= 0.01'))
+VALUES = ([Measured(22.0, 0.1), Measured(22.1, 0.1), Measured(22.05, 0.1)], [Measured(1.45, 0.1)],
+          [Measured(1.3, 0.05)], [Measured(math.nan, 0.0)])
+
+
+def results(values=VALUES):
+    return [Kept(one.name, judged(one, repetitions, 'no reversal' * math.isnan(repetitions[0].value)),
+                 tuple((f'{one.name}-{k + 1}/{one.name}-{k + 1}.mcap', DIGEST) for k in range(len(repetitions))),
+                 f'2026-11-30T1{i}:00:00Z', 1 + i // 2)
+            for i, (one, repetitions) in enumerate(zip(REQUIREMENTS, values))]
+
+
+@pytest.fixture(scope='module')
+def antenna():
+    return in_loop.antenna(Variant('station_real').load())
+
+
+@pytest.fixture(scope='module')
+def whole(antenna):
+    """Report of a sequence that was interrupted once, then stopped before its last requirement."""
+    specification = Specification('Acceptance of Zürich', 'Ω <&> Söhne', 'no. 7', 'A. Smith', 'of 2026-11-20',
+                                  REQUIREMENTS, 'title: x')
+    return document.Acceptance(specification, results(), antenna, 'the running graph', 'pedestal acceptance x.yaml',
+                               MADE, STOPPED)
+
+
+@pytest.fixture(scope='module')
+def folder(whole, tmp_path_factory):
+    folder = tmp_path_factory.mktemp('report')
+    (folder / 'signals').mkdir()
+    t = np.linspace(0.0, 5.0, 50)
+    np.savetxt(folder / 'signals' / 'slew_rate.csv', np.column_stack((t, np.sin(t), 0.0 * t)), delimiter=',',
+               header=','.join(figure.HEADER), comments='')
+    document.write(whole, folder)
+    return folder
+
+
+def pdf_pages(data):
+    """Return the text of each page of a PDF, by the ToUnicode tables of its fonts."""
+    objects = {int(number): body for number, body in re.findall(rb'(?s)(\d+) 0 obj(.*?)endobj', data)}
+
+    def stream(number):
+        body = re.search(rb'(?s)stream\r?\n(.*?)\r?\nendstream', objects[number])[1]
+        return zlib.decompress(body) if b'/FlateDecode' in objects[number] else body
+    fonts = {}
+    for name, number in re.findall(rb'/(F\d+) (\d+) 0 R', data):
+        table = stream(int(re.search(rb'/ToUnicode (\d+) 0 R', objects[int(number)])[1]))
+        fonts[name] = {int(code, 16): bytes.fromhex(text.decode()).decode('utf-16-be')
+                       for code, text in re.findall(rb'<(\w{4})> <(\w+)>', table)}
+    pages = []
+    for body in objects.values():
+        if re.search(rb'/Type /Page\b', body):
+            text, font = [], {}
+            for name, shown in re.findall(rb'(?s)/(F\d+) [\d.]+ Tf|\(((?:\\.|[^\\)])*)\) Tj',
+                                          stream(int(re.search(rb'/Contents (\d+) 0 R', body)[1]))):
+                if name:
+                    font = fonts[name]
+                else:
+                    codes = re.sub(rb'(?s)\\(.)', lambda found: {b'r': b'\r', b'n': b'\n'}.get(found[1], found[1]),
+                                   shown)
+                    text.append(''.join(font.get(code, '?') for code in np.frombuffer(codes, '>u2').tolist()))
+            pages.append(' '.join(text))
+    return pages
+
+
+def words(text):
+    """Return a text without any blanks, because a line of a table may be wrapped anywhere."""
+    return re.sub(r'\s', '', text)
+
+
+def test_page_and_pdf_hold_the_same_texts(whole, folder):
+    page, paper = (folder / 'report.html').read_text(), words(''.join(pdf_pages((folder / 'report.pdf').read_bytes())))
+    shown = words(html.unescape(re.sub('<[^>]*>', '', re.sub('(?s)<(style|svg).*?</\\1>', '', page))))
+    texts = [part for _, content in document.blocks(whole, folder) if isinstance(content, str) for part in [content]]
+    cells = [cell for _, content in document.blocks(whole, folder) if isinstance(content, document.TextTable)
+             for row in [content.heads, *content.rows] for cell in row]
+    assert len(cells) > 200
+    for text in (*texts, *cells, *(one.name for one in REQUIREMENTS)):
+        assert words(text) in shown and words(text) in paper, text
+
+
+def test_the_report_states_what_a_customer_signs(folder):
+    text = html.unescape((folder / 'report.html').read_text())
+    for part in ('Acceptance of Zürich', 'Ω <&> Söhne', 'A. Smith', 'of 2026-11-20', 'pedestal_bringup 0.',
+                 f'slew rate-1/slew rate-1.mcap {DIGEST} and 2 more', 'slew rate-3/slew rate-3.mcap',
+                 'interrupted, continued at 2026-11-30T12:00:00Z with slope', '2026-11-30T10:00:00Z to 2026-11-30T12',
+                 'Not passed: 1 passed, 2 inconclusive, 1 failed, 1 not performed of 5', STOPPED, 'signature',
+                 'not measured: no reversal', 'acu.azimuth.shaper.rate'):
+        assert part in text, part
+    assert not re.findall('(?:src|href)="(?!#)', text) and 'url(' not in text.replace('url(#', '')  # self-contained
+    assert text.count('<figure') == 4 and text.count('motion since the begin') == 1
+    assert len(re.findall(r'SHA-256 [0-9a-f]{64}', text)) == 2      # of the parameters, of the specification
+
+
+def test_each_page_of_the_pdf_has_its_number(folder):
+    pages = pdf_pages((folder / 'report.pdf').read_bytes())
+    assert len(pages) >= 3
+    for number, text in enumerate(pages, start=1):
+        assert words(f'Acceptance of Zürich: page {number} of {len(pages)}') in words(text)
+
+
+def test_equal_results_give_equal_bytes(whole, tmp_path):
+    one = document.dataclasses.replace(whole, kept=whole.kept[:1])
+    first = [path.read_bytes() for path in document.write(one, tmp_path)]
+    assert [path.read_bytes() for path in document.write(one, tmp_path)] == first
+
+
+def test_junit_holds_each_requirement(folder):
+    suite = ElementTree.parse(folder / 'report.xml').getroot().find('testsuite')
+    assert {key: suite.get(key) for key in ('name', 'tests', 'failures', 'skipped', 'errors')} == {
+        'name': 'Acceptance of Zürich', 'tests': '5', 'failures': '3', 'skipped': '1', 'errors': '0'}
+    cases = {case.get('name'): case for case in suite}
+    assert list(cases) == [one.name for one in REQUIREMENTS]
+    assert cases['slew rate'].find('failure') is None and DIGEST in cases['slew rate'].findtext('system-out')
+    assert cases['settling'].find('failure').get('type') == 'inconclusive'
+    assert cases['slope <&> "x"'].find('failure').get('type') == 'failed'
+    assert cases['creep'].find('skipped').get('message') == STOPPED
+
+
+def test_rows_for_json(whole):
+    content = document.json_content(whole)
+    assert json.loads(json.dumps(content, allow_nan=False)) == content
+    found = {(row['case'], row['metric']): row['value'] for row in content['rows']}
+    assert len(found) == 4 * 4
+    assert [found[one.name, 'passed'] for one in REQUIREMENTS[:4]] == [1.0, 0.5, 0.0, 0.5]
+    assert [found[one.name, 'limit'] for one in REQUIREMENTS[:3]] == pytest.approx([20.0, 1.5, 1.1])
+    assert found['slew rate', 'value'] == pytest.approx(22.05) and found['settling', 'uncertainty'] == 0.1
+    assert found['lash', 'value'] is None and found['lash', 'uncertainty'] is None
+
+
+def test_a_report_without_results_and_one_of_passed_requirements(whole, tmp_path):
+    nothing = document.dataclasses.replace(whole, kept=[])
+    document.write(nothing, tmp_path)
+    assert not nothing.passed and 'nothing was measured' in (tmp_path / 'report.html').read_text()
+    passed = document.dataclasses.replace(whole, stopped='', kept=results(
+        [[Measured(value, 0.001)] for value in (30.0, 1.0, 1.0, 0.03, 0.001)]))
+    assert passed.passed and passed.verdict == 'Passed: 5 passed of 5'
+
+
+def test_the_signal_of_a_performance_is_kept(tmp_path):
+    from pedestal_workbench.acceptance.exercise import Action, Exercise, Span
+    span = Span(-90.0, 90.0, 30.0)
+    performed = in_loop.InLoop(Variant('station_real')).perform('x', Exercise(
+        3.0, (span, span), (Action(0.5, 'acu', 'preset azimuth=0.05 elevation=0.5'),), (0.0, 0.5)), 1)
+    figure.keep_signal(performed, tmp_path / 'signals' / 'x.csv')
+    t, azimuth, elevation = np.loadtxt(tmp_path / 'signals' / 'x.csv', delimiter=',', skiprows=1).T
+    assert 300 < t.size <= figure.MAX_SIGNAL_POINTS + 1 and t[0] < 0.01 and t[-1] == pytest.approx(3.0, abs=0.02)
+    assert azimuth[0] == pytest.approx(0.0, abs=0.02) and azimuth[-1] == pytest.approx(math.degrees(0.05), abs=0.02)
+    assert elevation[-1] == pytest.approx(math.degrees(0.5), abs=0.02)

@@ -1,0 +1,160 @@
+"""Exercises of an acceptance on processes: on graphs of their own, on a running graph, and after a kill."""
+import contextlib
+import dataclasses
+import json
+import math
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+from shared import PATIENCE, PEDESTAL
+
+from pedestal_bringup.scenario.variant import Variant
+from pedestal_common.graph.steps import GraphError
+from pedestal_results.intervals import Target
+from pedestal_workbench.acceptance import sequence
+from pedestal_workbench.acceptance.exercise import Action, Exercise, Span, StoppedError, Track
+from pedestal_workbench.acceptance.in_loop import InLoop
+from pedestal_workbench.acceptance.method import Measured, Method
+from pedestal_workbench.acceptance.own_graph import OwnGraph
+from pedestal_workbench.acceptance.running_graph import RunningGraph
+from pedestal_workbench.acceptance.specification import Requirement, Specification
+
+UAV = Variant('uav_tracker_3m')
+SPAN = Span(-20.0, 60.0, 40.0)
+REST = 0.0, 0.5
+SLOW = 'acu.azimuth.shaper.rate=0.1', 'adu.initial_azimuth=0.01', 'adu.initial_elevation=0.5'   # of a running graph
+# Alarms of a busy machine.
+BUSY = 'steps lost', 'time jump', 'drive silent', 'azimuth encoder jump', 'elevation encoder jump'
+
+
+def step(at=0.5, size=1.0, duration=2.0, **more):
+    """Return a step in azimuth by `size` [deg]."""
+    command = f'preset azimuth={math.radians(size)} elevation={REST[1]}'
+    return Exercise(duration, (SPAN, SPAN), (Action(at, 'acu', command),), REST, **{'alarms': BUSY, **more})
+
+
+def azimuth(performed, times):
+    """Return the azimuth [deg] at times after the execution of the first action."""
+    table = performed.recording.table('joint_states')
+    begin = performed.begin + performed.executed[0].t
+    return np.degrees(np.interp(times, table['t'] - begin, table['azimuth.position']))
+
+
+def specification():
+    """Return two requirements with exercises of their own, and one that shares the second."""
+    def method(size):
+        return Method('last', '', 'deg', '+-', (), lambda antenna, arguments: step(size=size),
+                      lambda performed, arguments: Measured(float(azimuth(performed, [1.4])[0]), 0.0))
+    return Specification('title', '', '', '', '', tuple(
+        Requirement(name, method(size), {}, Target.parse(f'{size} +- 0.1'), 1, 0.95)
+        for name, size in (('one', 1.0), ('two', 2.0), ('two again', 2.0))), 'text')
+
+
+@pytest.fixture
+def domain(reserve_domain, monkeypatch):
+    """A domain of its own for this process and its children."""
+    number = reserve_domain()
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(number))
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    return number
+
+
+def test_a_step_on_a_graph_is_that_of_the_closed_loop(domain, tmp_path):
+    t = np.arange(0.0, 4.0, 0.1)
+    track = Track(t, np.column_stack([0.0 * t, REST[1] + 0.0 * t]))
+    exercise = step(track=track)
+    on_nodes, in_memory = (performer.perform('step', exercise, 3) for performer in (OwnGraph(UAV, tmp_path),
+                                                                                    InLoop(UAV)))
+    [executed] = on_nodes.executed
+    assert executed.granted and executed.reply == 'mode is preset' and executed.t >= 0.5
+    assert on_nodes.recording.end == in_memory.recording.end
+    times = np.arange(0.0, 1.0, 0.005)
+    assert azimuth(on_nodes, times) == pytest.approx(azimuth(in_memory, times), abs=0.005)
+    if executed.t == in_memory.executed[0].t:   # no command was late: the same bits
+        tables = (performed.recording.table('joint_states') for performed in (on_nodes, in_memory))
+        assert all(np.array_equal(a, b) for a, b in zip(*(table.values() for table in tables)))
+
+
+@pytest.mark.thorough
+def test_a_killed_sequence_continues(domain, tmp_path, start_process):
+    killed = start_process([sys.executable, __file__, tmp_path], ROS_DOMAIN_ID=str(domain))
+    deadline = time.monotonic() + PATIENCE
+    while not list((tmp_path / 'two-1').glob('*.mcap')):
+        assert killed.poll() is None and time.monotonic() < deadline, killed.communicate()
+        time.sleep(0.02)
+    os.kill(killed.pid, signal.SIGKILL)
+    assert [kept['name'] for kept in json.loads((tmp_path / 'results.json').read_text())['results']] == ['one']
+    time.sleep(3.0)     # the kernel ends the graph of the killed process
+    results = main(tmp_path)
+    assert [(kept.name, kept.session, kept.judged.verdict) for kept in results] == [
+        ('one', 1, 1.0), ('two', 2, 1.0), ('two again', 2, 1.0)]
+    assert results[1].bags == results[2].bags != results[0].bags
+    assert (tmp_path / 'two-1.interrupted-1').is_dir()
+
+
+@pytest.mark.thorough
+def test_an_antenna_outside_of_its_envelope_is_stopped(domain, tmp_path):
+    narrow = dataclasses.replace(step(duration=30.0), envelope=(Span(-1.0, 0.5, 40.0), SPAN))
+    with pytest.raises(StoppedError, match='azimuth 0.5.* deg: outside its envelope, -1.000 to 0.500 deg'):
+        OwnGraph(UAV, tmp_path).perform('narrow', narrow, 1)
+
+
+@pytest.fixture
+def running(domain, start_run, patient):
+    changes = (*SLOW, 'acu.initial_mode=standby', 'acu.tracker.handover=false')
+    return start_run('uav_tracker_3m', '--pacing', 'realtime', '--duration', '600', *patient,
+                     *(word for change in changes for word in ('--param', change)), domain_id=domain)
+
+
+def ask(*arguments):
+    """Return the exit code of a client, and what it printed."""
+    done = subprocess.run([*PEDESTAL, *arguments], capture_output=True, text=True, timeout=PATIENCE)
+    return done.returncode, done.stdout
+
+
+@contextlib.contextmanager
+def connected(folder):
+    """Connect to a graph that starts, as a context."""
+    deadline = time.monotonic() + PATIENCE
+    with contextlib.ExitStack() as stack:
+        while True:
+            with contextlib.suppress(GraphError):
+                performer = stack.enter_context(RunningGraph(folder))
+                break
+            assert time.monotonic() < deadline
+        yield performer
+
+
+@pytest.mark.thorough
+def test_a_running_graph(running, tmp_path):
+    with connected(tmp_path) as performer:
+        assert performer.antenna.period == 0.02 and performer.antenna.adu.initial_elevation != 0.0
+        with pytest.raises(ValueError, match='adu.period: a running graph keeps its parameters'):
+            performer.check(step(changes={'adu.period': 0.01}))
+        results = sequence.run(specification(), performer, tmp_path, 1, lambda kept: None)
+        assert [kept.judged.verdict for kept in results] == [1.0] * 3
+        expected = InLoop(UAV.with_(SLOW)).perform('one', step(), 1).recording.table('joint_states')
+        assert results[0].judged.value == pytest.approx(np.degrees(expected['azimuth.position'][-1]), abs=0.005)
+        threading.Timer(2.0, ask, ['stop']).start()
+        with pytest.raises(StoppedError, match='commanded stop'):
+            performer.perform('stopped', step(duration=60.0), 1)
+    assert ask('ask', 'take')[0] == 0       # control was released
+    with pytest.raises(StoppedError, match='cannot take control: .*held by'), connected(tmp_path):
+        pass
+
+
+def main(folder):
+    """Run the sequence on graphs of its own."""
+    return sequence.run(specification(), OwnGraph(UAV, pathlib.Path(folder)), pathlib.Path(folder), 1,
+                        lambda kept: print(kept.name, flush=True))
+
+
+if __name__ == '__main__':
+    main(pathlib.Path(sys.argv[1]))
