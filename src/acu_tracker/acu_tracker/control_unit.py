@@ -238,9 +238,9 @@ def _take_receiver(state: State, constants: Constants, inputs: Inputs, outputs: 
         guidance.check_slope(state.guidance, state.tracking, constants, inputs, at, way)
     restart_gap = math.inf if _outage(state, constants).permitted else constants.p.tracker.restart_gap
     judged = not guidance.held(state.guidance, constants, state.stamp)
-    return receiver_error.take_error(state.tracking, constants, inputs, outputs, at, restart_gap,
-                                     mode == Mode.AUTOTRACK and judged,
-                                     interruptions.axes_follow_commands(state.supervision) and judged)
+    loop = receiver_error.Loop(mode == Mode.AUTOTRACK and judged,
+                               interruptions.axes_follow_commands(state.supervision) and judged, way.program)
+    return receiver_error.take_error(state.tracking, constants, inputs, outputs, at, restart_gap, loop)
 
 
 @compiled

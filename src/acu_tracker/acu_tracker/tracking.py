@@ -3,7 +3,7 @@ import math
 from typing import TYPE_CHECKING
 
 from acu_tracker import signals
-from acu_tracker.estimation import monitors, target
+from acu_tracker.estimation import monitors, slope_ratio, target
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.geometry import attitude, frames, history
 from acu_tracker.geometry.vector import ZERO_VECTOR, LineOfSight, Vector, rotated
@@ -33,6 +33,7 @@ class Tracking(Record):
     repetition: monitors.Repetition
     divergence: monitors.Divergence
     wrong_slope: monitors.WrongSlope
+    slope_ratio: slope_ratio.SlopeRatio
 
 
 def initialise(tracking: Records, pointing: PointingParameters) -> None:
@@ -107,6 +108,7 @@ def restart(tracking: Tracking) -> None:
     """Restart the monitors of divergence and slope when a mode begins."""
     monitors.restart_divergence(tracking.divergence)
     monitors.restart_slope(tracking.wrong_slope)
+    slope_ratio.restart(tracking.slope_ratio)
 
 
 @compiled

@@ -17,6 +17,7 @@ from acu_tracker.estimation.filters.kinds import FILTER_KINDS
 from acu_tracker.estimation.params import FilterParameters, ReceiverModelParameters, TrackerParameters
 from acu_tracker.geometry.history import Pointing
 from acu_tracker.params import AcuParameters, AxisParameters, ElevationParameters
+from acu_tracker.program.program_track import NO_TRACK
 from pedestal.recording import Table
 from pedestal.scenario import Value
 from pedestal_common.compiled import compiled
@@ -231,7 +232,8 @@ def take_each(state: tracking.Tracking, constants: control_unit.Constants, input
         gated = state.target.gated
         inputs.error_stamp, inputs.cn0_dbhz = t[k], cn0_dbhz[k]
         flag = receiver_error.take_error(state, constants, inputs, outputs,
-                                         Pointing(measured[k, 0], measured[k, 1], 0.0, 0.0), gap, False, False)
+                                         Pointing(measured[k, 0], measured[k, 1], 0.0, 0.0), gap,
+                                         receiver_error.Loop(False, False, NO_TRACK))
         tracking.write_outputs(state, constants, t[k], outputs)
         started = math.isnan(outputs.nis[0]) or state.target.gated > gated
         outcomes[k] = 2 if flag else 1 if started else 0

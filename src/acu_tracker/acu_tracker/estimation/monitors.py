@@ -62,7 +62,7 @@ fast as the beam.
 The comparison is a likelihood ratio of hypotheses (Willsky, A survey of design methods for failure detection in
 dynamic systems, Automatica 12 (1976) 601). The directions are those in the earth frame, because the motion of the deck
 has no effect there. `pedestal study wrong-slope` compares the time of the alarm with the time of a test that knows the
-direction of the target.
+direction of the target. With the program of a satellite `slope_ratio` is sooner.
 """
 import math
 from typing import Annotated, NamedTuple
@@ -314,6 +314,25 @@ def _innovation(state: WrongSlope, i: int, T: Seconds) -> float:
 
 
 @compiled
+def means(state: WrongSlope) -> tuple[Vector, Vector]:
+    """Return the means (ENU) of the beam's direction and of the error of a full block."""
+    s, n = state.sum, BLOCK_ERROR_COUNT
+    return Vector(s[0] / n, s[1] / n, s[2] / n), Vector(s[3] / n, s[4] / n, s[5] / n)
+
+
+@compiled
+def mean_variance(state: WrongSlope) -> Radians2:
+    """Return the variance of the mean of the errors of a full block."""
+    return state.variance / (BLOCK_ERROR_COUNT * BLOCK_ERROR_COUNT)
+
+
+@compiled
+def full(state: WrongSlope) -> bool:
+    """Return True if the last error has ended a block. The block stays until the next error."""
+    return state.count == BLOCK_ERROR_COUNT
+
+
+@compiled
 def _take_block(state: WrongSlope, t: Seconds, beam: Beam) -> None:
     """Update parabolas and means of the products with the present block, which ends at t with the beam."""
     T = t - state.block_stamp
@@ -322,15 +341,13 @@ def _take_block(state: WrongSlope, t: Seconds, beam: Beam) -> None:
     nu_u = Vector(_innovation(state, 0, T), _innovation(state, 1, T), _innovation(state, 2, T))
     nu_e = Vector(_innovation(state, 3, T), _innovation(state, 4, T), _innovation(state, 5, T))
     if state.n > 3:
-        # sigma2: variance of the mean of the errors.
-        sigma2 = state.variance / (BLOCK_ERROR_COUNT * BLOCK_ERROR_COUNT)
+        sigma2 = mean_variance(state)
         a, b = (dot(nu_u, beam.across), dot(nu_u, beam.up)), (dot(nu_e, beam.across), dot(nu_e, beam.up))
         for i in range(2):
             state.beam_square[i] += (a[i] * a[i] / sigma2 - state.beam_square[i]) / SLOPE_BLOCK_COUNT
             state.error_square[i] += (b[i] * b[i] / sigma2 - state.error_square[i]) / SLOPE_BLOCK_COUNT
             state.product[i] += (a[i] * b[i] / sigma2 - state.product[i]) / SLOPE_BLOCK_COUNT
         state.turn += ((a[0] * b[1] - a[1] * b[0]) / sigma2 - state.turn) / SLOPE_BLOCK_COUNT
-    _clear_block(state)
 
 
 @compiled
@@ -366,6 +383,8 @@ def take_slope(state: WrongSlope, t: Seconds, beam: Beam, error: tuple[Radians, 
     state.stamp = t
     if T > gap:
         _clear_slope(state)
+    elif full(state):
+        _clear_block(state)
     u, across, up = beam.u, beam.across, beam.up
     for i, x in enumerate((u.x, u.y, u.z)):
         state.sum[i] += x
@@ -373,7 +392,7 @@ def take_slope(state: WrongSlope, t: Seconds, beam: Beam, error: tuple[Radians, 
         state.sum[3 + i] += error[0] * x + error[1] * y
     state.variance += variance
     state.count += 1
-    if state.count < BLOCK_ERROR_COUNT:
+    if not full(state):
         return False
     _take_block(state, t, beam)
     return (state.n >= MIN_BLOCK_COUNT

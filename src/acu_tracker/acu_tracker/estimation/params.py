@@ -179,6 +179,8 @@ class TrackerParameters(Parameters):
     coast_time: float = parameter(3.0, 1e-3, 1000.0, 's', 'time without an error after which autotrack ends',
                                   must_be='at least coast_after')
     handover: bool = flag(True, 'automatic hand-over from program to autotrack after lock')
+    keeps_program: bool = flag(False, 'target that keeps to its program except for a constant delay and slow errors, '
+                               'as a satellite does; a wrong slope of the receiver is then reported sooner')
     receiver: ReceiverModelParameters = group(ReceiverModelParameters)
     matrix: ErrorMatrixParameters = group(ErrorMatrixParameters)
     attitude: AttitudeModelParameters = group(AttitudeModelParameters)

@@ -5,10 +5,10 @@ differs too much from its prediction is rejected. `correct_error`, `used_error` 
 order in each step.
 """
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from acu_tracker import signals
-from acu_tracker.estimation import monitors, target
+from acu_tracker.estimation import monitors, slope_ratio, target
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.estimation.filters.measurement import (
     NO_INNOVATION,
@@ -29,6 +29,7 @@ from acu_tracker.geometry.frames import Attitude
 from acu_tracker.geometry.history import Pointing
 from acu_tracker.geometry.vector import ZERO_VECTOR, Rotation, Vector, rotated, rotation
 from acu_tracker.pointing import model
+from acu_tracker.program.program_track import ProgramTrack
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled, separate
 from pedestal_common.geometry import line_of_sight as pointing
@@ -44,6 +45,13 @@ UNKNOWN_POINTING = Pointing(math.nan, math.nan, math.nan, math.nan)  # of the be
 OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY, OUTCOME_NO_ATTITUDE = range(6)
 """Outcomes of a measurement: it starts the filter, is used, is rejected by the gate, is not newer than the last one,
 is only noise, has no known attitude of the deck at its instant."""
+
+
+class Loop(NamedTuple):
+    """Conditions of the monitors. While a limit holds the beam off the target, both truth values are False."""
+    closed: bool    # the loop is closed on the errors (autotrack)
+    follows: bool   # the axes follow their commands
+    program: ProgramTrack   # where the target is expected
 
 
 @compiled
@@ -105,12 +113,11 @@ def _wrong_level(encoders: history.Encoders, inputs: Inputs) -> int:
 
 @compiled
 def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, outputs: Outputs, at: Pointing,
-               restart_gap: Seconds, closed: bool, follows: bool) -> int:
+               restart_gap: Seconds, loop: Loop) -> int:
     """Filter an error of the receiver and run the monitors. Return a flag if the error is not accepted, else 0.
 
     at: the beam when the error was measured; restart_gap: time without accepted errors after which the filter
-    restarts; closed: the loop is closed on the errors (autotrack); follows: the axes follow their commands. While a
-    limit holds the beam off the target, both are False.
+    restarts.
     """
     receiver, params = constants.p.tracker.receiver, constants.p.tracker
     measured = pointing.displaced(at.A, at.E, inputs.cross_elevation, inputs.elevation)
@@ -121,7 +128,7 @@ def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, out
         measurement = _measure(tracking, constants, inputs, at, measured, deck)
         # gap: time without errors before this one and the gated ones before it.
         gap = measurement.stamp - tracking.target.stamp - tracking.target.gated_in_a_row * constants.p.period
-        counts = follows and gap <= params.coast_after
+        counts = loop.follows and gap <= params.coast_after
         if gap > params.coast_after:
             monitors.restart_growth(tracking.divergence)
         outcome, innovation = gate(tracking.target, params, constants.target, measurement, restart_gap)
@@ -129,8 +136,8 @@ def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, out
             _follow_with_frame(tracking.target, constants.target)
         if outcome != OUTCOME_NOISY and counts:
             monitors.take_divergence(tracking.divergence, innovation, measurement, tracking.target.roughness.q)
-    if closed and known and monitors.shows_slope(inputs, receiver.beamwidth):
-        _watch_slope(tracking, params, inputs, at, deck.mat)
+    if loop.closed and known and monitors.shows_slope(inputs, receiver.beamwidth):
+        _watch_slope(tracking, params, inputs, at, deck.mat, loop.program)
     return _write_innovation(outputs, outcome, innovation)
 
 
@@ -295,12 +302,20 @@ def _follow_with_frame(state: Target, constants: target.Constants) -> None:
 
 @compiled
 def _watch_slope(tracking: 'Tracking', params: TrackerParameters, inputs: Inputs, at: Pointing,
-                 mat_ed: Rotation) -> None:
+                 mat_ed: Rotation, program: ProgramTrack) -> None:
     """Test the slope with an error and its beam; latch the divergence if the slope is wrong."""
     error, beam = (inputs.cross_elevation, inputs.elevation), monitors.slope_beam(mat_ed, at.A, at.E)
     variance = error_variance(inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz, params.receiver)
-    if monitors.take_slope(tracking.wrong_slope, inputs.error_stamp - params.receiver.age, beam, error, variance,
-                           params.coast_after):
+    wrong = monitors.take_slope(tracking.wrong_slope, inputs.error_stamp - params.receiver.age, beam, error, variance,
+                                params.coast_after)
+    if params.keeps_program and monitors.full(tracking.wrong_slope):
+        walk = 0.0
+        if tracking.attitude.stabilised:
+            _, (tilt, heading) = attitude.expected_error(tracking.attitude.error, params.attitude)
+            walk = tilt + heading * (beam.u.x * beam.u.x + beam.u.y * beam.u.y)
+        wrong = slope_ratio.take(tracking.slope_ratio, tracking.wrong_slope, beam, program, walk,
+                                 params.coast_after) or wrong
+    if wrong:
         monitors.latch_divergence(tracking.divergence)
 
 

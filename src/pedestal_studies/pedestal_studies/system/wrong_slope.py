@@ -15,7 +15,8 @@ Statistics 42 (1971) 1897). No other test with so few false alarms is faster for
 target than the noise of the receiver, errors of any slope look alike.
 
 The score of a step is J - WRONG_SLOPE_RATIO (J' - EXPLAINED_ROUGHNESS k) of `acu_tracker.estimation.monitors`. The
-alarm has a limit for the score; the figure shows what lower limits would do.
+alarm has a limit for the score; the figure shows what lower limits would do. For a target that keeps to its program,
+the sum of `acu_tracker.estimation.slope_ratio` has a limit too; largest_sum is its largest value in the case `right`.
 """
 import cmath
 import math
@@ -25,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from acu_tracker.estimation import monitors
+from acu_tracker.estimation import monitors, slope_ratio
 from acu_tracker.estimation.filters.measurement import error_variance
 from acu_tracker.modes import Mode
 from pedestal_bringup.loop import closed_loop
@@ -91,6 +92,13 @@ def score(state: AnyRecord) -> float:
     return max(monitors.score(state, hypothesis) for hypothesis in range(3))
 
 
+def ratio(state: AnyRecord) -> float:
+    """Return the largest sum of a SlopeRatio less its deductions, 0 without a program."""
+    if state['n'] < slope_ratio.MIN_BLOCK_COUNT:
+        return 0.0
+    return float((state['S'] - slope_ratio.MISFIT_WEIGHT * np.maximum(state['X'], 0.0)).max())
+
+
 def known_steps(true: Complexes, variance: Floats, factor: complex) -> float:
     """Return the number of errors until a test that knows the target gives its alarm; NaN without one.
 
@@ -113,8 +121,8 @@ def _known_steps(run: Run, slope: Slope, first: int) -> float:
 
 
 def measured(name: str, number: int) -> Floats:
-    """Return of one run: steps from the onset until the score is above each of MARGINS, known_steps, largest error
-    [beamwidths], largest score without a fault."""
+    """Return of one run: steps from the onset until the score is above each of MARGINS, hours of autotrack,
+    known_steps, largest error [beamwidths], largest score and largest sum of slope_ratio without a fault."""
     target, _, slope = name.partition('/')
     seed = FIRST_SEED + number
     onset = round(float(np.random.default_rng(seed).uniform(EARLIEST_ONSET_S, LATEST_ONSET_S)), 2)
@@ -122,12 +130,12 @@ def measured(name: str, number: int) -> Floats:
     first = math.ceil(onset * 1e9 / loop.period_ns) if SLOPES[slope].inject else loop.steps
     acu = loop.units['acu']
     state = acu.parts['state']['tracking']
-    steps, quiet = np.full(len(MARGINS), np.nan), [0.0]
+    steps, quiet = np.full(len(MARGINS), np.nan), [(0.0, 0.0)]
 
     def watch(made: int) -> int:
         now = score(state['wrong_slope'])
         if made <= first:
-            quiet.append(now)
+            quiet.append((now, ratio(state['slope_ratio'])))
             return min(COARSE_STEPS, first - made) or FINE_STEPS
         if state['divergence']['diverged']:
             now = math.inf
@@ -141,7 +149,8 @@ def measured(name: str, number: int) -> Floats:
                                                                   else first + int(steps[-1]))
     off = np.hypot(*run.truth['error'][judged].T) / acu.parameters.tracker.receiver.beamwidth
     known = _known_steps(run, SLOPES[slope], first) if first < loop.steps else math.nan
-    return np.array([*steps, known, np.nanmax(off), max(quiet)])
+    hours = (run['acu/mode'] == Mode.AUTOTRACK).sum() * loop.period_ns / 3.6e12
+    return np.array([*steps, hours, known, np.nanmax(off), *np.max(quiet, axis=0)])
 
 
 def rows(values: Mapping[str, Pairs]) -> list[Row]:
@@ -158,7 +167,7 @@ def rows(values: Mapping[str, Pairs]) -> list[Row]:
 
 
 def _rows(case: str, of_runs: Pairs) -> list[Row]:
-    steps, known, error = of_runs[:, len(MARGINS) - 1], of_runs[:, -3], of_runs[:, -2]
+    steps, known, error = of_runs[:, len(MARGINS) - 1], of_runs[:, -4], of_runs[:, -3]
     told, slope = np.isfinite(steps), case.partition('/')[2]
     gross = slope in GROSS_SLOPES
     table = [row(case, 'alarm_percent', 100.0 * told, '%', target=None if gross else '<= 0'),
@@ -169,8 +178,10 @@ def _rows(case: str, of_runs: Pairs) -> list[Row]:
         if told.any():
             table.append(row(case, 'alarm_steps', steps[told], 'steps'))
     if slope == 'right':
-        table.append(row(case, 'largest_score', float(of_runs[:, -1].max()),
-                         target=f'<= {monitors.WRONG_SLOPE_MARGIN:g}'))
+        table += [row(case, 'hours', float(of_runs[:, -5].sum()), 'h'),
+                  row(case, 'largest_score', float(of_runs[:, -2].max()),
+                      target=f'<= {monitors.WRONG_SLOPE_MARGIN:g}'),
+                  row(case, 'largest_sum', float(of_runs[:, -1].max()), target=f'<= {slope_ratio.MAX_S:g}')]
     return table
 
 
@@ -187,6 +198,6 @@ def figure(values: Mapping[str, Pairs]) -> Figure:
         steps = np.concatenate([of_runs[:, :len(MARGINS)] for name, of_runs in values.items()
                                 if name.endswith(f'/{slope}')])
         axes[0, 0].plot(MARGINS, 100.0 * (steps <= MAX_ALARM_STEPS).mean(axis=0), 'o-', label=f'in time: {slope}')
-    quiet = np.concatenate([of_runs[:, -1] for name, of_runs in values.items() if name.endswith('/right')])
+    quiet = np.concatenate([of_runs[:, -2] for name, of_runs in values.items() if name.endswith('/right')])
     axes[0, 0].plot(MARGINS, [100.0 * (quiet > margin).mean() for margin in MARGINS], 'k--', label='false alarm')
     return legend(drawn)
