@@ -169,7 +169,7 @@ def silent(folder):
 
 REFUSED = {
     'unknown kind': ((BAG, '--filter', 'kalman'), '--filter kalman: must be one of alpha_beta, '),
-    'neither': ((BAG,), 'one of --filter KIND and --feedforward must be given'),
+    'neither': ((BAG,), 'one of --filter KIND, --feedforward and --loops must be given'),
     'feed-forward of a bag': ((BAG, '--feedforward'), '--feedforward: identifies the drive of a scenario'),
     'seed of a bag': ((BAG, '--filter', 'cv', '--seed', '3'), '--seed 3: is for a scenario'),
     'seed 0 of a bag': ((BAG, '--filter', 'cv', '--seed', '0'), '--seed 0: is for a scenario'),

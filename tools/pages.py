@@ -172,14 +172,15 @@ def links(text: str) -> Iterator[str]:
 
 
 def resolved(path: str, target: str) -> tuple[str, str]:
-    """Return (path in the checkout, anchor) of the target of a link. path: of the page with the link."""
+    """Return (path in the checkout, anchor) of the target of a link. path: that of the page with the link."""
     file, _, anchor = target.partition('#')
     return os.path.normpath(os.path.join(os.path.dirname(path), file)) if file else path, anchor
 
 
 def for_book(text: str, path: str, files: set[str]) -> str:
-    """Return the text of a page with the links that it needs in the book. path: of the page in the checkout; files:
-    paths in the checkout of the files in the book. A link to a file that is not in the book becomes plain text."""
+    """Return the text of a page with the links that it needs in the book. path: that of the page in the checkout;
+    files: paths in the checkout of the files in the book. A link to a file that is not in the book becomes plain
+    text."""
     place = book_path(path) or ''
 
     def link(match: re.Match[str]) -> str:

@@ -202,8 +202,8 @@ def mark_started(state: ModeState) -> None:
 
 @compiled
 def watch_arrival(state: ModeState, distance: float) -> None:
-    """Note whether the axes have reached the target of the mode. distance: from the target, 1 at the largest distance
-    that counts as reached. An axis that has arrived leaves its target at twice this distance."""
+    """Note whether the axes have reached the target of the mode. distance: distance from the target, 1 where it still
+    counts as reached. An axis that has arrived leaves its target at twice this distance."""
     state.arrived = distance <= (2.0 if state.arrived else 1.0)
 
 

@@ -65,7 +65,7 @@ def _notch(axis: 'AxisParameters', s: Complexes) -> Complexes:
 
 
 def axis_response(axis: 'AxisParameters', delay: Seconds, s: Complexes) -> Complexes:
-    """Return the angle of the base per reference; delay: from an encoder angle to the middle of its command."""
+    """Return the angle of the base per reference; delay: time from an encoder angle to the middle of its command."""
     reaction = axis.structure.inertia_share * twist(axis, s) * s * s
     if axis.controller == 'adrc':
         w_c, w_o = axis.adrc.bandwidth, axis.adrc.observer_bandwidth

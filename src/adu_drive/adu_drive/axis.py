@@ -60,7 +60,7 @@ class MotorConstants(axis_control.MotorConstants, motors.Constants):
 
 
 class Constants(axis_control.Constants):
-    """An axis with its plant. The names follow the rules of axis_control.Constants, and these:
+    """Constants of an axis with its plant. The names follow the rules of axis_control.Constants, and these:
 
     h_X, h_R_L       h / X, h R / L; h_sigma_0 = h sigma_0; sigma_1_h = sigma_1 / h; h: sub-step of the plant
     q_B              factor of an implicit step with viscous friction: 1 / (1 + h B / J)
@@ -166,8 +166,8 @@ def _dish(p: AxisParameters) -> tuple[KilogramMeters2, float, float]:
 
 def constants(p: AxisParameters, h: Seconds, varying: bool = False,
               period: Seconds = SPEED_LOOP_PERIOD_S) -> Records:
-    """Return the Constants (1,) of an axis for a plant sub-step h. period: of the speed loop. varying: True if the
-    inertia of the load varies; `change_inertia` then sets it before each control period."""
+    """Return the Constants (1,) of an axis for a plant sub-step h. period: that of the speed loop. varying: True if
+    the inertia of the load varies; `change_inertia` then sets it before each control period."""
     g, error = p.gear_train, p.encoder.error
     J_dish, k_dish, c_dish = _dish(p)
     J_base = p.load.inertia - J_dish

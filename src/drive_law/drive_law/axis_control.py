@@ -37,7 +37,7 @@ class MotorConstants(Record):
 
 
 class Constants(Record):
-    """An axis. The names follow these rules:
+    """Constants of an axis. The names follow these rules:
 
     per_X            1 / X; per_2N = 1 / (2 N)
     K_iT             integral gain times the period of its loop
@@ -74,7 +74,7 @@ class Constants(Record):
 
 
 class MotorState(Record):
-    """A motor."""
+    """State of a motor."""
     i_d: Amperes
     i_q: Amperes
     theta: Radians
@@ -88,7 +88,7 @@ class MotorState(Record):
 
 
 class State(Record):
-    """An axis."""
+    """State of an axis."""
     motor_1: MotorState
     motor_2: MotorState
     theta: Radians              # at which the load meets the switches beyond the ends of travel
@@ -128,7 +128,7 @@ class Outputs(Record):
 
 
 def motor_constants(m: MotorParameters, heat: ThermalParameters, motor_bits: int, period: Seconds) -> dict[str, float]:
-    """Return the values of MotorConstants. period: of the speed loop."""
+    """Return the values of MotorConstants. period: that of the speed loop."""
     per_rad = counts_per_rad(motor_bits)
     return {'per_rated': 1.0 / heat.rated_torque, 'heat_gain': 1.0 - math.exp(-period / heat.time_constant),
             'K_t_hat': m.torque_constant, 'per_K_t_hat': 1.0 / m.torque_constant,
@@ -137,7 +137,7 @@ def motor_constants(m: MotorParameters, heat: ThermalParameters, motor_bits: int
 
 
 def constants(p: AxisParameters, period: Seconds) -> dict[str, float | Records]:
-    """Return the values of Constants without those of the motors. period: of the speed loop."""
+    """Return the values of Constants without those of the motors. period: that of the speed loop."""
     per_rad, N = counts_per_rad(p.encoder.load_bits), p.gear_train.ratio
     J_shaft = 0.5 * (p.motor_1.inertia + p.motor_2.inertia + p.speed_loop.load_inertia / N ** 2)
     T_b, out, per_fade = loops.bias_constants(p.bias)

@@ -222,7 +222,8 @@ def run(device: Device, axes: Axes, descriptor: int, delay: Seconds) -> None:
 
 
 def serve(protocol: str, rate: float, delay: Seconds, habits: Habits) -> None:
-    """Open a pseudo terminal, print its path, and answer as a rotator until Ctrl-C. rate: of both axes [deg/s]."""
+    """Open a pseudo terminal, print its path, and answer as a rotator until Ctrl-C. rate: largest rate of both axes
+    [deg/s]."""
     end, device = pty.openpty()
     tty.setraw(device)
     print(os.ttyname(device), flush=True)

@@ -311,8 +311,8 @@ def show_trials(title: str, rows: Sequence[Row], metrics: Sequence[str] | None =
 
 
 def _show_compared(rows: Sequence[Row], result: str) -> list[str]:
-    """Print the rows of comparisons as a table. Return the columns that are left out. result: of all rows, '' for
-    several; what is the same in all rows is in the title."""
+    """Print the rows of comparisons as a table. Return the columns that are left out. result: name of the result in
+    all rows, '' for several; what is the same in all rows is in the title."""
     from pedestal_results.intervals import interval_text, number
     from pedestal_workbench.trials.statistics import coverage
     cases = {row['case'] for row in rows}
@@ -348,7 +348,7 @@ def show_night(night: Night) -> None:
 
 
 def show_tried(key: str, unit: str, tried: Iterable[Tried]) -> None:
-    """Print the values that a search has tried as a table; key, unit: of the parameter of the search."""
+    """Print the values that a search has tried as a table; key, unit: name and unit of the parameter of the search."""
     from pedestal_results.intervals import interval_text, number
     from pedestal_workbench.trials.solve import reason
     lines = []

@@ -73,8 +73,8 @@ class Table(Mapping[str, np.ndarray]):
 
 
 class Run:
-    """A run: run[topic] is the Table of a topic. name: of the scenario or of the recording; beam: '' for an antenna
-    with a single beam, and for the first beam of a recording."""
+    """A run: run[topic] is the Table of a topic. name: name of the scenario or of the recording; beam: '' for an
+    antenna with a single beam, and for the first beam of a recording."""
 
     def __init__(self, source: memory_recording.MemoryRecording | bags.Bag, name: str, beam: str = '') -> None:
         self._source, self.name, self.beam = source, name, beam

@@ -58,7 +58,7 @@ class Chosen(typing.NamedTuple):
 
 def chosen(draft: 'Draft', changes: Sequence[str], choice: Choice, duration: Seconds | None,
            now: datetime.datetime) -> Chosen:
-    """Return a Draft with the changes of the user and of a Choice. duration: as given by the user; now: UTC. Raises
+    """Return a Draft with the changes of the user and of a Choice. duration: that given by the user; now: UTC. Raises
     ValueError."""
     selected = with_satellite(draft, changes, choice, now)
     started = _started(changes)
@@ -212,7 +212,7 @@ class PassSelection:
 
 
 def _start(p: passes.Pass, which: str, duration: Seconds | None, start: str | None) -> datetime.datetime:
-    """Return the UTC of the beginning of a run of a pass; arguments: of PassSelection.choose.
+    """Return the UTC of the beginning of a run of a pass; arguments: those of PassSelection.choose.
 
     A run begins at `start`, or at a `which` that is a UTC inside the pass. A run that is shorter than the pass is laid
     about the culmination. Otherwise the run begins with the second in which the satellite rises.

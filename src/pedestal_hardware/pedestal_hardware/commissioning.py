@@ -43,7 +43,7 @@ class Setting(typing.NamedTuple):
 
 def settings(parameters: ServoDriveParameters, drive: int, velocity: RadiansPerSecond,
              rated: NewtonMeters) -> list[Setting]:
-    """Return the settings of a drive. velocity: of one step of its velocity; rated: its rated torque."""
+    """Return the settings of a drive. velocity: size of one step of its velocity; rated: its rated torque."""
     axis = getattr(parameters, topics.AXES[drive // 2])
     motor = (axis.motor_1, axis.motor_2)[drive % 2]
     deceleration = axis.limits.deceleration * axis.gear_train.ratio / velocity
@@ -118,8 +118,8 @@ def _rated_torque(bus: Bus, drive: int, parameters: ServoDriveParameters) -> New
     for unit in TORQUE_UNITS_NM:
         if expected / MAX_RATED_TORQUE_FACTOR <= raw * unit <= expected * MAX_RATED_TORQUE_FACTOR:
             return raw * unit
-    raise BusError(f'object 6076: rated torque {raw}: must be near thermal.rated_torque = {expected:g} Nm, in mNm or '
-                   'uNm')
+    raise BusError(f'object 6076: rated torque {raw}: must be thermal.rated_torque = {expected:g} Nm in mNm or uNm, '
+                   f'within a factor of {MAX_RATED_TORQUE_FACTOR:g}')
 
 
 def _set(bus: Bus, drive: int, setting: Setting) -> None:

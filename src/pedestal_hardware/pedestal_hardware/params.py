@@ -63,7 +63,7 @@ class AxisDriveParameters(Parameters):
 
 @dataclasses.dataclass(frozen=True)
 class DrivesParameters(Parameters):
-    """The four drives."""
+    """Parameters of the four drives."""
     azimuth: AxisDriveParameters = group(AxisDriveParameters)
     elevation: AxisDriveParameters = group(AxisDriveParameters, node_1=3, node_2=4)
     gain_step: float = parameter(1e-3, 0.0, 10.0, 'Nms/rad', 'control velocity: gain of one step of object 60F9:1 of '

@@ -419,7 +419,8 @@ class Bag:
         return f'{name}: {count} left out, at {shown}{more}: {text}'
 
     def last_values(self, node: str, first: bool = False) -> dict[str, str]:
-        """Return {key: value} of the last readable diagnostics of a node, {} without any. first: of the first ones."""
+        """Return {key: value} of the last readable diagnostics of a node, {} without any. first: True for the first
+        diagnostics in place of the last."""
         rows = self.rows('diagnostics') if 'diagnostics' in self.topics else self.index[:0]
         for _, _, _, data in self.take((rows if first else rows[::-1])[:MAX_SEARCHED_DIAGNOSTICS]):
             with contextlib.suppress(ValueError):

@@ -89,7 +89,7 @@ def frame(data: Data, at: int) -> tuple[int, int]:
         raise ValueError('the file ends')
     opcode, length = _RECORD.unpack_from(data, at)
     if not Opcode.HEADER <= opcode <= Opcode.DATA_END:
-        raise ValueError('no record')
+        raise ValueError('its first byte is no opcode of MCAP')
     if at + 9 + length > len(data):
         raise ValueError('the file ends inside a record')
     return opcode, at + 9 + length
@@ -204,7 +204,7 @@ class McapFile:
             raise EOFError(f'the file ends at byte {self.size} without a summary (recorder killed, or disk full)')
         opcode, length = _RECORD.unpack(self.read(at, at + 9))
         if not opcode:
-            raise EOFError(f'broken record at byte {at}: no record')
+            raise EOFError(f'broken record at byte {at}: its first byte is no opcode of MCAP')
         stop = at + 9 + length
         if stop > self.size:
             raise EOFError(f'the file ends at byte {self.size} inside a record that ends at byte {stop}')

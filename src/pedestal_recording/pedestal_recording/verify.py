@@ -208,7 +208,7 @@ def steps_before(bag: Bag) -> int:
 
 
 def _problems(bag: Bag, rows: Index, name: str, stamp: Stamps, grid: _Grid, cut: bool) -> list[str]:
-    """Return the problems of a topic; stamp: since the start.
+    """Return the problems of a topic; stamp: time since the start.
 
     cut: True if the recording begins during its run. The number of messages before its begin is then unknown.
     """

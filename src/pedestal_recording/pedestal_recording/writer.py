@@ -354,7 +354,7 @@ class Writer(BagFile):
     """A bag of topics of the graph that is being written. The messages of each topic are numbered from 1.
 
     The directory must not exist, or must hold an unfinished bag to continue (_earlier_files). The methods take the
-    index of a topic in `rows`. metadata: of the run, for the record `pedestal`; more: further records by name.
+    index of a topic in `rows`. metadata: those of the run, for the record `pedestal`; more: further records by name.
     """
 
     def __init__(self, directory: str | pathlib.Path, rows: Sequence[nodes.Link | topics.Topic],

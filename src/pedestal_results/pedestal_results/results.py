@@ -221,7 +221,7 @@ def marks(parts: Mapping[str, object], table: Sequence[Result] = RESULTS) -> dic
 def brief(columns: Iterable[Values], count: int = BRIEF_COUNT) -> list[str]:
     """Return the names of the results that are printed by default, in the order of the table.
 
-    columns: of `measured`, for each beam and for the run. Results with the flag `brief` have precedence; other
+    columns: those of `measured`, for each beam and for the run. Results with the flag `brief` have precedence; other
     measured results fill the remaining of `count` places.
     """
     found = [result for result in RESULTS

@@ -75,7 +75,7 @@ def _fill(relative: Vectors3, attitude: Quaternions, shift: Pairs, floor: travel
 
 
 def obstacles(bag: Recording, relative: Vectors3, attitude: Quaternions, shift: Pairs) -> Ints:
-    """Return at each step the code of the reason why the target cannot be tracked, NONE if it can; arguments: of
+    """Return at each step the code of the reason why the target cannot be tracked, NONE if it can; arguments: those of
     `_fill`."""
     acu = recordings.parameters(bag, 'acu')
     found = np.empty(len(relative), np.int64)

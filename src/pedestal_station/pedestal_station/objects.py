@@ -132,8 +132,8 @@ class _Set(NamedTuple):
 
 def read(paths: Sequence[FilePath], station: StationParameters, begin: datetime.datetime, duration: Seconds,
          oldest: Days = OLDEST_DAYS) -> tuple[list[Object], list[Refusal]]:
-    """Return the objects of files and of the files in folders, and what cannot be planned. begin: of the night (UTC,
-    without a zone); oldest: acu.prediction.oldest. Raises TargetError for a path that does not exist."""
+    """Return the objects of files and of the files in folders, and what cannot be planned. begin: beginning of the
+    night (UTC, without a zone); oldest: acu.prediction.oldest. Raises TargetError for a path that does not exist."""
     query = Query(station, begin, duration, _ut1_offset(begin + datetime.timedelta(seconds=0.5 * duration)))
     found: list[_Set | Object | Refusal] = []
     for path in _files(paths):

@@ -200,7 +200,7 @@ def _usable(each: Pass) -> Window:
 
 
 def _whole(plan: Choice, passes: Sequence[Pass], places: Sequence[int]) -> Choice:
-    """Return a plan with the passes that took no part in it; places: of those that did."""
+    """Return a plan with the passes that took no part in it; places: places of the passes that did."""
     shares = [Share(False, np.nan, np.nan, (), NO_WINDOW)] * len(passes)
     for i, share in zip(places, plan.shares, strict=True):
         window = passes[i].window

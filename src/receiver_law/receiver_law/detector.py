@@ -40,7 +40,7 @@ class Receiver(Protocol):
 
     @property
     def smoothing(self) -> str:
-        """One of SMOOTHING_KINDS."""
+        """Kind of smoothing, one of SMOOTHING_KINDS."""
 
     @property
     def smoothing_samples(self) -> int:
@@ -52,11 +52,11 @@ class Receiver(Protocol):
 
     @property
     def agc_time_constant(self) -> Seconds:
-        """Of the sum power that normalises the errors."""
+        """Time constant of the sum power that normalises the errors."""
 
     @property
     def cn0_time_constant(self) -> Seconds:
-        """Of the C/N0."""
+        """Time constant of the C/N0."""
 
     @property
     def acquire_level_dbhz(self) -> DecibelHertz:

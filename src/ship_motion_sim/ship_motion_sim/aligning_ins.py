@@ -108,7 +108,7 @@ def integrate(constants: Constants, state: State, stamp_ns: Nanoseconds, rate: V
 
 @compiled
 def measure(constants: Constants, state: State, stamp_ns: Nanoseconds, rate: Vector3, force: Vector3) -> None:
-    """Put attitude and deck rate of the navigator at stamp_ns into the ring; rate, force: of the IMU message."""
+    """Put attitude and deck rate of the navigator at stamp_ns into the ring; rate, force: those of the IMU message."""
     n = ring.put(state, stamp_ns)
     q, w = state.quaternion, state.angular_velocity
     q[n, 0], q[n, 1], q[n, 2], q[n, 3] = navigator.attitude(state.navigator)

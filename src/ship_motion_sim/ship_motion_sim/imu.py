@@ -64,7 +64,7 @@ class Inputs(Record):
 
 
 class Outputs(Record):
-    """A sample."""
+    """Outputs of the IMU: a sample."""
     status: int                     # index into IMU_STATUS_TEXTS; unless IMU_OK, the rest is NaN
     angular_velocity: Vector3       # against inertial space, FLU [rad/s]
     linear_acceleration: Vector3    # specific force, FLU [m/s2]: at rest +g along z
@@ -158,7 +158,7 @@ def add_sensor_errors(errors: SensorErrors, dt: Seconds, values: Vector3, normal
 @compiled
 def step(state: State, constants: Constants, ship: motion.Constants, inputs: Inputs, truth: motion.Truth, out: Outputs,
          normals: Floats) -> None:
-    """Take one sample. truth: at the time of the sample; normals: (IMU_NORMALS_PER_STEP,)."""
+    """Take one sample. truth: truth of the ship at the time of the sample; normals: (IMU_NORMALS_PER_STEP,)."""
     rate, force = out.angular_velocity, out.linear_acceleration
     if truth.status != motion.MOTION_OK:
         out.status = IMU_BAD_TRUTH

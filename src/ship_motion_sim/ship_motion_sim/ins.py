@@ -84,7 +84,7 @@ class LateIns(Protocol):
 
 
 class Inputs(Record):
-    """An IMU message."""
+    """Inputs of the INS: a message of the IMU."""
     stamp_ns: Nanoseconds
     angular_velocity: Vector3       # [rad/s]
     linear_acceleration: Vector3    # [m/s2]

@@ -85,7 +85,7 @@ def _mean_over(u: Floats) -> Floats:
 
 def _slope_over(u: Floats) -> Floats:
     """Return 3 (sin u - u cos u) / u^3: the slope of the best straight line through a sine wave over a length. The
-    slope is relative to that in the middle; u: as of _mean_over."""
+    slope is relative to that in the middle; u: that of _mean_over."""
     small = np.abs(u) < 1e-2
     v = np.where(small, 1.0, u)
     return np.where(small, 1.0 - u ** 2 / 10.0, 3.0 * (sin(v) - v * cos(v)) / (v * v * v))

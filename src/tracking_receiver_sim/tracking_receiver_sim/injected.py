@@ -62,7 +62,7 @@ def _clear_faults(constants: receiver.Constants, injected: Injected) -> None:
 
 @compiled
 def _apply_fault(constants: receiver.Constants, injected: Injected, fault: int, values: Floats) -> None:
-    """Apply a fault; values: in the order of injection/table.py."""
+    """Apply a fault; values: arguments in the order of injection/table.py."""
     message_faults.apply(injected.message_fault, MESSAGE_FAULT_CODES, fault, values)
     if fault == Fault.DELAY:
         constants.latency_ns += round(values[0] * NS_PER_SECOND)

@@ -256,7 +256,10 @@ def inputs_known(inputs: Inputs) -> bool:
 
 @compiled
 def place_antenna(state: State, constants: Constants, inputs: Inputs) -> None:
-    """Set the antenna's position p + M r [m] and velocity v + w x r [m/s] in the state; r: the lever arm."""
+    """Set the antenna's position p + M r [m] and velocity v + w x r [m/s] in the state.
+
+    The ship has the position p, the velocity v, the attitude M (deck to earth) and the rate w; r is the lever arm.
+    """
     x, y, z = constants.lever_arm[0], constants.lever_arm[1], constants.lever_arm[2]
     wx, wy, wz = inputs.twist_angular[0], inputs.twist_angular[1], inputs.twist_angular[2]
     e, n, u = to_earth(inputs.mat_ed, x, y, z)
@@ -354,9 +357,9 @@ def measure(state: State, constants: Constants, seen: Incidence, normals: Floats
 @compiled
 def error_rate(inputs: Inputs, position: Vector3, velocity: Vector3,
                seen: target.TargetState) -> tuple[RadiansPerSecond, RadiansPerSecond]:
-    """Return (d dX/dt, d dE/dt) of a target off the beam, exactly. velocity: of the antenna, FLU [m/s]. In the deck
-    frame the target is at r = M^T (p - position). Its derivative is dr/dt = M^T v - velocity - w x r, with the
-    rotation M deck -> earth and the rate w of the deck."""
+    """Return (d dX/dt, d dE/dt) of a target off the beam, exactly. velocity: velocity of the antenna, FLU [m/s]. In
+    the deck frame the target is at r = M^T (p - position). Its derivative is dr/dt = M^T v - velocity - w x r, with
+    the rotation M deck -> earth and the rate w of the deck."""
     (e, n, u), (v_e, v_n, v_u) = seen.position, seen.velocity
     x, y, z = r = to_deck(inputs.mat_ed, e - position[0], n - position[1], u - position[2])
     vx, vy, vz = to_deck(inputs.mat_ed, v_e, v_n, v_u)

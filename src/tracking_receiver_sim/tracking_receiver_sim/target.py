@@ -227,7 +227,7 @@ def _peak(elevations: Callable[[Times], Floats], begin: Seconds, end: Seconds) -
 
 def _start(params: TargetParameters, satrec: orbit.Satellite, duration: Seconds) -> tuple[float, float]:
     """Return (Julian day, fraction) of stamp 0: start_time, or else a whole second of UTC that centres the run on a
-    culmination. satrec: of orbit.satellite."""
+    culmination. satrec: satellite of orbit.satellite."""
     if not params.leo_pass.start_time:
         # The added 0.5 s turns the cut to whole seconds below into rounding.
         start = culmination(params, satrec) - 0.5 * duration + 0.5

@@ -75,7 +75,7 @@ def to_ins(state: LeverArm, u: Vector, du: Vector) -> tuple[Vector, Vector]:
 
 @compiled
 def earth_angles_to_antenna(state: LeverArm, mat_ed: Rotation, motion: Motion) -> Motion:
-    """Return the Motion in earth angles as seen from the antenna; motion: as seen from the INS. Only the angles
+    """Return the Motion in earth angles as seen from the antenna; motion: that seen from the INS. Only the angles
     differ; the rates and the accelerations stay as they are."""
     A, E = motion.azimuth.angle, motion.elevation.angle
     e, n, u = earth_direction(A, E)

@@ -285,5 +285,6 @@ def slewing(planner: Planner, t: Seconds) -> bool:
 @compiled
 def motion_at(planner: Planner, constants: Constants, t: Seconds, target: Motion,
               level: AxisMotion) -> tuple[Motion, Radians]:
-    """Return (motion of the axes at t, pointing offset) of the planned slew; target, level: as in slew.motion_at."""
+    """Return (motion of the axes at t, pointing offset) of the planned slew; target, level: those of
+    slew.motion_at."""
     return slews.motion_at(planner.slew, t, target, level, constants.limits.highest)

@@ -63,7 +63,8 @@ def true_deck_share(slew: Slew, t: Seconds) -> AxisMotion:
 
 @compiled
 def best_elevation(azimuth: AxisMotion, sight: LineOfSight) -> AxisMotion:
-    """Return the motion of the elevation at which a beam at an azimuth a is closest to the target; sight: to it, FLU.
+    """Return the motion of the elevation at which a beam at an azimuth a is closest to the target; sight: direction to
+    it, FLU.
 
         E = atan2(z, b),  b = x cos a - y sin a,  c = db/da
 
@@ -97,9 +98,12 @@ def pointing_offset(azimuth: Radians, u: Vector, highest: Radians) -> Radians:
 
 @compiled
 def motion_at(slew: Slew, t: Seconds, target: Motion, level: AxisMotion, highest: Radians) -> tuple[Motion, Radians]:
-    """Return (motion of the axes at t on a slew, pointing offset from the target). target: on the true deck; level:
-    azimuth of the target on the levelled deck of the plan; highest: largest elevation. At its ends the slew meets the
-    target on the true deck. In its middle it is the planned slew on the levelled deck."""
+    """Return (motion of the axes at t on a slew, pointing offset from the target).
+
+    target: motion of the target on the true deck; level: azimuth of the target on the levelled deck of the plan;
+    highest: largest elevation. At its ends the slew meets the target on the true deck. In its middle it is the planned
+    slew on the levelled deck.
+    """
     # D: azimuth of the target on the true deck minus that on the levelled deck.
     azimuth, share = azimuth_at(slew, t), true_deck_share(slew, t)
     D = wrap(target.azimuth.angle - level.angle)

@@ -116,7 +116,7 @@ def reset_latched(alarms: AlarmList, t: Seconds) -> bool:
 def mode_after(state: Resumption, mode: int, last: Seconds, stamp: Seconds, resume_time: Seconds) -> int:
     """Return the mode after a silence: `mode`, or STANDBY if the silence was longer than resume_time.
 
-    Keep the mode if the drive may have been restarted. last, stamp: of the steps before and after the silence.
+    Keep the mode if the drive may have been restarted. last, stamp: stamps of the steps before and after the silence.
     """
     if stamp > last + resume_time:
         return Mode.STANDBY

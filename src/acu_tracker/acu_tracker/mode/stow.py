@@ -45,7 +45,7 @@ def initialise(stow: Records) -> None:
 
 @compiled
 def failed(code: int, i: int) -> bool:
-    """Return True if the pin of axis i has failed. code: of adu/stow_pins; below 0: not yet reported."""
+    """Return True if the pin of axis i has failed. code: value of adu/stow_pins; below 0: not yet reported."""
     state = code // _PIN_STATE_COUNT if i == 0 else code % _PIN_STATE_COUNT
     return code >= 0 and state == _PIN_FAILED
 

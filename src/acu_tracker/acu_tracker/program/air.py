@@ -91,8 +91,8 @@ class Air:
         self._weather = [self._of_parameters]
 
     def take(self, topic: str, stamp: Seconds | None, message: Message, now: Seconds | None) -> None:
-        """Take the message of a weather topic. A reading that cannot be used is counted, named and dropped. stamp: of
-        the message, None without one; now: stamp of the last step, None before the first."""
+        """Take the message of a weather topic. A reading that cannot be used is counted, named and dropped. stamp:
+        that of the message, None without one; now: stamp of the last step, None before the first."""
         quantity = WEATHER_QUANTITIES[topic]
         value, (low, high) = float(getattr(message, quantity.field)), quantity.limits
         refused = ''

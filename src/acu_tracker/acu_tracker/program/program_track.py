@@ -40,7 +40,8 @@ def checked(times: ArrayLike, angles: ArrayLike) -> ProgramTrack:
     """Return the ProgramTrack of times and angles (n, 2) [rad]; raise ProgramTrackError if it cannot be followed."""
     times, angles = np.array(times, float), np.array(angles, float)
     if times.ndim != 1 or angles.shape != (len(times), 2):
-        raise ProgramTrackError(f'program track: times {times.shape}, angles {angles.shape}; must be (n,), (n, 2)')
+        raise ProgramTrackError(f'program track: times have the shape {times.shape}, angles {angles.shape}; '
+                                'must be (n,), (n, 2)')
     if not 2 <= len(times) <= MAX_PROGRAM_ROWS:
         raise ProgramTrackError(f'program track has {len(times)} rows; must be 2 to {MAX_PROGRAM_ROWS}')
     bad = np.flatnonzero(~(np.isfinite(times) & np.isfinite(angles).all(axis=1)))

@@ -150,7 +150,7 @@ def observer_gains(w_o: RadiansPerSecond, w_s: RadiansPerSecond, h: Seconds) -> 
 @compiled
 def observed(z: Vector3, y: Radians, u: RadiansPerSecond, v3: RadiansPerSecond2, w_o: RadiansPerSecond,
              w_s: RadiansPerSecond, h: Seconds) -> tuple[Radians, RadiansPerSecond, RadiansPerSecond2]:
-    """Return the new state (z1, z2, z3) of the observer, h after z; u, v3: in force during h."""
+    """Return the new state (z1, z2, z3) of the observer, h after z; u, v3: values in force during h."""
     z1, z2, z3 = z[0], z[1], z[2]
     # settled: rate that the drive would reach at constant u, v3 and z3.
     g = -math.expm1(-w_s * h) / w_s
@@ -165,7 +165,7 @@ def observed(z: Vector3, y: Radians, u: RadiansPerSecond, v3: RadiansPerSecond2,
 @compiled
 def adrc_rate(z: Vector3, v1: Radians, v2: RadiansPerSecond, v2_m: RadiansPerSecond, w_c: RadiansPerSecond,
               w_s: RadiansPerSecond) -> RadiansPerSecond:
-    """Return the rate command; z, v1, v2: at t_k; v2_m: rate of the reference at t_m."""
+    """Return the rate command; z, v1, v2: values at t_k; v2_m: rate of the reference at t_m."""
     # u0 - v3 = feedback, so v3 cancels: u = (feedback + w_s z2 - z3) / w_s = z2 + (feedback - z3) / w_s. The command
     # acts at t_m. Therefore z2 is predicted to t_m: the rate of the reference there, plus the error z2 - v2 of t_k.
     feedback = w_c * w_c * (v1 - z[0]) + 2.0 * w_c * (v2 - z[1])

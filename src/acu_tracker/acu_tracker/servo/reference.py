@@ -57,7 +57,7 @@ def _plan(reference: Reference, stamp: Seconds, command: RadiansPerSecond) -> No
 @compiled
 def initialise(reference: Reference, stamp: Seconds, y: Radians, dy: RadiansPerSecond,
                command: RadiansPerSecond) -> None:
-    """Restart the reference at an angle y and a rate dy at a stamp; clear the history. command: in force."""
+    """Restart the reference at an angle y and a rate dy at a stamp; clear the history. command: that in force."""
     reference.planned.count = 0
     put(reference, AxisMotion(y, dy, 0.0))
     _plan(reference, stamp, command)

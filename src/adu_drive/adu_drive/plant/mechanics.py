@@ -123,7 +123,7 @@ def swing(dish: Radians, omega_dish: RadiansPerSecond, theta: Radians, omega: Ra
           k: float, c: float, h: Seconds, h_J: float) -> tuple[Radians, RadiansPerSecond, NewtonMeters]:
     """Return angle and rate of the dish one sub-step h later, and its torque on the base.
 
-    theta, omega: angle and rate of the base; torque: on the dish; k, c: see `spring_and_damper`;
+    theta, omega: angle and rate of the base; torque: that on the dish; k, c: see `spring_and_damper`;
     h_J = h / inertia of the dish.
     """
     twist = k * (dish - theta) + c * (omega_dish - omega)

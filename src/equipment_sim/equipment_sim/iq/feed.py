@@ -45,7 +45,7 @@ def turn(voltages: Complexes, simulated: Feed) -> None:
 @compiled
 def fill(voltages: Complexes, simulated: Feed, state: receiver.State, constants: receiver.Constants,
          seen: receiver.Incidence) -> None:
-    """Set voltages (rows, channels) of a step without noise. state, constants: of the simulated receiver."""
+    """Set voltages (rows, channels) of a step without noise. state, constants: records of the simulated receiver."""
     for k in range(voltages.shape[0]):
         part = (k + 0.5) / voltages.shape[0]
         if simulated.kind == THREE_CHANNELS_KIND or simulated.kind == ONE_CHANNEL_KIND:

@@ -265,7 +265,7 @@ def _tune(options: argparse.Namespace) -> int:
         arguments.refuse_given(options, ('filter', 'feedforward', 'runs', 'seed', 'duration'),
                                'cannot be combined with --loops, which measures the plant')
     elif bool(options.filter) == options.feedforward:
-        raise ValueError('one of --filter KIND and --feedforward must be given')
+        raise ValueError('one of --filter KIND, --feedforward and --loops must be given')
     else:
         arguments.refuse_given(options, LOOP_REQUIREMENTS, 'needs --loops', stated=True)
     with console.progress_of_share() as progress:

@@ -106,7 +106,7 @@ def _mode(options: argparse.Namespace) -> int:
         if degrees is not None:
             given[name] = math.radians(degrees)
     if options.hold is not None and not (options.mode == 'rate' and 0.0 < options.hold <= MAX_HOLD_S):
-        raise ValueError(f'--hold {options.hold:g}: must be in 0 to {MAX_HOLD_S:g} s, with mode rate only')
+        raise ValueError(f'--hold {options.hold:g}: must be 0 to {MAX_HOLD_S:g} s, with mode rate only')
     if options.wait is not None:
         row = next((row for row in MODE_ROWS if row.name == options.mode), None)
         if row and not row.going:

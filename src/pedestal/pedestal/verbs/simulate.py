@@ -86,8 +86,9 @@ def _add_rotator(parser: argparse.ArgumentParser) -> None:
                         f'{MAX_RATE_DEG_S:g}; default: 6 deg/s')
     parser.add_argument('--delay', type=float, default=0.05, metavar='DELAY', help='time until an answer, 0 to '
                         f'{MAX_DELAY_S:g}; default: 0.05 s')
-    parser.add_argument('--habit', action='append', default=[], metavar='NAME=VALUE', help='what this device does '
-                        'otherwise, for example pulses=2, prompt=true or turned=true; a wrong NAME lists them all')
+    parser.add_argument('--habit', action='append', default=[], metavar='NAME=VALUE', help='habit in which '
+                        'this device differs from a usual one, for example pulses=2, prompt=true or turned=true; a '
+                        'wrong NAME lists all habits')
 
 
 def _rotator(options: argparse.Namespace) -> int:

@@ -51,7 +51,7 @@ def _station(options: argparse.Namespace) -> int:
     from pedestal_station.station import sequence, station_node
     for name, high in (('lead', MAX_LEAD_S), ('gap', MAX_GAP_S)):
         if not 0.0 <= getattr(options, name) <= high:
-            raise ValueError(f'--{name} {getattr(options, name):g}: must be in 0 to {high:g} s')
+            raise ValueError(f'--{name} {getattr(options, name):g}: must be 0 to {high:g} s')
     arguments.check_beam(options)
     plan = file.read(options.plan)
     bags = options.bags or options.plan.with_name(f'{options.plan.stem}-bags')

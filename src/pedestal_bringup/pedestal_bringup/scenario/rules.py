@@ -94,7 +94,7 @@ def derive_from_flight(name: str, receiver_values: dict[str, Value],
 
 @dataclasses.dataclass(frozen=True)
 class _Rules:
-    """Rules for the sections of one scenario; each changes the sections. seed: as of scenario.checked."""
+    """Rules for the sections of one scenario; each changes the sections. seed: that of scenario.checked."""
     name: str
     sections: Sections
     header: ScenarioParameters

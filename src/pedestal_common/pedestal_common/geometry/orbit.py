@@ -158,8 +158,8 @@ def _teme(satrec: Satellite, julian: float, fractions: Floats) -> tuple[Vectors3
 
 def enu(satrec: Satellite, station: StationParameters, julian: float, fraction: float, times: Times,
         ut1_offset: Seconds | Times = 0.0) -> tuple[Vectors3, Vectors3]:
-    """Return position [m] and velocity against the earth [m/s] of a satellite, ENU of a station. times: after the
-    Julian date julian + fraction, UTC. Raises TargetError where SGP4 fails."""
+    """Return position [m] and velocity against the earth [m/s] of a satellite, ENU of a station. times: seconds after
+    the Julian date julian + fraction, UTC. Raises TargetError where SGP4 fails."""
     fractions = fraction + times / SECONDS_PER_DAY
     position, velocity = _teme(satrec, julian, fractions)
     to_fixed = earth_fixed(julian, fractions, ut1_offset)

@@ -43,7 +43,7 @@ class Span(typing.NamedTuple):
 
 def spans(height: Height, times: Times, heights: Floats) -> tuple[list[Span], Times]:
     """Return (the spans between the first and the last of the times, which grow, the maxima of the height). heights:
-    at the times."""
+    values at the times."""
     peaks = maxima(height, times, heights)
     turns = np.concatenate((peaks, maxima(lambda t: -height(t), times, -heights)))
     at = np.concatenate((times, turns))
@@ -209,7 +209,7 @@ def search_start(satrec: Satellite, now: datetime.datetime) -> tuple[datetime.da
 
 def chosen_pass(satrec: Satellite, station: StationParameters, which: str, now: datetime.datetime,
                 least: Degrees = 0.0) -> Pass:
-    """Return the pass that `which` names; least: as of passes_after. Raises TargetError.
+    """Return the pass that `which` names; least: that of passes_after. Raises TargetError.
 
     next    the pass under way, or the next pass
     N       a number: the Nth pass after `search_start`

@@ -51,9 +51,9 @@ def read(text: str) -> Report:
         report = Report(**values)
         for terms in (report.terms, report.before):
             if not set(terms) <= set(TERMS) or not all(math.isfinite(value) for value in terms.values()):
-                raise ValueError(f'terms {terms}')
+                raise ValueError(f'terms {terms!s:.80}: must be finite numbers, named {TERMS[0]} to {TERMS[-1]}')
         if not math.isfinite(report.begins_s + report.ends_s + report.rms_deg):
-            raise ValueError('a time or the rms is not finite')
+            raise ValueError('begins_s, ends_s, rms_deg: must be finite')
         residual_rows(report.residuals)
     except (TypeError, ValueError, AttributeError) as error:
         raise ValueError(f'acu/pointing: {error}') from None

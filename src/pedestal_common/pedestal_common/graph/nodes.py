@@ -326,7 +326,7 @@ def members(names: Iterable[str], beams: int) -> tuple[str, ...]:
 
 
 class Link(typing.NamedTuple):
-    """Topic in a graph."""
+    """Topic of a graph with the nodes at its two ends."""
     name: str                   # in the graph
     type: str                   # as in topics.Topic, as are rate and flag
     rate: str
@@ -337,8 +337,11 @@ class Link(typing.NamedTuple):
 
 @functools.cache
 def links(beams: int = 0, servo: bool = False, iq: bool = False, own: str = '') -> dict[str, Link]:
-    """Return {name: Link} of a graph, in the order of TOPICS. beams: of an electronic array, 0 for a drive with
-    motors; servo, iq: as in `row`, simulated; own: as in `own_rows`."""
+    """Return {name: Link} of a graph, in the order of TOPICS.
+
+    beams: number of beams of an electronic array, 0 for a drive with motors; own: argument of `own_rows`.
+    Simulated drives (servo) and simulated I/Q samples (iq) add their nodes.
+    """
     rows = [own_rows(own).get(node.name) or row(node.name, beams > 0, servo, iq) for node in NODES]
     rows += [SIMULATED_DRIVES] * servo + [SIMULATED_IQ] * iq
     links = {}
@@ -363,7 +366,7 @@ def links_of(names: Collection[str], beams: int = 0, own: str = '') -> dict[str,
 
 def recorded(names: Collection[str], flags: Collection[str] = (), beams: int = 0, own: str = '') -> list[Link]:
     """Return the Links that have a publisher in a graph of these nodes, or to which any client may publish. flags:
-    those of topics.TOPIC_FLAGS that are set; own: as in `own_rows`."""
+    those of topics.TOPIC_FLAGS that are set; own: argument of `own_rows`."""
     return [link for link in links_of(names, beams, own).values()
             if link.rate == STATION_RATE
             or any(name in names for name in (link.readers if link.rate in REALTIME_RATES else link.writers))

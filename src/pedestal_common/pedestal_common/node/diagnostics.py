@@ -65,7 +65,7 @@ class Diagnostics:
         self._write(messages.serialize(array))
 
     def _with_findings(self, diagnosis: Diagnosis, now: Nanoseconds, elapsed: Nanoseconds) -> Diagnosis:
-        """Return a Diagnosis with the findings of the shell, the worst first. elapsed: since the last one."""
+        """Return a Diagnosis with the findings of the shell, the worst first. elapsed: time since the last one."""
         utc = self._node.utc
         findings: list[tuple[int, str]] = [*filter(None, (listener.finding(now) for listener in self._node.listeners))]
         if elapsed > STALL_LIMIT_NS:

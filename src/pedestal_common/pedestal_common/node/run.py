@@ -17,7 +17,8 @@ def command(executable: str, *arguments: str) -> list[str]:
 
 
 def run(executable: str, args: Sequence[str] | None = None) -> int:
-    """Run the node of an executable to its end, and return the exit code. args: of ROS 2, None for sys.argv."""
+    """Run the node of an executable to its end, and return the exit code. args: arguments of ROS 2, None for
+    sys.argv."""
     from pedestal_common.graph import nodes
     from pedestal_common.node import shell
     row = nodes.EXECUTABLES.get(executable)

@@ -75,7 +75,7 @@ class Unprepared(Protocol):
     """What has laws to compile: a unit."""
 
     def prepare(self) -> None:
-        """Compile them."""
+        """Compile the laws."""
 
 
 _stop: list[bool] = []  # not empty after SIGINT or SIGTERM

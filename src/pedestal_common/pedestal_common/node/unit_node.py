@@ -34,7 +34,8 @@ class LastText:
 
 
 class Port:
-    """Connection of a unit to its topics. prefix: of the unit's beam in a node that serves several beams, else ''."""
+    """Connection of a unit to its topics. prefix: that of the unit's beam in a node that serves several beams, else
+    ''."""
 
     def __init__(self, node: shell.Shell, unit: Unit, prefix: str = '') -> None:
         self.prefix = prefix

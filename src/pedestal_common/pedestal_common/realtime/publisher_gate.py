@@ -73,7 +73,8 @@ class PublisherGate(Generic[_M]):
         self._back: Nanoseconds | None = None           # the newest of these
 
     def take(self, data: bytes, number: int, source: Nanoseconds, now: Nanoseconds, utc: Nanoseconds) -> _M | None:
-        """Return the decoded message, None for a dropped one. source: time of sending; now, utc: of reception."""
+        """Return the decoded message, None for a dropped one. source: time of sending; now, utc: times of
+        reception."""
         self.after_gap = False
         if not self._paced:
             if self._unexpected():

@@ -104,7 +104,8 @@ def _check(events: Iterable[yaml.Event], aliases: bool) -> None:
     sizes: dict[str | None, int] = {}            # {anchor: number of values}
     for event in events:
         if getattr(event, 'tag', None):
-            raise yaml.composer.ComposerError(None, None, f'tag {event.tag}', event.start_mark)
+            problem = f'the tag {event.tag} is refused; write the value alone'
+            raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
         if isinstance(event, yaml.AliasEvent):
             if not aliases:
                 problem = f'the alias *{event.anchor} is refused; write the values themselves'

@@ -47,8 +47,8 @@ class UnitError(ValueError):
 
 
 def bare(name: str, text: str, unit: str) -> str:
-    """Return the number in a text such as `51.6 [deg]` or `51.6`, without its unit. Raises UnitError. name: of the
-    number; unit: the only one that its format has."""
+    """Return the number in a text such as `51.6 [deg]` or `51.6`, without its unit. Raises UnitError. name: name of
+    the number; unit: the only one that its format has."""
     match = _BRACKETED_PATTERN.fullmatch(text)
     if not match:
         return text.strip()

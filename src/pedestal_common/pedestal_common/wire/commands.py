@@ -93,7 +93,7 @@ class Definition(typing.Protocol):
 
     @property
     def arguments(self) -> tuple[Argument, ...]:
-        """Its arguments."""
+        """Arguments of the command."""
 
 
 def values(definitions: Iterable[Definition], command: Command) -> dict[str, Value]:

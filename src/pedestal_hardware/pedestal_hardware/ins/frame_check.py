@@ -86,7 +86,7 @@ def is_compared(check: Check, i: int) -> bool:
 
 @compiled
 def agrees(check: Check, i: int, axes: int) -> bool:
-    """Return True if attitude and rates of an axis agree; axes: as of `take`."""
+    """Return True if attitude and rates of an axis agree; axes: those of `take`."""
     if axes == ALL_AXES:
         return SLOPE_RANGE[0] <= slope(check, i) <= SLOPE_RANGE[1]
     return check.cross[i, i] >= MIN_TURN_CORRELATION * math.sqrt(check.attitude[i] * check.rates[i])

@@ -76,7 +76,7 @@ class InsInputUnit:
         self.record[...] = before
 
     def take_line(self, line: bytes, arrival: Nanoseconds) -> Sample | None:
-        """Return the sample of a line; None without one. arrival: of the line, UTC."""
+        """Return the sample of a line; None without one. arrival: UTC at which the line arrived."""
         p = self.parameters
         try:
             found = sentences.parse(line)
@@ -121,7 +121,7 @@ class InsInputUnit:
         return pitch, roll
 
     def take_imu(self, message: Message, arrival: Nanoseconds) -> Sample | None:
-        """Return the sample of a sensor_msgs/Imu; None without one. arrival: of the message, UTC."""
+        """Return the sample of a sensor_msgs/Imu; None without one. arrival: UTC at which the message arrived."""
         p, u = self.parameters, self.record['inputs'][0]
         if message.orientation_covariance[0] < 0.0:
             return self._drop('no_orientation', f'{p.imu.topic}: orientation_covariance[0] < 0 declares no '

@@ -57,7 +57,7 @@ class LevelUnit:
         self._newest: Level | None = None
 
     def take(self, line: bytes, arrival: Nanoseconds) -> Level | None:
-        """Return the level in a line; None for a line that is dropped. arrival: of the line, UTC."""
+        """Return the level in a line; None for a line that is dropped. arrival: UTC at which the line arrived."""
         p = self.parameters
         stamp = arrival - round(p.latency * 1e9)
         try:

@@ -85,7 +85,7 @@ class TimeBase:
 
 
 class Blocks:
-    """Blocks of a size, made of chunks. recorder: to which the samples are written."""
+    """Blocks of a size, made of chunks. recorder: recording to which the samples are written."""
     kept: Samples           # samples of an incomplete block
     next: int | None        # number of the sample after the last one
     lost: int               # number of samples that were missing

@@ -26,7 +26,7 @@ STOP_REPEAT_NS = 1_000_000_000  # time after which an axis that still moves in a
 
 
 class Limits(Record):
-    """Constants."""
+    """Constants of the watch on both axes."""
     reaction_ns: Nanoseconds    # longest time until a set-point or a stop has an effect
     low: Pair                   # lower end of the travel [rad]
     high: Pair                  # upper end of the travel [rad]

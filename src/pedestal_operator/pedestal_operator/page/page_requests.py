@@ -60,7 +60,7 @@ class PageRequests:
         self._waiting[self._request(str(client), verb, given)] = client, number, verb, now
 
     def _jog(self, client: Client, rates: Json, now: Seconds, age: Seconds) -> None:
-        """Send a jog. rates: of both axes [deg/s], 0 at its end; age: that of the last state on the page."""
+        """Send a jog. rates: those of both axes [deg/s], 0 at its end; age: that of the last state on the page."""
         refusal = page_security.refusal_reason(client.role, 'rate', {})
         if refusal:
             self._send(client, {'verb': 'rate', 'granted': False, 'reply': refusal})

@@ -151,7 +151,7 @@ def sky(antenna: PageAntenna, coming: Iterable[Mapping[str, float]]) -> dict[str
     """Return the content of the sky plot in earth angles [deg]: path, hidden sectors, lines, sun and passes.
 
     `floor`, `top`: lines of the lowest and highest elevation in reach; `hole`: time of the keyhole, UTC [s];
-    `station`: position of the antenna, '' while it is unknown; `residuals`: of the pointing model, azimuth and
+    `station`: position of the antenna, '' while it is unknown; `residuals`: those of the pointing model, azimuth and
     elevation on the deck, cross-elevation, elevation [deg]. coming: passes after the track.
     """
     deck, p, acu = _deck(antenna), antenna.configuration, antenna.diagnostics_of('acu')

@@ -88,7 +88,7 @@ def _speed(text: str) -> float:
 
 def answer(request: LineRequest, angles: Sequence[Degrees] | None, status: int, errors: int, version: str) -> bytes:
     """Return the answer to a line. angles: None if unknown, then AZ and EL are not answered; status, errors, version:
-    for GS, GE and VE."""
+    answers to GS, GE and VE."""
     values = {'GS': f'GS{status}', 'GE': f'GE{errors}', 'VE': f'VE{version}'}
     if angles is not None:
         values |= {'AZ': f'AZ{round(angles[0] % 360.0, 1) % 360.0:.1f}', 'EL': f'EL{angles[1]:.1f}'}

@@ -144,7 +144,7 @@ def state(limits: Limits, extended: bool) -> list[tuple[str, str]]:
 
 
 def flags(rates: Sequence[float], angles: Sequence[Degrees], limits: Limits) -> str:
-    """Return the status words of axes that move and of axes at a limit. rates [deg/s], angles: of both axes."""
+    """Return the status words of axes that move and of axes at a limit. rates [deg/s], angles: those of both axes."""
     words, moving = [], [abs(rate) > 0.01 for rate in rates]
     if any(moving):
         words.append('MOVING')

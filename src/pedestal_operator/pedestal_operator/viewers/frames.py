@@ -69,7 +69,7 @@ def of_deck(attitude: Sequence[float] = ASHORE_ATTITUDE) -> Transform:
 
 
 def of_pedestal(angles: Sequence[Radians], prefix: str = '') -> list[Transform]:
-    """Return the transforms from the deck to the beam. prefix: of one of several beams, such as beam_2/."""
+    """Return the transforms from the deck to the beam. prefix: that of one of several beams, such as beam_2/."""
     turned = dict(zip(topics.AXES, angles))
     return [Transform(joint.parent if joint.parent == 'base_link' else prefix + joint.parent, prefix + joint.child,
                       joint.origin, _rotation(joint.axis or (0.0, 0.0, 0.0), turned.get(joint.name, 0.0)))

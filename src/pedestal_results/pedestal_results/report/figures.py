@@ -107,7 +107,7 @@ def new_panels(rows: int, columns: int = 1, height: float | None = None, width: 
 
 def draw_line(axes: Axes, t: Times, y: Floats, window: Window | None = None,
               **options: Any) -> None:  # of matplotlib, which has many
-    """Draw y over t with fewer points (`thin`); options: of Axes.plot."""
+    """Draw y over t with fewer points (`thin`); options: those of Axes.plot."""
     if window is not None:
         inside = (t >= window[0]) & (t <= window[1])
         t, y = t[inside], y[inside]

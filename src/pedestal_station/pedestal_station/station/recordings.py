@@ -37,7 +37,8 @@ class _Recording:
 
 
 class Recordings:
-    """Recordings in a folder. parameters: {name: value} of each recorder; arguments: for ROS 2, as the namespace."""
+    """Recordings in a folder. parameters: {name: value} of each recorder; arguments: those for ROS 2, such as the
+    namespace."""
 
     def __init__(self, folder: pathlib.Path, parameters: Mapping[str, Value], arguments: Iterable[str] = ()) -> None:
         self._folder, self._parameters, self._arguments = folder.resolve(), parameters, tuple(arguments)

@@ -96,7 +96,8 @@ def added(first: float, second: float, n: int, x: float) -> tuple[float, float, 
 
 @compiled
 def slope(first: float, second: float, n: int) -> float:
-    """Return the least-squares slope per step of the integral of n values; NaN for n = 0. first, second: of `added`.
+    """Return the least-squares slope per step of the integral of n values; NaN for n = 0. first, second: sums of
+    `added`.
 
     The slope is the mean of the signal x with the weights of a parabola. The slope of X_j = sum_{k<j} x_k over
     j = 0 ... n is sum_k (k + 1)(n - k) x_k / (n (n + 1)(n + 2) / 6). The middle of a window has the largest weight.

@@ -105,7 +105,7 @@ class PaperLoop:
     def run(self, target: Floats, rate: Floats | None = None, noise: Floats | None = None) -> tuple[Floats, Floats]:
         """Return (beam, smoothed error in the loop) [rad] of a target [rad].
 
-        rate: of the target due to the carrier [rad/s]. noise: of the samples [rad]. None for zeros.
+        rate: rate of the target due to the carrier [rad/s]. noise: noise of the samples [rad]. None for zeros.
         """
         zeros, beam, errors = np.zeros(len(target)), np.zeros(len(target)), np.zeros(len(target))
         constants = PaperLoopConstants(controllers.LOOP_FORMS.index(self.form), self.alpha, self.period, self.delta,
@@ -133,11 +133,8 @@ class FilterLoop:
 
     def run(self, target: Floats, noise: Floats | None = None, attitude: Floats | None = None,
             rate: Floats | None = None) -> tuple[Floats, Floats]:
-        """Return (beam, innovation of the filter) [rad] of a target [rad].
-
-        noise: of the samples [rad]. attitude, rate: rotation by the carrier as the INS measures it, needed with
-        use_ins.
-        """
+        """Return (beam, innovation of the filter) [rad] of a target [rad]. noise: noise of the samples [rad].
+        attitude, rate: rotation by the carrier as the INS measures it, needed with use_ins."""
         n = len(target)
         zeros, beam, errors = np.zeros(n), np.zeros(n), np.zeros(n)
         measured = np.maximum(np.arange(n) - self.stamp_error, 0)

@@ -90,7 +90,7 @@ def _follow(target: Vectors3, known: Pairs, filters: Records, constants: Records
     """Run the loop once for each row of `normals` (runs, n) and write its Steps to `out` (runs, n).
 
     known: rate and acceleration to feed forward; if it is (0, 2), the filter estimates them. lead: time from the
-    instant of the miss to that of the prediction. M: of `rate_loop_step`. The miss of step j arrives in step k.
+    instant of the miss to that of the prediction. M: that of `rate_loop_step`. The miss of step j arrives in step k.
     """
     R = MISS_SIGMA_RAD * MISS_SIGMA_RAD
     encoder = np.empty(len(target))
@@ -244,11 +244,11 @@ class MissStatistics:
     values: Annotated[Floats, '(runs, 4)']  # metrics of METRIC_UNITS of every run
 
     def of(self, metric: str) -> Floats:
-        """Return the values of one of METRIC_UNITS."""
+        """Return the values of a metric in every run. metric: a key of METRIC_UNITS."""
         return self.values[:, list(METRIC_UNITS).index(metric)]
 
     def mean(self, metric: str) -> float:
-        """Return the mean over the runs of one of METRIC_UNITS."""
+        """Return the mean of a metric over the runs. metric: a key of METRIC_UNITS."""
         return float(self.of(metric).mean())
 
 

@@ -383,7 +383,7 @@ def cases() -> list[tuple[str, str, str, Expectation]]:
 
 
 def rows(case: str, found: FaultOutcome, mode: str, expected: Expectation) -> list[Row]:
-    """Return the rows of a case: time of the first report, mode at the end, largest error; mode: at the onset."""
+    """Return the rows of a case: time of the first report, mode at the end, largest error; mode: mode at the onset."""
     within = None if expected.report_steps is None else f'<= {expected.report_steps}'
     report_steps = row(case, 'told_after_steps', np.nan if found.report_steps is None else found.report_steps,
                        'steps', target=within)

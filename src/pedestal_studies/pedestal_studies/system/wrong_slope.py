@@ -103,7 +103,7 @@ def known_steps(true: Complexes, variance: Floats, factor: complex) -> float:
     """Return the number of errors until a test that knows the target gives its alarm; NaN without one.
 
     true: error of the beam at each measured error, cross-elevation as real and elevation as imaginary part [rad];
-    variance: of the noise of each error [rad2]; factor: that of the measured errors.
+    variance: variance of the noise of each error [rad2]; factor: that of the measured errors.
     """
     evidence = np.nancumsum(0.5 * np.abs((1.0 - factor) * true)**2 / variance)
     after = int(np.searchsorted(evidence, math.log(FALSE_ALARM_FREE_STEPS)))

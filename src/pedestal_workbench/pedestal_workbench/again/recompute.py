@@ -117,8 +117,8 @@ def unit_of(recording: FedRecording, node: str, params: parameters.Parameters) -
 
 def recompute(recording: FedRecording, node: str, params: parameters.Parameters,
               requests: Mapping[int, Sequence[commands.Command]] | None = None) -> Recomputed:
-    """Recompute a node. requests: by step. None: those of the recorded replies or, without replies, those that the
-    recorded states need."""
+    """Recompute a node. requests: those of each step. None: those of the recorded replies or, without replies, those
+    that the recorded states need."""
     unit = unit_of(recording, node, params)
     fed = feed.matched(recording, unit)
     states = None

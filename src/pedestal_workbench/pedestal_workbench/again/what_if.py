@@ -44,7 +44,7 @@ COMPARISON_NOTE = ('the recorded antenna does not move with the recomputed comma
 
 
 class Overlay:
-    """A Recording in which the outputs of one node are replaced; outputs: by topic."""
+    """A Recording in which the outputs of one node are replaced; outputs: those of each topic."""
 
     def __init__(self, bag: Recording, outputs: Mapping[str, Output]) -> None:
         self.path, self.beam, self.beams, self.metadata = bag.path, bag.beam, bag.beams, bag.metadata

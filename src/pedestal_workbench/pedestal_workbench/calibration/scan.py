@@ -74,8 +74,8 @@ class Dwell(NamedTuple):
 
 
 def scans(bag: Recording, t: Times, modes: Texts) -> list[list[Dwell]]:
-    """Return the scans of a recording; t, modes: by step. A scan ends with a dwell that no command ends within
-    MAX_DWELL_S, or with a change of the mode. The last dwell is at most as long as the dwell before it."""
+    """Return the scans of a recording; t, modes: time and mode of each step. A scan ends with a dwell that no command
+    ends within MAX_DWELL_S, or with a change of the mode. The last dwell is at most as long as the dwell before it."""
     commands = [(time, command.arguments) for time, command, reply in recordings.replies(bag, 'acu/command_result')
                 if command.verb == 'offset' and reply.granted]
     found: list[list[Dwell]] = [[]]

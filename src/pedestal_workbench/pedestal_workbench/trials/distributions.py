@@ -85,7 +85,7 @@ def parse(text: str) -> Distribution:
 
 
 def _number(text: str, value: Json) -> float:
-    """Return a value as a finite float. text: of the distribution, for the ValueError."""
+    """Return a value as a finite float. text: distribution as given, for the ValueError."""
     try:
         number = float('nan' if isinstance(value, bool) else value)
     except (TypeError, ValueError):

@@ -40,7 +40,7 @@ change of acu/mode has the stamp of the acu/rate_command of its step (pedestal_c
 
 
 def open_table(plan: Plan, folder: str | pathlib.Path, name: str = 'trials') -> Table:
-    """Return the table of the trials of a plan in a folder; `with` opens its files. name: of the files, without
+    """Return the table of the trials of a plan in a folder; `with` opens its files. name: name of the files, without
     extension."""
     prefixes = plan.scenario(0).prefixes
     heads = [f'{prefix}{result}' for prefix in prefixes for result in TRIAL_RESULTS]

@@ -80,8 +80,8 @@ class Pool:
 
     def map(self, function: Callable[[_Item], _Result], items: Iterable[_Item],
             progress: Progress = lambda share, text: None) -> Iterator[_Result]:
-        """Yield function(item) of each item, in their order. function: of a module, because others cannot be sent to
-        workers."""
+        """Yield function(item) of each item, in their order. function: a function of a module, because others cannot
+        be sent to workers."""
         items = list(items)
         for done, result in enumerate(self.each(function, items, len(items)), 1):
             progress(done / len(items), f'{done} of {len(items)} batches')

@@ -164,7 +164,7 @@ def _points(first: int, runs: int, count: int, sobol: bool) -> Floats:
 
 def field(nominal: Scenario, column: str, option: str = '--vary') -> dataclasses.Field[Json]:
     """Return the dataclass field of a parameter node.key, after a check that trials can vary it. nominal: scenario of
-    the unvaried trials; option: for the text of the ValueError."""
+    the unvaried trials; option: option to name in the ValueError."""
     node, _, key = column.partition('.')
     parameters_of(node)
     if node == 'scenario' and key in PLAN_HEADER_KEYS:

@@ -165,9 +165,9 @@ class _Clock:
         self.first, self.days, self.leaps, self._last = first, 0, 0, None
 
     def advance(self, second: Seconds, day: int | None = None) -> Seconds:
-        """Move on to a sentence. Return its instant, without a date the time since midnight. second: of the day; day:
-        since 1970, if the sentence has a date, which moves the time only forward. Raises ValueError for a leap second
-        on a day that has none."""
+        """Move on to a sentence. Return its instant, without a date the time since midnight. second: seconds since
+        midnight; day: number of days since 1970 if the sentence has a date, which moves the time only forward. Raises
+        ValueError for a leap second on a day that has none."""
         if self._last is not None:
             midnights = round((self._last - second) / SECONDS_PER_DAY)
             # A last second of 86400 or more was a leap second.

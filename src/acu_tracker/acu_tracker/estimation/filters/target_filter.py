@@ -60,7 +60,7 @@ class Filter(Record):
 
 
 def constants(ukf: 'UkfParameters', axes: 'Sequence[FilterParameters]', noise_bandwidth: Hertz) -> Records:
-    """Return the constants (1,); noise_bandwidth: as in axis_filter; the Cartesian filter assumes white noise."""
+    """Return the constants (1,); noise_bandwidth: that of axis_filter; the Cartesian filter assumes white noise."""
     c = Constants.zeros()
     c['axis'] = np.concatenate([axis_filter.constants(params, noise_bandwidth) for params in axes])
     c['cartesian'], c['range_share_2'] = unscented.constants(ukf), ukf.range_share**2
@@ -270,7 +270,7 @@ def transfer(state: Filter, constants: Constants, running: Bit) -> None:
 
 @compiled
 def turn(state: Filter, constants: Constants, rotation: Rotation) -> None:
-    """Turn the estimate and its covariances into another frame; rotation: from the old frame into the new one.
+    """Turn the estimate and its covariances into another frame; rotation: matrix from the old frame into the new one.
 
     The direction of growing azimuth turns by an angle phi against the old one. Across the line of sight the variance
     of an axis becomes cos2(phi) of its own and sin2(phi) of the variance of the other axis, because the errors of both

@@ -40,8 +40,8 @@ class Levels:
 
 
 def read(path: pathlib.Path, elevation: Degrees | None = None) -> Levels:
-    """Return the levels of a CSV file. Raises TableError and CalibrationError. elevation: of the source, with which an
-    offset in azimuth becomes an offset in cross-elevation."""
+    """Return the levels of a CSV file. Raises TableError and CalibrationError. elevation: elevation of the source,
+    with which an offset in azimuth becomes an offset in cross-elevation."""
     try:
         table = csv_table.Table(path, csv_table.text(path))
         up = table.column(_OFFSETS[0])
