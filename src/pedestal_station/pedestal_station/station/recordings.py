@@ -61,7 +61,7 @@ class Recordings:
         return bag
 
     def end(self, case: str) -> None:
-        """Let the recorder of a pass end in order."""
+        """End the recorder of a pass, so that its bag is complete."""
         for each in self._recorders:
             if each.case == case:
                 each.process.send_signal(signal.SIGTERM)
