@@ -32,7 +32,8 @@ VERDICTS = {PASSED: 'passed', INCONCLUSIVE: 'inconclusive', FAILED: 'failed'}
 NOT_PERFORMED = 'not performed'
 EXPLANATION = ('The uncertainty is the half width of the interval of the mean, at the confidence of the requirement. '
                'A requirement is passed if the whole interval meets the limit, failed if none of it does, and '
-               'inconclusive in between.')
+               'inconclusive in between. Where the uncertainty is not known, the value alone is compared with the '
+               'limit.')
 CSS = """
 body { max-width: 76rem; } table.line { font-size: .85rem; } .line th, .line td { padding-right: .8rem; }
 .results td:nth-child(n+4):nth-child(-n+6) { white-space: nowrap; }

@@ -52,7 +52,7 @@ def judged(requirement: Requirement, repetitions: Sequence[Measured], reason: st
         z, z_95 = ndtri(0.5 * (1.0 + levels))
         half = math.hypot(high - mean if len(values) > 1 else 0.0, z / z_95 * math.hypot(*own) / len(own))
     if math.isnan(value) or math.isnan(half):
-        return Judged(math.nan, math.nan, INCONCLUSIVE, tuple(repetitions), reason)
+        return Judged(math.nan, math.nan, INCONCLUSIVE, tuple(repetitions), reason or 'no number for its uncertainty')
     meets, interval = requirement.limit.meets, (value - half, value + half)
     if all(map(meets, interval)):
         return Judged(value, half, PASSED, tuple(repetitions))

@@ -111,6 +111,8 @@ def _resonance(performed: Performed, arguments: Arguments) -> Measured:
     """Return the lowest frequency at which the open loop has a notch, the highest one for none."""
     response = _response(*_signals(performed, arguments))
     known = response.deviation < MAX_NOISE
+    if known.sum() < 2:
+        raise ValueError('the recording shows the open loop at no two frequencies')
     f = response.frequency[known]
     level = 20.0 * np.log10(np.abs(response.open_loop[known]) * f)
     notches, _ = signal.find_peaks(-level, prominence=MIN_NOTCH_DB)

@@ -37,6 +37,7 @@ STANDSTILL_SHARE = 0.02         # rate below which an axis stands after an emerg
 FAULT_TIME_S, RECOVERY_TIME_S = 10.0, 5.0   # time of the begin of a fault, and time after its end [s]
 ENVELOPE_DEG = 10.0             # of a fault outside autotrack, about the motion [deg]
 TRAVEL_SHARE = 0.8              # largest share of the travel that an emergency stop uses [-]
+MIN_RATE_SHARE = 0.9            # least share of the largest rate at an emergency stop [-]
 RAMP_DEG_S = 1.0                # rate of the azimuth in the mode `ramp` of a fault [deg/s]
 REPORT_TOPICS = 'acu/alarms', 'acu/mode', 'adu/state'   # whose changes report a fault
 TARGET_MODES = 'autotrack', 'program', 'tle', 'search', 'acquire'   # modes with an error towards the target
@@ -83,11 +84,15 @@ def _limit(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 
 def _beyond(performed: Performed, arguments: Arguments) -> tuple[Times, Floats]:
-    """Return (times, angles beyond the limit [deg])."""
+    """Return (times, angles beyond the limit [deg]). Raises ValueError if the axis did not come near the limit."""
+    granted(performed, 'acu', 'rate')
     joints, axis = performed.recording.table('joint_states'), str(arguments['axis'])
     limits = getattr(performed.antenna.acu, axis).limits
     angle = joints[f'{axis}.position']
-    return joints['t'], np.degrees(angle - limits.high if arguments['side'] == 'high' else limits.low - angle)
+    beyond = np.degrees(angle - limits.high if arguments['side'] == 'high' else limits.low - angle)
+    if not np.nanmax(beyond, initial=-math.inf) > -RETURN_DEG:
+        raise ValueError(f'the {axis} stayed more than {RETURN_DEG:g} deg away from its limit')
+    return joints['t'], beyond
 
 
 def _limit_overshoot(performed: Performed, arguments: Arguments) -> Measured:
@@ -143,7 +148,8 @@ def _stow_time(performed: Performed, _: Arguments) -> Measured:
         | (np.abs(joints[f'{axis}.velocity']) > MAX_REST_RATE_RAD_S) for axis in AXES])
     if outside[-1]:
         return NEVER
-    return Measured(float(joints['t'][outside & (joints['t'] >= begin)][-1]) - begin, performed.antenna.period)
+    last = joints['t'][outside & (joints['t'] >= begin)].max(initial=begin)
+    return Measured(float(last) - begin, performed.antenna.period)
 
 
 def _unstow_time(performed: Performed, _: Arguments) -> Measured:
@@ -176,6 +182,9 @@ def _stopping(performed: Performed, arguments: Arguments) -> tuple[Seconds, Degr
     during = (joints['t'] > begin - 1.5 * performed.antenna.period) & (joints['t'] < begin + REST_TIME_S)
     t, rate, angle = (joints[name][during] for name in ('t', *(f'{arguments["axis"]}.{part}'
                                                                for part in ('velocity', 'position'))))
+    full = getattr(performed.antenna.acu, str(arguments['axis'])).shaper.rate
+    if not np.abs(rate[:1]).sum() > MIN_RATE_SHARE * full:
+        raise ValueError(f'the {arguments["axis"]} did not move at its largest rate, {math.degrees(full):.4g} deg/s')
     moving = np.flatnonzero(np.abs(rate) > STANDSTILL_SHARE * abs(rate[0]))
     if moving[-1] == t.size - 1:
         return math.inf, math.inf
@@ -245,6 +254,8 @@ def _fault_error(performed: Performed, arguments: Arguments) -> Measured:
     errors = run.following
     if towards:
         errors = tracking.DEG_PER_RAD * (run.error if np.isfinite(run.error).any() else run.measured)
+    if towards and during.any() and not np.isfinite(errors[during]).any():
+        raise ValueError('the recording holds no error during the fault')
     known = np.nan_to_num(errors[during])   # no error counts where the fault ends the mode at once
     return Measured(float(np.hypot(*known.T).max(initial=0.0)), 0.0)
 

@@ -46,10 +46,7 @@ def _target(*options: str) -> Argument:
     return Argument('target', 'target that the antenna follows', options=options, default=options[0])
 
 
-def _duration(default: Seconds) -> Argument:
-    return Argument('duration', 'duration of the exercise', 15.0, 3600.0, 's', default=default)
-
-
+_DURATION = Argument('duration', 'duration of the exercise', 15.0, 3600.0, 's', default=40.0)
 _PLACE = (Argument('azimuth', 'azimuth of beacon or manoeuvre', -360.0, 360.0, 'deg', default=0.0),
           Argument('elevation', 'elevation of beacon or manoeuvre', 0.0, 90.0, 'deg', default=35.0))
 
@@ -149,13 +146,17 @@ def _offsets(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 
 def granted(performed: Performed, node: str, command: str) -> Seconds:
-    """Return the time in the recording of the last action of a node with a command. Raises ValueError unless it was
-    granted."""
-    *_, done = (done for done in performed.executed if done.action.node == node
-                and done.action.command.split()[0] == command)
-    if not done.granted:
-        raise ValueError(f'{done.action.command}: {done.reply}')
-    return performed.begin + done.t
+    """Return the time in the recording of the last action of a node with a command. Raises ValueError if one of these
+    actions was refused, and without any."""
+    times = [math.nan]
+    for done in performed.executed:
+        if done.action.node == node and done.action.command.split()[0] == command:
+            if not done.granted:
+                raise ValueError(f'{done.action.command}: {done.reply}')
+            times.append(performed.begin + done.t)
+    if len(times) == 1:
+        raise ValueError(f'{command}: was not executed')
+    return times[-1]
 
 
 def _of_blocks(errors: Pairs, value: float) -> Measured:
@@ -212,26 +213,23 @@ def _fade_recovery(performed: Performed, arguments: Arguments) -> Measured:
                  (run.mode == 'autotrack') & np.isfinite(run.measured[:, 0]))
 
 
-def _slopes(performed: Performed) -> matrix.RealSlopes:
-    """Return the slopes of the errors as the control unit uses them."""
-    points = beacon_offsets.read(performed.recording)
-    corrected = points.errors @ tracking.error_matrix(performed.recording).T
-    return matrix.fit(points.offsets[points.fitted], corrected[points.fitted])
-
-
 def _slope(performed: Performed, arguments: Arguments) -> Measured:
-    slopes, channel = _slopes(performed), arguments['channel']
+    """Return a slope of the errors as the control unit uses them."""
+    granted(performed, 'acu', 'preset')
+    points, channel = beacon_offsets.read(performed.recording), arguments['channel']
+    corrected = points.errors @ tracking.error_matrix(performed.recording).T
+    slopes = matrix.fit(points.offsets[points.fitted], corrected[points.fitted])
     row, column = CHANNELS[str(channel)]
     if channel == CROSS_TALK and abs(slopes.C[column, row]) > abs(slopes.C[row, column]):
         row, column = column, row
     return Measured(float(slopes.C[row, column]), float(slopes.half[row, column]))
 
 
-_TRACKED = (_target('pass', 'beacon', 'own'), *_PLACE, _duration(40.0))
+_TRACKED = (_target('pass', 'beacon', 'own'), *_PLACE, _DURATION)
 METHODS = (
     Method('autotrack_rms', 'follow a target in autotrack: rms pointing error of both axes together, against the '
            'truth of the target or, without truth, by the receiver', 'deg', '<=',
-           (_target('beacon', 'pass', 'manoeuvre', 'own'), *_PLACE, _duration(40.0),
+           (_target('beacon', 'pass', 'manoeuvre', 'own'), *_PLACE, _DURATION,
             Argument('acceleration', 'largest acceleration of the manoeuvre', 1e-3, 100.0, 'deg/s2', default=0.1)),
            _follow, _autotrack_rms),
     Method('program_rms', 'follow a target by its program track: rms pointing error of both axes together', 'deg',
