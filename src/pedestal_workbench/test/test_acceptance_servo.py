@@ -90,7 +90,7 @@ def test_overshoot_and_settling_of_a_step(source):
 
 
 def test_a_step_that_does_not_settle_has_the_time_of_its_end():
-    done, found = performed('step_settling', FAST, {'adu.inject': '3 noise sigma=0.001'}, size=1.0, band=0.01)
+    done, found = performed('step_settling', FAST, {'adu.inject': '3 noise sigma=0.0003'}, size=1.0, band=0.01)
     assert found.value > done.exercise.duration - 2.5
 
 

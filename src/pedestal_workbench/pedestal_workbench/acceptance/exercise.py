@@ -84,6 +84,17 @@ class Performed:
     executed: tuple[Executed, ...]
     bag: pathlib.Path | None = None     # None: in memory
 
+    def times(self, command: str) -> list[Seconds]:
+        """Return the times of the actions with a command, since the begin. Raises ValueError if one of them was
+        refused, and without any."""
+        found = [done for done in self.executed if done.action.command.split()[0] == command]
+        for done in found:
+            if not done.granted:
+                raise ValueError(f'{done.action.command}: {done.reply}')
+        if not found:
+            raise ValueError(f'{command}: was not executed')
+        return [done.t for done in found]
+
 
 class Performer(Protocol):
     """Makes exercises with one antenna."""

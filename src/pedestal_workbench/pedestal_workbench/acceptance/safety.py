@@ -25,7 +25,7 @@ from pedestal_results import tracking
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
 from pedestal_workbench.acceptance.method import Arguments, Measured, Method
-from pedestal_workbench.acceptance.tracking import NEVER, first, granted, inside, travel
+from pedestal_workbench.acceptance.tracking import NEVER, first, inside, travel
 
 BEGIN_TIME_S, REST_TIME_S = 1.0, 3.0    # time of the first command, and time until an axis has come to rest [s]
 LARGEST_OVERSHOOT_DEG = 1.0     # angle beyond a limit of travel at which the exercise is stopped [deg]
@@ -85,7 +85,7 @@ def _limit(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _beyond(performed: Performed, arguments: Arguments) -> tuple[Times, Floats]:
     """Return (times, angles beyond the limit [deg]). Raises ValueError if the axis did not come near the limit."""
-    granted(performed, 'acu', 'rate')
+    performed.times('rate')
     joints, axis = performed.recording.table('joint_states'), str(arguments['axis'])
     limits = getattr(performed.antenna.acu, axis).limits
     angle = joints[f'{axis}.position']
@@ -103,7 +103,7 @@ def _limit_return(performed: Performed, arguments: Arguments) -> Measured:
     rates = [done for done in performed.executed if done.action.command.startswith('rate ')]
     opposite = next(done for done in rates if done.action.command != rates[0].action.command)
     t, beyond = _beyond(performed, arguments)
-    return first(performed, performed.begin + opposite.t, t, beyond < -RETURN_DEG)
+    return first(performed, opposite.t, t, beyond < -RETURN_DEG)
 
 
 def _stow(antenna: Antenna, arguments: Arguments) -> Exercise:
@@ -133,7 +133,7 @@ def _pins(performed: Performed, command: str, state: str) -> Measured:
     """Return the time from a command until both pins have a state."""
     states = performed.recording.table('adu/stow_pins')
     wanted = ', '.join(f'{axis} {state}' for axis in AXES)
-    return first(performed, granted(performed, 'acu', command), np.array(states['t']),
+    return first(performed, performed.times(command)[-1], np.array(states['t']),
                  np.array([text == wanted for text in states['data']]))
 
 
@@ -141,7 +141,7 @@ def _stow_time(performed: Performed, _: Arguments) -> Measured:
     """Return the time from `stow` until the pins are in or, without pins, until the axes rest at their stow angles."""
     if 'adu/stow_pins' in performed.recording.topics:
         return _pins(performed, 'stow', 'in')
-    begin, acu = granted(performed, 'acu', 'stow'), performed.antenna.acu
+    begin, acu = performed.begin + performed.times('stow')[-1], performed.antenna.acu
     joints = performed.recording.table('joint_states')
     outside = np.logical_or.reduce([
         (np.abs(joints[f'{axis}.position'] - getattr(acu, axis).stow) > acu.stow_window)
@@ -178,7 +178,7 @@ def _emergency(antenna: Antenna, arguments: Arguments) -> Exercise:
 def _stopping(performed: Performed, arguments: Arguments) -> tuple[Seconds, Degrees]:
     """Return time and angle from the emergency stop to the standstill of the axis. The angle counts from the step
     before the request, which acts within a step."""
-    begin, joints = granted(performed, DRIVE_NODE, EMERGENCY_STOP), performed.recording.table('joint_states')
+    begin, joints = performed.begin + performed.times(EMERGENCY_STOP)[-1], performed.recording.table('joint_states')
     during = (joints['t'] > begin - 1.5 * performed.antenna.period) & (joints['t'] < begin + REST_TIME_S)
     t, rate, angle = (joints[name][during] for name in ('t', *(f'{arguments["axis"]}.{part}'
                                                                for part in ('velocity', 'position'))))
@@ -226,8 +226,7 @@ def _faulty(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _onset(performed: Performed, arguments: Arguments) -> Seconds:
     """Return the time of the fault. Raises ValueError where the antenna was not in its mode then."""
-    node, _, fault = str(arguments['fault']).partition('.')
-    begin = granted(performed, node, fault)
+    begin = performed.begin + performed.times(str(arguments['fault']).partition('.')[2])[-1]
     mode = recordings.modes(performed.recording, np.array([begin - performed.antenna.period]))[0]
     wanted = 'autotrack' if arguments['mode'] == 'autotrack' else 'preset'
     if mode != wanted:
@@ -241,7 +240,7 @@ def _fault_report(performed: Performed, arguments: Arguments) -> Measured:
     end = begin + float(arguments['duration']) + RECOVERY_TIME_S
     times = np.sort(np.concatenate([recording.table(topic)['t'] for topic in REPORT_TOPICS
                                     if topic in recording.topics]))
-    return first(performed, begin, times, times < end)
+    return first(performed, begin - performed.begin, times, times < end)
 
 
 def _fault_error(performed: Performed, arguments: Arguments) -> Measured:

@@ -4,7 +4,7 @@ Each exercise moves one axis beside the middle of its travel, where its teeth ar
 minus load encoder; the reference is the shaped one, so that a planned acceleration is no error.
 """
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from pedestal_common.quantities import Bools, Degrees, Floats, Radians, RadiansP
 from pedestal_common.wire.commands import Argument
 from pedestal_recording import recording as recordings
 from pedestal_results import metrics, tracking
-from pedestal_results.intervals import interval, pseudo_values
+from pedestal_results.intervals import half_width, pseudo_values
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed, Span, Track
 from pedestal_workbench.acceptance.method import Arguments, Measured, Method
 from pedestal_workbench.calibration.drive import motion_data
@@ -142,22 +142,6 @@ def followed(performed: Performed, arguments: Arguments) -> Followed:
                     360.0 / 2**drive.encoder.load_bits if drive else 0.0)
 
 
-def executed_at(performed: Performed, number: int) -> Seconds:
-    """Return the time of the action of this number. Raises ValueError if it was refused."""
-    if number >= len(performed.executed):
-        raise ValueError(f'only {len(performed.executed)} commands of the exercise were executed')
-    done = performed.executed[number]
-    if not done.granted:
-        raise ValueError(f'{done.action.command}: {done.reply}')
-    return done.t
-
-
-def half_width(values: Sequence[float] | Floats) -> float:
-    """Return the half width of the interval of a mean."""
-    _, low, high = interval(values)
-    return 0.5 * (high - low)
-
-
 def over_parts(values: Floats, statistic: Callable[[Floats], float]) -> Measured:
     """Return a statistic of a stretch of values, with the jackknife over its parts. Raises ValueError."""
     if len(values) < 2 * PART_COUNT:
@@ -179,6 +163,7 @@ def _slew(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _slews(performed: Performed, arguments: Arguments) -> tuple[Followed, list[tuple[int, int]]]:
     """Return the motion, and the steps of the middle half of the way of both slews. Raises ValueError."""
+    performed.times('preset')
     motion = followed(performed, arguments)
     low, high = np.percentile(motion.angle, (0.5, 99.5))
     found = tracking.stretches(np.abs(motion.angle - 0.5 * (low + high)) < 0.25 * (high - low))
@@ -220,7 +205,7 @@ def _brake(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _braking_distance(performed: Performed, arguments: Arguments) -> Measured:
     motion, full = followed(performed, arguments), math.degrees(plan(performed.antenna, arguments).rate)
-    at = executed_at(performed, 1)
+    at = performed.times('stop')[0]
     rate = float(np.abs(np.interp(at, motion.t, motion.rate)))
     if rate < 0.9 * full:
         raise ValueError(f'the axis stops from {rate:.4g} deg/s, must be from {full:.4g} deg/s')
@@ -237,7 +222,7 @@ def _ramp(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 
 def _ramp_error(performed: Performed, arguments: Arguments) -> Measured:
-    axis, at = plan(performed.antenna, arguments), executed_at(performed, 0)
+    axis, at = plan(performed.antenna, arguments), performed.times('preset')[0]
     rate = axis.rate_of(arguments)
     return followed(performed, arguments).rms_error(
         at + axis.settling(rate), at + min(float(arguments['duration']), axis.travel / rate))
@@ -265,7 +250,7 @@ def _sine(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 
 def _sine_error(performed: Performed, arguments: Arguments) -> Measured:
-    executed_at(performed, 0)
+    performed.times('program')
     return followed(performed, arguments).rms_error(2.0 * BEGIN_S + 1.0 / float(arguments['frequency']))
 
 
@@ -280,7 +265,7 @@ def _step(antenna: Antenna, arguments: Arguments) -> Exercise:
 def _stepped(performed: Performed, arguments: Arguments) -> tuple[Times, Floats, Degrees, Degrees]:
     """Return (times after the command, response [deg], its size [deg], noise of the encoder [deg]). Raises ValueError
     without a step."""
-    motion, at = followed(performed, arguments), executed_at(performed, 1)
+    motion, at = followed(performed, arguments), performed.times('preset')[1]
     reference, after = motion.angle + motion.error, motion.t >= at
     before = reference[motion.t < at][-1]
     size = float(reference[-1] - before)
@@ -309,12 +294,13 @@ REVERSAL_S, REVERSAL_COUNT = 4.0, 6     # time between two reversals [s], and th
 GUST_S = 3.0    # length of a gust and of the rest after it [s]
 
 
-def _peaks(actions: Sequence[int], time: Seconds) -> Callable[[Performed, Arguments], Measured]:
-    """Return the measure of the mean of the largest errors within a time after some actions."""
+def _peaks(command: str, dropped: int, time: Seconds) -> Callable[[Performed, Arguments], Measured]:
+    """Return the measure of the mean of the largest errors within a time after each of the actions with a command.
+    dropped: number of first actions that do not count."""
     def measure(performed: Performed, arguments: Arguments) -> Measured:
         motion = followed(performed, arguments)
         peaks = [metrics.peak(motion.error[motion.between(at, at + time)])
-                 for at in (executed_at(performed, number) for number in actions)]
+                 for at in performed.times(command)[dropped:]]
         return Measured(float(np.mean(peaks)), math.hypot(half_width(peaks), motion.resolution / math.sqrt(12.0)))
     return measure
 
@@ -358,7 +344,7 @@ def _per_way(performed: Performed, arguments: Arguments, of: Callable[[Motion], 
     Each way has the same angles, without those in which the axis accelerates. Raises ValueError."""
     axis, actions = plan(performed.antenna, arguments), performed.exercise.actions
     motion = motion_data.read(performed.recording, axis.name, drive_of(performed.antenna, axis.name))
-    rate, begins = axis.rate_of(arguments), [executed_at(performed, k) for k in range(len(actions))]
+    rate, begins = axis.rate_of(arguments), performed.times('preset')
     way = rate * (actions[1].at - actions[0].at - REST_S)
     inside = np.abs(motion.theta - axis.place[axis.number]) < 0.5 * way - min(0.3 * way, rate * axis.settling(rate))
     t, values, found = motion.t - performed.begin, of(motion), []
@@ -434,10 +420,10 @@ METHODS = (
     Method('creep_rms', 'rms error at a very low rate', 'deg', '<=', (AXIS, _rate(0.005), _duration(60.0)), _ramp,
            _ramp_error),
     Method('reversal_error', 'mean of the largest errors after six reversals of a rate', 'deg', '<=',
-           (AXIS, _rate(0.1)), _reversals, _peaks(range(1, 1 + REVERSAL_COUNT), 0.75 * REVERSAL_S)),
+           (AXIS, _rate(0.1)), _reversals, _peaks('preset', 1, 0.75 * REVERSAL_S)),
     Method('gust_error', 'mean of the largest errors after the begin of four injected gusts', 'deg', '<=', (
         AXIS, Argument('torque', 'torque of the gust', 1.0, 1e5, 'Nm', default=1000.0)), _gusts,
-        _peaks(range(4), GUST_S), simulated=True),
+        _peaks('gust', 0, GUST_S), simulated=True),
     Method('lash', 'angle between both motors at the load while they pull against each other: lash and wind-up',
            'deg', '<=', (AXIS, _rate(0.2)), _mechanics, _lash),
     Method('bias', 'torque with which both motors pull against each other, on the motor shaft', 'Nm', '>=',

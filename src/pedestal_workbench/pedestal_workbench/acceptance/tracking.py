@@ -145,20 +145,6 @@ def _offsets(antenna: Antenna, arguments: Arguments) -> Exercise:
     return Exercise((1 + len(offsets)) * POINT_TIME_S, travel(antenna), tuple(actions), start, changes=changes)
 
 
-def granted(performed: Performed, node: str, command: str) -> Seconds:
-    """Return the time in the recording of the last action of a node with a command. Raises ValueError if one of these
-    actions was refused, and without any."""
-    times = [math.nan]
-    for done in performed.executed:
-        if done.action.node == node and done.action.command.split()[0] == command:
-            if not done.granted:
-                raise ValueError(f'{done.action.command}: {done.reply}')
-            times.append(performed.begin + done.t)
-    if len(times) == 1:
-        raise ValueError(f'{command}: was not executed')
-    return times[-1]
-
-
 def _of_blocks(errors: Pairs, value: float) -> Measured:
     """Return an rms of errors in the order of time with its uncertainty, by the jackknife over blocks.
 
@@ -167,10 +153,9 @@ def _of_blocks(errors: Pairs, value: float) -> Measured:
     """
     values = intervals.pseudo_values(np.array_split(errors, BLOCK_COUNT),
                                      lambda blocks: tracking.known_rms(np.concatenate(blocks)))
-    _, low, high = intervals.interval(values)
     rest = values - values.mean()
     r = min(max(float(rest[1:] @ rest[:-1] / (rest @ rest)), 0.0), MAX_CORRELATION)
-    return Measured(value, 0.5 * (high - low) * math.sqrt((1.0 + r) / (1.0 - r)))
+    return Measured(value, intervals.half_width(values) * math.sqrt((1.0 + r) / (1.0 - r)))
 
 
 def _autotrack_rms(performed: Performed, _: Arguments) -> Measured:
@@ -196,26 +181,27 @@ def _pointing_offset(performed: Performed, _: Arguments) -> Measured:
     return Measured(size, 0.5 * math.hypot(x * (x_high - x_low), y * (y_high - y_low)) / size)
 
 
-def first(performed: Performed, begin: Seconds, t: Times, met: Bools) -> Measured:
-    """Return the time from `begin` to the first of the times t that meets a condition."""
-    times = t[(t >= begin) & met]
-    return Measured(float(times[0]) - begin, performed.antenna.period) if times.size else NEVER
+def first(performed: Performed, since: Seconds, t: Times, met: Bools) -> Measured:
+    """Return the time from a time since the begin of the exercise to the first of the times t that meets a condition.
+    """
+    times = t[(t >= performed.begin + since) & met]
+    return Measured(float(times[0]) - (performed.begin + since), performed.antenna.period) if times.size else NEVER
 
 
 def _acquisition_time(performed: Performed, _: Arguments) -> Measured:
     run = RecordedRun(performed.recording).evaluated
-    return first(performed, granted(performed, 'acu', 'program'), run.t, run.mode == 'autotrack')
+    return first(performed, performed.times('program')[-1], run.t, run.mode == 'autotrack')
 
 
 def _fade_recovery(performed: Performed, arguments: Arguments) -> Measured:
     run, end = RecordedRun(performed.recording).evaluated, float(arguments['fade'])
-    return first(performed, granted(performed, RECEIVER, 'fade') + end, run.t,
+    return first(performed, performed.times('fade')[-1] + end, run.t,
                  (run.mode == 'autotrack') & np.isfinite(run.measured[:, 0]))
 
 
 def _slope(performed: Performed, arguments: Arguments) -> Measured:
     """Return a slope of the errors as the control unit uses them."""
-    granted(performed, 'acu', 'preset')
+    performed.times('preset')
     points, channel = beacon_offsets.read(performed.recording), arguments['channel']
     corrected = points.errors @ tracking.error_matrix(performed.recording).T
     slopes = matrix.fit(points.offsets[points.fitted], corrected[points.fitted])
