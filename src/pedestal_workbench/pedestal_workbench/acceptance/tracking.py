@@ -11,7 +11,6 @@ The program track of a simulated target has no error. The level of beacon and ma
 import dataclasses
 import itertools
 import math
-from typing import TypeAlias
 
 import numpy as np
 
@@ -38,8 +37,6 @@ CROSS_BEAMWIDTHS = (0.2, -0.2, 0.1, -0.1)   # offsets about the beacon on each a
 CROSS_TALK = 'cross-talk'
 CHANNELS = {'cross-elevation': (0, 0), 'elevation': (1, 1), CROSS_TALK: (0, 1)}     # row and column of the slopes
 NEVER = Measured(math.inf, 0.0)     # time until an event that does not come
-
-Changes: TypeAlias = dict[str, Json]    # {'node.key': value}
 
 
 def _target(*options: str) -> Argument:
@@ -88,14 +85,14 @@ def _amplitude(antenna: Antenna, arguments: Arguments) -> Radians:
     return acceleration / w**2
 
 
-def simulated(antenna: Antenna, arguments: Arguments) -> Changes:
-    """Return the changes for a target. Raises ValueError for a target that the antenna cannot have."""
+def simulated(antenna: Antenna, arguments: Arguments) -> dict[str, Json]:
+    """Return {'node.key': value} for a target. Raises ValueError for a target that the antenna cannot have."""
     target = arguments['target']
     if target == 'own':
         return {}
     if RECEIVER not in antenna.simulated:
         raise ValueError(f'target = {target}: must be own, because this antenna has no simulated target')
-    found: Changes = {f'scenario.program.{name}_offset': 0.0 for name in ('time', *AXES)}
+    found: dict[str, Json] = {f'scenario.program.{name}_offset': 0.0 for name in ('time', *AXES)}
     of_target = f'{RECEIVER}.target'
     if target == 'pass':
         return {**found, f'{of_target}.kind': 'leo_pass', f'{of_target}.leo_pass.start_time': ''}
