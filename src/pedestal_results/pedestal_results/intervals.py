@@ -32,6 +32,12 @@ def interval(values: ArrayLike, level: float = CONFIDENCE_LEVEL) -> Estimate:
     return mean, mean - half, mean + half
 
 
+def half_width(values: ArrayLike) -> float:
+    """Return the half width of the `interval` of the mean of values."""
+    _, low, high = interval(values)
+    return 0.5 * (high - low)
+
+
 def pseudo_values(parts: list[_P], statistic: Callable[[list[_P]], float | Floats]) -> Floats:
     """Return values for `interval` of a statistic that is taken over all runs together, such as an rms.
 

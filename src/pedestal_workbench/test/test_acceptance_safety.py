@@ -54,6 +54,23 @@ def test_angle_beyond_a_limit_is_the_overshoot():
     assert found.value == pytest.approx(1.0, abs=0.01)
 
 
+def test_a_limit_that_the_axis_does_not_reach_is_not_measured():
+    done = performed(Variant(UAV), 'limit_overshoot')
+    refused = tuple(each._replace(granted=False, reply='refused: no power') for each in done.executed)
+    for name in ('limit_overshoot', 'limit_return'):
+        with pytest.raises(ValueError, match='stayed more than 1 deg away'):
+            METHODS[name].measure(done, arguments(name, side='low'))
+        with pytest.raises(ValueError, match='rate .*: refused: no power'):
+            METHODS[name].measure(dataclasses.replace(done, executed=refused), arguments(name))
+
+
+def test_an_emergency_stop_at_rest_is_not_measured():
+    done = performed(Variant(UAV), 'emergency_stop_time')
+    for name in ('emergency_stop_time', 'emergency_stop_angle'):
+        with pytest.raises(ValueError, match='elevation did not move at its largest rate'):
+            METHODS[name].measure(done, {'axis': 'elevation'})
+
+
 @pytest.mark.parametrize('scenario', [UAV, STATION])
 @pytest.mark.parametrize('axis', ['azimuth', 'elevation'])
 def test_emergency_stop_takes_the_distance_of_the_deceleration(scenario, axis):
@@ -81,6 +98,10 @@ def test_stow_ends_with_the_travel_of_the_pins():
     rest = measured(Variant(UAV), 'stow_time')
     brake = 0.1     # the pins move when the brakes grip, after half a second of rest
     assert measured(slow, 'stow_time', pins='simulated') == pytest.approx(rest + 0.5 + travel_time, abs=3.0 * brake)
+
+
+def test_an_antenna_that_is_stowed_stows_in_no_time():
+    assert measured(Variant(UAV), 'stow_time', distance=0.0) == 0.0
 
 
 def test_fitted_pins_need_no_change_of_the_simulation():
@@ -139,9 +160,9 @@ def test_exercise_that_does_not_fit_is_refused(scenario, name, given, text):
 
 @pytest.mark.parametrize(('change', 'text'), [
     ({'envelope': (Span(-5.0, 5.0, 900.0), Span(0.0, 90.0, 50.0))},
-     r'azimuth \d+\.\d+ deg is outside -5.000 to 5.000 deg'),
+     r'azimuth \d+\.\d+ deg: outside its envelope, -5.000 to 5.000 deg'),
     ({'envelope': (Span(-90.0, 90.0, 20.0), Span(0.0, 90.0, 20.0))},
-     r'azimuth turns at \d+\.\d+ deg/s, must be at most 20.000 deg/s'),
+     r'azimuth \d+\.\d+ deg/s: outside its envelope, -20.000 to 20.000 deg/s'),
     ({'actions': (Action(2.0, 'adu', 'motor_loss'),)}, 'alarm azimuth motor lost')])
 def test_performer_stops_at_a_breach(change, text):
     performer = InLoop(Variant(UAV))

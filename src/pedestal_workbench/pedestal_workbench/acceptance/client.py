@@ -10,7 +10,6 @@ from typing import NamedTuple
 from pedestal_bringup.scenario.program import program_message
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
-from pedestal_common.graph.topics import AXES
 from pedestal_common.injection import table
 from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_common.wire import commands, messages
@@ -90,15 +89,7 @@ class Client(Commander):
             return self.interference
         unexpected = [f'alarm {each["name"]}: {each["detail"] or each["meaning"]}' for each in map(alarm, self.alarms)
                       if each['state'] not in PAST_STATES and each['name'] not in exercise.alarms]
-        return self._outside(exercise) or '; '.join(unexpected)
-
-    def _outside(self, exercise: Exercise) -> str:
-        for axis, span, angle, rate in zip(AXES, exercise.envelope, self.encoder_angles(JOINTS_TOPIC), self.rates()):
-            if angle < span.low or angle > span.high:
-                return f'{axis} {angle:.3f} deg: outside its envelope, {span.low:.3f} to {span.high:.3f} deg'
-            if abs(rate) > span.rate:
-                return f'{axis} {rate:.3f} deg/s: outside its envelope, -{span.rate:.3f} to {span.rate:.3f} deg/s'
-        return ''
+        return exercise.outside(self.encoder_angles(JOINTS_TOPIC), self.rates()) or '; '.join(unexpected)
 
 
 class ClientSession(RemoteSession):

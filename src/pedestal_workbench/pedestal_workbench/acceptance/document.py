@@ -32,7 +32,8 @@ VERDICTS = {PASSED: 'passed', INCONCLUSIVE: 'inconclusive', FAILED: 'failed'}
 NOT_PERFORMED = 'not performed'
 EXPLANATION = ('The uncertainty is the half width of the interval of the mean, at the confidence of the requirement. '
                'A requirement is passed if the whole interval meets the limit, failed if none of it does, and '
-               'inconclusive in between.')
+               'inconclusive in between. Where the uncertainty is not known, the value alone is compared with the '
+               'limit. Systematic errors, such as those of the encoders, are not part of the uncertainty.')
 CSS = """
 body { max-width: 76rem; } table.line { font-size: .85rem; } .line th, .line td { padding-right: .8rem; }
 .results td:nth-child(n+4):nth-child(-n+6) { white-space: nowrap; }
@@ -105,9 +106,9 @@ def measured(requirement: Requirement, kept: Kept | None) -> tuple[str, str, str
             text(intervals.number(float(f'{uncertainty:.2g}'))) if uncertainty else 'not known', limit)
 
 
-def line(acceptance: Specification, kept: Kept) -> str:
+def line(specification: Specification, kept: Kept) -> str:
     """Return a result as a line of text."""
-    requirement = next(one for one in acceptance.requirements if one.name == kept.name)
+    requirement = next(one for one in specification.requirements if one.name == kept.name)
     value, uncertainty, limit = measured(requirement, kept)
     return f'{verdict(kept):12}  {kept.name}: {value}, {f"uncertainty {uncertainty}, " * bool(uncertainty)}' \
            f'must be {limit}'

@@ -1,10 +1,9 @@
 """Exercise: what a method of acceptance makes the antenna do, and what is known after it was performed.
 
-A performer makes an exercise in the closed loop (in_loop) or on nodes (on_graph). Both execute the same commands, and
-both return a recording with the same topics, so that every measure is the same law for both.
+A performer makes an exercise in the closed loop (in_loop) or on nodes (own_graph, running_graph). All performers
+execute the same commands and return a recording with the same topics, so that every measure is one law.
 """
 import dataclasses
-import math
 import pathlib
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple, Protocol
@@ -12,16 +11,7 @@ from typing import NamedTuple, Protocol
 from acu_tracker.params import AcuParameters
 from drive_law.params import AduParameters
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import (
-    Degrees,
-    DegreesPerSecond,
-    Json,
-    Pairs,
-    Radians,
-    RadiansPerSecond,
-    Seconds,
-    Times,
-)
+from pedestal_common.quantities import Degrees, DegreesPerSecond, Json, Pairs, Radians, Seconds, Times
 from pedestal_recording.recording import Recording
 
 
@@ -66,17 +56,14 @@ class Exercise:
     changes: Mapping[str, Json] = dataclasses.field(default_factory=dict)   # {'node.key': value} of simulated nodes
     alarms: tuple[str, ...] = ()                    # names of alarms that belong to it; any other ends the sequence
 
-    def breach(self, angles: Iterable[Radians], rates: Iterable[RadiansPerSecond], alarms: Iterable[str]) -> str:
-        """Return the reason why the antenna must stop, '' for none. angles, rates: of the encoders, NaN if unknown;
-        alarms: names of the listed alarms."""
-        foreign = [name for name in alarms if name not in self.alarms]
-        reasons = [f'alarm {", ".join(foreign)}'] if foreign else []
-        for axis, span, angle, rate in zip(AXES, self.envelope, map(math.degrees, angles), map(math.degrees, rates)):
+    def outside(self, angles: Iterable[Degrees], rates: Iterable[DegreesPerSecond]) -> str:
+        """Return how the antenna is outside its envelope, '' inside it. angles, rates: values of the encoders."""
+        for axis, span, angle, rate in zip(AXES, self.envelope, angles, rates):
             if angle < span.low or angle > span.high:
-                reasons.append(f'{axis} {angle:.3f} deg is outside {span.low:.3f} to {span.high:.3f} deg')
+                return f'{axis} {angle:.3f} deg: outside its envelope, {span.low:.3f} to {span.high:.3f} deg'
             if abs(rate) > span.rate:
-                reasons.append(f'{axis} turns at {rate:.3f} deg/s, must be at most {span.rate:.3f} deg/s')
-        return '; '.join(reasons)
+                return f'{axis} {rate:.3f} deg/s: outside its envelope, -{span.rate:.3f} to {span.rate:.3f} deg/s'
+        return ''
 
 
 class Executed(NamedTuple):
@@ -96,6 +83,17 @@ class Performed:
     begin: Seconds                  # stamp of the begin, in the time of the recording
     executed: tuple[Executed, ...]
     bag: pathlib.Path | None = None     # None: in memory
+
+    def times(self, command: str) -> list[Seconds]:
+        """Return the times of the actions with a command, since the begin. Raises ValueError if one of them was
+        refused, and without any."""
+        found = [done for done in self.executed if done.action.command.split()[0] == command]
+        for done in found:
+            if not done.granted:
+                raise ValueError(f'{done.action.command}: {done.reply}')
+        if not found:
+            raise ValueError(f'{command}: was not executed')
+        return [done.t for done in found]
 
 
 class Performer(Protocol):

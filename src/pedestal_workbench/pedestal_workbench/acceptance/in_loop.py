@@ -86,5 +86,6 @@ def _breach(loop: Loop, exercise: Exercise) -> str:
     """Return the reason why the antenna must stop after the last step, '' for none."""
     acu, axes = loop.units['acu'], [loop.units['adu'].parts['outputs'][axis] for axis in AXES]
     assert isinstance(acu, Acu)
-    return exercise.breach([axis['position'] for axis in axes], [axis['velocity'] for axis in axes],
-                           [ALARM_NAMES[i] for i in report.order(acu.alarms)])
+    foreign = [name for name in (ALARM_NAMES[i] for i in report.order(acu.alarms)) if name not in exercise.alarms]
+    return f'alarm {", ".join(foreign)}' if foreign else exercise.outside(
+        [math.degrees(axis['position']) for axis in axes], [math.degrees(axis['velocity']) for axis in axes])

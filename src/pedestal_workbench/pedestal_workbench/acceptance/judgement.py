@@ -52,12 +52,9 @@ def judged(requirement: Requirement, repetitions: Sequence[Measured], reason: st
         z, z_95 = ndtri(0.5 * (1.0 + levels))
         half = math.hypot(high - mean if len(values) > 1 else 0.0, z / z_95 * math.hypot(*own) / len(own))
     if math.isnan(value) or math.isnan(half):
-        return Judged(math.nan, math.nan, INCONCLUSIVE, tuple(repetitions), reason)
+        return Judged(math.nan, math.nan, INCONCLUSIVE, tuple(repetitions), reason or 'no number for its uncertainty')
     meets, interval = requirement.limit.meets, (value - half, value + half)
-    if all(map(meets, interval)):
-        return Judged(value, half, PASSED, tuple(repetitions))
-    low, high = ends(requirement.limit)
     # Of the values in the interval, the middle of the range, or an end of the interval, meets the limit best.
-    middle = 0.5 * (low + high)
-    best = min(max(middle, interval[0]), interval[1])
-    return Judged(value, half, INCONCLUSIVE if meets(best) else FAILED, tuple(repetitions))
+    best = min(max(0.5 * sum(ends(requirement.limit)), interval[0]), interval[1])
+    verdict = PASSED if all(map(meets, interval)) else INCONCLUSIVE if meets(best) else FAILED
+    return Judged(value, half, verdict, tuple(repetitions))

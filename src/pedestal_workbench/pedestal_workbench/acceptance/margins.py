@@ -15,7 +15,7 @@ from acu_tracker.servo.excitation import MAX_PEAK_RAD_S, MAX_PEAK_SHARE, MAX_SIN
 from pedestal_common.multisine import Sweep
 from pedestal_common.quantities import Floats, RadiansPerSecond
 from pedestal_recording import recording as recordings
-from pedestal_results.intervals import pseudo_values
+from pedestal_results.intervals import half_width, pseudo_values
 from pedestal_workbench.acceptance import servo
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
 from pedestal_workbench.acceptance.method import Arguments, Measured, Method
@@ -63,7 +63,7 @@ def _signals(performed: Performed, arguments: Arguments) -> tuple[Sweep, Floats,
     if missing := recordings.missing(bag, 'joint_states', 'acu/rate_command'):
         raise ValueError(f'the recording holds no {missing}')
     t = bag.table('joint_states')['t']
-    first = int(np.searchsorted(t, performed.begin + servo.executed_at(performed, 1) + 0.5 * SPARE_S
+    first = int(np.searchsorted(t, performed.begin + performed.times('excite')[0] + 0.5 * SPARE_S
                                 + sweep.dropped * sweep.period))
     kept = slice(first, first + sweep.kept * n)
     command = recordings.at(bag, t, 'acu/rate_command', [f'{name}.velocity'])[kept, 0]
@@ -99,7 +99,7 @@ def _measured(performed: Performed, arguments: Arguments, statistic: Callable[[R
             raise ValueError(f'the band from {sweep.lowest:g} to {sweep.highest:g} Hz does not show this value')
         return value
     value, rows = of(list(sent)), list(sent)
-    return Measured(value, math.hypot(servo.half_width(pseudo_values(rows, of)), FRICTION_SHARE * value))
+    return Measured(value, math.hypot(half_width(pseudo_values(rows, of)), FRICTION_SHARE * value))
 
 
 def _margin(metric: str) -> Callable[[Performed, Arguments], Measured]:
@@ -111,6 +111,8 @@ def _resonance(performed: Performed, arguments: Arguments) -> Measured:
     """Return the lowest frequency at which the open loop has a notch, the highest one for none."""
     response = _response(*_signals(performed, arguments))
     known = response.deviation < MAX_NOISE
+    if known.sum() < 2:
+        raise ValueError('the recording shows the open loop at no two frequencies')
     f = response.frequency[known]
     level = 20.0 * np.log10(np.abs(response.open_loop[known]) * f)
     notches, _ = signal.find_peaks(-level, prominence=MIN_NOTCH_DB)

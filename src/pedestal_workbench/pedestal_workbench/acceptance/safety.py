@@ -25,7 +25,7 @@ from pedestal_results import tracking
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
 from pedestal_workbench.acceptance.method import Arguments, Measured, Method
-from pedestal_workbench.acceptance.tracking import NEVER, first, granted, inside, travel
+from pedestal_workbench.acceptance.tracking import NEVER, first, inside, travel
 
 BEGIN_TIME_S, REST_TIME_S = 1.0, 3.0    # time of the first command, and time until an axis has come to rest [s]
 LARGEST_OVERSHOOT_DEG = 1.0     # angle beyond a limit of travel at which the exercise is stopped [deg]
@@ -37,6 +37,7 @@ STANDSTILL_SHARE = 0.02         # rate below which an axis stands after an emerg
 FAULT_TIME_S, RECOVERY_TIME_S = 10.0, 5.0   # time of the begin of a fault, and time after its end [s]
 ENVELOPE_DEG = 10.0             # of a fault outside autotrack, about the motion [deg]
 TRAVEL_SHARE = 0.8              # largest share of the travel that an emergency stop uses [-]
+MIN_RATE_SHARE = 0.9            # least share of the largest rate at an emergency stop [-]
 RAMP_DEG_S = 1.0                # rate of the azimuth in the mode `ramp` of a fault [deg/s]
 REPORT_TOPICS = 'acu/alarms', 'acu/mode', 'adu/state'   # whose changes report a fault
 TARGET_MODES = 'autotrack', 'program', 'tle', 'search', 'acquire'   # modes with an error towards the target
@@ -83,11 +84,15 @@ def _limit(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 
 def _beyond(performed: Performed, arguments: Arguments) -> tuple[Times, Floats]:
-    """Return (times, angles beyond the limit [deg])."""
+    """Return (times, angles beyond the limit [deg]). Raises ValueError if the axis did not come near the limit."""
+    performed.times('rate')
     joints, axis = performed.recording.table('joint_states'), str(arguments['axis'])
     limits = getattr(performed.antenna.acu, axis).limits
     angle = joints[f'{axis}.position']
-    return joints['t'], np.degrees(angle - limits.high if arguments['side'] == 'high' else limits.low - angle)
+    beyond = np.degrees(angle - limits.high if arguments['side'] == 'high' else limits.low - angle)
+    if not np.nanmax(beyond, initial=-math.inf) > -RETURN_DEG:
+        raise ValueError(f'the {axis} stayed more than {RETURN_DEG:g} deg away from its limit')
+    return joints['t'], beyond
 
 
 def _limit_overshoot(performed: Performed, arguments: Arguments) -> Measured:
@@ -98,7 +103,7 @@ def _limit_return(performed: Performed, arguments: Arguments) -> Measured:
     rates = [done for done in performed.executed if done.action.command.startswith('rate ')]
     opposite = next(done for done in rates if done.action.command != rates[0].action.command)
     t, beyond = _beyond(performed, arguments)
-    return first(performed, performed.begin + opposite.t, t, beyond < -RETURN_DEG)
+    return first(performed, opposite.t, t, beyond < -RETURN_DEG)
 
 
 def _stow(antenna: Antenna, arguments: Arguments) -> Exercise:
@@ -128,7 +133,7 @@ def _pins(performed: Performed, command: str, state: str) -> Measured:
     """Return the time from a command until both pins have a state."""
     states = performed.recording.table('adu/stow_pins')
     wanted = ', '.join(f'{axis} {state}' for axis in AXES)
-    return first(performed, granted(performed, 'acu', command), np.array(states['t']),
+    return first(performed, performed.times(command)[-1], np.array(states['t']),
                  np.array([text == wanted for text in states['data']]))
 
 
@@ -136,14 +141,15 @@ def _stow_time(performed: Performed, _: Arguments) -> Measured:
     """Return the time from `stow` until the pins are in or, without pins, until the axes rest at their stow angles."""
     if 'adu/stow_pins' in performed.recording.topics:
         return _pins(performed, 'stow', 'in')
-    begin, acu = granted(performed, 'acu', 'stow'), performed.antenna.acu
+    begin, acu = performed.begin + performed.times('stow')[-1], performed.antenna.acu
     joints = performed.recording.table('joint_states')
     outside = np.logical_or.reduce([
         (np.abs(joints[f'{axis}.position'] - getattr(acu, axis).stow) > acu.stow_window)
         | (np.abs(joints[f'{axis}.velocity']) > MAX_REST_RATE_RAD_S) for axis in AXES])
     if outside[-1]:
         return NEVER
-    return Measured(float(joints['t'][outside & (joints['t'] >= begin)][-1]) - begin, performed.antenna.period)
+    last = joints['t'][outside & (joints['t'] >= begin)].max(initial=begin)
+    return Measured(float(last) - begin, performed.antenna.period)
 
 
 def _unstow_time(performed: Performed, _: Arguments) -> Measured:
@@ -172,10 +178,13 @@ def _emergency(antenna: Antenna, arguments: Arguments) -> Exercise:
 def _stopping(performed: Performed, arguments: Arguments) -> tuple[Seconds, Degrees]:
     """Return time and angle from the emergency stop to the standstill of the axis. The angle counts from the step
     before the request, which acts within a step."""
-    begin, joints = granted(performed, DRIVE_NODE, EMERGENCY_STOP), performed.recording.table('joint_states')
+    begin, joints = performed.begin + performed.times(EMERGENCY_STOP)[-1], performed.recording.table('joint_states')
     during = (joints['t'] > begin - 1.5 * performed.antenna.period) & (joints['t'] < begin + REST_TIME_S)
     t, rate, angle = (joints[name][during] for name in ('t', *(f'{arguments["axis"]}.{part}'
                                                                for part in ('velocity', 'position'))))
+    full = getattr(performed.antenna.acu, str(arguments['axis'])).shaper.rate
+    if not np.abs(rate[:1]).sum() > MIN_RATE_SHARE * full:
+        raise ValueError(f'the {arguments["axis"]} did not move at its largest rate, {math.degrees(full):.4g} deg/s')
     moving = np.flatnonzero(np.abs(rate) > STANDSTILL_SHARE * abs(rate[0]))
     if moving[-1] == t.size - 1:
         return math.inf, math.inf
@@ -217,8 +226,7 @@ def _faulty(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _onset(performed: Performed, arguments: Arguments) -> Seconds:
     """Return the time of the fault. Raises ValueError where the antenna was not in its mode then."""
-    node, _, fault = str(arguments['fault']).partition('.')
-    begin = granted(performed, node, fault)
+    begin = performed.begin + performed.times(str(arguments['fault']).partition('.')[2])[-1]
     mode = recordings.modes(performed.recording, np.array([begin - performed.antenna.period]))[0]
     wanted = 'autotrack' if arguments['mode'] == 'autotrack' else 'preset'
     if mode != wanted:
@@ -232,7 +240,7 @@ def _fault_report(performed: Performed, arguments: Arguments) -> Measured:
     end = begin + float(arguments['duration']) + RECOVERY_TIME_S
     times = np.sort(np.concatenate([recording.table(topic)['t'] for topic in REPORT_TOPICS
                                     if topic in recording.topics]))
-    return first(performed, begin, times, times < end)
+    return first(performed, begin - performed.begin, times, times < end)
 
 
 def _fault_error(performed: Performed, arguments: Arguments) -> Measured:
@@ -245,6 +253,8 @@ def _fault_error(performed: Performed, arguments: Arguments) -> Measured:
     errors = run.following
     if towards:
         errors = tracking.DEG_PER_RAD * (run.error if np.isfinite(run.error).any() else run.measured)
+    if towards and during.any() and not np.isfinite(errors[during]).any():
+        raise ValueError('the recording holds no error during the fault')
     known = np.nan_to_num(errors[during])   # no error counts where the fault ends the mode at once
     return Measured(float(np.hypot(*known.T).max(initial=0.0)), 0.0)
 

@@ -4,7 +4,7 @@ Each exercise moves one axis beside the middle of its travel, where its teeth ar
 minus load encoder; the reference is the shaped one, so that a planned acceleration is no error.
 """
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from pedestal_common.quantities import Bools, Degrees, Floats, Radians, RadiansP
 from pedestal_common.wire.commands import Argument
 from pedestal_recording import recording as recordings
 from pedestal_results import metrics, tracking
-from pedestal_results.intervals import interval, pseudo_values
+from pedestal_results.intervals import half_width, pseudo_values
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed, Span, Track
 from pedestal_workbench.acceptance.method import Arguments, Measured, Method
 from pedestal_workbench.calibration.drive import motion_data
@@ -25,7 +25,7 @@ PLACE_SHARE, TRAVEL_SHARE = 0.53, 0.8   # place of the exercises in the travel, 
 MARGIN_DEG, MARGIN_RATE = 1.0, 2.0      # of the envelope around angles, factor of it on rates [deg, -]
 LARGEST_SHARE = 0.8     # of the shaper's rate and acceleration, for which 0 stands in an argument [-]
 PART_COUNT, CYCLE_COUNT = 10, 4         # parts of a jackknife, motions forth and back
-BEGIN_S = 1.0           # first command of an exercise [s]
+BEGIN_S, REST_S = 1.0, 1.0              # time of the first command of an exercise, and rest after a motion [s]
 AXIS = Argument('axis', 'axis', options=AXES, default=AXES[0])
 
 
@@ -55,15 +55,15 @@ class Plan(NamedTuple):
         low, high, _ = spans[self.number]
         spans[self.number] = Span(low - around, high + around, 1.0 + math.degrees(min(MARGIN_RATE * rate,
                                                                                       1.2 * self.rate)))
-        return Exercise(math.ceil(duration), (spans[0], spans[1]), actions, (begin[0], begin[1]), track,
-                        {'scenario.program.source': 'none'} if track else {})
+        return Exercise(math.ceil(duration), (spans[0], spans[1]), actions, (begin[0], begin[1]), track)
 
-    def both_ways(self, way: Radians, rate: RadiansPerSecond, cycles: int) -> Exercise:
-        """Return the exercise that moves along a way at a constant rate, forth and back several times."""
-        time, signs = way / rate, (1.0, -1.0) * cycles
-        moves = [self.preset(BEGIN_S + k * (time + 1.0), -0.5 * sign * way, sign * rate, time)
-                 for k, sign in enumerate(signs)]
-        return self.exercise(BEGIN_S + len(moves) * (time + 1.0), 0.5 * way, rate, *moves, start=-0.5 * way)
+    def motions(self, way: Radians, rate: RadiansPerSecond, count: int = 1, rest: Seconds = 0.0) -> Exercise:
+        """Return the exercise that moves along a way at a constant rate, forth and back in turn. rest: time between
+        two motions."""
+        time = way / rate
+        moves = [self.preset(BEGIN_S + k * (time + rest), -0.5 * sign * way, sign * rate, time)
+                 for k, sign in enumerate((1.0, -1.0) * count)][:count]
+        return self.exercise(BEGIN_S + count * (time + rest), 0.5 * way, rate, *moves, start=-0.5 * way)
 
     def checked(self, arguments: Arguments, name: str, largest: float, unit: str) -> float:
         """Return an argument. Raises ValueError above its largest value."""
@@ -142,22 +142,6 @@ def followed(performed: Performed, arguments: Arguments) -> Followed:
                     360.0 / 2**drive.encoder.load_bits if drive else 0.0)
 
 
-def executed_at(performed: Performed, number: int) -> Seconds:
-    """Return the time of the action of this number. Raises ValueError if it was refused."""
-    if number >= len(performed.executed):
-        raise ValueError(f'only {len(performed.executed)} commands of the exercise were executed')
-    done = performed.executed[number]
-    if not done.granted:
-        raise ValueError(f'{done.action.command}: {done.reply}')
-    return done.t
-
-
-def half_width(values: Sequence[float] | Floats) -> float:
-    """Return the half width of the interval of a mean."""
-    _, low, high = interval(values)
-    return 0.5 * (high - low)
-
-
 def over_parts(values: Floats, statistic: Callable[[Floats], float]) -> Measured:
     """Return a statistic of a stretch of values, with the jackknife over its parts. Raises ValueError."""
     if len(values) < 2 * PART_COUNT:
@@ -179,6 +163,7 @@ def _slew(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _slews(performed: Performed, arguments: Arguments) -> tuple[Followed, list[tuple[int, int]]]:
     """Return the motion, and the steps of the middle half of the way of both slews. Raises ValueError."""
+    performed.times('preset')
     motion = followed(performed, arguments)
     low, high = np.percentile(motion.angle, (0.5, 99.5))
     found = tracking.stretches(np.abs(motion.angle - 0.5 * (low + high)) < 0.25 * (high - low))
@@ -220,7 +205,7 @@ def _brake(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _braking_distance(performed: Performed, arguments: Arguments) -> Measured:
     motion, full = followed(performed, arguments), math.degrees(plan(performed.antenna, arguments).rate)
-    at = executed_at(performed, 1)
+    at = performed.times('stop')[0]
     rate = float(np.abs(np.interp(at, motion.t, motion.rate)))
     if rate < 0.9 * full:
         raise ValueError(f'the axis stops from {rate:.4g} deg/s, must be from {full:.4g} deg/s')
@@ -230,23 +215,17 @@ def _braking_distance(performed: Performed, arguments: Arguments) -> Measured:
 
 # Errors of motions.
 
-def _ramp(duration: Seconds) -> Callable[[Antenna, Arguments], Exercise]:
-    def exercise(antenna: Antenna, arguments: Arguments) -> Exercise:
-        axis = plan(antenna, arguments)
-        rate = axis.rate_of(arguments)
-        time = min(duration, axis.travel / rate)
-        half = 0.5 * rate * time
-        return axis.exercise(BEGIN_S + time, half, rate, axis.preset(BEGIN_S, -half, rate, time), start=-half)
-    return exercise
+def _ramp(antenna: Antenna, arguments: Arguments) -> Exercise:
+    axis = plan(antenna, arguments)
+    rate = axis.rate_of(arguments)
+    return axis.motions(min(rate * float(arguments['duration']), axis.travel), rate)
 
 
-def _ramp_error(duration: Seconds) -> Callable[[Performed, Arguments], Measured]:
-    def measure(performed: Performed, arguments: Arguments) -> Measured:
-        axis, at = plan(performed.antenna, arguments), executed_at(performed, 0)
-        rate = axis.rate_of(arguments)
-        return followed(performed, arguments).rms_error(at + axis.settling(rate),
-                                                        at + min(duration, axis.travel / rate))
-    return measure
+def _ramp_error(performed: Performed, arguments: Arguments) -> Measured:
+    axis, at = plan(performed.antenna, arguments), performed.times('preset')[0]
+    rate = axis.rate_of(arguments)
+    return followed(performed, arguments).rms_error(
+        at + axis.settling(rate), at + min(float(arguments['duration']), axis.travel / rate))
 
 
 def _stand(antenna: Antenna, arguments: Arguments) -> Exercise:
@@ -271,7 +250,7 @@ def _sine(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 
 def _sine_error(performed: Performed, arguments: Arguments) -> Measured:
-    executed_at(performed, 0)
+    performed.times('program')
     return followed(performed, arguments).rms_error(2.0 * BEGIN_S + 1.0 / float(arguments['frequency']))
 
 
@@ -286,7 +265,7 @@ def _step(antenna: Antenna, arguments: Arguments) -> Exercise:
 def _stepped(performed: Performed, arguments: Arguments) -> tuple[Times, Floats, Degrees, Degrees]:
     """Return (times after the command, response [deg], its size [deg], noise of the encoder [deg]). Raises ValueError
     without a step."""
-    motion, at = followed(performed, arguments), executed_at(performed, 1)
+    motion, at = followed(performed, arguments), performed.times('preset')[1]
     reference, after = motion.angle + motion.error, motion.t >= at
     before = reference[motion.t < at][-1]
     size = float(reference[-1] - before)
@@ -311,25 +290,25 @@ def _settling(performed: Performed, arguments: Arguments) -> Measured:
     return Measured(value, max(0.5 * performed.antenna.period, *(abs(each - value) for each in around)))
 
 
-REVERSAL_S, GUST_S = 4.0, 3.0   # time between two reversals, and length of a gust and of the rest after it [s]
+REVERSAL_S, REVERSAL_COUNT = 4.0, 6     # time between two reversals [s], and their number
+GUST_S = 3.0    # length of a gust and of the rest after it [s]
 
 
-def _peaks(actions: Sequence[int], time: Seconds) -> Callable[[Performed, Arguments], Measured]:
-    """Return the measure of the mean of the largest errors within a time after some actions."""
+def _peaks(command: str, dropped: int, time: Seconds) -> Callable[[Performed, Arguments], Measured]:
+    """Return the measure of the mean of the largest errors within a time after each of the actions with a command.
+    dropped: number of first actions that do not count."""
     def measure(performed: Performed, arguments: Arguments) -> Measured:
         motion = followed(performed, arguments)
         peaks = [metrics.peak(motion.error[motion.between(at, at + time)])
-                 for at in (executed_at(performed, number) for number in actions)]
+                 for at in performed.times(command)[dropped:]]
         return Measured(float(np.mean(peaks)), math.hypot(half_width(peaks), motion.resolution / math.sqrt(12.0)))
     return measure
 
 
 def _reversals(antenna: Antenna, arguments: Arguments) -> Exercise:
     axis = plan(antenna, arguments)
-    rate, half = axis.rate_of(arguments), 0.5 * axis.rate_of(arguments) * REVERSAL_S
-    moves = [axis.preset(BEGIN_S + k * REVERSAL_S, -sign * half, sign * rate, REVERSAL_S)
-             for k, sign in enumerate((1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0))]
-    return axis.exercise(BEGIN_S + len(moves) * REVERSAL_S, half, rate, *moves, start=-half)
+    rate = axis.rate_of(arguments)
+    return axis.motions(rate * REVERSAL_S, rate, 1 + REVERSAL_COUNT)
 
 
 def _gusts(antenna: Antenna, arguments: Arguments) -> Exercise:
@@ -347,7 +326,7 @@ def _mechanics(antenna: Antenna, arguments: Arguments) -> Exercise:
     axis = plan(antenna, arguments)
     drive_of(antenna, axis.name)
     rate = axis.rate_of(arguments)
-    return axis.both_ways(min(5.0 * rate, axis.travel), rate, CYCLE_COUNT)
+    return axis.motions(min(5.0 * rate, axis.travel), rate, 2 * CYCLE_COUNT, REST_S)
 
 
 def _pinion_turn(antenna: Antenna, arguments: Arguments) -> Exercise:
@@ -356,7 +335,7 @@ def _pinion_turn(antenna: Antenna, arguments: Arguments) -> Exercise:
     if way > axis.travel:
         raise ValueError(f'a turn of the pinion needs {math.degrees(way):.4g} deg of the {axis.name}: must be at most '
                          f'{math.degrees(axis.travel):.4g} deg')
-    return axis.both_ways(way, axis.rate_of(arguments), 1)
+    return axis.motions(way, axis.rate_of(arguments), 2, REST_S)
 
 
 def _per_way(performed: Performed, arguments: Arguments, of: Callable[[Motion], Floats],
@@ -365,8 +344,8 @@ def _per_way(performed: Performed, arguments: Arguments, of: Callable[[Motion], 
     Each way has the same angles, without those in which the axis accelerates. Raises ValueError."""
     axis, actions = plan(performed.antenna, arguments), performed.exercise.actions
     motion = motion_data.read(performed.recording, axis.name, drive_of(performed.antenna, axis.name))
-    rate, begins = axis.rate_of(arguments), [executed_at(performed, k) for k in range(len(actions))]
-    way = rate * (actions[1].at - actions[0].at - 1.0)
+    rate, begins = axis.rate_of(arguments), performed.times('preset')
+    way = rate * (actions[1].at - actions[0].at - REST_S)
     inside = np.abs(motion.theta - axis.place[axis.number]) < 0.5 * way - min(0.3 * way, rate * axis.settling(rate))
     t, values, found = motion.t - performed.begin, of(motion), []
     for begin, end in zip(begins, (*begins[1:], performed.exercise.duration)):
@@ -414,8 +393,11 @@ def _rate(default: float) -> Argument:
                     default=default)
 
 
+def _duration(default: Seconds) -> Argument:
+    return Argument('duration', 'duration, less where the travel ends it', 5.0, 3600.0, 's', default=default)
+
+
 SIZE = Argument('size', 'size of the step', 1e-3, 180.0, 'deg', default=1.0)
-RAMP_S, CREEP_S = 12.0, 60.0    # longest duration of a ramp and of a creep [s]
 
 METHODS = (
     Method('slew_rate', 'rate of a slew to a distant preset, forth and back', 'deg/s', '>=', (AXIS,), _slew,
@@ -424,8 +406,8 @@ METHODS = (
            _acceleration),
     Method('braking_distance', 'distance from the command `stop` at the largest rate to rest', 'deg', '<=', (AXIS,),
            _brake, _braking_distance),
-    Method('ramp_error', 'rms following error at a constant rate', 'deg', '<=', (AXIS, _rate(1.0)), _ramp(RAMP_S),
-           _ramp_error(RAMP_S)),
+    Method('ramp_error', 'rms following error at a constant rate', 'deg', '<=', (AXIS, _rate(1.0), _duration(12.0)),
+           _ramp, _ramp_error),
     Method('sine_error', 'rms following error in a sine, a program track', 'deg', '<=', (
         AXIS, Argument('frequency', 'frequency', 0.01, 5.0, 'Hz', default=0.1),
         Argument('amplitude', 'amplitude; 0: 1 deg, or less by rate and acceleration', 0.0, 45.0, 'deg',
@@ -434,15 +416,14 @@ METHODS = (
            _step, _overshoot),
     Method('step_settling', 'time after a step of the preset until the load encoder stays within a band', 's', '<=', (
         AXIS, SIZE, Argument('band', 'half width of the band', 1e-4, 10.0, 'deg', default=0.01)), _step, _settling),
-    Method('standstill_rms', 'rms error at rest', 'deg', '<=', (
-        AXIS, Argument('duration', 'duration', 5.0, 3600.0, 's', default=60.0)), _stand, _standstill_rms),
-    Method('creep_rms', 'rms error at a very low rate', 'deg', '<=', (AXIS, _rate(0.005)), _ramp(CREEP_S),
-           _ramp_error(CREEP_S)),
+    Method('standstill_rms', 'rms error at rest', 'deg', '<=', (AXIS, _duration(60.0)), _stand, _standstill_rms),
+    Method('creep_rms', 'rms error at a very low rate', 'deg', '<=', (AXIS, _rate(0.005), _duration(60.0)), _ramp,
+           _ramp_error),
     Method('reversal_error', 'mean of the largest errors after six reversals of a rate', 'deg', '<=',
-           (AXIS, _rate(0.1)), _reversals, _peaks(range(1, 7), 0.75 * REVERSAL_S)),
+           (AXIS, _rate(0.1)), _reversals, _peaks('preset', 1, 0.75 * REVERSAL_S)),
     Method('gust_error', 'mean of the largest errors after the begin of four injected gusts', 'deg', '<=', (
         AXIS, Argument('torque', 'torque of the gust', 1.0, 1e5, 'Nm', default=1000.0)), _gusts,
-        _peaks(range(4), GUST_S), simulated=True),
+        _peaks('gust', 0, GUST_S), simulated=True),
     Method('lash', 'angle between both motors at the load while they pull against each other: lash and wind-up',
            'deg', '<=', (AXIS, _rate(0.2)), _mechanics, _lash),
     Method('bias', 'torque with which both motors pull against each other, on the motor shaft', 'Nm', '>=',

@@ -45,12 +45,6 @@ class Requirement(NamedTuple):
         """Name of its files, without an ending."""
         return NO_FILE_PATTERN.sub('_', self.name)
 
-    def exercise(self, antenna: Antenna) -> Exercise:
-        """Return the exercise with an antenna. Raises ValueError for what the antenna cannot do."""
-        if self.method.simulated and antenna.adu is None:
-            raise ValueError(f'method = {self.method.name!r}: needs a simulated drive; this drive is real')
-        return self.method.exercise(antenna, self.arguments)
-
 
 class Specification(NamedTuple):
     """A checked specification."""
@@ -66,8 +60,11 @@ class Specification(NamedTuple):
         """Return the exercise of each requirement. Raises ValueError with a line for each one that does not fit."""
         exercises, problems = [], []
         for requirement in self.requirements:
+            method = requirement.method
             try:
-                exercises.append(requirement.exercise(antenna))
+                if method.simulated and antenna.adu is None:
+                    raise ValueError(f'method = {method.name!r}: needs a simulated drive; this drive is real')
+                exercises.append(method.exercise(antenna, requirement.arguments))
             except ValueError as error:
                 problems.append(f'requirement {requirement.name!r}: {error}')
         if problems:

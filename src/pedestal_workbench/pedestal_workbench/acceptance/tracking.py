@@ -11,7 +11,6 @@ The program track of a simulated target has no error. The level of beacon and ma
 import dataclasses
 import itertools
 import math
-from typing import TypeAlias
 
 import numpy as np
 
@@ -39,17 +38,12 @@ CROSS_TALK = 'cross-talk'
 CHANNELS = {'cross-elevation': (0, 0), 'elevation': (1, 1), CROSS_TALK: (0, 1)}     # row and column of the slopes
 NEVER = Measured(math.inf, 0.0)     # time until an event that does not come
 
-Changes: TypeAlias = dict[str, Json]    # {'node.key': value}
-
 
 def _target(*options: str) -> Argument:
     return Argument('target', 'target that the antenna follows', options=options, default=options[0])
 
 
-def _duration(default: Seconds) -> Argument:
-    return Argument('duration', 'duration of the exercise', 15.0, 3600.0, 's', default=default)
-
-
+_DURATION = Argument('duration', 'duration of the exercise', 15.0, 3600.0, 's', default=40.0)
 _PLACE = (Argument('azimuth', 'azimuth of beacon or manoeuvre', -360.0, 360.0, 'deg', default=0.0),
           Argument('elevation', 'elevation of beacon or manoeuvre', 0.0, 90.0, 'deg', default=35.0))
 
@@ -91,14 +85,14 @@ def _amplitude(antenna: Antenna, arguments: Arguments) -> Radians:
     return acceleration / w**2
 
 
-def simulated(antenna: Antenna, arguments: Arguments) -> Changes:
-    """Return the changes for a target. Raises ValueError for a target that the antenna cannot have."""
+def simulated(antenna: Antenna, arguments: Arguments) -> dict[str, Json]:
+    """Return {'node.key': value} for a target. Raises ValueError for a target that the antenna cannot have."""
     target = arguments['target']
     if target == 'own':
         return {}
     if RECEIVER not in antenna.simulated:
         raise ValueError(f'target = {target}: must be own, because this antenna has no simulated target')
-    found: Changes = {f'scenario.program.{name}_offset': 0.0 for name in ('time', *AXES)}
+    found: dict[str, Json] = {f'scenario.program.{name}_offset': 0.0 for name in ('time', *AXES)}
     of_target = f'{RECEIVER}.target'
     if target == 'pass':
         return {**found, f'{of_target}.kind': 'leo_pass', f'{of_target}.leo_pass.start_time': ''}
@@ -148,16 +142,6 @@ def _offsets(antenna: Antenna, arguments: Arguments) -> Exercise:
     return Exercise((1 + len(offsets)) * POINT_TIME_S, travel(antenna), tuple(actions), start, changes=changes)
 
 
-def granted(performed: Performed, node: str, command: str) -> Seconds:
-    """Return the time in the recording of the last action of a node with a command. Raises ValueError unless it was
-    granted."""
-    *_, done = (done for done in performed.executed if done.action.node == node
-                and done.action.command.split()[0] == command)
-    if not done.granted:
-        raise ValueError(f'{done.action.command}: {done.reply}')
-    return performed.begin + done.t
-
-
 def _of_blocks(errors: Pairs, value: float) -> Measured:
     """Return an rms of errors in the order of time with its uncertainty, by the jackknife over blocks.
 
@@ -166,10 +150,9 @@ def _of_blocks(errors: Pairs, value: float) -> Measured:
     """
     values = intervals.pseudo_values(np.array_split(errors, BLOCK_COUNT),
                                      lambda blocks: tracking.known_rms(np.concatenate(blocks)))
-    _, low, high = intervals.interval(values)
     rest = values - values.mean()
     r = min(max(float(rest[1:] @ rest[:-1] / (rest @ rest)), 0.0), MAX_CORRELATION)
-    return Measured(value, 0.5 * (high - low) * math.sqrt((1.0 + r) / (1.0 - r)))
+    return Measured(value, intervals.half_width(values) * math.sqrt((1.0 + r) / (1.0 - r)))
 
 
 def _autotrack_rms(performed: Performed, _: Arguments) -> Measured:
@@ -195,43 +178,41 @@ def _pointing_offset(performed: Performed, _: Arguments) -> Measured:
     return Measured(size, 0.5 * math.hypot(x * (x_high - x_low), y * (y_high - y_low)) / size)
 
 
-def first(performed: Performed, begin: Seconds, t: Times, met: Bools) -> Measured:
-    """Return the time from `begin` to the first of the times t that meets a condition."""
-    times = t[(t >= begin) & met]
-    return Measured(float(times[0]) - begin, performed.antenna.period) if times.size else NEVER
+def first(performed: Performed, since: Seconds, t: Times, met: Bools) -> Measured:
+    """Return the time from a time since the begin of the exercise to the first of the times t that meets a condition.
+    """
+    times = t[(t >= performed.begin + since) & met]
+    return Measured(float(times[0]) - (performed.begin + since), performed.antenna.period) if times.size else NEVER
 
 
 def _acquisition_time(performed: Performed, _: Arguments) -> Measured:
     run = RecordedRun(performed.recording).evaluated
-    return first(performed, granted(performed, 'acu', 'program'), run.t, run.mode == 'autotrack')
+    return first(performed, performed.times('program')[-1], run.t, run.mode == 'autotrack')
 
 
 def _fade_recovery(performed: Performed, arguments: Arguments) -> Measured:
     run, end = RecordedRun(performed.recording).evaluated, float(arguments['fade'])
-    return first(performed, granted(performed, RECEIVER, 'fade') + end, run.t,
+    return first(performed, performed.times('fade')[-1] + end, run.t,
                  (run.mode == 'autotrack') & np.isfinite(run.measured[:, 0]))
 
 
-def _slopes(performed: Performed) -> matrix.RealSlopes:
-    """Return the slopes of the errors as the control unit uses them."""
-    points = beacon_offsets.read(performed.recording)
-    corrected = points.errors @ tracking.error_matrix(performed.recording).T
-    return matrix.fit(points.offsets[points.fitted], corrected[points.fitted])
-
-
 def _slope(performed: Performed, arguments: Arguments) -> Measured:
-    slopes, channel = _slopes(performed), arguments['channel']
+    """Return a slope of the errors as the control unit uses them."""
+    performed.times('preset')
+    points, channel = beacon_offsets.read(performed.recording), arguments['channel']
+    corrected = points.errors @ tracking.error_matrix(performed.recording).T
+    slopes = matrix.fit(points.offsets[points.fitted], corrected[points.fitted])
     row, column = CHANNELS[str(channel)]
     if channel == CROSS_TALK and abs(slopes.C[column, row]) > abs(slopes.C[row, column]):
         row, column = column, row
     return Measured(float(slopes.C[row, column]), float(slopes.half[row, column]))
 
 
-_TRACKED = (_target('pass', 'beacon', 'own'), *_PLACE, _duration(40.0))
+_TRACKED = (_target('pass', 'beacon', 'own'), *_PLACE, _DURATION)
 METHODS = (
     Method('autotrack_rms', 'follow a target in autotrack: rms pointing error of both axes together, against the '
            'truth of the target or, without truth, by the receiver', 'deg', '<=',
-           (_target('beacon', 'pass', 'manoeuvre', 'own'), *_PLACE, _duration(40.0),
+           (_target('beacon', 'pass', 'manoeuvre', 'own'), *_PLACE, _DURATION,
             Argument('acceleration', 'largest acceleration of the manoeuvre', 1e-3, 100.0, 'deg/s2', default=0.1)),
            _follow, _autotrack_rms),
     Method('program_rms', 'follow a target by its program track: rms pointing error of both axes together', 'deg',
