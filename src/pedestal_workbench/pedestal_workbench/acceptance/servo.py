@@ -17,7 +17,7 @@ from pedestal_recording import recording as recordings
 from pedestal_results import metrics, tracking
 from pedestal_results.intervals import interval, pseudo_values
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed, Span, Track
-from pedestal_workbench.acceptance.method import Arguments, Measured, Method
+from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method
 from pedestal_workbench.calibration.drive import motion_data
 from pedestal_workbench.calibration.drive.motion_data import Motion
 
@@ -137,9 +137,13 @@ def followed(performed: Performed, arguments: Arguments) -> Followed:
     known = (t > -1e-9) & (t < performed.exercise.duration + 1e-9) & np.isfinite(angle) & np.isfinite(reference)
     if known.sum() < 2 * PART_COUNT:
         raise ValueError(f'the recording holds only {known.sum()} steps of the exercise')
-    drive: AxisParameters | None = getattr(performed.antenna.adu, name, None)
-    return Followed(t[known], angle[known], (reference - angle)[known],
-                    360.0 / 2**drive.encoder.load_bits if drive else 0.0)
+    return Followed(t[known], angle[known], (reference - angle)[known], resolution(performed.antenna, name))
+
+
+def resolution(antenna: Antenna, name: str) -> Degrees:
+    """Return the resolution of the load encoder of an axis, 0 if it is not known."""
+    drive: AxisParameters | None = getattr(antenna.adu, name, None)
+    return 360.0 / 2**drive.encoder.load_bits if drive else 0.0
 
 
 def executed_at(performed: Performed, number: int) -> Seconds:
@@ -306,7 +310,8 @@ def _settling(performed: Performed, arguments: Arguments) -> Measured:
     band = float(arguments['band'])
     found = [metrics.settling_time(t, y, size, max(width, noise) / size)
              for width in (band, band + 2.0 * noise, band - 2.0 * noise)]
-    # A response that does not settle counts as settled at its end.
+    if math.isnan(found[0]):
+        return NEVER
     value, *around = (float(t[-1]) if math.isnan(each) else each for each in found)
     return Measured(value, max(0.5 * performed.antenna.period, *(abs(each - value) for each in around)))
 

@@ -22,7 +22,7 @@ from pedestal_results import intervals, tracking
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_results.results import RESULT_BY_NAME
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed, Span
-from pedestal_workbench.acceptance.method import Arguments, Measured, Method
+from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method
 from pedestal_workbench.calibration import collect, predicted
 from pedestal_workbench.calibration.receiver import beacon_offsets, matrix
 
@@ -37,7 +37,6 @@ POINT_TIME_S, CIRCLE_POINTS = 2.5, 8        # time at each offset about the beac
 CROSS_BEAMWIDTHS = (0.2, -0.2, 0.1, -0.1)   # offsets about the beacon on each axis [beamwidths]
 CROSS_TALK = 'cross-talk'
 CHANNELS = {'cross-elevation': (0, 0), 'elevation': (1, 1), CROSS_TALK: (0, 1)}     # row and column of the slopes
-NEVER = Measured(math.inf, 0.0)     # time until an event that does not come
 
 Changes: TypeAlias = dict[str, Json]    # {'node.key': value}
 
