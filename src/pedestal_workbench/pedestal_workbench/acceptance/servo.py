@@ -289,7 +289,8 @@ def _step(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _stepped(performed: Performed, arguments: Arguments) -> tuple[Times, Floats, Degrees, Degrees]:
     """Return (times after the command, response [deg], its size [deg], noise of the encoder [deg]). Raises ValueError
-    without a step."""
+    without a step. Twice the noise is at least a step of the encoder and its interpolation error, which no angle at
+    rest shows."""
     motion, at = followed(performed, arguments), executed_at(performed, 1)
     reference, after = motion.angle + motion.error, motion.t >= at
     before = reference[motion.t < at][-1]
@@ -297,7 +298,10 @@ def _stepped(performed: Performed, arguments: Arguments) -> tuple[Times, Floats,
     if size < 0.5 * float(arguments['size']):
         raise ValueError(f'the reference moved by {size:.4g} deg in the step, must be {arguments["size"]} deg')
     noise = float(np.std(motion.error[motion.t > motion.t[-1] - 2.0]))
-    return motion.t[after] - at, motion.angle[after] - before, size, max(noise, motion.resolution / math.sqrt(12.0))
+    drive: AxisParameters | None = getattr(performed.antenna.adu, str(arguments['axis']), None)
+    waves = math.degrees(drive.encoder.error.interpolation) if drive else 0.0
+    return (motion.t[after] - at, motion.angle[after] - before, size,
+            max(noise, 0.5 * math.hypot(motion.resolution, waves)))
 
 
 def _overshoot(performed: Performed, arguments: Arguments) -> Measured:
