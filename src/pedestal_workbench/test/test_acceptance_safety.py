@@ -52,6 +52,7 @@ def test_angle_beyond_a_limit_is_the_overshoot():
     judged = dataclasses.replace(done, antenna=done.antenna._replace(acu=stricter))
     found = METHODS['limit_overshoot'].measure(judged, arguments('limit_overshoot'))
     assert found.value == pytest.approx(1.0, abs=0.01)
+    assert found.uncertainty == 360.0 / 2**done.antenna.adu.azimuth.encoder.load_bits
 
 
 def test_a_limit_that_the_axis_does_not_reach_is_not_measured():
@@ -77,7 +78,8 @@ def test_emergency_stop_takes_the_distance_of_the_deceleration(scenario, axis):
     done = performed(Variant(scenario), 'emergency_stop_angle', axis=axis)
     rate = getattr(done.antenna.acu, axis).shaper.rate
     deceleration = getattr(done.antenna.adu, axis).limits.deceleration
-    angle = METHODS['emergency_stop_angle'].measure(done, {'axis': axis}).value
+    angle, uncertainty = METHODS['emergency_stop_angle'].measure(done, {'axis': axis})
+    assert uncertainty == pytest.approx(math.degrees(rate) * done.antenna.period, rel=0.05)     # the way of a step
     assert angle == pytest.approx(math.degrees(rate**2 / (2.0 * deceleration)), rel=0.15)
     time = METHODS['emergency_stop_time'].measure(done, {'axis': axis}).value
     assert 0.95 < time * deceleration / rate < 2.0

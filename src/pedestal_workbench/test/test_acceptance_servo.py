@@ -12,6 +12,7 @@ from pedestal_results import tracking
 from pedestal_workbench.acceptance import margins, servo
 from pedestal_workbench.acceptance.exercise import Executed
 from pedestal_workbench.acceptance.in_loop import InLoop
+from pedestal_workbench.acceptance.method import NEVER
 from pedestal_workbench.acceptance.methods import METHOD_BY_NAME
 from pedestal_workbench.tuning import frequency_response
 from pedestal_workbench.tuning.loops import Loops
@@ -89,9 +90,9 @@ def test_overshoot_and_settling_of_a_step(source):
     assert abs(settling.value - (t[t >= 2.0][outside] - 2.0)) < settling.uncertainty + done.antenna.period
 
 
-def test_a_step_that_does_not_settle_has_the_time_of_its_end():
-    done, found = performed('step_settling', FAST, {'adu.inject': '3 noise sigma=0.0003'}, size=1.0, band=0.01)
-    assert found.value > done.exercise.duration - 2.5
+def test_a_step_that_does_not_settle_never_settles():
+    found = measured('step_settling', FAST, {'adu.inject': '3 noise sigma=0.0003'}, size=1.0, band=0.01)
+    assert found == NEVER
 
 
 def test_standstill_and_creep_stay_at_a_step_of_the_encoder():
@@ -169,12 +170,11 @@ def test_margins_are_those_of_the_study_on_the_same_plant():
 @pytest.mark.parametrize('axis', AXES)
 def test_margins_in_wind_are_those_of_the_study(axis, seed):
     study = frequency_response.margins(Loops(Variant(SLOW)).response('position', axis))
-    done, _ = performed('gain_margin', SLOW, {'adu.wind.field.seed': seed}, axis=axis)
+    done, _ = performed('gain_margin', SLOW, seed=seed, axis=axis)
     for name, metric in (('gain_margin', 'gain_margin_db'), ('phase_margin', 'phase_margin_deg'),
                          ('bandwidth', 'bandwidth_hz')):
         found = METHOD_BY_NAME[name].measure(done, arguments(name, axis=axis))
-        # The study has noise of its own: the teeth of the elevation pass at 1.2 Hz, near its bandwidth.
-        assert abs(found.value - study[metric][0]) < 1.5 * found.uncertainty, name
+        assert abs(found.value - study[metric][0]) < found.uncertainty, name
 
 
 def test_a_resonance_is_that_of_the_structure():

@@ -76,6 +76,15 @@ def test_what_is_asked_is_the_crossover_of_the_position_loop():
 
 
 @pytest.mark.thorough
+def test_teeth_that_pass_near_the_bandwidth_do_not_move_it():
+    """The elevation of station_real passes a tooth at 1.15 Hz, near its bandwidth of 1.38 Hz."""
+    with_teeth, without = (loops.Loops(Variant('station_real').with_(changes)).measured('position', 'elevation')
+                           for changes in ({}, {'adu.elevation.gear_train.tooth_error': 0.0}))
+    for metric in ('bandwidth_hz', 'crossover_hz'):
+        assert with_teeth[metric][0] == pytest.approx(without[metric][0], rel=0.005)
+
+
+@pytest.mark.thorough
 def test_an_axis_slower_than_the_rate_of_the_measurement():
     """2 deg/s in azimuth, 1 deg/s in elevation: the same loops as of the fast axis. The friction of a motor that turns
     below 1 rad/s damps the speed loop by 2 to 5 deg more."""

@@ -17,6 +17,7 @@ from pedestal_common.wire.commands import parsed
 from pedestal_workbench.acceptance.exercise import Antenna, Executed, Exercise, Performed, StoppedError
 
 CLIENT = 'acceptance'   # name of the client that commands the control unit
+WIND_SEEDS = 'adu.wind.field.seed', 'adu.wind.gust.seed'     # which the seed of a scenario leaves as they are
 WATCH_STEPS = 10        # number of steps between two checks of alarms and envelope
 
 
@@ -38,9 +39,9 @@ def changes(exercise: Exercise) -> dict[str, Json]:
 
 
 def run_of(exercise: Exercise, variant: Variant, period: Seconds, seed: int = 1) -> Variant:
-    """Return the variant whose run makes an exercise, in whole steps."""
+    """Return the variant whose run makes an exercise, in whole steps. The wind of each seed is another one."""
     duration = math.ceil(exercise.duration / period - 1e-6) * period
-    return variant.with_(changes(exercise), seed=seed, duration=duration)
+    return variant.with_({**changes(exercise), **dict.fromkeys(WIND_SEEDS, seed)}, seed=seed, duration=duration)
 
 
 class InLoop:

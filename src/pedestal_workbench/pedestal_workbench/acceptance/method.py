@@ -1,4 +1,5 @@
 """Method of acceptance: what a row of the table of methods states."""
+import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, TypeAlias
 
@@ -12,6 +13,9 @@ class Measured(NamedTuple):
     """Result of one exercise."""
     value: float
     uncertainty: float      # half width of its interval of 95 % from this exercise alone, 0 if not known
+
+
+NEVER = Measured(math.inf, 0.0)     # time until an event that does not come
 
 
 class Method(NamedTuple):

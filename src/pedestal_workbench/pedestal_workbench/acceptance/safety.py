@@ -18,14 +18,15 @@ from acu_tracker.mode.stow import MAX_REST_RATE_RAD_S
 from acu_tracker.servo.travel import braking_distance
 from pedestal_common.graph.nodes import DRIVE_NODE
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Degrees, Floats, Radians, Seconds, Times
+from pedestal_common.quantities import Floats, Radians, Seconds, Times
 from pedestal_common.wire.commands import Argument
 from pedestal_recording import recording as recordings
 from pedestal_results import tracking
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
-from pedestal_workbench.acceptance.method import Arguments, Measured, Method
-from pedestal_workbench.acceptance.tracking import NEVER, first, inside, travel
+from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method
+from pedestal_workbench.acceptance.servo import resolution
+from pedestal_workbench.acceptance.tracking import first, inside, travel
 
 BEGIN_TIME_S, REST_TIME_S = 1.0, 3.0    # time of the first command, and time until an axis has come to rest [s]
 LARGEST_OVERSHOOT_DEG = 1.0     # angle beyond a limit of travel at which the exercise is stopped [deg]
@@ -96,7 +97,8 @@ def _beyond(performed: Performed, arguments: Arguments) -> tuple[Times, Floats]:
 
 
 def _limit_overshoot(performed: Performed, arguments: Arguments) -> Measured:
-    return Measured(float(_beyond(performed, arguments)[1].max()), 0.0)
+    return Measured(float(_beyond(performed, arguments)[1].max()),
+                    resolution(performed.antenna, str(arguments['axis'])))
 
 
 def _limit_return(performed: Performed, arguments: Arguments) -> Measured:
@@ -175,9 +177,9 @@ def _emergency(antenna: Antenna, arguments: Arguments) -> Exercise:
                     alarms=('emergency stop', f'{axis} following error'))
 
 
-def _stopping(performed: Performed, arguments: Arguments) -> tuple[Seconds, Degrees]:
+def _stopping(performed: Performed, arguments: Arguments) -> tuple[Measured, Measured]:
     """Return time and angle from the emergency stop to the standstill of the axis. The angle counts from the step
-    before the request, which acts within a step."""
+    before the request. Because the request acts within a step, the angle is uncertain by the way of a step."""
     begin, joints = performed.begin + performed.times(EMERGENCY_STOP)[-1], performed.recording.table('joint_states')
     during = (joints['t'] > begin - 1.5 * performed.antenna.period) & (joints['t'] < begin + REST_TIME_S)
     t, rate, angle = (joints[name][during] for name in ('t', *(f'{arguments["axis"]}.{part}'
@@ -187,16 +189,18 @@ def _stopping(performed: Performed, arguments: Arguments) -> tuple[Seconds, Degr
         raise ValueError(f'the {arguments["axis"]} did not move at its largest rate, {math.degrees(full):.4g} deg/s')
     moving = np.flatnonzero(np.abs(rate) > STANDSTILL_SHARE * abs(rate[0]))
     if moving[-1] == t.size - 1:
-        return math.inf, math.inf
-    return float(t[moving[-1] + 1] - begin), math.degrees(np.abs(angle - angle[0]).max())
+        return NEVER, NEVER
+    way, step = math.degrees(np.abs(angle - angle[0]).max()), math.degrees(abs(angle[1] - angle[0]))
+    return (Measured(float(t[moving[-1] + 1] - begin), performed.antenna.period),
+            Measured(way, math.hypot(step, resolution(performed.antenna, str(arguments['axis'])))))
 
 
 def _emergency_time(performed: Performed, arguments: Arguments) -> Measured:
-    return Measured(_stopping(performed, arguments)[0], performed.antenna.period)
+    return _stopping(performed, arguments)[0]
 
 
 def _emergency_angle(performed: Performed, arguments: Arguments) -> Measured:
-    return Measured(_stopping(performed, arguments)[1], 0.0)
+    return _stopping(performed, arguments)[1]
 
 
 def _faulty(antenna: Antenna, arguments: Arguments) -> Exercise:

@@ -17,7 +17,7 @@ from pedestal_recording import recording as recordings
 from pedestal_results import metrics, tracking
 from pedestal_results.intervals import half_width, pseudo_values
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed, Span, Track
-from pedestal_workbench.acceptance.method import Arguments, Measured, Method
+from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method
 from pedestal_workbench.calibration.drive import motion_data
 from pedestal_workbench.calibration.drive.motion_data import Motion
 
@@ -137,9 +137,13 @@ def followed(performed: Performed, arguments: Arguments) -> Followed:
     known = (t > -1e-9) & (t < performed.exercise.duration + 1e-9) & np.isfinite(angle) & np.isfinite(reference)
     if known.sum() < 2 * PART_COUNT:
         raise ValueError(f'the recording holds only {known.sum()} steps of the exercise')
-    drive: AxisParameters | None = getattr(performed.antenna.adu, name, None)
-    return Followed(t[known], angle[known], (reference - angle)[known],
-                    360.0 / 2**drive.encoder.load_bits if drive else 0.0)
+    return Followed(t[known], angle[known], (reference - angle)[known], resolution(performed.antenna, name))
+
+
+def resolution(antenna: Antenna, name: str) -> Degrees:
+    """Return the resolution of the load encoder of an axis, 0 if it is not known."""
+    drive: AxisParameters | None = getattr(antenna.adu, name, None)
+    return 360.0 / 2**drive.encoder.load_bits if drive else 0.0
 
 
 def over_parts(values: Floats, statistic: Callable[[Floats], float]) -> Measured:
@@ -264,7 +268,8 @@ def _step(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _stepped(performed: Performed, arguments: Arguments) -> tuple[Times, Floats, Degrees, Degrees]:
     """Return (times after the command, response [deg], its size [deg], noise of the encoder [deg]). Raises ValueError
-    without a step."""
+    without a step. Twice the noise is at least a step of the encoder and its interpolation error, which no angle at
+    rest shows."""
     motion, at = followed(performed, arguments), performed.times('preset')[1]
     reference, after = motion.angle + motion.error, motion.t >= at
     before = reference[motion.t < at][-1]
@@ -272,7 +277,10 @@ def _stepped(performed: Performed, arguments: Arguments) -> tuple[Times, Floats,
     if size < 0.5 * float(arguments['size']):
         raise ValueError(f'the reference moved by {size:.4g} deg in the step, must be {arguments["size"]} deg')
     noise = float(np.std(motion.error[motion.t > motion.t[-1] - 2.0]))
-    return motion.t[after] - at, motion.angle[after] - before, size, max(noise, motion.resolution / math.sqrt(12.0))
+    drive: AxisParameters | None = getattr(performed.antenna.adu, str(arguments['axis']), None)
+    waves = math.degrees(drive.encoder.error.interpolation) if drive else 0.0
+    return (motion.t[after] - at, motion.angle[after] - before, size,
+            max(noise, 0.5 * math.hypot(motion.resolution, waves)))
 
 
 def _overshoot(performed: Performed, arguments: Arguments) -> Measured:
@@ -285,7 +293,8 @@ def _settling(performed: Performed, arguments: Arguments) -> Measured:
     band = float(arguments['band'])
     found = [metrics.settling_time(t, y, size, max(width, noise) / size)
              for width in (band, band + 2.0 * noise, band - 2.0 * noise)]
-    # A response that does not settle counts as settled at its end.
+    if math.isnan(found[0]):
+        return NEVER
     value, *around = (float(t[-1]) if math.isnan(each) else each for each in found)
     return Measured(value, max(0.5 * performed.antenna.period, *(abs(each - value) for each in around)))
 

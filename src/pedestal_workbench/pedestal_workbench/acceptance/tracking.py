@@ -21,14 +21,14 @@ from pedestal_results import intervals, tracking
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_results.results import RESULT_BY_NAME
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed, Span
-from pedestal_workbench.acceptance.method import Arguments, Measured, Method
+from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method
 from pedestal_workbench.calibration import collect, predicted
 from pedestal_workbench.calibration.receiver import beacon_offsets, matrix
 
 RECEIVER = 'tracking_receiver'
 RATE_MARGIN = 1.1   # largest permitted rate of an axis over its largest rate command [-]
 BLOCK_COUNT = 16    # number of blocks of the jackknife
-MAX_CORRELATION = 0.8   # largest correlation of neighbouring blocks that the uncertainty takes [-]
+MIN_CORRELATION, MAX_CORRELATION = 0.25, 0.8    # of neighbouring blocks, as the uncertainty takes it [-]
 ACTION_TIME_S = 10.0    # time of the first action in autotrack [s]
 MANOEUVRE_FREQUENCY_HZ = 0.05   # frequency of the manoeuvre [Hz]
 TARGET_RANGE_M = 3.6e7  # range of beacon and manoeuvre [m]; from a ship under way, it hides the motion of the ship
@@ -36,7 +36,6 @@ POINT_TIME_S, CIRCLE_POINTS = 2.5, 8        # time at each offset about the beac
 CROSS_BEAMWIDTHS = (0.2, -0.2, 0.1, -0.1)   # offsets about the beacon on each axis [beamwidths]
 CROSS_TALK = 'cross-talk'
 CHANNELS = {'cross-elevation': (0, 0), 'elevation': (1, 1), CROSS_TALK: (0, 1)}     # row and column of the slopes
-NEVER = Measured(math.inf, 0.0)     # time until an event that does not come
 
 
 def _target(*options: str) -> Argument:
@@ -146,12 +145,13 @@ def _of_blocks(errors: Pairs, value: float) -> Measured:
     """Return an rms of errors in the order of time with its uncertainty, by the jackknife over blocks.
 
     Because neighbouring blocks may be correlated, the half width grows by sqrt((1 + r) / (1 - r)). r is the
-    correlation of successive pseudo-values.
+    correlation of successive pseudo-values. Because r of BLOCK_COUNT values is itself uncertain by MIN_CORRELATION,
+    r is at least that.
     """
     values = intervals.pseudo_values(np.array_split(errors, BLOCK_COUNT),
                                      lambda blocks: tracking.known_rms(np.concatenate(blocks)))
     rest = values - values.mean()
-    r = min(max(float(rest[1:] @ rest[:-1] / (rest @ rest)), 0.0), MAX_CORRELATION)
+    r = min(max(float(rest[1:] @ rest[:-1] / (rest @ rest)), MIN_CORRELATION), MAX_CORRELATION)
     return Measured(value, intervals.half_width(values) * math.sqrt((1.0 + r) / (1.0 - r)))
 
 

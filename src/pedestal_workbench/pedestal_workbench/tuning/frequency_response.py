@@ -207,14 +207,20 @@ def _at_rates(variant: Variant) -> tuple[Variant, list[RadiansPerSecond]]:
 
 
 def position(variant: Variant, axes: Collection[str] = AXES, sweep: Sweep = POSITION_SWEEP) -> dict[str, Response]:
-    """Return {'position/AXIS': response} of the position loops of a variant that `moving` returns."""
+    """Return {'position/AXIS': response} of the position loops of a variant that `moving` returns.
+
+    The teeth and poles that the axis passes, and the wind, disturb a band of frequencies. Because they are the same in
+    a run without the sweep, the signals of that run are subtracted.
+    """
     variant, rates = _at_rates(variant)
-    loop = closed_loop.Loop(variant.with_(duration=(sweep.dropped + sweep.kept) * sweep.period).load())
+    scenario = variant.with_(duration=(sweep.dropped + sweep.kept) * sweep.period).load()
+    loop = closed_loop.Loop(scenario)
     added = np.zeros((loop.steps, 2))
     # Because the axes of a mount with varying inertia act on each other, no other axis is excited.
     for i in (AXES.index(name) for name in axes):
         added[:-1, i] = _at_most(sweep, *rates).signal(loop.period_ns * 1e-9)
-    commanded = loop.run(added)['acu/rate_command']['velocity']
+    commanded = (loop.run(added)['acu/rate_command']['velocity']
+                 - closed_loop.Loop(scenario).run()['acu/rate_command']['velocity'])
     return {f'position/{name}': response(sweep, (commanded + added)[:-1, i], -commanded[:-1, i])
             for i, name in enumerate(AXES) if name in axes}
 

@@ -88,7 +88,7 @@ SLOWDOWN_FACTOR, MAX_SLOWDOWNS = 0.85, 12
 
 STILL_AIR_PARAMETERS = {'scenario.ship': False, 'scenario.program.source': 'target', 'acu.initial_mode': 'program',
                         'adu.initially_enabled': True, 'adu.wind.azimuth': 0.0, 'adu.wind.elevation': 0.0,
-                        'adu.wind.gust.kind': 'none'}
+                        'adu.wind.gust.kind': 'none', 'adu.wind.field.speed': 0.0}
 """Changed parameters of a scenario for the measurement of a plant: ashore, in still air, on a program track."""
 
 
