@@ -19,7 +19,7 @@ import pytest
 
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_results import metrics
-from pedestal_workbench.acceptance import sequence, servo, specification
+from pedestal_workbench.acceptance import sequence, specification
 from pedestal_workbench.acceptance.exercise import StoppedError
 from pedestal_workbench.acceptance.in_loop import InLoop
 from pedestal_workbench.acceptance.judgement import FAILED, PASSED
@@ -141,7 +141,7 @@ def of_steps(antenna, axis, seed):
     perfect, _ = performed(antenna, 'step_overshoot', seed, {'adu.wind.field.speed': 0.0, **{
         f'adu.{axis}.encoder.{key}': value for key, value in PERFECT_ENCODER.items()}}, axis=axis, size=size)
     t, angle = (perfect.recording.table('joint_states')[name] for name in ('t', f'{axis}.position'))
-    t, y = t - servo.executed_at(perfect, 1), np.degrees(angle)
+    t, y = t - perfect.times('preset')[1], np.degrees(angle)
     y, t = (y - y[t < 0.0][-1])[t >= 0.0], t[t >= 0.0]
     band = METHOD_BY_NAME['step_settling'].arguments[-1].default
     for name, true in (('step_overshoot', metrics.overshoot_percent(y, size)),

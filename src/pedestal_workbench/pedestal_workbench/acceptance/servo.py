@@ -288,12 +288,15 @@ def _overshoot(performed: Performed, arguments: Arguments) -> Measured:
     return Measured(metrics.overshoot_percent(y, size), 200.0 * noise / size)
 
 
+SETTLED_S = 0.2     # shortest time within the band at the end of the exercise, so that noise does not count as settled
+
+
 def _settling(performed: Performed, arguments: Arguments) -> Measured:
     t, y, size, noise = _stepped(performed, arguments)
     band = float(arguments['band'])
     found = [metrics.settling_time(t, y, size, max(width, noise) / size)
              for width in (band, band + 2.0 * noise, band - 2.0 * noise)]
-    if math.isnan(found[0]):
+    if not found[0] <= t[-1] - SETTLED_S:
         return NEVER
     value, *around = (float(t[-1]) if math.isnan(each) else each for each in found)
     return Measured(value, max(0.5 * performed.antenna.period, *(abs(each - value) for each in around)))
