@@ -112,3 +112,7 @@ class Performer(Protocol):
 class StoppedError(Exception):
     """The antenna was stopped: by an alarm, outside the envelope, by an operator, or because a node is silent. The
     text states the reason."""
+
+
+class LateError(StoppedError):
+    """A command was sent or executed too late, because the computer is too busy."""

@@ -17,13 +17,14 @@ from pedestal_common.quantities import Json
 from pedestal_common.text_files import files
 from pedestal_recording import bag_files
 from pedestal_workbench.acceptance import figure
-from pedestal_workbench.acceptance.exercise import Exercise, Performed, Performer
+from pedestal_workbench.acceptance.exercise import Exercise, LateError, Performed, Performer
 from pedestal_workbench.acceptance.judgement import Judged, judged
 from pedestal_workbench.acceptance.method import Measured
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
 RESULTS_FILE, LOCK_FILE, SIGNALS_FOLDER = 'results.json', 'results.lock', 'signals'  # in the folder of the acceptance
 MAX_RESULTS_BYTES = 50_000_000  # largest size of the file of results [bytes]
+MAX_RUNS = 5  # of an exercise, whose commands were late in all others
 SEED_STEP = 1000  # between the seeds of repetitions, so that sequences with neighbouring seeds share no noise
 
 
@@ -101,10 +102,18 @@ class _Performances:
             if i == len(made):
                 name = f'{requirement.file_name}-{i + 1}'
                 pass_recorder.set_aside(self._folder / name, 'interrupted')
-                made.append(self._performer.perform(name, exercise, self._seed + SEED_STEP * i))
+                made.append(self._make(name, exercise, self._seed + SEED_STEP * i))
             yield made[i]
         if key not in self._left:
             del self._made[key]
+
+    def _make(self, name: str, exercise: Exercise, seed: int) -> Performed:
+        """Make an exercise, and make it again after one with late commands. Raises StoppedError."""
+        for _ in range(MAX_RUNS - 1):
+            with contextlib.suppress(LateError):
+                return self._performer.perform(name, exercise, seed)
+            pass_recorder.set_aside(self._folder / name, 'late')
+        return self._performer.perform(name, exercise, seed)
 
 
 def _key(exercise: Exercise) -> str:
