@@ -153,8 +153,8 @@ class ClientSession(RemoteSession):
 
 def lateness(action: Action, t: Seconds) -> str:
     """Return the words on a late command. t: time of the exercise at which it was sent or executed."""
-    return (f'{action.command}: {t - action.at:.2f} s late, must be at most {MAX_LATENESS_S:g} s: this computer is too '
-            'busy')
+    return (f'{action.command}: {t - action.at:.2f} s late, must be at most {MAX_LATENESS_S:g} s; this computer is '
+            'too busy')
 
 
 def outcomes(exercise: Exercise, sent: Sequence[Sent], recording: Recording, begin: Seconds) -> tuple[Executed, ...]:

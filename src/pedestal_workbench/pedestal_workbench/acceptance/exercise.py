@@ -4,6 +4,7 @@ A performer makes an exercise in the closed loop (in_loop) or on nodes (on_graph
 both return a recording with the same topics, so that every measure is the same law for both.
 """
 import dataclasses
+import hashlib
 import math
 import pathlib
 from collections.abc import Iterable, Mapping
@@ -12,6 +13,7 @@ from typing import NamedTuple, Protocol
 from acu_tracker.params import AcuParameters
 from drive_law.params import AduParameters
 from pedestal_common.graph.topics import AXES
+from pedestal_common.parameters import AnyParameters, as_dict
 from pedestal_common.quantities import (
     Degrees,
     DegreesPerSecond,
@@ -22,6 +24,7 @@ from pedestal_common.quantities import (
     Seconds,
     Times,
 )
+from pedestal_common.text_files import plain_yaml
 from pedestal_recording.recording import Recording
 
 
@@ -32,6 +35,17 @@ class Antenna(NamedTuple):
     beamwidth: Radians
     period: Seconds                 # of a step
     simulated: tuple[str, ...] = ()     # its nodes that are simulated, into which faults can be injected
+
+    @property
+    def parts(self) -> dict[str, AnyParameters]:
+        """{node: its parameters}."""
+        return {'acu': self.acu, **({'adu': self.adu} if self.adu else {})}
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of all parameters."""
+        values = plain_yaml.dump({node: as_dict(part) for node, part in self.parts.items()})
+        return hashlib.sha256(values.encode()).hexdigest()
 
 
 class Action(NamedTuple):
@@ -109,7 +123,7 @@ class Performer(Protocol):
         """Make an exercise. name: of its recording. Raises StoppedError."""
 
 
-class StoppedError(Exception):
+class StoppedError(RuntimeError):
     """The antenna was stopped: by an alarm, outside the envelope, by an operator, or because a node is silent. The
     text states the reason."""
 

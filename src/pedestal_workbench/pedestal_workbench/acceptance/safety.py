@@ -18,14 +18,14 @@ from acu_tracker.mode.stow import MAX_REST_RATE_RAD_S
 from acu_tracker.servo.travel import braking_distance
 from pedestal_common.graph.nodes import DRIVE_NODE
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Degrees, Floats, Radians, Seconds, Times
+from pedestal_common.quantities import Floats, Radians, Seconds, Times
 from pedestal_common.wire.commands import Argument
 from pedestal_recording import recording as recordings
 from pedestal_results import tracking
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
 from pedestal_workbench.acceptance.method import Arguments, Measured, Method
-from pedestal_workbench.acceptance.tracking import NEVER, first, granted, inside, travel
+from pedestal_workbench.acceptance.tracking import NEVER, TIME_STEPS, first, granted, inside, travel
 
 BEGIN_TIME_S, REST_TIME_S = 1.0, 3.0    # time of the first command, and time until an axis has come to rest [s]
 LARGEST_OVERSHOOT_DEG = 1.0     # angle beyond a limit of travel at which the exercise is stopped [deg]
@@ -143,7 +143,8 @@ def _stow_time(performed: Performed, _: Arguments) -> Measured:
         | (np.abs(joints[f'{axis}.velocity']) > MAX_REST_RATE_RAD_S) for axis in AXES])
     if outside[-1]:
         return NEVER
-    return Measured(float(joints['t'][outside & (joints['t'] >= begin)][-1]) - begin, performed.antenna.period)
+    return Measured(float(joints['t'][outside & (joints['t'] >= begin)][-1]) - begin,
+                    TIME_STEPS * performed.antenna.period)
 
 
 def _unstow_time(performed: Performed, _: Arguments) -> Measured:
@@ -169,7 +170,7 @@ def _emergency(antenna: Antenna, arguments: Arguments) -> Exercise:
                     alarms=('emergency stop', f'{axis} following error'))
 
 
-def _stopping(performed: Performed, arguments: Arguments) -> tuple[Seconds, Degrees]:
+def _stopping(performed: Performed, arguments: Arguments) -> tuple[Measured, Measured]:
     """Return time and angle from the emergency stop to the standstill of the axis. The angle counts from the step
     before the request, which acts within a step."""
     begin, joints = granted(performed, DRIVE_NODE, EMERGENCY_STOP), performed.recording.table('joint_states')
@@ -178,16 +179,18 @@ def _stopping(performed: Performed, arguments: Arguments) -> tuple[Seconds, Degr
                                                                for part in ('velocity', 'position'))))
     moving = np.flatnonzero(np.abs(rate) > STANDSTILL_SHARE * abs(rate[0]))
     if moving[-1] == t.size - 1:
-        return math.inf, math.inf
-    return float(t[moving[-1] + 1] - begin), math.degrees(np.abs(angle - angle[0]).max())
+        return NEVER, NEVER
+    period = performed.antenna.period
+    return (Measured(float(t[moving[-1] + 1] - begin), TIME_STEPS * period),
+            Measured(math.degrees(np.abs(angle - angle[0]).max()), math.degrees(abs(rate[0])) * period))
 
 
 def _emergency_time(performed: Performed, arguments: Arguments) -> Measured:
-    return Measured(_stopping(performed, arguments)[0], performed.antenna.period)
+    return _stopping(performed, arguments)[0]
 
 
 def _emergency_angle(performed: Performed, arguments: Arguments) -> Measured:
-    return Measured(_stopping(performed, arguments)[1], 0.0)
+    return _stopping(performed, arguments)[1]
 
 
 def _faulty(antenna: Antenna, arguments: Arguments) -> Exercise:

@@ -37,6 +37,7 @@ POINT_TIME_S, CIRCLE_POINTS = 2.5, 8        # time at each offset about the beac
 CROSS_BEAMWIDTHS = (0.2, -0.2, 0.1, -0.1)   # offsets about the beacon on each axis [beamwidths]
 CROSS_TALK = 'cross-talk'
 CHANNELS = {'cross-elevation': (0, 0), 'elevation': (1, 1), CROSS_TALK: (0, 1)}     # row and column of the slopes
+TIME_STEPS = 2.0                # uncertainty of a time: its begin and its end are known to a step each [steps]
 NEVER = Measured(math.inf, 0.0)     # time until an event that does not come
 
 Changes: TypeAlias = dict[str, Json]    # {'node.key': value}
@@ -198,7 +199,7 @@ def _pointing_offset(performed: Performed, _: Arguments) -> Measured:
 def first(performed: Performed, begin: Seconds, t: Times, met: Bools) -> Measured:
     """Return the time from `begin` to the first of the times t that meets a condition."""
     times = t[(t >= begin) & met]
-    return Measured(float(times[0]) - begin, performed.antenna.period) if times.size else NEVER
+    return Measured(float(times[0]) - begin, TIME_STEPS * performed.antenna.period) if times.size else NEVER
 
 
 def _acquisition_time(performed: Performed, _: Arguments) -> Measured:
