@@ -1,6 +1,7 @@
 """Exercises of an acceptance on processes: on graphs of their own, on a running graph, and after a kill."""
 import contextlib
 import dataclasses
+import importlib.resources
 import json
 import math
 import os
@@ -114,9 +115,9 @@ def running(domain, start_run, patient):
 
 
 def ask(*arguments):
-    """Return the exit code of a client, and what it printed."""
+    """Return the exit code of a command, and what it printed."""
     done = subprocess.run([*PEDESTAL, *arguments], capture_output=True, text=True, timeout=PATIENCE)
-    return done.returncode, done.stdout
+    return done.returncode, done.stdout + done.stderr
 
 
 @contextlib.contextmanager
@@ -136,6 +137,7 @@ def connected(folder):
 def test_a_running_graph(running, tmp_path):
     with connected(tmp_path) as performer:
         assert performer.antenna.period == 0.02 and performer.antenna.adu.initial_elevation != 0.0
+        assert performer.antenna.simulated == ('adu', 'tracking_receiver')
         with pytest.raises(ValueError, match='adu.period: a running graph keeps its parameters'):
             performer.check(step(changes={'adu.period': 0.01}))
         results = sequence.run(specification(), performer, tmp_path, 1, lambda kept: None)
@@ -146,8 +148,9 @@ def test_a_running_graph(running, tmp_path):
         with pytest.raises(StoppedError, match='commanded stop'):
             performer.perform('stopped', step(duration=60.0), 1)
     assert ask('ask', 'take')[0] == 0       # control was released
-    with pytest.raises(StoppedError, match='cannot take control: .*held by'), connected(tmp_path):
-        pass
+    sample = importlib.resources.files('pedestal') / 'samples' / 'acceptance.yaml'
+    code, said = ask('acceptance', str(sample), '--yes', '--output', str(tmp_path / 'other'))
+    assert code == 1 and 'pedestal: error: acceptance cannot take control: refused: control is held by' in said
 
 
 def main(folder):

@@ -84,7 +84,9 @@ def test_nothing_moves_before_it_is_confirmed(accept, tmp_path, monkeypatch):
     (TITLE + STEP.replace('size: 0.1', 'axis: elevation, size: 170') + SLEW, (), ("requirement 'step': size = 170",)),
     ('', (), ('spec.yaml',)),
     (TITLE + SLEW, ('--param', 'adu.nothing=1'), ('nothing',)),
-    (TITLE + SLEW, ('--output', 'spec.yaml'), ('spec.yaml',)),
+    (TITLE + SLEW, ('--output', 'spec.yaml'), ('--output spec.yaml: must be a directory',)),
+    (TITLE + SLEW, ('--output', 'missing/out'), ('--output missing/out: must be a directory',)),
+    (TITLE + SLEW, ('--tester', 'A\nB'), (r"tester = 'A\nB': must be a text of one line",)),
     (TITLE + SLEW, ('--json', 'missing/rows.json'), ('--json missing/rows.json',))])
 def test_what_cannot_be_done_is_refused(accept, tmp_path, text, options, words):
     code, _, errors = accept(text, '--yes', *options)
@@ -130,7 +132,8 @@ def test_an_operator_stops_the_sequence(accept, tmp_path, monkeypatch):
     monkeypatch.setattr(in_loop.InLoop, 'perform', made)
     code, said, _ = accept(TITLE + STEP + SLEW, '--yes')
     assert code == 0
-    assert 'interrupted, continued at' in (tmp_path / 'acceptance-spec' / 'report.html').read_text()
+    page = (tmp_path / 'acceptance-spec' / 'report.html').read_text()
+    assert ': interrupted; parameters' in page and ': came to its end; parameters' in page
 
 
 @pytest.mark.parametrize('name, scenario', [

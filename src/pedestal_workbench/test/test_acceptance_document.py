@@ -16,7 +16,7 @@ from pedestal_workbench.acceptance import document, figure, in_loop
 from pedestal_workbench.acceptance.judgement import judged
 from pedestal_workbench.acceptance.method import Measured
 from pedestal_workbench.acceptance.methods import METHOD_BY_NAME
-from pedestal_workbench.acceptance.sequence import Kept
+from pedestal_workbench.acceptance.sequence import Kept, Session
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
 DIGEST = 'dae21ce247d6975e14b4750aeafc499dd34b7558b5d8f4ee483c1175c94c9275'
@@ -55,7 +55,8 @@ def whole(antenna):
     specification = Specification('Acceptance of Zürich', 'Ω <&> Söhne', 'no. 7', 'A. Smith', 'of 2026-11-20',
                                   REQUIREMENTS, 'title: x')
     return document.Acceptance(specification, results(), antenna, 'the running graph', 'pedestal acceptance x.yaml',
-                               MADE, STOPPED)
+                               MADE, [Session('2026-11-30T10:00:00Z', DIGEST, 'stopped: alarm azimuth at limit'),
+                                      Session('2026-11-30T11:59:00Z', DIGEST)], STOPPED)
 
 
 @pytest.fixture(scope='module')
@@ -117,13 +118,14 @@ def test_the_report_states_what_a_customer_signs(folder):
     text = html.unescape((folder / 'report.html').read_text())
     for part in ('Acceptance of Zürich', 'Ω <&> Söhne', 'A. Smith', 'of 2026-11-20', 'pedestal_bringup 0.',
                  f'slew rate-1/slew rate-1.mcap {DIGEST} and 2 more', 'slew rate-3/slew rate-3.mcap',
-                 'interrupted, continued at 2026-11-30T12:00:00Z with slope', '2026-11-30T10:00:00Z to 2026-11-30T12',
+                 f'from 2026-11-30T10:00:00Z: stopped: alarm azimuth at limit; parameters SHA-256 {DIGEST}',
+                 'from 2026-11-30T11:59:00Z: interrupted', '2026-11-30T10:00:00Z to 2026-11-30T12',
                  'Not passed: 1 passed, 2 inconclusive, 1 failed, 1 not performed of 5', STOPPED, 'signature',
                  'not measured: no reversal', 'acu.azimuth.shaper.rate'):
         assert part in text, part
     assert not re.findall('(?:src|href)="(?!#)', text) and 'url(' not in text.replace('url(#', '')  # self-contained
     assert text.count('<figure') == 4 and text.count('motion since the begin') == 1
-    assert len(re.findall(r'SHA-256 [0-9a-f]{64}', text)) == 2      # of the parameters, of the specification
+    assert len(re.findall(r'SHA-256 [0-9a-f]{64}', text)) == 4      # parameters, sessions, specification
 
 
 def test_each_page_of_the_pdf_has_its_number(folder):

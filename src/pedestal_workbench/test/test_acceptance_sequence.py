@@ -9,7 +9,7 @@ import pytest
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_results.intervals import Target
 from pedestal_workbench.acceptance import sequence
-from pedestal_workbench.acceptance.exercise import Action, Exercise, Span, StoppedError
+from pedestal_workbench.acceptance.exercise import Action, Exercise, LateError, Span, StoppedError
 from pedestal_workbench.acceptance.in_loop import InLoop
 from pedestal_workbench.acceptance.judgement import INCONCLUSIVE, PASSED
 from pedestal_workbench.acceptance.method import Measured, Method
@@ -90,8 +90,31 @@ def test_a_stopped_sequence_continues_with_the_first_requirement_without_a_resul
     assert [name for name, _ in performer.made] == ['b-1', 'c-1']
     assert [(kept.name, kept.session) for kept in results] == [('a', 1), ('b', 2), ('c', 2)]
     assert sorted(path.name for path in tmp_path.glob('b-1*')) == ['b-1.interrupted-1', 'b-1.log.interrupted-1']
+    first, second = sequence.sessions(tmp_path)
+    assert (first.end, second.end) == ('stopped: an operator commanded stop', 'came to its end')
+    assert first.parameters == second.parameters == performer.antenna.sha256
     finished = Noted()
     assert run(tmp_path, finished, *three) == results and finished.made == []
+
+
+@pytest.mark.parametrize('late', [2, sequence.MAX_RUNS])
+def test_an_exercise_with_late_commands_is_made_again(tmp_path, late):
+    class Late(Noted):
+        def perform(self, name, exercise, seed):
+            performed = super().perform(name, exercise, seed)
+            if len(self.made) <= late:
+                (tmp_path / name).mkdir()
+                raise LateError('preset: 0.2 s late')
+            return performed
+    performer = Late()
+    if late == sequence.MAX_RUNS:
+        with pytest.raises(StoppedError, match='0.2 s late'):
+            run(tmp_path, performer, requirement('a'))
+    else:
+        assert [kept.judged.verdict for kept in run(tmp_path, performer, requirement('a'))] == [PASSED]
+        assert not (tmp_path / 'a-1').exists()
+    assert performer.made == [('a-1', 1)] * min(late + 1, sequence.MAX_RUNS)
+    assert len(list(tmp_path.glob('a-1.late-*'))) == min(late, sequence.MAX_RUNS - 1)
 
 
 def test_the_folder_keeps_every_number(tmp_path):
@@ -106,7 +129,7 @@ def test_another_specification_is_refused(tmp_path):
         run(tmp_path, Noted(), requirement('a'), text='another text')
 
 
-@pytest.mark.parametrize('content', ['', '[]', '{"specification_sha256": 1, "session": 1, "results": [1]}'])
+@pytest.mark.parametrize('content', ['', '[]', '{"specification_sha256": 1, "sessions": [], "results": [1]}'])
 def test_a_broken_file_of_results_is_named(tmp_path, content):
     (tmp_path / 'results.json').write_text(content)
     with pytest.raises(ValueError, match='results.json: is no file of results'):
@@ -155,3 +178,4 @@ def test_the_results_are_never_half_written(tmp_path, monkeypatch):
     monkeypatch.undo()
     assert [kept['name'] for kept in json.loads((tmp_path / 'results.json').read_text())['results']] == ['a']
     assert [kept.session for kept in run(tmp_path, Noted(), *two)] == [1, 2]
+    assert [session.end for session in sequence.sessions(tmp_path)] == ['interrupted', 'came to its end']

@@ -3,6 +3,7 @@ import argparse
 import contextlib
 import datetime
 import inspect
+import math
 import pathlib
 import sys
 import typing
@@ -64,9 +65,10 @@ def _acceptance(options: argparse.Namespace) -> int:
     if not options.scenario:
         arguments.refuse_given(options, ('closed_loop', 'param', 'params_file'), 'needs --scenario')
     console.check_json(options.json)
-    spec = specification.read(options.specification)
-    spec = spec._replace(tester=options.tester or spec.tester)
+    spec = specification.read(options.specification, options.tester)
     folder = options.output or pathlib.Path(f'acceptance-{options.specification.stem}')
+    if not folder.is_dir() and (folder.exists() or not folder.parent.is_dir()):
+        raise ValueError(f'--output {folder}: must be a directory, or a new one in a directory that exists')
     results: list[Kept] = []
     stopped, code = '', console.EXIT_ERROR
     with _performer(options, folder) as performer:
@@ -83,7 +85,8 @@ def _acceptance(options: argparse.Namespace) -> int:
             except KeyboardInterrupt:
                 stopped, code = 'an operator stopped it', stop.STOP_EXIT_CODE
     now = datetime.datetime.now(datetime.timezone.utc)
-    found = document.Acceptance(spec, results, performer.antenna, _source(options), options.command, now, stopped)
+    found = document.Acceptance(spec, results, performer.antenna, _source(options), options.command, now,
+                                sequence.sessions(folder), stopped)
     print(*document.write(found, folder), sep='\n')
     console.write_json(options.json, document.json_content(found))
     print(found.verdict)
@@ -125,8 +128,8 @@ def _confirm(options: argparse.Namespace, spec: 'Specification', exercises: 'Seq
         whole += exercise.duration * requirement.repetitions
     heads = ('requirement', ('azimuth [deg]', '>'), ('elevation [deg]', '>'), ('azimuth rate [deg/s]', '>.3g'),
              ('elevation rate [deg/s]', '>.3g'), ('time [s]', '>.0f'), ('repetitions', '>.0f'))
-    print('The antenna will move within:', *TextTable(heads, rows).lines(),
-          f'Time of all exercises: {whole / 60.0:.0f} minutes, without the motions to their begins.', sep='\n')
+    print('The antenna will move within:', *TextTable(heads, rows).lines(), 'Time of all exercises: at most '
+          f'{math.ceil(whole / 60.0)} min, without the motions to their begins.', sep='\n')
     if options.yes:
         return
     if not sys.stdin.isatty():

@@ -17,11 +17,12 @@ from pedestal_operator.commander import Commander
 from pedestal_operator.remote_node import RemoteSession, user
 from pedestal_operator.state import PAST_STATES, alarm
 from pedestal_recording.recording import Recording, holds, replies
-from pedestal_workbench.acceptance.exercise import Action, Executed, Exercise, StoppedError, Track
+from pedestal_workbench.acceptance.exercise import Action, Executed, Exercise, LateError, StoppedError, Track
 from pedestal_workbench.acceptance.in_loop import CLIENT
 
 JOINTS_TOPIC, TRACK_TOPIC = 'joint_states', 'acu/program_track'
 STOP_TIMEOUT_S = 2.0  # longest wait for the reply to `stop` or `clear` [s]
+MAX_LATENESS_S = 0.1  # of a command [s]
 TURN_S = 0.05  # longest time between two looks at the antenna [s]
 
 
@@ -103,14 +104,25 @@ class ClientSession(RemoteSession):
             raise StoppedError(f'acceptance cannot take control: {reply.text}')
         self.remote.interference = ''
 
+    def spin_to_newest(self) -> None:
+        """Receive all messages that have arrived, so that the client acts on the newest one; wait for the first."""
+        self.spin(TURN_S)
+        last = None
+        while last != self.remote.stamp:
+            last = self.remote.stamp
+            self.spin(0.0)
+
     def conduct(self, exercise: Exercise, begin: Nanoseconds, left: Callable[[], str | None]) -> list[Sent]:
         """Command an exercise at its times until its end. begin: stamp of its time 0; left(): why the antenna must be
         stopped for another reason, None after the end of the graph. Raises StoppedError, after it has stopped the
         antenna."""
         client, due, sent = self.remote, list(exercise.actions), list[Sent]()
         while (reason := left()) == '' and client.stamp < begin + round(exercise.duration * NS_PER_SECOND):
-            self.spin(TURN_S)
+            self.spin_to_newest()
             elapsed = client.stamp - begin
+            if due and elapsed > round((due[0].at + MAX_LATENESS_S) * NS_PER_SECOND):
+                self.stop_antenna()
+                raise LateError(lateness(due[0], elapsed / NS_PER_SECOND))
             while due and elapsed >= round(due[0].at * NS_PER_SECOND):
                 sent.append(client.send(due.pop(0)))
             reason = client.trouble(exercise) if elapsed >= 0 else ''
@@ -130,12 +142,18 @@ class ClientSession(RemoteSession):
         self.until(lambda: self.remote.replied(number), STOP_TIMEOUT_S)
 
 
+def lateness(action: Action, t: Seconds) -> str:
+    """Return the words on a late command. t: time of the exercise at which it was sent or executed."""
+    return (f'{action.command}: {t - action.at:.2f} s late, must be at most {MAX_LATENESS_S:g} s; this computer is '
+            'too busy')
+
+
 def outcomes(exercise: Exercise, sent: Sequence[Sent], recording: Recording, begin: Seconds) -> tuple[Executed, ...]:
     """Return the actions with their outcomes as recorded. A service of the drive has no number: the recorded replies
-    to a service are in the order of its requests. begin: in the time of the recording. Raises StoppedError for an
-    action without an outcome."""
+    to a service are in the order of its requests. begin: in the time of the recording. Raises LateError for a late
+    action, StoppedError for one without an outcome."""
     for late in exercise.actions[len(sent):]:
-        raise StoppedError(f'{late.command} was not sent within the exercise: this computer is too busy')
+        raise LateError(lateness(late, exercise.duration))
     found: dict[str, tuple[Seconds, commands.Reply]] = {}
     services: dict[str, list[tuple[Seconds, commands.Reply]]] = defaultdict(list)
     for topic in {nodes.row(each.action.node).replies for each in sent}:
@@ -149,5 +167,7 @@ def outcomes(exercise: Exercise, sent: Sequence[Sent], recording: Recording, beg
         if number not in found and not of_service:
             raise StoppedError(f'{action.node} did not reply to {action.command}')
         t, reply = found[number] if number in found else of_service.pop(0)
+        if t - begin > action.at + MAX_LATENESS_S:
+            raise LateError(lateness(action, t - begin))
         made.append(Executed(t - begin, action, *reply))
     return tuple(made)

@@ -15,9 +15,8 @@ from typing import NamedTuple
 import matplotlib
 from fpdf import FPDF
 
-from pedestal_common.parameters import AnyParameters, as_dict
+from pedestal_common.parameters import as_dict
 from pedestal_common.quantities import Json, Row
-from pedestal_common.text_files import plain_yaml
 from pedestal_common.text_files.text_table import TextTable
 from pedestal_recording import configuration
 from pedestal_results import intervals
@@ -25,7 +24,7 @@ from pedestal_results.report import elements, figures, subject
 from pedestal_workbench.acceptance import figure
 from pedestal_workbench.acceptance.exercise import Antenna
 from pedestal_workbench.acceptance.judgement import FAILED, INCONCLUSIVE, PASSED, ends
-from pedestal_workbench.acceptance.sequence import Kept
+from pedestal_workbench.acceptance.sequence import Kept, Session
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
 VERDICTS = {PASSED: 'passed', INCONCLUSIVE: 'inconclusive', FAILED: 'failed'}
@@ -36,7 +35,7 @@ EXPLANATION = ('The uncertainty is the half width of the interval of the mean, a
                'limit. Systematic errors, such as those of the encoders, are not part of the uncertainty.')
 CSS = """
 body { max-width: 76rem; } table.line { font-size: .85rem; } .line th, .line td { padding-right: .8rem; }
-.results td:nth-child(n+4):nth-child(-n+6) { white-space: nowrap; }
+.results td:nth-child(n+3):nth-child(-n+6) { white-space: nowrap; }
 .line td:last-child { overflow-wrap: anywhere; font-size: .75rem; } .sign td { height: 3.2rem; min-width: 14rem; }
 """
 FONT, TEXT_PT, TITLE_PT, TABLE_PT = 'DejaVu', 9.0, 15.0, 6.5    # of the PDF; the font comes with matplotlib
@@ -61,6 +60,7 @@ class Acceptance:
     source: str                 # what was tested: the running graph, or a scenario and how it ran
     command: str                # whole command line
     made: datetime              # of the report, UTC
+    sessions: Sequence[Session] = ()
     stopped: str = ''           # reason why the sequence did not come to its end
 
     def lines(self) -> Iterator[tuple[Requirement, Kept | None]]:
@@ -187,7 +187,8 @@ def blocks(acceptance: Acceptance, signals: pathlib.Path) -> Iterator[Block]:
         (kept.name, *bag) for kept in acceptance.kept for bag in kept.bags]))
     yield Block('h2', 'Parameters that differ from their defaults')
     yield Block('line', TextTable(('parameter', 'value', 'default', 'unit'), [
-        row for node, part in _parts(acceptance.antenna) for row in subject.changed(node, type(part), as_dict(part))]))
+        row for node, part in acceptance.antenna.parts.items()
+        for row in subject.changed(node, type(part), as_dict(part))]))
 
 
 def _first_bag(bags: Sequence[tuple[str, str]]) -> str:
@@ -196,26 +197,19 @@ def _first_bag(bags: Sequence[tuple[str, str]]) -> str:
     return f'{" ".join(bags[0])}{more}' if bags else 'none'
 
 
-def _parts(antenna: Antenna) -> list[tuple[str, AnyParameters]]:
-    """Return [(node, its parameters)] of an antenna."""
-    return [(node, part) for node, part in (('acu', antenna.acu), ('adu', antenna.adu)) if part is not None]
-
-
 def _head(acceptance: Acceptance) -> list[tuple[str, str]]:
     """Return the rows [name, text] of the table at the head."""
     spec, pointing = acceptance.specification, acceptance.antenna.acu.pointing
     begun = min((kept.begun for kept in acceptance.kept), default='nothing was measured')
-    first = {kept.session: kept for kept in reversed(acceptance.kept)}
     versions = ', '.join(f'{key.removeprefix("version.")} {value}' for key, value in configuration.versions().items())
     model = f'pointing model {pointing.report().title}' if pointing.named else 'the control unit has no pointing model'
-    values = plain_yaml.dump({node: as_dict(part) for node, part in _parts(acceptance.antenna)})
     return [('customer', spec.customer), ('antenna', spec.antenna), ('tested by', spec.tester),
             ('tested', f'{begun} to {acceptance.made:%Y-%m-%dT%H:%M:%SZ}'),
-            *(('session', f'interrupted, continued at {first[session].begun} with {first[session].name}')
-              for session in sorted(first)[1:]),
+            *((f'session {i}', f'from {session.begun}: {session.end}; parameters SHA-256 {session.parameters}')
+              for i, session in enumerate(acceptance.sessions, start=1)),
             ('equipment', acceptance.source), ('calibration', '; '.join(filter(None, (spec.calibration, model)))),
             ('software', f'{versions}, git {configuration.git_revision() or "unknown"}'),
-            ('parameters', f'SHA-256 {hashlib.sha256(values.encode()).hexdigest()}'),
+            ('parameters', f'SHA-256 {acceptance.antenna.sha256}'),
             ('specification', f'SHA-256 {hashlib.sha256(spec.text.encode()).hexdigest()}'),
             ('made by', acceptance.command)]
 

@@ -4,6 +4,8 @@ A performer makes an exercise in the closed loop (in_loop) or on nodes (own_grap
 execute the same commands and return a recording with the same topics, so that every measure is one law.
 """
 import dataclasses
+import hashlib
+import math
 import pathlib
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple, Protocol
@@ -11,7 +13,18 @@ from typing import NamedTuple, Protocol
 from acu_tracker.params import AcuParameters
 from drive_law.params import AduParameters
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Degrees, DegreesPerSecond, Json, Pairs, Radians, Seconds, Times
+from pedestal_common.parameters import AnyParameters, as_dict
+from pedestal_common.quantities import (
+    Degrees,
+    DegreesPerSecond,
+    Json,
+    Pairs,
+    Radians,
+    RadiansPerSecond,
+    Seconds,
+    Times,
+)
+from pedestal_common.text_files import plain_yaml
 from pedestal_recording.recording import Recording
 
 
@@ -22,6 +35,17 @@ class Antenna(NamedTuple):
     beamwidth: Radians
     period: Seconds                 # of a step
     simulated: tuple[str, ...] = ()     # its nodes that are simulated, into which faults can be injected
+
+    @property
+    def parts(self) -> dict[str, AnyParameters]:
+        """{node: its parameters}."""
+        return {'acu': self.acu, **({'adu': self.adu} if self.adu else {})}
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of all parameters."""
+        values = plain_yaml.dump({node: as_dict(part) for node, part in self.parts.items()})
+        return hashlib.sha256(values.encode()).hexdigest()
 
 
 class Action(NamedTuple):
@@ -107,6 +131,10 @@ class Performer(Protocol):
         """Make an exercise. name: of its recording. Raises StoppedError."""
 
 
-class StoppedError(Exception):
+class StoppedError(RuntimeError):
     """The antenna was stopped: by an alarm, outside the envelope, by an operator, or because a node is silent. The
     text states the reason."""
+
+
+class LateError(StoppedError):
+    """A command was sent or executed too late, because the computer is too busy."""

@@ -20,7 +20,6 @@ from pedestal_workbench.acceptance.exercise import Exercise, Performed, StoppedE
 
 START_TIMEOUT_S = 120.0  # longest time until the nodes of a run have started, compiled laws included [s]
 END_TIMEOUT_S = 60.0  # longest time from the end of a run to its results, and from a signal to its end [s]
-MAX_LATENESS_S, MAX_RUNS = 0.1, 3  # of a command [s]; of an exercise, whose commands were late in all others
 JUDGED_EXIT_CODES = 0, 4  # of `pedestal run` after a whole run; 4: its verdict on the tracking is a failure
 
 
@@ -45,18 +44,8 @@ class OwnGraph:
         return in_loop.run_of(exercise, self._variant, self.antenna.period, seed)
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
-        """Make an exercise from time 0 of a run. A run with late commands is made again. Raises StoppedError."""
-        for _ in range(MAX_RUNS):
-            performed = self._run_once(self._folder / name, exercise, seed)
-            late = max((executed.t - executed.action.at for executed in performed.executed), default=0.0)
-            if late <= MAX_LATENESS_S:
-                return performed
-            pass_recorder.set_aside(self._folder / name, 'late')
-        raise StoppedError(f'a command was executed {late:.2f} s late, must be at most {MAX_LATENESS_S:g} s: this '
-                           'computer is too busy')
-
-    def _run_once(self, bag: pathlib.Path, exercise: Exercise, seed: int) -> Performed:
-        pacing = _pacing(exercise)
+        """Make an exercise from time 0 of a run. Raises StoppedError."""
+        bag, pacing = self._folder / name, _pacing(exercise)
         arguments = [*self._changed(exercise, seed).arguments(), '--bag', str(bag), '--pacing', pacing]
         with domain.of_child(), _run(arguments, bag) as run:
             with ClientSession(Client, ['--ros-args', '-p', f'graph.pacing:={pacing}']) as session:

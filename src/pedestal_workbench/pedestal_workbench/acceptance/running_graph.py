@@ -20,6 +20,7 @@ from pedestal_common.graph import nodes
 from pedestal_common.graph.modes import MODE_ROWS
 from pedestal_common.graph.steps import NS_PER_SECOND, GraphError
 from pedestal_common.graph.topics import AXES
+from pedestal_common.injection import table
 from pedestal_common.quantities import Radians, Seconds
 from pedestal_operator.commander import DRIVE_STATE_TOPIC
 from pedestal_operator.remote_node import REPLY_TIMEOUT_S
@@ -62,7 +63,9 @@ class RunningGraph:
             acu = parameters.build(AcuParameters, self._session.parameters(parameters.defaults(AcuParameters)))
             adu = parameters.build(AduNodeParameters, self._session.parameters(
                 parameters.defaults(AduNodeParameters), nodes.DRIVE_NODE)) if self._graph['graph.simulated'] else None
-            self.antenna = Antenna(acu, adu, acu.tracker.receiver.beamwidth, acu.period)
+            simulated = tuple(node for node in table.INJECTED_FAULTS
+                              if self._session.remote.count_subscribers(f'{node}/inject'))
+            self.antenna = Antenna(acu, adu, acu.tracker.receiver.beamwidth, acu.period, simulated)
             self._session.take_control()
         except BaseException:
             self._session.__exit__()
@@ -81,7 +84,7 @@ class RunningGraph:
         if exercise.changes:
             raise ValueError(f'{", ".join(exercise.changes)}: a running graph keeps its parameters; use --scenario')
         for node, fault in client.faults(exercise):
-            if not self._session.remote.count_subscribers(f'{node}/inject'):
+            if node not in self.antenna.simulated:
                 raise ValueError(f'{fault} of {node}: the node is not simulated and accepts no faults')
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:

@@ -26,7 +26,7 @@ from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
 from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method
 from pedestal_workbench.acceptance.servo import resolution
-from pedestal_workbench.acceptance.tracking import first, inside, travel
+from pedestal_workbench.acceptance.tracking import TIME_STEPS, first, inside, travel
 
 BEGIN_TIME_S, REST_TIME_S = 1.0, 3.0    # time of the first command, and time until an axis has come to rest [s]
 LARGEST_OVERSHOOT_DEG = 1.0     # angle beyond a limit of travel at which the exercise is stopped [deg]
@@ -151,7 +151,7 @@ def _stow_time(performed: Performed, _: Arguments) -> Measured:
     if outside[-1]:
         return NEVER
     last = joints['t'][outside & (joints['t'] >= begin)].max(initial=begin)
-    return Measured(float(last) - begin, performed.antenna.period)
+    return Measured(float(last) - begin, TIME_STEPS * performed.antenna.period)
 
 
 def _unstow_time(performed: Performed, _: Arguments) -> Measured:
@@ -191,7 +191,7 @@ def _stopping(performed: Performed, arguments: Arguments) -> tuple[Measured, Mea
     if moving[-1] == t.size - 1:
         return NEVER, NEVER
     way, step = math.degrees(np.abs(angle - angle[0]).max()), math.degrees(abs(angle[1] - angle[0]))
-    return (Measured(float(t[moving[-1] + 1] - begin), performed.antenna.period),
+    return (Measured(float(t[moving[-1] + 1] - begin), TIME_STEPS * performed.antenna.period),
             Measured(way, math.hypot(step, resolution(performed.antenna, str(arguments['axis'])))))
 
 

@@ -17,13 +17,14 @@ from pedestal_common.quantities import Json
 from pedestal_common.text_files import files
 from pedestal_recording import bag_files
 from pedestal_workbench.acceptance import figure
-from pedestal_workbench.acceptance.exercise import Exercise, Performed, Performer
+from pedestal_workbench.acceptance.exercise import Exercise, LateError, Performed, Performer, StoppedError
 from pedestal_workbench.acceptance.judgement import Judged, judged
 from pedestal_workbench.acceptance.method import Measured
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
 RESULTS_FILE, LOCK_FILE, SIGNALS_FOLDER = 'results.json', 'results.lock', 'signals'  # in the folder of the acceptance
 MAX_RESULTS_BYTES = 50_000_000  # largest size of the file of results [bytes]
+MAX_RUNS = 5  # of an exercise, whose commands were late in all others
 SEED_STEP = 1000  # between the seeds of repetitions, so that sequences with neighbouring seeds share no noise
 
 
@@ -36,13 +37,20 @@ class Kept(NamedTuple):
     session: int                            # number of the run of the verb that measured it, from 1 on
 
 
+class Session(NamedTuple):
+    """Run of the sequence with a folder."""
+    begun: str                              # UTC
+    parameters: str                         # SHA-256 of those of the antenna
+    end: str = 'interrupted'                # how it ended
+
+
 def run(specification: Specification, performer: Performer, folder: pathlib.Path, seed: int,
         report: Callable[[Kept], None]) -> list[Kept]:
     """Perform the requirements without a result in the folder, and return all results. Requirements with the same
     exercise share its recordings. report: called with each result, also with those of earlier sessions.
 
-    Raises ValueError before anything moves, for exercises that cannot be made and for the folder of another
-    specification; StoppedError if the antenna was stopped.
+    The folder keeps how the run ended. Raises ValueError before anything moves, for exercises that cannot be made and
+    for the folder of another specification; StoppedError if the antenna was stopped.
     """
     exercises = specification.exercises(performer.antenna)
     for requirement, exercise in zip(specification.requirements, exercises):
@@ -52,23 +60,33 @@ def run(specification: Specification, performer: Performer, folder: pathlib.Path
             raise ValueError(f'requirement {requirement.name!r}: {error}') from None
     folder.mkdir(parents=True, exist_ok=True)
     with _locked(folder):
-        results = _Results(folder, specification)
+        results = _Results(folder, specification, performer.antenna.sha256)
         for kept in results.kept:
             report(kept)
         names = [kept.name for kept in results.kept]
         left = [(requirement, exercise) for requirement, exercise in zip(specification.requirements, exercises)
                 if requirement.name not in names]
         performances = _Performances(performer, folder, seed, [exercise for _, exercise in left])
-        for requirement, exercise in left:
-            results.keep(_result(requirement, exercise, performances, folder, results.session))
-            report(results.kept[-1])
+        try:
+            for requirement, exercise in left:
+                results.keep(_result(requirement, exercise, performances, folder, len(results.sessions)))
+                report(results.kept[-1])
+            results.end('came to its end')
+        except StoppedError as error:
+            results.end(f'stopped: {error}')
+            raise
     return results.kept
+
+
+def sessions(folder: pathlib.Path) -> list[Session]:
+    """Return the runs of the sequence with a folder. Raises ValueError."""
+    return _read(folder / RESULTS_FILE)[1] if (folder / RESULTS_FILE).exists() else []
 
 
 def _result(requirement: Requirement, exercise: Exercise, performances: '_Performances', folder: pathlib.Path,
             session: int) -> Kept:
     """Perform, measure and judge a requirement."""
-    begun = f'{datetime.datetime.now(datetime.timezone.utc):%Y-%m-%dT%H:%M:%SZ}'
+    begun = _now()
     measured: list[Measured] = []
     bags: list[tuple[str, str]] = []
     reason = ''
@@ -101,10 +119,18 @@ class _Performances:
             if i == len(made):
                 name = f'{requirement.file_name}-{i + 1}'
                 pass_recorder.set_aside(self._folder / name, 'interrupted')
-                made.append(self._performer.perform(name, exercise, self._seed + SEED_STEP * i))
+                made.append(self._make(name, exercise, self._seed + SEED_STEP * i))
             yield made[i]
         if key not in self._left:
             del self._made[key]
+
+    def _make(self, name: str, exercise: Exercise, seed: int) -> Performed:
+        """Make an exercise, and make it again after one with late commands. Raises StoppedError."""
+        for _ in range(MAX_RUNS - 1):
+            with contextlib.suppress(LateError):
+                return self._performer.perform(name, exercise, seed)
+            pass_recorder.set_aside(self._folder / name, 'late')
+        return self._performer.perform(name, exercise, seed)
 
 
 def _key(exercise: Exercise) -> str:
@@ -128,20 +154,21 @@ def _locked(folder: pathlib.Path) -> Iterator[None]:
 class _Results:
     """Results in a folder. Raises ValueError for a broken file, and for that of another specification."""
     kept: list[Kept]
+    sessions: list[Session]
 
-    def __init__(self, folder: pathlib.Path, specification: Specification) -> None:
-        self._file, self.kept, before = folder / RESULTS_FILE, [], 0
+    def __init__(self, folder: pathlib.Path, specification: Specification, parameters: str) -> None:
+        self._file, self.kept, self.sessions = folder / RESULTS_FILE, [], []
         self._sha256 = hashlib.sha256(specification.text.encode()).hexdigest()
         if self._file.exists():
-            try:
-                content = json.loads(files.read_text(self._file, MAX_RESULTS_BYTES))
-                of_these, before = content['specification_sha256'] == self._sha256, content['session']
-                self.kept = list(map(_kept, content['results']))
-            except (ValueError, KeyError, TypeError) as error:
-                raise ValueError(f'{self._file}: is no file of results: {error!r}') from None
-            if not of_these:
+            before, self.sessions, self.kept = _read(self._file)
+            if before != self._sha256:
                 raise ValueError(f'{self._file}: holds results of another specification; choose a new folder')
-        self.session = before + 1
+        self.sessions.append(Session(_now(), parameters))
+        self._write()
+
+    def end(self, text: str) -> None:
+        """Keep how the session ended."""
+        self.sessions[-1] = self.sessions[-1]._replace(end=text)
         self._write()
 
     def keep(self, kept: Kept) -> None:
@@ -151,8 +178,22 @@ class _Results:
 
     def _write(self) -> None:
         results = [{**kept._asdict(), 'judged': kept.judged._asdict()} for kept in self.kept]
-        files.replace_text(self._file, json.dumps({'specification_sha256': self._sha256, 'session': self.session,
-                                                   'results': results}, indent=1) + '\n')
+        files.replace_text(self._file, json.dumps({'specification_sha256': self._sha256,
+                                                   'sessions': self.sessions, 'results': results}, indent=1) + '\n')
+
+
+def _now() -> str:
+    return f'{datetime.datetime.now(datetime.timezone.utc):%Y-%m-%dT%H:%M:%SZ}'
+
+
+def _read(file: pathlib.Path) -> tuple[str, list[Session], list[Kept]]:
+    """Return (SHA-256 of the specification, sessions, results) of a file. Raises ValueError for a broken one."""
+    try:
+        content = json.loads(files.read_text(file, MAX_RESULTS_BYTES))
+        return (content['specification_sha256'], [Session(*one) for one in content['sessions']],
+                list(map(_kept, content['results'])))
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f'{file}: is no file of results: {error!r}') from None
 
 
 def _kept(content: dict[str, Json]) -> Kept:

@@ -72,8 +72,9 @@ class Specification(NamedTuple):
         return exercises
 
 
-def read(path: FilePath) -> Specification:
-    """Return the specification of a file. Raises ValueError, which names file, entry, field and value."""
+def read(path: FilePath, tester: str = '') -> Specification:
+    """Return the specification of a file. tester: replaces that of the file. Raises ValueError, which names file,
+    entry, field and value."""
     try:
         text = files.read_text(path, plain_yaml.MAX_YAML_BYTES)
         content = plain_yaml.parse(text)
@@ -82,6 +83,7 @@ def read(path: FilePath) -> Specification:
         raise ValueError(f'{path}: {plain_yaml.problem(error)}{hint}') from None
     if not isinstance(content, dict):
         raise ValueError(f'{path}: must hold the keys requirements, {", ".join(HEADER_KEYS)}')
+    content = {**content, 'tester': tester or content.get('tester', '')}
     requirements: dict[str, Requirement] = {}
     problems = list(_header_problems(content))
     entries = content.get('requirements')

@@ -36,6 +36,7 @@ POINT_TIME_S, CIRCLE_POINTS = 2.5, 8        # time at each offset about the beac
 CROSS_BEAMWIDTHS = (0.2, -0.2, 0.1, -0.1)   # offsets about the beacon on each axis [beamwidths]
 CROSS_TALK = 'cross-talk'
 CHANNELS = {'cross-elevation': (0, 0), 'elevation': (1, 1), CROSS_TALK: (0, 1)}     # row and column of the slopes
+TIME_STEPS = 2.0                # uncertainty of a time: its begin and its end are known to a step each [steps]
 
 
 def _target(*options: str) -> Argument:
@@ -182,7 +183,8 @@ def first(performed: Performed, since: Seconds, t: Times, met: Bools) -> Measure
     """Return the time from a time since the begin of the exercise to the first of the times t that meets a condition.
     """
     times = t[(t >= performed.begin + since) & met]
-    return Measured(float(times[0]) - (performed.begin + since), performed.antenna.period) if times.size else NEVER
+    return Measured(float(times[0]) - (performed.begin + since),
+                    TIME_STEPS * performed.antenna.period) if times.size else NEVER
 
 
 def _acquisition_time(performed: Performed, _: Arguments) -> Measured:
