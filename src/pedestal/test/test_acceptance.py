@@ -142,7 +142,7 @@ def test_an_operator_stops_the_sequence(accept, tmp_path, monkeypatch):
 def test_a_sample_fits_its_antenna(name, scenario):
     path = importlib.resources.files('pedestal') / 'samples' / f'{name}.yaml'
     spec = specification.read(path)
-    assert len(spec.exercises(in_loop.antenna(Variant(scenario).load()))) >= (5 if name == 'acceptance' else 30)
+    assert len(spec.exercises(in_loop.InLoop(Variant(scenario)))) >= (5 if name == 'acceptance' else 30)
 
 
 @pytest.mark.thorough

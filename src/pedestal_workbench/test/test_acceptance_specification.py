@@ -128,22 +128,23 @@ def test_a_file_that_is_none_is_refused(tmp_path):
 
 @pytest.mark.parametrize('scenario', ['station_real', 'uav_tracker_3m'])
 def test_what_an_antenna_cannot_do_is_refused_with_the_name_of_its_requirement(read, scenario):
-    antenna = in_loop.antenna(Variant(scenario).load())
+    performer = in_loop.InLoop(Variant(scenario))
     good, bad = ENTRY.replace('size: 2', 'size: 0.5'), ENTRY.replace('size: 2', 'size: 180').replace(
         'settling\n', 'too far\n', 1)
-    assert len(read(f'title: a\nrequirements:{good}').exercises(antenna)) == 1
+    assert len(read(f'title: a\nrequirements:{good}').exercises(performer)) == 1
     with pytest.raises(ValueError) as error:
-        read(f'title: a\nrequirements:{good}{bad}{bad.replace("too far", "too far again")}').exercises(antenna)
+        read(f'title: a\nrequirements:{good}{bad}{bad.replace("too far", "too far again")}').exercises(performer)
     lines = str(error.value).splitlines()
     assert len(lines) == 2 and "requirement 'too far': size = 180" in lines[0] and 'too far again' in lines[1]
 
 
 def test_a_fault_is_refused_without_a_simulated_drive(read):
-    antenna = in_loop.antenna(Variant('station_real').load())._replace(adu=None)
+    performer = in_loop.InLoop(Variant('station_real'))
+    performer.antenna = performer.antenna._replace(adu=None)
     method = next(method for method in METHODS if method.simulated and method.unit == 'deg')
     with pytest.raises(ValueError, match="requirement 'gust'.*simulated"):
         read(f"title: a\nrequirements:\n- {{name: gust, method: {method.name}, limit: '<= 1', unit: deg}}"
-             ).exercises(antenna)
+             ).exercises(performer)
 
 
 def test_an_exercise_stays_within_the_travel_of_its_antenna():

@@ -72,7 +72,7 @@ def _acceptance(options: argparse.Namespace) -> int:
     results: list[Kept] = []
     stopped, code = '', console.EXIT_ERROR
     with _performer(options, folder) as performer:
-        _confirm(options, spec, spec.exercises(performer.antenna))
+        _confirm(options, spec, spec.exercises(performer))
         with console.progress_of_share() as progress:
             def report(kept: 'Kept') -> None:
                 results.append(kept)

@@ -5,7 +5,6 @@ execute the same commands and return a recording with the same topics, so that e
 """
 import dataclasses
 import hashlib
-import math
 import pathlib
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple, Protocol
@@ -14,16 +13,7 @@ from acu_tracker.params import AcuParameters
 from drive_law.params import AduParameters
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import AnyParameters, as_dict
-from pedestal_common.quantities import (
-    Degrees,
-    DegreesPerSecond,
-    Json,
-    Pairs,
-    Radians,
-    RadiansPerSecond,
-    Seconds,
-    Times,
-)
+from pedestal_common.quantities import Degrees, DegreesPerSecond, Json, Pairs, Radians, Seconds, Times
 from pedestal_common.text_files import plain_yaml
 from pedestal_recording.recording import Recording
 

@@ -52,12 +52,7 @@ def run(specification: Specification, performer: Performer, folder: pathlib.Path
     The folder keeps how the run ended. Raises ValueError before anything moves, for exercises that cannot be made and
     for the folder of another specification; StoppedError if the antenna was stopped.
     """
-    exercises = specification.exercises(performer.antenna)
-    for requirement, exercise in zip(specification.requirements, exercises):
-        try:
-            performer.check(exercise)
-        except ValueError as error:
-            raise ValueError(f'requirement {requirement.name!r}: {error}') from None
+    exercises = specification.exercises(performer)
     folder.mkdir(parents=True, exist_ok=True)
     with _locked(folder):
         results = _Results(folder, specification, performer.antenna.sha256)

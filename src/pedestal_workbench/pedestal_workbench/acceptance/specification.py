@@ -15,7 +15,7 @@ from pedestal_common.text_files import files, plain_yaml
 from pedestal_common.text_files.files import FilePath
 from pedestal_common.wire import commands
 from pedestal_results.intervals import CONFIDENCE_LEVEL, Target
-from pedestal_workbench.acceptance.exercise import Antenna, Exercise
+from pedestal_workbench.acceptance.exercise import Exercise, Performer
 from pedestal_workbench.acceptance.method import Arguments, Method
 from pedestal_workbench.acceptance.methods import METHOD_BY_NAME
 
@@ -56,15 +56,17 @@ class Specification(NamedTuple):
     requirements: tuple[Requirement, ...]
     text: str               # of the file, for the report and for the comparison at a continuation
 
-    def exercises(self, antenna: Antenna) -> list[Exercise]:
-        """Return the exercise of each requirement. Raises ValueError with a line for each one that does not fit."""
+    def exercises(self, performer: Performer) -> list[Exercise]:
+        """Return the exercise of each requirement. Raises ValueError with a line for each one that the antenna or its
+        performer cannot make."""
         exercises, problems = [], []
         for requirement in self.requirements:
-            method = requirement.method
+            method, antenna = requirement.method, performer.antenna
             try:
                 if method.simulated and antenna.adu is None:
                     raise ValueError(f'method = {method.name!r}: needs a simulated drive; this drive is real')
                 exercises.append(method.exercise(antenna, requirement.arguments))
+                performer.check(exercises[-1])
             except ValueError as error:
                 problems.append(f'requirement {requirement.name!r}: {error}')
         if problems:
