@@ -227,7 +227,7 @@ METHODS = (
     Method('fade_recovery', 'let the signal fade in autotrack: time after the fade to autotrack with a locked '
            'receiver', 's', '<=',
            (_target('own', 'pass', 'beacon'), *_TRACKED[1:],
-            Argument('fade', 'duration of the fade', 0.1, 60.0, 's', default=2.0),
+            Argument('fade', 'duration of the fade', 0.1, 60.0, 's', default=4.0),
             Argument('depth', 'loss of level', 0.0, 200.0, 'dB', default=30.0)), _fade, _fade_recovery, True),
     Method('receiver_slope', 'point beside a beacon by `preset`: slope of a receiver channel or larger cross-talk, as '
            'corrected by the control unit', '1', '+-',
