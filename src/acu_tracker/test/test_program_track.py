@@ -77,7 +77,7 @@ def test_travel_until_the_end():
 
 @pytest.mark.parametrize('times, angles, words', [
     ([0.0], [[0, 0]], '1 rows'),
-    ([0.0, 1.0], [[0, 0]], 'times (2,), angles (1, 2)'),
+    ([0.0, 1.0], [[0, 0]], 'shape (2,), angles (1, 2)'),
     ([0.0, math.nan], [[0, 0], [1, 0]], 'row 1'),
     ([0.0, 1.0], [[0, math.inf], [1, 0]], 'row 0'),
     ([0.0, 2.0, 2.0], [[0, 0]] * 3, 'row 2: time 2 s; must be after 2'),
