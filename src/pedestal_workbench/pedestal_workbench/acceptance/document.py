@@ -1,7 +1,6 @@
 """Report of an acceptance: HTML and PDF from the same list of blocks, JSON, and JUnit XML."""
 import collections
 import dataclasses
-import hashlib
 import html
 import json
 import math
@@ -24,7 +23,7 @@ from pedestal_results.report import elements, figures, subject
 from pedestal_workbench.acceptance import figure
 from pedestal_workbench.acceptance.exercise import Antenna
 from pedestal_workbench.acceptance.judgement import FAILED, INCONCLUSIVE, PASSED, ends
-from pedestal_workbench.acceptance.sequence import Kept, Session
+from pedestal_workbench.acceptance.sequence import Kept, Session, utc_text
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
 VERDICTS = {PASSED: 'passed', INCONCLUSIVE: 'inconclusive', FAILED: 'failed'}
@@ -204,13 +203,13 @@ def _head(acceptance: Acceptance) -> list[tuple[str, str]]:
     versions = ', '.join(f'{key.removeprefix("version.")} {value}' for key, value in configuration.versions().items())
     model = f'pointing model {pointing.report().title}' if pointing.named else 'the control unit has no pointing model'
     return [('customer', spec.customer), ('antenna', spec.antenna), ('tested by', spec.tester),
-            ('tested', f'{begun} to {acceptance.made:%Y-%m-%dT%H:%M:%SZ}'),
+            ('tested', f'{begun} to {utc_text(acceptance.made)}'),
             *((f'session {i}', f'from {session.begun}: {session.end}; parameters SHA-256 {session.parameters}')
               for i, session in enumerate(acceptance.sessions, start=1)),
             ('equipment', acceptance.source), ('calibration', '; '.join(filter(None, (spec.calibration, model)))),
             ('software', f'{versions}, git {configuration.git_revision() or "unknown"}'),
             ('parameters', f'SHA-256 {acceptance.antenna.sha256}'),
-            ('specification', f'SHA-256 {hashlib.sha256(spec.text.encode()).hexdigest()}'),
+            ('specification', f'SHA-256 {spec.sha256}'),
             ('made by', acceptance.command)]
 
 

@@ -6,7 +6,6 @@ interrupted, also by a loss of power, continues there with the first requirement
 import contextlib
 import datetime
 import fcntl
-import hashlib
 import json
 import pathlib
 from collections.abc import Callable, Iterator, Sequence
@@ -153,7 +152,7 @@ class _Results:
 
     def __init__(self, folder: pathlib.Path, specification: Specification, parameters: str) -> None:
         self._file, self.kept, self.sessions = folder / RESULTS_FILE, [], []
-        self._sha256 = hashlib.sha256(specification.text.encode()).hexdigest()
+        self._sha256 = specification.sha256
         if self._file.exists():
             before, self.sessions, self.kept = _read(self._file)
             if before != self._sha256:
@@ -177,8 +176,13 @@ class _Results:
                                                    'sessions': self.sessions, 'results': results}, indent=1) + '\n')
 
 
+def utc_text(at: datetime.datetime) -> str:
+    """Return a UTC as text, to the second."""
+    return f'{at:%Y-%m-%dT%H:%M:%SZ}'
+
+
 def _now() -> str:
-    return f'{datetime.datetime.now(datetime.timezone.utc):%Y-%m-%dT%H:%M:%SZ}'
+    return utc_text(datetime.datetime.now(datetime.timezone.utc))
 
 
 def _read(file: pathlib.Path) -> tuple[str, list[Session], list[Kept]]:

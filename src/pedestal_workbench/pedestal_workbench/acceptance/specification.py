@@ -2,6 +2,7 @@
 
 All problems of a file are found before anything moves, and are stated together, a line for each of them.
 """
+import hashlib
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,6 +56,11 @@ class Specification(NamedTuple):
     calibration: str        # calibration in force, in words
     requirements: tuple[Requirement, ...]
     text: str               # of the file, for the report and for the comparison at a continuation
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the file."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
 
     def exercises(self, performer: Performer) -> list[Exercise]:
         """Return the exercise of each requirement. Raises ValueError with a line for each one that the antenna or its
