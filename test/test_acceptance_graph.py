@@ -140,7 +140,8 @@ def test_a_running_graph(running, tmp_path):
         assert performer.antenna.simulated == ('adu', 'tracking_receiver')
         with pytest.raises(ValueError, match='adu.period: a running graph keeps its parameters'):
             performer.check(step(changes={'adu.period': 0.01}))
-        results = sequence.run(specification(), performer, tmp_path, 1, lambda kept: None)
+        asked = specification()
+        results = sequence.run(asked, asked.exercises(performer), performer, tmp_path, 1, lambda kept: None)
         assert [kept.judged.verdict for kept in results] == [1.0] * 3
         expected = InLoop(UAV.with_(SLOW)).perform('one', step(), 1).recording.table('joint_states')
         assert results[0].judged.value == pytest.approx(np.degrees(expected['azimuth.position'][-1]), abs=0.005)
@@ -155,7 +156,8 @@ def test_a_running_graph(running, tmp_path):
 
 def main(folder):
     """Run the sequence on graphs of its own."""
-    return sequence.run(specification(), OwnGraph(UAV, pathlib.Path(folder)), pathlib.Path(folder), 1,
+    performer, asked = OwnGraph(UAV, pathlib.Path(folder)), specification()
+    return sequence.run(asked, asked.exercises(performer), performer, pathlib.Path(folder), 1,
                         lambda kept: print(kept.name, flush=True))
 
 

@@ -80,7 +80,8 @@ def unexpected(antenna, state, seed, folder, methods=None):
     and on a stop of the antenna."""
     asked, kept = shipped(antenna, methods), []
     try:
-        sequence.run(asked, InLoop(Variant(antenna).with_(STATES[state][antenna])), folder, seed, kept.append)
+        performer = InLoop(Variant(antenna).with_(STATES[state][antenna]))
+        sequence.run(asked, asked.exercises(performer), performer, folder, seed, kept.append)
     except StoppedError as error:
         return [f'stopped: {error}']
     fails = EXPECTED_FAILURES[state][antenna]

@@ -63,7 +63,8 @@ class Noted(InLoop):
 
 def run(folder, performer, *requirements, text='text', seed=1):
     reported = []
-    results = sequence.run(specification(*requirements, text=text), performer, folder, seed, reported.append)
+    asked = specification(*requirements, text=text)
+    results = sequence.run(asked, asked.exercises(performer), performer, folder, seed, reported.append)
     assert reported == results
     return results
 

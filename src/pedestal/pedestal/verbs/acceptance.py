@@ -71,21 +71,24 @@ def _acceptance(options: argparse.Namespace) -> int:
         raise ValueError(f'--output {folder}: must be a directory, or a new one in a directory that exists')
     results: list[Kept] = []
     stopped, code = '', console.EXIT_ERROR
-    with _performer(options, folder) as performer:
-        _confirm(options, spec, spec.exercises(performer))
+    opened, source = _performer(options, folder)
+    with opened as performer:
+        exercises = spec.exercises(performer)
+        _confirm(options.yes, spec, exercises)
         with console.progress_of_share() as progress:
             def report(kept: 'Kept') -> None:
+                requirement = next(one for one in spec.requirements if one.name == kept.name)
                 results.append(kept)
                 progress(len(results) / len(spec.requirements), kept.name)
-                print(document.line(spec, kept))
+                print(document.line(requirement, kept))
             try:
-                sequence.run(spec, performer, folder, options.seed, report)
+                sequence.run(spec, exercises, performer, folder, options.seed, report)
             except StoppedError as error:
                 stopped = str(error)
             except KeyboardInterrupt:
                 stopped, code = 'an operator stopped it', stop.STOP_EXIT_CODE
     now = datetime.datetime.now(datetime.timezone.utc)
-    found = document.Acceptance(spec, results, performer.antenna, _source(options), options.command, now,
+    found = document.Acceptance(spec, results, performer.antenna, source, options.command, now,
                                 sequence.sessions(folder), stopped)
     print(*document.write(found, folder), sep='\n')
     console.write_json(options.json, document.json_content(found))
@@ -96,41 +99,33 @@ def _acceptance(options: argparse.Namespace) -> int:
     return 0 if found.passed else console.EXIT_FAILED_RUN
 
 
-def _performer(options: argparse.Namespace, folder: pathlib.Path) -> 'AbstractContextManager[Performer]':
-    """Return the performer of the options as a context."""
-    from pedestal_workbench.acceptance import in_loop
-    if options.closed_loop:
-        return contextlib.nullcontext(in_loop.InLoop(arguments.variant(options)))
-    if options.scenario:
-        from pedestal_workbench.acceptance.own_graph import OwnGraph
-        return OwnGraph(arguments.variant(options), folder)
-    from pedestal_workbench.acceptance.running_graph import RunningGraph
-    return RunningGraph(folder)
-
-
-def _source(options: argparse.Namespace) -> str:
-    """Return what is tested, in words."""
+def _performer(options: argparse.Namespace, folder: pathlib.Path) -> 'tuple[AbstractContextManager[Performer], str]':
+    """Return the performer of the options as a context, and what it tests in words."""
     if not options.scenario:
-        return 'the running graph'
-    how = 'in the closed loop' if options.closed_loop else 'as nodes'
-    return f'scenario {options.scenario} {how}, seed {options.seed}'
+        from pedestal_workbench.acceptance.running_graph import RunningGraph
+        return RunningGraph(folder), 'the running graph'
+    variant, source = arguments.variant(options), f'simulation: scenario {options.scenario}'
+    if options.closed_loop:
+        from pedestal_workbench.acceptance.in_loop import InLoop
+        return contextlib.nullcontext(InLoop(variant)), f'{source} in the closed loop, seed {options.seed}'
+    from pedestal_workbench.acceptance.own_graph import OwnGraph
+    return contextlib.nullcontext(OwnGraph(variant, folder)), f'{source} as nodes, seed {options.seed}'
 
 
-def _confirm(options: argparse.Namespace, spec: 'Specification', exercises: 'Sequence[Exercise]') -> None:
-    """Print what the antenna will do. Raises ValueError without a confirmation."""
+def _confirm(yes: bool, spec: 'Specification', exercises: 'Sequence[Exercise]') -> None:
+    """Print what the antenna will do. yes: it is confirmed. Raises ValueError without a confirmation."""
     from pedestal_common.text_files.text_table import Cell, TextTable
-    rows: list[list[Cell]] = []
-    whole = 0.0
-    for requirement, exercise in zip(spec.requirements, exercises):
-        spans = [f'{span.low:.4g} to {span.high:.4g}' for span in exercise.envelope]
-        rows.append([requirement.name, *spans, *(span.rate for span in exercise.envelope), exercise.duration,
-                     requirement.repetitions])
-        whole += exercise.duration * requirement.repetitions
+    rows: list[list[Cell]] = [
+        [requirement.name, *(f'{span.low:.4g} to {span.high:.4g}' for span in exercise.envelope),
+         *(span.rate for span in exercise.envelope), exercise.duration, requirement.repetitions]
+        for requirement, exercise in zip(spec.requirements, exercises)]
     heads = ('requirement', ('azimuth [deg]', '>'), ('elevation [deg]', '>'), ('azimuth rate [deg/s]', '>.3g'),
              ('elevation rate [deg/s]', '>.3g'), ('time [s]', '>.0f'), ('repetitions', '>.0f'))
+    whole = sum(exercise.duration * requirement.repetitions
+                for requirement, exercise in zip(spec.requirements, exercises))
     print('The antenna will move within:', *TextTable(heads, rows).lines(), 'Time of all exercises: at most '
           f'{math.ceil(whole / 60.0)} min, without the motions to their begins.', sep='\n')
-    if options.yes:
+    if yes:
         return
     if not sys.stdin.isatty():
         raise ValueError('--yes: must be given without a terminal, to confirm the motions above')

@@ -32,12 +32,6 @@ class Sent(NamedTuple):
     number: str     # of its request
 
 
-def faults(exercise: Exercise) -> list[tuple[str, str]]:
-    """Return [(node, fault)] that the actions of an exercise inject, with `clear`."""
-    parsed = [(action.node, commands.parsed(action.command).verb) for action in exercise.actions]
-    return [(node, verb) for node, verb in parsed if node != 'acu' and verb not in nodes.DRIVE_SERVICES]
-
-
 class Client(Commander):
     """Client that makes exercises. injected: nodes into which it may inject faults."""
 

@@ -63,7 +63,7 @@ class OwnGraph:
 
 def _pacing(exercise: Exercise) -> str:
     """Return the pacing of a run: realtime for a fault that a lockstep graph cannot have."""
-    injected = client.faults(exercise) + [
+    injected = exercise.faults + [
         (key.partition('.')[0], command.verb) for key, text in exercise.changes.items() if key.endswith('.inject')
         for _, command in table.scheduled_commands(key.partition('.')[0], str(text))]
     return 'realtime' if any(table.refused_in_lockstep(*fault) for fault in injected) else 'lockstep'

@@ -83,9 +83,6 @@ class RunningGraph:
         """Raise ValueError for an exercise that the running graph cannot make."""
         if exercise.changes:
             raise ValueError(f'{", ".join(exercise.changes)}: a running graph keeps its parameters; use --scenario')
-        for node, fault in client.faults(exercise):
-            if node not in self.antenna.simulated:
-                raise ValueError(f'{fault} of {node}: the node is not simulated and accepts no faults')
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from a stamp shortly after its recorder writes. Raises StoppedError."""
@@ -193,7 +190,7 @@ class RunningGraph:
         """
         session, remote = self._session, self._session.remote
         session.stop_antenna()
-        for node in {node for node, _ in client.faults(exercise)}:
+        for node in {node for node, _ in exercise.faults}:
             session.await_reply(remote.send(Action(0.0, node, 'clear')).number)
         drive = remote.texts.get(DRIVE_STATE_TOPIC, '')
         if not drive.startswith('enabled') and any(action.node == nodes.DRIVE_NODE for action in exercise.actions):

@@ -43,15 +43,15 @@ class Session(NamedTuple):
     end: str = 'interrupted'                # how it ended
 
 
-def run(specification: Specification, performer: Performer, folder: pathlib.Path, seed: int,
-        report: Callable[[Kept], None]) -> list[Kept]:
+def run(specification: Specification, exercises: Sequence[Exercise], performer: Performer, folder: pathlib.Path,
+        seed: int, report: Callable[[Kept], None]) -> list[Kept]:
     """Perform the requirements without a result in the folder, and return all results. Requirements with the same
-    exercise share its recordings. report: called with each result, also with those of earlier sessions.
+    exercise share its recordings. exercises: of the requirements, as Specification.exercises returns them; report:
+    called with each result, also with those of earlier sessions.
 
-    The folder keeps how the run ended. Raises ValueError before anything moves, for exercises that cannot be made and
-    for the folder of another specification; StoppedError if the antenna was stopped.
+    The folder keeps how the run ended. Raises ValueError before anything moves for the folder of another
+    specification, StoppedError if the antenna was stopped.
     """
-    exercises = specification.exercises(performer)
     folder.mkdir(parents=True, exist_ok=True)
     with _locked(folder):
         results = _Results(folder, specification, performer.antenna.sha256)
