@@ -8,7 +8,7 @@ import pytest
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.injection.table import INJECTED_FAULTS
 from pedestal_workbench.acceptance import safety
-from pedestal_workbench.acceptance.exercise import Action, Exercise, Span, StoppedError
+from pedestal_workbench.acceptance.exercise import Action, BreachError, Exercise, Span
 from pedestal_workbench.acceptance.in_loop import InLoop
 from pedestal_workbench.acceptance.tracking import travel
 
@@ -171,5 +171,5 @@ def test_performer_stops_at_a_breach(change, text):
     move = Exercise(5.0, travel(performer.antenna), (Action(1.0, 'acu', 'preset azimuth=0.5 elevation=0.5'),),
                     (0.0, 0.5))
     performer.perform('move', move, 1)
-    with pytest.raises(StoppedError, match=f'move, after .* s: {text}'):
+    with pytest.raises(BreachError, match=f'move, after .* s: {text}'):
         performer.perform('move', dataclasses.replace(move, **change), 1)

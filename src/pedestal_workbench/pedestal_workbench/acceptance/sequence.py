@@ -7,6 +7,7 @@ import contextlib
 import datetime
 import fcntl
 import json
+import math
 import pathlib
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
@@ -16,8 +17,15 @@ from pedestal_common.quantities import Json
 from pedestal_common.text_files import files
 from pedestal_recording import bag_files
 from pedestal_workbench.acceptance import figure
-from pedestal_workbench.acceptance.exercise import Exercise, LateError, Performed, Performer, StoppedError
-from pedestal_workbench.acceptance.judgement import Judged, judged
+from pedestal_workbench.acceptance.exercise import (
+    BreachError,
+    Exercise,
+    LateError,
+    Performed,
+    Performer,
+    StoppedError,
+)
+from pedestal_workbench.acceptance.judgement import FAILED, Judged, judged
 from pedestal_workbench.acceptance.method import Measured
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
@@ -48,8 +56,10 @@ def run(specification: Specification, performer: Performer, folder: pathlib.Path
     """Perform the requirements without a result in the folder, and return all results. Requirements with the same
     exercise share its recordings. report: called with each result, also with those of earlier sessions.
 
-    The folder keeps how the run ended. Raises ValueError before anything moves, for exercises that cannot be made and
-    for the folder of another specification; StoppedError if the antenna was stopped.
+    An alarm, or an antenna outside the envelope, fails the requirement. Because its cause may last, the sequence then
+    goes on only with a run of its own for each exercise. The folder keeps how the sequence ended. Raises ValueError
+    before anything moves, for exercises that cannot be made and for the folder of another specification; StoppedError
+    if the antenna was stopped.
     """
     exercises = specification.exercises(performer)
     folder.mkdir(parents=True, exist_ok=True)
@@ -65,6 +75,8 @@ def run(specification: Specification, performer: Performer, folder: pathlib.Path
             for requirement, exercise in left:
                 results.keep(_result(requirement, exercise, performances, folder, len(results.sessions)))
                 report(results.kept[-1])
+                if results.kept[-1].judged.breached and not performer.own_runs:
+                    raise StoppedError(results.kept[-1].judged.reason)
             results.end('came to its end')
         except StoppedError as error:
             results.end(f'stopped: {error}')
@@ -82,19 +94,30 @@ def _result(requirement: Requirement, exercise: Exercise, performances: '_Perfor
     """Perform, measure and judge a requirement."""
     begun = _now()
     measured: list[Measured] = []
-    bags: list[tuple[str, str]] = []
-    reason = ''
-    for i, performed in enumerate(performances.of(requirement, exercise)):
-        if performed.bag is not None:
-            bags += [(str(file.relative_to(folder.resolve())), files.sha256(file))
-                     for file in bag_files.locate(performed.bag.resolve())]
-        if i == 0:
-            figure.keep_signal(performed, folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
-        try:
-            measured.append(requirement.method.measure(performed, requirement.arguments))
-        except ValueError as error:
-            reason = str(error)
-    return Kept(requirement.name, judged(requirement, measured, reason), tuple(bags), begun, session)
+    bags: list[pathlib.Path | None] = []
+    reason, breach = '', ''
+    try:
+        for performed in performances.of(requirement, exercise):
+            if not bags:
+                figure.keep_signal(performed, folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
+            bags.append(performed.bag)
+            try:
+                measured.append(requirement.method.measure(performed, requirement.arguments))
+            except ValueError as error:
+                reason = str(error)
+    except BreachError as error:
+        bags.append(folder / _recording(requirement, len(bags)))
+        breach = str(error)
+    found = Judged(math.nan, math.nan, FAILED, tuple(measured), breach) if breach else judged(
+        requirement, measured, reason)
+    sums = tuple((str(file.relative_to(folder.resolve())), files.sha256(file))
+                 for bag in bags if bag and bag.exists() for file in bag_files.locate(bag.resolve()))
+    return Kept(requirement.name, found, sums, begun, session)
+
+
+def _recording(requirement: Requirement, i: int) -> str:
+    """Return the name of the recording of a repetition, which counts from 0."""
+    return f'{requirement.file_name}-{i + 1}'
 
 
 class _Performances:
@@ -109,14 +132,14 @@ class _Performances:
         """Yield a performance for each repetition of the next requirement."""
         key = self._left.pop(0)
         made = self._made.setdefault(key, [])
+        if key not in self._left:
+            del self._made[key]
         for i in range(requirement.repetitions):
             if i == len(made):
-                name = f'{requirement.file_name}-{i + 1}'
+                name = _recording(requirement, i)
                 pass_recorder.set_aside(self._folder / name, 'interrupted')
                 made.append(self._make(name, exercise, self._seed + SEED_STEP * i))
             yield made[i]
-        if key not in self._left:
-            del self._made[key]
 
     def _make(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise, and make it again after one with late commands. Raises StoppedError."""
