@@ -2,6 +2,7 @@
 import importlib.resources
 import io
 import json
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -117,7 +118,7 @@ LOST = '--param', 'adu.inject=0.1 motor_loss axis=azimuth motor=1'
 def test_an_alarm_fails_its_requirement_and_is_exit_code_4(accept, tmp_path):
     code, said, _ = accept(TITLE + STEP + SLEW, '--yes', *LOST)
     assert code == 4 and 'Not passed: 2 failed of 2' in said
-    assert 'failed        step: not measured: step-1, after ' in said and ' s: alarm azimuth motor lost, must be' in said
+    assert re.search('failed        step: not measured: step-1, after .* s: alarm azimuth motor lost, must be', said)
     folder = tmp_path / 'acceptance-spec'
     assert 'alarm azimuth motor lost' in (folder / 'report.html').read_text()
     assert {rows((folder / 'report.json').read_text())[name, 'passed'] for name in ('step', 'slew')} == {0.0}

@@ -65,6 +65,7 @@ EXPECTED_FAILURES = {
     'tilted mount': dict.fromkeys(ANTENNAS, ('program track of a pass', 'pointing offset'))}
 """{state: {antenna: names of the requirements that fail}}."""
 
+FIRST_SEED = 101    # of the agreement: MIN_CORRELATION of the rms was chosen with the seeds 1 to 40
 RECEIVER_METHODS = ('autotrack_rms', 'program_rms', 'pointing_offset', 'acquisition_time', 'fade_recovery',
                     'receiver_slope', 'fault_report')
 
@@ -172,19 +173,20 @@ def of_tracking(antenna, target, seeds):
 
 
 def agreement(seeds, axes=('azimuth', 'elevation'), targets=('beacon', 'pass', 'manoeuvre')):
-    """Return a Compared for each metric and seed. Because the margins of the antenna without wind repeat bit for bit,
+    """Yield a Compared for each metric and seed. Because the margins of the antenna without wind repeat bit for bit,
     they are made once."""
-    found = []
     for antenna, axis in itertools.product(ANTENNAS, axes):
-        found += [one for seed in seeds for one in of_steps(antenna, axis, seed)]
-        found += [one for seed in (seeds if antenna == SLOW else seeds[:1]) for one in of_margins(antenna, axis, seed)]
-    return found + [one for antenna, target in itertools.product(ANTENNAS, targets)
-                    for one in of_tracking(antenna, target, seeds)]
+        for i, seed in enumerate(seeds):
+            yield from of_steps(antenna, axis, seed)
+            if i == 0 or antenna == SLOW:
+                yield from of_margins(antenna, axis, seed)
+    for antenna, target in itertools.product(ANTENNAS, targets):
+        yield from of_tracking(antenna, target, seeds)
 
 
 @pytest.mark.thorough
 def test_step_margins_and_rms_agree_within_their_uncertainty():
-    found = agreement(range(1, 5), ('elevation',), ('pass',))
+    found = list(agreement(range(1, 5), ('elevation',), ('pass',)))
     outside = [one for one in found if not one.within]
     assert len(outside) <= 0.05 * len(found), outside
 
@@ -204,7 +206,7 @@ def main(seeds, repetitions):
             wrong = unexpected(antenna, state, seed, pathlib.Path(folder),
                                None if seed == 1 or antenna == SLOW else RECEIVER_METHODS)
         print(f'{antenna:15} {state:20} seed {seed:2}: {"; ".join(wrong) or "as expected"}', flush=True)
-    found = agreement(range(1, repetitions + 1)) if repetitions else []
+    found = list(agreement(range(FIRST_SEED, FIRST_SEED + repetitions)))
     for metric in dict.fromkeys(one.metric for one in found):
         of = [one for one in found if one.metric == metric]
         print(f'{metric:45} within {sum(one.within for one in of)} of {len(of)}; reference {of[0].reference:.5g}, '

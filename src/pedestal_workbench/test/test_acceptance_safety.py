@@ -52,7 +52,7 @@ def test_angle_beyond_a_limit_is_the_overshoot():
     judged = dataclasses.replace(done, antenna=done.antenna._replace(acu=stricter))
     found = METHODS['limit_overshoot'].measure(judged, arguments('limit_overshoot'))
     assert found.value == pytest.approx(1.0, abs=0.01)
-    assert found.uncertainty == 360.0 / 2**done.antenna.adu.azimuth.encoder.load_bits
+    assert found.uncertainty == 0.475 * 360.0 / 2**done.antenna.adu.azimuth.encoder.load_bits
 
 
 def test_a_limit_that_the_axis_does_not_reach_is_not_measured():

@@ -25,6 +25,7 @@ class Antenna(NamedTuple):
     beamwidth: Radians
     period: Seconds                 # of a step
     simulated: tuple[str, ...] = ()     # its nodes that are simulated, into which faults can be injected
+    on_ship: bool = False           # an INS states the attitude of its deck
 
     @property
     def parts(self) -> dict[str, AnyParameters]:

@@ -25,7 +25,7 @@ def antenna(scenario: Scenario) -> Antenna:
     """Return what methods need to know of the antenna of a scenario."""
     acu, adu = scenario.node_parameters('acu'), scenario.node_parameters('adu')
     return Antenna(acu, adu, scenario.node_parameters('tracking_receiver').antenna.beamwidth, adu.period,
-                   tuple(node for node in INJECTED_FAULTS if node in scenario.nodes))
+                   tuple(node for node in INJECTED_FAULTS if node in scenario.nodes), 'ins' in scenario.nodes)
 
 
 def changes(exercise: Exercise) -> dict[str, Json]:

@@ -66,7 +66,8 @@ class RunningGraph:
                 parameters.defaults(AduNodeParameters), nodes.DRIVE_NODE)) if self._graph['graph.simulated'] else None
             simulated = tuple(node for node in table.INJECTED_FAULTS
                               if self._session.remote.count_subscribers(f'{node}/inject'))
-            self.antenna = Antenna(acu, adu, acu.tracker.receiver.beamwidth, acu.period, simulated)
+            self.antenna = Antenna(acu, adu, acu.tracker.receiver.beamwidth, acu.period, simulated,
+                                   bool(self._session.remote.count_publishers('ship/imu/data')))
             self._session.take_control()
         except BaseException:
             self._session.__exit__()
