@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from drive_law.axis_params import SPEED_LOOP_PERIOD_S, AxisParameters
 from pedestal_common.graph.topics import AXES
@@ -148,7 +147,7 @@ def encoder_uncertainty(antenna: Antenna, name: str) -> Degrees:
     return UNIFORM_SHARE * 360.0 / 2**drive.encoder.load_bits if drive else 0.0
 
 
-def mean(values: ArrayLike, uncertainty: float = 0.0) -> Measured:
+def mean(values: Floats | list[float], uncertainty: float = 0.0) -> Measured:
     """Return the mean of values by their scatter. uncertainty: that all values share."""
     return Measured(float(np.mean(values)), math.hypot(half_width(np.ravel(values)), uncertainty))
 
