@@ -48,10 +48,13 @@ def azimuth(performed, times):
     return np.degrees(np.interp(times, table['t'] - begin, table['azimuth.position']))
 
 
-def specification():
-    """Return two requirements with exercises of their own, and one that shares the second."""
+def specification(*faults):
+    """Return two requirements with exercises of their own, and one that shares the second. faults: during each."""
     def method(size):
-        return Method('last', '', 'deg', '+-', (), lambda antenna, arguments: step(size=size),
+        def exercise(antenna, arguments):
+            made = step(size=size)
+            return dataclasses.replace(made, actions=made.actions + faults)
+        return Method('last', '', 'deg', '+-', (), exercise,
                       lambda performed, arguments: Measured(float(azimuth(performed, [1.4])[0]), 0.0))
     return Specification('title', '', '', '', '', tuple(
         Requirement(name, method(size), {}, Target.parse(f'{size} +- 0.1'), 1, 0.95)
@@ -148,6 +151,12 @@ def test_a_running_graph(running, tmp_path):
         with pytest.raises(StoppedError, match='commanded stop') as stop:
             performer.perform('stopped', step(duration=60.0), 1)
         assert stop.type is StoppedError        # no BreachError: an operator's stop fails no requirement
+    lost, kept = tmp_path / 'lost', []
+    with connected(lost) as performer, pytest.raises(StoppedError, match='alarm azimuth motor lost'):
+        sequence.run(specification(Action(1.0, 'adu', 'motor_loss')), performer, lost, 1, kept.append)
+    [failed] = kept
+    assert failed.judged.verdict == 0.0 and 'alarm azimuth motor lost' in failed.judged.reason
+    assert [name for name, _ in failed.bags] == ['one-1/one-1_0.mcap']
     assert ask('ask', 'take')[0] == 0       # control was released
     sample = importlib.resources.files('pedestal') / 'samples' / 'acceptance.yaml'
     code, said = ask('acceptance', str(sample), '--yes', '--output', str(tmp_path / 'other'))
