@@ -13,11 +13,19 @@ from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.injection import table
 from pedestal_common.quantities import Nanoseconds, Seconds
 from pedestal_common.wire import commands, messages
-from pedestal_operator.commander import Commander
+from pedestal_operator.commander import EMERGENCY_STOP, Commander
 from pedestal_operator.remote_node import RemoteSession, user
 from pedestal_operator.state import PAST_STATES, alarm
 from pedestal_recording.recording import Recording, holds, replies
-from pedestal_workbench.acceptance.exercise import Action, Executed, Exercise, LateError, StoppedError, Track
+from pedestal_workbench.acceptance.exercise import (
+    Action,
+    BreachError,
+    Executed,
+    Exercise,
+    LateError,
+    StoppedError,
+    Track,
+)
 from pedestal_workbench.acceptance.in_loop import CLIENT
 
 JOINTS_TOPIC, TRACK_TOPIC = 'joint_states', 'acu/program_track'
@@ -75,16 +83,21 @@ class Client(Commander):
         messages.put_stamp(message.header.stamp, begin)
         self._send_track(messages.serialize(message))
 
-    def trouble(self, exercise: Exercise) -> str:
-        """Return why the antenna must be stopped in an exercise, '' for no reason."""
+    def trouble(self, exercise: Exercise) -> StoppedError | None:
+        """Return why the antenna must be stopped in an exercise, None for no reason."""
         if self.holder not in ('', self.who):
-            return f'control is with {self.holder}'
+            return StoppedError(f'control is with {self.holder}')
+        unexpected = {each['name']: f'alarm {each["name"]}: {each["detail"] or each["meaning"]}'
+                      for each in map(alarm, self.alarms)
+                      if each['state'] not in PAST_STATES and each['name'] not in exercise.alarms}
+        pressed = unexpected.pop(EMERGENCY_STOP, '')    # by an operator, if no other alarm explains it
+        if breach := exercise.outside(self.encoder_angles(JOINTS_TOPIC), self.rates()) or '; '.join(
+                unexpected.values()):
+            return BreachError(breach)
         scheduled = self.interference.startswith(f'{commands.SCHEDULE_CLIENT} ')
         if self.interference and not scheduled and self.interference not in exercise.alarms:
-            return self.interference
-        unexpected = [f'alarm {each["name"]}: {each["detail"] or each["meaning"]}' for each in map(alarm, self.alarms)
-                      if each['state'] not in PAST_STATES and each['name'] not in exercise.alarms]
-        return exercise.outside(self.encoder_angles(JOINTS_TOPIC), self.rates()) or '; '.join(unexpected)
+            return StoppedError(self.interference)
+        return StoppedError(pressed) if pressed else None
 
 
 class ClientSession(RemoteSession):
@@ -119,9 +132,9 @@ class ClientSession(RemoteSession):
                 raise LateError(lateness(due[0], elapsed / NS_PER_SECOND))
             while due and elapsed >= round(due[0].at * NS_PER_SECOND):
                 sent.append(client.send(due.pop(0)))
-            reason = client.trouble(exercise) if elapsed >= 0 else ''
-            if reason:
-                break
+            if elapsed >= 0 and (trouble := client.trouble(exercise)):
+                self.stop_antenna()
+                raise trouble
         if reason:
             self.stop_antenna()
             raise StoppedError(reason)

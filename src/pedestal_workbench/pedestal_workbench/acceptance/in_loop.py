@@ -14,7 +14,7 @@ from pedestal_common.graph.topics import AXES
 from pedestal_common.injection.table import INJECTED_FAULTS
 from pedestal_common.quantities import Json, Seconds
 from pedestal_common.wire.commands import parsed
-from pedestal_workbench.acceptance.exercise import Antenna, Executed, Exercise, Performed, StoppedError
+from pedestal_workbench.acceptance.exercise import Antenna, BreachError, Executed, Exercise, Performed
 
 CLIENT = 'acceptance'   # name of the client that commands the control unit
 WIND_SEEDS = 'adu.wind.field.seed', 'adu.wind.gust.seed'     # which the seed of a scenario leaves as they are
@@ -25,7 +25,7 @@ def antenna(scenario: Scenario) -> Antenna:
     """Return what methods need to know of the antenna of a scenario."""
     acu, adu = scenario.node_parameters('acu'), scenario.node_parameters('adu')
     return Antenna(acu, adu, scenario.node_parameters('tracking_receiver').antenna.beamwidth, adu.period,
-                   tuple(node for node in INJECTED_FAULTS if node in scenario.nodes))
+                   tuple(node for node in INJECTED_FAULTS if node in scenario.nodes), 'ins' in scenario.nodes)
 
 
 def changes(exercise: Exercise) -> dict[str, Json]:
@@ -46,6 +46,7 @@ def run_of(exercise: Exercise, variant: Variant, period: Seconds, seed: int = 1)
 
 class InLoop:
     """Performer in the closed loop of a variant of a scenario."""
+    own_runs = True
 
     def __init__(self, variant: Variant) -> None:
         self._variant = variant
@@ -69,7 +70,7 @@ class InLoop:
             """Stop where the exercise is breached, and execute the actions that are due after `made` steps. Return the
             number of steps to the next call."""
             if made and (reason := _breach(loop, exercise)):
-                raise StoppedError(f'{name}, after {made * loop.period_ns / NS_PER_SECOND:g} s: {reason}')
+                raise BreachError(f'{name}, after {made * loop.period_ns / NS_PER_SECOND:g} s: {reason}')
             while due and round(due[0].at * NS_PER_SECOND) <= made * loop.period_ns:
                 action = due.pop(0)
                 unit = loop.units[action.node]

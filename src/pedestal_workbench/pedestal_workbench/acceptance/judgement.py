@@ -21,6 +21,11 @@ class Judged(NamedTuple):
     repetitions: tuple[Measured, ...]
     reason: str = ''        # why the value could not be measured
 
+    @property
+    def breached(self) -> bool:
+        """True if an alarm or an antenna outside its envelope ended an exercise."""
+        return self.verdict == FAILED and math.isnan(self.value)
+
 
 def judged(requirement: Requirement, repetitions: Sequence[Measured], reason: str = '') -> Judged:
     """Return the judgement of the repetitions of a requirement. reason: why one of them could not be measured.

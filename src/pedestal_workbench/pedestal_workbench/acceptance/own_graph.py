@@ -25,6 +25,7 @@ JUDGED_EXIT_CODES = 0, 4  # of `pedestal run` after a whole run; 4: its verdict 
 
 class OwnGraph:
     """Performer on the graphs of a variant. folder: of the recordings."""
+    own_runs = True
 
     def __init__(self, variant: Variant, folder: pathlib.Path) -> None:
         self._variant, self._folder = variant, folder.resolve()

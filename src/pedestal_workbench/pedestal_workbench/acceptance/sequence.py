@@ -7,6 +7,7 @@ import contextlib
 import datetime
 import fcntl
 import json
+import math
 import pathlib
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
@@ -16,8 +17,15 @@ from pedestal_common.quantities import Json
 from pedestal_common.text_files import files
 from pedestal_recording import bag_files
 from pedestal_workbench.acceptance import figure
-from pedestal_workbench.acceptance.exercise import Exercise, LateError, Performed, Performer, StoppedError
-from pedestal_workbench.acceptance.judgement import Judged, judged
+from pedestal_workbench.acceptance.exercise import (
+    BreachError,
+    Exercise,
+    LateError,
+    Performed,
+    Performer,
+    StoppedError,
+)
+from pedestal_workbench.acceptance.judgement import FAILED, Judged, judged
 from pedestal_workbench.acceptance.method import Measured
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
@@ -49,8 +57,9 @@ def run(specification: Specification, exercises: Sequence[Exercise], performer: 
     exercise share its recordings. exercises: of the requirements, as Specification.exercises returns them; report:
     called with each result, also with those of earlier sessions.
 
-    The folder keeps how the run ended. Raises ValueError before anything moves for the folder of another
-    specification, StoppedError if the antenna was stopped.
+    An alarm, or an antenna outside the envelope, fails the requirement. Because its cause may last, the sequence then
+    goes on only with a run of its own for each exercise. The folder keeps how the sequence ended. Raises ValueError
+    before anything moves for the folder of another specification, StoppedError if the antenna was stopped.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with _locked(folder):
@@ -58,13 +67,19 @@ def run(specification: Specification, exercises: Sequence[Exercise], performer: 
         for kept in results.kept:
             report(kept)
         names = [kept.name for kept in results.kept]
-        left = [(requirement, exercise) for requirement, exercise in zip(specification.requirements, exercises)
-                if requirement.name not in names]
-        performances = _Performances(performer, folder, seed, [exercise for _, exercise in left])
+        left = [(requirement, exercise, _key(exercise)) for requirement, exercise in zip(
+            specification.requirements, exercises) if requirement.name not in names]
+        made: dict[str, list[Performed]] = {}
         try:
-            for requirement, exercise in left:
-                results.keep(_result(requirement, exercise, performances, folder, len(results.sessions)))
-                report(results.kept[-1])
+            for i, (requirement, exercise, key) in enumerate(left):
+                kept = _result(requirement, exercise, performer, folder, seed, made.setdefault(key, []),
+                               len(results.sessions))
+                results.keep(kept)
+                report(kept)
+                if kept.judged.breached and not performer.own_runs:
+                    raise StoppedError(kept.judged.reason)
+                if key not in [later for _, _, later in left[i + 1:]]:
+                    del made[key]       # frees its recordings
             results.end('came to its end')
         except StoppedError as error:
             results.end(f'stopped: {error}')
@@ -77,54 +92,42 @@ def sessions(folder: pathlib.Path) -> list[Session]:
     return _read(folder / RESULTS_FILE)[1] if (folder / RESULTS_FILE).exists() else []
 
 
-def _result(requirement: Requirement, exercise: Exercise, performances: '_Performances', folder: pathlib.Path,
-            session: int) -> Kept:
-    """Perform, measure and judge a requirement."""
-    begun = _now()
-    measured: list[Measured] = []
-    bags: list[tuple[str, str]] = []
-    reason = ''
-    for i, performed in enumerate(performances.of(requirement, exercise)):
-        if performed.bag is not None:
-            bags += [(str(file.relative_to(folder.resolve())), files.sha256(file))
-                     for file in bag_files.locate(performed.bag.resolve())]
-        if i == 0:
-            figure.keep_signal(performed, folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
+def _result(requirement: Requirement, exercise: Exercise, performer: Performer, folder: pathlib.Path, seed: int,
+            made: list[Performed], session: int) -> Kept:
+    """Perform, measure and judge a requirement. made: performances of its exercise so far; new ones are added."""
+    begun, measured, reason, breach = _now(), list[Measured](), '', ''
+    bags: list[pathlib.Path | None] = []
+    for i in range(requirement.repetitions):
+        name = f'{requirement.file_name}-{i + 1}'
         try:
-            measured.append(requirement.method.measure(performed, requirement.arguments))
+            if i == len(made):
+                made.append(_performed(performer, folder, name, exercise, seed + SEED_STEP * i))
+        except BreachError as error:
+            breach = str(error)
+            bags.append(folder / name)
+            break
+        bags.append(made[i].bag)
+        if i == 0:
+            figure.keep_signal(made[0], folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
+        try:
+            measured.append(requirement.method.measure(made[i], requirement.arguments))
         except ValueError as error:
             reason = str(error)
-    return Kept(requirement.name, judged(requirement, measured, reason), tuple(bags), begun, session)
+    found = Judged(math.nan, math.nan, FAILED, tuple(measured), breach) if breach else judged(
+        requirement, measured, reason)
+    sums = tuple((str(file.relative_to(folder.resolve())), files.sha256(file))
+                 for bag in bags if bag and bag.exists() for file in bag_files.locate(bag.resolve()))
+    return Kept(requirement.name, found, sums, begun, session)
 
 
-class _Performances:
-    """Performances of a run of the sequence, each kept until the last requirement with its exercise is measured."""
-
-    def __init__(self, performer: Performer, folder: pathlib.Path, seed: int, exercises: Sequence[Exercise]) -> None:
-        self._performer, self._folder, self._seed = performer, folder, seed
-        self._left = list(map(_key, exercises))     # of the requirements that are not measured yet
-        self._made: dict[str, list[Performed]] = {}
-
-    def of(self, requirement: Requirement, exercise: Exercise) -> Iterator[Performed]:
-        """Yield a performance for each repetition of the next requirement."""
-        key = self._left.pop(0)
-        made = self._made.setdefault(key, [])
-        for i in range(requirement.repetitions):
-            if i == len(made):
-                name = f'{requirement.file_name}-{i + 1}'
-                pass_recorder.set_aside(self._folder / name, 'interrupted')
-                made.append(self._make(name, exercise, self._seed + SEED_STEP * i))
-            yield made[i]
-        if key not in self._left:
-            del self._made[key]
-
-    def _make(self, name: str, exercise: Exercise, seed: int) -> Performed:
-        """Make an exercise, and make it again after one with late commands. Raises StoppedError."""
-        for _ in range(MAX_RUNS - 1):
-            with contextlib.suppress(LateError):
-                return self._performer.perform(name, exercise, seed)
-            pass_recorder.set_aside(self._folder / name, 'late')
-        return self._performer.perform(name, exercise, seed)
+def _performed(performer: Performer, folder: pathlib.Path, name: str, exercise: Exercise, seed: int) -> Performed:
+    """Make an exercise, and make it again after one with late commands. Raises StoppedError."""
+    pass_recorder.set_aside(folder / name, 'interrupted')
+    for _ in range(MAX_RUNS - 1):
+        with contextlib.suppress(LateError):
+            return performer.perform(name, exercise, seed)
+        pass_recorder.set_aside(folder / name, 'late')
+    return performer.perform(name, exercise, seed)
 
 
 def _key(exercise: Exercise) -> str:
