@@ -25,7 +25,7 @@ from pedestal_workbench.acceptance.in_loop import InLoop
 from pedestal_workbench.acceptance.method import Measured, Method
 from pedestal_workbench.acceptance.own_graph import OwnGraph
 from pedestal_workbench.acceptance.running_graph import RunningGraph
-from pedestal_workbench.acceptance.specification import Requirement, Specification
+from pedestal_workbench.acceptance.specification import Head, Requirement, Specification
 
 UAV = Variant('uav_tracker_3m')
 SPAN = Span(-20.0, 60.0, 40.0)
@@ -56,7 +56,7 @@ def specification(*faults):
             return dataclasses.replace(made, actions=made.actions + faults)
         return Method('last', '', 'deg', '+-', (), exercise,
                       lambda performed, arguments: Measured(float(azimuth(performed, [1.4])[0]), 0.0))
-    return Specification('title', '', '', '', '', tuple(
+    return Specification(Head('title'), tuple(
         Requirement(name, method(size), {}, Target.parse(f'{size} +- 0.1'), 1, 0.95)
         for name, size in (('one', 1.0), ('two', 2.0), ('two again', 2.0))), 'text')
 

@@ -16,11 +16,11 @@ from pedestal_workbench.acceptance.judgement import judged
 from pedestal_workbench.acceptance.method import NEVER, Measured
 from pedestal_workbench.acceptance.methods import METHOD_BY_NAME
 from pedestal_workbench.acceptance.sequence import Kept, Session
-from pedestal_workbench.acceptance.specification import Requirement, Specification
+from pedestal_workbench.acceptance.specification import Head, Requirement, Specification
 
 DIGEST = 'dae21ce247d6975e14b4750aeafc499dd34b7558b5d8f4ee483c1175c94c9275'
 MADE = datetime.datetime(2026, 11, 30, 12, 0, 0, tzinfo=datetime.timezone.utc)
-STOPPED = 'alarm azimuth drive fault'
+STOPPED = 'stopped: alarm azimuth drive fault'
 
 
 def requirement(name, method, limit, repetitions=1):
@@ -51,11 +51,12 @@ def antenna():
 @pytest.fixture(scope='module')
 def whole(antenna):
     """Report of a sequence that was interrupted once, then stopped before its last requirement."""
-    specification = Specification('Acceptance of Zürich', 'Ω <&> Söhne', 'no. 7', 'A. Smith', 'of 2026-11-20',
+    specification = Specification(Head('Acceptance of Zürich', 'Ω <&> Söhne', 'no. 7', 'A. Smith', 'of 2026-11-20'),
                                   REQUIREMENTS, 'title: x')
-    return document.Acceptance(specification, results(), antenna, 'the running graph', 'pedestal acceptance x.yaml',
-                               MADE, [Session('2026-11-30T10:00:00Z', DIGEST, 'stopped: alarm azimuth at limit'),
-                                      Session('2026-11-30T11:59:00Z', DIGEST)], STOPPED)
+    sessions = [Session('2026-11-30T10:00:00Z', DIGEST, 'stopped: alarm azimuth at limit'),
+                Session('2026-11-30T11:59:00Z', DIGEST, STOPPED)]
+    return document.Acceptance(specification, results(), sessions, antenna, 'the running graph',
+                               'pedestal acceptance x.yaml', MADE)
 
 
 @pytest.fixture(scope='module')
@@ -74,7 +75,7 @@ def test_the_report_states_what_a_customer_signs(folder):
     for part in ('Acceptance of Zürich', 'Ω <&> Söhne', 'A. Smith', 'of 2026-11-20', 'pedestal_bringup 0.',
                  f'slew rate-1/slew rate-1.mcap {DIGEST} and 2 more', f'slew rate-3/slew rate-3.mcap {DIGEST}.',
                  f'from 2026-11-30T10:00:00Z: stopped: alarm azimuth at limit; parameters SHA-256 {DIGEST}',
-                 'from 2026-11-30T11:59:00Z: interrupted', '2026-11-30T10:00:00Z to 2026-11-30T12',
+                 f'from 2026-11-30T11:59:00Z: {STOPPED}', '2026-11-30T10:00:00Z to 2026-11-30T12',
                  'Not passed: 1 passed, 2 inconclusive, 1 failed, 1 not performed of 5 requirements', STOPPED,
                  'signature', 'not measured: no reversal', 'acu.azimuth.shaper.rate'):
         assert part in text, part
@@ -132,7 +133,7 @@ def test_a_report_without_results_and_one_of_passed_requirements(whole, tmp_path
     nothing = document.dataclasses.replace(whole, kept=[])
     document.write(nothing, tmp_path)
     assert not nothing.passed and 'nothing was measured' in (tmp_path / 'report.html').read_text()
-    passed = document.dataclasses.replace(whole, stopped='', kept=results(
+    passed = document.dataclasses.replace(whole, kept=results(
         [[Measured(value, 0.001)] for value in (30.0, 1.0, 1.0, 0.03, 0.001)]))
     assert passed.passed and passed.verdict == 'Passed: 5 passed of 5 requirements'
 

@@ -9,7 +9,7 @@ import sys
 import typing
 from collections.abc import Sequence
 
-from pedestal import console, stop
+from pedestal import console
 from pedestal.verbs import arguments
 from pedestal.verbs.arguments import Verb
 
@@ -70,34 +70,30 @@ def _acceptance(options: argparse.Namespace) -> int:
     folder = options.output or pathlib.Path(f'acceptance-{options.specification.stem}')
     if not folder.is_dir() and (folder.exists() or not folder.parent.is_dir()):
         raise ValueError(f'--output {folder}: must be a directory, or a new one in a directory that exists')
-    results: list[Kept] = []
-    stopped, code = '', console.EXIT_ERROR
+    code = 0
     opened, source = _performer(options, folder)
     with opened as performer:
         exercises = spec.exercises(performer)
         _confirm(options.yes, spec, exercises)
         with console.progress_of_share() as progress:
             def report(kept: 'Kept') -> None:
-                requirement = next(one for one in spec.requirements if one.name == kept.name)
-                results.append(kept)
-                progress(len(results) / len(spec.requirements), kept.name)
-                print(document.line(requirement, kept))
+                place = [requirement.name for requirement in spec.requirements].index(kept.name)
+                progress((place + 1) / len(spec.requirements), kept.name)
+                print(document.line(spec.requirements[place], kept))
             try:
                 sequence.run(spec, exercises, performer, folder, options.seed, report)
-            except StoppedError as error:
-                stopped = str(error)
+            except StoppedError:
+                code = console.EXIT_ERROR
             except KeyboardInterrupt:
-                stopped, code = 'an operator stopped it', stop.STOP_EXIT_CODE
-    now = datetime.datetime.now(datetime.timezone.utc)
-    found = document.Acceptance(spec, results, performer.antenna, source, options.command, now,
-                                sequence.sessions(folder), stopped)
+                code = console.EXIT_STOPPED
+    found = document.Acceptance(spec, *sequence.read(folder), performer.antenna, source, options.command,
+                                datetime.datetime.now(datetime.timezone.utc))
     print(*document.write(found, folder), sep='\n')
     console.write_json(options.json, document.json_content(found))
     print(found.verdict)
-    if stopped:
-        print(f'pedestal: stopped: {stopped}; the same command continues the sequence', file=sys.stderr)
-        return code
-    return 0 if found.passed else console.EXIT_FAILED_RUN
+    if found.stopped:
+        print(f'pedestal: {found.stopped}; the same command continues the sequence', file=sys.stderr)
+    return code or (0 if found.passed else console.EXIT_FAILED_RUN)
 
 
 def _performer(options: argparse.Namespace, folder: pathlib.Path) -> 'tuple[AbstractContextManager[Performer], str]':

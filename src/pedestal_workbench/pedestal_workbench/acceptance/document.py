@@ -18,7 +18,7 @@ from pedestal_results.report import elements, figures, paper, subject
 from pedestal_workbench.acceptance import figure
 from pedestal_workbench.acceptance.exercise import Antenna
 from pedestal_workbench.acceptance.judgement import FAILED, INCONCLUSIVE, PASSED
-from pedestal_workbench.acceptance.sequence import Kept, Session, utc_text
+from pedestal_workbench.acceptance.sequence import COMPLETE, Kept, Session, utc_text
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
 VERDICTS = {PASSED: 'passed', INCONCLUSIVE: 'inconclusive', FAILED: 'failed'}
@@ -41,12 +41,11 @@ class Acceptance:
     """Content of a report."""
     specification: Specification
     kept: Sequence[Kept]        # measured requirements
+    sessions: Sequence[Session]
     antenna: Antenna
     source: str                 # what was tested: the running graph, or a scenario and how it ran
     command: str                # whole command line
     made: datetime              # of the report, UTC
-    sessions: Sequence[Session] = ()
-    stopped: str = ''           # reason why the sequence did not come to its end
 
     def lines(self) -> Iterator[tuple[Requirement, Kept | None]]:
         """Yield each requirement with its result, None if it was not performed."""
@@ -59,6 +58,11 @@ class Acceptance:
         """{verdict: number of its requirements}."""
         found = collections.Counter(map(verdict, (kept for _, kept in self.lines())))
         return {word: found[word] for word in (*VERDICTS.values(), NOT_PERFORMED) if found[word]}
+
+    @property
+    def stopped(self) -> str:
+        """How the sequence ended before its end, '' if it came to its end."""
+        return '' if self.sessions[-1].end == COMPLETE else self.sessions[-1].end
 
     @property
     def passed(self) -> bool:
@@ -123,7 +127,7 @@ def junit(acceptance: Acceptance) -> bytes:
     failures = sum(kept is not None and kept.judged.verdict != PASSED for _, kept in acceptance.lines())
     whole = ElementTree.Element('testsuites')
     suite = ElementTree.SubElement(whole, 'testsuite', {
-        'name': acceptance.specification.title, 'tests': str(len(acceptance.specification.requirements)),
+        'name': acceptance.specification.head.title, 'tests': str(len(acceptance.specification.requirements)),
         'failures': str(failures), 'errors': '0', 'skipped': str(acceptance.counts.get(NOT_PERFORMED, 0)),
         'timestamp': acceptance.made.isoformat(timespec='seconds')})
     for requirement, kept in acceptance.lines():
@@ -143,10 +147,10 @@ def junit(acceptance: Acceptance) -> bytes:
 def _parts(acceptance: Acceptance, signals: pathlib.Path) -> Iterator[str]:
     """Yield the elements of the page. signals: folder of the signals."""
     spec, numbered = acceptance.specification, list(enumerate(acceptance.lines(), start=1))
-    yield f'<h1>{html.escape(spec.title)}</h1>'
+    yield f'<h1>{html.escape(spec.head.title)}</h1>'
     yield f'<p class="verdict{" bad" * (not acceptance.passed)}">{acceptance.verdict}</p>'
     if acceptance.stopped:
-        yield f'<p class="bad">The sequence was stopped before its end: {html.escape(acceptance.stopped)}</p>'
+        yield f'<p class="bad">The sequence did not come to its end; {html.escape(acceptance.stopped)}</p>'
     yield TextTable(('', ''), [(name, text or 'not stated') for name, text in _head(acceptance)]).html('meta')
     yield '<h2>Requirements</h2>'
     yield TextTable(
@@ -156,7 +160,7 @@ def _parts(acceptance: Acceptance, signals: pathlib.Path) -> Iterator[str]:
           else 'none') for i, (requirement, kept) in numbered]).html('results')
     yield f'<p>{EXPLANATION}</p><h2>Signatures</h2>'
     yield TextTable(('', 'name', 'place and date', 'signature'), [
-        ('tested by', spec.tester, '', ''), ('for the supplier', '', '', ''), ('for the customer', '', '', '')]
+        ('tested by', spec.head.tester, '', ''), ('for the supplier', '', '', ''), ('for the customer', '', '', '')]
     ).html('sign')
     yield '<h2>Measurements</h2>'
     for i, (requirement, kept) in numbered:
@@ -184,17 +188,16 @@ def _caption(requirement: Requirement, kept: Kept) -> str:
 
 def _head(acceptance: Acceptance) -> list[tuple[str, str]]:
     """Return the rows [name, text] of the table at the head."""
-    spec, antenna = acceptance.specification, acceptance.antenna
+    head, antenna = acceptance.specification.head, acceptance.antenna
     begun = min((kept.begun for kept in acceptance.kept), default='nothing was measured')
     versions = ', '.join(f'{key.removeprefix("version.")} {value}' for key, value in configuration.versions().items())
     pointing = antenna.acu.pointing
-    model = f'pointing model {pointing.report().title}' if pointing.named else 'the control unit has no pointing model'
-    return [('customer', spec.customer), ('antenna', spec.antenna), ('tested by', spec.tester),
+    return [('customer', head.customer), ('antenna', head.antenna), ('tester', head.tester),
             ('tested', f'{begun} to {utc_text(acceptance.made)}'), ('tested on', acceptance.source),
-            ('simulated nodes', ', '.join(antenna.simulated) or 'none'),
-            ('calibration', '; '.join(filter(None, (spec.calibration, model)))),
+            ('simulated nodes', ', '.join(antenna.simulated) or 'none'), ('calibration', head.calibration),
+            ('pointing model', pointing.report().title if pointing.named else 'none'),
             ('software', f'{versions}, git {configuration.git_revision() or "unknown"}'),
-            ('specification', f'SHA-256 {spec.sha256}'),
+            ('specification', f'SHA-256 {acceptance.specification.sha256}'),
             *((f'session {i}', f'from {session.begun}: {session.end}; parameters SHA-256 {session.parameters}')
               for i, session in enumerate(acceptance.sessions, start=1)),
             ('command', acceptance.command)]
@@ -202,7 +205,7 @@ def _head(acceptance: Acceptance) -> list[tuple[str, str]]:
 
 def write(acceptance: Acceptance, folder: pathlib.Path) -> list[pathlib.Path]:
     """Write the report into a folder as HTML, PDF, JSON and JUnit XML, and return the paths."""
-    page = elements.page(acceptance.specification.title, _parts(acceptance, folder / 'signals'), CSS)
+    page = elements.page(acceptance.specification.head.title, _parts(acceptance, folder / 'signals'), CSS)
     written = {'report.html': page.encode(), 'report.pdf': paper.pdf(page, acceptance.made),
                'report.json': json.dumps(json_content(acceptance), indent=1).encode(), 'report.xml': junit(acceptance)}
     folder.mkdir(parents=True, exist_ok=True)

@@ -30,6 +30,7 @@ from pedestal_workbench.acceptance.method import Measured
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
 RESULTS_FILE, LOCK_FILE, SIGNALS_FOLDER = 'results.json', 'results.lock', 'signals'  # in the folder of the acceptance
+COMPLETE = 'came to its end'     # end of a session that has performed all requirements
 MAX_RESULTS_BYTES = 50_000_000  # largest size of the file of results [bytes]
 MAX_RUNS = 5  # of an exercise, whose commands were late in all others
 SEED_STEP = 1000  # between the seeds of repetitions, so that sequences with neighbouring seeds share no noise
@@ -48,7 +49,7 @@ class Session(NamedTuple):
     """Run of the sequence with a folder."""
     begun: str                              # UTC
     parameters: str                         # SHA-256 of those of the antenna
-    end: str = 'interrupted'                # how it ended
+    end: str = 'interrupted'                # COMPLETE, or how it ended
 
 
 def run(specification: Specification, exercises: Sequence[Exercise], performer: Performer, folder: pathlib.Path,
@@ -80,16 +81,17 @@ def run(specification: Specification, exercises: Sequence[Exercise], performer: 
                     raise StoppedError(kept.judged.reason)
                 if key not in [later for _, _, later in left[i + 1:]]:
                     del made[key]       # frees its recordings
-            results.end('came to its end')
-        except StoppedError as error:
-            results.end(f'stopped: {error}')
+            results.end(COMPLETE)
+        except (StoppedError, KeyboardInterrupt) as error:
+            results.end(f'stopped: {str(error) or "by an operator"}')
             raise
     return results.kept
 
 
-def sessions(folder: pathlib.Path) -> list[Session]:
-    """Return the runs of the sequence with a folder. Raises ValueError."""
-    return _read(folder / RESULTS_FILE)[1] if (folder / RESULTS_FILE).exists() else []
+def read(folder: pathlib.Path) -> tuple[list[Kept], list[Session]]:
+    """Return the results in a folder, and the runs of the sequence with it. Raises ValueError."""
+    _, sessions, kept = _read(folder / RESULTS_FILE)
+    return kept, sessions
 
 
 def _result(requirement: Requirement, exercise: Exercise, performer: Performer, folder: pathlib.Path, seed: int,

@@ -70,11 +70,7 @@ class Requirement(NamedTuple):
 
 class Specification(NamedTuple):
     """A checked specification."""
-    title: str
-    customer: str
-    antenna: str
-    tester: str             # name of the person who tests
-    calibration: str        # calibration in force, in words
+    head: Head
     requirements: tuple[Requirement, ...]
     text: str               # of the file, for the report and for the comparison at a continuation
 
@@ -131,7 +127,7 @@ def read(path: FilePath, tester: str = '') -> Specification:
             problems.append(f'requirement {number}{named}: {error}')
     if problems:
         raise ValueError('\n'.join(f'{path}: {_cut(problem)}' for problem in problems))
-    return Specification(**parameters.as_dict(head), requirements=tuple(requirements.values()), text=text)
+    return Specification(head, tuple(requirements.values()), text)
 
 
 def _cut(problem: str) -> str:
