@@ -39,7 +39,7 @@ def draw(shown: Shown) -> Figure:
     """Return the figure of a requirement: its repetitions against the limit, and the first recorded signal."""
     judged, count, signal = shown.judged, len(shown.judged.repetitions), shown.signal.is_file()
     drawn, panels = figures.new_panels(1, 2, height=HEIGHT_INCH, x=('repetition', 'time [s]'),
-                                       y=shown.requirement.method.unit, width_ratios=(1.0, 2.0))
+                                       y=shown.requirement.method.unit.removeprefix('1'), width_ratios=(1.0, 2.0))
     axes = panels[0, 0]
     known = [(i, *one) for i, one in enumerate(judged.repetitions, start=1) if all(map(math.isfinite, one))]
     if known:
@@ -52,10 +52,10 @@ def draw(shown: Shown) -> Figure:
     axes.set(xlim=(0.4, count + 0.6), xticks=range(1, count + 1, 1 + count // 10),
              title=f'measured, limit {shown.requirement.limit.text}')
     axes.margins(y=0.15)
+    panels[0, 1].set(title='motion, repetition 1' if signal else 'no motion was recorded', ylabel='deg')
     if signal:
         t, *angles = np.loadtxt(shown.signal, delimiter=',', skiprows=1, ndmin=2).T
         for axis, angle, colour in zip(AXES, angles, (figures.FILTERED_COLOUR, figures.RAW_COLOUR)):
             figures.draw_line(panels[0, 1], t, angle - angle[0], color=colour, label=axis)
-        panels[0, 1].set(title='motion, repetition 1', ylabel='deg')
         panels[0, 1].legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
     return drawn
