@@ -96,3 +96,10 @@ def test_equal_pages_give_equal_bytes_and_curves_stay_curves():
 def test_a_cell_above_a_page_is_cut():
     long = TextTable(('name', 'text'), [('a', 'word ' * 10_000)]).html()
     assert len(pdf_pages(paper.pdf(elements.page('x', [long])))) <= 2
+
+
+def test_a_table_of_any_width_is_printed():
+    """The columns share the page to the last bit."""
+    tables = [TextTable([f'column {i}' for i in range(count)], [['word ' * (40 + 7 * i) for i in range(count)]]).html()
+              for count in range(1, 12)]
+    assert pdf_pages(paper.pdf(elements.page('x', tables)))

@@ -77,7 +77,7 @@ class _Paper(FPDF):
             rest -= width
         widths = [min(width, widest) for width in widths]
         self.set_font(FONT, size=TABLE_PT)
-        with self.table(col_widths=widths, width=self.epw if signed else sum(widths), align='L',
+        with self.table(col_widths=widths, width=self.epw if signed else min(sum(widths), self.epw), align='L',
                         first_row_as_headings=headed, borders_layout='HORIZONTAL_LINES', v_align='T',
                         text_align=tuple('RIGHT' if each else 'LEFT' for each in right),
                         line_height=LINE_HEIGHT * self.font_size) as made:
