@@ -6,7 +6,7 @@ execute the same commands and return a recording with the same topics, so that e
 import dataclasses
 import hashlib
 import pathlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from acu_tracker.params import AcuParameters
@@ -116,6 +116,9 @@ class Performer(Protocol):
 
     def check(self, exercise: Exercise) -> None:
         """Raise ValueError for an exercise that it cannot make, before anything moves."""
+
+    def expect(self, performances: Sequence[tuple[str, Exercise, int]]) -> None:
+        """Take the arguments of the next calls of `perform`, which a performer may make ahead."""
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise. name: of its recording. Raises StoppedError."""

@@ -6,6 +6,7 @@ interrupted, also by a loss of power, continues there with the first requirement
 import contextlib
 import datetime
 import fcntl
+import itertools
 import json
 import pathlib
 from collections.abc import Callable, Iterator, Sequence
@@ -60,10 +61,10 @@ def run(specification: Specification, performer: Performer, folder: pathlib.Path
         names = [kept.name for kept in results.kept]
         left = [(requirement, exercise) for requirement, exercise in zip(specification.requirements, exercises)
                 if requirement.name not in names]
-        performances = _Performances(performer, folder, seed, [exercise for _, exercise in left])
+        performances = _Performances(performer, folder, seed, left)
         try:
-            for requirement, exercise in left:
-                results.keep(_result(requirement, exercise, performances, folder, len(results.sessions)))
+            for requirement, _ in left:
+                results.keep(_result(requirement, performances, folder, len(results.sessions)))
                 report(results.kept[-1])
             results.end('came to its end')
         except StoppedError as error:
@@ -77,14 +78,13 @@ def sessions(folder: pathlib.Path) -> list[Session]:
     return _read(folder / RESULTS_FILE)[1] if (folder / RESULTS_FILE).exists() else []
 
 
-def _result(requirement: Requirement, exercise: Exercise, performances: '_Performances', folder: pathlib.Path,
-            session: int) -> Kept:
+def _result(requirement: Requirement, performances: '_Performances', folder: pathlib.Path, session: int) -> Kept:
     """Perform, measure and judge a requirement."""
     begun = _now()
     measured: list[Measured] = []
     bags: list[tuple[str, str]] = []
     reason = ''
-    for i, performed in enumerate(performances.of(requirement, exercise)):
+    for i, performed in enumerate(performances.of(requirement)):
         if performed.bag is not None:
             bags += [(str(file.relative_to(folder.resolve())), files.sha256(file))
                      for file in bag_files.locate(performed.bag.resolve())]
@@ -100,20 +100,28 @@ def _result(requirement: Requirement, exercise: Exercise, performances: '_Perfor
 class _Performances:
     """Performances of a run of the sequence, each kept until the last requirement with its exercise is measured."""
 
-    def __init__(self, performer: Performer, folder: pathlib.Path, seed: int, exercises: Sequence[Exercise]) -> None:
-        self._performer, self._folder, self._seed = performer, folder, seed
-        self._left = list(map(_key, exercises))     # of the requirements that are not measured yet
+    def __init__(self, performer: Performer, folder: pathlib.Path, seed: int,
+                 requirements: Sequence[tuple[Requirement, Exercise]]) -> None:
+        self._performer, self._folder = performer, folder
+        self._left = [_key(exercise) for _, exercise in requirements]   # of those that are not measured yet
+        self._named: dict[str, list[tuple[str, Exercise, int]]] = {}    # arguments of Performer.perform
         self._made: dict[str, list[Performed]] = {}
+        for (requirement, exercise), key in zip(requirements, self._left):
+            named = self._named.setdefault(key, [])
+            named += [(f'{requirement.file_name}-{i + 1}', exercise, seed + SEED_STEP * i)
+                      for i in range(len(named), requirement.repetitions)]
+        expected = list(itertools.chain(*self._named.values()))
+        for name, *_ in expected:
+            pass_recorder.set_aside(folder / name, 'interrupted')
+        performer.expect(expected)
 
-    def of(self, requirement: Requirement, exercise: Exercise) -> Iterator[Performed]:
+    def of(self, requirement: Requirement) -> Iterator[Performed]:
         """Yield a performance for each repetition of the next requirement."""
         key = self._left.pop(0)
         made = self._made.setdefault(key, [])
         for i in range(requirement.repetitions):
             if i == len(made):
-                name = f'{requirement.file_name}-{i + 1}'
-                pass_recorder.set_aside(self._folder / name, 'interrupted')
-                made.append(self._make(name, exercise, self._seed + SEED_STEP * i))
+                made.append(self._make(*self._named[key][i]))
             yield made[i]
         if key not in self._left:
             del self._made[key]
