@@ -20,7 +20,7 @@ from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph.steps import GraphError
 from pedestal_results.intervals import Target
 from pedestal_workbench.acceptance import sequence
-from pedestal_workbench.acceptance.exercise import Action, Exercise, Span, StoppedError, Track
+from pedestal_workbench.acceptance.exercise import Action, BreachError, Exercise, Span, StoppedError, Track
 from pedestal_workbench.acceptance.in_loop import InLoop
 from pedestal_workbench.acceptance.method import Measured, Method
 from pedestal_workbench.acceptance.own_graph import OwnGraph
@@ -103,7 +103,7 @@ def test_a_killed_sequence_continues(domain, tmp_path, start_process):
 @pytest.mark.thorough
 def test_an_antenna_outside_of_its_envelope_is_stopped(domain, tmp_path):
     narrow = dataclasses.replace(step(duration=30.0), envelope=(Span(-1.0, 0.5, 40.0), SPAN))
-    with pytest.raises(StoppedError, match='azimuth 0.5.* deg: outside its envelope, -1.000 to 0.500 deg'):
+    with pytest.raises(BreachError, match='azimuth 0.5.* deg: outside its envelope, -1.000 to 0.500 deg'):
         OwnGraph(UAV, tmp_path).perform('narrow', narrow, 1)
 
 
@@ -145,8 +145,9 @@ def test_a_running_graph(running, tmp_path):
         expected = InLoop(UAV.with_(SLOW)).perform('one', step(), 1).recording.table('joint_states')
         assert results[0].judged.value == pytest.approx(np.degrees(expected['azimuth.position'][-1]), abs=0.005)
         threading.Timer(2.0, ask, ['stop']).start()
-        with pytest.raises(StoppedError, match='commanded stop'):
+        with pytest.raises(StoppedError, match='commanded stop') as stop:
             performer.perform('stopped', step(duration=60.0), 1)
+        assert stop.type is StoppedError        # no BreachError: an operator's stop fails no requirement
     assert ask('ask', 'take')[0] == 0       # control was released
     sample = importlib.resources.files('pedestal') / 'samples' / 'acceptance.yaml'
     code, said = ask('acceptance', str(sample), '--yes', '--output', str(tmp_path / 'other'))

@@ -2,6 +2,7 @@
 import importlib.resources
 import io
 import json
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -111,12 +112,28 @@ def test_results_stay_and_another_specification_needs_another_folder(accept, tmp
     assert code == 2 and 'another specification' in errors
 
 
-def test_a_sequence_that_is_stopped_is_exit_code_1_with_a_report(accept, tmp_path):
-    code, _, errors = accept(TITLE + STEP + SLEW, '--yes', '--param',
-                             'adu.inject=0.1 motor_loss axis=azimuth motor=1')
+LOST = '--param', 'adu.inject=0.1 motor_loss axis=azimuth motor=1'
+
+
+def test_an_alarm_fails_its_requirement_and_is_exit_code_4(accept, tmp_path):
+    code, said, _ = accept(TITLE + STEP + SLEW, '--yes', *LOST)
+    assert code == 4 and 'Not passed: 2 failed of 2' in said
+    assert re.search('failed        step: not measured: step-1, after .* s: alarm azimuth motor lost, must be', said)
+    folder = tmp_path / 'acceptance-spec'
+    assert 'alarm azimuth motor lost' in (folder / 'report.html').read_text()
+    assert {rows((folder / 'report.json').read_text())[name, 'passed'] for name in ('step', 'slew')} == {0.0}
+    assert len(ElementTree.parse(folder / 'report.xml').findall('.//failure[@type="failed"]')) == 2
+
+
+def test_a_sequence_that_is_stopped_is_exit_code_1_with_a_report(accept, tmp_path, monkeypatch):
+    """By an alarm of a running graph, for which the closed loop stands in."""
+    monkeypatch.setattr(in_loop.InLoop, 'own_runs', False)
+    code, _, errors = accept(TITLE + STEP + SLEW, '--yes', *LOST)
     assert code == 1 and 'alarm azimuth motor lost' in errors and 'the same command continues' in errors
     page = (tmp_path / 'acceptance-spec' / 'report.html').read_text()
-    assert 'The sequence was stopped before its end' in page and '2 not performed of 2' in page
+    assert 'The sequence was stopped before its end' in page and '1 failed, 1 not performed of 2' in page
+    code, said, _ = accept(TITLE + STEP + SLEW, '--yes')
+    assert code == 4 and '1 passed, 1 failed of 2' in said
 
 
 def test_an_operator_stops_the_sequence(accept, tmp_path, monkeypatch):

@@ -20,7 +20,6 @@ import pytest
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_results import metrics
 from pedestal_workbench.acceptance import sequence, specification
-from pedestal_workbench.acceptance.exercise import StoppedError
 from pedestal_workbench.acceptance.in_loop import InLoop
 from pedestal_workbench.acceptance.judgement import FAILED, PASSED
 from pedestal_workbench.acceptance.methods import METHOD_BY_NAME
@@ -29,13 +28,14 @@ from pedestal_workbench.tuning.loops import Loops
 
 FAST, SLOW = ANTENNAS = 'uav_tracker_3m', 'station_real'
 SAMPLES = pathlib.Path(__file__).parents[2] / 'pedestal' / 'pedestal' / 'samples'
-TILT, SLOPE, BRAKE = ({'adu.mount.tilt_forward': 1e-3}, {'tracking_receiver.antenna.slope_factor': 0.6},
-                      {'adu.azimuth.motor_1.friction': 3.0, 'adu.azimuth.motor_2.friction': 3.0})
+TILT, SLOPE, BRAKE, TOOTH = (
+    {'adu.mount.tilt_forward': 1e-3}, {'tracking_receiver.antenna.slope_factor': 0.6},
+    {'adu.azimuth.motor_1.friction': 3.0, 'adu.azimuth.motor_2.friction': 3.0},
+    {'adu.inject': '0 lost_tooth axis=azimuth motor=1 teeth=200'})
 STATES = {
     'sound': {FAST: {}, SLOW: {}},
     'lash': {FAST: {'adu.azimuth.gear_train.lash': 3e-3}, SLOW: {'adu.azimuth.gear_train.lash': 9e-4}},
-    'cracked tooth': {FAST: {'adu.inject': '0 lost_tooth axis=azimuth motor=1 teeth=100'},
-                      SLOW: {'adu.inject': '0 lost_tooth axis=azimuth motor=1 teeth=150'}},
+    'cracked tooth': {FAST: TOOTH, SLOW: TOOTH},
     'detuned speed loop': {FAST: {'adu.azimuth.speed_loop.proportional': 1.8015},
                            SLOW: {'adu.azimuth.speed_loop.proportional': 1.8}},
     'wrong slope': {FAST: SLOPE, SLOW: SLOPE},
@@ -43,7 +43,8 @@ STATES = {
     'slow encoder': {FAST: {'adu.azimuth.encoder.error.age': 1.5e-3}, SLOW: {'adu.azimuth.encoder.error.age': 4e-3}},
     'tilted mount': {FAST: TILT, SLOW: TILT}}
 """{state: {antenna: changes of its parameters}}. The lash is three times and the gain of the speed loop 0.3 times that
-of the sound antenna."""
+of the sound antenna. The gap of a tooth of 200 is small enough to track through: a larger one is an alarm, which fails
+the requirement of its exercise too."""
 
 EXPECTED_FAILURES = {
     'sound': {FAST: (), SLOW: ()},
@@ -64,6 +65,7 @@ EXPECTED_FAILURES = {
     'tilted mount': dict.fromkeys(ANTENNAS, ('program track of a pass', 'pointing offset'))}
 """{state: {antenna: names of the requirements that fail}}."""
 
+FIRST_SEED = 101    # of the agreement: MIN_CORRELATION of the rms was chosen with the seeds 1 to 40
 RECEIVER_METHODS = ('autotrack_rms', 'program_rms', 'pointing_offset', 'acquisition_time', 'fade_recovery',
                     'receiver_slope', 'fault_report')
 
@@ -76,13 +78,10 @@ def shipped(antenna, methods=None):
 
 
 def unexpected(antenna, state, seed, folder, methods=None):
-    """Perform the sequence, and return a line on each requirement with a verdict that EXPECTED_FAILURES does not have,
-    and on a stop of the antenna."""
-    asked, kept = shipped(antenna, methods), []
-    try:
-        sequence.run(asked, InLoop(Variant(antenna).with_(STATES[state][antenna])), folder, seed, kept.append)
-    except StoppedError as error:
-        return [f'stopped: {error}']
+    """Perform the sequence, and return a line on each requirement with a verdict that EXPECTED_FAILURES does not have.
+    """
+    asked = shipped(antenna, methods)
+    kept = sequence.run(asked, InLoop(Variant(antenna).with_(STATES[state][antenna])), folder, seed, lambda _: None)
     fails = EXPECTED_FAILURES[state][antenna]
     return [f'{each.name} = {each.judged.value:.4g} +- {each.judged.uncertainty:.2g}, {requirement.limit.text}: '
             f'{each.judged.verdict:g} {each.judged.reason}' for each, requirement in zip(kept, asked.requirements)
@@ -174,19 +173,20 @@ def of_tracking(antenna, target, seeds):
 
 
 def agreement(seeds, axes=('azimuth', 'elevation'), targets=('beacon', 'pass', 'manoeuvre')):
-    """Return a Compared for each metric and seed. Because the margins of the antenna without wind repeat bit for bit,
+    """Yield a Compared for each metric and seed. Because the margins of the antenna without wind repeat bit for bit,
     they are made once."""
-    found = []
     for antenna, axis in itertools.product(ANTENNAS, axes):
-        found += [one for seed in seeds for one in of_steps(antenna, axis, seed)]
-        found += [one for seed in (seeds if antenna == SLOW else seeds[:1]) for one in of_margins(antenna, axis, seed)]
-    return found + [one for antenna, target in itertools.product(ANTENNAS, targets)
-                    for one in of_tracking(antenna, target, seeds)]
+        for i, seed in enumerate(seeds):
+            yield from of_steps(antenna, axis, seed)
+            if i == 0 or antenna == SLOW:
+                yield from of_margins(antenna, axis, seed)
+    for antenna, target in itertools.product(ANTENNAS, targets):
+        yield from of_tracking(antenna, target, seeds)
 
 
 @pytest.mark.thorough
 def test_step_margins_and_rms_agree_within_their_uncertainty():
-    found = agreement(range(1, 5), ('elevation',), ('pass',))
+    found = list(agreement(range(1, 5), ('elevation',), ('pass',)))
     outside = [one for one in found if not one.within]
     assert len(outside) <= 0.05 * len(found), outside
 
@@ -206,7 +206,7 @@ def main(seeds, repetitions):
             wrong = unexpected(antenna, state, seed, pathlib.Path(folder),
                                None if seed == 1 or antenna == SLOW else RECEIVER_METHODS)
         print(f'{antenna:15} {state:20} seed {seed:2}: {"; ".join(wrong) or "as expected"}', flush=True)
-    found = agreement(range(1, repetitions + 1)) if repetitions else []
+    found = list(agreement(range(FIRST_SEED, FIRST_SEED + repetitions)))
     for metric in dict.fromkeys(one.metric for one in found):
         of = [one for one in found if one.metric == metric]
         print(f'{metric:45} within {sum(one.within for one in of)} of {len(of)}; reference {of[0].reference:.5g}, '

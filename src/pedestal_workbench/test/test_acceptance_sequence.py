@@ -9,9 +9,9 @@ import pytest
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_results.intervals import Target
 from pedestal_workbench.acceptance import sequence
-from pedestal_workbench.acceptance.exercise import Action, Exercise, LateError, Span, StoppedError
+from pedestal_workbench.acceptance.exercise import Action, BreachError, Exercise, LateError, Span, StoppedError
 from pedestal_workbench.acceptance.in_loop import InLoop
-from pedestal_workbench.acceptance.judgement import INCONCLUSIVE, PASSED
+from pedestal_workbench.acceptance.judgement import FAILED, INCONCLUSIVE, PASSED
 from pedestal_workbench.acceptance.method import Measured, Method
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
@@ -95,6 +95,33 @@ def test_a_stopped_sequence_continues_with_the_first_requirement_without_a_resul
     assert first.parameters == second.parameters == performer.antenna.sha256
     finished = Noted()
     assert run(tmp_path, finished, *three) == results and finished.made == []
+
+
+@pytest.mark.parametrize('own_runs', [True, False])
+def test_a_breach_fails_its_requirement_and_ends_a_sequence_that_goes_on_with_the_same_graph(tmp_path, own_runs):
+    class Breached(Noted):
+        def perform(self, name, exercise, seed):
+            if name == 'b-2':
+                (tmp_path / name).mkdir()
+                (tmp_path / name / 'b-2_0.mcap').write_text('recorded')
+                raise BreachError('alarm azimuth motor lost')
+            return super().perform(name, exercise, seed)
+    Breached.own_runs = own_runs
+    three = requirement('a'), requirement('b', size=2.0, repetitions=3), requirement('c', size=3.0, limit='<= 4')
+    if own_runs:
+        results = run(tmp_path, Breached(), *three)
+    else:
+        with pytest.raises(StoppedError, match='alarm azimuth motor lost'):
+            run(tmp_path, Breached(), *three)
+        performer = Noted()
+        results = run(tmp_path, performer, *three)
+        assert [name for name, _ in performer.made] == ['c-1']      # the failed line stays
+        assert [one.end for one in sequence.sessions(tmp_path)] == ['stopped: alarm azimuth motor lost',
+                                                                    'came to its end']
+    assert [kept.judged.verdict for kept in results] == [PASSED, FAILED, PASSED]
+    failed = results[1].judged
+    assert failed.breached and failed.reason == 'alarm azimuth motor lost' and len(failed.repetitions) == 1
+    assert [name for name, _ in results[1].bags] == ['b-2/b-2_0.mcap']
 
 
 @pytest.mark.parametrize('late', [2, sequence.MAX_RUNS])

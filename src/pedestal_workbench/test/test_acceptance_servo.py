@@ -99,7 +99,7 @@ def test_standstill_and_creep_stay_at_a_step_of_the_encoder():
     step = 360.0 / 2**22
     for name in ('standstill_rms', 'creep_rms'):
         found = measured(name)
-        assert found.value < step and found.uncertainty == pytest.approx(step / math.sqrt(12.0), rel=0.05)
+        assert found.value < step and found.uncertainty == pytest.approx(0.475 * step, rel=0.05)
 
 
 def test_a_reversal_without_bias_shows_the_lash():
@@ -124,6 +124,19 @@ def test_lash_and_bias_are_those_of_the_parameters(axis):
     assert found.value == pytest.approx(math.degrees(gears.lash + wound), rel=0.03)
     bias = METHOD_BY_NAME['bias'].measure(done, arguments('bias', axis=axis))
     assert bias.value == pytest.approx(drive.bias.torque, rel=1e-3)
+
+
+def test_uncertainty_of_the_mechanics_is_at_least_that_of_the_resolution_of_the_encoders():
+    coarse = {'adu.azimuth.encoder.motor_bits': 14}
+    for name in ('lash', 'bias', 'tooth_error'):
+        fine, found = measured(name), measured(name, changes=coarse)
+        assert abs(found.value - fine.value) < found.uncertainty and found.uncertainty > 20.0 * fine.uncertainty, name
+
+
+@pytest.mark.parametrize('name', ['sine_error', 'receiver_slope'])
+def test_what_moves_against_the_earth_is_refused_on_a_ship(name):
+    with pytest.raises(ValueError, match=f'{name}: must be ashore'):
+        METHOD_BY_NAME[name].exercise(InLoop(Variant('ship_pass')).antenna, arguments(name))
 
 
 def test_friction_is_the_sum_of_load_and_motors():

@@ -82,6 +82,17 @@ def test_tilt_of_the_mount_is_the_offset_from_the_program(azimuth, share):
     assert measured(Variant(UAV), 'pointing_offset', target='beacon', azimuth=azimuth).value < 0.1 * expected
 
 
+@pytest.mark.parametrize('offset', [0.0, 0.5, 3.0, 30.0])
+def test_the_length_of_a_mean_has_no_bias_by_noise(offset):
+    """offset: of the mean, over the standard deviation of the mean."""
+    rng, n = np.random.default_rng(3), 20
+    found = [tracking.of_mean(np.array([0.6, 0.8]) * offset + math.sqrt(n) * rng.standard_normal((n, 2)))
+             for _ in range(1000)]
+    assert np.mean([abs(one.value - offset) <= one.uncertainty for one in found]) >= 0.94
+    plain = math.sqrt(offset**2 + 2.0)      # rms length of the mean with its noise
+    assert abs(np.mean([one.value for one in found]) - offset) < max(0.7 * (plain - offset), 0.1)
+
+
 def test_acquisition_takes_the_errors_of_the_lock_and_never_ends_without_a_signal():
     counted = InLoop(Variant(UAV)).antenna.acu.tracker.lock_count * 0.005
     assert measured(Variant(UAV), 'acquisition_time', target='beacon').value == pytest.approx(counted, abs=0.02)

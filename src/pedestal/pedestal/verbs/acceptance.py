@@ -24,8 +24,9 @@ if typing.TYPE_CHECKING:
 def _add_acceptance(parser: argparse.ArgumentParser) -> None:
     """Makes the exercise of each requirement of a specification on the running graph, measures it, judges it, and
     writes report.html, report.pdf, report.json and report.xml (JUnit). `pedestal samples` writes a specification that
-    explains its keys. What the antenna will do is printed and confirmed first. An alarm, an antenna outside of the
-    stated envelope, or an operator ends the sequence in a stop. The same command continues it.
+    explains its keys. What the antenna will do is printed and confirmed first. An alarm, or an antenna outside of the
+    stated envelope, ends the exercise in a stop and fails its requirement. The sequence then ends on a running graph,
+    and goes on with --scenario. An operator ends it in a stop. The same command continues it.
 
         pedestal acceptance acceptance.yaml --tester "A. Smith"
         pedestal acceptance acceptance.yaml --scenario station_real --yes --json -

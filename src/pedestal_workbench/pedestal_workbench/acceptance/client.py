@@ -55,15 +55,13 @@ class Client(Commander):
         messages.put_stamp(message.header.stamp, begin)
         self._send_track(messages.serialize(message))
 
-    def trouble(self, exercise: Exercise) -> str:
-        """Return why the antenna must be stopped in an exercise, '' for no reason."""
+    def trouble(self, exercise: Exercise) -> StoppedError | None:
+        """Return why the antenna must be stopped in an exercise, None for no reason."""
         if self.holder not in ('', self.who):
-            return f'control is with {self.holder}'
+            return StoppedError(f'control is with {self.holder}')
         scheduled = self.interference.startswith(f'{commands.SCHEDULE_CLIENT} ')
-        if self.interference and not scheduled and self.interference not in exercise.alarms:
-            return self.interference
-        return (exercise.outside(self.encoder_angles(JOINTS_TOPIC), self.rates())
-                or '; '.join(in_loop.unexpected(exercise, self.alarms)))
+        return in_loop.trouble(exercise, exercise.outside(self.encoder_angles(JOINTS_TOPIC), self.rates()),
+                               self.alarms, '' if scheduled else self.interference)
 
 
 class ClientSession(RemoteSession):
@@ -92,12 +90,14 @@ class ClientSession(RemoteSession):
         while client.stamp < begin + round(exercise.duration * NS_PER_SECOND):
             self.spin_to_newest()
             t = (client.stamp - begin) / NS_PER_SECOND
-            if reason := left() or (client.trouble(exercise) if t >= 0.0 else ''):
+            trouble = client.trouble(exercise) if t >= 0.0 else None
+            if reason := left():
+                trouble = StoppedError(reason)
+            elif not trouble and due and t > due[0].at + in_loop.MAX_LATENESS_S:
+                trouble = LateError(in_loop.lateness(due[0], t))
+            if trouble:
                 self.stop_antenna()
-                raise StoppedError(reason)
-            if due and t > due[0].at + in_loop.MAX_LATENESS_S:
-                self.stop_antenna()
-                raise LateError(in_loop.lateness(due[0], t))
+                raise trouble
             while due and t >= due[0].at:
                 client.send(due.pop(0))
 

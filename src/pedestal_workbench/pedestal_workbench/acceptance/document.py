@@ -30,7 +30,8 @@ VERDICTS = {PASSED: 'passed', INCONCLUSIVE: 'inconclusive', FAILED: 'failed'}
 NOT_PERFORMED = 'not performed'
 EXPLANATION = ('The uncertainty is the half width of the interval of the mean, at the confidence of the requirement. '
                'A requirement is passed if the whole interval meets the limit, failed if none of it does, and '
-               'inconclusive in between. Where the uncertainty is not known, the value alone is compared with the '
+               'inconclusive in between. An alarm, or an antenna outside its envelope, ends an exercise and fails '
+               'its requirement. Where the uncertainty is not known, the value alone is compared with the '
                'limit. Systematic errors, such as those of the encoders, are not part of the uncertainty.')
 CSS = """
 body { max-width: 76rem; } table.line { font-size: .85rem; } .line th, .line td { padding-right: .8rem; }

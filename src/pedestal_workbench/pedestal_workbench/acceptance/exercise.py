@@ -25,6 +25,7 @@ class Antenna(NamedTuple):
     beamwidth: Radians
     period: Seconds                 # of a step
     simulated: tuple[str, ...] = ()     # its nodes that are simulated, into which faults can be injected
+    on_ship: bool = False           # an INS states the attitude of its deck
 
     @property
     def parts(self) -> dict[str, AnyParameters]:
@@ -68,7 +69,7 @@ class Exercise:
                                                     # antenna follows the target of its scenario from the begin
     track: Track | None = None
     changes: Mapping[str, Json] = dataclasses.field(default_factory=dict)   # {'node.key': value} of simulated nodes
-    alarms: tuple[str, ...] = ()                    # names of alarms that belong to it; any other ends the sequence
+    alarms: tuple[str, ...] = ()                    # names of alarms that belong to it; any other ends it
 
     def outside(self, angles: Iterable[Degrees], rates: Iterable[DegreesPerSecond]) -> str:
         """Return how the antenna is outside its envelope, '' inside it. angles, rates: values of the encoders."""
@@ -113,6 +114,7 @@ class Performed:
 class Performer(Protocol):
     """Makes exercises with one antenna."""
     antenna: Antenna
+    own_runs: bool = True       # each exercise begins in a run of its own, whatever the exercise before has left
 
     def check(self, exercise: Exercise) -> None:
         """Raise ValueError for an exercise that it cannot make, before anything moves."""
@@ -125,8 +127,11 @@ class Performer(Protocol):
 
 
 class StoppedError(RuntimeError):
-    """The antenna was stopped: by an alarm, outside the envelope, by an operator, or because a node is silent. The
-    text states the reason."""
+    """The antenna was stopped: by an operator, or because a node is silent. The text states the reason."""
+
+
+class BreachError(StoppedError):
+    """The antenna was stopped by an alarm or outside the envelope: the requirement of the exercise is failed."""
 
 
 class LateError(StoppedError):

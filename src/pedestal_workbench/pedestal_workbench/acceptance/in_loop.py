@@ -21,6 +21,7 @@ from pedestal_recording.recording import Recording, replies
 from pedestal_workbench.acceptance.exercise import (
     Action,
     Antenna,
+    BreachError,
     Executed,
     Exercise,
     LateError,
@@ -32,14 +33,15 @@ from pedestal_workbench.acceptance.exercise import (
 WIND_SEEDS = 'adu.wind.field.seed', 'adu.wind.gust.seed'     # which the seed of a scenario leaves as they are
 WATCH_STEPS = 10        # number of steps between two checks of alarms and envelope
 MAX_LATENESS_S = 0.1    # of a command [s]
-EARLY_S = 1e-6          # smallest time of a reply before its action [s]
+EARLY_S = 1e-6          # largest time of a reply before its action, of rounding [s]
+EMERGENCY_STOP = 'emergency stop'       # alarm
 
 
 def antenna(scenario: Scenario) -> Antenna:
     """Return what methods need to know of the antenna of a scenario."""
     acu, adu = scenario.node_parameters('acu'), scenario.node_parameters('adu')
     return Antenna(acu, adu, scenario.node_parameters('tracking_receiver').antenna.beamwidth, adu.period,
-                   tuple(node for node in INJECTED_FAULTS if node in scenario.nodes))
+                   tuple(node for node in INJECTED_FAULTS if node in scenario.nodes), 'ins' in scenario.nodes)
 
 
 def changes(exercise: Exercise) -> dict[str, Json]:
@@ -100,10 +102,17 @@ def lateness(action: Action, t: Seconds) -> str:
             'too busy')
 
 
-def unexpected(exercise: Exercise, alarms: Iterable[Message]) -> list[str]:
-    """Return texts on the alarms that do not belong to an exercise. alarms: a list of acu/alarms."""
-    return [f'alarm {each["name"]}: {each["detail"] or each["meaning"]}' for each in map(alarm, alarms)
-            if each['state'] not in PAST_STATES and each['name'] not in exercise.alarms]
+def trouble(exercise: Exercise, outside: str, alarms: Iterable[Message], interference: str) -> StoppedError | None:
+    """Return why the antenna must be stopped in an exercise, None for no reason. outside: how it is outside its
+    envelope; alarms: those of acu/alarms; interference: what an operator has done."""
+    unexpected = {each['name']: f'alarm {each["name"]}: {each["detail"] or each["meaning"]}'
+                  for each in map(alarm, alarms)
+                  if each['state'] not in PAST_STATES and each['name'] not in exercise.alarms}
+    pressed = unexpected.pop(EMERGENCY_STOP, '')    # by an operator, if no other alarm explains it
+    if breach := outside or '; '.join(unexpected.values()):
+        return BreachError(breach)
+    stop = interference if interference not in exercise.alarms else pressed
+    return StoppedError(stop) if stop else None
 
 
 class InLoop(Performer):
@@ -128,7 +137,7 @@ class InLoop(Performer):
         def watch(made: int) -> int:
             """Stop where the exercise is breached. Return the number of steps to the next call."""
             if made and (reason := _breach(loop, exercise)):
-                raise StoppedError(f'{name}, after {made * loop.period_ns / NS_PER_SECOND:g} s: {reason}')
+                raise BreachError(f'{name}, after {made * loop.period_ns / NS_PER_SECOND:g} s: {reason}')
             return WATCH_STEPS
         recording = MemoryRecording(scenario, loop.run(watch=watch))
         return Performed(self.antenna, exercise, recording, 0.0, outcomes(exercise, recording))

@@ -22,6 +22,11 @@ class Judged(NamedTuple):
     repetitions: tuple[Measured, ...]
     reason: str = ''        # why the value could not be measured
 
+    @property
+    def breached(self) -> bool:
+        """True if an alarm or an antenna outside its envelope ended an exercise."""
+        return self.verdict == FAILED and math.isnan(self.value)
+
 
 def ends(limit: Target) -> tuple[float, float]:
     """Return the smallest and the largest value that meet a limit."""

@@ -108,7 +108,8 @@ def _margin(metric: str) -> Callable[[Performed, Arguments], Measured]:
 
 
 def _resonance(performed: Performed, arguments: Arguments) -> Measured:
-    """Return the lowest frequency at which the open loop has a notch, the highest one for none."""
+    """Return the lowest frequency at which the open loop has a notch. Without a notch, the
+    highest frequency is the lower bound: no resonance is below it."""
     response = _response(*_signals(performed, arguments))
     known = response.deviation < MAX_NOISE
     if known.sum() < 2:
@@ -126,5 +127,5 @@ METHODS = tuple(
         ('gain_margin', 'gain margin of the position loop', 'dB', _margin('gain_margin_db')),
         ('phase_margin', 'phase margin of the position loop', 'deg', _margin('phase_margin_deg')),
         ('bandwidth', 'bandwidth of the position loop', 'Hz', _margin('bandwidth_hz')),
-        ('resonance', 'lowest resonance of the structure on locked motors, a notch in the open loop; without one the '
-         'highest frequency', 'Hz', _resonance)))
+        ('resonance', 'lowest resonance of the structure on locked motors, a notch in the open loop; without a notch, '
+         'the highest frequency, as its lower bound', 'Hz', _resonance)))

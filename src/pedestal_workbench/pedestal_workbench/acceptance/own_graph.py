@@ -77,8 +77,8 @@ class OwnGraph(Performer):
         if lost > MAX_LOST_STEP_SHARE * exercise.duration / self.antenna.period:
             raise LateError(f'the drive lost {lost} steps; this computer is too busy')
         recording = Decoded(read(bag))
-        if reason := _breach(recording, exercise):
-            raise StoppedError(f'{name}: {reason}')
+        if trouble := _trouble(recording, exercise):
+            raise trouble
         return Performed(self.antenna, exercise, recording, 0.0, in_loop.outcomes(exercise, recording), bag)
 
 
@@ -103,15 +103,14 @@ def _run(variant: Variant, pacing: str, track: Track | None, bag: pathlib.Path, 
     return graph.run(plan, bag, contextlib.nullcontext(lambda t: None)).losses
 
 
-def _breach(recording: Recording, exercise: Exercise) -> str:
-    """Return why the antenna had to be stopped in an exercise, '' for no reason."""
+def _trouble(recording: Recording, exercise: Exercise) -> StoppedError | None:
+    """Return why the antenna had to be stopped in an exercise, None for no reason."""
     t = np.asarray(recording.table('joint_states')['t'])
-    numbers = [np.degrees(at(recording, t, 'joint_states', [f'{axis}.{name}' for axis in AXES]))
-               for name in ('position', 'velocity')]
-    reasons = [f'{command.who} commanded {command.verb}' for _, command, reply in
-               replies(recording, 'acu/command_result') if reply.granted and command.who != commands.SCHEDULE_CLIENT
-               and command.verb.removeprefix('acu/') in MODES]
-    for _, _, _, array in recording.messages('acu/alarms'):
-        reasons += in_loop.unexpected(exercise, array.status)
-    reasons += filter(None, (exercise.outside(*row) for row in zip(*numbers)))
-    return next(iter(reasons), '')
+    angles, rates = (np.degrees(at(recording, t, 'joint_states', [f'{axis}.{name}' for axis in AXES]))
+                     for name in ('position', 'velocity'))
+    alarms = [alarm for _, _, _, array in recording.messages('acu/alarms') for alarm in array.status]
+    others = [f'{command.who} commanded {command.verb}' for _, command, reply in
+              replies(recording, 'acu/command_result') if reply.granted and command.who != commands.SCHEDULE_CLIENT
+              and command.verb.removeprefix('acu/') in MODES]
+    outside = next(filter(None, map(exercise.outside, angles, rates)), '')
+    return in_loop.trouble(exercise, outside, alarms, ''.join(others[:1]))

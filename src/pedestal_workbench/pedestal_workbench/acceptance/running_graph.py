@@ -46,6 +46,7 @@ class RunningGraph(Performer):
     Raises GraphError without a graph or in lockstep, StoppedError if another client has control.
     """
     antenna: Antenna
+    own_runs = False
 
     def __init__(self, folder: pathlib.Path) -> None:
         self._folder, self._session = folder.resolve(), ClientSession(Client, [])
@@ -65,7 +66,8 @@ class RunningGraph(Performer):
                 parameters.defaults(AduNodeParameters), nodes.DRIVE_NODE)) if self._graph['graph.simulated'] else None
             simulated = tuple(node for node in table.INJECTED_FAULTS
                               if self._session.remote.count_subscribers(f'{node}/inject'))
-            self.antenna = Antenna(acu, adu, acu.tracker.receiver.beamwidth, acu.period, simulated)
+            self.antenna = Antenna(acu, adu, acu.tracker.receiver.beamwidth, acu.period, simulated,
+                                   bool(self._session.remote.count_publishers('ship/imu/data')))
             self._session.take_control()
         except BaseException:
             self._session.__exit__()
@@ -159,11 +161,10 @@ class RunningGraph(Performer):
 
         def over() -> bool:
             known = remote.arrivals['acu'] > begun + SETTLING_S
-            return known and progress() in (row.arrived, row.handover) or remote.trouble(moving) != ''
+            return known and progress() in (row.arrived, row.handover) or remote.trouble(moving) is not None
         arrived = self._session.until(over, seconds)
-        if reason := remote.trouble(moving) or (
-                '' if arrived else f'the antenna has not arrived within {seconds:.0f} s: {progress()}'):
-            raise StoppedError(reason)
+        if (trouble := remote.trouble(moving)) or not arrived:
+            raise StoppedError(str(trouble or f'the antenna has not arrived within {seconds:.0f} s: {progress()}'))
 
     @contextlib.contextmanager
     def _recorder(self, bag: pathlib.Path) -> Iterator[Child]:

@@ -25,7 +25,7 @@ from pedestal_results import tracking
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
 from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method
-from pedestal_workbench.acceptance.servo import resolution
+from pedestal_workbench.acceptance.servo import encoder_uncertainty
 from pedestal_workbench.acceptance.tracking import TIME_STEPS, first, inside, travel
 
 BEGIN_TIME_S, REST_TIME_S = 1.0, 3.0    # time of the first command, and time until an axis has come to rest [s]
@@ -98,7 +98,7 @@ def _beyond(performed: Performed, arguments: Arguments) -> tuple[Times, Floats]:
 
 def _limit_overshoot(performed: Performed, arguments: Arguments) -> Measured:
     return Measured(float(_beyond(performed, arguments)[1].max()),
-                    resolution(performed.antenna, str(arguments['axis'])))
+                    encoder_uncertainty(performed.antenna, str(arguments['axis'])))
 
 
 def _limit_return(performed: Performed, arguments: Arguments) -> Measured:
@@ -192,7 +192,7 @@ def _stopping(performed: Performed, arguments: Arguments) -> tuple[Measured, Mea
         return NEVER, NEVER
     way, step = math.degrees(np.abs(angle - angle[0]).max()), math.degrees(abs(angle[1] - angle[0]))
     return (Measured(float(t[moving[-1] + 1] - begin), TIME_STEPS * performed.antenna.period),
-            Measured(way, math.hypot(step, resolution(performed.antenna, str(arguments['axis'])))))
+            Measured(way, math.hypot(step, encoder_uncertainty(performed.antenna, str(arguments['axis'])))))
 
 
 def _emergency_time(performed: Performed, arguments: Arguments) -> Measured:

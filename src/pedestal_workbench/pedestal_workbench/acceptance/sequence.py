@@ -8,6 +8,7 @@ import datetime
 import fcntl
 import itertools
 import json
+import math
 import pathlib
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
@@ -17,8 +18,15 @@ from pedestal_common.quantities import Json
 from pedestal_common.text_files import files
 from pedestal_recording import bag_files
 from pedestal_workbench.acceptance import figure
-from pedestal_workbench.acceptance.exercise import Exercise, LateError, Performed, Performer, StoppedError
-from pedestal_workbench.acceptance.judgement import Judged, judged
+from pedestal_workbench.acceptance.exercise import (
+    BreachError,
+    Exercise,
+    LateError,
+    Performed,
+    Performer,
+    StoppedError,
+)
+from pedestal_workbench.acceptance.judgement import FAILED, Judged, judged
 from pedestal_workbench.acceptance.method import Measured
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
@@ -49,8 +57,10 @@ def run(specification: Specification, performer: Performer, folder: pathlib.Path
     """Perform the requirements without a result in the folder, and return all results. Requirements with the same
     exercise share its recordings. report: called with each result, also with those of earlier sessions.
 
-    The folder keeps how the run ended. Raises ValueError before anything moves, for exercises that cannot be made and
-    for the folder of another specification; StoppedError if the antenna was stopped.
+    An alarm, or an antenna outside the envelope, fails the requirement. Because its cause may last, the sequence then
+    goes on only with a run of its own for each exercise. The folder keeps how the sequence ended. Raises ValueError
+    before anything moves, for exercises that cannot be made and for the folder of another specification; StoppedError
+    if the antenna was stopped.
     """
     exercises = specification.exercises(performer)
     folder.mkdir(parents=True, exist_ok=True)
@@ -66,6 +76,8 @@ def run(specification: Specification, performer: Performer, folder: pathlib.Path
             for requirement, _ in left:
                 results.keep(_result(requirement, performances, folder, len(results.sessions)))
                 report(results.kept[-1])
+                if results.kept[-1].judged.breached and not performer.own_runs:
+                    raise StoppedError(results.kept[-1].judged.reason)
             results.end('came to its end')
         except StoppedError as error:
             results.end(f'stopped: {error}')
@@ -82,30 +94,37 @@ def _result(requirement: Requirement, performances: '_Performances', folder: pat
     """Perform, measure and judge a requirement."""
     begun = _now()
     measured: list[Measured] = []
-    bags: list[tuple[str, str]] = []
-    reason = ''
-    for i, performed in enumerate(performances.of(requirement)):
-        if performed.bag is not None:
-            bags += [(str(file.relative_to(folder.resolve())), files.sha256(file))
-                     for file in bag_files.locate(performed.bag.resolve())]
-        if i == 0:
-            figure.keep_signal(performed, folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
-        try:
-            measured.append(requirement.method.measure(performed, requirement.arguments))
-        except ValueError as error:
-            reason = str(error)
-    return Kept(requirement.name, judged(requirement, measured, reason), tuple(bags), begun, session)
+    bags: list[pathlib.Path | None] = []
+    reason, breach = '', ''
+    try:
+        for performed in performances.of(requirement):
+            if not bags:
+                figure.keep_signal(performed, folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
+            bags.append(performed.bag)
+            try:
+                measured.append(requirement.method.measure(performed, requirement.arguments))
+            except ValueError as error:
+                reason = str(error)
+    except BreachError as error:
+        bags.append(folder / performances.name)
+        breach = str(error)
+    found = Judged(math.nan, math.nan, FAILED, tuple(measured), breach) if breach else judged(
+        requirement, measured, reason)
+    sums = tuple((str(file.relative_to(folder.resolve())), files.sha256(file))
+                 for bag in bags if bag and bag.exists() for file in bag_files.locate(bag.resolve()))
+    return Kept(requirement.name, found, sums, begun, session)
 
 
 class _Performances:
     """Performances of a run of the sequence, each kept until the last requirement with its exercise is measured."""
+    name = ''       # of the last recording
 
     def __init__(self, performer: Performer, folder: pathlib.Path, seed: int,
                  requirements: Sequence[tuple[Requirement, Exercise]]) -> None:
         self._performer, self._folder = performer, folder
         self._left = [_key(exercise) for _, exercise in requirements]   # of those that are not measured yet
         self._named: dict[str, list[tuple[str, Exercise, int]]] = {}    # arguments of Performer.perform
-        self._made: dict[str, list[Performed]] = {}
+        self._made: dict[str, list[Performed | BreachError]] = {}
         for (requirement, exercise), key in zip(requirements, self._left):
             named = self._named.setdefault(key, [])
             named += [(f'{requirement.file_name}-{i + 1}', exercise, seed + SEED_STEP * i)
@@ -116,15 +135,22 @@ class _Performances:
         performer.expect(expected)
 
     def of(self, requirement: Requirement) -> Iterator[Performed]:
-        """Yield a performance for each repetition of the next requirement."""
+        """Yield a performance for each repetition of the next requirement. Raises BreachError, StoppedError."""
         key = self._left.pop(0)
         made = self._made.setdefault(key, [])
-        for i in range(requirement.repetitions):
-            if i == len(made):
-                made.append(self._make(*self._named[key][i]))
-            yield made[i]
         if key not in self._left:
             del self._made[key]
+        for i in range(requirement.repetitions):
+            self.name = self._named[key][i][0]
+            if i == len(made):
+                try:
+                    made.append(self._make(*self._named[key][i]))
+                except BreachError as error:
+                    made.append(error)
+            found = made[i]
+            if isinstance(found, BreachError):
+                raise found
+            yield found
 
     def _make(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise, and make it again after one with late commands. Raises StoppedError."""

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from drive_law.axis_params import AxisParameters
+from drive_law.axis_params import SPEED_LOOP_PERIOD_S, AxisParameters
 from pedestal_common.graph.topics import AXES
 from pedestal_common.quantities import Bools, Degrees, Floats, Radians, RadiansPerSecond, Seconds, Times
 from pedestal_common.wire.commands import Argument
@@ -25,6 +26,7 @@ PLACE_SHARE, TRAVEL_SHARE = 0.53, 0.8   # place of the exercises in the travel, 
 MARGIN_DEG, MARGIN_RATE = 1.0, 2.0      # of the envelope around angles, factor of it on rates [deg, -]
 LARGEST_SHARE = 0.8     # of the shaper's rate and acceleration, for which 0 stands in an argument [-]
 PART_COUNT, CYCLE_COUNT = 10, 4         # parts of a jackknife, motions forth and back
+UNIFORM_SHARE = 0.475   # half width of 95 % of an evenly spread error, over the whole width of the error [-]
 BEGIN_S, REST_S = 1.0, 1.0              # time of the first command of an exercise, and rest after a motion [s]
 AXIS = Argument('axis', 'axis', options=AXES, default=AXES[0])
 
@@ -109,7 +111,7 @@ class Followed(NamedTuple):
     t: Times        # since the begin
     angle: Floats   # of the load encoder
     error: Floats   # reference minus angle
-    resolution: Degrees     # of the encoder, 0 if not known
+    uncertainty: Degrees    # of an angle, by the resolution of the encoder; 0 if not known
 
     @property
     def rate(self) -> Floats:
@@ -123,7 +125,7 @@ class Followed(NamedTuple):
     def rms_error(self, begin: Seconds, end: Seconds = math.inf) -> Measured:
         """Return the rms error between two times."""
         value, uncertainty = over_parts(self.error[self.between(begin, end)], tracking.rms)
-        return Measured(value, math.hypot(uncertainty, self.resolution / math.sqrt(12.0)))
+        return Measured(value, math.hypot(uncertainty, self.uncertainty))
 
 
 def followed(performed: Performed, arguments: Arguments) -> Followed:
@@ -137,13 +139,18 @@ def followed(performed: Performed, arguments: Arguments) -> Followed:
     known = (t > -1e-9) & (t < performed.exercise.duration + 1e-9) & np.isfinite(angle) & np.isfinite(reference)
     if known.sum() < 2 * PART_COUNT:
         raise ValueError(f'the recording holds only {known.sum()} steps of the exercise')
-    return Followed(t[known], angle[known], (reference - angle)[known], resolution(performed.antenna, name))
+    return Followed(t[known], angle[known], (reference - angle)[known], encoder_uncertainty(performed.antenna, name))
 
 
-def resolution(antenna: Antenna, name: str) -> Degrees:
-    """Return the resolution of the load encoder of an axis, 0 if it is not known."""
+def encoder_uncertainty(antenna: Antenna, name: str) -> Degrees:
+    """Return the uncertainty of an angle by the resolution of the load encoder, 0 if the resolution is not known."""
     drive: AxisParameters | None = getattr(antenna.adu, name, None)
-    return 360.0 / 2**drive.encoder.load_bits if drive else 0.0
+    return UNIFORM_SHARE * 360.0 / 2**drive.encoder.load_bits if drive else 0.0
+
+
+def mean(values: ArrayLike, uncertainty: float = 0.0) -> Measured:
+    """Return the mean of values by their scatter. uncertainty: that all values share."""
+    return Measured(float(np.mean(values)), math.hypot(half_width(np.ravel(values)), uncertainty))
 
 
 def over_parts(values: Floats, statistic: Callable[[Floats], float]) -> Measured:
@@ -241,6 +248,8 @@ def _standstill_rms(performed: Performed, arguments: Arguments) -> Measured:
 
 
 def _sine(antenna: Antenna, arguments: Arguments) -> Exercise:
+    if antenna.on_ship:
+        raise ValueError('sine_error: must be ashore, because a program track moves against the motion of a ship')
     axis, f = plan(antenna, arguments), float(arguments['frequency'])
     w = 2.0 * math.pi * f
     largest = math.degrees(LARGEST_SHARE * min(axis.rate / w, axis.acceleration / w**2, 0.5 * axis.travel))
@@ -268,8 +277,8 @@ def _step(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _stepped(performed: Performed, arguments: Arguments) -> tuple[Times, Floats, Degrees, Degrees]:
     """Return (times after the command, response [deg], its size [deg], noise of the encoder [deg]). Raises ValueError
-    without a step. Twice the noise is at least a step of the encoder and its interpolation error, which no angle at
-    rest shows."""
+    without a step. Twice the noise is at least the uncertainty of two angles and the interpolation error of an
+    encoder, which no angle at rest shows."""
     motion, at = followed(performed, arguments), performed.times('preset')[1]
     reference, after = motion.angle + motion.error, motion.t >= at
     before = reference[motion.t < at][-1]
@@ -280,7 +289,7 @@ def _stepped(performed: Performed, arguments: Arguments) -> tuple[Times, Floats,
     drive: AxisParameters | None = getattr(performed.antenna.adu, str(arguments['axis']), None)
     waves = math.degrees(drive.encoder.error.interpolation) if drive else 0.0
     return (motion.t[after] - at, motion.angle[after] - before, size,
-            max(noise, 0.5 * math.hypot(motion.resolution, waves)))
+            max(noise, math.hypot(motion.uncertainty, 0.5 * waves)))
 
 
 def _overshoot(performed: Performed, arguments: Arguments) -> Measured:
@@ -313,7 +322,7 @@ def _peaks(command: str, dropped: int, time: Seconds) -> Callable[[Performed, Ar
         motion = followed(performed, arguments)
         peaks = [metrics.peak(motion.error[motion.between(at, at + time)])
                  for at in performed.times(command)[dropped:]]
-        return Measured(float(np.mean(peaks)), math.hypot(half_width(peaks), motion.resolution / math.sqrt(12.0)))
+        return mean(peaks, motion.uncertainty)
     return measure
 
 
@@ -374,30 +383,40 @@ def _apart(motion: Motion) -> Floats:
 
 
 def _lash(performed: Performed, arguments: Arguments) -> Measured:
-    values = _per_way(performed, arguments, _apart)
-    return Measured(float(values.mean()), half_width(values.ravel()))
+    return mean(_per_way(performed, arguments, _apart), _apart_uncertainty(performed, arguments))
+
+
+def _apart_uncertainty(performed: Performed, arguments: Arguments) -> Degrees:
+    """Return the uncertainty of `_apart` by the resolution of both motor encoders."""
+    drive = drive_of(performed.antenna, str(arguments['axis']))
+    return UNIFORM_SHARE * 360.0 / 2**drive.encoder.motor_bits / drive.gear_train.ratio * math.sqrt(2.0)
 
 
 def _bias(performed: Performed, arguments: Arguments) -> Measured:
-    values = _per_way(performed, arguments, lambda motion: 0.5 * (motion.motor_torque @ (1.0, -1.0)))
-    return Measured(float(values.mean()), half_width(values.ravel()))
+    """Return the bias torque. A count of a motor encoder in a period is a rate, to which the speed loop replies by a
+    torque; this torque, for half of the difference of two motors, is the least uncertainty."""
+    drive = drive_of(performed.antenna, str(arguments['axis']))
+    count = 2.0 * math.pi / 2**drive.encoder.motor_bits * drive.speed_loop.proportional / SPEED_LOOP_PERIOD_S
+    return mean(_per_way(performed, arguments, lambda motion: 0.5 * (motion.motor_torque @ (1.0, -1.0))),
+                UNIFORM_SHARE * count / math.sqrt(2.0))
 
 
 def _friction(performed: Performed, arguments: Arguments) -> Measured:
     ratio = drive_of(performed.antenna, str(arguments['axis'])).gear_train.ratio
-    values = _per_way(performed, arguments, lambda motion: ratio * motion.motor_torque.sum(axis=1)) @ (0.5, -0.5)
-    return Measured(float(values.mean()), half_width(values))
+    return mean(_per_way(performed, arguments, lambda motion: ratio * motion.motor_torque.sum(axis=1)) @ (0.5, -0.5))
 
 
 def _encoder_lag(performed: Performed, arguments: Arguments) -> Measured:
     behind = _per_way(performed, arguments, lambda motion: motion.motor_angle.mean(axis=1) - motion.theta)
-    values = 1e3 * (behind @ (0.5, -0.5)) / plan(performed.antenna, arguments).rate_of(arguments)
-    return Measured(float(values.mean()), half_width(values))
+    axis = plan(performed.antenna, arguments)
+    rate, uncertainty = axis.rate_of(arguments), math.radians(encoder_uncertainty(performed.antenna, axis.name))
+    return mean(1e3 * (behind @ (0.5, -0.5)) / rate, 1e3 * uncertainty / rate)
 
 
 def _tooth_error(performed: Performed, arguments: Arguments) -> Measured:
     peaks = _per_way(performed, arguments, _apart, lambda x: metrics.peak(x - np.median(x)))
-    return Measured(float(peaks.max()), float(0.5 * np.ptp(peaks)))
+    return Measured(float(peaks.max()), math.hypot(0.5 * float(np.ptp(peaks)),
+                                                   _apart_uncertainty(performed, arguments)))
 
 
 def _rate(default: float) -> Argument:
@@ -420,7 +439,7 @@ METHODS = (
            _brake, _braking_distance),
     Method('ramp_error', 'rms following error at a constant rate', 'deg', '<=', (AXIS, _rate(1.0), _duration(12.0)),
            _ramp, _ramp_error),
-    Method('sine_error', 'rms following error in a sine, a program track', 'deg', '<=', (
+    Method('sine_error', 'rms following error in a sine, a program track; ashore only', 'deg', '<=', (
         AXIS, Argument('frequency', 'frequency', 0.01, 5.0, 'Hz', default=0.1),
         Argument('amplitude', 'amplitude; 0: 1 deg, or less by rate and acceleration', 0.0, 45.0, 'deg',
                  default=0.0)), _sine, _sine_error),

@@ -129,7 +129,7 @@ def _fade(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _offsets(antenna: Antenna, arguments: Arguments) -> Exercise:
     """Return the exercise of `preset` at offsets about a beacon: a cross, and the circle of the verification."""
-    if 'ins' in antenna.simulated:
+    if antenna.on_ship:
         raise ValueError('receiver_slope: must be ashore, because the offsets contain the attitude of a ship')
     circle = [(beacon_offsets.CIRCLE_BEAMWIDTHS * math.cos(angle), beacon_offsets.CIRCLE_BEAMWIDTHS * math.sin(angle))
               for angle in np.arange(CIRCLE_POINTS) * 2.0 * math.pi / CIRCLE_POINTS]
@@ -173,10 +173,26 @@ def _program_rms(performed: Performed, _: Arguments) -> Measured:
 
 
 def _pointing_offset(performed: Performed, _: Arguments) -> Measured:
-    offsets = collect.points(performed.recording, predicted.programs(performed.recording))[2]
-    (x, x_low, x_high), (y, y_low, y_high) = map(intervals.interval, offsets.T)
-    size = math.hypot(x, y)
-    return Measured(size, 0.5 * math.hypot(x * (x_high - x_low), y * (y_high - y_low)) / size)
+    return of_mean(collect.points(performed.recording, predicted.programs(performed.recording))[2])
+
+
+def of_mean(offsets: Pairs) -> Measured:
+    """Return the length of the mean of offsets (n, 2), without the bias by their noise.
+
+        length = sqrt(max(|mean|^2 - s^2 / n, 0))
+
+        s^2     variance of the offsets, of both directions together
+
+    The bias |mean| - length is a part of the uncertainty, so that the interval also covers an offset of 0.
+    Raises ValueError for less than two offsets.
+    """
+    if len(offsets) < 2:
+        raise ValueError('the recording holds one offset, must be at least 2')
+    mean, noise = offsets.mean(axis=0), offsets.std(axis=0, ddof=1) / math.sqrt(len(offsets))
+    size = math.hypot(*mean)
+    length = math.sqrt(max(size**2 - float(noise @ noise), 0.0))
+    halves = [intervals.half_width(column) for column in offsets.T]
+    return Measured(length, math.hypot(*(mean * halves)) / size + size - length)
 
 
 def first(performed: Performed, since: Seconds, t: Times, met: Bools) -> Measured:
@@ -230,7 +246,7 @@ METHODS = (
             Argument('fade', 'duration of the fade', 0.1, 60.0, 's', default=4.0),
             Argument('depth', 'loss of level', 0.0, 200.0, 'dB', default=30.0)), _fade, _fade_recovery, True),
     Method('receiver_slope', 'point beside a beacon by `preset`: slope of a receiver channel or larger cross-talk, as '
-           'corrected by the control unit', '1', '+-',
+           'corrected by the control unit; ashore only', '1', '+-',
            (_target('beacon', 'own'), *_PLACE,
             Argument('channel', 'channel of the receiver', options=tuple(CHANNELS), default='elevation')),
            _offsets, _slope))
