@@ -123,11 +123,6 @@ class Child:
         self.send_signal(signal.SIGKILL)
 
 
-def end_with_parent() -> None:
-    """Let the kernel send this process SIGTERM when its parent ends."""
-    _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-
-
 def _run_child(run: Callable[[], int]) -> NoReturn:
     """End the child with the exit code of run(), 1 after an error. It must never return into the code of its parent.
     """
@@ -152,7 +147,7 @@ def _settle(parent: int, output: int, gate: int, mask: Iterable[int]) -> int:
     # standard stream (0, 1, 2).
     output, gate = (fcntl.fcntl(descriptor, fcntl.F_DUPFD, 3) for descriptor in (output, gate))
     os.setsid()
-    end_with_parent()
+    _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:     # the parent ended before the signal was set
         os._exit(1)
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)

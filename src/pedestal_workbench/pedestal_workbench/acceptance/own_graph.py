@@ -10,13 +10,14 @@ from multiprocessing.pool import AsyncResult
 
 import numpy as np
 
-from pedestal_bringup.graph import child, graph, pass_recorder
+from pedestal_bringup.graph import graph, pass_recorder
 from pedestal_bringup.scenario.program import Plan, program_message
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph import domain
 from pedestal_common.graph.modes import MODES
 from pedestal_common.graph.topics import AXES
 from pedestal_common.injection import table
+from pedestal_common.quantities import Seconds
 from pedestal_common.wire import commands
 from pedestal_recording.bag import read
 from pedestal_recording.recording import Decoded, Recording, at, replies
@@ -90,8 +91,14 @@ def _pacing(exercise: Exercise) -> str:
 def _run(variant: Variant, pacing: str, track: Track | None, bag: pathlib.Path, environment: Mapping[str, str]) -> int:
     """Run a graph in this process, whose output goes to the log of its bag. Return the number of lost steps."""
     os.setsid()     # a Ctrl-C on the terminal is for acceptance only, which then ends this process
-    child.end_with_parent()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    acceptance = multiprocessing.parent_process()
+    assert acceptance
+
+    def advance(_: Seconds) -> None:
+        """End the run if acceptance was killed."""
+        if not acceptance.is_alive():
+            raise KeyboardInterrupt
     os.environ.update(environment)
     bag.parent.mkdir(parents=True, exist_ok=True)
     with open(pass_recorder.log_of(bag), 'ab') as log:
@@ -100,7 +107,7 @@ def _run(variant: Variant, pacing: str, track: Track | None, bag: pathlib.Path, 
     plan = Plan(variant.load(pacing))
     if track:
         vars(plan)['tracks'] = {'acu/program_track': program_message(*track)}
-    return graph.run(plan, bag, contextlib.nullcontext(lambda t: None)).losses
+    return graph.run(plan, bag, contextlib.nullcontext(advance)).losses
 
 
 def _trouble(recording: Recording, exercise: Exercise) -> StoppedError | None:
