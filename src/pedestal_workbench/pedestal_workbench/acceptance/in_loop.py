@@ -13,7 +13,7 @@ from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.graph.topics import AXES
-from pedestal_common.injection.table import INJECTED_FAULTS
+from pedestal_common.injection import table
 from pedestal_common.quantities import Json, Message, Seconds
 from pedestal_common.wire.commands import parsed
 from pedestal_operator.state import PAST_STATES, alarm
@@ -41,7 +41,7 @@ def antenna(scenario: Scenario) -> Antenna:
     """Return what methods need to know of the antenna of a scenario."""
     acu, adu = scenario.node_parameters('acu'), scenario.node_parameters('adu')
     return Antenna(acu, adu, scenario.node_parameters('tracking_receiver').antenna.beamwidth, adu.period,
-                   tuple(node for node in INJECTED_FAULTS if node in scenario.nodes), 'ins' in scenario.nodes)
+                   tuple(node for node in table.INJECTED_FAULTS if node in scenario.nodes), 'ins' in scenario.nodes)
 
 
 def changes(exercise: Exercise) -> dict[str, Json]:
@@ -74,6 +74,11 @@ def faults(exercise: Exercise) -> list[tuple[str, str]]:
     """Return [(node, fault)] that the actions of an exercise inject, with `clear`."""
     verbs = [(action.node, parsed(action.command).verb) for action in exercise.actions]
     return [(node, verb) for node, verb in verbs if node != 'acu' and verb not in nodes.DRIVE_SERVICES]
+
+
+def pacing(exercise: Exercise) -> str:
+    """Return the pacing of a run: realtime for a fault that a lockstep graph cannot have."""
+    return 'realtime' if any(table.refused_in_lockstep(*fault) for fault in faults(exercise)) else 'lockstep'
 
 
 def outcomes(exercise: Exercise, recording: Recording, begin: Seconds = 0.0) -> tuple[Executed, ...]:
@@ -124,11 +129,11 @@ class InLoop(Performer):
 
     def check(self, exercise: Exercise) -> None:
         """Raise ValueError for an exercise that no run of the variant can make."""
-        run_of(exercise, self._variant, self._scenario).load()
+        run_of(exercise, self._variant, self._scenario).load(pacing(exercise))
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from time 0 of a run."""
-        scenario = run_of(exercise, self._variant, self._scenario, seed).load()
+        scenario = run_of(exercise, self._variant, self._scenario, seed).load(pacing(exercise))
         loop = Loop(scenario)
         if exercise.track:
             loop.tracks['acu/program_track'] = program_message(*exercise.track)

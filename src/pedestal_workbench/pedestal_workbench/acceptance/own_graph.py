@@ -16,7 +16,6 @@ from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph import domain
 from pedestal_common.graph.modes import MODES
 from pedestal_common.graph.topics import AXES
-from pedestal_common.injection import table
 from pedestal_common.quantities import Seconds
 from pedestal_common.wire import commands
 from pedestal_recording.bag import read
@@ -52,7 +51,7 @@ class OwnGraph(Performer):
 
     def check(self, exercise: Exercise) -> None:
         """Raise ValueError for an exercise that no run of the variant can make."""
-        self._changed(exercise, 1).load(_pacing(exercise))
+        self._changed(exercise, 1).load(in_loop.pacing(exercise))
 
     def _changed(self, exercise: Exercise, seed: int) -> Variant:
         changed = in_loop.run_of(exercise, self._variant, self._scenario, seed)
@@ -61,11 +60,11 @@ class OwnGraph(Performer):
     def expect(self, performances: Sequence[tuple[str, Exercise, int]]) -> None:
         """Begin the runs in lockstep, as many at a time as this computer has cores."""
         for name, exercise, seed in performances:
-            if _pacing(exercise) == 'lockstep':
+            if in_loop.pacing(exercise) == 'lockstep':
                 self._begun[name] = self._begin(name, exercise, seed)
 
     def _begin(self, name: str, exercise: Exercise, seed: int) -> AsyncResult[int]:
-        return self._pool.apply_async(_run, (self._changed(exercise, seed), _pacing(exercise), exercise.track,
+        return self._pool.apply_async(_run, (self._changed(exercise, seed), in_loop.pacing(exercise), exercise.track,
                                              self._folder / name, dict(os.environ)))
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
@@ -81,11 +80,6 @@ class OwnGraph(Performer):
         if trouble := _trouble(recording, exercise):
             raise trouble
         return Performed(self.antenna, exercise, recording, 0.0, in_loop.outcomes(exercise, recording), bag)
-
-
-def _pacing(exercise: Exercise) -> str:
-    """Return the pacing of a run: realtime for a fault that a lockstep graph cannot have."""
-    return 'realtime' if any(table.refused_in_lockstep(*fault) for fault in in_loop.faults(exercise)) else 'lockstep'
 
 
 def _run(variant: Variant, pacing: str, track: Track | None, bag: pathlib.Path, environment: Mapping[str, str]) -> int:
