@@ -27,18 +27,18 @@ END_TIME_S = 3.0
 
 POLL_TIME_S = 0.05
 
-TRACKER = b'multiprocessing.resource_tracker'
-"""Part of the command line of a process of Python itself, which ends with the last process that uses it."""
+OF_PYTHON = b'multiprocessing.resource_tracker', b'multiprocessing.forkserver'
+"""Parts of the command lines of processes of Python itself, which end with the last process that uses them."""
 
 
 def _marked(mark: str) -> list[int]:
-    """Return the pids of all processes whose environment holds a mark, except resource trackers."""
+    """Return the pids of all processes whose environment holds a mark, except those of Python itself."""
     entry = f'{VARIABLE}={mark}'.encode()
     found = []
     for process in pathlib.Path('/proc').glob('[0-9]*'):
         with contextlib.suppress(OSError):
             if entry in (process / 'environ').read_bytes().split(b'\0') and (
-                    TRACKER not in (process / 'cmdline').read_bytes()):
+                    not any(part in (process / 'cmdline').read_bytes() for part in OF_PYTHON)):
                 found.append(int(process.name))
     return found
 

@@ -208,7 +208,7 @@ class RunParameters(Parameters):
 @dataclasses.dataclass(frozen=True)
 class AduNodeParameters(RunParameters, AduParameters):
     """Parameters of adu_node: drive and run."""
-    inject: str = text('', table.INJECT_DOC)
+    inject: str = text('', f"{table.INJECT_DOC}; also requests, such as '5 adu/emergency_stop'")
     state_file: str = text('', 'file for the angles of the simulated plant, from which it continues after a restart; '
                            'empty: it begins at the initial angles')
 

@@ -193,6 +193,18 @@ def test_a_silent_writer_may_lose_some_when_it_speaks_again(pause, lost):
     assert gate.streams.lost == lost + 1
 
 
+@pytest.mark.parametrize('every', [1, 7, 60])
+def test_a_client_follows_a_fast_lockstep_graph(every):
+    """A graph of a fifth of a millisecond for a step, of which the client sees every message or one in 60, twice."""
+    gate = PublisherGate(decode, FUTURE)
+    for begin in 0, 10 * S:
+        for k in range(0, 6000, every):
+            now = begin + k * MS // 5
+            taken = gate.take(k * T, k + 1, UTC + now, now, UTC + now)
+            assert taken is not None or begin and k * MS // 5 < 2 * publisher_gate.SILENCE_LIMIT_NS
+    assert not set(gate.drops.counts) & set(publisher_gate.WARNING_DROP_REASONS)
+
+
 def test_a_frozen_reader_takes_up_where_the_writer_is():
     """It finds what its queue kept, all at one time."""
     gate = PublisherGate(decode, FUTURE)

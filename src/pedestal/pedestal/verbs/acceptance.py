@@ -106,7 +106,7 @@ def _performer(options: argparse.Namespace, folder: pathlib.Path) -> 'tuple[Abst
         from pedestal_workbench.acceptance.in_loop import InLoop
         return contextlib.nullcontext(InLoop(variant)), f'{source} in the closed loop, seed {options.seed}'
     from pedestal_workbench.acceptance.own_graph import OwnGraph
-    return contextlib.nullcontext(OwnGraph(variant, folder)), f'{source} as nodes, seed {options.seed}'
+    return OwnGraph(variant, folder), f'{source} as nodes, seed {options.seed}'
 
 
 def _confirm(yes: bool, spec: 'Specification', exercises: 'Sequence[Exercise]') -> None:

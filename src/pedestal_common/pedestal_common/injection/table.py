@@ -2,6 +2,7 @@
 `NODE/inject` and in its parameter `inject`, for example '12 encoder_jump axis=azimuth size=0.01 duration=5'."""
 import typing
 
+from pedestal_common.graph import nodes
 from pedestal_common.parameters import ParameterError
 from pedestal_common.quantities import Nanoseconds
 from pedestal_common.wire.commands import Argument, Command, CommandDefinition, schedule
@@ -121,6 +122,8 @@ INJECT_COMMANDS: dict[str, tuple[Fault | CommandDefinition, ...]] = {
     node: (*faults, CLEAR_COMMAND) for node, faults in INJECTED_FAULTS.items()}
 """{node: its commands on `NODE/inject`}."""
 
+DRIVE_REQUESTS = tuple(CommandDefinition(row.service, row.doc) for row in nodes.DRIVE_REQUESTS)
+
 MAX_FAULT_VALUES = max(len(fault.arguments) - 1 for faults in INJECTED_FAULTS.values() for fault in faults)
 """Largest number of arguments of a fault, without its last argument `duration`."""
 
@@ -135,7 +138,8 @@ def code(node: str, name: str) -> int:
 
 def scheduled_commands(node: str, text: str) -> list[tuple[Nanoseconds, Command]]:
     """Return the commands of the parameter `inject` of a node with their times, in order. Raises ParameterError."""
-    return schedule('inject', text, INJECT_COMMANDS[node])
+    requests = DRIVE_REQUESTS if node == nodes.DRIVE_NODE else ()
+    return schedule('inject', text, (*INJECT_COMMANDS[node], *requests))
 
 
 def check_pacing(node: str, text: str, lockstep: bool) -> None:

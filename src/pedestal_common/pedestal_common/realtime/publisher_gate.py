@@ -30,6 +30,9 @@ unknown."""
 PUBLISHER_POLL_NS = 50_000_000
 """Time between two checks of the graph for unexpected publishers, for each candidate [ns]."""
 
+MAX_LOCKSTEP_STAMP_NS = 10**16
+"""Stamp up to which a message is of a lockstep graph, whose stamps count from 0 [ns]; in realtime they are UTC."""
+
 DROP_UNDECODABLE, DROP_STALE, DROP_FUTURE, DROP_OTHER_PUBLISHER, DROP_UNCLEAR_PUBLISHER = (
     'undecodable', 'stale', 'future', 'another publisher', 'publishers unclear')
 """Kinds of dropped messages."""
@@ -71,29 +74,43 @@ class PublisherGate(Generic[_M]):
         self._stamp: Nanoseconds | None = None
         self._back_since: Nanoseconds | None = None     # since when earlier stamps arrive
         self._back: Nanoseconds | None = None           # the newest of these
+        self._sent: tuple[Nanoseconds, Nanoseconds] | None = None   # time of sending and stamp of the last message
+        self._ahead: Nanoseconds = 0    # time by which the stamps of a lockstep graph have run ahead of the clock
 
     def take(self, data: bytes, number: int, source: Nanoseconds, now: Nanoseconds, utc: Nanoseconds) -> _M | None:
         """Return the decoded message, None for a dropped one. source: time of sending; now, utc: times of
         reception."""
         self.after_gap = False
+        problem = ''
+        try:
+            stamp, message = self._decode(data)
+            self._note_lead(source, stamp)
+        except ValueError as error:
+            problem = str(error)
         if not self._paced:
             if self._unexpected():
                 self.drops.drop(DROP_OTHER_PUBLISHER, '', now)
                 return None
-        elif not self._is_open and not self._admit(self.streams.of(number, source, now), now):
+        elif not self._is_open and not self._admit(self.streams.of(number, source + self._ahead, now), now):
             return None
         if self._oldest is not None and utc - source > self._oldest:
             self.drops.drop(DROP_STALE, f'{(utc - source) * 1e-9:.3f} s from sending to reception', now)
             return None
-        try:
-            stamp, message = self._decode(data)
-        except ValueError as error:
-            self.drops.drop(DROP_UNDECODABLE, str(error), now)
+        if problem:
+            self.drops.drop(DROP_UNDECODABLE, problem, now)
             return None
         if stamp is not None and not self._in_order(stamp, now, utc):
             return None
         self.offset = utc - source if self.offset is None else min(self.offset, utc - source)
         return message
+
+    def _note_lead(self, source: Nanoseconds, stamp: Nanoseconds | None) -> None:
+        """Note the lead of a lockstep graph over the clock. Its messages come faster than its period permits in
+        realtime, and a client that misses some would take the others for messages of another publisher."""
+        if stamp is not None and stamp < MAX_LOCKSTEP_STAMP_NS:
+            if self._sent:
+                self._ahead += max(stamp - self._sent[1] - (source - self._sent[0]), 0)
+            self._sent = source, stamp
 
     def _admit(self, stream: Stream | None, now: Nanoseconds) -> bool:
         """Return True if a message is of the active publisher, else drop it. A publisher that may take over becomes

@@ -6,7 +6,7 @@ execute the same commands and return a recording with the same topics, so that e
 import dataclasses
 import hashlib
 import pathlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from acu_tracker.params import AcuParameters
@@ -122,10 +122,14 @@ class Performed:
 class Performer(Protocol):
     """Makes exercises with one antenna."""
     antenna: Antenna
-    own_runs: bool      # each exercise begins in a run of its own, whatever the exercise before has left
+    own_runs: bool = True       # each exercise begins in a run of its own, whatever the exercise before has left
 
     def check(self, exercise: Exercise) -> None:
         """Raise ValueError for an exercise that it cannot make, before anything moves."""
+
+    def expect(self, performances: Sequence[tuple[str, Exercise, int]]) -> None:
+        """Take the arguments of the next calls of `perform`, which a performer may make ahead."""
+        return None
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise. name: of its recording. Raises StoppedError."""

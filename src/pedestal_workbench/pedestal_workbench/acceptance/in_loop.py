@@ -1,5 +1,6 @@
 """Exercises in the closed loop: in memory, with the seed that the caller gives."""
 import math
+from collections.abc import Iterable
 
 from acu_tracker.alarms import report
 from acu_tracker.alarms.table import ALARM_NAMES
@@ -9,23 +10,38 @@ from pedestal_bringup.loop.memory_recording import MemoryRecording
 from pedestal_bringup.scenario.program import program_message
 from pedestal_bringup.scenario.scenario import Scenario
 from pedestal_bringup.scenario.variant import Variant
+from pedestal_common.graph import nodes
 from pedestal_common.graph.steps import NS_PER_SECOND
 from pedestal_common.graph.topics import AXES
-from pedestal_common.injection.table import INJECTED_FAULTS
-from pedestal_common.quantities import Json, Seconds
+from pedestal_common.injection import table
+from pedestal_common.quantities import Json, Message, Seconds
 from pedestal_common.wire.commands import parsed
-from pedestal_workbench.acceptance.exercise import Antenna, BreachError, Executed, Exercise, Performed
+from pedestal_operator.state import PAST_STATES, alarm
+from pedestal_recording.recording import Recording, replies
+from pedestal_workbench.acceptance.exercise import (
+    Action,
+    Antenna,
+    BreachError,
+    Executed,
+    Exercise,
+    LateError,
+    Performed,
+    Performer,
+    StoppedError,
+)
 
-CLIENT = 'acceptance'   # name of the client that commands the control unit
 WIND_SEEDS = 'adu.wind.field.seed', 'adu.wind.gust.seed'     # which the seed of a scenario leaves as they are
 WATCH_STEPS = 10        # number of steps between two checks of alarms and envelope
+MAX_LATENESS_S = 0.1    # of a command [s]
+EARLY_S = 1e-6          # largest time of a reply before its action, of rounding [s]
+EMERGENCY_STOP = 'emergency stop'       # alarm
 
 
 def antenna(scenario: Scenario) -> Antenna:
     """Return what methods need to know of the antenna of a scenario."""
     acu, adu = scenario.node_parameters('acu'), scenario.node_parameters('adu')
     return Antenna(acu, adu, scenario.node_parameters('tracking_receiver').antenna.beamwidth, adu.period,
-                   tuple(node for node in INJECTED_FAULTS if node in scenario.nodes), 'ins' in scenario.nodes)
+                   tuple(node for node in table.INJECTED_FAULTS if node in scenario.nodes), 'ins' in scenario.nodes)
 
 
 def changes(exercise: Exercise) -> dict[str, Json]:
@@ -38,50 +54,92 @@ def changes(exercise: Exercise) -> dict[str, Json]:
     return {**found, **exercise.changes}
 
 
-def run_of(exercise: Exercise, variant: Variant, period: Seconds, seed: int = 1) -> Variant:
-    """Return the variant whose run makes an exercise, in whole steps. The wind of each seed is another one."""
-    duration = math.ceil(exercise.duration / period - 1e-6) * period
-    return variant.with_({**changes(exercise), **dict.fromkeys(WIND_SEEDS, seed)}, seed=seed, duration=duration)
+def run_of(exercise: Exercise, variant: Variant, scenario: Scenario, seed: int = 1) -> Variant:
+    """Return the variant whose run makes an exercise, in whole steps: its actions are scheduled after those of the
+    scenario, which is that of the variant. The wind of each seed is another one."""
+    period, changed = scenario.node_parameters('adu').period, changes(exercise)
+    schedules: dict[str, list[str]] = {}
+    for action in exercise.actions:
+        key = f'{action.node}.{"commands" if action.node == "acu" else "inject"}'
+        schedules.setdefault(key, []).append(f'{action.at:.9f} {action.command}')
+    for key, actions in schedules.items():
+        node, _, name = key.partition('.')
+        given = changed.get(key, getattr(scenario.node_parameters(node), name))
+        changed[key] = '; '.join([*filter(None, [str(given)]), *actions])
+    return variant.with_({**changed, **dict.fromkeys(WIND_SEEDS, seed)}, seed=seed,
+                         duration=math.ceil(exercise.duration / period - 1e-6) * period)
 
 
-class InLoop:
+def pacing(exercise: Exercise) -> str:
+    """Return the pacing of a run: realtime for a fault that a lockstep graph cannot have."""
+    return 'realtime' if any(table.refused_in_lockstep(*fault) for fault in exercise.faults) else 'lockstep'
+
+
+def outcomes(exercise: Exercise, recording: Recording, begin: Seconds = 0.0) -> tuple[Executed, ...]:
+    """Return the actions with their outcomes as recorded. begin: in the time of the recording. Raises LateError for a
+    late action, StoppedError for one without an outcome."""
+    left = {node: list(replies(recording, nodes.row(node).replies))
+            for node in {each.node for each in exercise.actions}}
+    made = []
+    for action in exercise.actions:
+        wanted = parsed(action.command)
+        found = next((one for one in left[action.node] if one[0] - begin > action.at - EARLY_S and
+                      (one[1].verb, one[1].arguments) == (wanted.verb, wanted.arguments)), None)
+        if found is None:
+            raise StoppedError(f'{action.node} did not reply to {action.command}')
+        left[action.node].remove(found)
+        t, _, reply = found
+        if t - begin > action.at + MAX_LATENESS_S:
+            raise LateError(lateness(action, t - begin))
+        made.append(Executed(t - begin, action, *reply))
+    return tuple(made)
+
+
+def lateness(action: Action, t: Seconds) -> str:
+    """Return the words on a late command. t: time of the exercise at which it was sent or executed."""
+    return (f'{action.command}: {t - action.at:.2f} s late, must be at most {MAX_LATENESS_S:g} s; this computer is '
+            'too busy')
+
+
+def trouble(exercise: Exercise, outside: str, alarms: Iterable[Message], interference: str) -> StoppedError | None:
+    """Return why the antenna must be stopped in an exercise, None for no reason. outside: how it is outside its
+    envelope; alarms: those of acu/alarms; interference: what an operator has done."""
+    unexpected = {each['name']: f'alarm {each["name"]}: {each["detail"] or each["meaning"]}'
+                  for each in map(alarm, alarms)
+                  if each['state'] not in PAST_STATES and each['name'] not in exercise.alarms}
+    pressed = unexpected.pop(EMERGENCY_STOP, '')    # by an operator, if no other alarm explains it
+    if breach := outside or '; '.join(unexpected.values()):
+        return BreachError(breach)
+    stop = interference if interference not in exercise.alarms else pressed
+    return StoppedError(stop) if stop else None
+
+
+class InLoop(Performer):
     """Performer in the closed loop of a variant of a scenario."""
-    own_runs = True
 
     def __init__(self, variant: Variant) -> None:
-        self._variant = variant
-        self.antenna = antenna(variant.load())
+        self._variant, self._scenario = variant, variant.load()
+        self.antenna = antenna(self._scenario)
 
     def check(self, exercise: Exercise) -> None:
         """Raise ValueError for an exercise that no run of the variant can make."""
-        run_of(exercise, self._variant, self.antenna.period).load()
+        run_of(exercise, self._variant, self._scenario).load(pacing(exercise))
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from time 0 of a run."""
-        scenario = run_of(exercise, self._variant, self.antenna.period, seed).load()
+        scenario = run_of(exercise, self._variant, self._scenario, seed).load(pacing(exercise))
         loop = Loop(scenario)
         if exercise.track:
             loop.tracks['acu/program_track'] = program_message(*exercise.track)
             loop.units['acu'].decode('acu/program_track', loop.tracks['acu/program_track'])
-        executed: list[Executed] = []
-        due = list(exercise.actions)
 
         def watch(made: int) -> int:
-            """Stop where the exercise is breached, and execute the actions that are due after `made` steps. Return the
-            number of steps to the next call."""
+            """Stop where the exercise is breached. Return the number of steps to the next call."""
             if made and (reason := _breach(loop, exercise)):
                 raise BreachError(f'{name}, after {made * loop.period_ns / NS_PER_SECOND:g} s: {reason}')
-            while due and round(due[0].at * NS_PER_SECOND) <= made * loop.period_ns:
-                action = due.pop(0)
-                unit = loop.units[action.node]
-                reply = unit.command(parsed(action.command)._replace(who=CLIENT))
-                unit.pending_replies.clear()
-                executed.append(Executed(made * loop.period_ns / NS_PER_SECOND, action, *reply))
-            if not due:
-                return WATCH_STEPS
-            return min(max(1, math.ceil(round(due[0].at * NS_PER_SECOND) / loop.period_ns) - made), WATCH_STEPS)
+            return WATCH_STEPS
         recording = MemoryRecording(scenario, loop.run(watch=watch))
-        return Performed(self.antenna, exercise, recording, 0.0, tuple(executed))
+        return Performed(self.antenna, exercise, recording, 0.0, outcomes(exercise, recording))
 
 
 def _breach(loop: Loop, exercise: Exercise) -> str:

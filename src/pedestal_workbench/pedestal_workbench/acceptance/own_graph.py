@@ -1,115 +1,117 @@
-"""Exercises on simulated graphs that acceptance starts itself, one for each exercise: `pedestal run` as a child."""
+"""Exercises on simulated graphs that acceptance starts itself, one for each exercise. Commands are parameters of the
+nodes, so that a graph in lockstep equals the closed loop to the last bit."""
 import contextlib
+import multiprocessing
+import os
 import pathlib
-import sys
-from collections.abc import Iterator
+import signal
+from collections.abc import Mapping, Sequence
+from multiprocessing.pool import AsyncResult
 
-from pedestal_bringup.graph import pass_recorder
-from pedestal_bringup.graph.child import Child
-from pedestal_bringup.graph.processes import SHOWN_LOG_LINES, exit_description, uninterrupted
+import numpy as np
+
+from pedestal_bringup.graph import graph, pass_recorder
+from pedestal_bringup.scenario.program import Plan, program_message
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.graph import domain
-from pedestal_common.graph.steps import GraphError
-from pedestal_common.injection import table
-from pedestal_common.quantities import Nanoseconds
+from pedestal_common.graph.modes import MODES
+from pedestal_common.graph.topics import AXES
+from pedestal_common.quantities import Seconds
+from pedestal_common.wire import commands
 from pedestal_recording.bag import read
-from pedestal_recording.recording import Decoded
-from pedestal_workbench.acceptance import client, in_loop
-from pedestal_workbench.acceptance.client import Client, ClientSession
-from pedestal_workbench.acceptance.exercise import Exercise, Performed, StoppedError
+from pedestal_recording.recording import Decoded, Recording, at, replies
+from pedestal_workbench.acceptance import in_loop
+from pedestal_workbench.acceptance.exercise import Exercise, LateError, Performed, Performer, StoppedError, Track
 
-START_TIMEOUT_S = 120.0  # longest time until the nodes of a run have started, compiled laws included [s]
-END_TIMEOUT_S = 60.0  # longest time from the end of a run to its results, and from a signal to its end [s]
-JUDGED_EXIT_CODES = 0, 4  # of `pedestal run` after a whole run; 4: its verdict on the tracking is a failure
+MAX_LOST_STEP_SHARE = 0.01  # largest share of lost steps of a run in realtime [-]
+PRELOADED = __name__,       # modules of the process from which each run is forked
 
 
-class OwnGraph:
-    """Performer on the graphs of a variant. folder: of the recordings."""
-    own_runs = True
+class OwnGraph(Performer):
+    """Performer on the graphs of a variant, as a context. folder: of the recordings.
+
+    Each run is a fork of a process that has loaded the modules of all nodes, because a start of Python takes longer
+    than many exercises.
+    """
 
     def __init__(self, variant: Variant, folder: pathlib.Path) -> None:
-        self._variant, self._folder = variant, folder.resolve()
-        self.antenna = in_loop.antenna(variant.load())
+        self._variant, self._folder, self._scenario = variant, folder.resolve(), variant.load()
+        self.antenna = in_loop.antenna(self._scenario)
+        self._begun: dict[str, AsyncResult[int]] = {}   # runs that were begun ahead, by name
 
     def __enter__(self) -> 'OwnGraph':
+        starter = multiprocessing.get_context('forkserver')
+        starter.set_forkserver_preload(list(PRELOADED))
+        self._pool = starter.Pool(1 if domain.VARIABLE in os.environ else os.cpu_count(), maxtasksperchild=1)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """A graph ends with its exercise."""
+        self._pool.terminate()
+        self._pool.join()
 
     def check(self, exercise: Exercise) -> None:
         """Raise ValueError for an exercise that no run of the variant can make."""
-        self._changed(exercise, 1).load(_pacing(exercise))
+        self._changed(exercise, 1).load(in_loop.pacing(exercise))
 
     def _changed(self, exercise: Exercise, seed: int) -> Variant:
-        return in_loop.run_of(exercise, self._variant, self.antenna.period, seed)
+        changed = in_loop.run_of(exercise, self._variant, self._scenario, seed)
+        return changed.with_({'scenario.program.source': 'target'}) if exercise.track else changed
+
+    def expect(self, performances: Sequence[tuple[str, Exercise, int]]) -> None:
+        """Begin the runs in lockstep, as many at a time as this computer has cores."""
+        for name, exercise, seed in performances:
+            if in_loop.pacing(exercise) == 'lockstep':
+                self._begun[name] = self._begin(name, exercise, seed)
+
+    def _begin(self, name: str, exercise: Exercise, seed: int) -> AsyncResult[int]:
+        return self._pool.apply_async(_run, (self._changed(exercise, seed), in_loop.pacing(exercise), exercise.track,
+                                             self._folder / name, dict(os.environ)))
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from time 0 of a run. Raises StoppedError."""
-        bag, pacing = self._folder / name, _pacing(exercise)
-        arguments = [*self._changed(exercise, seed).arguments(), '--bag', str(bag), '--pacing', pacing]
-        with domain.of_child(), _run(arguments, bag) as run:
-            with ClientSession(Client, ['--ros-args', '-p', f'graph.pacing:={pacing}']) as session:
-                try:
-                    sent = session.conduct(exercise, _begun(session, run, exercise), lambda: _left(run))
-                except GraphError as error:     # the run has ended early, which explains more
-                    raise StoppedError(f'{error}{_ending(run, bag)}') from None
-                session.until(lambda: run.poll() is not None, END_TIMEOUT_S)
-        if run.returncode not in JUDGED_EXIT_CODES:
-            raise StoppedError(f'the run ended early{_ending(run, bag)}')
+        bag = self._folder / name
+        try:
+            lost = (self._begun.pop(name, None) or self._begin(name, exercise, seed)).get()
+        except RuntimeError as error:
+            raise StoppedError(f'the run ended early: {error}') from None
+        if lost > MAX_LOST_STEP_SHARE * exercise.duration / self.antenna.period:
+            raise LateError(f'the drive lost {lost} steps; this computer is too busy')
         recording = Decoded(read(bag))
-        executed = client.outcomes(exercise, sent, recording, 0.0)
-        return Performed(self.antenna, exercise, recording, 0.0, executed, bag)
+        if trouble := _trouble(recording, exercise):
+            raise trouble
+        return Performed(self.antenna, exercise, recording, 0.0, in_loop.outcomes(exercise, recording), bag)
 
 
-def _pacing(exercise: Exercise) -> str:
-    """Return the pacing of a run: realtime for a fault that a lockstep graph cannot have."""
-    injected = exercise.faults + [
-        (key.partition('.')[0], command.verb) for key, text in exercise.changes.items() if key.endswith('.inject')
-        for _, command in table.scheduled_commands(key.partition('.')[0], str(text))]
-    return 'realtime' if any(table.refused_in_lockstep(*fault) for fault in injected) else 'lockstep'
+def _run(variant: Variant, pacing: str, track: Track | None, bag: pathlib.Path, environment: Mapping[str, str]) -> int:
+    """Run a graph in this process, whose output goes to the log of its bag. Return the number of lost steps."""
+    os.setsid()     # a Ctrl-C on the terminal is for acceptance only, which then ends this process
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    acceptance = multiprocessing.parent_process()
+    assert acceptance
 
-
-@contextlib.contextmanager
-def _run(arguments: list[str], bag: pathlib.Path) -> Iterator[Child]:
-    """Start a run as a context, at whose end it ends in order."""
+    def advance(_: Seconds) -> None:
+        """End the run if acceptance was killed."""
+        if not acceptance.is_alive():
+            raise KeyboardInterrupt
+    os.environ.update(environment)
     bag.parent.mkdir(parents=True, exist_ok=True)
-    run = pass_recorder.logged_child([sys.executable, '-m', 'pedestal.cli', 'run', *arguments], bag)
-    try:
-        yield run
-    finally:
-        with uninterrupted():
-            pass_recorder.end(run, END_TIMEOUT_S)
+    with open(pass_recorder.log_of(bag), 'ab') as log:
+        for stream in 1, 2:
+            os.dup2(log.fileno(), stream)
+    plan = Plan(variant.load(pacing))
+    if track:
+        vars(plan)['tracks'] = {'acu/program_track': program_message(*track)}
+    return graph.run(plan, bag, contextlib.nullcontext(advance)).losses
 
 
-def _begun(session: ClientSession, run: Child, exercise: Exercise) -> Nanoseconds:
-    """Wait for the begin of a run, take control, load the track, and return the stamp of time 0. Raises GraphError.
-
-    A run in lockstep does not wait for this client: a wait for a reply would delay the first actions. Time 0 of a run
-    in realtime is seconds after the start of its nodes.
-    """
-    remote, lockstep = session.remote, _pacing(exercise) == 'lockstep'
-    if exercise.track and lockstep:
-        remote.send_track(exercise.track, 0)    # latched: the control unit receives it before the first step
-    session.until(lambda: run.poll() is not None or remote.reaches_acu and (remote.stamp >= 0 or not lockstep),
-                  START_TIMEOUT_S)
-    remote.request('take')
-    if lockstep or run.poll() is not None:
-        return 0
-    start: Nanoseconds = session.parameters(['graph.start'])['graph.start']
-    if exercise.track:
-        remote.send_track(exercise.track, start)
-    return start
-
-
-def _left(run: Child) -> str | None:
-    return '' if run.poll() is None else None
-
-
-def _ending(run: Child, bag: pathlib.Path) -> str:
-    """Return the words on the end of a run, with the last lines of its log; '' while it runs."""
-    if run.poll() is None:
-        return ''
-    lines = pass_recorder.log_of(bag).read_text(errors='replace').splitlines()[-SHOWN_LOG_LINES:]
-    assert run.returncode is not None
-    return '\n'.join([f': `pedestal run` {exit_description(run.returncode)}:', *lines])
+def _trouble(recording: Recording, exercise: Exercise) -> StoppedError | None:
+    """Return why the antenna had to be stopped in an exercise, None for no reason."""
+    t = np.asarray(recording.table('joint_states')['t'])
+    angles, rates = (np.degrees(at(recording, t, 'joint_states', [f'{axis}.{name}' for axis in AXES]))
+                     for name in ('position', 'velocity'))
+    alarms = [alarm for _, _, _, array in recording.messages('acu/alarms') for alarm in array.status]
+    others = [f'{command.who} commanded {command.verb}' for _, command, reply in
+              replies(recording, 'acu/command_result') if reply.granted and command.who != commands.SCHEDULE_CLIENT
+              and command.verb.removeprefix('acu/') in MODES]
+    outside = next(filter(None, map(exercise.outside, angles, rates)), '')
+    return in_loop.trouble(exercise, outside, alarms, ''.join(others[:1]))

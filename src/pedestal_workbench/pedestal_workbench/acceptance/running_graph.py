@@ -26,9 +26,9 @@ from pedestal_operator.commander import DRIVE_STATE_TOPIC
 from pedestal_operator.remote_node import REPLY_TIMEOUT_S
 from pedestal_recording.bag import read
 from pedestal_recording.recording import Decoded
-from pedestal_workbench.acceptance import client
+from pedestal_workbench.acceptance import in_loop
 from pedestal_workbench.acceptance.client import JOINTS_TOPIC, Client, ClientSession
-from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed, Span, StoppedError
+from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed, Performer, Span, StoppedError
 
 GRAPH_KEYS = 'graph.pacing', 'graph.start', 'graph.beams', 'graph.simulated'  # parameters of every node
 START_TIMEOUT_S = 20.0  # longest wait for the first angles of a graph that has just been started [s]
@@ -40,7 +40,7 @@ ANYWHERE = Span(-math.inf, math.inf, math.inf)  # envelope on the way to a start
 TARGET_MODES = 'program', 'tle'  # modes that lead to the target, in the order in which they are tried
 
 
-class RunningGraph:
+class RunningGraph(Performer):
     """Performer on the running graph, as a context. folder: of the recordings.
 
     Raises GraphError without a graph or in lockstep, StoppedError if another client has control.
@@ -97,7 +97,7 @@ class RunningGraph:
                     self._follow()
                 if exercise.track:
                     session.remote.send_track(exercise.track, begin)
-                sent = session.conduct(exercise, begin, lambda: self._silent(recorder))
+                session.conduct(exercise, begin, lambda: self._silent(recorder))
         except GraphError as error:
             raise StoppedError(str(error)) from None
         finally:
@@ -105,8 +105,7 @@ class RunningGraph:
                 self._restore(exercise)
         recording = Decoded(read(bag))
         time_0 = (begin - recording.start) / NS_PER_SECOND
-        executed = client.outcomes(exercise, sent, recording, time_0)
-        return Performed(self.antenna, exercise, recording, time_0, executed, bag)
+        return Performed(self.antenna, exercise, recording, time_0, in_loop.outcomes(exercise, recording, time_0), bag)
 
     def _silent(self, recorder: Child | None = None) -> str:
         """Return which node is silent or which process has ended, '' for none."""
@@ -192,7 +191,7 @@ class RunningGraph:
         session, remote = self._session, self._session.remote
         session.stop_antenna()
         for node in {node for node, _ in exercise.faults}:
-            session.await_reply(remote.send(Action(0.0, node, 'clear')).number)
+            session.await_reply(remote.send(Action(0.0, node, 'clear')))
         drive = remote.texts.get(DRIVE_STATE_TOPIC, '')
         if not drive.startswith('enabled') and any(action.node == nodes.DRIVE_NODE for action in exercise.actions):
             session.until(lambda: session.request('adu/reset_faults').granted, REPLY_TIMEOUT_S)

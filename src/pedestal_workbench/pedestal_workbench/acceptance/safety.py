@@ -1,8 +1,10 @@
 """Methods of safety: limits of travel, stow, emergency stop, and the reports of injected faults.
 
-The faults of the methods are FAULTS. An acceptance leaves these faults out:
+The faults of the methods are FAULTS. A loss of the receiver or of the INS has two forms: with `nan` the messages come
+without valid numbers, with `drop` no message comes. Because a lockstep graph would wait for the message, a graph of
+acceptance with such a `drop` runs in realtime. The loss of the commands is adu.drop. These faults are left out:
 
-    drop (except of the drive), clock_step, delay   would stop a lockstep graph; nan stands for missing messages
+    clock_step, delay   would stop a lockstep graph, and do not lose a message
     adu.delay       can make the position loop unstable
     adu.pin_stuck   has an effect in stow only, and leaves a pin half in
     adu.gust, adu.lost_tooth    belong to the methods of the servo: gust, lash
@@ -18,7 +20,7 @@ from acu_tracker.mode.stow import MAX_REST_RATE_RAD_S
 from acu_tracker.servo.travel import braking_distance
 from pedestal_common.graph.nodes import DRIVE_NODE
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Floats, Radians, Seconds, Times
+from pedestal_common.quantities import Floats, Radians, RadiansPerSecond, Seconds, Times
 from pedestal_common.wire.commands import Argument
 from pedestal_recording import recording as recordings
 from pedestal_results import tracking
@@ -49,15 +51,27 @@ FAULTS = {
     **dict.fromkeys(('adu.motor_loss', 'adu.encoder_jump', 'adu.bias', 'adu.nan', 'adu.noise'), ANY_MODE),
     **dict.fromkeys(('adu.encoder_stuck', 'adu.brake_stuck', 'adu.drop', 'adu.freeze'), MOVING),
     **{f'{node}.{name}': TRACKING for node, names in {
-        'tracking_receiver': ('freeze', 'nan', 'fade', 'wrong_slope', 'phase_180', 'bias', 'noise'),
-        'ship_motion': ('nan',),
-        'ins': ('freeze', 'nan', 'noise', 'ins_jump', 'bias')}.items() for name in names}}
+        'tracking_receiver': ('drop', 'freeze', 'nan', 'fade', 'wrong_slope', 'phase_180', 'bias', 'noise'),
+        'ship_motion': ('drop', 'nan'),
+        'ins': ('drop', 'freeze', 'nan', 'noise', 'ins_jump', 'bias')}.items() for name in names}}
 """{'NODE.FAULT': modes in which it has an effect} of the faults that an acceptance provokes. Noise and bias have no
 report except that of adu.bias and ins.noise; fault_error is for them."""
 
 
+def _ends(antenna: Antenna, axis: str) -> tuple[Radians, Radians]:
+    """Return the lower and the upper limit of travel."""
+    span = travel(antenna)[AXES.index(axis)]
+    return math.radians(span.low), math.radians(span.high)
+
+
+def _rate(antenna: Antenna, axis: str) -> RadiansPerSecond:
+    """Return the largest rate that the control unit commands and the drive accepts."""
+    rate: RadiansPerSecond = getattr(antenna.acu, axis).shaper.rate
+    return min(rate, getattr(antenna.adu, axis).limits.rate) if antenna.adu else rate
+
+
 def _middle(antenna: Antenna) -> list[Radians]:
-    return [0.5 * (limits.low + limits.high) for limits in (antenna.acu.azimuth.limits, antenna.acu.elevation.limits)]
+    return [0.5 * sum(_ends(antenna, axis)) for axis in AXES]
 
 
 def _limit(antenna: Antenna, arguments: Arguments) -> Exercise:
@@ -65,11 +79,12 @@ def _limit(antenna: Antenna, arguments: Arguments) -> Exercise:
     rate brings the axis back."""
     axis, sign = str(arguments['axis']), 1.0 if arguments['side'] == 'high' else -1.0
     i, of_axis = AXES.index(axis), getattr(antenna.acu, axis)
-    end, rate = of_axis.limits.high if sign > 0.0 else of_axis.limits.low, of_axis.shaper.rate
+    (low, high), rate = _ends(antenna, axis), _rate(antenna, axis)
+    end = high if sign > 0.0 else low
     rise = rate / (ACCELERATION_SHARE * of_axis.shaper.acceleration)
     way = min(rate * (0.5 * rise + CRUISE_TIME_S) + braking_distance(rate, of_axis.limits.deceleration,
                                                                      antenna.acu.reaction),
-              0.5 * (of_axis.limits.high - of_axis.limits.low))
+              0.5 * (high - low))
     start = _middle(antenna)
     start[i] = end - sign * way
     back = 2.0 * BEGIN_TIME_S + rise + way / rate + REST_TIME_S
@@ -88,9 +103,8 @@ def _beyond(performed: Performed, arguments: Arguments) -> tuple[Times, Floats]:
     """Return (times, angles beyond the limit [deg]). Raises ValueError if the axis did not come near the limit."""
     performed.times('rate')
     joints, axis = performed.recording.table('joint_states'), str(arguments['axis'])
-    limits = getattr(performed.antenna.acu, axis).limits
-    angle = joints[f'{axis}.position']
-    beyond = np.degrees(angle - limits.high if arguments['side'] == 'high' else limits.low - angle)
+    (low, high), angle = _ends(performed.antenna, axis), joints[f'{axis}.position']
+    beyond = np.degrees(angle - high if arguments['side'] == 'high' else low - angle)
     if not np.nanmax(beyond, initial=-math.inf) > -RETURN_DEG:
         raise ValueError(f'the {axis} stayed more than {RETURN_DEG:g} deg away from its limit')
     return joints['t'], beyond
@@ -117,12 +131,15 @@ def _stow(antenna: Antenna, arguments: Arguments) -> Exercise:
         start.append(inside(antenna, 'distance', axis, math.degrees(of_axis.stow + way)))
         slew = max(slew, abs(way) / of_axis.shaper.rate + 2.0 * of_axis.shaper.rate / of_axis.shaper.acceleration)
     pins = {'adu.stow_pins': True, **{f'adu.pins.{axis}': getattr(antenna.acu, axis).stow for axis in AXES}}
-    if arguments['pins'] == 'simulated' and DRIVE_NODE not in antenna.simulated:
+    simulated = arguments['pins'] == 'simulated'
+    if simulated and DRIVE_NODE not in antenna.simulated:
         raise ValueError('pins = simulated: must be own, because this antenna has no simulated drive')
-    unstow = BEGIN_TIME_S + slew + REST_TIME_S + antenna.acu.stow_timeout
-    return Exercise(unstow + antenna.acu.stow_timeout, travel(antenna),
-                    (Action(BEGIN_TIME_S, 'acu', 'stow'), Action(unstow, 'acu', 'unstow')), (start[0], start[1]),
-                    changes=pins if arguments['pins'] == 'simulated' else {})
+    stow, rest = Action(BEGIN_TIME_S, 'acu', 'stow'), BEGIN_TIME_S + slew + REST_TIME_S
+    if not simulated and not antenna.acu.stow_pins:
+        return Exercise(rest, travel(antenna), (stow,), (start[0], start[1]))
+    unstow = rest + antenna.acu.stow_timeout
+    return Exercise(unstow + antenna.acu.stow_timeout, travel(antenna), (stow, Action(unstow, 'acu', 'unstow')),
+                    (start[0], start[1]), changes=pins if simulated else {})
 
 
 def _unstow(antenna: Antenna, arguments: Arguments) -> Exercise:
@@ -162,7 +179,8 @@ def _emergency(antenna: Antenna, arguments: Arguments) -> Exercise:
     """Return the exercise of an emergency stop of an axis at its largest rate, in the middle of its travel."""
     axis = str(arguments['axis'])
     of_axis, i, start = getattr(antenna.acu, axis), AXES.index(axis), _middle(antenna)
-    rate, way = of_axis.shaper.rate, TRAVEL_SHARE * (of_axis.limits.high - of_axis.limits.low)
+    (low, high), rate = _ends(antenna, axis), _rate(antenna, axis)
+    way = TRAVEL_SHARE * (high - low)
     rise = rate / of_axis.shaper.acceleration
     if rate * (1.5 * rise + CRUISE_TIME_S) > way:
         raise ValueError(f'axis = {axis}: its travel is too short to reach its largest rate, must be at least '
@@ -184,7 +202,7 @@ def _stopping(performed: Performed, arguments: Arguments) -> tuple[Measured, Mea
     during = (joints['t'] > begin - 1.5 * performed.antenna.period) & (joints['t'] < begin + REST_TIME_S)
     t, rate, angle = (joints[name][during] for name in ('t', *(f'{arguments["axis"]}.{part}'
                                                                for part in ('velocity', 'position'))))
-    full = getattr(performed.antenna.acu, str(arguments['axis'])).shaper.rate
+    full = _rate(performed.antenna, str(arguments['axis']))
     if not np.abs(rate[:1]).sum() > MIN_RATE_SHARE * full:
         raise ValueError(f'the {arguments["axis"]} did not move at its largest rate, {math.degrees(full):.4g} deg/s')
     moving = np.flatnonzero(np.abs(rate) > STANDSTILL_SHARE * abs(rate[0]))

@@ -4,13 +4,16 @@ The file results.json in the folder of the acceptance keeps each result as soon 
 interrupted, also by a loss of power, continues there with the first requirement without a result.
 """
 import contextlib
+import dataclasses
 import datetime
 import fcntl
 import json
 import math
 import pathlib
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
 
 from pedestal_bringup.graph import pass_recorder
 from pedestal_common.quantities import Json
@@ -29,6 +32,7 @@ from pedestal_workbench.acceptance.judgement import FAILED, Judged, judged
 from pedestal_workbench.acceptance.method import Measured
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
+Planned: TypeAlias = tuple[str, Exercise, int]     # a performance: the arguments of Performer.perform
 RESULTS_FILE, LOCK_FILE, SIGNALS_FOLDER = 'results.json', 'results.lock', 'signals'  # in the folder of the acceptance
 COMPLETE = 'came to its end'     # end of a session that has performed all requirements
 MAX_RESULTS_BYTES = 50_000_000  # largest size of the file of results [bytes]
@@ -68,19 +72,23 @@ def run(specification: Specification, exercises: Sequence[Exercise], performer: 
         for kept in results.kept:
             report(kept)
         names = [kept.name for kept in results.kept]
-        left = [(requirement, exercise, _key(exercise)) for requirement, exercise in zip(
-            specification.requirements, exercises) if requirement.name not in names]
-        made: dict[str, list[Performed]] = {}
+        left = [(requirement, exercise) for requirement, exercise in zip(specification.requirements, exercises)
+                if requirement.name not in names]
+        planned = _planned(left, seed)
+        expected = {each[0]: each for of_one in planned for each in of_one}
+        for name in expected:
+            pass_recorder.set_aside(folder / name, 'interrupted')
+        made: dict[str, Performed | BreachError] = {}
         try:
-            for i, (requirement, exercise, key) in enumerate(left):
-                kept = _result(requirement, exercise, performer, folder, seed, made.setdefault(key, []),
-                               len(results.sessions))
+            performer.expect([*expected.values()])
+            for i, (requirement, _) in enumerate(left):
+                kept = _result(requirement, planned[i], performer, folder, made, len(results.sessions))
                 results.keep(kept)
                 report(kept)
                 if kept.judged.breached and not performer.own_runs:
                     raise StoppedError(kept.judged.reason)
-                if key not in [later for _, _, later in left[i + 1:]]:
-                    del made[key]       # frees its recordings
+                later = {name for of_one in planned[i + 1:] for name, *_ in of_one}
+                made = {name: each for name, each in made.items() if name in later}     # frees the other recordings
             results.end(COMPLETE)
         except (StoppedError, KeyboardInterrupt) as error:
             results.end(f'stopped: {str(error) or "by an operator"}')
@@ -94,37 +102,47 @@ def read(folder: pathlib.Path) -> tuple[list[Kept], list[Session]]:
     return kept, sessions
 
 
-def _result(requirement: Requirement, exercise: Exercise, performer: Performer, folder: pathlib.Path, seed: int,
-            made: list[Performed], session: int) -> Kept:
-    """Perform, measure and judge a requirement. made: performances of its exercise so far; new ones are added."""
+def _planned(left: Sequence[tuple[Requirement, Exercise]], seed: int) -> list[list[Planned]]:
+    """Return the performances of each requirement. Requirements with equal exercises share them."""
+    shared: dict[str, list[Planned]] = {}
+    for requirement, exercise in left:
+        found = shared.setdefault(_key(exercise), [])
+        found += [(f'{requirement.file_name}-{i + 1}', exercise, seed + SEED_STEP * i)
+                  for i in range(len(found), requirement.repetitions)]
+    return [shared[_key(exercise)][:requirement.repetitions] for requirement, exercise in left]
+
+
+def _result(requirement: Requirement, planned: Sequence[Planned], performer: Performer, folder: pathlib.Path,
+            made: dict[str, Performed | BreachError], session: int) -> Kept:
+    """Perform, measure and judge a requirement. made: performances so far, by name; new ones are added."""
     begun, measured, reason, breach = _now(), list[Measured](), '', ''
     bags: list[pathlib.Path | None] = []
-    for i in range(requirement.repetitions):
-        name = f'{requirement.file_name}-{i + 1}'
+    for name, exercise, seed in planned:
         try:
-            if i == len(made):
-                made.append(_performed(performer, folder, name, exercise, seed + SEED_STEP * i))
+            found = made[name] if name in made else _performed(performer, folder, name, exercise, seed)
         except BreachError as error:
-            breach = str(error)
+            found = error
+        made[name] = found
+        if isinstance(found, BreachError):
             bags.append(folder / name)
+            breach = str(found)
             break
-        bags.append(made[i].bag)
-        if i == 0:
-            figure.keep_signal(made[0], folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
+        if not bags:
+            figure.keep_signal(found, folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
+        bags.append(found.bag)
         try:
-            measured.append(requirement.method.measure(made[i], requirement.arguments))
+            measured.append(requirement.method.measure(found, requirement.arguments))
         except ValueError as error:
             reason = str(error)
-    found = Judged(math.nan, math.nan, FAILED, tuple(measured), breach) if breach else judged(
+    verdict = Judged(math.nan, math.nan, FAILED, tuple(measured), breach) if breach else judged(
         requirement, measured, reason)
     sums = tuple((str(file.relative_to(folder.resolve())), files.sha256(file))
                  for bag in bags if bag and bag.exists() for file in bag_files.locate(bag.resolve()))
-    return Kept(requirement.name, found, sums, begun, session)
+    return Kept(requirement.name, verdict, sums, begun, session)
 
 
 def _performed(performer: Performer, folder: pathlib.Path, name: str, exercise: Exercise, seed: int) -> Performed:
     """Make an exercise, and make it again after one with late commands. Raises StoppedError."""
-    pass_recorder.set_aside(folder / name, 'interrupted')
     for _ in range(MAX_RUNS - 1):
         with contextlib.suppress(LateError):
             return performer.perform(name, exercise, seed)
@@ -134,9 +152,7 @@ def _performed(performer: Performer, folder: pathlib.Path, name: str, exercise: 
 
 def _key(exercise: Exercise) -> str:
     """Return a text that equal exercises have in common."""
-    track = exercise.track and [exercise.track.t.tolist(), exercise.track.angles.tolist()]
-    return json.dumps([exercise.duration, exercise.envelope, exercise.actions, exercise.start, track,
-                       dict(exercise.changes), exercise.alarms], sort_keys=True)
+    return json.dumps(dataclasses.asdict(exercise), sort_keys=True, default=np.ndarray.tolist)
 
 
 @contextlib.contextmanager
