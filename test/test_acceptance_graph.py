@@ -25,7 +25,7 @@ from pedestal_workbench.acceptance.in_loop import InLoop
 from pedestal_workbench.acceptance.method import Measured, Method
 from pedestal_workbench.acceptance.own_graph import OwnGraph
 from pedestal_workbench.acceptance.running_graph import RunningGraph
-from pedestal_workbench.acceptance.specification import Requirement, Specification
+from pedestal_workbench.acceptance.specification import Head, Requirement, Specification
 
 UAV = Variant('uav_tracker_3m')
 SPAN = Span(-20.0, 60.0, 40.0)
@@ -48,12 +48,15 @@ def azimuth(performed, times):
     return np.degrees(np.interp(times, table['t'] - begin, table['azimuth.position']))
 
 
-def specification():
-    """Return two requirements with exercises of their own, and one that shares the second."""
+def specification(*faults):
+    """Return two requirements with exercises of their own, and one that shares the second. faults: during each."""
     def method(size):
-        return Method('last', '', 'deg', '+-', (), lambda antenna, arguments: step(size=size),
+        def exercise(antenna, arguments):
+            made = step(size=size)
+            return dataclasses.replace(made, actions=made.actions + faults)
+        return Method('last', '', 'deg', '+-', (), exercise,
                       lambda performed, arguments: Measured(float(azimuth(performed, [1.4])[0]), 0.0))
-    return Specification('title', '', '', '', '', tuple(
+    return Specification(Head('title'), tuple(
         Requirement(name, method(size), {}, Target.parse(f'{size} +- 0.1'), 1, 0.95)
         for name, size in (('one', 1.0), ('two', 2.0), ('two again', 2.0))), 'text')
 
@@ -146,7 +149,8 @@ def test_a_running_graph(running, tmp_path):
         performer.check(step(changes={'acu.tracker.handover': False}))      # as it is
         with pytest.raises(ValueError, match='adu.period: must be 0.01 on the running graph'):
             performer.check(step(changes={'adu.period': 0.01}))
-        results = sequence.run(specification(), performer, tmp_path, 1, lambda kept: None)
+        asked = specification()
+        results = sequence.run(asked, asked.exercises(performer), performer, tmp_path, 1, lambda kept: None)
         assert [kept.judged.verdict for kept in results] == [1.0] * 3
         expected = InLoop(UAV.with_(SLOW)).perform('one', step(), 1).recording.table('joint_states')
         assert results[0].judged.value == pytest.approx(np.degrees(expected['azimuth.position'][-1]), abs=0.005)
@@ -154,6 +158,13 @@ def test_a_running_graph(running, tmp_path):
         with pytest.raises(StoppedError, match='commanded stop') as stop:
             performer.perform('stopped', step(duration=60.0), 1)
         assert stop.type is StoppedError        # no BreachError: an operator's stop fails no requirement
+    lost, kept = tmp_path / 'lost', []
+    with connected(lost) as performer, pytest.raises(StoppedError, match='alarm azimuth motor lost'):
+        asked = specification(Action(1.0, 'adu', 'motor_loss'))
+        sequence.run(asked, asked.exercises(performer), performer, lost, 1, kept.append)
+    [failed] = kept
+    assert failed.judged.verdict == 0.0 and 'alarm azimuth motor lost' in failed.judged.reason
+    assert [name for name, _ in failed.bags] == ['one-1/one-1_0.mcap']
     assert ask('ask', 'take')[0] == 0       # control was released
     sample = importlib.resources.files('pedestal') / 'samples' / 'acceptance.yaml'
     code, said = ask('acceptance', str(sample), '--yes', '--output', str(tmp_path / 'other'))
@@ -163,7 +174,8 @@ def test_a_running_graph(running, tmp_path):
 def main(folder):
     """Run the sequence on graphs of its own."""
     with OwnGraph(UAV, pathlib.Path(folder)) as performer:
-        return sequence.run(specification(), performer, pathlib.Path(folder), 1,
+        asked = specification()
+        return sequence.run(asked, asked.exercises(performer), performer, pathlib.Path(folder), 1,
                             lambda kept: print(kept.name, flush=True))
 
 

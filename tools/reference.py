@@ -135,9 +135,9 @@ def _defaulted(argument: Argument) -> str:
 
 def method_table() -> TextTable:
     """Return the table of the methods of acceptance."""
-    rows = [(f'`{method.name}`', method.doc, method.unit, method.better, ', '.join(map(_defaulted, method.arguments)),
-             'simulated' if method.simulated else 'any') for method in METHODS]
-    return TextTable(('method', 'exercise and measured value', 'unit', 'limit', 'arguments', 'equipment'), rows)
+    rows = [(f'`{method.name}`', method.doc, method.unit, method.better, ', '.join(map(_defaulted, method.arguments)))
+            for method in METHODS]
+    return TextTable(('method', 'exercise and measured value', 'unit', 'limit', 'arguments'), rows)
 
 
 def expectation_table(node: str) -> TextTable:

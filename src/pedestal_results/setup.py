@@ -10,7 +10,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         ('share/' + package_name, ['package.xml']),
     ],
-    install_requires=['numpy', 'scipy', 'matplotlib'],
+    install_requires=['numpy', 'scipy', 'matplotlib', 'fpdf2'],
     extras_require={'test': ['pytest', 'ccsds-ndm-py', 'beyond']},
     python_requires='>=3.10',
     zip_safe=False,

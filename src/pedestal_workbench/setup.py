@@ -10,7 +10,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         ('share/' + package_name, ['package.xml']),
     ],
-    install_requires=['numpy', 'scipy', 'matplotlib', 'rich', 'joblib', 'PyYAML', 'fpdf2'],
+    install_requires=['numpy', 'scipy', 'matplotlib', 'rich', 'joblib', 'PyYAML'],
     extras_require={'cluster': ['dask', 'distributed'],
                     'test': ['pytest', 'dask', 'distributed', 'katpoint']},
     python_requires='>=3.10',

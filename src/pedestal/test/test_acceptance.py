@@ -131,7 +131,7 @@ def test_a_sequence_that_is_stopped_is_exit_code_1_with_a_report(accept, tmp_pat
     code, _, errors = accept(TITLE + STEP + SLEW, '--yes', *LOST)
     assert code == 1 and 'alarm azimuth motor lost' in errors and 'the same command continues' in errors
     page = (tmp_path / 'acceptance-spec' / 'report.html').read_text()
-    assert 'The sequence was stopped before its end' in page and '1 failed, 1 not performed of 2' in page
+    assert 'The sequence did not come to its end; stopped: ' in page and '1 failed, 1 not performed of 2' in page
     code, said, _ = accept(TITLE + STEP + SLEW, '--yes')
     assert code == 4 and '1 passed, 1 failed of 2' in said
 
@@ -145,12 +145,12 @@ def test_an_operator_stops_the_sequence(accept, tmp_path, monkeypatch):
         return made(self, name, exercise, seed)
     monkeypatch.setattr(in_loop.InLoop, 'perform', perform)
     code, said, errors = accept(TITLE + STEP + SLEW, '--yes')
-    assert code == 130 and 'an operator' in errors and '1 passed, 1 not performed of 2' in said
+    assert code == 130 and 'by an operator' in errors and '1 passed, 1 not performed of 2' in said
     monkeypatch.setattr(in_loop.InLoop, 'perform', made)
     code, said, _ = accept(TITLE + STEP + SLEW, '--yes')
     assert code == 0
     page = (tmp_path / 'acceptance-spec' / 'report.html').read_text()
-    assert ': interrupted; parameters' in page and ': came to its end; parameters' in page
+    assert ': stopped: by an operator; parameters' in page and ': came to its end; parameters' in page
 
 
 @pytest.mark.parametrize('name, scenario', [

@@ -105,6 +105,14 @@ class Target(NamedTuple):
         *first, word, last = text.split()
         return cls(text, word, float(first[0]) if first else math.nan, float(last))
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Smallest and largest value that meet the target."""
+        if self.word == '+-':
+            return self.first - self.last, self.first + self.last
+        low = self.last if self.word.startswith('>') else self.first
+        return -math.inf if math.isnan(low) else low, math.inf if self.word.startswith('>') else self.last
+
     def meets(self, value: float | None) -> bool:
         """Return True if a value meets the target; None does not."""
         return value is not None and bool(_COMPARISONS[self.word](value, self.first, self.last))

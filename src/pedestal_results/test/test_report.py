@@ -15,7 +15,7 @@ from pedestal_recording import bag as bags
 from pedestal_recording.writer import Writer
 from pedestal_results import consistency, results, tracking
 from pedestal_results.recorded_run import RecordedRun
-from pedestal_results.report import elements, figures, filter_figures, run_figures
+from pedestal_results.report import figures, filter_figures, run_figures
 from pedestal_results.report.page import write as write_report
 
 REFERENCES = pathlib.Path(__file__).parents[3] / 'bags' / 'reference'
@@ -313,19 +313,11 @@ def test_the_frame_is_that_of_the_tracking_and_not_of_the_slew(whole):
     assert any('off scale outside the evaluated part' in text.get_text() for text in axes.texts)
 
 
-@pytest.mark.thorough
-@pytest.mark.skipif(not any(map(shutil.which, elements.BROWSERS)), reason='no browser is installed')
 def test_the_report_as_pdf_with_its_author(story, tmp_path, capsys):
     assert cli.main(['report', str(story), '--output', str(tmp_path / 'r.html'), '--author', 'A. <B>', '--pdf']) == 0
     assert capsys.readouterr().out.split() == [str(tmp_path / 'r.html'), str(tmp_path / 'r.pdf')]
     assert (tmp_path / 'r.pdf').read_bytes().startswith(b'%PDF')
     assert Page((tmp_path / 'r.html').read_text()).rows['author'] == ['A. <B>']
-
-
-def test_a_pdf_without_a_browser_is_refused_with_the_cure(story, tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv('PATH', str(tmp_path))
-    assert cli.main(['report', str(story), '--output', str(tmp_path / 'r.html'), '--pdf']) == 2
-    assert 'apt install chromium' in capsys.readouterr().err and not (tmp_path / 'r.html').exists()
 
 
 def test_the_filter_is_judged(page, whole):

@@ -7,7 +7,7 @@ import pytest
 import scipy.stats
 
 from pedestal_results.intervals import Target
-from pedestal_workbench.acceptance.judgement import FAILED, INCONCLUSIVE, PASSED, ends, judged
+from pedestal_workbench.acceptance.judgement import FAILED, INCONCLUSIVE, PASSED, judged
 from pedestal_workbench.acceptance.method import Measured
 
 LIMITS = '<= 1', '< 1', '>= 1', '> 1', '1 +- 0.5', '0.5 to 2'
@@ -62,8 +62,8 @@ def test_the_verdict_is_that_of_all_values_in_the_interval(limit):
 
 @pytest.mark.parametrize('limit', LIMITS)
 def test_the_ends_of_a_limit(limit):
-    low, high = ends(Target.parse(limit))
     target = Target.parse(limit)
+    low, high = target.ends
     assert low < high
     for end, inside in ((low, 1e-9), (high, -1e-9)):
         assert target.meets(min(max(end, -1e6), 1e6) + inside)

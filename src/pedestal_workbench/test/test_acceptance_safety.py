@@ -152,7 +152,6 @@ def test_loss_of_the_receiver_costs_a_part_of_the_beam_and_a_bias_its_size():
 
 
 @pytest.mark.parametrize(('scenario', 'name', 'given', 'text'), [
-    (UAV, 'fault_report', {'fault': 'ins.nan'}, 'must be of a simulated node, which are adu, tracking_receiver'),
     (UAV, 'fault_error', {'fault': 'adu.drop', 'mode': 'preset'}, 'must be one of ramp, autotrack'),
     (UAV, 'unstow_time', {}, 'must have stow pins'),
     (UAV, 'stow_time', {'distance': 100.0}, 'distance: elevation -10 deg must be -2 to 92 deg')])

@@ -13,7 +13,7 @@ from pedestal_workbench.acceptance.exercise import Action, BreachError, Exercise
 from pedestal_workbench.acceptance.in_loop import InLoop
 from pedestal_workbench.acceptance.judgement import FAILED, INCONCLUSIVE, PASSED
 from pedestal_workbench.acceptance.method import Measured, Method
-from pedestal_workbench.acceptance.specification import Requirement, Specification
+from pedestal_workbench.acceptance.specification import Head, Requirement, Specification
 
 SPAN = Span(-20.0, 60.0, 60.0)
 
@@ -44,7 +44,7 @@ def requirement(name, measure=last, size=1.0, limit='1 +- 0.1', repetitions=1):
 
 
 def specification(*requirements, text='text'):
-    return Specification('title', 'customer', 'antenna', '', '', requirements, text)
+    return Specification(Head('title', 'customer', 'antenna'), requirements, text)
 
 
 class Noted(InLoop):
@@ -63,7 +63,8 @@ class Noted(InLoop):
 
 def run(folder, performer, *requirements, text='text', seed=1):
     reported = []
-    results = sequence.run(specification(*requirements, text=text), performer, folder, seed, reported.append)
+    asked = specification(*requirements, text=text)
+    results = sequence.run(asked, asked.exercises(performer), performer, folder, seed, reported.append)
     assert reported == results
     return results
 
@@ -90,7 +91,7 @@ def test_a_stopped_sequence_continues_with_the_first_requirement_without_a_resul
     assert [name for name, _ in performer.made] == ['b-1', 'c-1']
     assert [(kept.name, kept.session) for kept in results] == [('a', 1), ('b', 2), ('c', 2)]
     assert sorted(path.name for path in tmp_path.glob('b-1*')) == ['b-1.interrupted-1', 'b-1.log.interrupted-1']
-    first, second = sequence.sessions(tmp_path)
+    _, (first, second) = sequence.read(tmp_path)
     assert (first.end, second.end) == ('stopped: an operator commanded stop', 'came to its end')
     assert first.parameters == second.parameters == performer.antenna.sha256
     finished = Noted()
@@ -116,7 +117,7 @@ def test_a_breach_fails_its_requirement_and_ends_a_sequence_that_goes_on_with_th
         performer = Noted()
         results = run(tmp_path, performer, *three)
         assert [name for name, _ in performer.made] == ['c-1']      # the failed line stays
-        assert [one.end for one in sequence.sessions(tmp_path)] == ['stopped: alarm azimuth motor lost',
+        assert [one.end for one in sequence.read(tmp_path)[1]] == ['stopped: alarm azimuth motor lost',
                                                                     'came to its end']
     assert [kept.judged.verdict for kept in results] == [PASSED, FAILED, PASSED]
     failed = results[1].judged
@@ -196,13 +197,13 @@ def test_the_results_are_never_half_written(tmp_path, monkeypatch):
         count.append(text)
         if len(count) == 3:
             pathlib.Path(f'{path}.new').write_text(text[:100])
-            raise KeyboardInterrupt
+            raise SystemExit
         replace(path, text)
     monkeypatch.setattr(sequence.files, 'replace_text', dies)
     two = requirement('a'), requirement('b', size=2.0, limit='<= 3')
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(SystemExit):
         run(tmp_path, Noted(), *two)
     monkeypatch.undo()
     assert [kept['name'] for kept in json.loads((tmp_path / 'results.json').read_text())['results']] == ['a']
     assert [kept.session for kept in run(tmp_path, Noted(), *two)] == [1, 2]
-    assert [session.end for session in sequence.sessions(tmp_path)] == ['interrupted', 'came to its end']
+    assert [session.end for session in sequence.read(tmp_path)[1]] == ['interrupted', 'came to its end']

@@ -9,7 +9,7 @@ import sys
 import typing
 from collections.abc import Sequence
 
-from pedestal import console, stop
+from pedestal import console
 from pedestal.verbs import arguments
 from pedestal.verbs.arguments import Verb
 
@@ -70,68 +70,59 @@ def _acceptance(options: argparse.Namespace) -> int:
     folder = options.output or pathlib.Path(f'acceptance-{options.specification.stem}')
     if not folder.is_dir() and (folder.exists() or not folder.parent.is_dir()):
         raise ValueError(f'--output {folder}: must be a directory, or a new one in a directory that exists')
-    results: list[Kept] = []
-    stopped, code = '', console.EXIT_ERROR
-    with _performer(options, folder) as performer:
-        _confirm(options, spec, spec.exercises(performer))
+    code = 0
+    opened, source = _performer(options, folder)
+    with opened as performer:
+        exercises = spec.exercises(performer)
+        _confirm(options.yes, spec, exercises)
         with console.progress_of_share() as progress:
             def report(kept: 'Kept') -> None:
-                results.append(kept)
-                progress(len(results) / len(spec.requirements), kept.name)
-                print(document.line(spec, kept))
+                place = [requirement.name for requirement in spec.requirements].index(kept.name)
+                progress((place + 1) / len(spec.requirements), kept.name)
+                print(document.line(spec.requirements[place], kept))
             try:
-                sequence.run(spec, performer, folder, options.seed, report)
-            except StoppedError as error:
-                stopped = str(error)
+                sequence.run(spec, exercises, performer, folder, options.seed, report)
+            except StoppedError:
+                code = console.EXIT_ERROR
             except KeyboardInterrupt:
-                stopped, code = 'an operator stopped it', stop.STOP_EXIT_CODE
-    now = datetime.datetime.now(datetime.timezone.utc)
-    found = document.Acceptance(spec, results, performer.antenna, _source(options), options.command, now,
-                                sequence.sessions(folder), stopped)
+                code = console.EXIT_STOPPED
+    found = document.Acceptance(spec, *sequence.read(folder), performer.antenna, source, options.command,
+                                datetime.datetime.now(datetime.timezone.utc))
     print(*document.write(found, folder), sep='\n')
     console.write_json(options.json, document.json_content(found))
     print(found.verdict)
-    if stopped:
-        print(f'pedestal: stopped: {stopped}; the same command continues the sequence', file=sys.stderr)
-        return code
-    return 0 if found.passed else console.EXIT_FAILED_RUN
+    if found.stopped:
+        print(f'pedestal: {found.stopped}; the same command continues the sequence', file=sys.stderr)
+    return code or (0 if found.passed else console.EXIT_FAILED_RUN)
 
 
-def _performer(options: argparse.Namespace, folder: pathlib.Path) -> 'AbstractContextManager[Performer]':
-    """Return the performer of the options as a context."""
-    from pedestal_workbench.acceptance import in_loop
-    if options.closed_loop:
-        return contextlib.nullcontext(in_loop.InLoop(arguments.variant(options)))
-    if options.scenario:
-        from pedestal_workbench.acceptance.own_graph import OwnGraph
-        return OwnGraph(arguments.variant(options), folder)
-    from pedestal_workbench.acceptance.running_graph import RunningGraph
-    return RunningGraph(folder)
-
-
-def _source(options: argparse.Namespace) -> str:
-    """Return what is tested, in words."""
+def _performer(options: argparse.Namespace, folder: pathlib.Path) -> 'tuple[AbstractContextManager[Performer], str]':
+    """Return the performer of the options as a context, and what it tests in words."""
     if not options.scenario:
-        return 'the running graph'
-    how = 'in the closed loop' if options.closed_loop else 'as nodes'
-    return f'scenario {options.scenario} {how}, seed {options.seed}'
+        from pedestal_workbench.acceptance.running_graph import RunningGraph
+        return RunningGraph(folder), 'the running graph'
+    variant, source = arguments.variant(options), f'simulation: scenario {options.scenario}'
+    if options.closed_loop:
+        from pedestal_workbench.acceptance.in_loop import InLoop
+        return contextlib.nullcontext(InLoop(variant)), f'{source} in the closed loop, seed {options.seed}'
+    from pedestal_workbench.acceptance.own_graph import OwnGraph
+    return OwnGraph(variant, folder), f'{source} as nodes, seed {options.seed}'
 
 
-def _confirm(options: argparse.Namespace, spec: 'Specification', exercises: 'Sequence[Exercise]') -> None:
-    """Print what the antenna will do. Raises ValueError without a confirmation."""
+def _confirm(yes: bool, spec: 'Specification', exercises: 'Sequence[Exercise]') -> None:
+    """Print what the antenna will do. yes: it is confirmed. Raises ValueError without a confirmation."""
     from pedestal_common.text_files.text_table import Cell, TextTable
-    rows: list[list[Cell]] = []
-    whole = 0.0
-    for requirement, exercise in zip(spec.requirements, exercises):
-        spans = [f'{span.low:.4g} to {span.high:.4g}' for span in exercise.envelope]
-        rows.append([requirement.name, *spans, *(span.rate for span in exercise.envelope), exercise.duration,
-                     requirement.repetitions])
-        whole += exercise.duration * requirement.repetitions
+    rows: list[list[Cell]] = [
+        [requirement.name, *(f'{span.low:.4g} to {span.high:.4g}' for span in exercise.envelope),
+         *(span.rate for span in exercise.envelope), exercise.duration, requirement.repetitions]
+        for requirement, exercise in zip(spec.requirements, exercises)]
     heads = ('requirement', ('azimuth [deg]', '>'), ('elevation [deg]', '>'), ('azimuth rate [deg/s]', '>.3g'),
              ('elevation rate [deg/s]', '>.3g'), ('time [s]', '>.0f'), ('repetitions', '>.0f'))
+    whole = sum(exercise.duration * requirement.repetitions
+                for requirement, exercise in zip(spec.requirements, exercises))
     print('The antenna will move within:', *TextTable(heads, rows).lines(), 'Time of all exercises: at most '
           f'{math.ceil(whole / 60.0)} min, without the motions to their begins.', sep='\n')
-    if options.yes:
+    if yes:
         return
     if not sys.stdin.isatty():
         raise ValueError('--yes: must be given without a terminal, to confirm the motions above')

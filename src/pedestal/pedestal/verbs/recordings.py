@@ -80,8 +80,7 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
                         'written as PNG')
     parser.add_argument('--author', default='', metavar='NAME', help='name of the author on the first page; default: '
                         'none')
-    parser.add_argument('--pdf', action='store_true', help='the report also as PDF, beside the HTML file; needs '
-                        'Chromium or Google Chrome')
+    parser.add_argument('--pdf', action='store_true', help='the report also as PDF, beside the HTML file')
 
 
 def _report(options: argparse.Namespace) -> int:

@@ -41,11 +41,12 @@ class TextTable:
 
         kind: CSS class; 'n' aligns the other cells to the right, 'meta' is for the table at the head of a page.
         """
-        of_cell = f' class="{kind}"' if kind not in ('', 'meta') else ''
+        classes = [' class="n"' if right or kind == 'n' else '' for right in self.right]
 
         def line(cells: Sequence[str], tag: str) -> str:
             name, *rest = map(html.escape, cells)
-            return f'<tr><th>{name}</th>{"".join(f"<{tag}{of_cell}>{cell}</{tag}>" for cell in rest)}</tr>'
+            of_rest = ''.join(f'<{tag}{of_cell}>{cell}</{tag}>' for cell, of_cell in zip(rest, classes[1:]))
+            return f'<tr><th>{name}</th>{of_rest}</tr>'
         top = f'<thead>{line(self.heads, "th")}</thead>' if any(self.heads) else ''
         body = ''.join(line(row, 'td') for row in self.rows)
         return f'<div class="wide"><table class="{kind}">{top}<tbody>{body}</tbody></table></div>'

@@ -1,12 +1,7 @@
-"""HTML elements of report pages: numbers, figures, the page as one self-contained file, and its print."""
+"""HTML elements of report pages: numbers, figures, and the page as one self-contained file."""
 import html
 import io
 import math
-import os
-import pathlib
-import shutil
-import subprocess
-import tempfile
 from collections.abc import Iterable
 
 from pedestal_results.report import figures
@@ -37,11 +32,6 @@ figure svg { display: block; width: 100%; height: auto; min-width: 26rem; }
   body { padding: .6rem; } th, td { padding-right: .7rem; } .n tbody th { min-width: 6rem; } }
 """
 
-BROWSERS = 'chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable'
-"""Programs that can print, in the order of the search."""
-
-MAX_PRINT_TIME_S = 300.0  # longest time for the print of a page [s]
-
 
 def page(title: str, parts: Iterable[str], css: str = '') -> str:
     """Return the text of an HTML page; parts: its elements as texts; css: rules beside those of every page."""
@@ -66,35 +56,3 @@ def number(value: float, unit: str = '') -> str:
     """Return a value with its unit as text."""
     text = f'{value:#.4g}'.rstrip('.') if math.isfinite(value) else 'not measured'
     return f'{text}\N{NO-BREAK SPACE}{unit}'.rstrip() if math.isfinite(value) else text
-
-
-def browser() -> str:
-    """Return the path of an installed browser. Raises ValueError without one."""
-    found = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if found is None:
-        raise ValueError('--pdf: needs Chromium or Google Chrome, and neither is installed: apt install chromium, or '
-                         'print the page without --pdf from any browser')
-    return found
-
-
-def print_pdf(program: str, page: pathlib.Path, output: pathlib.Path) -> None:
-    """Print a page by the browser `program` to a path. Raises ValueError if it fails.
-
-    A browser prints the page as it shows it. This avoids a second layout of the page and a further library: matplotlib
-    would only write the figures, and WeasyPrint needs the system library Pango.
-    """
-    with tempfile.TemporaryDirectory() as folder:
-        printed = pathlib.Path(folder) / 'page.pdf'
-        # Chromium refuses to start its sandbox as root.
-        root = ['--no-sandbox'] if os.geteuid() == 0 else []
-        try:
-            done = subprocess.run([program, '--headless', *root, '--disable-gpu', '--no-pdf-header-footer',
-                                   f'--user-data-dir={folder}/profile', f'--print-to-pdf={printed}',
-                                   page.resolve().as_uri()], stdin=subprocess.DEVNULL, capture_output=True,
-                                  text=True, timeout=MAX_PRINT_TIME_S, check=False)
-        except subprocess.TimeoutExpired:
-            raise ValueError(f'--pdf: {program} did not print {page} within {MAX_PRINT_TIME_S:g} s') from None
-        if not printed.exists():
-            last = (done.stderr.strip().splitlines() or ['without a message'])[-1]
-            raise ValueError(f'--pdf: {program} did not print {page}, exit code {done.returncode}: {last}')
-        shutil.copyfile(printed, output)

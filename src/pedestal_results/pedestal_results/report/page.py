@@ -15,7 +15,7 @@ from pedestal_recording import recording as recordings
 from pedestal_recording.verify import Report, verify
 from pedestal_results import consistency, events, results, tracking
 from pedestal_results.recorded_run import RecordedRun, Status
-from pedestal_results.report import elements, figures, filter_figures, run_figures, subject
+from pedestal_results.report import elements, figures, filter_figures, paper, run_figures, subject
 from pedestal_results.tracking import DEG_PER_RAD
 
 MAX_DIAGNOSTICS_ROWS = 200  # largest number of rows of the table of diagnostics
@@ -35,10 +35,9 @@ def write(bag_path: str | pathlib.Path, output: str | pathlib.Path | None = None
     author       text on the page, '' for none
     pdf          True to print the page as PDF too, beside the HTML file
 
-    Equal bags give equal bytes, except for the PDF. Raises bag.BagError if the bag cannot be read to its end, OSError
-    if the report cannot be written, ValueError if no browser for the PDF is installed.
+    Equal bags give equal bytes. Raises bag.BagError if the bag cannot be read to its end, OSError if the report cannot
+    be written.
     """
-    browser = elements.browser() if pdf else None
     whole = bags.read(bag_path)
     bag = whole.view(beam)
     output = pathlib.Path(output) if output is not None else bag.file.parent / 'report.html'
@@ -47,8 +46,8 @@ def write(bag_path: str | pathlib.Path, output: str | pathlib.Path | None = None
     page = _page(bag, run, verify(whole), author)
     output.parent.mkdir(parents=True, exist_ok=True)
     output.write_text(page, encoding='utf-8')
-    if browser:
-        elements.print_pdf(browser, output, output.with_suffix('.pdf'))
+    if pdf:
+        output.with_suffix('.pdf').write_bytes(paper.pdf(page))
     if png_folder is not None:
         folder = pathlib.Path(png_folder)
         folder.mkdir(parents=True, exist_ok=True)

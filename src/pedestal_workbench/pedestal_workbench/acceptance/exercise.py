@@ -11,10 +11,12 @@ from typing import NamedTuple, Protocol
 
 from acu_tracker.params import AcuParameters
 from drive_law.params import AduParameters
+from pedestal_common.graph import nodes
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import AnyParameters, as_dict
 from pedestal_common.quantities import Degrees, DegreesPerSecond, Json, Pairs, Radians, Seconds, Times
 from pedestal_common.text_files import plain_yaml
+from pedestal_common.wire import commands
 from pedestal_recording.recording import Recording
 
 
@@ -71,6 +73,12 @@ class Exercise:
     changes: Mapping[str, Json] = dataclasses.field(default_factory=dict)   # {'node.key': value} of simulated nodes
     alarms: tuple[str, ...] = ()                    # names of alarms that belong to it; any other ends it
 
+    @property
+    def faults(self) -> list[tuple[str, str]]:
+        """[(node, fault)] that its actions inject, with `clear`."""
+        parsed = [(action.node, commands.parsed(action.command).verb) for action in self.actions]
+        return [(node, verb) for node, verb in parsed if node != 'acu' and verb not in nodes.DRIVE_SERVICES]
+
     def outside(self, angles: Iterable[Degrees], rates: Iterable[DegreesPerSecond]) -> str:
         """Return how the antenna is outside its envelope, '' inside it. angles, rates: values of the encoders."""
         for axis, span, angle, rate in zip(AXES, self.envelope, angles, rates):
@@ -121,6 +129,7 @@ class Performer(Protocol):
 
     def expect(self, performances: Sequence[tuple[str, Exercise, int]]) -> None:
         """Take the arguments of the next calls of `perform`, which a performer may make ahead."""
+        return
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise. name: of its recording. Raises StoppedError."""

@@ -70,15 +70,9 @@ def run_of(exercise: Exercise, variant: Variant, scenario: Scenario, seed: int =
                          duration=math.ceil(exercise.duration / period - 1e-6) * period)
 
 
-def faults(exercise: Exercise) -> list[tuple[str, str]]:
-    """Return [(node, fault)] that the actions of an exercise inject, with `clear`."""
-    verbs = [(action.node, parsed(action.command).verb) for action in exercise.actions]
-    return [(node, verb) for node, verb in verbs if node != 'acu' and verb not in nodes.DRIVE_SERVICES]
-
-
 def pacing(exercise: Exercise) -> str:
     """Return the pacing of a run: realtime for a fault that a lockstep graph cannot have."""
-    return 'realtime' if any(table.refused_in_lockstep(*fault) for fault in faults(exercise)) else 'lockstep'
+    return 'realtime' if any(table.refused_in_lockstep(*fault) for fault in exercise.faults) else 'lockstep'
 
 
 def outcomes(exercise: Exercise, recording: Recording, begin: Seconds = 0.0) -> tuple[Executed, ...]:

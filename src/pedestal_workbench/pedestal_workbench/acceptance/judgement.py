@@ -7,7 +7,6 @@ import numpy as np
 from scipy.special import ndtri
 
 from pedestal_results import intervals
-from pedestal_results.intervals import Target
 from pedestal_workbench.acceptance.method import Measured
 from pedestal_workbench.acceptance.specification import Requirement
 
@@ -26,14 +25,6 @@ class Judged(NamedTuple):
     def breached(self) -> bool:
         """True if an alarm or an antenna outside its envelope ended an exercise."""
         return self.verdict == FAILED and math.isnan(self.value)
-
-
-def ends(limit: Target) -> tuple[float, float]:
-    """Return the smallest and the largest value that meet a limit."""
-    if limit.word == '+-':
-        return limit.first - limit.last, limit.first + limit.last
-    return (-math.inf if limit.word.startswith('<') else limit.last if limit.word.startswith('>') else limit.first,
-            math.inf if limit.word.startswith('>') else limit.last)
 
 
 def judged(requirement: Requirement, repetitions: Sequence[Measured], reason: str = '') -> Judged:
@@ -60,6 +51,6 @@ def judged(requirement: Requirement, repetitions: Sequence[Measured], reason: st
         return Judged(math.nan, math.nan, INCONCLUSIVE, tuple(repetitions), reason or 'no number for its uncertainty')
     meets, interval = requirement.limit.meets, (value - half, value + half)
     # Of the values in the interval, the middle of the range, or an end of the interval, meets the limit best.
-    best = min(max(0.5 * sum(ends(requirement.limit)), interval[0]), interval[1])
+    best = min(max(0.5 * sum(requirement.limit.ends), interval[0]), interval[1])
     verdict = PASSED if all(map(meets, interval)) else INCONCLUSIVE if meets(best) else FAILED
     return Judged(value, half, verdict, tuple(repetitions))

@@ -27,4 +27,3 @@ class Method(NamedTuple):
     arguments: tuple[Argument, ...]
     exercise: Callable[[Antenna, Arguments], Exercise]      # raises ValueError for what the antenna cannot do
     measure: Callable[[Performed, Arguments], Measured]     # raises ValueError for a recording that cannot be judged
-    simulated: bool = False             # needs a simulated node, into which faults can be injected

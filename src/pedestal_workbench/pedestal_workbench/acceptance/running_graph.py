@@ -89,9 +89,6 @@ class RunningGraph(Performer):
             if present.get(key) != value:
                 raise ValueError(f'{key}: must be {value} on the running graph, which keeps its parameters; or use '
                                  '--scenario')
-        for node, fault in in_loop.faults(exercise):
-            if node not in self.antenna.simulated:
-                raise ValueError(f'{fault} of {node}: the node is not simulated and accepts no faults')
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from a stamp shortly after its recorder writes. Raises StoppedError."""
@@ -197,7 +194,7 @@ class RunningGraph(Performer):
         """
         session, remote = self._session, self._session.remote
         session.stop_antenna()
-        for node in {node for node, _ in in_loop.faults(exercise)}:
+        for node in {node for node, _ in exercise.faults}:
             session.await_reply(remote.send(Action(0.0, node, 'clear')))
         drive = remote.texts.get(DRIVE_STATE_TOPIC, '')
         if not drive.startswith('enabled') and any(action.node == nodes.DRIVE_NODE for action in exercise.actions):

@@ -6,7 +6,6 @@ interrupted, also by a loss of power, continues there with the first requirement
 import contextlib
 import datetime
 import fcntl
-import itertools
 import json
 import math
 import pathlib
@@ -31,6 +30,7 @@ from pedestal_workbench.acceptance.method import Measured
 from pedestal_workbench.acceptance.specification import Requirement, Specification
 
 RESULTS_FILE, LOCK_FILE, SIGNALS_FOLDER = 'results.json', 'results.lock', 'signals'  # in the folder of the acceptance
+COMPLETE = 'came to its end'     # end of a session that has performed all requirements
 MAX_RESULTS_BYTES = 50_000_000  # largest size of the file of results [bytes]
 MAX_RUNS = 5  # of an exercise, whose commands were late in all others
 SEED_STEP = 1000  # between the seeds of repetitions, so that sequences with neighbouring seeds share no noise
@@ -49,65 +49,78 @@ class Session(NamedTuple):
     """Run of the sequence with a folder."""
     begun: str                              # UTC
     parameters: str                         # SHA-256 of those of the antenna
-    end: str = 'interrupted'                # how it ended
+    end: str = 'interrupted'                # COMPLETE, or how it ended
 
 
-def run(specification: Specification, performer: Performer, folder: pathlib.Path, seed: int,
-        report: Callable[[Kept], None]) -> list[Kept]:
+def run(specification: Specification, exercises: Sequence[Exercise], performer: Performer, folder: pathlib.Path,
+        seed: int, report: Callable[[Kept], None]) -> list[Kept]:
     """Perform the requirements without a result in the folder, and return all results. Requirements with the same
-    exercise share its recordings. report: called with each result, also with those of earlier sessions.
+    exercise share its recordings. exercises: of the requirements, as Specification.exercises returns them; report:
+    called with each result, also with those of earlier sessions.
 
     An alarm, or an antenna outside the envelope, fails the requirement. Because its cause may last, the sequence then
     goes on only with a run of its own for each exercise. The folder keeps how the sequence ended. Raises ValueError
-    before anything moves, for exercises that cannot be made and for the folder of another specification; StoppedError
-    if the antenna was stopped.
+    before anything moves for the folder of another specification, StoppedError if the antenna was stopped.
     """
-    exercises = specification.exercises(performer)
     folder.mkdir(parents=True, exist_ok=True)
     with _locked(folder):
         results = _Results(folder, specification, performer.antenna.sha256)
         for kept in results.kept:
             report(kept)
         names = [kept.name for kept in results.kept]
-        left = [(requirement, exercise) for requirement, exercise in zip(specification.requirements, exercises)
-                if requirement.name not in names]
-        performances = _Performances(performer, folder, seed, left)
+        left = [(requirement, exercise, _key(exercise)) for requirement, exercise in zip(
+            specification.requirements, exercises) if requirement.name not in names]
+        expected: dict[tuple[str, int], tuple[str, Exercise, int]] = {}     # arguments of Performer.perform
+        for requirement, exercise, key in left:
+            for i in range(requirement.repetitions):
+                pass_recorder.set_aside(folder / _recording(requirement, i), 'interrupted')
+                expected.setdefault((key, i), (_recording(requirement, i), exercise, seed + SEED_STEP * i))
+        performer.expect(list(expected.values()))
+        made: dict[str, list[Performed]] = {}
         try:
-            for requirement, _ in left:
-                results.keep(_result(requirement, performances, folder, len(results.sessions)))
-                report(results.kept[-1])
-                if results.kept[-1].judged.breached and not performer.own_runs:
-                    raise StoppedError(results.kept[-1].judged.reason)
-            results.end('came to its end')
-        except StoppedError as error:
-            results.end(f'stopped: {error}')
+            for i, (requirement, exercise, key) in enumerate(left):
+                kept = _result(requirement, exercise, performer, folder, seed, made.setdefault(key, []),
+                               len(results.sessions))
+                results.keep(kept)
+                report(kept)
+                if kept.judged.breached and not performer.own_runs:
+                    raise StoppedError(kept.judged.reason)
+                if key not in [later for _, _, later in left[i + 1:]]:
+                    del made[key]       # frees its recordings
+            results.end(COMPLETE)
+        except (StoppedError, KeyboardInterrupt) as error:
+            results.end(f'stopped: {str(error) or "by an operator"}')
             raise
     return results.kept
 
 
-def sessions(folder: pathlib.Path) -> list[Session]:
-    """Return the runs of the sequence with a folder. Raises ValueError."""
-    return _read(folder / RESULTS_FILE)[1] if (folder / RESULTS_FILE).exists() else []
+def read(folder: pathlib.Path) -> tuple[list[Kept], list[Session]]:
+    """Return the results in a folder, and the runs of the sequence with it. Raises ValueError."""
+    _, sessions, kept = _read(folder / RESULTS_FILE)
+    return kept, sessions
 
 
-def _result(requirement: Requirement, performances: '_Performances', folder: pathlib.Path, session: int) -> Kept:
-    """Perform, measure and judge a requirement."""
-    begun = _now()
-    measured: list[Measured] = []
+def _result(requirement: Requirement, exercise: Exercise, performer: Performer, folder: pathlib.Path, seed: int,
+            made: list[Performed], session: int) -> Kept:
+    """Perform, measure and judge a requirement. made: performances of its exercise so far; new ones are added."""
+    begun, measured, reason, breach = _now(), list[Measured](), '', ''
     bags: list[pathlib.Path | None] = []
-    reason, breach = '', ''
-    try:
-        for performed in performances.of(requirement):
-            if not bags:
-                figure.keep_signal(performed, folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
-            bags.append(performed.bag)
-            try:
-                measured.append(requirement.method.measure(performed, requirement.arguments))
-            except ValueError as error:
-                reason = str(error)
-    except BreachError as error:
-        bags.append(folder / performances.name)
-        breach = str(error)
+    for i in range(requirement.repetitions):
+        name = _recording(requirement, i)
+        try:
+            if i == len(made):
+                made.append(_performed(performer, folder, name, exercise, seed + SEED_STEP * i))
+        except BreachError as error:
+            breach = str(error)
+            bags.append(folder / name)
+            break
+        bags.append(made[i].bag)
+        if i == 0:
+            figure.keep_signal(made[0], folder / SIGNALS_FOLDER / f'{requirement.file_name}.csv')
+        try:
+            measured.append(requirement.method.measure(made[i], requirement.arguments))
+        except ValueError as error:
+            reason = str(error)
     found = Judged(math.nan, math.nan, FAILED, tuple(measured), breach) if breach else judged(
         requirement, measured, reason)
     sums = tuple((str(file.relative_to(folder.resolve())), files.sha256(file))
@@ -115,50 +128,18 @@ def _result(requirement: Requirement, performances: '_Performances', folder: pat
     return Kept(requirement.name, found, sums, begun, session)
 
 
-class _Performances:
-    """Performances of a run of the sequence, each kept until the last requirement with its exercise is measured."""
-    name = ''       # of the last recording
+def _recording(requirement: Requirement, i: int) -> str:
+    """Return the name of the recording of a repetition, which counts from 0."""
+    return f'{requirement.file_name}-{i + 1}'
 
-    def __init__(self, performer: Performer, folder: pathlib.Path, seed: int,
-                 requirements: Sequence[tuple[Requirement, Exercise]]) -> None:
-        self._performer, self._folder = performer, folder
-        self._left = [_key(exercise) for _, exercise in requirements]   # of those that are not measured yet
-        self._named: dict[str, list[tuple[str, Exercise, int]]] = {}    # arguments of Performer.perform
-        self._made: dict[str, list[Performed | BreachError]] = {}
-        for (requirement, exercise), key in zip(requirements, self._left):
-            named = self._named.setdefault(key, [])
-            named += [(f'{requirement.file_name}-{i + 1}', exercise, seed + SEED_STEP * i)
-                      for i in range(len(named), requirement.repetitions)]
-        expected = list(itertools.chain(*self._named.values()))
-        for name, *_ in expected:
-            pass_recorder.set_aside(folder / name, 'interrupted')
-        performer.expect(expected)
 
-    def of(self, requirement: Requirement) -> Iterator[Performed]:
-        """Yield a performance for each repetition of the next requirement. Raises BreachError, StoppedError."""
-        key = self._left.pop(0)
-        made = self._made.setdefault(key, [])
-        if key not in self._left:
-            del self._made[key]
-        for i in range(requirement.repetitions):
-            self.name = self._named[key][i][0]
-            if i == len(made):
-                try:
-                    made.append(self._make(*self._named[key][i]))
-                except BreachError as error:
-                    made.append(error)
-            found = made[i]
-            if isinstance(found, BreachError):
-                raise found
-            yield found
-
-    def _make(self, name: str, exercise: Exercise, seed: int) -> Performed:
-        """Make an exercise, and make it again after one with late commands. Raises StoppedError."""
-        for _ in range(MAX_RUNS - 1):
-            with contextlib.suppress(LateError):
-                return self._performer.perform(name, exercise, seed)
-            pass_recorder.set_aside(self._folder / name, 'late')
-        return self._performer.perform(name, exercise, seed)
+def _performed(performer: Performer, folder: pathlib.Path, name: str, exercise: Exercise, seed: int) -> Performed:
+    """Make an exercise, and make it again after one with late commands. Raises StoppedError."""
+    for _ in range(MAX_RUNS - 1):
+        with contextlib.suppress(LateError):
+            return performer.perform(name, exercise, seed)
+        pass_recorder.set_aside(folder / name, 'late')
+    return performer.perform(name, exercise, seed)
 
 
 def _key(exercise: Exercise) -> str:

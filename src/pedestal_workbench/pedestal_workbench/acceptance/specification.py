@@ -2,15 +2,17 @@
 
 All problems of a file are found before anything moves, and are stated together, a line for each of them.
 """
+import dataclasses
 import hashlib
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple, TypeVar
 
 import yaml
 
-from pedestal_common.parameters import did_you_mean
+from pedestal_common import parameters
+from pedestal_common.parameters import Parameters, did_you_mean
 from pedestal_common.quantities import Json
 from pedestal_common.text_files import files, plain_yaml
 from pedestal_common.text_files.files import FilePath
@@ -20,16 +22,35 @@ from pedestal_workbench.acceptance.exercise import Exercise, Performer
 from pedestal_workbench.acceptance.method import Arguments, Method
 from pedestal_workbench.acceptance.methods import METHOD_BY_NAME
 
-HEADER_KEYS = 'title', 'customer', 'antenna', 'tester', 'calibration'
-REQUIREMENT_KEYS = 'name', 'method', 'arguments', 'limit', 'unit', 'repetitions', 'confidence'
-NEEDED_KEYS = 'name', 'method', 'limit', 'unit'
-MAX_REQUIREMENTS, MAX_NAME_CHARS, MAX_TEXT_CHARS = 200, 60, 500     # of a file, of a name, of a text of the header
-REPETITION_LIMITS, CONFIDENCE_LIMITS = (1, 100), (0.5, 0.999)
+_P = TypeVar('_P', bound=Parameters)
+MAX_REQUIREMENTS, MAX_NAME_CHARS, MAX_TEXT_CHARS, MAX_PROBLEM_CHARS = 200, 60, 500, 400
+"""Largest number of requirements, length of a name, of another text, of a line on a problem."""
 NO_FILE_PATTERN = re.compile(r'[^\w.,()+-]+|^[.-]+')     # parts of the name of a requirement that no file has
 _NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
 LIMIT_PATTERN = re.compile(rf'(?:<=|>=|<|>) {_NUMBER}|{_NUMBER} (?:\+-|to) {_NUMBER}')
 LIMIT_WORDS = {'<=': ('<=', '<', '+-', 'to'), '>=': ('>=', '>', '+-', 'to'), '+-': ('+-', 'to')}
 """{Method.better: words of a limit that make sense}."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Head(Parameters):
+    """Head of a file, which the report repeats."""
+    title: str = parameters.text('', 'title of the report')
+    customer: str = parameters.text('', 'name of the customer')
+    antenna: str = parameters.text('', 'name of the antenna')
+    tester: str = parameters.text('', 'name of the person who tests')
+    calibration: str = parameters.text('', 'calibration in force, in words')
+
+
+@dataclasses.dataclass(frozen=True)
+class Entry(Parameters):
+    """Entry of a file for a requirement, without its arguments."""
+    name: str = parameters.text('', 'name, unique in the file')
+    method: str = parameters.text('', 'name of the method')
+    limit: str = parameters.text('', 'limit of the value')
+    unit: str = parameters.text('', 'unit of the method')
+    repetitions: int = parameters.parameter(1, 1, 100, '', 'number of repetitions')
+    confidence: float = parameters.parameter(CONFIDENCE_LEVEL, 0.5, 0.999, '', 'level of the interval of the value')
 
 
 class Requirement(NamedTuple):
@@ -49,11 +70,7 @@ class Requirement(NamedTuple):
 
 class Specification(NamedTuple):
     """A checked specification."""
-    title: str
-    customer: str
-    antenna: str
-    tester: str             # name of the person who tests
-    calibration: str        # calibration in force, in words
+    head: Head
     requirements: tuple[Requirement, ...]
     text: str               # of the file, for the report and for the comparison at a continuation
 
@@ -69,9 +86,10 @@ class Specification(NamedTuple):
         for requirement in self.requirements:
             method, antenna = requirement.method, performer.antenna
             try:
-                if method.simulated and antenna.adu is None:
-                    raise ValueError(f'method = {method.name!r}: needs a simulated drive; this drive is real')
                 exercises.append(method.exercise(antenna, requirement.arguments))
+                for node, fault in exercises[-1].faults:
+                    if node not in antenna.simulated:
+                        raise ValueError(f'method = {method.name}: {fault} of {node}: must be of a simulated node')
                 performer.check(exercises[-1])
             except ValueError as error:
                 problems.append(f'requirement {requirement.name!r}: {error}')
@@ -89,101 +107,76 @@ def read(path: FilePath, tester: str = '') -> Specification:
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         hint = "; a limit that begins with > stands in quotes: '>= 1'" if 'block scalar' in str(error) else ''
         raise ValueError(f'{path}: {plain_yaml.problem(error)}{hint}') from None
-    if not isinstance(content, dict):
-        raise ValueError(f'{path}: must hold the keys requirements, {", ".join(HEADER_KEYS)}')
-    content = {**content, 'tester': tester or content.get('tester', '')}
-    requirements: dict[str, Requirement] = {}
-    problems = list(_header_problems(content))
-    entries = content.get('requirements')
-    for number, entry in enumerate(entries if isinstance(entries, list) else (), start=1):
+    if not isinstance(content, dict) or not isinstance(entries := content.pop('requirements', None), list):
+        raise ValueError(f'{path}: must hold the list requirements, and {", ".join(parameters.defaults(Head))}')
+    head, problems, requirements = Head(), list[str](), dict[str, Requirement]()
+    try:
+        head = _built(Head, {**content, 'tester': tester or content.get('tester', '')}, 'title')
+        if not 1 <= len(entries) <= MAX_REQUIREMENTS:
+            raise ValueError(f'requirements: {len(entries)} entries, must be 1 to {MAX_REQUIREMENTS}')
+    except ValueError as error:
+        problems.append(str(error))
+    for number, entry in enumerate(entries[:MAX_REQUIREMENTS], start=1):
         try:
             requirement = _requirement(entry)
             # Because files have these names, the case and the kinds of blanks make no difference.
             if requirements.setdefault(requirement.file_name.casefold(), requirement) is not requirement:
                 raise ValueError('the name is given twice; must be unique')
         except ValueError as error:
-            named = f' {_short(entry["name"])}' if isinstance(entry, dict) and 'name' in entry else ''
+            named = f' {entry["name"]!r:.{MAX_NAME_CHARS}}' if isinstance(entry, dict) and 'name' in entry else ''
             problems.append(f'requirement {number}{named}: {error}')
     if problems:
-        raise ValueError('\n'.join(f'{path}: {problem}' for problem in problems))
-    return Specification(**{key: content.get(key, '') for key in HEADER_KEYS},
-                         requirements=tuple(requirements.values()), text=text)
+        raise ValueError('\n'.join(f'{path}: {_cut(problem)}' for problem in problems))
+    return Specification(head, tuple(requirements.values()), text)
 
 
-def _header_problems(content: Mapping[str, Json]) -> Iterator[str]:
-    """Yield a line for each problem of a file outside of its requirements."""
-    try:
-        _check_keys(content, (*HEADER_KEYS, 'requirements'), ('title', 'requirements'))
-    except ValueError as error:
-        yield str(error)
-    for key in HEADER_KEYS:
-        text = content.get(key, '')
-        if not isinstance(text, str) or len(text) > MAX_TEXT_CHARS or not text.isprintable():
-            yield f'{key} = {_short(text)}: must be a text of one line and at most {MAX_TEXT_CHARS} characters'
-    entries = content.get('requirements', [None])
-    if not isinstance(entries, list) or not 1 <= len(entries) <= MAX_REQUIREMENTS:
-        yield f'requirements = {_short(entries)}: must be a list of 1 to {MAX_REQUIREMENTS} entries'
+def _cut(problem: str) -> str:
+    """Return a problem without the middle of a long value."""
+    half = MAX_PROBLEM_CHARS // 2
+    return problem if len(problem) <= MAX_PROBLEM_CHARS else f'{problem[:half]} ... {problem[-half:]}'
 
 
-def _check_keys(section: Mapping[str, Json], known: Sequence[str], needed: Sequence[str]) -> None:
-    for key in section:
-        if key not in known:
-            raise ValueError(f'unknown key {_short(key)};{did_you_mean(key[:MAX_NAME_CHARS], known)} there are '
-                             f'{", ".join(known)}')
-    for key in needed:
-        if section.get(key) is None:
-            raise ValueError(f'{key} is missing')
+def _built(kind: type[_P], section: Mapping[str, Json], *needed: str) -> _P:
+    """Return the record of a section, whose texts have one line each. needed: keys of texts that must be given.
+    Raises ValueError."""
+    found = parameters.build(kind, section)
+    for name, value in parameters.as_dict(found).items():
+        if isinstance(value, str) and not (len(value) <= MAX_TEXT_CHARS and value.isprintable()):
+            raise ValueError(f'{name} = {value!r}: must be a text of one line and at most {MAX_TEXT_CHARS} characters')
+        if name in needed and not value:
+            raise ValueError(f'{name}: must be given')
+    return found
 
 
 def _requirement(entry: Json) -> Requirement:
     """Return the requirement of an entry. Raises ValueError, which names field, value and allowed range."""
     if not isinstance(entry, dict):
-        raise ValueError(f'{_short(entry)}: must hold the keys {", ".join(NEEDED_KEYS)}')
-    _check_keys(entry, REQUIREMENT_KEYS, NEEDED_KEYS)
-    name, word, given = entry['name'], entry['method'], entry.get('arguments', {})
-    if not isinstance(name, str) or not (1 <= len(name) <= MAX_NAME_CHARS and name.isprintable()):
-        raise ValueError(f'name = {_short(name)}: must be a text of 1 to {MAX_NAME_CHARS} characters')
-    if word not in list(METHOD_BY_NAME):
-        hint = did_you_mean(str(word)[:MAX_NAME_CHARS], METHOD_BY_NAME)
-        raise ValueError(f'method = {_short(word)}: unknown;{hint} must be one of {", ".join(METHOD_BY_NAME)}')
-    method = METHOD_BY_NAME[word]
+        raise ValueError(f'{entry!r}: must hold the keys {", ".join(parameters.defaults(Entry))}')
+    given = entry.pop('arguments', {})
+    found = _built(Entry, entry, 'name', 'method', 'limit', 'unit')
+    if len(found.name) > MAX_NAME_CHARS:
+        raise ValueError(f'name = {found.name!r}: must be a text of 1 to {MAX_NAME_CHARS} characters')
+    if found.method not in METHOD_BY_NAME:
+        hint = did_you_mean(found.method, METHOD_BY_NAME)
+        raise ValueError(f'method = {found.method!r}: unknown;{hint} must be one of {", ".join(METHOD_BY_NAME)}')
+    method = METHOD_BY_NAME[found.method]
     if not isinstance(given, dict) or any(isinstance(value, (bool, list, dict)) for value in given.values()):
-        raise ValueError(f'arguments = {_short(given)}: must be a section with a number or text for each argument')
-    arguments = commands.values((method,), commands.Command(word, arguments={
-        name: str(value)[:MAX_TEXT_CHARS] for name, value in given.items()}))
-    if entry['unit'] != method.unit:
-        raise ValueError(f'unit = {_short(entry["unit"])}: must be {method.unit!r}, the unit of {word}')
-    return Requirement(name, method, arguments, _limit(method, entry['limit']),
-                       int(_number(entry, 'repetitions', 1, REPETITION_LIMITS, int)),
-                       _number(entry, 'confidence', CONFIDENCE_LEVEL, CONFIDENCE_LIMITS, float))
+        raise ValueError(f'arguments = {given!r}: must be a section with a number or text for each argument')
+    arguments = commands.values((method,), commands.Command(method.name, arguments={
+        name: str(value) for name, value in given.items()}))
+    if found.unit != method.unit:
+        raise ValueError(f'unit = {found.unit!r}: must be {method.unit!r}, the unit of {method.name}')
+    return Requirement(found.name, method, arguments, _limit(method, found.limit), found.repetitions, found.confidence)
 
 
-def _limit(method: Method, text: Json) -> Target:
+def _limit(method: Method, text: str) -> Target:
     """Return the limit of a text. Raises ValueError for a text that is no limit, and for an impossible limit."""
-    if not isinstance(text, str) or len(text) > MAX_NAME_CHARS or not LIMIT_PATTERN.fullmatch(text):
-        raise ValueError(f"limit = {_short(text)}: must be a text as '<= 0.05', '>= 1', '1 +- 0.1' or '1 to 2'")
+    if not LIMIT_PATTERN.fullmatch(text):
+        raise ValueError(f"limit = {text!r}: must be a text as '<= 0.05', '>= 1', '1 +- 0.1' or '1 to 2'")
     limit, words = Target.parse(text), LIMIT_WORDS[method.better]
     if limit.word not in words:
         raise ValueError(f'limit = {text!r}: the limit of {method.name} must have one of the words {", ".join(words)}')
-    if math.isinf(limit.first) or math.isinf(limit.last):
-        raise ValueError(f'limit = {text!r}: its numbers must be finite')
-    if limit.word == '+-' and limit.last <= 0.0 or limit.word == 'to' and limit.first >= limit.last:
-        must = 'the second number must be above ' + ('0' if limit.word == '+-' else 'the first')
-        raise ValueError(f'limit = {text!r}: no value is inside; {must}')
+    low, high = limit.ends
+    if not low < high or math.isinf(limit.first) or math.isinf(limit.last):
+        raise ValueError(f'limit = {text!r}: no value is inside; must have finite numbers, and low below high')
     return limit
-
-
-def _number(entry: Mapping[str, Json], key: str, default: float, limits: tuple[float, float],
-            kind: type[float]) -> float:
-    """Return the number of a key, or its default. Raises ValueError for another value or one outside limits."""
-    value: Json = entry.get(key, default)
-    if type(value) not in (int, kind) or not limits[0] <= value <= limits[1]:
-        raise ValueError(f'{key} = {_short(value)}: must be a {"whole " if kind is int else ""}number from '
-                         f'{limits[0]:g} to {limits[1]:g}')
-    return float(value)
-
-
-def _short(value: Json) -> str:
-    """Return a value of a file for an error, cut to a readable length."""
-    text = repr(value)
-    return text if len(text) <= MAX_NAME_CHARS else f'{text[:MAX_NAME_CHARS]}...'

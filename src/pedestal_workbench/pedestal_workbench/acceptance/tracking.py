@@ -117,6 +117,8 @@ def _follow(antenna: Antenna, arguments: Arguments, *actions: Action, handover: 
 
 
 def _program(antenna: Antenna, arguments: Arguments) -> Exercise:
+    if RECEIVER not in antenna.simulated:
+        raise ValueError('program_rms: must have a simulated receiver, which states the true direction of its target')
     return _follow(antenna, arguments, handover=False)
 
 
@@ -239,7 +241,7 @@ METHODS = (
             Argument('acceleration', 'largest acceleration of the manoeuvre', 1e-3, 100.0, 'deg/s2', default=0.1)),
            _follow, _autotrack_rms),
     Method('program_rms', 'follow a target by its program track: rms pointing error of both axes together', 'deg',
-           '<=', _TRACKED, _program, _program_rms, True),
+           '<=', _TRACKED, _program, _program_rms),
     Method('pointing_offset', 'follow a target in autotrack: mean of its direction, by encoders and receiver, less '
            'its program track', 'deg', '<=', _TRACKED, _follow, _pointing_offset),
     Method('acquisition_time', 'stop beside a target, then command `program`: time to autotrack', 's', '<=',
@@ -249,7 +251,7 @@ METHODS = (
            'receiver', 's', '<=',
            (_target('own', 'pass', 'beacon'), *_TRACKED[1:],
             Argument('fade', 'duration of the fade', 0.1, 60.0, 's', default=4.0),
-            Argument('depth', 'loss of level', 0.0, 200.0, 'dB', default=30.0)), _fade, _fade_recovery, True),
+            Argument('depth', 'loss of level', 0.0, 200.0, 'dB', default=30.0)), _fade, _fade_recovery),
     Method('receiver_slope', 'point beside a beacon by `preset`: slope of a receiver channel or larger cross-talk, as '
            'corrected by the control unit; ashore only', '1', '+-',
            (_target('beacon', 'own'), *_PLACE,
