@@ -98,7 +98,7 @@ INJECTED_FAULTS = {
         _fault('bias', 'rate and specific force of the IMU are offset', _DECK_AXIS,
                _number('rate', 'offset of the rate', 0.01, 1.0, 'rad/s'),
                _number('force', 'offset of the specific force', 0.0, 20.0, 'm/s2')),
-        _fault('nan', 'the numbers of the IMU are NaN'),
+        _fault('nan', 'the numbers of the IMU are NaN, so that the INS publishes no attitude', lockstep=False),
         _fault('noise', 'white noise on the rates of the IMU', *_noise(0.05, 1.0, 'rad/s'))),
     'ins': (
         _fault('drop', 'the INS publishes no attitude', lockstep=False),

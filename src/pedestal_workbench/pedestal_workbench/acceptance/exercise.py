@@ -129,7 +129,7 @@ class Performer(Protocol):
 
     def expect(self, performances: Sequence[tuple[str, Exercise, int]]) -> None:
         """Take the arguments of the next calls of `perform`, which a performer may make ahead."""
-        return None
+        return
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise. name: of its recording. Raises StoppedError."""

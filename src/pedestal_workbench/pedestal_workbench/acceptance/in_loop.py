@@ -33,7 +33,7 @@ from pedestal_workbench.acceptance.exercise import (
 WIND_SEEDS = 'adu.wind.field.seed', 'adu.wind.gust.seed'     # which the seed of a scenario leaves as they are
 WATCH_STEPS = 10        # number of steps between two checks of alarms and envelope
 MAX_LATENESS_S = 0.1    # of a command [s]
-EARLY_S = 1e-6          # largest time of a reply before its action, of rounding [s]
+EARLY_S = 0.02          # largest time of a reply before its action, of an INS with latency [s]
 EMERGENCY_STOP = 'emergency stop'       # alarm
 
 
@@ -88,10 +88,10 @@ def outcomes(exercise: Exercise, recording: Recording, begin: Seconds = 0.0) -> 
         if found is None:
             raise StoppedError(f'{action.node} did not reply to {action.command}')
         left[action.node].remove(found)
-        t, _, reply = found
-        if t - begin > action.at + MAX_LATENESS_S:
-            raise LateError(lateness(action, t - begin))
-        made.append(Executed(t - begin, action, *reply))
+        t = max(found[0] - begin, action.at)
+        if t > action.at + MAX_LATENESS_S:
+            raise LateError(lateness(action, t))
+        made.append(Executed(t, action, *found[2]))
     return tuple(made)
 
 

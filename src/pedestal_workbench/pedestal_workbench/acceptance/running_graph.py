@@ -83,8 +83,12 @@ class RunningGraph(Performer):
 
     def check(self, exercise: Exercise) -> None:
         """Raise ValueError for an exercise that the running graph cannot make."""
-        if exercise.changes:
-            raise ValueError(f'{", ".join(exercise.changes)}: a running graph keeps its parameters; use --scenario')
+        present = {f'{node}.{name}': value for node, part in self.antenna.parts.items()
+                   for name, value in parameters.as_dict(part).items()}
+        for key, value in exercise.changes.items():
+            if present.get(key) != value:
+                raise ValueError(f'{key}: must be {value} on the running graph, which keeps its parameters; or use '
+                                 '--scenario')
 
     def perform(self, name: str, exercise: Exercise, seed: int) -> Performed:
         """Make an exercise from a stamp shortly after its recorder writes. Raises StoppedError."""
