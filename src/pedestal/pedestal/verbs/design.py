@@ -31,6 +31,8 @@ SAMPLE_FILES = {
                  'navigation system, one in a Molniya orbit, and a geostationary one.',
     'my_antenna.yaml': 'A scenario: another antenna that tracks the flight of uav_flyby.',
     'acceptance.yaml': 'A specification of acceptance that explains all its keys, for the scenario uav_tracker_3m.',
+    'acceptance_ship_pass.yaml': 'A short specification of acceptance with the losses of receiver and INS, for the '
+                                 'scenario ship_pass.',
     'acceptance_station_real.yaml': 'A whole specification of acceptance, for the scenario station_real.',
     'acceptance_uav_tracker_3m.yaml': 'A whole specification of acceptance, for the scenario uav_tracker_3m.',
 }
@@ -57,7 +59,7 @@ def _scenarios(_options: argparse.Namespace) -> int:
 
 
 def _add_samples(parser: argparse.ArgumentParser) -> None:
-    """Writes flight.csv, ship.csv, iss.tle, night.tle, my_antenna.yaml, and three specifications of acceptance. If one
+    """Writes flight.csv, ship.csv, iss.tle, night.tle, my_antenna.yaml, and four specifications of acceptance. If one
     of these files exists, nothing is written."""
     parser.add_argument('folder', nargs='?', type=pathlib.Path, default=pathlib.Path(), metavar='DIR',
                         help='output folder; default: the current folder')

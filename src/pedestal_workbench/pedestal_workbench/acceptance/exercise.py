@@ -14,7 +14,16 @@ from drive_law.params import AduParameters
 from pedestal_common.graph import nodes
 from pedestal_common.graph.topics import AXES
 from pedestal_common.parameters import AnyParameters, as_dict
-from pedestal_common.quantities import Degrees, DegreesPerSecond, Json, Pairs, Radians, Seconds, Times
+from pedestal_common.quantities import (
+    Degrees,
+    DegreesPerSecond,
+    Json,
+    Pairs,
+    Radians,
+    RadiansPerSecond,
+    Seconds,
+    Times,
+)
 from pedestal_common.text_files import plain_yaml
 from pedestal_common.wire import commands
 from pedestal_recording.recording import Recording
@@ -33,6 +42,17 @@ class Antenna(NamedTuple):
     def parts(self) -> dict[str, AnyParameters]:
         """{node: its parameters}."""
         return {'acu': self.acu, **({'adu': self.adu} if self.adu else {})}
+
+    def travel(self, axis: str) -> tuple[Radians, Radians]:
+        """Return the limits of travel of an axis, the tighter ones of control unit and drive."""
+        limits, drive = getattr(self.acu, axis).limits, getattr(self.adu, axis, None)
+        return ((max(limits.low, drive.limits.lower), min(limits.high, drive.limits.upper)) if drive else
+                (limits.low, limits.high))
+
+    def rate(self, axis: str) -> RadiansPerSecond:
+        """Return the largest rate of an axis, the lower one of control unit and drive."""
+        rate, drive = getattr(self.acu, axis).shaper.rate, getattr(self.adu, axis, None)
+        return float(min(rate, drive.limits.rate) if drive else rate)
 
     @property
     def sha256(self) -> str:

@@ -10,6 +10,8 @@ acceptance with such a `drop` runs in realtime. The loss of the commands is adu.
     adu.gust, adu.lost_tooth    belong to the methods of the servo: gust, lash
     ship_motion.freeze, bias, noise    have an effect only on an INS that navigates with the data of the IMU
 """
+import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -20,14 +22,14 @@ from acu_tracker.mode.stow import MAX_REST_RATE_RAD_S
 from acu_tracker.servo.travel import braking_distance
 from pedestal_common.graph.nodes import DRIVE_NODE
 from pedestal_common.graph.topics import AXES
-from pedestal_common.quantities import Floats, Radians, RadiansPerSecond, Seconds, Times
+from pedestal_common.quantities import Floats, Seconds, Times
 from pedestal_common.wire.commands import Argument
 from pedestal_recording import recording as recordings
 from pedestal_results import tracking
 from pedestal_results.recorded_run import RecordedRun
 from pedestal_workbench.acceptance.exercise import Action, Antenna, Exercise, Performed
 from pedestal_workbench.acceptance.method import NEVER, Arguments, Measured, Method
-from pedestal_workbench.acceptance.servo import encoder_uncertainty
+from pedestal_workbench.acceptance.servo import encoder_uncertainty, plan
 from pedestal_workbench.acceptance.tracking import TIME_STEPS, first, inside, travel
 
 BEGIN_TIME_S, REST_TIME_S = 1.0, 3.0    # time of the first command, and time until an axis has come to rest [s]
@@ -39,7 +41,6 @@ RETURN_DEG = 1.0                # way back from a limit after which the axis has
 STANDSTILL_SHARE = 0.02         # rate below which an axis stands after an emergency stop, over its rate before [-]
 FAULT_TIME_S, RECOVERY_TIME_S = 10.0, 5.0   # time of the begin of a fault, and time after its end [s]
 ENVELOPE_DEG = 10.0             # of a fault outside autotrack, about the motion [deg]
-TRAVEL_SHARE = 0.8              # largest share of the travel that an emergency stop uses [-]
 MIN_RATE_SHARE = 0.9            # least share of the largest rate at an emergency stop [-]
 RAMP_DEG_S = 1.0                # rate of the azimuth in the mode `ramp` of a fault [deg/s]
 REPORT_TOPICS = 'acu/alarms', 'acu/mode', 'adu/state'   # whose changes report a fault
@@ -58,34 +59,16 @@ FAULTS = {
 report except that of adu.bias and ins.noise; fault_error is for them."""
 
 
-def _ends(antenna: Antenna, axis: str) -> tuple[Radians, Radians]:
-    """Return the lower and the upper limit of travel."""
-    span = travel(antenna)[AXES.index(axis)]
-    return math.radians(span.low), math.radians(span.high)
-
-
-def _rate(antenna: Antenna, axis: str) -> RadiansPerSecond:
-    """Return the largest rate that the control unit commands and the drive accepts."""
-    rate: RadiansPerSecond = getattr(antenna.acu, axis).shaper.rate
-    return min(rate, getattr(antenna.adu, axis).limits.rate) if antenna.adu else rate
-
-
-def _middle(antenna: Antenna) -> list[Radians]:
-    return [0.5 * sum(_ends(antenna, axis)) for axis in AXES]
-
-
 def _limit(antenna: Antenna, arguments: Arguments) -> Exercise:
     """Return the exercise that drives an axis into a limit, first by a refused preset, and then by rate. The opposite
     rate brings the axis back."""
-    axis, sign = str(arguments['axis']), 1.0 if arguments['side'] == 'high' else -1.0
-    i, of_axis = AXES.index(axis), getattr(antenna.acu, axis)
-    (low, high), rate = _ends(antenna, axis), _rate(antenna, axis)
+    planned, sign = plan(antenna, arguments), 1.0 if arguments['side'] == 'high' else -1.0
+    axis, i, rate, start = planned.name, planned.number, planned.rate, list(planned.place)
+    (low, high), deceleration = antenna.travel(axis), getattr(antenna.acu, axis).limits.deceleration
     end = high if sign > 0.0 else low
-    rise = rate / (ACCELERATION_SHARE * of_axis.shaper.acceleration)
-    way = min(rate * (0.5 * rise + CRUISE_TIME_S) + braking_distance(rate, of_axis.limits.deceleration,
-                                                                     antenna.acu.reaction),
+    rise = rate / (ACCELERATION_SHARE * planned.acceleration)
+    way = min(rate * (0.5 * rise + CRUISE_TIME_S) + braking_distance(rate, deceleration, antenna.acu.reaction),
               0.5 * (high - low))
-    start = _middle(antenna)
     start[i] = end - sign * way
     back = 2.0 * BEGIN_TIME_S + rise + way / rate + REST_TIME_S
     finish = back + rise + CRUISE_TIME_S
@@ -103,7 +86,7 @@ def _beyond(performed: Performed, arguments: Arguments) -> tuple[Times, Floats]:
     """Return (times, angles beyond the limit [deg]). Raises ValueError if the axis did not come near the limit."""
     performed.times('rate')
     joints, axis = performed.recording.table('joint_states'), str(arguments['axis'])
-    (low, high), angle = _ends(performed.antenna, axis), joints[f'{axis}.position']
+    (low, high), angle = performed.antenna.travel(axis), joints[f'{axis}.position']
     beyond = np.degrees(angle - high if arguments['side'] == 'high' else low - angle)
     if not np.nanmax(beyond, initial=-math.inf) > -RETURN_DEG:
         raise ValueError(f'the {axis} stayed more than {RETURN_DEG:g} deg away from its limit')
@@ -125,9 +108,9 @@ def _limit_return(performed: Performed, arguments: Arguments) -> Measured:
 def _stow(antenna: Antenna, arguments: Arguments) -> Exercise:
     """Return the exercise that stows the antenna from a distance, and unstows it."""
     start, slew = [], 0.0
-    for axis, middle in zip(AXES, _middle(antenna)):
+    for axis, place in zip(AXES, plan(antenna, {'axis': AXES[0]}).place):
         of_axis = getattr(antenna.acu, axis)
-        way = math.copysign(math.radians(float(arguments['distance'])), middle - of_axis.stow)
+        way = math.copysign(math.radians(float(arguments['distance'])), place - of_axis.stow)
         start.append(inside(antenna, 'distance', axis, math.degrees(of_axis.stow + way)))
         slew = max(slew, abs(way) / of_axis.shaper.rate + 2.0 * of_axis.shaper.rate / of_axis.shaper.acceleration)
     pins = {'adu.stow_pins': True, **{f'adu.pins.{axis}': getattr(antenna.acu, axis).stow for axis in AXES}}
@@ -177,48 +160,34 @@ def _unstow_time(performed: Performed, _: Arguments) -> Measured:
 
 def _emergency(antenna: Antenna, arguments: Arguments) -> Exercise:
     """Return the exercise of an emergency stop of an axis at its largest rate, in the middle of its travel."""
-    axis = str(arguments['axis'])
-    of_axis, i, start = getattr(antenna.acu, axis), AXES.index(axis), _middle(antenna)
-    (low, high), rate = _ends(antenna, axis), _rate(antenna, axis)
-    way = TRAVEL_SHARE * (high - low)
-    rise = rate / of_axis.shaper.acceleration
-    if rate * (1.5 * rise + CRUISE_TIME_S) > way:
-        raise ValueError(f'axis = {axis}: its travel is too short to reach its largest rate, must be at least '
-                         f'{math.degrees(rate * (1.5 * rise + CRUISE_TIME_S) / TRAVEL_SHARE):.4g} deg')
-    start[i] -= 0.5 * way
-    goal = start[i] + way
-    stop = BEGIN_TIME_S + rise + CRUISE_TIME_S
-    actions = (Action(BEGIN_TIME_S, 'acu', f'preset {axis}={goal:.6f} {AXES[1 - i]}={start[1 - i]:.6f}'),
-               Action(stop, DRIVE_NODE, EMERGENCY_STOP), Action(stop + REST_TIME_S, DRIVE_NODE, RESET_FAULTS),
-               Action(stop + 2.0 * REST_TIME_S, 'acu', 'stop'))
-    return Exercise(stop + 3.0 * REST_TIME_S, travel(antenna), actions, (start[0], start[1]),
-                    alarms=('emergency stop', f'{axis} following error'))
+    axis = plan(antenna, arguments)
+    rise = axis.rate / axis.acceleration
+    if (least := axis.rate * (1.5 * rise + CRUISE_TIME_S)) > axis.travel:
+        raise ValueError(f'axis = {axis.name}: {math.degrees(axis.travel):.4g} deg of its travel are too short for '
+                         f'its largest rate, must be at least {math.degrees(least):.4g} deg')
+    half, stop = 0.5 * axis.travel, BEGIN_TIME_S + rise + CRUISE_TIME_S
+    actions = (axis.preset(BEGIN_TIME_S, half), Action(stop, DRIVE_NODE, EMERGENCY_STOP),
+               Action(stop + REST_TIME_S, DRIVE_NODE, RESET_FAULTS), Action(stop + 2.0 * REST_TIME_S, 'acu', 'stop'))
+    made = axis.exercise(stop + 3.0 * REST_TIME_S, half, axis.rate, *actions, start=-half)
+    return dataclasses.replace(made, alarms=('emergency stop', f'{axis.name} following error'))
 
 
-def _stopping(performed: Performed, arguments: Arguments) -> tuple[Measured, Measured]:
-    """Return time and angle from the emergency stop to the standstill of the axis. The angle counts from the step
+def _stopping(part: str, performed: Performed, arguments: Arguments) -> Measured:
+    """Return time or angle from the emergency stop to the standstill of the axis. The angle counts from the step
     before the request. Because the request acts within a step, the angle is uncertain by the way of a step."""
     begin, joints = performed.begin + performed.times(EMERGENCY_STOP)[-1], performed.recording.table('joint_states')
+    axis, full = str(arguments['axis']), performed.antenna.rate(str(arguments['axis']))
     during = (joints['t'] > begin - 1.5 * performed.antenna.period) & (joints['t'] < begin + REST_TIME_S)
-    t, rate, angle = (joints[name][during] for name in ('t', *(f'{arguments["axis"]}.{part}'
-                                                               for part in ('velocity', 'position'))))
-    full = _rate(performed.antenna, str(arguments['axis']))
+    t, rate, angle = (joints[name][during] for name in ('t', f'{axis}.velocity', f'{axis}.position'))
     if not np.abs(rate[:1]).sum() > MIN_RATE_SHARE * full:
-        raise ValueError(f'the {arguments["axis"]} did not move at its largest rate, {math.degrees(full):.4g} deg/s')
+        raise ValueError(f'the {axis} did not move at its largest rate, {math.degrees(full):.4g} deg/s')
     moving = np.flatnonzero(np.abs(rate) > STANDSTILL_SHARE * abs(rate[0]))
     if moving[-1] == t.size - 1:
-        return NEVER, NEVER
+        return NEVER
+    if part == 'time':
+        return Measured(float(t[moving[-1] + 1] - begin), TIME_STEPS * performed.antenna.period)
     way, step = math.degrees(np.abs(angle - angle[0]).max()), math.degrees(abs(angle[1] - angle[0]))
-    return (Measured(float(t[moving[-1] + 1] - begin), TIME_STEPS * performed.antenna.period),
-            Measured(way, math.hypot(step, encoder_uncertainty(performed.antenna, str(arguments['axis'])))))
-
-
-def _emergency_time(performed: Performed, arguments: Arguments) -> Measured:
-    return _stopping(performed, arguments)[0]
-
-
-def _emergency_angle(performed: Performed, arguments: Arguments) -> Measured:
-    return _stopping(performed, arguments)[1]
+    return Measured(way, math.hypot(step, encoder_uncertainty(performed.antenna, axis)))
 
 
 def _faulty(antenna: Antenna, arguments: Arguments) -> Exercise:
@@ -233,14 +202,10 @@ def _faulty(antenna: Antenna, arguments: Arguments) -> Exercise:
     finish = end + 2.0 * RECOVERY_TIME_S
     if mode == 'autotrack':
         return Exercise(finish, travel(antenna), tuple(actions), alarms=ALARM_NAMES)
-    azimuth, elevation = start = _middle(antenna)
-    rate = RAMP_DEG_S if mode == 'ramp' else 0.0
-    actions.insert(0, Action(BEGIN_TIME_S, 'acu', f'preset azimuth={azimuth:.6f} elevation={elevation:.6f} '
-                             f'azimuth_rate={math.radians(rate):.6f} moves={finish:g}'))
-    spans = [span._replace(low=math.degrees(angle) - ENVELOPE_DEG, high=math.degrees(angle) + ENVELOPE_DEG)
-             for span, angle in zip(travel(antenna), start)]
-    spans[0] = spans[0]._replace(high=spans[0].high + rate * finish)
-    return Exercise(finish, (spans[0], spans[1]), tuple(actions), (azimuth, elevation), alarms=ALARM_NAMES)
+    axis, rate = plan(antenna, {'axis': AXES[0]}), math.radians(RAMP_DEG_S) if mode == 'ramp' else 0.0
+    made = axis.exercise(finish, math.radians(ENVELOPE_DEG) + rate * finish, axis.rate,
+                         axis.preset(BEGIN_TIME_S, 0.0, rate, finish), *actions)
+    return dataclasses.replace(made, alarms=ALARM_NAMES)
 
 
 def _onset(performed: Performed, arguments: Arguments) -> Seconds:
@@ -294,10 +259,9 @@ METHODS = (
            _STOW, _stow, _stow_time),
     Method('unstow_time', 'as stow_time, then `unstow`: time until the pins are out', 's', '<=', _STOW, _unstow,
            _unstow_time),
-    Method('emergency_stop_time', 'request an emergency stop at the largest rate: time to standstill', 's', '<=',
-           (_AXIS,), _emergency, _emergency_time),
-    Method('emergency_stop_angle', 'request an emergency stop at the largest rate: angle to standstill', 'deg', '<=',
-           (_AXIS,), _emergency, _emergency_angle),
+    *(Method(f'emergency_stop_{part}', f'request an emergency stop at the largest rate: {part} to standstill', unit,
+             '<=', (_AXIS,), _emergency, functools.partial(_stopping, part))
+      for part, unit in (('time', 's'), ('angle', 'deg'))),
     Method('fault_report', 'inject a fault: time to the first alarm, or to a change of the mode or of the state of '
            'the drive', 's', '<=', _FAULT, _faulty, _fault_report),
     Method('fault_error', 'inject a fault: largest error until the mode ends, towards the target in autotrack, else '

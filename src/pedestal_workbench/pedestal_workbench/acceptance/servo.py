@@ -84,17 +84,11 @@ class Plan(NamedTuple):
 
 
 def plan(antenna: Antenna, arguments: Arguments) -> Plan:
-    """Return the Plan for the argument `axis` of a method."""
-    name, ends = str(arguments['axis']), []
-    for each in AXES:
-        limits, drive = getattr(antenna.acu, each).limits, getattr(antenna.adu, each, None)
-        ends.append((max(limits.low, drive.limits.lower), min(limits.high, drive.limits.upper)) if drive else
-                    (limits.low, limits.high))
-    azimuth, elevation = (low + PLACE_SHARE * (high - low) for low, high in ends)
-    low, high = ends[AXES.index(name)]
-    shaper = getattr(antenna.acu, name).shaper
-    return Plan(name, AXES.index(name), TRAVEL_SHARE * (high - low), (azimuth, elevation), shaper.rate,
-                shaper.acceleration)
+    """Return the Plan for the argument `axis` of a method. Limits are the tighter of control unit and drive."""
+    name, (low, high) = str(arguments['axis']), antenna.travel(str(arguments['axis']))
+    azimuth, elevation = (lower + PLACE_SHARE * (upper - lower) for lower, upper in map(antenna.travel, AXES))
+    return Plan(name, AXES.index(name), TRAVEL_SHARE * (high - low), (azimuth, elevation), antenna.rate(name),
+                getattr(antenna.acu, name).shaper.acceleration)
 
 
 def drive_of(antenna: Antenna, name: str) -> AxisParameters:

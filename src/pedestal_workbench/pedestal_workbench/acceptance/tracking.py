@@ -49,16 +49,10 @@ _PLACE = (Argument('azimuth', 'azimuth of beacon or manoeuvre', -360.0, 360.0, '
 
 
 def travel(antenna: Antenna) -> tuple[Span, Span]:
-    """Return the envelope of the travel that control unit and drive permit, with the largest rates of both."""
-    spans = []
-    for axis in AXES:
-        limits = getattr(antenna.acu, axis).limits
-        low, high, rate = limits.low, limits.high, limits.rate
-        if antenna.adu:
-            of_drive = getattr(antenna.adu, axis).limits
-            low, high, rate = max(low, of_drive.lower), min(high, of_drive.upper), min(rate, of_drive.rate)
-        spans.append(Span(math.degrees(low), math.degrees(high), math.degrees(RATE_MARGIN * rate)))
-    return spans[0], spans[1]
+    """Return the envelope of the whole travel of the axes, with their largest rates."""
+    azimuth, elevation = (Span(*map(math.degrees, (*antenna.travel(axis), RATE_MARGIN * getattr(
+        antenna.acu, axis).limits.rate))) for axis in AXES)
+    return azimuth, elevation
 
 
 def inside(antenna: Antenna, name: str, axis: str, angle: float) -> Radians:
