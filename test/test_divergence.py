@@ -176,6 +176,30 @@ def test_a_fade_of_a_target_that_is_tracked_is_no_divergence(depth):
     assert off(done)[done.t > 4.0].max() < 0.1
 
 
+def after_a_fade(name, cn0, depth, seed):
+    loop = closed_loop.Loop(scenario.load(name, [f'tracking_receiver.inject=6 fade depth={depth} duration=1',
+                                                 f'tracking_receiver.receiver.cn0_dbhz={cn0}'], seed=seed,
+                                          duration=9.0))
+    return loop.run(), loop.units['acu'].faults
+
+
+@pytest.mark.parametrize('name, cn0, seed', [('leo_pass', 70, 7), ('leo_pass', 70, 20), ('uav_flyby', 80, 1),
+                                             ('uav_flyby', 80, 8), ('uav_flyby', 80, 12)])
+def test_the_end_of_a_fade_of_a_strong_signal_does_not_throw_the_filter(name, cn0, seed):
+    """The C/N0 rises at once, while the errors still hold the noise of the fade."""
+    done, told = after_a_fade(name, cn0, 30, seed)
+    assert done['acu/mode'][-1] == Mode.AUTOTRACK and told == () and off(done)[done.t > 4.0].max() < 0.1
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize('name, cn0', [('leo_pass', 70), ('uav_flyby', 80)])
+def test_fades_of_a_strong_signal_are_survived(name, cn0):
+    for depth in (20, 30):
+        for seed in range(21, 41):
+            done, told = after_a_fade(name, cn0, depth, seed)
+            assert done['acu/mode'][-1] == Mode.AUTOTRACK and told == (), (depth, seed)
+
+
 TURNING = ['acu.elevation.preset=0.6', 'adu.initial_elevation=0.6', 'adu.initial_azimuth=0',
            'tracking_receiver.target.kind=sine', 'tracking_receiver.target.angle.azimuth_amplitude=0.1',
            'tracking_receiver.target.angle.elevation_amplitude=0', 'tracking_receiver.target.angle.frequency=0.1',
