@@ -292,7 +292,8 @@ def _situation(state: State, constants: Constants, inputs: Inputs, all_tables: p
     unstable = tracking.unstable(state.tracking, constants, inputs, t)
     pins = stow.obstacle(state.stow, constants, inputs)
     closed = mode == Mode.AUTOTRACK and interruptions.axes_follow_commands(state.supervision)
-    lock, slope, track = tracking.conditions(state.tracking, constants, t, no_signal, closed)
+    lock, slope, track = tracking.conditions(state.tracking, constants, t, no_signal, closed,
+                                             program_track.of_mode(all_tables, state.mode.table))
     if track == Reason.NONE and acquisition.in_side_lobe(state.guidance.acquisition, constants, t):
         track = Reason.SIDE_LOBE
     # The fallback AUTOTRACK means coasting. Because a filter without an estimate cannot coast, the fallback is then

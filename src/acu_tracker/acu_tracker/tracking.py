@@ -6,20 +6,27 @@ from acu_tracker import signals
 from acu_tracker.estimation import monitors, slope_ratio, target
 from acu_tracker.estimation.filters import target_filter
 from acu_tracker.geometry import attitude, frames, history
-from acu_tracker.geometry.vector import ZERO_VECTOR, LineOfSight, Vector, rotated
+from acu_tracker.geometry.vector import ZERO_VECTOR, LineOfSight, Vector, line_of_sight, rotated
 from acu_tracker.modes import Reason
 from acu_tracker.pointing import model
 from acu_tracker.pointing.params import PointingParameters
+from acu_tracker.program import program_track
+from acu_tracker.program.program_track import ProgramTrack
 from acu_tracker.signals import Inputs, Outputs
 from pedestal_common.compiled import compiled
 from pedestal_common.geometry import line_of_sight as pointing
-from pedestal_common.quantities import Pair, Radians, Radians2, RadiansPerSecond, Records, Seconds
+from pedestal_common.quantities import DecibelHertz, Pair, Radians, Radians2, RadiansPerSecond, Records, Seconds
 from pedestal_common.record import Record
 
 if TYPE_CHECKING:
     from acu_tracker.control_unit import Constants
     from acu_tracker.mode.interruptions import Outage
     from acu_tracker.params import SharedParameters
+
+
+MAX_DEPARTURE_BEAMWIDTHS = 2.0
+"""Largest departure of a coasting estimate from the program [beamwidths]. An estimate that garbled errors have thrown
+does not know this, and its sigma stays small."""
 
 
 class Tracking(Record):
@@ -29,6 +36,7 @@ class Tracking(Record):
     attitude: attitude.DeckAttitude     # history of the deck
     target: target.Target               # target filter
     error: Pair     # receiver error of this step, in deck angles [rad]; NaN: no error
+    cn0: DecibelHertz   # of the last error, as the filter takes it
     # monitors of the errors
     repetition: monitors.Repetition
     divergence: monitors.Divergence
@@ -88,14 +96,16 @@ def unstable(tracking: Tracking, constants: 'Constants', inputs: Inputs, t: Seco
 
 
 @compiled
-def conditions(tracking: Tracking, constants: 'Constants', t: Seconds, gap: 'Outage',
-               closed: bool) -> tuple[int, int, int]:
+def conditions(tracking: Tracking, constants: 'Constants', t: Seconds, gap: 'Outage', closed: bool,
+               program: ProgramTrack) -> tuple[int, int, int]:
     """Return (lock, slope, track) of modes.Conditions at t. closed: True if the loop is closed in autotrack, and the
-    axes follow their commands."""
+    axes follow their commands; program: where the target is expected."""
     # unexplained: no keyhole, turn or hidden sector explains the outage; lost: autotrack must end.
     p, unexplained, running = constants.p.tracker, not gap.permitted, tracking.target.running
-    spread_now = spread(tracking, constants, t) if running and unexplained and gap.coasting else 0.0
-    lost = not running or (unexplained and coast_over(gap.since, p.coast_time, spread_now, p.receiver.beamwidth))
+    lost = not running or (unexplained and gap.since > p.coast_time)
+    if running and unexplained and gap.coasting:
+        lost |= leaves_beam(spread(tracking, constants, t), departure(tracking, constants, program, t),
+                            p.receiver.beamwidth)
     if tracking.divergence.diverged or (
             closed and monitors.diverges(tracking.divergence, gap.coasting and unexplained)):
         return Reason.DIVERGED, Reason.DIVERGED, Reason.DIVERGED
@@ -127,9 +137,24 @@ def sigma_across(azimuth_variance: Radians2, elevation_variance: Radians2, eleva
 
 
 @compiled
-def coast_over(since: Seconds, coast_time: Seconds, sigma: Radians, beamwidth: Radians) -> bool:
-    """Return True if coasting ends: after coast_time, or with a sigma above half a beamwidth."""
-    return since > coast_time or sigma > 0.5 * beamwidth
+def departure(tracking: Tracking, constants: 'Constants', program: ProgramTrack, t: Seconds) -> Radians:
+    """Return how far the estimate has departed from the program since the last accepted measurement, 0 without a
+    program at one of the two times."""
+    before = tracking.target.stamp
+    if program_track.status(program, t) != Reason.NONE or program_track.status(program, before) != Reason.NONE:
+        return 0.0
+    u, v = sight(tracking, constants, t).u, sight(tracking, constants, before).u
+    p, q = (line_of_sight(program_track.motion_at(program, t)).u,
+            line_of_sight(program_track.motion_at(program, before)).u)
+    x, y, z = u.x - p.x - v.x + q.x, u.y - p.y - v.y + q.y, u.z - p.z - v.z + q.z
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@compiled
+def leaves_beam(sigma: Radians, departed: Radians, beamwidth: Radians) -> bool:
+    """Return True if a coast has become useless: sigma of the estimate is above half a beamwidth, or the estimate has
+    departed from the program by more than MAX_DEPARTURE_BEAMWIDTHS."""
+    return sigma > 0.5 * beamwidth or departed > MAX_DEPARTURE_BEAMWIDTHS * beamwidth
 
 
 @compiled

@@ -6,6 +6,7 @@ import pytest
 
 from acu_tracker.modes import REASONS, Mode, Reason
 from acu_tracker.operating import diagnosis
+from acu_tracker.program.program_track import ProgramTrack
 from pedestal_common.graph.modes import MODES
 
 
@@ -69,6 +70,25 @@ def test_handover_and_back_are_smooth(Rig):
     # From the settled program on: through hand-over, coasting, fall-back and hand-over again.
     assert np.abs(np.diff(rows[100:, :2], axis=0)).max() < 1e-3
     assert np.abs(rows[100:, 2:]).max() < 5e-5
+
+
+@pytest.mark.parametrize('departs', [True, False])
+def test_a_coast_that_departs_from_the_program_ends_at_two_beamwidths(Rig, departs):
+    """The filter coasts straight on. The program turns by 6 deg/s as the signal is lost, or goes straight on too."""
+    rate = 0.1 if departs else 0.0
+    rig = Rig(Rig.moving, at=(0.5, 0.6), initial_mode='program')
+    times = np.arange(0.0, 10.0, 0.1)
+    straight = np.array([Rig.moving(t) for t in times])
+    straight[:, 0] += rate * np.maximum(times - 4.0, 0.0)
+    rig.track = ProgramTrack(times, straight)
+    rig.run(4.0)
+    assert rig.mode == 'autotrack'
+    rig.receiver_on = False
+    until = 2.0 * rig.params.tracker.receiver.beamwidth / (0.1 * math.cos(0.68))
+    rig.run(until - 0.05)
+    assert rig.mode == 'autotrack' and rig.outputs['coasting'][0] == 1
+    rig.run(0.1)
+    assert (rig.mode, rig.reason) == (('program', 'signal lost') if departs else ('autotrack', 'locked'))
 
 
 def test_a_known_latency_is_no_loss(Rig):

@@ -85,5 +85,6 @@ def test_expected_level():
 def test_coast():
     assert tracking.sigma_across(4e-6, 1e-6, math.acos(0.25)) == pytest.approx(1e-3)
     assert tracking.sigma_across(4e-6, 1e-6, 0.0) == pytest.approx(2e-3)
-    assert not tracking.coast_over(1.0, 3.0, 0.49 * B, B)
-    assert tracking.coast_over(3.1, 3.0, 0.0, B) and tracking.coast_over(0.5, 3.0, 0.51 * B, B)
+    departed = tracking.MAX_DEPARTURE_BEAMWIDTHS * B
+    assert not tracking.leaves_beam(0.49 * B, 0.99 * departed, B)
+    assert tracking.leaves_beam(0.51 * B, 0.0, B) and tracking.leaves_beam(0.0, 1.01 * departed, B)

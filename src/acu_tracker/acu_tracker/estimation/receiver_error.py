@@ -47,6 +47,11 @@ OUTCOME_STARTED, OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_STALE, OUTCOME_NOISY, 
 is only noise, has no known attitude of the deck at its instant."""
 
 
+MAX_RISE_DB = 0.5
+"""Largest rise of the C/N0 from error to error that the filter believes [dB]. Errors are means, and after a fade they
+hold the noise of the fade for longer than the published C/N0."""
+
+
 class Loop(NamedTuple):
     """Conditions of the monitors. While a limit holds the beam off the target, both truth values are False."""
     closed: bool    # the loop is closed on the errors (autotrack)
@@ -122,6 +127,8 @@ def take_error(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, out
     receiver, params = constants.p.tracker.receiver, constants.p.tracker
     measured = pointing.displaced(at.A, at.E, inputs.cross_elevation, inputs.elevation)
     tracking.error[0], tracking.error[1] = measured[0] - at.A, measured[1] - at.E
+    risen = tracking.cn0 + MAX_RISE_DB if tracking.target.running else math.inf
+    tracking.cn0 = min(inputs.cn0_dbhz, risen)
     outcome, innovation = OUTCOME_NO_ATTITUDE, NO_INNOVATION
     known, deck = attitude.at(tracking.attitude, constants.p, inputs.error_stamp - receiver.age)
     if known:
@@ -153,7 +160,7 @@ def _measure(tracking: 'Tracking', constants: 'Constants', inputs: Inputs, at: P
     if math.isfinite(inputs.error_rate[0] + inputs.error_rate[1] + inputs.error_rate_sigma):
         azimuth_rate, elevation_rate = _measured_rates(state, now, inputs, at)
     # R_cross, R_elevation: variances of the measured direction in cross-elevation and elevation [rad2].
-    R_cross = R_elevation = error_variance(inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz, params.receiver)
+    R_cross = R_elevation = error_variance(inputs.cross_elevation, inputs.elevation, tracking.cn0, params.receiver)
     cos_el = max(math.cos(elevation), 0.01)     # This avoids a division by zero at the zenith.
     # walk_cross, walk_elevation: growth of these variances by the random walk of the attitude error [rad2/s].
     walk_cross = walk_elevation = 0.0
@@ -306,8 +313,9 @@ def _watch_slope(tracking: 'Tracking', params: TrackerParameters, inputs: Inputs
     """Test the slope with an error and its beam; latch the divergence if the slope is wrong."""
     error, beam = (inputs.cross_elevation, inputs.elevation), monitors.slope_beam(mat_ed, at.A, at.E)
     variance = error_variance(inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz, params.receiver)
+    leaving = monitors.leaving_error(tracking.divergence, params.receiver.beamwidth)
     wrong = monitors.take_slope(tracking.wrong_slope, inputs.error_stamp - params.receiver.age, beam, error, variance,
-                                params.coast_after)
+                                params.coast_after, leaving)
     if params.keeps_program and monitors.full(tracking.wrong_slope):
         walk = 0.0
         if tracking.attitude.stabilised:

@@ -89,7 +89,7 @@ def score(state: AnyRecord) -> float:
     """Return the score of a WrongSlope, 0 before its first verdict."""
     if state['n'] < monitors.MIN_BLOCK_COUNT:
         return 0.0
-    return max(monitors.score(state, hypothesis) for hypothesis in range(3))
+    return max(monitors.score(state, hypothesis, monitors.WRONG_SLOPE_RATIO) for hypothesis in range(3))
 
 
 def ratio(state: AnyRecord) -> float:
