@@ -8,7 +8,6 @@ The argument `target` is `own`, the target of the scenario as it is, or a simula
 
 The program track of a simulated target has no error. The level of beacon and manoeuvre does not depend on the range.
 """
-import dataclasses
 import itertools
 import math
 
@@ -103,10 +102,11 @@ def simulated(antenna: Antenna, arguments: Arguments) -> dict[str, Json]:
             f'{of_target}.angle.range': TARGET_RANGE_M, f'{of_target}.angle.frequency': MANOEUVRE_FREQUENCY_HZ}
 
 
-def _follow(antenna: Antenna, arguments: Arguments, *actions: Action, handover: bool = True) -> Exercise:
+def _follow(antenna: Antenna, arguments: Arguments, *actions: Action, handover: bool = True,
+            alarms: tuple[str, ...] = ()) -> Exercise:
     """Return the exercise that follows a target from its begin. handover: from program to autotrack."""
     changes = simulated(antenna, arguments)
-    return Exercise(float(arguments['duration']), travel(antenna), actions,
+    return Exercise(float(arguments['duration']), travel(antenna), actions, alarms=alarms,
                     changes=changes if handover else {**changes, 'acu.tracker.handover': False})
 
 
@@ -124,8 +124,7 @@ def _acquisition(antenna: Antenna, arguments: Arguments) -> Exercise:
 
 def _fade(antenna: Antenna, arguments: Arguments) -> Exercise:
     command = f'fade depth={arguments["depth"]} duration={arguments["fade"]}'
-    exercise = _follow(antenna, arguments, Action(ACTION_TIME_S, RECEIVER, command))
-    return dataclasses.replace(exercise, alarms=('signal lost', 'diverged'))
+    return _follow(antenna, arguments, Action(ACTION_TIME_S, RECEIVER, command), alarms=('signal lost', 'diverged'))
 
 
 def _offsets(antenna: Antenna, arguments: Arguments) -> Exercise:
