@@ -7,7 +7,7 @@ import pytest
 
 from pedestal_bringup.scenario.variant import Variant
 from pedestal_common.injection.table import INJECTED_FAULTS
-from pedestal_workbench.acceptance import safety
+from pedestal_workbench.acceptance import in_loop, safety
 from pedestal_workbench.acceptance.exercise import Action, BreachError, Exercise, Span
 from pedestal_workbench.acceptance.in_loop import InLoop
 from pedestal_workbench.acceptance.tracking import travel
@@ -132,6 +132,26 @@ REPORTS_S = {'adu.motor_loss': 0.02, 'adu.encoder_jump': 0.02, 'adu.nan': 0.02, 
 @pytest.mark.parametrize('fault', REPORTS_S)
 def test_fault_is_reported_as_the_study_of_faults_expects(fault):
     assert measured(Variant(SHIP), 'fault_report', fault=fault) <= REPORTS_S[fault]
+
+
+@pytest.mark.parametrize('node', ['tracking_receiver', 'ins'])
+def test_a_loss_has_two_forms_with_the_same_effect(node):
+    """Invalid messages, which a lockstep graph can have, and no messages, which it cannot have."""
+    invalid, none = (performed(Variant(SHIP), 'fault_report', fault=f'{node}.{name}') for name in ('nan', 'drop'))
+    assert [in_loop.pacing(done.exercise) for done in (invalid, none)] == ['lockstep', 'realtime']
+    tables = (done.recording.table('joint_states') for done in (invalid, none))
+    assert all(np.array_equal(a, b) for a, b in zip(*(table.values() for table in tables)))
+
+
+def test_limits_are_the_tighter_ones_of_control_unit_and_drive():
+    antenna = InLoop(Variant(UAV)).antenna
+    axis, (low, high) = antenna.adu.azimuth, antenna.travel('azimuth')
+    limits = dataclasses.replace(axis.limits, upper=high - 1.0, rate=0.1)
+    tight = antenna._replace(adu=dataclasses.replace(antenna.adu, azimuth=dataclasses.replace(axis, limits=limits)))
+    assert tight.travel('azimuth') == (low, high - 1.0) and tight.rate('azimuth') == 0.1
+    assert travel(tight)[0].high == math.degrees(high - 1.0)
+    assert antenna._replace(adu=None).travel('azimuth') == (antenna.acu.azimuth.limits.low,
+                                                            antenna.acu.azimuth.limits.high)
 
 
 @pytest.mark.thorough

@@ -44,30 +44,20 @@ def antenna(scenario: Scenario) -> Antenna:
                    tuple(node for node in table.INJECTED_FAULTS if node in scenario.nodes), 'ins' in scenario.nodes)
 
 
-def changes(exercise: Exercise) -> dict[str, Json]:
-    """Return {'node.key': value} of a simulated run for an exercise. An exercise with a start begins at rest there. A
-    track replaces that of the scenario."""
-    found: dict[str, Json] = {'scenario.program.source': 'none'} if exercise.track else {}
-    if exercise.start is not None:
-        found |= {f'adu.initial_{axis}': angle for axis, angle in zip(AXES, exercise.start)}
-        found |= {'acu.initial_mode': 'stop', 'acu.tracker.handover': False}
-    return {**found, **exercise.changes}
-
-
 def run_of(exercise: Exercise, variant: Variant, scenario: Scenario, seed: int = 1) -> Variant:
-    """Return the variant whose run makes an exercise, in whole steps: its actions are scheduled after those of the
-    scenario, which is that of the variant. The wind of each seed is another one."""
-    period, changed = scenario.node_parameters('adu').period, changes(exercise)
-    schedules: dict[str, list[str]] = {}
+    """Return the variant whose run makes an exercise, in whole steps: at rest from its start on, with its track, and
+    with its actions scheduled beside those of the scenario of the variant. The wind of each seed is another one."""
+    changes: dict[str, Json] = {'scenario.program.source': 'none'} if exercise.track else {}
+    if exercise.start is not None:
+        changes |= {f'adu.initial_{axis}': angle for axis, angle in zip(AXES, exercise.start)}
+        changes |= {'acu.initial_mode': 'stop', 'acu.tracker.handover': False}
+    changes |= {**exercise.changes, **dict.fromkeys(WIND_SEEDS, seed)}
     for action in exercise.actions:
-        key = f'{action.node}.{"commands" if action.node == "acu" else "inject"}'
-        schedules.setdefault(key, []).append(f'{action.at:.9f} {action.command}')
-    for key, actions in schedules.items():
-        node, _, name = key.partition('.')
-        given = changed.get(key, getattr(scenario.node_parameters(node), name))
-        changed[key] = '; '.join([*filter(None, [str(given)]), *actions])
-    return variant.with_({**changed, **dict.fromkeys(WIND_SEEDS, seed)}, seed=seed,
-                         duration=math.ceil(exercise.duration / period - 1e-6) * period)
+        name = 'commands' if action.node == 'acu' else 'inject'
+        before = changes.get(key := f'{action.node}.{name}', getattr(scenario.node_parameters(action.node), name))
+        changes[key] = '; '.join([*filter(None, [str(before)]), f'{action.at:.9f} {action.command}'])
+    period = scenario.node_parameters('adu').period
+    return variant.with_(changes, seed=seed, duration=math.ceil(exercise.duration / period - 1e-6) * period)
 
 
 def pacing(exercise: Exercise) -> str:

@@ -125,8 +125,7 @@ class RunningGraph(Performer):
             self._wait(exercise, self._follow(), WAY_MARGIN_S)
         else:
             here = np.radians(self._session.remote.encoder_angles(JOINTS_TOPIC))
-            rates = [getattr(self.antenna.acu, axis).shaper.rate for axis in AXES]
-            way = float(np.max(np.abs(here - exercise.start) / rates))
+            way = float(np.max(np.abs(here - exercise.start) / [self.antenna.rate(axis) for axis in AXES]))
             # The command has deck angles, the start has encoder angles.
             report = self._session.remote.pointing_model
             t = np.array([report.ends_s if report else 0.0])
