@@ -290,8 +290,8 @@ def opposes_command(state: AxisDetectors, dy: RadiansPerSecond, high: RadiansPer
                     threshold: RadiansPerSecond, dt: Seconds) -> bool:
     """Return True if the axis moves against its recent commands, which all had one sign.
 
-    The rate a quarter of a step ahead must be above the threshold plus STOP_OVERSHOOT_SHARE of the recent rate along the
-    commands. A drive that stops without a command overshoots by less, and then slows down; a runaway accelerates.
+    The rate a quarter of a step ahead must be above the threshold plus STOP_OVERSHOOT_SHARE of the recent rate along
+    the commands. A drive that stops without a command overshoots by less, and then slows down; a runaway accelerates.
     """
     along = 1.0 if low >= 0.0 and high > STANDSTILL_RATE_RAD_S else 0.0
     if high <= 0.0 and low < -STANDSTILL_RATE_RAD_S:
