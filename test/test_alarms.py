@@ -166,3 +166,52 @@ def test_an_axis_that_loses_its_commands_on_a_ramp_is_told(name, rate):
                                                  'adu.inject=3 drop duration=5'], duration=8.0))
     loop.run()
     assert raised(loop.units['acu']) == {'azimuth following error'}
+
+
+def runaways(run):
+    alarms = run.units['acu'].parts['state']['supervision']['alarms']['alarm']
+    return {name: float(alarm['raised']) for name, alarm in zip(table.ALARM_NAMES, alarms)
+            if 'runaway' in name and np.isfinite(alarm['raised'])}
+
+
+def slewing(scenario_name, axis, rate, seed, duration, *overrides):
+    """Closed loop of a scenario whose axis moves at a rate [rad/s] by commands from 0.5 s on."""
+    commands = '; '.join(f'{at} rate {axis}={rate}' for at in np.arange(0.5, duration, 0.5))
+    return closed_loop.Loop(scenario.load(scenario_name, [
+        'acu.initial_mode=standby', f'acu.commands={commands}', 'adu.initial_azimuth=-1', 'adu.initial_elevation=0.1',
+        *overrides], seed=seed, duration=duration))
+
+
+DROPS = [('uav_flyby', 'azimuth', 0.5), ('uav_flyby', 'azimuth', -1.0), ('ship_terminal_1m2', 'elevation', 0.3)]
+
+
+@pytest.mark.parametrize('name, axis, rate', DROPS)
+def test_a_drive_that_stops_without_commands_overshoots_and_is_no_runaway(name, axis, rate):
+    run = slewing(name, axis, rate, 1, 2.0, 'adu.inject=1.2 drop duration=0.6').run()
+    velocity = run['joint_states']['velocity'][:, 0 if axis == 'azimuth' else 1]
+    assert (np.sign(rate) * velocity[240:]).min() < -0.05 and runaways(run) == {}
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize('name', ['uav_flyby', 'uav_tracker_3m', 'ship_terminal_1m2'])
+def test_no_stop_without_commands_is_a_runaway(name):
+    for seed in range(1, 7):
+        for axis, rates in (('azimuth', (0.3, -0.5, 0.7, -1.0)), ('elevation', (0.3, 0.5, 0.85))):
+            for rate in rates:
+                begin = 1.2 + 0.0137 * seed
+                run = slewing(name, axis, rate, seed, 2.0, f'adu.inject={begin} drop duration=0.5').run()
+                assert runaways(run) == {}, (seed, axis, rate)
+
+
+@pytest.mark.parametrize('rate, steps', [(0.1, 2), (0.5, 6), (-1.0, 9)])
+def test_a_motor_that_turns_the_wrong_way_is_told_at_once(rate, steps):
+    """The torque constants of both motors change their sign while the axis moves."""
+    loop = slewing('uav_flyby', 'azimuth', rate, 1, 2.5)
+
+    def reverse(made):
+        if made == 400:
+            for motor in ('motor_1', 'motor_2'):
+                loop.units['adu'].parts['constants']['azimuth'][motor]['K_t'] *= -1.0
+        return 400 - made if made < 400 else 1000
+    told = runaways(loop.run(watch=reverse))
+    assert 0.0 < told['azimuth runaway'] - 2.0 <= steps * 0.005 + 1e-9

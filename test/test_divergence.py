@@ -221,3 +221,34 @@ def test_a_target_that_turns_in_a_fade_is_no_divergence(kind):
 def test_the_loop_is_slowed_with_a_command_that_comes_late(delay):
     done = run(f'adu.transport_delay={delay}')
     assert done['acu/mode'][-1] == Mode.AUTOTRACK and off(done)[-200:].max() < 0.05
+
+
+BEACON = ['tracking_receiver.target.kind=sine', 'tracking_receiver.target.angle.azimuth_amplitude=0',
+          'tracking_receiver.target.angle.elevation_amplitude=0', 'tracking_receiver.target.angle.range=3.6e7',
+          'tracking_receiver.target.angle.elevation=0.61', 'tracking_receiver.receiver.range_exponent=0',
+          'adu.initial_elevation=0.61',
+          *(f'scenario.program.{name}_offset=0' for name in ('time', 'azimuth', 'elevation'))]
+
+
+def captured(azimuth, tilt, seed):
+    """(largest error after the hand-over, error at the end [beamwidths], faults) of a beacon over a tilted mount."""
+    loop = closed_loop.Loop(scenario.load('station_real', [
+        *BEACON, f'tracking_receiver.target.angle.azimuth={azimuth}', f'adu.initial_azimuth={azimuth}',
+        f'adu.mount.tilt_forward={tilt}'], seed=seed, duration=5.0))
+    done = loop.run()
+    error = np.radians(off(done)) / loop.units['acu'].parameters.tracker.receiver.beamwidth
+    return error[np.argmax(done['acu/mode'] == Mode.AUTOTRACK):].max(), error[-1], loop.units['acu'].faults
+
+
+@pytest.mark.parametrize('azimuth, seed', [(0.0, 1), (0.0, 4), (1.047, 4), (-1.047, 4)])
+def test_an_error_of_a_sixth_of_a_beamwidth_is_captured_without_a_swing_of_the_dish(azimuth, seed):
+    largest, last, told = captured(azimuth, 1e-3, seed)
+    assert 0.12 < largest < 0.22 and last < 0.05 and told == ()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize('tilt', [1e-3, -1e-3, 1.5e-3])
+def test_errors_at_the_hand_over_are_captured(tilt):
+    for seed in range(1, 21):
+        largest, last, told = captured(0.3 * seed - 3.0, tilt, seed)
+        assert largest < 0.4 and last < 0.05 and told == (), seed

@@ -129,7 +129,27 @@ def test_restarts_of_the_reference_do_not_hide_that_an_axis_stands():
     (0.1, 0.0, -0.1, True), (-0.1, 0.1, 0.0, True), (0.1, 0.1, 0.0, False), (0.1, 0.0, 0.0, False),
     (0.01, 0.0, -0.1, False), (-0.1, 0.1, -0.1, False)))
 def test_against_the_commands(dy, high, low, expected):
-    assert detectors.opposes_command(dy, high, low, 0.05) == expected
+    assert detectors.opposes_command(detector(), dy, high, low, 0.05, T) == expected
+
+
+@pytest.mark.parametrize('sign', (1.0, -1.0))
+@pytest.mark.parametrize('fast', (0.3, 1.0))
+def test_the_overshoot_of_a_stop_is_no_runaway_and_an_axis_that_accelerates_is_one(fast, sign):
+    """Both come from the same rate; the stop overshoots by a tenth of it, and at rest nothing of the rate is left."""
+    d = detector()
+    stop = [fast, 0.7 * fast, 0.3 * fast, 0.0, -0.06, -0.05 - 0.05 * fast, -0.05 - 0.04 * fast, -0.05, -0.01]
+    runaway = [fast, 0.6 * fast, 0.2 * fast, -0.2 * fast - 0.05, -0.6 * fast]
+
+    def opposed(rates):
+        told = []
+        for dy in rates:
+            told.append(detectors.opposes_command(d, sign * dy, max(sign, 0.0), min(sign, 0.0), 0.05, T))
+            d['dy'] = sign * dy
+        return told
+    assert not any(opposed(stop))
+    assert opposed(runaway) == [False] * 3 + [True] * 2
+    opposed([0.0] * 1000)
+    assert opposed([-0.051]) == [True]
 
 
 @pytest.mark.parametrize(('frequency', 'amplitude', 'expected'), (

@@ -85,7 +85,7 @@ def _of_motors(axis: detectors.AxisDetectors, i: int, inputs: Inputs, envelope: 
     bits |= Bit.AZIMUTH_ENCODER_DISAGREEMENT * detectors.disagreement(axis, x, facts.dt)
     bits |= Bit.AZIMUTH_BRAKE_NOT_RELEASED * resisted
     bits |= Bit.AZIMUTH_IMMOBILE * detectors.immobile(axis, dy, high, low)
-    bits |= Bit.AZIMUTH_RUNAWAY * detectors.opposes_command(dy, high, low, facts.unasked_rate)
+    bits |= Bit.AZIMUTH_RUNAWAY * detectors.opposes_command(axis, dy, high, low, facts.unasked_rate, facts.dt)
     return bits << i
 
 

@@ -42,6 +42,7 @@ class AxisDetectors(Record):
     pushed: float           # direction of the torque during a gust: 1 or -1; 0 without a gust
     behind: Bit
     moves: Bit
+    swing: RadiansPerSecond     # largest recent rate along the commands, of `opposes_command`; decays
     e: Radians              # last following error other than 0
     area: float             # area of the present half wave of the following error [rad s]
     half_waves: float       # number of half waves, which decays
@@ -67,6 +68,10 @@ MIN_COMMANDED_RATE_RAD_S = 5e-3     # rate command above which an axis must move
 IMMOBILE_RATE_SHARE = 0.1           # share of the commanded rate below which an axis is immobile
 MAX_ACCELERATION_RATIO = 2.0        # ratio of the largest acceleration of an axis to the largest commanded one [-]
 FOLLOWING_ERROR_BEAMWIDTHS = 0.25   # following error that is too large [beamwidths]
+
+# Overshoot of a stop, above the threshold of a runaway, as a share of the recent rate [-], and the time constant with
+# which this rate decays [s]. The stops of drives that lost their commands at up to 1 rad/s overshot by up to 0.12.
+STOP_OVERSHOOT_SHARE, SWING_TIME_CONSTANT_S = 0.15, 0.5
 
 # Time constant with which a hidden following error decays [s]. An axis that stands on a ramp of 0.5 mrad/s then hides
 # more than a quarter of a beamwidth of one degree. The decay avoids an alarm by the rare hidden errors of gusts.
@@ -281,11 +286,19 @@ def moves(state: AxisDetectors, dy: RadiansPerSecond) -> bool:
 
 
 @compiled
-def opposes_command(dy: RadiansPerSecond, high: RadiansPerSecond, low: RadiansPerSecond,
-                    threshold: RadiansPerSecond) -> bool:
-    """Return True if the axis moves against its recent commands, which all had one sign, above a threshold."""
-    return (dy > threshold and high <= 0.0 and low < -STANDSTILL_RATE_RAD_S
-            or dy < -threshold and low >= 0.0 and high > STANDSTILL_RATE_RAD_S)
+def opposes_command(state: AxisDetectors, dy: RadiansPerSecond, high: RadiansPerSecond, low: RadiansPerSecond,
+                    threshold: RadiansPerSecond, dt: Seconds) -> bool:
+    """Return True if the axis moves against its recent commands, which all had one sign.
+
+    The rate a quarter of a step ahead must be above the threshold plus STOP_OVERSHOOT_SHARE of the recent rate along
+    the commands. A drive that stops without a command overshoots by less, and then slows down; a runaway accelerates.
+    """
+    along = 1.0 if low >= 0.0 and high > STANDSTILL_RATE_RAD_S else 0.0
+    if high <= 0.0 and low < -STANDSTILL_RATE_RAD_S:
+        along = -1.0
+    state.swing = max(along * dy, state.swing - state.swing * min(dt / SWING_TIME_CONSTANT_S, 1.0))
+    ahead = dy + 0.25 * (dy - state.dy)
+    return along * dy < -threshold and along * ahead < -(threshold + STOP_OVERSHOOT_SHARE * state.swing)
 
 
 @compiled

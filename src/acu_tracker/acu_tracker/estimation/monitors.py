@@ -256,8 +256,8 @@ LEAVING_RATIO = 2.0
 """Ratio that takes the place of WRONG_SLOPE_RATIO while the target leaves the beam [-]."""
 
 LEAVING_ERROR_BEAMWIDTHS, MAX_FOLLOWING_MEAN = 0.25, 2.2
-"""Mean error of a block with which the target leaves the beam [beamwidths], and the m of a Divergence up to
-which a filter follows its target so well that no lag explains this error [-]. With a right slope the default filter
+"""Mean error of a block with which the target leaves the beam [beamwidths], and the m of a Divergence [-]. Up to this
+m a filter follows its target so well that its lag does not explain this error. With a right slope the default filter
 never had an error above 0.17 beamwidths on any target of the study. Filters of one model reached 0.43 beamwidths on
 targets that reverse, with J = 5 J' and m of at least 2.8. With a wrong slope m is 1.4 to 1.9 at this error, because
 the filter follows the target that seems to flee.
