@@ -202,9 +202,13 @@ class Loop:
 
     def copy(self) -> 'Loop':
         """Return a loop that continues from the present state by itself. Both share their constant data."""
-        shared = [self.tracks, *(part for unit in self.units.values()
-                                 for part in (unit.parameters, unit.messages, *unit.memory[1:]))]
-        return copy.deepcopy(self, {id(part): part for part in shared})
+        known: dict[int, object] = {id(self.tracks): self.tracks}
+        for unit in self.units.values():
+            record, *constant = unit.memory
+            known |= {id(part): part for part in (unit.parameters, unit.messages, *constant)}
+            # numpy would copy a record field by field, in three times the time.
+            known[id(record)] = record.view(np.uint8).copy().view(record.dtype)
+        return copy.deepcopy(self, known)
 
     def before_step(self, first: int, forecasts: list[Forecast]) -> None:
         """Execute the scheduled commands that are due. At each whole second, add to `forecasts`."""
