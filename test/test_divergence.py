@@ -7,6 +7,7 @@ from pedestal_bringup.loop import closed_loop
 from pedestal_bringup.scenario import scenario
 from pedestal_common.node.unit import LEVEL_ERROR
 from pedestal_studies.p003_lin_wu_zhu import imm_feedforward
+from pedestal_studies.system import target_filters
 
 SECONDS = 8.0
 
@@ -54,6 +55,39 @@ def test_a_slope_that_turns_over_in_autotrack_is_seen_before_the_target_leaves_t
         assert 4.0 < t[automatic[-1]] < SECONDS - 0.5 and (mode[automatic[-1] + 1:] == Mode.PROGRAM).all()
         assert off(done)[t > 4.0].max() < 0.5
         assert done.units['acu'].faults == ('diverged',)
+
+
+def phase_of_a_quadcopter(seed, onset):
+    """(off [deg], steps from the onset until autotrack ended, faults): the phase turns by 180 deg during the dashes of
+    a quadcopter, whose accelerations jump by 0.5 g."""
+    variant = target_filters.placed('quadcopter/default', seed).with_(
+        {'tracking_receiver.inject': f'{onset} phase_180'}, duration=onset + 4.0)
+    done = closed_loop.Loop(variant.load()).run()
+    after = done.t > onset
+    return off(done)[after].max(), int(np.argmax(done['acu/mode'][after] != Mode.AUTOTRACK)), done.units['acu'].faults
+
+
+@pytest.mark.parametrize('seed, onset', [(1, 11.12), (5, 14.05), (9, 12.5)])
+def test_a_phase_of_180_deg_on_a_target_that_accelerates_is_told_before_the_target_leaves_the_beam(seed, onset):
+    largest, steps, told = phase_of_a_quadcopter(seed, onset)
+    assert largest < 1.0 and 0 < steps <= 200 and told == ('diverged',)
+
+
+@pytest.mark.thorough
+def test_a_phase_of_180_deg_is_told_at_any_time_of_a_flight():
+    for seed in range(1, 25):
+        largest, steps, told = phase_of_a_quadcopter(seed, 6.0 + 0.43 * seed)
+        assert largest < 1.5 and 0 < steps <= 200 and told == ('diverged',)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize('seed', [1, 2])
+def test_a_slow_filter_whose_target_nearly_leaves_the_beam_shows_no_wrong_slope(seed):
+    """The S motion reverses so fast that the error of a filter with one model reaches 0.4 beamwidths."""
+    done = closed_loop.Loop(target_filters.placed('s-motion/current-statistical', seed).load()).run()
+    begun = np.argmax(done['acu/mode'] == Mode.AUTOTRACK)
+    assert np.nanmax(off(done)[begun + 200:]) > 0.25
+    assert (done['acu/mode'][begun:] == Mode.AUTOTRACK).all() and done.units['acu'].faults == ()
 
 
 @pytest.mark.thorough

@@ -28,16 +28,16 @@ def alarms(state, beam, errors):
     found = False
     for k in range(len(beam)):
         found |= monitors.take_slope(state, T * k, monitors.slope_beam(ASHORE, beam[k, 0], beam[k, 1]),
-                                     (errors[k, 0], errors[k, 1]), SIGMA**2, GAP)
+                                     (errors[k, 0], errors[k, 1]), SIGMA**2, GAP, math.inf)
     return found
 
 
-def first(state, angles, errors, t=None, sigma=SIGMA):
+def first(state, angles, errors, t=None, sigma=SIGMA, leaving=math.inf):
     """Index of the first error at which the slope counts as reversed, None: it never does. angles (n, 2): azimuth and
     elevation of the beam [rad]; errors (n, 2) [rad]."""
     t = T * np.arange(len(errors)) if t is None else t
     return next((k for k, (at, e) in enumerate(zip(angles, errors)) if monitors.take_slope(
-        state, t[k], monitors.slope_beam(ASHORE, *at), tuple(e), sigma**2, GAP)), None)
+        state, t[k], monitors.slope_beam(ASHORE, *at), tuple(e), sigma**2, GAP, leaving)), None)
 
 
 FIRST_VERDICT = monitors.MIN_BLOCK_COUNT * monitors.BLOCK_ERROR_COUNT
@@ -178,9 +178,9 @@ def test_noise_and_a_beam_that_shakes_are_no_wrong_slope_in_an_hour(state, jitte
 def test_it_begins_anew_after_a_gap_and_leaves_old_errors_alone(state):
     beam = monitors.Beam(Vector(1.0, 0.0, 0.0), Vector(0.0, 1.0, 0.0), Vector(0.0, 0.0, 1.0))
     for k in range(50):
-        monitors.take_slope(state, T * k, beam, (1e-3 * (-1)**(k // 4), 0.0), SIGMA**2, GAP)
+        monitors.take_slope(state, T * k, beam, (1e-3 * (-1)**(k // 4), 0.0), SIGMA**2, GAP, math.inf)
     before = state.copy()
-    monitors.take_slope(state, T * 49, beam, (1.0, 1.0), SIGMA**2, GAP)
+    monitors.take_slope(state, T * 49, beam, (1.0, 1.0), SIGMA**2, GAP, math.inf)
     assert state == before and monitors.roughnesses(state, 0)[0] > 0.1
-    monitors.take_slope(state, T * 49 + 1.01 * GAP, beam, (1.0, 1.0), SIGMA**2, GAP)
+    monitors.take_slope(state, T * 49 + 1.01 * GAP, beam, (1.0, 1.0), SIGMA**2, GAP, math.inf)
     assert (state['n'], state['count']) == (0, 1) and monitors.roughnesses(state, 2) == (0.0, 0.0)

@@ -306,8 +306,9 @@ def _watch_slope(tracking: 'Tracking', params: TrackerParameters, inputs: Inputs
     """Test the slope with an error and its beam; latch the divergence if the slope is wrong."""
     error, beam = (inputs.cross_elevation, inputs.elevation), monitors.slope_beam(mat_ed, at.A, at.E)
     variance = error_variance(inputs.cross_elevation, inputs.elevation, inputs.cn0_dbhz, params.receiver)
+    leaving = monitors.leaving_error(tracking.divergence, params.receiver.beamwidth)
     wrong = monitors.take_slope(tracking.wrong_slope, inputs.error_stamp - params.receiver.age, beam, error, variance,
-                                params.coast_after)
+                                params.coast_after, leaving)
     if params.keeps_program and monitors.full(tracking.wrong_slope):
         walk = 0.0
         if tracking.attitude.stabilised:

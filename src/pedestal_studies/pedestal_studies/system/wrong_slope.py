@@ -18,7 +18,7 @@ the true direction of the target. A limit of ln(n) gives at least n steps to a f
 of Mathematical Statistics 42 (1971) 1897). No other test with so few false alarms is faster for long. While the beam
 is nearer to the target than the noise of the receiver, errors of any slope look alike.
 
-The alarm has two limits: one for the score J - WRONG_SLOPE_RATIO (J' - EXPLAINED_ROUGHNESS k) of
+The alarm has two limits: one for the score J - ratio (J' - EXPLAINED_ROUGHNESS k) of
 `acu_tracker.estimation.monitors`, and one for the sum of `acu_tracker.estimation.slope_ratio` of a target that keeps
 to its program. The figure shows alarms in time over false alarms, for both limits times each of LIMIT_FACTORS.
 """
@@ -99,10 +99,12 @@ def variant(target: str, seed: int) -> Variant:
 
 def reached(loop: Loop) -> tuple[float, float]:
     """Return the score and the sum of a loop, each divided by its limit; 0 before the first verdict."""
-    tracking = loop.units['acu'].parts['state']['tracking']
+    acu = loop.units['acu']
+    tracking, beamwidth = acu.parts['state']['tracking'], acu.parameters.tracker.receiver.beamwidth
     curves, sums = tracking['wrong_slope'], tracking['slope_ratio']
     scored, summed = curves['n'] >= monitors.MIN_BLOCK_COUNT, sums['n'] >= slope_ratio.MIN_BLOCK_COUNT
-    score = max(monitors.score(curves, hypothesis) for hypothesis in range(3)) if scored else 0.0
+    ratio = monitors.permitted_ratio(curves, monitors.leaving_error(tracking['divergence'], beamwidth))
+    score = max(monitors.score(curves, hypothesis, ratio) for hypothesis in range(3)) if scored else 0.0
     largest = (sums['S'] - slope_ratio.MISFIT_WEIGHT * np.maximum(sums['X'], 0.0)).max() if summed else 0.0
     return score / monitors.WRONG_SLOPE_MARGIN, float(largest) / slope_ratio.MAX_S
 
