@@ -43,6 +43,13 @@ def reversal_table(rows: Rows) -> Content:
          _cell(rows, f'{target}/right', 'false_alarms_per_10_h')) for target in ('all', *wrong_slope.TARGETS)]
 
 
+def limit_table(rows: Rows) -> Content:
+    """Return the table of the limits of the alarm: alarms in time against false alarms."""
+    return ('both limits times', 'alarm within 200 steps, %', 'false alarms in 10 h'), [
+        (f'{factor:g}', _cell(rows, f'limits/{factor:g}', 'in_time_percent'),
+         _cell(rows, f'limits/{factor:g}', 'false_alarms_per_10_h')) for factor in wrong_slope.LIMIT_FACTORS]
+
+
 def structure_table(rows: Rows) -> Content:
     """Return the table of the ratios of the study structure, and of the lost runs."""
     def cell(case: str) -> str:
@@ -57,4 +64,5 @@ def structure_table(rows: Rows) -> Content:
         for share in structure.SHARES for air in structure.AIR_PARAMETERS]
 
 
-TABLES = {'wrong slopes': slope_table, 'reversed slopes': reversal_table, 'filter on a structure': structure_table}
+TABLES = {'wrong slopes': slope_table, 'reversed slopes': reversal_table, 'limits of the alarm': limit_table,
+          'filter on a structure': structure_table}

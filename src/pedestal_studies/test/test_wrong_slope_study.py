@@ -62,6 +62,9 @@ def test_rows_of_every_slope():
     assert table['leo/turn-180', 'alarm_steps_median']['value'] == 150.0
     assert ('geo/turn-180', 'alarm_steps_median') not in table
     assert table['all/right', 'hours']['value'] == 20.0
+    assert [table[f'limits/{factor:g}', 'false_alarms_per_10_h']['value'] for factor in study.LIMIT_FACTORS] == [
+        4.0, 4.0, 4.0, 0.0]
+    assert table['limits/1', 'in_time_percent']['value'] == pytest.approx(100.0 - 100.0 / (7 * 7))
     assert table['all/right', 'false_alarms_per_10_h']['ci_high'] == pytest.approx(-math.log(0.025) / 2.0)
     assert table['all/right', 'largest_sum']['value'] == pytest.approx(0.9 * study.slope_ratio.MAX_S)
     assert all((('all/' + name, 'in_time_percent') in table) == (name in study.GROSS_SLOPES) for name in NAMES)

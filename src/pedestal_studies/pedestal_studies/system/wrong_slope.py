@@ -20,7 +20,8 @@ is nearer to the target than the noise of the receiver, errors of any slope look
 
 The alarm has two limits: one for the score J - ratio (J' - EXPLAINED_ROUGHNESS k) of
 `acu_tracker.estimation.monitors`, and one for the sum of `acu_tracker.estimation.slope_ratio` of a target that keeps
-to its program. The figure shows alarms in time over false alarms, for both limits times each of LIMIT_FACTORS.
+to its program. The cases limits/<factor> have all gross slopes of all targets, with both limits times the factor; the
+figure has them for each slope.
 """
 import cmath
 import math
@@ -194,10 +195,12 @@ def measured(target: str, number: int) -> Floats:
 def rows(values: Mapping[str, Floats]) -> list[Row]:
     """Return the rows of the study; values: {target: as `measured` returns, of every run}."""
     of_all = {'all': np.concatenate(list(values.values())), **values}
-    return [line for target, of_runs in of_all.items()
-            for line in (*_right_rows(f'{target}/{RIGHT}', of_runs[:, 0]),
-                         *(line for k, slope in enumerate(SLOPES, 1)
-                           for line in _slope_rows(f'{target}/{slope}', slope in GROSS_SLOPES, of_runs[:, k])))]
+    table = _limit_rows(of_all['all'])
+    for target, of_runs in of_all.items():
+        table += _right_rows(f'{target}/{RIGHT}', of_runs[:, 0])
+        for k, slope in enumerate(SLOPES, 1):
+            table += _slope_rows(f'{target}/{slope}', slope in GROSS_SLOPES, of_runs[:, k])
+    return table
 
 
 def alarm_rate(count: int, hours: float) -> Estimate:
@@ -205,6 +208,22 @@ def alarm_rate(count: int, hours: float) -> Estimate:
     tail = 0.5 * (1.0 - CONFIDENCE_LEVEL)
     low = 0.5 * float(chi2.ppf(tail, 2 * count)) if count else 0.0
     return 10.0 * count / hours, 10.0 * low / hours, 5.0 * float(chi2.isf(tail, 2 * count + 2)) / hours
+
+
+def _false_alarms(of_right: Floats) -> list[Estimate]:
+    """Return the false alarms per 10 h with the limits times each of LIMIT_FACTORS."""
+    told, hours, *most = of_right[:, :4].T
+    share = np.where(told > 0.0, math.inf, np.minimum(np.max(most, axis=0), LIMIT_FACTORS[-1]))
+    return [alarm_rate(int((share > factor).sum()), float(hours.sum())) for factor in LIMIT_FACTORS]
+
+
+def _limit_rows(of_all: Floats) -> list[Row]:
+    """Return the rows of LIMIT_FACTORS, over all targets and gross slopes."""
+    gross = of_all[:, [k for k, name in enumerate(SLOPES, 1) if name in GROSS_SLOPES]].reshape(-1, COLUMN_COUNT)
+    steps = gross[np.isfinite(gross[:, -1]), :len(LIMIT_FACTORS)]
+    return [line for factor, false, told in zip(LIMIT_FACTORS, _false_alarms(of_all[:, 0]), steps.T) for line in (
+        estimated(f'limits/{factor:g}', 'false_alarms_per_10_h', false, '', len(of_all)),
+        _share(f'limits/{factor:g}', 'in_time_percent', told <= MAX_ALARM_STEPS))]
 
 
 def _right_rows(case: str, of_runs: Floats) -> list[Row]:
@@ -249,16 +268,15 @@ def run(progress: Progress, runs: int = DEFAULT_RUNS, pool: Pool | None = None) 
     values = of_cases(measured, TARGETS, runs, pool, progress)
     table = rows(values)
     return Result(table, {'limits': lambda: figure(values)}, [seeds(runs)],
-                  [line for line in table if line['case'].startswith('all/')])
+                  [line for line in table if line['case'].startswith(('all/', 'limits/'))])
 
 
 def figure(values: Mapping[str, Floats]) -> Figure:
     """Draw the alarms in time over the false alarms, for each of LIMIT_FACTORS and each gross slope."""
     drawn, axes = fig.new_panels(1, height=4.2, x='false alarms in 10 h of a right slope', y='alarms in time [%]')
     of_all = np.concatenate(list(values.values()))
-    told, hours, *most = of_all[:, 0, :4].T
-    share = np.where(told > 0.0, math.inf, np.minimum(np.max(most, axis=0), LIMIT_FACTORS[-1]))
-    false = [10.0 * float((share > factor).sum()) / hours.sum() for factor in LIMIT_FACTORS]
+    false = [value for value, *_ in _false_alarms(of_all[:, 0])]
+    axes[0, 0].set_xscale('symlog')
     for k, slope in enumerate(SLOPES, 1):
         if slope in GROSS_SLOPES:
             steps = of_all[np.isfinite(of_all[:, k, -1]), k, :len(LIMIT_FACTORS)]
